@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -12,10 +13,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from surface.head.model.file import load_data
+from surface.head.model.data import Group
+from surface.head.model.file import load_data, save_data
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.rig import SkinRig, rigid_motion
+from tests.surface.small_head import part, small_head
 
 SHAPES = {"jawOpen": 0.4, "mouthSmileLeft": 0.9, "browInnerUp": 0.7, "jawLeft": 0.5, "mouthShrugLower": 0.6}
 
@@ -44,16 +47,16 @@ def test_a_head_is_evaluated_from_its_files_alone_as_the_engine_does(found: list
     head = replace(load_data(folder), contacts=[])
     pose = read_pose(np.array([SHAPES.get(name, 0.0) for name in NAMES]))
     assert [material for material, *_ in found] == [p.material for p in head.parts]
-    for part, (_, vertices, triangles) in zip(head.parts, found, strict=True):
-        surface = make_surface(part)
-        if part.follows == "skin":
-            points = SkinRig(replace(part, lids=np.zeros(len(part.points))), head).apply(pose)
+    for own, (_, vertices, triangles) in zip(head.parts, found, strict=True):
+        surface = make_surface(own)
+        if own.follows == "skin":
+            points = SkinRig(replace(own, lids=np.zeros(len(own.points))), head).apply(pose)
         else:
-            linear, shift = rigid_motion(part.follows, head, pose)
-            points = part.points @ linear.T + shift
-        expected = surface.with_points(points).evaluate(part.mesh["mesh_uv"], part.mesh["mesh_side"])
+            linear, shift = rigid_motion(own.follows, head, pose)
+            points = own.points @ linear.T + shift
+        expected = surface.with_points(points).evaluate(own.mesh["mesh_uv"], own.mesh["mesh_side"])
         assert np.abs(vertices - expected).max() < 1e-9
-        assert np.array_equal(triangles, part.mesh["mesh_triangles"])
+        assert np.array_equal(triangles, own.mesh["mesh_triangles"])
 
 
 def test_blending_functions_take_both_limits(draw_head: ModuleType) -> None:
@@ -86,3 +89,41 @@ def test_a_picture_of_a_head_is_drawn(draw_head: ModuleType, found: list, root: 
 def test_words_that_are_missing_are_told(root: Path) -> None:
     done = subprocess.run([sys.executable, root / "examples" / "draw_head.py"], capture_output=True, text=True)
     assert done.returncode == 1 and "usage: python examples/draw_head.py" in done.stderr
+
+
+@pytest.fixture(scope="module")
+def page(root: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
+    """The page of the paper for a small head, in its short form."""
+    pytest.importorskip("PIL.Image", reason="Pillow draws the meshes: pip install omote[view]")
+    folder = tmp_path_factory.mktemp("paper")
+    bump = Group("jawOpen", np.arange(25, dtype=np.int32), np.full((25, 3), [0, -3, 2], np.float32))
+    save_data(folder / "head", small_head(parts=[part("face", -40, groups=[bump])], seams=[], paint=[]))
+    paper = load(root / "examples" / "paper.py")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["paper.py", str(folder / "paper.html"), "--head", str(folder / "head"), "--short"])
+        patch.setattr(paper, "EXPRESSIONS", {"at rest": {}, "open": {"jawOpen": 1.0}})
+        paper.main()
+    return (folder / "paper.html").read_text(encoding="utf-8")
+
+
+def test_the_page_of_the_paper_has_its_numbers_beside_ours(page: str) -> None:
+    rows = [[re.sub("<.*?>", "", cell) for cell in re.split("<t[dh]>", row)[1:]] for row in page.split("<tr>")[1:]]
+    rows = [[cell.split("</table>")[0] for cell in row] for row in rows]
+    assert rows[0] == ["", "the paper", "omote"]
+    told = {row[0]: row[1:] for row in rows[1:]}
+    assert told["data saved by control points, at equal greatest deviation"][0] == "50.2 %"
+    assert {f"data saved by chord error, at equal {m}" for m in ("root mean square", "99 % of the area")} <= set(told)
+    paper, ours = told["all vertices of a pose, every parameter moving"]
+    assert paper == "14.3 frames/s" and float(ours.split()[0]) > 100
+    saved = [cell[1] for name, cell in told.items() if name.startswith("data saved by chord")]
+    assert all(text == "none found" or re.fullmatch(r"-?[\d.]+ %", text) for text in saved)
+
+
+def test_the_page_of_the_paper_has_its_figures(page: str) -> None:
+    sections = page.split("<h2>")[1:]
+    assert [s.split(".")[0] for s in sections[1:5]] == ["2"] * 4 and sections[5].startswith("3 Experiment")
+    assert sections[1].count("<circle") == 25 and sections[1].count("<rect") == 12
+    assert "data:image/png;base64," in sections[2]
+    assert 0 < sections[4].count('fill="#e07b1a"') <= sections[3].count("<rect") == sections[4].count("<rect")
+    assert 'fill="#e07b1a"' not in sections[3]
+    assert "at rest" in sections[5] or "No pictures" in sections[5]

@@ -45,7 +45,9 @@ def bench(
     ] = "ict",
     seconds: Annotated[float, typer.Option(help="Time for each measurement.", min=0.01)] = 0.3,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture of the meshes (quadtree only).")] = None,
-    large: Annotated[bool, typer.Option("--large", help="Also a million vertices (surface only).")] = False,
+    large: Annotated[
+        bool, typer.Option("--large", help="Also a million vertices; for quadtree, ten surfaces.")
+    ] = False,
     growth: Annotated[
         Path | None, typer.Option(help="Also growth with size, drawn as this SVG (surface only).")
     ] = None,
@@ -88,7 +90,8 @@ def bench(
             case Subject.drift:
                 tables = benches.bench_drift(head, updates, log)
             case Subject.quadtree:
-                tables = benches.bench_quadtree(head, log, level, file)
+                tables = benches.bench_savings(head, log, level) if large else []
+                tables += benches.bench_quadtree(head, log, level, file)
             case _:
                 tables = benches.bench_surface(seconds, log, vertices)
                 tables += benches.bench_large(seconds, log, advance, vertices) if large else []

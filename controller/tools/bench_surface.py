@@ -17,6 +17,7 @@ from surface.bench import growth
 from surface.bench.bench import Measure, build_table, large_table, least, measure, speed_table
 from surface.bench.comparison import Variant, compare, draw
 from surface.bench.drift import drift
+from surface.bench.savings import MEASURES, nine_surfaces, savings
 from surface.head import Head
 from surface.head.model.meshes import domain_of
 
@@ -108,6 +109,22 @@ def bench_quadtree(name: str, log: Log, level: int = UNIFORM_LEVEL, out: Path | 
     if out is not None:
         draw(variants, out)
     return tables
+
+
+def bench_savings(name: str, log: Log, level: int = UNIFORM_LEVEL) -> Tables:
+    """What quad trees save on a head's face and nine other surfaces, least first, two levels above ``level``."""
+    log("loading")
+    head = Head.load(find_config("heads", name))
+    domain = domain_of(next(part for part in head.data.parts if part.name == "face"))
+    subjects = [*nine_surfaces(), (f"face of {name}", head.part("face").surface, domain)]
+    rows = savings(subjects, max(0, level - 2), log)
+    return [
+        (f"quad trees on ten surfaces, at equal {measure}",
+         [Measure(f"{row.name}: {way}", 0.0, saved, "the uniform mesh is saved")
+          for way, key in (("by control points", "by_points"), ("by chord error", "by_chord"))
+          for row in rows if row.measure == measure and np.isfinite(saved := getattr(row, key))])
+        for measure in MEASURES
+    ]  # fmt: skip
 
 
 def _saving(variant: Variant) -> Measure:

@@ -40,20 +40,22 @@ def compare(
     domain: Domain | None = None,
     *,
     level: int = 4,
-    quantile: float = 1.0,
+    quantile: float | None = 1.0,
     report: Report = no_report,
 ) -> list[Variant]:
     """A uniform mesh, and the smallest adaptive ones that deviate no more.
 
     The uniform mesh is quartered ``level`` times below the roots. A ``quantile`` of 1 compares greatest deviations,
-    0.99 those that 99 % of the area keep.
+    0.99 those that 99 % of the area keep, None root mean squares over the area.
 
     The reference is the surface itself, sampled everywhere at a spacing of a quarter of the uniform mesh's edges.
     """
     where = Domain.of(surface) if domain is None else domain
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     report("uniform")
-    uniform = surface.tessellate(chord_error=1e9, min_depth=level, max_depth=level, domain=where, loop_error=1e9)
+    uniform = surface.tessellate(
+        chord_error=1e9, measured=False, min_depth=level, max_depth=level, domain=where, loop_error=1e9
+    )
     spacing = _edge(uniform) / FINER
     bound = deviation(surface, uniform, spacing, quantile)
     total = len(uniform.vertices)
@@ -65,7 +67,9 @@ def compare(
             return 0.0  # so fine that it need not be measured, and no candidate
         return deviation(surface, mesh, spacing, quantile)
 
-    adaptive = partial(surface.tessellate, max_depth=level + DEEPER, domain=where, loop_error=loop_error)
+    adaptive = partial(
+        surface.tessellate, measured=False, max_depth=level + DEEPER, domain=where, loop_error=loop_error
+    )
     ways: list[tuple[str, Callable[[float], Mesh], float, float]] = [
         ("by control points", lambda limit: adaptive(max_points=round(limit)), float(surface.n), 4.0),
         ("by chord error", lambda limit: adaptive(chord_error=limit), 0.1 * size, 1e-6 * size),
@@ -104,11 +108,11 @@ def _edge(mesh: Mesh) -> float:
     return float(np.median(np.linalg.norm(b - a, axis=1)))
 
 
-def deviation(surface: DCPSurface, mesh: Mesh, spacing: float, quantile: float = 1.0) -> float:
+def deviation(surface: DCPSurface, mesh: Mesh, spacing: float, quantile: float | None = 1.0) -> float:
     """Distance between a surface and a mesh of it: of the surface's points from the planes of their triangles.
 
     Samples are at most ``spacing`` apart. ``quantile`` 1 asks for the greatest distance, 0.99 for the one that 99 % of
-    the area do not exceed.
+    the area do not exceed, None for the root mean square over the area.
     """
     corner, uv, side = mesh.vertices[mesh.triangles], mesh.uv[mesh.triangles], mesh.side[mesh.triangles]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
@@ -129,9 +133,12 @@ def deviation(surface: DCPSurface, mesh: Mesh, spacing: float, quantile: float =
     return _quantile(np.concatenate(found), np.concatenate(weight), quantile)
 
 
-def _quantile(values: Floats, weights: Floats, quantile: float) -> float:
-    """The value that the given part of the weight does not exceed; NaN values are left out."""
+def _quantile(values: Floats, weights: Floats, quantile: float | None) -> float:
+    """The value that the given part of the weight does not exceed, or the root mean square; NaN values are left out."""
     good = np.isfinite(values)
+    if quantile is None:
+        total = float(weights[good].sum())
+        return float(np.sqrt((weights[good] * values[good] ** 2).sum() / total)) if total > 0 else 0.0
     order = np.argsort(values[good])
     total = np.cumsum(weights[good][order])
     if not len(total):

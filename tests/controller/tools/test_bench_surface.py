@@ -16,11 +16,13 @@ from controller.tools.bench_surface import (
     bench_head,
     bench_large,
     bench_quadtree,
+    bench_savings,
     pose_rows,
     poser,
 )
 from surface.bench.comparison import Variant
 from surface.bench.drift import Drift
+from surface.bench.savings import MEASURES, Saving
 from surface.head import Head
 from surface.head.model.file import save_data
 from tests.surface.small_head import part, small_head
@@ -127,6 +129,20 @@ def test_drift_is_told_in_millionths(monkeypatch: pytest.MonkeyPatch, small: str
     assert title.endswith("after 10 moves of one point, 4 of a group, 2 changes of a weight and 1 of knots")
     assert (place.milliseconds, place.reach, normal.milliseconds, normal.reach) == (0.0, "<= 1", 0.0, "")
     assert place.ratio == pytest.approx(3.0) and normal.ratio == pytest.approx(5.0)
+
+
+def test_savings_are_told_least_first_on_the_face_and_nine_surfaces(
+    monkeypatch: pytest.MonkeyPatch, small: str
+) -> None:
+    def savings(subjects: Any, level: int, report: Any) -> list[Saving]:
+        assert len(subjects) == 10 and subjects[-1][0] == f"face of {small}" and level == 5
+        return [Saving(n, m, 0.25, c) for m in MEASURES for n, c in (("b", float("nan")), ("a", 0.5))]
+
+    monkeypatch.setattr(bench_surface, "savings", savings)
+    (title, rows), (other, again) = bench_savings(small, lambda text: None)
+    assert title == "quad trees on ten surfaces, at equal deviation of 99 % of the area" and other.endswith("equal RMS")
+    expected = [("b: by control points", 0.25), ("a: by control points", 0.25), ("a: by chord error", 0.5)]
+    assert [(row.name, row.ratio) for row in rows] == [(row.name, row.ratio) for row in again] == expected
 
 
 def test_quad_trees_tell_their_size_deviation_and_saving(monkeypatch: pytest.MonkeyPatch, small: str) -> None:

@@ -96,6 +96,12 @@ def test_nothing_is_found_where_no_mesh_is_within_the_bound_or_measured() -> Non
     assert isinstance(found, tuple) and 0.19 < found[0].limit < 0.2
 
 
+def test_the_root_mean_square_weighs_values() -> None:
+    values, weights = np.array([3.0, np.nan, 1.0]), np.array([1.0, 99.0, 3.0])
+    assert comparison._quantile(values, weights, None) == pytest.approx(np.sqrt(3.0))
+    assert comparison._quantile(values[1:2], weights[1:2], None) == 0.0
+
+
 def test_the_value_that_a_part_of_the_weight_does_not_exceed() -> None:
     values, weights = np.array([4.0, np.nan, 1.0, 3.0, 2.0]), np.array([1.0, 99.0, 2.0, 3.0, 4.0])
     for quantile, expected in (

@@ -1,0 +1,210 @@
+"""The figures and numbers of the paper, made anew and beside omote's own, on one HTML page.
+
+    python examples/paper.py paper.html            # minutes: the meshes are compared as in docs/surface.md
+    python examples/paper.py paper.html --short    # seconds: coarser meshes, shorter measurements
+
+The paper is Hosaka, Sugimoto, Nishi and Kato, "Facial expression for a CG robot using real-time surface modification".
+Its head is not published, so the shipped one (or ``--head FOLDER``) stands in for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import io
+import time
+from collections.abc import Callable
+from html import escape
+from itertools import cycle
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+from surface import Domain, Mesh
+from surface.base.errors import ViewError
+from surface.bench.comparison import Variant, compare, draw
+from surface.deform.deformation import Deformation
+from surface.head import Head
+from surface.head.model.meshes import domain_of
+from surface.view.pictures.offscreen import Offscreen
+
+PAPER_SAVED, PAPER_FRAMES = 0.502, 14.3
+EXPRESSIONS: dict[str, dict[str, float]] = {
+    "at rest": {},
+    "smile": {"mouthSmileLeft": 0.9, "mouthSmileRight": 0.9, "cheekSquintLeft": 0.6, "cheekSquintRight": 0.6},
+    "surprise": {"browInnerUp": 1.0, "browOuterUpLeft": 0.9, "browOuterUpRight": 0.9, "jawOpen": 0.5,
+                 "eyeWideLeft": 0.8, "eyeWideRight": 0.8},
+    "anger": {"browDownLeft": 1.0, "browDownRight": 1.0, "noseSneerLeft": 0.7, "noseSneerRight": 0.7,
+              "mouthPressLeft": 0.6, "mouthPressRight": 0.6},
+}  # fmt: skip
+MEASURES: dict[str, float | None] = {"root mean square": None, "99 % of the area": 0.99, "greatest deviation": 1.0}
+SIZE = 360  # pixels of a drawing's side
+STYLE = "body{font:15px sans-serif;max-width:60em;margin:2em auto}td,th{padding:.2em .8em;text-align:left}"
+
+
+def main() -> None:
+    """Make the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("page", type=Path, help="the HTML file to write")
+    parser.add_argument("--head", type=Path, default=Path("configs/heads/ict"), help="folder of a head")
+    parser.add_argument("--short", action="store_true", help="coarser meshes, shorter measurements")
+    given = parser.parse_args()
+    given.page.write_text(page(Head.load(given.head), given.short), encoding="utf-8")
+
+
+def page(head: Head, short: bool) -> str:
+    """The HTML text."""
+    data = max((part for part in head.data.parts if part.follows == "skin"), key=lambda part: len(part.points))
+    surface, domain, mesh = head.part(data.name).surface, domain_of(data), head.part(data.name).mesh
+    seconds, level = (0.05, 3) if short else (1.0, 7)
+    moving = Deformation(surface, mesh)
+    saved = {name: compare(surface, domain, level=level, quantile=q) for name, q in MEASURES.items()}
+    frames, pictures = experiment(head, seconds)
+    sections = [
+        ("Beside the paper", summary(saved, frames)),
+        ("2.2 Control points without a grid", subdomains(surface.supports, domain)),
+        ("2.3 The quad tree (its figures 2 and 3)", quad_tree(saved["99 % of the area"])),
+        ("2.4 Lists: cells that share one list of control points", cells(mesh, domain, set())),
+        ("2.5 The differential update: cells that one moved point touches", update(moving, domain, seconds)),
+        ("3 Experiment: expressions of a head", pictures),
+    ]
+    body = "".join(f"<h2>{escape(title)}</h2>{text}" for title, text in sections)
+    about = f"{escape(head.name)}: {surface.n} control points and {len(mesh.vertices)} vertices on its {data.name}."
+    note = " Short form: coarse meshes, rough times." if short else ""
+    return (
+        f'<!doctype html><meta charset="utf-8"><title>The paper</title><style>{STYLE}</style><p>{about}{note}</p>{body}'
+    )
+
+
+def table(rows: list[tuple[str, ...]]) -> str:
+    """Rows of text, the first of them the head."""
+    marked = ("".join(f"<{'td' if k else 'th'}>{escape(cell)}" for cell in row) for k, row in enumerate(rows))
+    return "<table>" + "".join(f"<tr>{row}" for row in marked) + "</table>"
+
+
+def summary(saved: dict[str, list[Variant]], frames: dict[str, float]) -> str:
+    """The paper's two numbers beside ours, the least flattering first."""
+    rows: list[tuple[str, ...]] = [("", "the paper", "omote")]
+    for name, variants in saved.items():
+        for way in ("by control points", "by chord error"):
+            found = [f"{100 * v.saving:.1f} %" for v in variants if v.name == way]
+            paper = f"{100 * PAPER_SAVED:.1f} %" if name == "greatest deviation" and "points" in way else ""
+            rows.append((f"data saved {way}, at equal {name}", paper, found[0] if found else "none found"))
+    rows += [
+        (name, f"{PAPER_FRAMES} frames/s", f"{rate:.0f} frames/s")
+        for name, rate in sorted(frames.items(), key=lambda x: x[1])
+    ]
+    return table(rows)
+
+
+def drawing(domain: Domain, shapes: list[str]) -> str:
+    """Shapes in (u, v), v upwards, as SVG; coordinates are those of :func:`box`."""
+    inside = "".join(shapes) + "".join(outline(domain, np.asarray(loop)) for loop in domain.loops)
+    return f'<svg width="{SIZE}" height="{SIZE}" viewBox="0 0 {SIZE} {SIZE}">{inside}</svg>'
+
+
+def scaled(domain: Domain, uv: np.ndarray) -> np.ndarray:
+    """(m, 2) pixels of ``uv (m, 2)``."""
+    u0, u1, v0, v1 = domain.rect
+    return SIZE * np.stack([(uv[:, 0] - u0) / (u1 - u0), (v1 - uv[:, 1]) / (v1 - v0)], axis=1)
+
+
+def outline(domain: Domain, loop: np.ndarray) -> str:
+    """A loop as a line."""
+    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in scaled(domain, loop))
+    return f'<polygon points="{points}" fill="none" stroke="#c62828"/>'
+
+
+def box(domain: Domain, rect: np.ndarray, fill: str, stroke: str) -> str:
+    """A rectangle (u0, u1, v0, v1)."""
+    (x0, y1), (x1, y0) = scaled(domain, np.array([rect[[0, 2]], rect[[1, 3]]]))
+    size = f'width="{x1 - x0:.1f}" height="{y1 - y0:.1f}"'
+    return f'<rect x="{x0:.1f}" y="{y0:.1f}" {size} fill="{fill}" stroke="{stroke}"/>'
+
+
+def subdomains(supports: np.ndarray, domain: Domain) -> str:
+    """Every control point at the middle of its subdomain, and the subdomains of some."""
+    middles = scaled(domain, np.stack([supports[:, :2].mean(axis=1), supports[:, 2:].mean(axis=1)], axis=1))
+    dots = [f'<circle cx="{x:.1f}" cy="{y:.1f}" r="1.2" fill="#3b6ea8"/>' for x, y in middles]
+    some = np.random.default_rng(2).choice(len(supports), min(12, len(supports)), replace=False)
+    return drawing(domain, dots + [box(domain, supports[i], "none", "#e07b1a") for i in some])
+
+
+def cells(mesh: Mesh, domain: Domain, marked: set[int]) -> str:
+    """The cells of a mesh, and some of them marked."""
+    boxes = mesh.cell_boxes[0]
+    fills = [("#e07b1a" if c in marked else ("#dfe7ef", "#c9d8e6", "#b3c8dc")[c % 3]) for c in range(len(boxes))]
+    count = np.diff(mesh.list_start)
+    text = f"{len(boxes)} cells; a list holds {int(np.median(count))} control points (median), {count.max()} at most."
+    return f"<p>{text}</p>" + drawing(domain, [box(domain, b, f, "white") for b, f in zip(boxes, fills, strict=True)])
+
+
+def rate(call: Callable[[], object], seconds: float) -> float:
+    """Calls a second, of calls repeated for so long, at least three times."""
+    call()
+    begin, count = time.perf_counter(), 0
+    while count < 3 or time.perf_counter() - begin < seconds:
+        call()
+        count += 1
+    return count / (time.perf_counter() - begin)
+
+
+def update(moving: Deformation, domain: Domain, seconds: float) -> str:
+    """What one point costs beside all, and the cells it touches."""
+    u0, u1, v0, v1 = domain.rect
+    supports = moving.surface.supports
+    off = np.hypot(supports[:, :2].mean(axis=1) - (u0 + u1) / 2, supports[:, 2:].mean(axis=1) - (v0 + v1) / 2)
+    one = np.array([int(np.argmin(off))])
+    steps = cycle(np.array([[[0.0, 0.0, 0.1]], [[0.0, 0.0, -0.1]]]))
+    single, whole = rate(lambda: moving.move(one, next(steps)), seconds), rate(moving.refresh, seconds)
+    touched = set(map(int, moving.lists.entries_of(int(one[0]))[0]))
+    text = f"One point moved: {1e6 / single:.0f} µs. All vertices computed anew: {1e6 / whole:.0f} µs."
+    return f"<p>{text}</p>" + cells(moving.mesh, domain, touched)
+
+
+def image(data: bytes, kind: str, width: int) -> str:
+    """A picture inside the page."""
+    return f'<img width="{width}" src="data:image/{kind};base64,{base64.b64encode(data).decode()}">'
+
+
+def quad_tree(variants: list[Variant]) -> str:
+    """The uniform mesh and those of the quad tree that are as good."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "meshes.png"
+        draw(variants, path, height=640)
+        return image(path.read_bytes(), "png", 900)
+
+
+def experiment(head: Head, seconds: float) -> tuple[dict[str, float], str]:
+    """Frames a second with everything moving, and pictures of expressions; without OpenGL only what is computed."""
+    rng = np.random.default_rng(0)
+    poses = cycle(rng.uniform(0, 0.5, (16, len(head.parameters))))
+    frames = {"all vertices of a pose, every parameter moving": rate(lambda: head.pose(next(poses)), seconds)}
+    try:
+        screen = Offscreen(head, (300, 380))
+    except ViewError as error:
+        return frames, f"<p>No pictures: {escape(str(error))}</p>"
+    with screen:
+        shown = "".join(picture(screen.render(head.values(values)), name) for name, values in EXPRESSIONS.items())
+
+        def frame() -> None:
+            screen.draw(next(poses))
+            screen.finish()
+
+        frames["pictures of 300 x 380, every parameter moving"] = rate(frame, seconds)
+    return frames, shown
+
+
+def picture(pixels: np.ndarray, name: str) -> str:
+    """Pixels (h, w, 3) and their name."""
+    from PIL import Image
+
+    out = io.BytesIO()
+    Image.fromarray(pixels).save(out, "webp", quality=85)
+    shown = image(out.getvalue(), "webp", 220)
+    return f"<figure style='display:inline-block;margin:4px'>{shown}<figcaption>{name}</figcaption></figure>"
+
+
+if __name__ == "__main__":
+    main()
