@@ -192,7 +192,9 @@ def _fold(mesh: FitMesh, island: Island) -> Floats:
     area3 = face_areas(mesh.vertices[island.vertex], f)
     area2 = face_areas(np.pad(island.uv, ((0, 0), (0, 1))), f)
     stretch = np.sqrt(area3 / np.maximum(area2, 1e-12))
-    low, high = np.array(CLUTTER) * np.median(stretch)
+    if not stretch.any():
+        return np.zeros(len(island.uv))
+    low, high = np.array(CLUTTER) * np.median(stretch[stretch > 0])
     depth = np.clip((stretch - low) / (high - low), 0, 1)
     used = f >= 0
     total = np.bincount(f[used], np.repeat(depth, used.sum(axis=1)), len(island.uv))

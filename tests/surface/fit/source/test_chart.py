@@ -204,3 +204,10 @@ def test_border_samples_weigh_eight_times_as_much() -> None:
     ends = chart.uv[rows + len(mesh.faces) :]
     halves = np.concatenate([0.5 * (loop + np.roll(loop, -1, axis=0)) for loop in chart.loops])
     np.testing.assert_allclose(ends, halves)
+
+
+def test_faces_without_area_are_no_folds_and_do_not_count_in_the_median() -> None:
+    for stretches in ([0.0] * 4, [0.0] * 9 + [2.0, 2.0, 11.5]):
+        mesh = apart(stretches)
+        fold = chart_module._fold(mesh, Island(np.arange(len(mesh.uv)), mesh.uv, mesh.faces)).reshape(-1, 4)
+        np.testing.assert_allclose(fold[:, 0], 0.5 * (np.array(stretches) == 11.5), atol=1e-9)
