@@ -40,7 +40,11 @@ def test_a_narrow_terminal_loses_nothing(columns: str) -> None:
     result = said("run", "demo", "--dry-run", COLUMNS=columns)
     assert result.returncode == 0, result.stderr
     assert result.stdout.split().count("xl330-m288;") == 24
-    assert said("check", "ict", COLUMNS=columns).stdout.count("\n") == 1
+
+
+def test_a_narrow_terminal_wraps_no_line_of_a_file() -> None:
+    result = said("check", "head24", COLUMNS="30")
+    assert result.stdout.count("\n") == 1 and len(result.stdout) > 30
 
 
 def test_an_interrupt_ends_what_was_started_in_the_background(tmp_path: Path) -> None:

@@ -394,6 +394,29 @@ def test_sdk_code_runs_on_our_handlers(wire: Wire, ours: tuple) -> None:
     assert packets.read2ByteTxRx(port, 2, POSITION) == (20, bare.COMM_SUCCESS, 0)
 
 
+class Bytes:
+    """A port that hands out what lies ready, all at once, and keeps what is given back to it."""
+
+    def __init__(self, data: bytes) -> None:
+        self._held, self.is_using = bytearray(data), True
+
+    def readPort(self, count: int) -> bytes:  # the SDK's name
+        data, self._held = bytes(self._held), bytearray()
+        return data
+
+
+def test_replies_that_come_together_are_returned_one_by_one() -> None:
+    replies = [encode_status(servo, 0, bytes((servo,))) for servo in (1, 2, 3, 4)]
+    port, cut = Bytes(encode_instruction(9, 1) + b"".join(replies)[:-3]), b"".join(replies)[-3:]
+    for servo in (1, 2, 3):
+        frame, result = Packets().rxPacket(port, False)  # type: ignore[arg-type]
+        assert (frame[4], frame[9], result) == (servo, servo, bare.COMM_SUCCESS)
+        assert not port.is_using
+    port._held += cut
+    assert Packets().rxPacket(port, False)[0] == list(replies[3])  # type: ignore[arg-type]
+    assert Packets().rxPacket(port, False) == ([], bare.COMM_RX_TIMEOUT)  # type: ignore[arg-type]
+
+
 def test_broadcast_ping_finds_everybody(wire: Wire, ours: tuple) -> None:
     wire.answer = lambda packet: [encode_status(i, 0, bytes((i, 4, 38))) for i in (3, 9, 200)]
     port, packets = ours

@@ -65,18 +65,11 @@ def weak_blink(head: HeadData) -> HeadData:
     return scaled_group(head, "eyeBlinkLeft", 0.5)
 
 
-def no_blink(head: HeadData) -> HeadData:
-    return with_groups(head, lambda g: None if g.name == "eyeBlinkRight" else g)
-
-
-def swapped(head: HeadData, *names: str) -> HeadData:
-    """Left and right exchanged in the names of groups: of all, or of those whose names begin with ``names``."""
+def swapped(head: HeadData) -> HeadData:
+    """Left and right exchanged in the names of groups."""
 
     def other(group: Group) -> Group:
-        if names and not group.name.startswith(names):
-            return group
-        name = group.name.replace("Left", "@").replace("Right", "Left").replace("@", "Right")
-        return replace(group, name=name)
+        return replace(group, name=group.name.replace("Left", "@").replace("Right", "Left").replace("@", "Right"))
 
     return with_groups(head, other)
 
@@ -153,12 +146,6 @@ def inside_out_part(head: HeadData, name: str = "face") -> HeadData:
     part = part_of(head, name)
     triangles = part.mesh["mesh_triangles"][:, ::-1].copy()
     return with_part(head, name, mesh=part.mesh | {"mesh_triangles": triangles})
-
-
-def inward_normals(head: HeadData, name: str = "face") -> HeadData:
-    made = part_of(head, name).mesh["mesh_made"].copy()
-    made[4] = 1.0 - made[4]
-    return with_part(head, name, mesh=part_of(head, name).mesh | {"mesh_made": made})
 
 
 def open_lips(head: HeadData, mm: float = 4.0) -> HeadData:

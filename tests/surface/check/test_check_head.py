@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from surface.check import Finding, borders, check_head, motions, spikes, stance
+from surface.check import Finding, borders, check_head, spikes, stance
 from surface.check.checker import unsealed_lips
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
@@ -46,21 +46,12 @@ OTHERS: dict[str, tuple[Seed, Callable[[Subject], Iterator[Finding]], str]] = {
         lambda s: spikes.spikes(s, Places(s, None), borders.find_borders(s)),
         "mouthSmileLeft = 1",
     ),
-    "no blink": (seeded.no_blink, motions.blind_lids, "no eyeBlinkRight"),
-    "a pair swapped": (
-        lambda h: seeded.swapped(h, "mouthLeft", "mouthRight"),
-        motions.swapped_sides,
-        "mouthLeft, mouthRight",
-    ),
     "hole of a loop": (
         seeded.hole_of_a_loop,
         lambda s: borders.holes(s, None, Places(s, None), borders.find_borders(s)),
         "forehead",
     ),
-    "ten times too small": (lambda h: seeded.scaled(h, 0.1), stance.wrong_unit, "6.36 mm apart"),
     "turned round": (seeded.turned_round, lambda s: stance.off_camera(s, None), "back of the head"),
-    "inward normals": (lambda h: seeded.inward_normals(h, "tongue"), stance.inside_out, "'tongue': its normals"),
-    "inside-out teeth": (lambda h: seeded.inside_out_part(h, "teeth_upper"), stance.inside_out, "'teeth_upper'"),
     "open lips": (seeded.open_lips, lambda s: unsealed_lips(s, find_mouth(s)), "neutral face"),
 }
 

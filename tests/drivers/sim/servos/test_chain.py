@@ -148,6 +148,15 @@ def test_wiring_faults():
     assert len(ask(bus, 3, I.PING, now_s=1.0)) == 1
 
 
+def test_a_servo_of_a_wrong_bit_rate_comes_back_at_the_wires_or_at_the_usual_one():
+    for line_baud, baud in ((57_600, 57_600), (None, 1_000_000)):
+        bus = chain(faults=("baud:3:115200",))
+        bus.set_line_baud(line_baud)
+        assert bus.servo(3).baud == 115_200
+        bus.faults.clear("baud", 1.0)
+        assert bus.servo(3).baud == baud
+
+
 def test_duplicate_id_as_a_fault():
     bus = chain(faults=("dup:2",))
     assert StatusReader().feed(wire(bus, 2, I.READ, POSITION)) == []
