@@ -158,3 +158,14 @@ def test_a_scan_of_nothing_like_it_has_no_landmarks(face, monkeypatch) -> None:
 def test_names_are_mirrored() -> None:
     assert mirrored("left_eye_inner") == "right_eye_inner" and mirrored("mouth_right") == "mouth_left"
     assert {mirrored(n) for n in NAMES} == set(NAMES) and mirrored("chin") == "chin"
+
+
+def test_a_piece_of_an_image_is_zero_outside_and_a_place_beyond_it_is_at_its_edge() -> None:
+    image = np.arange(1.0, 31.0).reshape(5, 6)
+    for row, column in ((2, 3), (0, 0), (4, 5), (-3, 2), (9, 9), (2, -1)):
+        r, c = min(max(row, 0), 4), min(max(column, 0), 5)
+        wanted = [
+            [image[i, j] if 0 <= i < 5 and 0 <= j < 6 else 0.0 for j in range(c - 3, c + 4)]
+            for i in range(r - 2, r + 3)
+        ]
+        np.testing.assert_array_equal(module._cut(image, row, column, 2, 3), wanted)
