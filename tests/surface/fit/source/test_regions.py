@@ -22,7 +22,7 @@ from surface.fit.source.regions import (
 
 @pytest.fixture(autouse=True)
 def fewer_views(monkeypatch) -> None:
-    monkeypatch.setattr(module, "VIEWS", 48)
+    monkeypatch.setattr(module, "VIEWS", 36)
     monkeypatch.setattr(module, "PIXELS", 160)
 
 
