@@ -238,7 +238,7 @@ def test_the_middle_of_a_head_is_as_high_as_what_moves() -> None:
     moves = np.zeros_like(mesh.vertices)
     moves[np.abs(mesh.vertices[:, 1] - 30) < 8] = [0, 1, 0]
     moving = mesh_of(mesh.vertices + np.array([5, 0, 9]), mesh.faces, moves)
-    np.testing.assert_allclose(module._middle(moving, every(mesh)), [5, 30, 9], atol=2.5)
+    np.testing.assert_allclose(module._middle(moving, every(mesh)), [5, 30, 9], atol=1.5)
     nose = np.vstack(
         [mesh.vertices, [[0, 0, 140.0], [1, 0, 140], [0, 1, 140], [0, -300, 400], [1, -300, 400], [0, -301, 400]]]
     )
