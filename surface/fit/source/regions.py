@@ -101,8 +101,6 @@ def in_two(mesh: FitMesh, faces: Ints) -> list[Ints]:
     axis = np.linalg.svd(middle - middle.mean(axis=0), full_matrices=False)[2][0]
     place = np.argsort(np.argsort(middle @ axis, kind="stable"), kind="stable") / max(len(faces) - 1, 1)
     side = shortest_cut(mesh, faces, place <= ENDS, place >= 1.0 - ENDS)
-    if side.all() or not side.any():
-        side = place <= 0.5
     return [part for half in (faces[side], faces[~side]) for part in connected(mesh, half)]
 
 

@@ -87,3 +87,22 @@ def test_of_hidden_faces_those_behind_the_centre_go_and_not_what_lies_beside() -
 def test_pixels_are_clipped_to_the_picture() -> None:
     i, j = module._pixels(np.array([[-9.0, 9, 0], [-2.6, -2.6, 0], [-2.6 + 1.5 * 0.04, 0, 0]]), 130)
     assert i.tolist() == [0, 0, 1] and j.tolist() == [129, 0, 65]
+
+
+def test_a_ball_is_as_deep_as_a_sphere_a_little_smaller_than_the_eye(monkeypatch) -> None:
+    monkeypatch.setattr(module, "VIEWS", ((0.0, 0.0),))
+    for across in (0.0, 0.3, 0.7, 0.9, 0.95):
+        front = np.sqrt(0.96**2 - across**2) - module.BEHIND
+        for turn in (0.0, 1.1, 4.0):
+            x, y = across * np.cos(turn), across * np.sin(turn)
+            assert ahead([[x, y, front + 0.01], [x, y, front - 0.01]]) == [True, False], across
+    assert ahead([[0.97, 0, -1.0]]) == [True]
+
+
+def test_what_is_seen_from_any_side_is_seen_from_the_others() -> None:
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-1.2, 1.2, (400, 3)) - np.array([0, 0, 0.6])
+    for factors in ([-1.0, 1, 1], [1.0, -1, 1]):
+        assert ahead(points) == ahead(points * np.array(factors))
+    seen = np.array(ahead(points))
+    assert 40 < seen.sum() < 360

@@ -43,3 +43,35 @@ def test_a_cut_within_one_chart():
 
 def test_parts_that_do_not_touch_have_no_seam():
     assert find_seams({"a": chart([1, 2, 3]), "b": chart([4, 5, 6])}) == []
+
+
+def test_seams_hold_every_edge_that_two_loops_share_once_and_in_order():
+    """Loops of random parts of a ring of vertices; brute force over all edges is the oracle."""
+    rng = np.random.default_rng(0)
+    counted = 0
+    for _ in range(60):
+        own = rng.permutation(12)
+        loops = {"a": [list(own)], "b": []}
+        first, length = int(rng.integers(12)), int(rng.integers(3, 12))
+        run = [int(own[(first + k) % 12]) for k in range(length)]
+        spare = [100, 101]
+        turned = int(rng.integers(length + 2))
+        other = (run[:: rng.choice([-1, 1])] + spare)[::1]
+        loops["b"].append(other[turned:] + other[:turned])
+        edges = [{frozenset(e) for e in zip(x, x[1:] + x[:1], strict=True)} for x in (loops["a"][0], loops["b"][0])]
+        both = {frozenset(map(float, e)) for e in edges[0] & edges[1]}
+        seams = find_seams({"a": chart(loops["a"][0]), "b": chart(loops["b"][0], offset=5.0)})
+        found = [frozenset(e) for s in seams for e in zip(s.uv_a[:-1, 0], s.uv_a[1:, 0], strict=True)]
+        assert len(found) == len(both) and set(found) == both
+        assert len(seams) == 1  # one run
+        for seam in seams:
+            np.testing.assert_array_equal(seam.uv_a[:, 0], seam.uv_b[:, 0])
+        counted += len(found)
+    assert counted > 200
+
+
+def test_two_runs_of_the_same_loops_are_two_seams():
+    seams = find_seams({"a": chart([1, 2, 3, 50, 4, 5, 6, 51]), "b": chart([6, 5, 4, 60, 3, 2, 1, 61])})
+    assert sorted(s.uv_a[:, 0].tolist() for s in seams) == [[1, 2, 3], [4, 5, 6]]
+    three = find_seams({"a": chart([1, 2, 9]), "b": chart([2, 1, 8]), "c": chart([1, 2, 7])})
+    assert three == []  # an edge of three is no seam

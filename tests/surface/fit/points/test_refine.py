@@ -1,10 +1,14 @@
 """Fitting a chart: accuracy grows with points, and a slit lets its lips part."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from slit_sheet import ROW, N, slit_sheet
 
-from surface.fit.points.refine import FitRequest, Fitted, fit_chart
+from surface.fit.points import refine
+from surface.fit.points.dense import dense_errors
+from surface.fit.points.refine import FitRequest, Fitted, Hold, fit_chart
 from surface.fit.points.solve import basis, fairness
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
@@ -60,3 +64,91 @@ def test_progress_never_falls(fitted):
     result = fit_chart(mesh, chart, FitRequest(120, coarse=0.25), heard.append)
     assert isinstance(result, Fitted)
     assert heard == sorted(heard) and heard[-1] <= 1.0
+
+
+def test_the_rms_of_a_fit_leaves_folds_out(fitted):
+    _, chart, fit = fitted
+    error = np.random.default_rng(0).uniform(0, 3, len(fit.error))
+    folded = np.arange(len(error)) % 3 == 0
+    kept = error[~folded]
+    other = replace(fit, error=error)
+    assert refine._rms(replace(chart, folded=folded), other) == pytest.approx(np.sqrt((kept**2).mean()))
+    assert refine._rms(replace(chart, folded=folded | True), other) == 0.0
+
+
+def test_what_a_sample_needs_is_its_worst_error_in_what_is_good_enough(fitted):
+    _, chart, fit = fitted
+    rng = np.random.default_rng(1)
+    neutral, shapes = rng.uniform(0, 1, len(fit.error)), rng.uniform(0, 1, fit.shape_error.shape)
+    weight = rng.uniform(0.1, 3, len(neutral))
+    request = FitRequest(100, neutral_mm=0.2, shape_mm=0.5)
+    own = replace(chart, weight=weight)
+    found = refine.need(own, replace(fit, error=neutral, shape_error=shapes), request)
+    for k in range(0, len(found), 37):
+        assert found[k] == pytest.approx(min(weight[k], 1.0) * max(neutral[k] / 0.2, max(s[k] for s in shapes) / 0.5))
+    still = refine.need(own, replace(fit, error=neutral, shape_error=shapes[:0]), request)
+    np.testing.assert_allclose(still, np.minimum(weight, 1.0) * neutral / 0.2)
+
+
+def test_points_are_held_where_they_reach_a_stray_place(fitted):
+    _, _, fit = fitted
+    uv = np.array([[0.3, 0.7], [0.8, 0.1]])
+    reached = (np.abs(basis(fit.net, uv).toarray()) > 0).any(axis=0)
+    found = Hold(uv, 30.0).fair(fit.net, 0.5)
+    np.testing.assert_array_equal(found, np.where(reached, 15.0, 0.5))
+    assert 0 < reached.sum() < len(fit.net)
+    np.testing.assert_array_equal(Hold().fair(fit.net, 0.5), 0.5)
+
+
+def test_places_become_samples_of_full_weight(fitted):
+    _, chart, _ = fitted
+    places = chart.between.take(np.arange(len(chart.between.uv)) < 9)
+    more = refine._with_samples(chart, places)
+    n = len(chart.uv)
+    np.testing.assert_array_equal(more.uv[n:], places.uv)
+    np.testing.assert_array_equal(more.weight[n:], 1.0)
+    assert not more.folded[n:].any() and abs(more.mix[n:] - places.mix).max() == 0
+    np.testing.assert_array_equal(more.uv[:n], chart.uv)
+
+
+def test_strays_are_places_too_far_off_and_those_beside_such_samples(fitted):
+    mesh, chart, fit = fitted
+    none = replace(fit, error=0 * fit.error, shape_error=0 * fit.shape_error)
+    dense = dense_errors(mesh, chart, fit.net, fit.points, fit.moves)
+    most = np.maximum(dense.neutral, dense.worst)
+    limit = float(np.quantile(most, 0.9))
+    np.testing.assert_array_equal(refine._strays(mesh, chart, none, limit), most > limit)
+    for sample in (40, 300):
+        for key, rows in (("error", none.error.copy()), ("shape_error", none.shape_error.copy())):
+            rows[..., sample] = 99.0
+            found = refine._strays(mesh, chart, replace(none, **{key: rows}), 50.0)
+            shared = (chart.between.mix[:, chart.mix[[sample]].indices].toarray() > 0).any(axis=1)
+            np.testing.assert_array_equal(found, shared)
+    rows = none.error.copy()
+    rows[40] = 99.0
+    folded = np.arange(len(rows)) == 40
+    assert not refine._strays(mesh, replace(chart, folded=folded), replace(none, error=rows), 50.0).any()
+    assert refine._most(mesh, chart, fit) == dense.most
+
+
+def test_a_net_grows_by_a_share_where_it_is_needed_most(fitted):
+    _, chart, fit = fitted
+    coarse = fit.net.take(np.arange(len(fit.net)) < 200)
+    needed = np.where(np.linalg.norm(chart.uv - [0.25, 0.75], axis=1) < 0.1, 9.0, 0.0)
+    request = FitRequest(900, coarse=0.2, growth=1.25)
+    grown, any_new = refine._grow(coarse, chart, needed, request, 500)
+    assert any_new and 200 < len(grown) <= 250
+    fresh = np.arange(200, len(grown))
+    middle = np.column_stack([grown.knots_u[fresh].mean(axis=1), grown.knots_v[fresh].mean(axis=1)])
+    assert np.linalg.norm(middle - [0.25, 0.75], axis=1).max() < 0.4
+    assert len(refine._grow(coarse, chart, needed, request, 7)[0]) <= 207
+    same, more = refine._grow(fit.net, chart, 0 * needed, request, 500)
+    assert not more and len(same) == len(fit.net)
+
+
+def test_control_points_have_the_errors_that_were_measured(fitted):
+    mesh, chart, fit = fitted
+    again = refine._on(mesh, chart, replace(fit, error=0 * fit.error, shape_error=0 * fit.shape_error))
+    np.testing.assert_allclose(again.error, fit.error, atol=1e-9)
+    np.testing.assert_allclose(again.shape_error, fit.shape_error, atol=1e-9)
+    np.testing.assert_array_equal(again.moves, fit.moves)

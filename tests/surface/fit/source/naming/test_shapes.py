@@ -43,7 +43,7 @@ def test_halves_add_up_to_the_whole_and_fade_over_a_band_about_the_middle() -> N
 
 
 def test_a_mood_is_cut_into_mouth_eyes_and_brows_which_add_up_to_it() -> None:
-    own = mesh(ONE, MOUTH[:, None] * ONE, EYES[:, None] * ONE)
+    own = mesh(ONE, -MOUTH[:, None] * ONE, EYES[:, None] * [1.0, -2.0, 0.5])
     mouth, eyes, brows = (made(Source(0, "", r), own, (1,), (2,))[:, 0] for r in ("mouth", "eyes", "brows"))
     np.testing.assert_allclose(mouth + eyes + brows, 1.0, atol=1e-9)
     assert (mouth[Y < -14] == 1).all() and (mouth[Y > 9] == 0).all() and mouth.min() >= 0

@@ -68,6 +68,8 @@ def test_the_line_to_the_eyes_leans_by_the_given_angle(tilt: float) -> None:
 
 
 def test_shapes_named_as_the_viewer_sees_them_are_noticed() -> None:
+    tiny = oriented_by(0.001 * HEAD, Eyes(0.001 * CENTRES[::-1], True, True, ""), 0.001 * low(0), 0.0)
+    np.testing.assert_array_equal(tiny.turn, np.eye(3))
     found = oriented_by(HEAD, eyes(flipped=True), low(0), 0.0)
     np.testing.assert_array_equal(found.turn, np.eye(3))
     assert len(found.notes) == 1 and "viewer" in found.notes[0]
@@ -95,8 +97,9 @@ def test_where_what_is_around_the_eyes_does_not_tell_the_whole_mesh_does() -> No
     flat = np.vstack([CENTRES, CENTRES + np.array([0, 0, 4.0])])
     hair = np.array([[0, 400.0, -300.0]])
     for points, flipped in ((np.vstack([flat, hair]), False), (np.vstack([flat, hair * [1, 1, -2]]), True)):
-        found = oriented_by(points, Eyes(CENTRES, False, True, ""), low(0), 0.0)
-        assert (found.turn[2, 2] < 0) == flipped
+        for scale in (0.001, 1.0, 30.0):
+            found = oriented_by(scale * points, Eyes(scale * CENTRES, False, True, ""), scale * low(0), 0.0)
+            assert (found.turn[2, 2] < 0) == flipped
 
 
 @pytest.mark.parametrize(
