@@ -77,7 +77,7 @@ def test_a_point_that_ended_on_another_fold_is_found_between_its_neighbours() ->
     kept, off = uv + 0.01, np.full(9, 1e-7)
     search_between(surface, points, kept, off, 1e-6)  # near enough
     assert np.array_equal(kept, uv + 0.01) and (off == 1e-7).all()
-    away = points + [0.0, 0.0, 1.0]
+    away = points + np.array([0.0, 0.0, 1.0])
     found, distance = uv.copy(), np.full(9, 1e-3)
     search_between(surface, away, found, distance, 1e-6)  # nothing nearer
     assert np.array_equal(found, uv) and (distance == 1e-3).all()
