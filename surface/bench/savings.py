@@ -81,8 +81,9 @@ def _crease(x: Floats, y: Floats) -> Floats:
 
 
 def _ripples(x: Floats, y: Floats) -> Floats:
-    r = np.hypot(x - 0.2, y - 0.2)
-    return 6 * np.cos(40 * r) * np.exp(-4 * r)
+    r: Floats = np.hypot(x - 0.2, y - 0.2)
+    heights: Floats = 6 * np.cos(40 * r) * np.exp(-4 * r)
+    return heights
 
 
 def _terrain(x: Floats, y: Floats) -> Floats:
