@@ -143,7 +143,7 @@ class DCPSurface(ControlPoints):
         domain : where to draw; the rectangle of all subdomains if left out
         loop_error : how near the mesh's border follows the loops; ``chord_error`` if left out
         roots : cells along u and v before any quartering; chosen roughly square if left out
-        measured : False estimates the distance from nine samples a cell, in half the time or less; the surface may then
+        measured : False estimates the distance from nine samples a cell, in a quarter of the time; the surface may then
             be up to twice ``chord_error`` away
         flip : reverse normals and triangles against S_u x S_v
         progress : is called with the name of a stage and the part of the whole that is done, 0 to 1

@@ -137,8 +137,8 @@ def _quantile(values: Floats, weights: Floats, quantile: float | None) -> float:
     """The value that the given part of the weight does not exceed, or the root mean square; NaN values are left out."""
     good = np.isfinite(values)
     if quantile is None:
-        total = float(weights[good].sum())
-        return float(np.sqrt((weights[good] * values[good] ** 2).sum() / total)) if total > 0 else 0.0
+        whole = float(weights[good].sum())
+        return float(np.sqrt((weights[good] * values[good] ** 2).sum() / whole)) if whole > 0 else 0.0
     order = np.argsort(values[good])
     total = np.cumsum(weights[good][order])
     if not len(total):

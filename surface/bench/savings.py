@@ -52,15 +52,16 @@ def savings(subjects: Sequence[Subject], level: int, report: Report = no_report)
 
 def nine_surfaces() -> list[Subject]:
     """Nine NURBS surfaces of about 100 units, each curved in another way."""
-    return [(name, _sheet(shape), None) for name, shape in SHEETS.items()] + [
-        ("ball", _turned(lambda t: (np.sin(np.pi * t), -np.cos(np.pi * t))), None),
-        (
-            "vase",
-            _turned(lambda t: (0.5 + 0.25 * np.sin(7 * t) + 0.15 * np.exp(-(((t - 0.9) / 0.05) ** 2)), 3 * t)),
-            None,
-        ),
-        ("ring", _ring(), None),
-    ]
+    sheets: list[Subject] = [(name, _sheet(shape), None) for name, shape in SHEETS.items()]
+    return [*sheets, ("ball", _turned(_half_circle), None), ("vase", _turned(_vase), None), ("ring", _ring(), None)]
+
+
+def _half_circle(t: Floats) -> tuple[Floats, Floats]:
+    return np.sin(np.pi * t), -np.cos(np.pi * t)
+
+
+def _vase(t: Floats) -> tuple[Floats, Floats]:
+    return 0.5 + 0.25 * np.sin(7 * t) + 0.15 * np.exp(-(((t - 0.9) / 0.05) ** 2)), 3 * t
 
 
 def _hills(x: Floats, y: Floats) -> Floats:
@@ -80,14 +81,18 @@ def _crease(x: Floats, y: Floats) -> Floats:
 
 
 def _ripples(x: Floats, y: Floats) -> Floats:
-    r = np.hypot(x - 0.2, y - 0.2)
-    return 6 * np.cos(40 * r) * np.exp(-4 * r)
+    r: Floats = np.hypot(x - 0.2, y - 0.2)
+    heights: Floats = 6 * np.cos(40 * r) * np.exp(-4 * r)
+    return heights
 
 
 def _terrain(x: Floats, y: Floats) -> Floats:
     rng = np.random.default_rng(4)
     waves = [(2.0**k, *rng.uniform(0, 2 * np.pi, 3)) for k in range(1, 6) for _ in range(3)]
-    return sum((30 / f**1.3 * np.sin(f * (np.cos(a) * x + np.sin(a) * y) * 2 + b + c) for f, a, b, c in waves), 0 * x)
+    heights: Floats = sum(
+        (30 / f**1.3 * np.sin(f * (np.cos(a) * x + np.sin(a) * y) * 2 + b + c) for f, a, b, c in waves), 0 * x
+    )
+    return heights
 
 
 SHEETS: dict[str, Callable[[Floats, Floats], Floats]] = {

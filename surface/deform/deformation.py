@@ -81,7 +81,7 @@ class Deformation(Generic[Table]):
         self._all, self._cells = np.arange(surface.n), np.arange(len(mesh.cell_start) - 1, dtype=np.int32)
         self.vertices, self.normals = _view(self._arrays["vertices"]), _view(self._arrays["normals"])
         self._sum_weights(np.arange(len(self._cells)))
-        self._check_weights("mesh", self._cells)
+        self._check_weights("mesh", np.arange(len(self._cells)))
         self._bind()
         self.refresh()
 

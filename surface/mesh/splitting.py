@@ -127,15 +127,15 @@ class SplitTests:
         blocks.count_points(inner, *self.surface.arrays()[:2], *self.surface.bin_arrays(), out)
         return out
 
-    def tighten(self, leaves: Leaves, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
-        """Quarter leaves until the surface is nowhere further than ``chord_error`` from their triangles, or the tree
+    def tighten(self, leaves: Leaves, inner: list[Ints], error: float) -> tuple[Leaves, list[Ints]]:
+        """Quarter leaves until the surface is nowhere further than ``error`` from their triangles, or the tree
         has no more levels; ``inner`` and what is returned are as of :func:`.quadtree.grow`."""
         passed = np.zeros(0, dtype=np.int64)
         while True:
             pattern = quadtree.patterns(self.lattice, leaves, inner)
             key = self._keys(leaves) * len(quadtree.TEMPLATES) + pattern
             left = np.flatnonzero((leaves.level < self.lattice.depth) & ~np.isin(key, passed))
-            far = self._too_far(leaves, pattern, left)
+            far = self._too_far(leaves, pattern, left, error)
             passed = np.concatenate([passed, key[left[~far]]])
             if not far.any():
                 return leaves, inner
@@ -147,7 +147,7 @@ class SplitTests:
         corner = self.lattice.key(leaves.cell[:, 0] << shift, leaves.cell[:, 1] << shift)
         return corner * (self.lattice.depth + 1) + leaves.level
 
-    def _too_far(self, leaves: Leaves, pattern: Ints, which: Ints) -> Bools:
+    def _too_far(self, leaves: Leaves, pattern: Ints, which: Ints, error: float) -> Bools:
         """(k,) bool: from the triangles of which of the leaves ``which (k,)`` the surface is too far."""
         far = np.zeros(len(which), dtype=bool)
         for level in np.unique(leaves.level[which]):
@@ -157,7 +157,7 @@ class SplitTests:
             at = at[active := self._active(rect, cells, int(level))[0]]
             uv = chords.sample_places(rect[active])
             side = inner_side(uv, uv[:, 12], self.domain)
-            far[at] = chords.measured_errors(self.surface, uv, side, pattern[which[at]]) > self.limits.chord_error
+            far[at] = chords.measured_errors(self.surface, uv, side, pattern[which[at]]) > error
         return far
 
     def _errors(self, level: int, cells: Ints) -> Floats:

@@ -35,7 +35,7 @@ def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: boo
     leaves, inner = quadtree.grow(lattice, tests.split, part_of(progress, 0.0, 0.4))
     if limits.measured and limits.chord_error is not None:
         progress("quad tree", 0.4)
-        leaves, inner = tests.tighten(leaves, inner)
+        leaves, inner = tests.tighten(leaves, inner, limits.chord_error)
     progress("triangles", 0.45)
     corners, owner = quadtree.triangulate(lattice, leaves, inner)
     nodes, _, triangles = keys.unique(corners)
@@ -152,7 +152,7 @@ def _without_poles(surface: ControlPoints, flat: Flat, points: Floats, domain: D
 def _along(domain: Domain, number: int) -> Floats:
     """(33, 2) places along a border of the rectangle: 0 and 1 where u ends, 2 and 3 where v does."""
     axis, low, high = number // 2, np.array(domain.rect[::2]), np.array(domain.rect[1::2])
-    uv = low + np.linspace(0.0, 1.0, 33)[:, None] * (high - low)
+    uv: Floats = low + np.linspace(0.0, 1.0, 33)[:, None] * (high - low)
     uv[:, axis] = domain.rect[number]
     return uv
 

@@ -38,6 +38,20 @@ def invert(surface: DCPSurface, points: Floats) -> tuple[Floats, Floats]:
     return uv, distance
 
 
+def search_between(surface: DCPSurface, points: Floats, uv: Floats, distance: Floats, near: float) -> None:
+    """Search again for points along a curve that are further than ``near`` from the surface: from beside and between
+    where their neighbours lie, since the nearest sample may lead to another fold or end at a crease.
+
+    points, uv, distance : (k, 3), (k, 2) and (k,) along the curve; the last two are changed where that leads nearer.
+    """
+    far = np.flatnonzero(~(distance <= near))
+    before, after = uv[np.maximum(far - 1, 0)], uv[np.minimum(far + 1, len(uv) - 1)]
+    for starts in ((before + after) / 2, before, after) if len(far) else ():
+        again, off = _gauss_newton(surface, points[far], starts)
+        better = ~(distance[far] <= off)
+        uv[far[better]], distance[far[better]] = again[better], off[better]
+
+
 def _grid(surface: DCPSurface) -> Floats:
     """(s, 2) even samples of the rectangle, and three in each knot span."""
     u0, u1, v0, v1 = surface.rect

@@ -16,7 +16,7 @@ import numpy as np
 from surface.base.arrays import Bools, Floats
 from surface.dcp import DCPSurface
 
-from .inversion import invert
+from .inversion import invert, search_between
 
 MOST_POINTS = 1024  # points along one edge
 MOST_DISTANCE = 3e-3  # of the face's size: an edge from its face; modelling tolerances are smaller
@@ -64,9 +64,12 @@ def loop_over(surface: DCPSurface, rect: Rect, edges: list[TrimEdge], size: floa
     if not curves:
         raise ValueError("has no edge in space")
     uv, distance = invert(surface, np.concatenate([c.points for c in curves]))
+    cuts = np.cumsum([len(c.points) for c in curves])[:-1]
+    parts, distances = np.split(uv, cuts), np.split(distance, cuts)  # views
+    for curve, part, off in zip(curves, parts, distances, strict=True):
+        search_between(surface, curve.points, part, off, CLOSES * size)
     if not (distance < MOST_DISTANCE * size).all():
         raise ValueError(f"lies up to {np.nanmax(distance):.3g} from its face")
-    parts = np.split(uv, np.cumsum([len(c.points) for c in curves])[:-1])
     for part in parts:
         _leave_poles(part, rect, _poles(surface, rect, size))
     free = _seams(parts, rect, _closes(surface, rect, size))

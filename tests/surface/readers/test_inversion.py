@@ -9,7 +9,7 @@ import pytest
 
 from surface import DCPSurface
 from surface.readers import inversion
-from surface.readers.inversion import invert
+from surface.readers.inversion import invert, search_between
 from tests.surface import shapes
 
 
@@ -157,3 +157,21 @@ def test_the_nearest_sample_is_that_of_all_distances(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(inversion, "AT_ONCE", 1)  # one at a time at least
     np.testing.assert_array_equal(inversion._nearest(samples, points), wanted)
     assert len(inversion._nearest(samples, points[:0])) == 0
+
+
+def test_a_point_that_ended_on_another_fold_is_found_between_its_neighbours() -> None:
+    surface = shapes.hills(12)
+    uv = np.column_stack([np.linspace(0.2, 0.6, 9), np.linspace(0.3, 0.4, 9)])
+    points = surface.evaluate(uv)
+    found, distance = uv.copy(), np.zeros(9)
+    for k in (0, 4, 8):  # the first and the last have one neighbour
+        found[k], distance[k] = [0.9, 0.95], np.nan if k == 4 else 50.0
+    search_between(surface, points, found, distance, 1e-6)
+    assert np.abs(found - uv).max() < 1e-9 and distance.max() < 1e-9
+    kept, off = uv + 0.01, np.full(9, 1e-7)
+    search_between(surface, points, kept, off, 1e-6)  # near enough
+    assert np.array_equal(kept, uv + 0.01) and (off == 1e-7).all()
+    away = points + np.array([0.0, 0.0, 1.0])
+    found, distance = uv.copy(), np.full(9, 1e-3)
+    search_between(surface, away, found, distance, 1e-6)  # nothing nearer
+    assert np.array_equal(found, uv) and (distance == 1e-3).all()
