@@ -87,8 +87,9 @@ def factorize(basis: Basis, lists: Lists, mesh: Mesh, cost: tuple[float, float] 
     _take_out(lists, made.rows_at == PLAIN)
     by_point = cells_by_point(lists.ids, lists.rows, len(lists.point_start))
     lists.point_start, lists.point_count, lists.point_cell, lists.point_row = by_point
-    kept = (array[:count].copy() for array, count in zip((factor_u, factor_v, factors, picks), used, strict=True))
-    return Factors(made.rows_at, made.picks_at, *kept, slopes=slopes, sums=made.sums + room)
+    arrays = zip((factor_u, factor_v, factors, picks), used, strict=True)
+    u, v, *others = (array[:count].copy() for array, count in arrays)
+    return Factors(made.rows_at, made.picks_at, u, v, others[0], others[1], slopes, made.sums + room)
 
 
 def _slots(entries: int) -> Ints:

@@ -4,7 +4,8 @@ Sums over control points stay in registers this way, whatever the loop around th
 operations into AVX, SSE or NEON instructions.
 """
 
-# mypy: allow-untyped-defs, allow-untyped-calls, allow-incomplete-defs, disable-error-code="import-untyped"
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-incomplete-defs
+# mypy: disable-error-code="import-untyped, attr-defined"
 from __future__ import annotations
 
 from inspect import Parameter, Signature

@@ -129,7 +129,7 @@ def test_every_subject_is_given_its_own_options(calls: list[tuple[Any, ...]], tm
     said("drift")
     said("quadtree")
     assert calls == [
-        ("bench_surface", 0.3, 100_000), ("bench_drift", "ict", 1_000_000), ("bench_quadtree", "ict", 7, None)
+        ("bench_surface", 0.3, 100_000, "ict"), ("bench_drift", "ict", 1_000_000), ("bench_quadtree", "ict", 7, None)
     ]  # fmt: skip
     calls.clear()
     svg, png = tmp_path / "a.svg", tmp_path / "b.PNG"
