@@ -75,7 +75,7 @@ def _operation(result, *arguments):
             return signature, lambda context, builder, _, args: build(context, builder, signature.args, args)
 
         names = "typingctx", *(f"argument{k}" for k in range(len(arguments)))
-        typed.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in names])  # type: ignore[attr-defined]
+        typed.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in names])
         typed.__name__, typed.__doc__ = build.__name__, build.__doc__
         return intrinsic(typed)
 
