@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -17,6 +17,9 @@ from controller.base.files import replacing
 from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
 from surface.base.extras import require
+
+if TYPE_CHECKING:
+    from surface.bench.bench import Measure
 
 PICTURES = (".png", ".svg", ".jpg", ".webp")
 _KEPT = {None: "", True: "kept", False: "missed"}
@@ -93,16 +96,21 @@ def bench(
                 tables = benches.bench_savings(head, log, level) if large else []
                 tables += benches.bench_quadtree(head, log, level, file)
             case _:
-                tables = benches.bench_surface(seconds, log, vertices)
+                tables = benches.bench_surface(seconds, log, vertices, head)
                 tables += benches.bench_large(seconds, log, advance, vertices) if large else []
                 tables += benches.bench_growth(seconds, log, file, vertices) if file is not None else []
     for title, measures in tables:
         table = Table("measure", "ms", "ratio", "to", "reach", "", title=title, title_justify="left")
         for row in measures:
             took = f"{row.milliseconds:.3f}" if row.milliseconds else ""
-            ratio = "" if row.ratio is None else f"{row.ratio:.2f}"
-            table.add_row(row.name, took, ratio, row.against, row.reach, _KEPT[row.kept])
+            table.add_row(row.name, took, _ratio(row), row.against, row.reach, _KEPT[row.kept])
         show_table(table)
+
+
+def _ratio(row: Measure) -> str:
+    """A ratio as text, with its interval where there is one."""
+    interval = "" if row.interval is None else f" ({row.interval[0]:.2f} to {row.interval[1]:.2f})"
+    return "" if row.ratio is None else f"{row.ratio:.2f}{interval}"
 
 
 def _bench_bus(seconds: float, face: bool, as_json: bool) -> None:

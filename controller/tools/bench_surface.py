@@ -13,8 +13,8 @@ import numpy as np
 from controller.base.parameters import Floats
 from controller.base.paths import find_config
 from surface.base.progress import Progress
-from surface.bench import growth
-from surface.bench.bench import Measure, build_table, large_table, least, measure, speed_table
+from surface.bench import cold, growth
+from surface.bench.bench import Measure, build_table, large_table, least, measure, sheet, speed_table
 from surface.bench.comparison import Variant, compare, draw
 from surface.bench.drift import drift
 from surface.bench.savings import MEASURES, nine_surfaces, savings
@@ -46,9 +46,21 @@ def bench_head(name: str, seconds: float, log: Log) -> Tables:
     return [(title, pose_rows(head, seconds, log)), (about, [replace(row, reach="") for row in engine])]
 
 
-def bench_surface(seconds: float, log: Log, vertices: int = VERTICES) -> Tables:
-    """The engine at its memory limit, on a plain sheet of about so many vertices."""
-    return [(f"about {vertices:,} vertices, 16 influences, one thread", speed_table(vertices, seconds, log))]
+def bench_surface(seconds: float, log: Log, vertices: int = VERTICES, name: str = "ict") -> Tables:
+    """The engine with cold caches on surfaces of several kinds, one of them a head; then, with warm caches, at its
+    limit, on a plain sheet of about so many vertices."""
+    head = Head.load(find_config("heads", name))
+    deforming = [(part.surface, part.mesh) for part in head.parts if part.follows == "skin"]
+    kinds: list[tuple[str, list[cold.Body], str]] = [
+        (f"head {head.name}", deforming, cold.REACH),
+        ("three levels", [cold.hierarchical(vertices // 2)], cold.REACH),
+        ("scattered points", [cold.scattered(vertices // 50, vertices // 2)], cold.REACH),
+        ("sheet", [sheet(vertices)], "<= 1.0"),
+    ]
+    rows = [row for kind in kinds for row in cold.cold_rows(*kind[:2], seconds, kind[2], report=log)]
+    title = f"about {vertices:,} vertices, 16 influences, one thread, caches warm"
+    return [("caches cold, as in a frame; ratios with the ends of their 95 % interval", rows),
+            (title, speed_table(vertices, seconds, log))]  # fmt: skip
 
 
 def bench_large(seconds: float, log: Log, progress: Progress, vertices: int = VERTICES) -> Tables:

@@ -14,6 +14,8 @@ import numpy as np
 from surface.base.jit import inlined, kernel
 from surface.spline.lanes import add, div, fma, load, mul, prefetch, root, splat, store, store3, sub, zero
 
+from .groupsums import HEAD, STEP, join_all, join_values, sum_groups, wide
+
 LEAST_SUM = 1e-36  # of the weights at a vertex: float32 has fewer digits for smaller numbers
 AHEAD = 1024  # weights that are prefetched before they are needed
 
@@ -24,8 +26,10 @@ NAMES = (
     "points", "origin", "inv_w", "dw", "numerators", "differences", "vertices", "normals",
     "ranges", "hits", "affected", "recomputed", "moved_ids", "delta", "local", "scratch",
     "pull", "span", "drift", "extent",
+    "rows_at", "picks_at", "factor_u", "factor_v", "factors", "picks",
 )  # fmt: skip
-"""The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`.
+"""The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`,
+then of :class:`.factors.Factors`.
 
 Kernels unpack that tuple once: each access of an element costs a reference count.
 """
@@ -115,41 +119,37 @@ def normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw):
 
 
 @inlined
-def compute_positions(rows, at, tile, value, inv_w, local):
-    """Positions of one tile relative to the cell's origin, from the cell's control points."""
-    x, y, z = sum_values(value, at, rows, local)
-    return positions_of(tile, x, y, z, inv_w)
-
-
-@inlined
-def compute_normals(rows, at, tile, sign, value, slope, inv_w, dw, local):
-    """Positions relative to the cell's origin and normals of one tile, from the cell's control points."""
-    x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, at, rows, local)
-    x, y, z = positions_of(tile, x, y, z, inv_w)
-    nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
-    return x, y, z, nx, ny, nz
-
-
-@inlined
-def store_numerators(first_tile, end_tile, rows, room, at, value, slope, local, numerators):
+def store_numerators(
+    first_tile, end_tile, rows, place, step, row, head, slopes, value, slope, factor_u, factor_v, factors, picks, local,
+    starts, scratch, numerators,
+):  # fmt: skip
     """Store the numerators of one cell, whose points are in ``local``, for later differences."""
-    size = 72 if slope.shape[0] > 0 else 24
-    for tile in range(first_tile, end_tile):
-        base = tile * size
-        if size == 24:
-            x, y, z = sum_values(value, at, rows, local)
-        else:
-            x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, at, rows, local)
+    base, at, groups = first_tile * (72 if slopes else 24), head + HEAD, 0
+    wide_u, wide_v = wide(row, head, picks)
+    if row >= 0:
+        groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, slopes, local, starts, scratch)
+    for _ in range(first_tile, end_tile):
+        if slopes:
+            if row >= 0:
+                x, y, z, ax, ay, az, bx, by, bz = join_all(groups, wide_u, wide_v, at, factors, picks, starts, scratch)
+            else:
+                x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, place, rows, local)
             store(numerators, base + 24, ax)
             store(numerators, base + 32, ay)
             store(numerators, base + 40, az)
             store(numerators, base + 48, bx)
             store(numerators, base + 56, by)
             store(numerators, base + 64, bz)
+        elif row >= 0:
+            x, y, z = join_values(groups, wide_u, at, factors, picks, starts, scratch)
+        else:
+            x, y, z = sum_values(value, place, rows, local)
         store(numerators, base, x)
         store(numerators, base + 8, y)
         store(numerators, base + 16, z)
-        at += room * 8
+        base += 72 if slopes else 24
+        place += step
+        at += STEP
 
 
 @inlined
@@ -184,78 +184,146 @@ def finish_cell(first, last, tile, ox, oy, oz, sign, inv_w, dw, numerators, vert
             write_last(normals, full, last, nx, ny, nz, scratch)
 
 
+@inlined
+def write_tile(out, vertex, last, x, y, z, scratch):
+    """Write the vectors of a tile that begins at ``vertex`` of a cell that ends before ``last``."""
+    if vertex + 8 <= last:
+        store3(out, 3 * vertex, x, y, z)
+    else:
+        write_last(out, vertex, last, x, y, z, scratch)
+
+
+@inlined
+def write_plain(first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, scratch, vertices):
+    """Positions of a cell with plain weights; the loop over whole tiles is without branches."""
+    full = last - (last - first) % 8
+    for vertex in range(first, full, 8):
+        x, y, z = sum_values(value, place, rows, local)
+        x, y, z = positions_of(tile, x, y, z, inv_w)
+        store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
+        place += step
+        tile += 1
+    if full < last:
+        x, y, z = sum_values(value, place, rows, local)
+        x, y, z = positions_of(tile, x, y, z, inv_w)
+        write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
+
+
+@inlined
+def write_joined(
+    first, last, tile, groups, wide_u, pick_at, px, py, pz, factors, picks, starts, scratch, inv_w, vertices
+):  # fmt: skip
+    """Positions of a cell with factors, whose groups have been summed."""
+    full = last - (last - first) % 8
+    for vertex in range(first, full, 8):
+        x, y, z = join_values(groups, wide_u, pick_at, factors, picks, starts, scratch)
+        x, y, z = positions_of(tile, x, y, z, inv_w)
+        store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
+        pick_at += STEP
+        tile += 1
+    if full < last:
+        x, y, z = join_values(groups, wide_u, pick_at, factors, picks, starts, scratch)
+        x, y, z = positions_of(tile, x, y, z, inv_w)
+        write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
+
+
 @kernel
 def compute_cells(arrays, cells, begin, end, sign, local, scratch):
     """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored."""
     cell_start, tile_start, all_rows, room, at, ids_at, ids, value, slope = arrays[:9]
     points, origin, inv_w, dw, _, differences, vertices, normals = arrays[13:21]
+    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:]
+    starts = np.empty(local.shape[0], np.int32)
     for q in range(begin, end):
         c = cells[q]
         differences[c] = -1
-        rows, place, step, tile = all_rows[c], at[c], room[c] * 8, tile_start[c]
+        rows, first, last = all_rows[c], cell_start[c], cell_start[c + 1]
         gather(points, ids, ids_at[c], rows, origin, c, local)
         px, py, pz = splat(np.float32(origin[c, 0])), splat(np.float32(origin[c, 1])), splat(np.float32(origin[c, 2]))
-        first, last = cell_start[c], cell_start[c + 1]
-        full = last - (last - first) % 8
-        if slope.shape[0] == 0:
-            for vertex in range(first, full, 8):
-                x, y, z = compute_positions(rows, place, tile, value, inv_w, local)
-                store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
+        place, step, row, pick_at, tile = at[c], room[c] * 8, rows_at[c], picks_at[c] + HEAD, tile_start[c]
+        wide_u, wide_v = wide(row, picks_at[c], picks)
+        if dw.shape[0] == 0 and row < 0:
+            write_plain(
+                first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, scratch, vertices
+            )  # fmt: skip
+        elif dw.shape[0] == 0:
+            groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, False, local, starts, scratch)
+            write_joined(
+                first, last, tile, groups, wide_u, pick_at, px, py, pz, factors, picks, starts, scratch, inv_w, vertices
+            )  # fmt: skip
+        elif row < 0:
+            for vertex in range(first, last, 8):
+                x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, place, rows, local)
+                x, y, z = positions_of(tile, x, y, z, inv_w)
+                nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
+                write_tile(vertices, vertex, last, add(x, px), add(y, py), add(z, pz), scratch)
+                write_tile(normals, vertex, last, nx, ny, nz, scratch)
                 place += step
                 tile += 1
-            if full < last:
-                x, y, z = compute_positions(rows, place, tile, value, inv_w, local)
-                write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
-            continue
-        for vertex in range(first, full, 8):
-            x, y, z, nx, ny, nz = compute_normals(rows, place, tile, sign, value, slope, inv_w, dw, local)
-            store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
-            store3(normals, 3 * vertex, nx, ny, nz)
-            place += step
-            tile += 1
-        if full < last:
-            x, y, z, nx, ny, nz = compute_normals(rows, place, tile, sign, value, slope, inv_w, dw, local)
-            write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
-            write_last(normals, full, last, nx, ny, nz, scratch)
+        else:
+            groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, True, local, starts, scratch)
+            for vertex in range(first, last, 8):
+                x, y, z, ax, ay, az, bx, by, bz = join_all(
+                    groups, wide_u, wide_v, pick_at, factors, picks, starts, scratch
+                )
+                x, y, z = positions_of(tile, x, y, z, inv_w)
+                nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
+                write_tile(vertices, vertex, last, add(x, px), add(y, py), add(z, pz), scratch)
+                write_tile(normals, vertex, last, nx, ny, nz, scratch)
+                pick_at += STEP
+                tile += 1
 
 
 @kernel
-def denominators(cells, cell_start, tile_start, rows, room, at, value, slope, inv_w, dw):
+def denominators(arrays, cells):
     """Sum the weights of the given cells."""
+    cell_start, tile_start, rows, room, at, _, _, value, slope = arrays[:9]
+    inv_w, dw = arrays[15:17]
+    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:]
+    slopes = dw.shape[0] > 0
     for q in range(cells.shape[0]):
         c = cells[q]
+        wide_u, wide_v = wide(rows_at[c], picks_at[c], picks)
         for tile in range(tile_start[c], tile_start[c + 1]):
             t = tile - tile_start[c]
+            pick_at = picks_at[c] + HEAD + STEP * t
             for j in range(8):
                 w, wu, wv = 0.0, 0.0, 0.0
                 for k in range(rows[c]):
-                    place = at[c] + (t * room[c] + k) * 8
-                    w += value[place + j]
-                    if slope.shape[0] > 0:
-                        wu += slope[2 * place + j]
-                        wv += slope[2 * place + 8 + j]
+                    if rows_at[c] >= 0:
+                        at_u = factor_u[rows_at[c] + k] + picks[pick_at + 16] + picks[pick_at + j]
+                        at_v = factor_v[rows_at[c] + k] + picks[pick_at + 17] + picks[pick_at + 8 + j]
+                        w += factors[at_u] * factors[at_v]
+                        if slopes:
+                            wu += factors[at_u + wide_u] * factors[at_v]
+                            wv += factors[at_u] * factors[at_v + wide_v]
+                    else:
+                        place = at[c] + (t * room[c] + k) * 8
+                        w += value[place + j]
+                        if slopes:
+                            wu += slope[2 * place + j]
+                            wv += slope[2 * place + 8 + j]
                 if cell_start[c] + 8 * t + j >= cell_start[c + 1]:
                     w = 1.0  # lanes that fill up the last tile
                 inv_w[8 * tile + j] = 1.0 / w if w >= LEAST_SUM else np.inf
-                if slope.shape[0] > 0:
+                if slopes:
                     dw[16 * tile + j], dw[16 * tile + 8 + j] = wu, wv
 
 
 @kernel
-def unusable(cells, cell_start, tile_start, rows, room, at, value, slope, inv_w):
-    """The first vertex of ``cells`` whose weights add up to less than ``LEAST_SUM``, or one of whose weights or
-    derivative weights is not finite; -1 if there is none."""
+def unusable(cells, cell_start, tile_start, inv_w, dw):
+    """The first vertex of ``cells`` whose weights add up to less than ``LEAST_SUM`` or to more than float32 has, or
+    whose derivative weights do; -1 if there is none."""
     for q in range(cells.shape[0]):
         c = cells[q]
         for vertex in range(cell_start[c], cell_start[c + 1]):
             t, j = (vertex - cell_start[c]) // 8, (vertex - cell_start[c]) % 8
-            total = np.float64(inv_w[8 * (tile_start[c] + t) + j])
-            for k in range(rows[c]):
-                place = at[c] + (t * room[c] + k) * 8
-                total += abs(value[place + j])
-                if slope.shape[0] > 0:
-                    total += abs(slope[2 * place + j]) + abs(slope[2 * place + 8 + j])
-            if not total < np.inf:
+            tile = tile_start[c] + t
+            total = np.float64(inv_w[8 * tile + j])
+            usable = total > 0.0
+            if dw.shape[0] > 0:
+                total += abs(dw[16 * tile + j]) + abs(dw[16 * tile + 8 + j])
+            if not (usable and total < np.inf):
                 return vertex
     return -1
 

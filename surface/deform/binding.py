@@ -17,7 +17,7 @@ from numba.extending import intrinsic
 
 from surface.base.jit import inlined, kernel
 
-from .apply import NAMES, compute_cells
+from .apply import NAMES, compute_cells, denominators
 from .updates import move_points
 
 
@@ -66,6 +66,8 @@ def _arrays(table):
         _rows(table, 26, 3, np.float64), _rows(table, 27, 3, np.float32), _flat(table, 28, np.float32),
         _flat(table, 29, np.float64), _flat(table, 30, np.float64), _flat(table, 31, np.float64),
         _flat(table, 32, np.float64),
+        _flat(table, 33, np.int64), _flat(table, 34, np.int64), _flat(table, 35, np.int32), _flat(table, 36, np.int32),
+        _flat(table, 37, np.float32), _flat(table, 38, np.int32),
     )  # fmt: skip
 
 
@@ -79,3 +81,9 @@ def move_points_at(table, ids, rows, relative, most, limit, bias, gap, sign):
 def compute_cells_at(table, cells, begin, end, sign, local, scratch):
     """:func:`surface.deform.apply.compute_cells` for the arrays of a table."""
     compute_cells(_arrays(table), cells, begin, end, sign, local, scratch)
+
+
+@kernel
+def denominators_at(table, cells):
+    """:func:`surface.deform.apply.denominators` for the arrays of a table."""
+    denominators(_arrays(table), cells)

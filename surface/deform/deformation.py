@@ -25,8 +25,9 @@ from surface.spline.basis import pad_knots
 from surface.spline.controlpoints import ControlPoints
 
 from . import apply, edits
-from .binding import address_table, compute_cells_at, move_points_at
-from .lists import Basis, build_lists
+from .binding import address_table, compute_cells_at, denominators_at, move_points_at
+from .factors import factorize
+from .lists import LANES, Basis, build_lists
 from .updates import NOT_STORED, REFUSED
 
 Table = TypeVar("Table", bound=ControlPoints)
@@ -52,7 +53,8 @@ class Deformation(Generic[Table]):
     Attributes
     ----------
     vertices, normals : (m, 3) float32, current, read-only; (0, 3) without normals
-    mesh, basis, lists : the mesh; knots, degrees and weights of the control points; their weights by cell
+    mesh, basis : the mesh; knots, degrees and weights of the control points
+    lists, factors : their weights by cell, where they are kept one by one, and where as products
 
     ``ValueError`` for no thread at all, a mesh of a surface with other control points or other knots, or weights so
     small, or derivatives so large, at a vertex that 32-bit numbers cannot hold them.
@@ -72,6 +74,8 @@ class Deformation(Generic[Table]):
             raise ValueError("mesh: was made from another surface, with other knots: tessellate this one")
         self.mesh, self.basis = mesh, Basis.of(surface)
         self.lists = build_lists(surface, mesh, normals, progress)
+        self._work = self.lists.rows * np.diff(self.lists.tile_start) * LANES  # weights by cell, however they are kept
+        self.factors = factorize(self.basis, self.lists, mesh)
         self._sign, self._threads = np.float32(-1 if mesh.flip else 1), threads
         self._most = int(MOST_MOVED * len(surface.arrays()[4]))
         self._pool: ThreadPoolExecutor | None = None  # started when first used
@@ -80,9 +84,9 @@ class Deformation(Generic[Table]):
         self._points, self._ranges, self._count = self._arrays["points"], self._arrays["ranges"], 0
         self._all, self._cells = np.arange(surface.n), np.arange(len(mesh.cell_start) - 1, dtype=np.int32)
         self.vertices, self.normals = _view(self._arrays["vertices"]), _view(self._arrays["normals"])
+        self._bind()
         self._sum_weights(np.arange(len(self._cells)))
         self._check_weights("mesh", np.arange(len(self._cells)))
-        self._bind()
         self.refresh()
 
     @property
@@ -107,7 +111,7 @@ class Deformation(Generic[Table]):
     @property
     def nbytes(self) -> int:
         """Bytes of weights and lists."""
-        return self.lists.nbytes
+        return self.lists.nbytes + self.factors.nbytes
 
     def move(self, ids: ArrayLike, delta: ArrayLike) -> None:
         """Move points by ``delta (k, 3)`` (or one (3,) for all); an id that is given twice moves twice.
@@ -137,14 +141,20 @@ class Deformation(Generic[Table]):
         if w.shape != which.shape:
             raise ValueError(f"weights: shape {w.shape}, expected {which.shape}")
         before = self.basis.weights[which]
-        cells = edits.change_weights(self.basis, self.lists, self.mesh, which, w)
-        self._sum_weights(cells)
         try:
-            self._check_weights("weights", cells)
+            cells = self._change_weights(which, w)
         except ValueError:
-            self._sum_weights(edits.change_weights(self.basis, self.lists, self.mesh, which, before))
+            self._change_weights(which, before)
             raise
         self._update(cells)
+
+    def _change_weights(self, which: Ints, weights: Floats) -> Ints:
+        """Give points other weights; returns the cells that changed. ``ValueError`` where a vertex has none then."""
+        cells = edits.change_weights(self.basis, self.lists, self.factors, self.mesh, which, weights)
+        self._bind()
+        self._sum_weights(cells)
+        self._check_weights("weights", cells)
+        return cells
 
     def set_knots(self, index: int, knots_u: ArrayLike, knots_v: ArrayLike) -> None:
         """Give one point other knots, and so another subdomain; lists change only where the old or new one reaches.
@@ -156,21 +166,26 @@ class Deformation(Generic[Table]):
         knots, degrees = [row[0][0] for row in rows], [int(row[1][0]) for row in rows]
         basis = self.basis
         before = [k[index, : p[index] + 2].copy() for k, p in zip(basis.knots, basis.degrees, strict=True)]
-        cells = edits.change_knots(basis, self.lists, self.mesh, index, knots, degrees)
-        self._sum_weights(cells)
+        cells = self._change_knots(index, knots, degrees)
         try:
             self._check_weights("knots_u, knots_v", cells)
         except ValueError:
-            same = [len(k) - 2 for k in before]
-            self._sum_weights(edits.change_knots(basis, self.lists, self.mesh, index, before, same))
+            self._change_knots(index, before, [len(k) - 2 for k in before])
             raise
+        self._update(cells)
+
+    def _change_knots(self, index: int, knots: list[Floats], degrees: list[int]) -> Ints:
+        """Give a point other knots; returns the cells that changed, whose weights are summed."""
+        try:
+            cells = edits.change_knots(self.basis, self.lists, self.factors, self.mesh, index, knots, degrees)
         finally:
             self._bind()
-        self._update(cells)
+        self._sum_weights(cells)
+        return cells
 
     def refresh(self) -> None:
         """Compute everything again from the control points."""
-        if self._threads == 1 or len(self.lists.value) < SMALL:
+        if self._threads == 1 or self._work.sum() < SMALL:
             self._compute(self._cells)
         else:
             self._compute_in_parts()
@@ -208,21 +223,19 @@ class Deformation(Generic[Table]):
         self.refresh()
 
     def _bind(self) -> None:
-        """Make room for the longest list, and take the addresses of all arrays, which other knots may have replaced."""
+        """Make room for the longest list and the sums of groups, and take the addresses of all arrays, which may have
+        been replaced."""
         self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)), 3), dtype=np.float32)
-        self._addresses = address_table(vars(self.lists) | self._arrays)
+        self._arrays["scratch"] = np.zeros(self.factors.sums, dtype=np.float32)
+        self._addresses = address_table(vars(self.lists) | self._arrays | vars(self.factors))
 
     def _sum_weights(self, cells: Ints) -> None:
-        x = self.lists
-        apply.denominators(
-            cells, x.cell_start, x.tile_start, x.rows, x.room, x.at, x.value, x.slope, self._arrays["inv_w"],
-            self._arrays["dw"],
-        )  # fmt: skip
+        denominators_at(self._addresses, cells)
 
     def _check_weights(self, name: str, cells: Ints) -> None:
         """``ValueError`` for the first vertex of ``cells`` whose weights 32-bit numbers cannot hold."""
-        bad = apply.unusable(cells, *(getattr(self.lists, key) for key in apply.NAMES[:5]),
-                             self.lists.value, self.lists.slope, self._arrays["inv_w"])  # fmt: skip
+        arrays = self._arrays
+        bad = apply.unusable(cells, self.lists.cell_start, self.lists.tile_start, arrays["inv_w"], arrays["dw"])
         if bad >= 0:
             u, v = self.mesh.uv[bad]
             raise ValueError(
@@ -243,7 +256,7 @@ class Deformation(Generic[Table]):
         """Threads take parts with equal shares of the weights, one after the other: a delayed thread does fewer."""
         if self._pool is None:
             self._pool = ThreadPoolExecutor(self._threads - 1, thread_name_prefix="surface")
-        total = np.cumsum(self.lists.rows * np.diff(self.lists.tile_start))
+        total = np.cumsum(self._work)
         parts = PARTS * self._threads
         cuts = [*np.searchsorted(total, total[-1] * np.arange(parts) / parts).tolist(), len(total)]
         turns = count()  # next(turns) is one step: no two threads take the same part
@@ -280,7 +293,7 @@ def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[
         "differences": np.full(cells, NOT_STORED),
         "vertices": single(3 * m), "normals": single(3 * m * normals), "ranges": np.zeros((max(cells, 1), 2), np.int64),
         "hits": cell(dtype=np.int64), "affected": cell(dtype=np.int32), "recomputed": cell(dtype=np.int32),
-        "moved_ids": np.zeros(n, np.int64), "delta": np.zeros((n, 3)), "scratch": single(24),
+        "moved_ids": np.zeros(n, np.int64), "delta": np.zeros((n, 3)),
         "pull": cell(), "span": cell(), "drift": cell(), "extent": np.array([float(np.ptp(points, axis=0).max()), 0.0]),
     }  # fmt: skip
 

@@ -11,29 +11,39 @@ from surface.mesh.mesh import Mesh
 from surface.spline.basis import blending
 from surface.spline.kernels import points_in
 
-from .lists import LANES, Basis, Lists, cells_by_point, write_rows
+from .factors import Factors, expand, remember
+from .lists import LANES, Basis, Lists, cells_by_point, grow, write_rows
 
 
-def change_weights(basis: Basis, lists: Lists, mesh: Mesh, which: Ints, weights: Floats) -> Ints:
-    """Give points ``which (k,)`` other ``weights (k,)``; returns the rising cells that changed."""
+def change_weights(
+    basis: Basis, lists: Lists, factors: Factors, mesh: Mesh, which: Ints, weights: Floats
+) -> Ints:  # fmt: skip
+    """Give points ``which (k,)`` other ``weights (k,)``; returns the rising cells that changed, which get plain
+    weights."""
     which, cells = basis.copies(which), [np.zeros(0, dtype=np.int64)]
     basis.weights[which] = np.tile(weights, len(basis.shifts))
     for i in which:
         reached, rows = lists.entries_of(int(i))
+        expand(lists, factors, reached)
         write_rows(basis, lists, mesh, int(i), reached, rows)
         cells.append(reached)
     return np.unique(np.concatenate(cells))
 
 
-def change_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]) -> Ints:
-    """Give point i other knots; returns the rising cells that changed.
+def change_knots(
+    basis: Basis, lists: Lists, factors: Factors, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]
+) -> Ints:  # fmt: skip
+    """Give point i other knots; returns the rising cells that changed, which get plain weights.
 
     ``ValueError`` where a vertex would be covered by no point; nothing is changed then.
     """
     copies = [(b * basis.n + i, [knots[k] + shift[k] for k in range(2)]) for b, shift in enumerate(basis.shifts)]
+    restore = remember(lists, factors)
     for copy, shifted in copies:
+        expand(lists, factors, np.union1d(lists.entries_of(copy)[0], _cells_in(mesh, shifted)))
         vertex = _first_uncovered(lists, mesh, copy, shifted)
         if vertex >= 0:
+            restore()
             raise ValueError(f"knots_u, knots_v: point {i} would leave vertex {vertex} of the mesh uncovered")
     return np.unique(np.concatenate([_replace_knots(basis, lists, mesh, *copy, degrees) for copy in copies]))
 
@@ -91,8 +101,10 @@ def _cells_in(mesh: Mesh, knots: list[Floats]) -> Ints:
 def _blocks(lists: Lists, c: int) -> list[np.ndarray]:
     """Views of a cell's weights (tiles, room, 8) and derivative weights (tiles, room, 16), if there are any."""
     room, at = lists.room[c], lists.at[c]
-    end = at + (lists.tile_start[c + 1] - lists.tile_start[c]) * room * LANES
-    return [lists.value[at:end].reshape(-1, room, 8), lists.slope[2 * at : 2 * end].reshape(-1, room, 16)]
+    tiles = lists.tile_start[c + 1] - lists.tile_start[c]
+    end = at + tiles * room * LANES
+    slope_tiles = tiles if len(lists.slope) else 0
+    return [lists.value[at:end].reshape(tiles, room, 8), lists.slope[2 * at : 2 * end].reshape(slope_tiles, room, 16)]
 
 
 def _entry(lists: Lists, i: int, c: int) -> int:
@@ -126,7 +138,7 @@ def _append_row(lists: Lists, i: int, c: int) -> int:
     if count == lists.point_room[i]:  # its list of cells is full: it moves to the end of the arrays
         room, end = count * 5 // 4 + 4, lists.point_used
         for name in ("point_cell", "point_row"):
-            table = _grow(getattr(lists, name), end + room)
+            table = grow(getattr(lists, name), end + room)
             table[end : end + count] = table[start : start + count]
             setattr(lists, name, table)
         start = lists.point_start[i] = end
@@ -143,23 +155,18 @@ def _enlarge(lists: Lists, c: int, room: int) -> None:
     lists.at[c], lists.ids_at[c], lists.room[c] = lists.used, lists.ids_used, room
     lists.used += int(lists.tile_start[c + 1] - lists.tile_start[c]) * room * LANES
     lists.ids_used += room
-    lists.value, lists.ids = _grow(lists.value, lists.used), _grow(lists.ids, lists.ids_used)
+    lists.value, lists.ids = grow(lists.value, lists.used), grow(lists.ids, lists.ids_used)
     if len(lists.slope):
-        lists.slope = _grow(lists.slope, 2 * lists.used)
+        lists.slope = grow(lists.slope, 2 * lists.used)
     for new, block in zip(_blocks(lists, c), old, strict=True):
         new[:, :rows] = block[:, :rows]
     lists.ids[lists.ids_at[c] : lists.ids_at[c] + rows] = ids
 
 
-def _grow(table: np.ndarray, wanted: int) -> np.ndarray:
-    if wanted <= len(table):
-        return table
-    return np.concatenate([table, np.zeros(max(wanted, len(table) * 5 // 4) - len(table), dtype=table.dtype)])
-
-
 def _compact(lists: Lists) -> None:
     """Once half of the arrays is no longer used, copy what is used to new ones without gaps."""
-    sizes = lists.rows * np.diff(lists.tile_start) * LANES
+    held = np.where(lists.room > 0, lists.rows, 0)  # none where a cell has factors
+    sizes = held * np.diff(lists.tile_start) * LANES
     if lists.used <= 2 * sizes.sum() and lists.point_used <= 2 * int(lists.point_count.sum()) + 1024:
         return
     cells = [(_blocks(lists, c), lists.ids_at[c], rows) for c, rows in enumerate(lists.rows)]
@@ -167,7 +174,7 @@ def _compact(lists: Lists) -> None:
         np.concatenate([blocks[k][:, :rows].ravel() for blocks, _, rows in cells]) for k in range(2)
     )
     lists.ids = np.concatenate([lists.ids[first : first + rows] for _, first, rows in cells])
-    lists.at, lists.ids_at, lists.room = np.cumsum(sizes) - sizes, np.cumsum(lists.rows) - lists.rows, lists.rows.copy()
+    lists.at, lists.ids_at, lists.room = np.cumsum(sizes) - sizes, np.cumsum(lists.rows) - lists.rows, held
     by_point = cells_by_point(lists.ids, lists.rows, len(lists.point_start))
     lists.point_start, lists.point_count, lists.point_cell, lists.point_row = by_point
     lists.__post_init__()

@@ -137,3 +137,10 @@ def write_rows(basis: Basis, lists: Lists, mesh: Mesh, i: int, cells: Ints, rows
         lists.value, lists.slope, lists.at, lists.room, nonzero,
     )  # fmt: skip
     return nonzero
+
+
+def grow(table: np.ndarray, wanted: int) -> np.ndarray:
+    """The table with zeros after it, at least ``wanted`` long in all, with some room for more."""
+    if wanted <= len(table):
+        return table
+    return np.concatenate([table, np.zeros(max(wanted, len(table) * 5 // 4) - len(table), dtype=table.dtype)])

@@ -17,6 +17,7 @@ from surface.base.jit import inlined, kernel
 from surface.spline.lanes import fma, load, store
 
 from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
+from .groupsums import HEAD, STEP, product, slope_products, wide
 
 NOT_STORED = -1  # in ``differences``: the cell's numerators are not stored
 STORE = -2  # in ``differences``: compute and store them now
@@ -34,16 +35,32 @@ def accumulate(numerators, place, weights, number):
 
 
 @inlined
-def add_row(first_tile, end_tile, place, step, dx, dy, dz, value, slope, numerators):
-    """Eq. (2): add b w dP of one control point, whose weights start at ``place``, to the numerators of one cell."""
-    size = 72 if slope.shape[0] > 0 else 24
+def add_row(
+    first_tile, end_tile, place, step, row, head, dx, dy, dz, slopes, value, slope, factor_u, factor_v, factors, picks,
+    numerators,
+):  # fmt: skip
+    """Eq. (2): add b w dP of one control point to the numerators of one cell.
+
+    Its plain weights start at ``place``, or it is the ``row`` in the factors, unless that is -1.
+    """
+    size, at = 72 if slopes else 24, head + HEAD
+    wide_u, wide_v = wide(row, head, picks)
     for tile in range(first_tile, end_tile):
-        a, base = load(value, place), tile * size
+        base = tile * size
+        if row >= 0:
+            at_u, at_v = factor_u[row] + picks[at + 16], factor_v[row] + picks[at + 17]
+            a = product(factors, picks, at_u, at_v, at)
+        else:
+            at_u, at_v = 0, 0
+            a = load(value, place)
         accumulate(numerators, base, a, dx)
         accumulate(numerators, base + 8, a, dy)
         accumulate(numerators, base + 16, a, dz)
-        if slope.shape[0] > 0:
-            u, v = load(slope, 2 * place), load(slope, 2 * place + 8)
+        if slopes:
+            if row >= 0:
+                _, u, v = slope_products(factors, picks, at_u, at_v, wide_u, wide_v, at)
+            else:
+                u, v = load(slope, 2 * place), load(slope, 2 * place + 8)
             accumulate(numerators, base + 24, u, dx)
             accumulate(numerators, base + 32, u, dy)
             accumulate(numerators, base + 40, u, dz)
@@ -51,6 +68,7 @@ def add_row(first_tile, end_tile, place, step, dx, dy, dz, value, slope, numerat
             accumulate(numerators, base + 56, v, dy)
             accumulate(numerators, base + 64, v, dz)
         place += step
+        at += STEP
 
 
 @kernel
@@ -149,7 +167,9 @@ def update_cells(arrays, count, limit, bias, sign):
     cell_start, tile_start, rows, room, at, ids_at, ids, value, slope = arrays[:9]
     point_start, point_count, point_cell, point_row = arrays[9:13]
     points, origin, inv_w, dw, numerators, differences, vertices, normals = arrays[13:21]
-    _, hits, affected, recomputed, moved_ids, delta, local, scratch, pull, span, drift, extent = arrays[21:]
+    _, hits, affected, recomputed, moved_ids, delta, local, scratch, pull, span, drift, extent = arrays[21:33]
+    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:]
+    slopes, starts = dw.shape[0] > 0, np.empty(local.shape[0], np.int32)
     total = find_affected(moved_ids, delta, count, point_start, point_count, point_cell, hits, pull, affected)
     again = choose_recomputed(
         total, affected, hits, pull, differences, span, drift, rows, limit, bias, MOST_DRIFT * extent[0], recomputed
@@ -160,9 +180,10 @@ def update_cells(arrays, count, limit, bias, sign):
         for e in range(point_start[i], point_start[i] + point_count[i]):
             c = point_cell[e]
             if differences[c] >= 0:
-                place = at[c] + 8 * point_row[e]
+                row = rows_at[c] + point_row[e] if rows_at[c] >= 0 else -1
                 add_row(
-                    tile_start[c], tile_start[c + 1], place, room[c] * 8, dx, dy, dz, value, slope, numerators
+                    tile_start[c], tile_start[c + 1], at[c] + 8 * point_row[e], room[c] * 8, row, picks_at[c], dx, dy,
+                    dz, slopes, value, slope, factor_u, factor_v, factors, picks, numerators,
                 )  # fmt: skip
     for q in range(total):
         c = affected[q]
@@ -171,7 +192,8 @@ def update_cells(arrays, count, limit, bias, sign):
         if differences[c] == STORE:
             gather(points, ids, ids_at[c], rows[c], origin, c, local)
             store_numerators(
-                tile_start[c], tile_start[c + 1], rows[c], room[c], at[c], value, slope, local, numerators
+                tile_start[c], tile_start[c + 1], rows[c], at[c], room[c] * 8, rows_at[c], picks_at[c], slopes, value,
+                slope, factor_u, factor_v, factors, picks, local, starts, scratch, numerators,
             )  # fmt: skip
             differences[c] = 0
             span[c], drift[c] = largest(local, rows[c]), 0.0
@@ -232,7 +254,7 @@ def move_points(arrays, ids, rows, relative, most, limit, bias, gap, sign):
     computed again; or what :func:`first_invalid` found, less REFUSED, and then nothing has been changed.
     """
     cell_start, points = arrays[0], arrays[13]
-    found, _, affected, _, moved_ids, delta, _, _, _, _, _, extent = arrays[21:]
+    found, _, affected, _, moved_ids, delta, _, _, _, _, _, extent = arrays[21:33]
     bad = first_invalid(ids, rows, relative, points)
     if bad != VALID:
         return bad - REFUSED

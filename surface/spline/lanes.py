@@ -4,18 +4,33 @@ Sums over control points stay in registers this way, whatever the loop around th
 operations into AVX, SSE or NEON instructions.
 """
 
-# mypy: allow-untyped-defs, allow-untyped-calls, allow-incomplete-defs, disable-error-code="import-untyped"
+# mypy: allow-untyped-defs, allow-untyped-calls, allow-incomplete-defs
+# mypy: disable-error-code="import-untyped, attr-defined"
 from __future__ import annotations
 
 from inspect import Parameter, Signature
 
-from llvmlite import ir
-from numba.core import types
+from llvmlite import binding, ir
+from numba.core import config, types
 from numba.extending import intrinsic, models, register_model
 
 LANES = 8
 VECTOR = ir.VectorType(ir.FloatType(), LANES)
 INDEX = ir.IntType(32)
+INDICES = ir.VectorType(INDEX, LANES)
+
+
+def _has_avx2() -> bool:
+    """Will numba compile for a processor with AVX2?"""
+    if config.CPU_NAME is not None or config.CPU_FEATURES is not None:
+        return "+avx2" in (config.CPU_FEATURES or "").split(",")
+    try:
+        return bool(binding.get_host_cpu_features().get("avx2"))
+    except RuntimeError:  # LLVM does not know this processor
+        return False
+
+
+PICKS_FAST = _has_avx2()  # is :func:`pick` one instruction?
 FLAGS = ("contract", "nsz", "arcp")  # a multiplication and an addition may become one instruction
 
 
@@ -60,7 +75,7 @@ def _operation(result, *arguments):
             return signature, lambda context, builder, _, args: build(context, builder, signature.args, args)
 
         names = "typingctx", *(f"argument{k}" for k in range(len(arguments)))
-        typed.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in names])  # type: ignore[attr-defined]
+        typed.__signature__ = Signature([Parameter(name, Parameter.POSITIONAL_ONLY) for name in names])
         typed.__name__, typed.__doc__ = build.__name__, build.__doc__
         return intrinsic(typed)
 
@@ -77,6 +92,27 @@ def zero(context, builder, kinds, args):
 def load(context, builder, kinds, args):
     """``array[index : index + 8]``."""
     return builder.load(_pointer(context, builder, kinds[0], *args), align=4)
+
+
+@_operation(lanes, None, types.intp, None, types.intp)
+def pick(context, builder, kinds, args):
+    """Lane k is ``array[index + picks[first + k]]``; the int32 ``picks`` must be 0 to 7."""
+    values = builder.load(_pointer(context, builder, kinds[0], *args[:2]), align=4)
+    data = context.make_array(kinds[2])(context, builder, args[2]).data
+    picks = builder.load(builder.bitcast(builder.gep(data, [args[3]]), INDICES.as_pointer()), align=4)
+    if PICKS_FAST:
+        kind = ir.FunctionType(VECTOR, [VECTOR, INDICES])
+        return builder.call(builder.module.declare_intrinsic("llvm.x86.avx2.permps", fnty=kind), [values, picks])
+    return _pick_each(builder, values, picks)
+
+
+def _pick_each(builder, values, picks):
+    """Lane by lane, for processors without such an instruction."""
+    out = ir.Constant(VECTOR, ir.Undefined)
+    for k in range(LANES):
+        lane = ir.Constant(INDEX, k)
+        out = builder.insert_element(out, builder.extract_element(values, builder.extract_element(picks, lane)), lane)
+    return out
 
 
 @_operation(types.void, None, types.intp)

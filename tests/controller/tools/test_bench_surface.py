@@ -164,3 +164,13 @@ def test_quad_trees_tell_their_size_deviation_and_saving(monkeypatch: pytest.Mon
         assert uniform.name == f"uniform: {len(mesh.vertices)} vertices, 0.123 mm" and uniform.ratio is None
         assert (uniform.milliseconds, points.milliseconds, points.ratio, chord.ratio) == (0.0, 0.0, 0.5, 0.75)
         assert (points.reach, chord.reach) == (">= 0.502", ">= 0.75")
+
+
+def test_a_head_and_three_kinds_of_surfaces_are_measured_cold(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = list[tuple[Any, ...]]()
+    monkeypatch.setattr(bench_surface.cold, "cold_rows", lambda *given, **_: found.append(given) or [])
+    monkeypatch.setattr(bench_surface, "speed_table", lambda *_: [])
+    assert len(bench_surface.bench_surface(0.1, lambda text: None, 1_000)) == 2
+    assert [given[0] for given in found] == ["head ict", "three levels", "scattered points", "sheet"]
+    assert [given[2:] for given in found] == [(0.1, "<= 2.0")] * 3 + [(0.1, "<= 1.0")]
+    assert len(found[0][1]) == 7 and all(len(given[1]) == 1 for given in found[1:])

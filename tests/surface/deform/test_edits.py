@@ -90,11 +90,15 @@ def test_changed_weights_name_the_cells_that_they_reach() -> None:
     surface = shapes.hills(10)
     mesh = surface.tessellate(chord_error=0.2)
     deformation = surface.deformation(mesh)
-    cells = change_weights(deformation.basis, deformation.lists, mesh, np.array([33, 34]), np.array([2.0, 3.0]))
+    cells = change_weights(
+        deformation.basis, deformation.lists, deformation.factors, mesh, np.array([33, 34]), np.array([2.0, 3.0])
+    )  # fmt: skip
     reached = surface.basis_matrix(mesh.uv)[:, [33, 34]].toarray().any(axis=1)
     assert np.array_equal(cells, np.unique(mesh.cell[reached]))
     assert deformation.basis.weights[[33, 34]].tolist() == [2, 3]
-    none = change_weights(deformation.basis, deformation.lists, mesh, np.zeros(0, dtype=np.int64), np.zeros(0))
+    none = change_weights(
+        deformation.basis, deformation.lists, deformation.factors, mesh, np.zeros(0, dtype=np.int64), np.zeros(0)
+    )
     assert none.shape == (0,)
 
 

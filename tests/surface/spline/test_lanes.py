@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from numba import njit
 
 from surface.spline import lanes
@@ -33,3 +34,25 @@ def test_every_operation() -> None:
     wanted = [x + b, x - b, x * b, x / b, x * number + b, np.sqrt(b), np.full(8, number), np.zeros(8)]
     assert np.allclose(out[:64].reshape(8, 8), wanted, rtol=3e-7, atol=3e-7)
     assert np.array_equal(out[64:].reshape(8, 3), np.stack([x, b, np.full(8, number)], axis=1))
+
+
+@pytest.mark.parametrize("fast", sorted({False, lanes.PICKS_FAST}))
+def test_lanes_are_picked_with_and_without_an_instruction_for_it(fast: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lanes, "PICKS_FAST", fast)
+
+    @njit
+    def picked(values, picks, out):
+        lanes.store(out, 0, lanes.pick(values, 2, picks, 1))
+
+    values, picks = np.arange(12, dtype="f4") ** 2, np.array([9, 0, 7, 3, 3, 5, 1, 2, 6], np.int32)
+    out = np.zeros(8, "f4")
+    picked(values, picks, out)
+    assert np.array_equal(out, values[2 + picks[1:]])
+
+
+def test_a_processor_chosen_for_numba_has_what_its_features_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(lanes.config, "CPU_NAME", "generic")
+    monkeypatch.setattr(lanes.config, "CPU_FEATURES", None)
+    assert lanes._has_avx2() is False
+    monkeypatch.setattr(lanes.config, "CPU_FEATURES", "+avx,+avx2")
+    assert lanes._has_avx2() is True

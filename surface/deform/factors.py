@@ -1,0 +1,290 @@
+"""Weights of cells as products of factors in u and in v, which take less memory than the weights themselves.
+
+A weight is b(u) b(v) w. The vertices of a cell share most of their coordinates, so a control point has few different
+factors b(u) w and b(v) there. They are stored once for each different coordinate, in rising order, with their slopes
+after them; equal rows of different cells and points are stored once. A tile picks its eight factors from a window of
+eight, so that the order of vertices does not matter. A cell keeps plain weights where these are cheaper or a tile's
+coordinates fit no window.
+"""
+
+# mypy: allow-untyped-defs, disable-error-code="call-arg"
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats32, Ints
+from surface.base.jit import kernel
+from surface.mesh.mesh import Mesh
+from surface.spline.kernels import along, distinct
+from surface.spline.lanes import PICKS_FAST
+
+from .groupsums import HEAD, STEP
+from .lists import LANES, Basis, Lists, cells_by_point, grow
+
+PLAIN = -1  # in ``rows_at``: the cell has plain weights
+COST = 1.0, 1.5  # without and with normals: factors that need more operations than so many times plain weights are
+# slower (measured on sheets and heads; they read less memory)
+MOST = 1 << 30  # numbers that are stored as factors; further cells keep plain weights
+MIX = 0x9E3779B1  # multiplier of the hash (Knuth, The Art of Computer Programming 6.4)
+
+
+@dataclass
+class Factors:
+    """The factors of a mesh's cells.
+
+    rows_at : (c,) int64, where every cell's rows start in ``factor_u`` and ``factor_v``; PLAIN without factors
+    picks_at : (c,) int64, where every cell's picks start in ``picks``
+    factor_u, factor_v : (k,) int32, where the factors of a cell's rows start in ``factors``
+    factors : (f,) float32: those of a row in rising order of their coordinates, then as many slopes if there are any
+    picks : (p,) int32: how many factors the rows of a cell have in u and in v; then, by tile, which of a window's
+        eight the lanes take in u, which in v, and where the windows start
+    slopes : are there any?
+    sums : how many numbers of scratch space a kernel needs
+    """
+
+    rows_at: Ints
+    picks_at: Ints
+    factor_u: np.ndarray
+    factor_v: np.ndarray
+    factors: np.ndarray
+    picks: np.ndarray
+    slopes: bool = False
+    sums: int = LANES * 3
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(array.nbytes for array in vars(self).values() if isinstance(array, np.ndarray))
+
+
+def no_factors(cells: int) -> Factors:
+    """Plain weights for that many cells."""
+    single = np.zeros(0, np.int32)
+    return Factors(np.full(cells, PLAIN), np.zeros(cells, np.int64), single, single, np.zeros(0, np.float32), single)
+
+
+def factorize(basis: Basis, lists: Lists, mesh: Mesh, cost: tuple[float, float] = COST) -> Factors:
+    """Replace plain weights by factors where these need at most ``cost`` times as many operations, see :data:`COST`.
+
+    The plain weights of such cells are taken out of ``lists``.
+    """
+    cells, entries = len(lists.rows), len(lists.ids)
+    made = no_factors(cells)
+    if not PICKS_FAST or not cells:
+        return made
+    tiles, slopes = np.diff(lists.tile_start), len(lists.slope) > 0
+    factor_u, factor_v = np.zeros(entries, np.int32), np.zeros(entries, np.int32)
+    factors = np.zeros(len(lists.value) + len(lists.slope), np.float32)
+    picks = np.zeros(HEAD * cells + STEP * int(tiles.sum()), np.int32)
+    *used, room = _factor_cells(
+        *basis.knots, *basis.degrees, basis.weights, mesh.uv, mesh.side, lists.cell_start, lists.tile_start, lists.rows,
+        lists.ids_at, lists.ids, slopes, cost[slopes], int(tiles.max()), made.rows_at, made.picks_at, factor_u,
+        factor_v, factors, picks, _slots(2 * entries), _slots(cells),
+    )  # fmt: skip
+    _take_out(lists, made.rows_at == PLAIN)
+    by_point = cells_by_point(lists.ids, lists.rows, len(lists.point_start))
+    lists.point_start, lists.point_count, lists.point_cell, lists.point_row = by_point
+    arrays = zip((factor_u, factor_v, factors, picks), used, strict=True)
+    u, v, *others = (array[:count].copy() for array, count in arrays)
+    return Factors(made.rows_at, made.picks_at, u, v, others[0], others[1], slopes, made.sums + room)
+
+
+def _slots(entries: int) -> Ints:
+    """An empty hash table, at most half of which so many entries fill."""
+    return np.zeros(1 << (2 * entries).bit_length(), np.int64)
+
+
+def _take_out(lists: Lists, plain: Bools) -> None:
+    """Keep weights only of the cells that are ``plain (c,)``."""
+    sizes = lists.rows * np.diff(lists.tile_start) * LANES
+    lists.value = lists.value[np.repeat(plain, sizes)]
+    if len(lists.slope):
+        lists.slope = lists.slope[np.repeat(plain, 2 * sizes)]
+    sizes[~plain] = 0
+    lists.room[~plain] = 0
+    lists.at = np.cumsum(sizes) - sizes
+    lists.used = len(lists.value)
+
+
+def remember(lists: Lists, factors: Factors) -> Callable[[], None]:
+    """What takes back the next calls of :func:`expand`, if nothing else was changed meanwhile."""
+    value, slope, used = lists.value, lists.slope, lists.used
+    at, room, rows_at = lists.at.copy(), lists.room.copy(), factors.rows_at.copy()
+
+    def restore() -> None:
+        lists.value, lists.slope, lists.used = value, slope, used
+        lists.at[:], lists.room[:], factors.rows_at[:] = at, room, rows_at
+
+    return restore
+
+
+def expand(lists: Lists, factors: Factors, cells: Ints) -> None:
+    """Give ``cells (k,)`` plain weights, at the end of the arrays of ``lists``, before they are changed."""
+    for c in cells[factors.rows_at[cells] >= 0]:
+        rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
+        blocks = _products(factors, c, rows, tiles)
+        filled = int(lists.cell_start[c + 1] - lists.cell_start[c])
+        for block in blocks:
+            block[-1, :, filled - LANES * (tiles - 1) :] = 0.0
+        end = lists.used + rows * tiles * LANES
+        lists.value = grow(lists.value, end)
+        lists.value[lists.used : end] = blocks[0].ravel()
+        if len(blocks) > 1:
+            lists.slope = grow(lists.slope, 2 * end)
+            lists.slope[2 * lists.used : 2 * end] = np.stack(blocks[1:], axis=2).ravel()
+        lists.at[c], lists.room[c], lists.used, factors.rows_at[c] = lists.used, rows, end, PLAIN
+
+
+def _products(factors: Factors, c: int, rows: int, tiles: int) -> list[Floats32]:
+    """(tiles, rows, 8) b w of a cell, and b_u w and b_v w if it has slopes."""
+    head, first = factors.picks_at[c], factors.rows_at[c]
+    wide, picks = factors.picks[head : head + HEAD], factors.picks[head + HEAD : head + HEAD + STEP * tiles]
+    of_tile = picks.reshape(tiles, 1, STEP)
+    along_u, along_v = (
+        table[first : first + rows, None] + of_tile[..., 16 + k : 17 + k] + of_tile[..., 8 * k : 8 * k + 8]
+        for k, table in enumerate((factors.factor_u, factors.factor_v))
+    )
+    a, b = factors.factors[along_u], factors.factors[along_v]
+    if not factors.slopes:
+        return [a * b]
+    return [a * b, factors.factors[along_u + wide[0]] * b, a * factors.factors[along_v + wide[1]]]
+
+
+@kernel
+def _ordered(uv, side, axis, values, rank, order):
+    """Distinct coordinates of a cell's vertices, rising, into ``values (k, 2)``, and each vertex's place among them
+    into ``rank``; returns how many there are."""
+    count = distinct(uv, side, axis, values, rank)
+    before = values[:count].copy()
+    for k in range(count):
+        order[k] = 0
+        for other in range(count):
+            low, high = before[other, 0], before[k, 0]
+            order[k] += low < high or (low == high and before[other, 1] < before[k, 1])
+        values[order[k]] = before[k]
+    for s in range(uv.shape[0]):
+        rank[s] = order[rank[s]]
+    return count
+
+
+@kernel
+def _put_windows(rank, size, wide, axis, tiles, picks):
+    """Write which of a window's eight every lane takes, and where windows start; False where one is too narrow."""
+    for t in range(tiles):
+        low, high = rank[8 * t], rank[8 * t]
+        for s in range(8 * t, min(8 * t + 8, size)):
+            low, high = min(low, rank[s]), max(high, rank[s])
+        low = min(low, wide - 8)
+        if high - low > 7:
+            return False
+        at = HEAD + STEP * t
+        picks[at + 16 + axis] = low
+        for j in range(8):
+            picks[at + 8 * axis + j] = rank[8 * t + j] - low if 8 * t + j < size else 0
+    picks[axis] = wide
+    return True
+
+
+@kernel
+def _stored(row, size, table, used, slots):
+    """The place of ``row[:size]`` in ``table``, where it is added at ``used`` if it is new; both int32."""
+    total, last = np.uint32(size), slots.shape[0] - 1
+    for k in range(size):
+        total = np.uint32((total ^ np.uint32(row[k])) * np.uint32(MIX))
+        total ^= total >> np.uint32(15)
+    slot = np.int64(total) & last
+    while slots[slot] > 0:
+        place, same = slots[slot] - 1, slots[slot] - 1 + size <= used
+        k = 0
+        while same and k < size:
+            same = table[place + k] == row[k]
+            k += 1
+        if same:
+            return place
+        slot = (slot + 1) & last
+    slots[slot] = used + 1
+    table[used : used + size] = row[:size]
+    return used
+
+
+@kernel
+def _factor_row(knots, i, p, values, many, wide, weight, slopes, work, numbers, row):
+    """One point's factors, times its weight, in ``row``; zeros where there are fewer than ``wide``."""
+    along(knots, i, p, values, many, True, work, numbers)
+    row[:] = 0.0
+    for k in range(many):
+        row[k] = numbers[k, 0] * weight
+        if slopes:
+            row[wide + k] = numbers[k, 1] * weight
+
+
+@kernel
+def _sort_rows(keys, ids):
+    """Sort ``keys (k,)`` and the points ``ids (k,)`` along with them; returns how many keys differ."""
+    for k in range(1, len(keys)):
+        key, i, q = keys[k], ids[k], k
+        while q > 0 and keys[q - 1] > key:
+            keys[q], ids[q] = keys[q - 1], ids[q - 1]
+            q -= 1
+        keys[q], ids[q] = key, i
+    groups = 1
+    for k in range(1, len(keys)):
+        groups += keys[k] != keys[k - 1]
+    return groups
+
+
+@kernel
+def _operations(rows, groups, tiles, wide_u, slopes):
+    """How many operations on eight numbers a cell takes with plain weights and with factors."""
+    if slopes:
+        return 9 * rows * tiles, 6 * rows * (wide_u // 8) + 17 * groups * tiles
+    return 3 * rows * tiles, 3 * rows * (wide_u // 8) + 7 * groups * tiles
+
+
+@kernel
+def _factor_cells(
+    knots_u, knots_v, pu, pv, weights, uv, side, cell_start, tile_start, rows, ids_at, ids, slopes, cost, most, rows_at,
+    picks_at, factor_u, factor_v, factors, picks, slots, pick_slots,
+):  # fmt: skip
+    """Fill the arrays of :class:`Factors`; returns how much of the last four is used, and the room for sums."""
+    widest, used, each, scratch = 8 * most, np.zeros(3, dtype=np.int64), 1 + slopes, 0
+    rank_u, rank_v, order = np.zeros(widest, np.int64), np.zeros(widest, np.int64), np.zeros(widest, np.int64)
+    values_u, values_v, numbers = np.zeros((widest, 2)), np.zeros((widest, 2)), np.zeros((widest, 2))
+    row, own, work = np.zeros(2 * widest, np.float32), np.zeros(HEAD + STEP * most, np.int32), np.zeros(12)
+    bits, table = row.view(np.int32), factors.view(np.int32)
+    for c in range(rows.shape[0]):
+        first, last, tiles, at = cell_start[c], cell_start[c + 1], tile_start[c + 1] - tile_start[c], used[0]
+        cell_uv, sides, size = uv[first:last], side[first:last], last - first
+        many_u = _ordered(cell_uv, sides, 0, values_u, rank_u, order)
+        many_v = _ordered(cell_uv, sides, 1, values_v, rank_v, order)
+        wide_u, wide_v = (many_u + 7) // 8 * 8, (many_v + 7) // 8 * 8
+        if used[1] + each * (wide_u + wide_v) * rows[c] > min(MOST, len(factors)):
+            continue
+        if not (
+            _put_windows(rank_u, size, wide_u, 0, tiles, own) and _put_windows(rank_v, size, wide_v, 1, tiles, own)
+        ):
+            continue
+        for k in range(rows[c]):
+            i = ids[ids_at[c] + k]
+            _factor_row(knots_v, i, pv[i], values_v, many_v, wide_v, 1.0, slopes, work, numbers, row)
+            factor_v[at + k] = _stored(bits, each * wide_v, table, used[1], slots)
+            used[1] = max(used[1], factor_v[at + k] + each * wide_v)
+        points = ids[ids_at[c] : ids_at[c] + rows[c]].copy()
+        groups = _sort_rows(factor_v[at : at + rows[c]], points)
+        plain, factored = _operations(rows[c], groups, tiles, wide_u, slopes)
+        if factored > cost * plain:
+            continue
+        for k in range(rows[c]):
+            i = ids[ids_at[c] + k] = points[k]
+            _factor_row(knots_u, i, pu[i], values_u, many_u, wide_u, weights[i], slopes, work, numbers, row)
+            factor_u[at + k] = _stored(bits, each * wide_u, table, used[1], slots)
+            used[1] = max(used[1], factor_u[at + k] + each * wide_u)
+        picks_at[c] = _stored(own, HEAD + STEP * tiles, picks, used[2], pick_slots)
+        used[2] = max(used[2], picks_at[c] + HEAD + STEP * tiles)
+        rows_at[c] = at
+        used[0] += rows[c]
+        scratch = max(scratch, 3 * each * groups * wide_u)
+    return used[0], used[0], used[1], used[2], scratch

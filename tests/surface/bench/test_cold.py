@@ -1,0 +1,77 @@
+"""Cold rows: complete, in turn, with intervals; no figure is judged here."""
+
+from __future__ import annotations
+
+from time import sleep
+
+import numpy as np
+import pytest
+
+from surface.bench import cold
+from surface.bench.bench import Measure
+from surface.deform.lists import build_lists
+
+
+def test_calls_take_turns_until_time_is_up() -> None:
+    calls: list[str] = []
+    times = cold.cold_times([lambda: calls.append("a"), lambda: (calls.append("b"), sleep(0.001))], 0.0, 64)
+    assert calls == ["a", "b"] * (1 + cold.LEAST_ROUNDS)
+    assert times.shape == (cold.LEAST_ROUNDS, 2)
+    assert (times[:, 1] >= 1.0).all() and (times[:, 0] < times[:, 1]).all()  # milliseconds
+
+
+def test_rounds_go_on_only_while_a_ratio_is_unsteady(monkeypatch: pytest.MonkeyPatch) -> None:
+    times = iter(np.cumsum(np.random.default_rng(0).exponential(size=10_000)).tolist())
+    monkeypatch.setattr(cold.time, "perf_counter", lambda: next(times))
+    steady = cold.cold_times([lambda: None], 1e9, 8)
+    assert len(steady) == cold.LEAST_ROUNDS
+    unsteady = cold.cold_times([lambda: None, lambda: None], 500.0, 8, [(0, 1)])
+    assert len(unsteady) > cold.LEAST_ROUNDS
+
+
+def test_other_memory_is_written_between_calls() -> None:
+    """Without that the call would find its array in the cache, and the row would be as flattering as a warm one."""
+    array = np.ones(200_000)
+    warm = np.median(cold.cold_times([array.sum], 0.0, 8))
+    flushed = np.median(cold.cold_times([array.sum], 0.0, 1 << 26))
+    assert flushed > warm
+
+
+def test_intervals_hold_the_median() -> None:
+    median, low, high = cold.median_interval(np.arange(101.0)[::-1])
+    assert (median, low, high) == (50.0, 40.0, 61.0)  # ranks 50.5 -+ 0.98 sqrt(101)
+    assert cold.median_interval(np.array([2.0, 1.0])) == (1.5, 1.0, 2.0)
+
+
+def test_noise_cannot_pass_a_bound() -> None:
+    assert Measure("a", 1.0, 1.8, "b", "<= 2.0", (1.7, 1.9)).kept is True
+    assert Measure("a", 1.0, 1.8, "b", "<= 2.0", (1.7, 2.1)).kept is False
+    assert Measure("a", 1.0, 6.0, "b", ">= 5", (4.9, 7.0)).kept is False
+    assert Measure("a", 1.0, 1.0, "b", "0.9 to 1.1", (0.95, 1.2)).kept is False
+
+
+def test_surfaces_of_other_kinds() -> None:
+    levels, mesh = cold.hierarchical(1_000)
+    spacing = np.unique([np.round(np.diff(k[:5]).max(), 6) for k in levels.arrays()[0]])
+    assert spacing.tolist() == pytest.approx([1 / 64, 1 / 32, 1 / 16], rel=1e-4)
+    assert np.isfinite(mesh.vertices).all() and len(mesh.vertices) == 33**2
+    scattered, mesh = cold.scattered(200, 1_000)
+    assert np.isfinite(mesh.vertices).all() and len(mesh.vertices) == 33**2
+    assert len(np.unique(scattered.arrays()[0][:, 0])) == scattered.n
+
+
+def test_rows_of_a_surface() -> None:
+    reported: list[str] = []
+    body = cold.scattered(100, 500)
+    rows = cold.cold_rows("some", [body, body], 0.0, "<= 1.0", 64, reported.append)
+    assert reported == ["some"] and [row.name.partition(": ")[2] for row in rows] == [
+        cold.READ, "all positions", "all positions and normals", "scipy CSR @ dense", "stencil table, row by row",
+        "memory of weights and lists",
+    ]  # fmt: skip
+    for row in rows[1:5]:
+        assert row.ratio is not None and row.interval is not None
+        assert row.interval[0] <= row.ratio <= row.interval[1] and row.milliseconds > 0
+    assert [row.reach for row in rows] == ["", "<= 1.0", "", ">= 5", ">= 2", ""]
+    weights = build_lists(*body, False).value
+    wanted = body[0].deformation(body[1], normals=False).nbytes / (4 * np.count_nonzero(weights))
+    assert rows[5].ratio == pytest.approx(wanted)

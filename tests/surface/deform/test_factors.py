@@ -1,0 +1,130 @@
+"""Weights that are kept as factors are those of the surface."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapes
+
+from surface import DCPSurface
+from surface.bench.bench import sheet
+from surface.deform import factors
+from surface.deform.deformation import Deformation
+from surface.deform.lists import LANES, Basis, Lists, build_lists
+from surface.mesh.domain import Domain, Slit
+from surface.mesh.mesh import Mesh
+
+pytestmark = pytest.mark.skipif(not factors.PICKS_FAST, reason="this processor has no instruction for picks")
+
+
+def weighted_sheet() -> tuple[DCPSurface, Mesh]:
+    """A sheet with other weights, whose cells mostly have factors."""
+    plain, mesh = sheet(2_000)
+    ku, kv, *_ = plain.arrays()
+    rng = np.random.default_rng(3)
+    return DCPSurface(plain.points, rng.uniform(0.5, 2.0, plain.n), list(ku), list(kv)), mesh
+
+
+def factored(surface: DCPSurface, mesh: Mesh) -> tuple[Lists, factors.Factors]:
+    lists = build_lists(surface, mesh, True)
+    return lists, factors.factorize(Basis.of(surface), lists, mesh)
+
+
+def test_factors_give_the_weights_of_the_surface() -> None:
+    surface, mesh = weighted_sheet()
+    lists, made = factored(surface, mesh)
+    held = np.flatnonzero(made.rows_at >= 0)
+    assert len(held) > 0.8 * len(lists.rows)
+    factors.expand(lists, made, held[::2])
+    assert set(np.flatnonzero(made.rows_at >= 0)) == set(held[1::2])
+    plain = build_lists(surface, mesh, True)
+    for c in held[::2]:
+        tiles, rows, order = np.diff(lists.tile_start)[c], lists.rows[c], lists.ids_at[c] + np.arange(lists.rows[c])
+        assert lists.room[c] == rows == plain.rows[c]
+        for name, each in (("value", 1), ("slope", 2)):
+            mine, whole = (
+                getattr(own, name)[each * own.at[c] :][: each * tiles * rows * LANES].reshape(tiles, rows, -1)
+                for own in (lists, plain)
+            )
+            mine, whole = mine[:, np.argsort(lists.ids[order])], whole[:, np.argsort(plain.ids[order])]
+            assert np.abs(mine - whole).max() <= 4e-7 * np.abs(whole).max(), (c, name)
+
+
+def test_factors_take_less_memory_and_neighbours_share_them() -> None:
+    surface, mesh = sheet(10_000)
+    plain = build_lists(surface, mesh, False).value.nbytes
+    deformation = surface.deformation(mesh, normals=False)
+    assert deformation.nbytes <= 0.6 * plain
+    made = deformation.factors
+    assert made.nbytes == sum(array.nbytes for array in vars(made).values() if isinstance(array, np.ndarray))
+    assert len(np.unique(made.factor_u)) <= 4 * 30  # four rows of factors reach each column of cells, whatever the row
+    assert len(made.factors) < 0.02 * plain / 4
+
+
+def test_every_point_knows_its_rows() -> None:
+    surface, mesh = weighted_sheet()
+    lists, _ = factored(surface, mesh)
+    for i in (0, 17, surface.n - 1):
+        cells, rows = lists.entries_of(i)
+        assert (lists.ids[lists.ids_at[cells] + rows] == i).all() and len(cells) > 0
+
+
+@pytest.mark.parametrize("normals", [True, False])
+def test_updates_of_any_kind_agree_with_a_new_evaluation(normals: bool) -> None:
+    surface, mesh = weighted_sheet()
+    deformation, rng = Deformation(surface, mesh, normals=normals), np.random.default_rng(1)
+    assert (deformation.factors.rows_at >= 0).any()
+
+    def check() -> None:
+        points, su, sv = deformation.surface.derivatives(mesh.uv, mesh.side)
+        assert np.abs(deformation.vertices - points).max() < 2e-5  # a ten-millionth of 200
+        if normals:
+            wanted = np.cross(su, sv)
+            wanted /= np.linalg.norm(wanted, axis=1)[:, None]
+            assert np.abs(deformation.normals - wanted).max() < 3e-6
+
+    check()
+    for _ in range(4):  # the first stores numerators, those after it add differences
+        deformation.move([30], rng.normal(size=3))
+        check()
+    deformation.move(np.arange(0, surface.n, 3), rng.normal(size=3))
+    check()
+    deformation.set_weights([40], [3.0])
+    check()
+    deformation.move([40, 41], rng.normal(size=3))
+    check()
+    deformation.refresh()
+    check()
+
+
+def test_a_refused_change_of_knots_leaves_factors() -> None:
+    surface, mesh = sheet(2_000)
+    deformation = surface.deformation(mesh)
+    before, used = deformation.factors.rows_at.copy(), deformation.lists.used
+    with pytest.raises(ValueError, match="uncovered"):
+        deformation.set_knots(0, [0.5, 0.6, 0.7], [0.5, 0.6, 0.7])
+    assert np.array_equal(before, deformation.factors.rows_at) and deformation.lists.used == used
+    deformation.move([0, 1], [0.0, 0.0, 1.0])
+    assert np.abs(deformation.vertices - deformation.surface.evaluate(mesh.uv)).max() < 2e-5
+
+
+def test_sides_of_a_slit_have_factors_of_their_own() -> None:
+    """The surface jumps at u = 1/2, so that vertices of the slit have two limits there."""
+    knots, net = np.repeat([0.0, 0.5, 1.0], 4), np.zeros((8, 8, 3))
+    net[..., 0], net[..., 1] = np.meshgrid(np.arange(8.0), np.arange(8.0), indexing="ij")
+    net[4:, :, 2] = 5.0
+    surface = DCPSurface.from_nurbs(3, 3, knots, knots, net)
+    mesh = surface.tessellate(min_depth=3, max_depth=3, domain=Domain((0, 1, 0, 1), slits=[Slit("u", 0.5, 0.0, 1.0)]))
+    deformation = surface.deformation(mesh)
+    assert (deformation.factors.rows_at >= 0).any() and len(np.unique(mesh.side)) > 1
+    assert np.abs(deformation.vertices - surface.derivatives(mesh.uv, mesh.side)[0]).max() < 1e-6
+
+
+def test_cells_for_which_factors_cost_more_keep_plain_weights() -> None:
+    surface, mesh = sheet(2_000)
+    lists = build_lists(surface, mesh, False)
+    made = factors.factorize(Basis.of(surface), lists, mesh, cost=(0.0, 0.0))
+    assert (made.rows_at == factors.PLAIN).all() and len(lists.value) == lists.used > 0
+    scattered = shapes.scattered(60, 2)  # every point has knots of its own: no groups
+    mesh = scattered.tessellate(chord_error=0.3, max_depth=4)
+    assert (scattered.deformation(mesh).factors.rows_at == factors.PLAIN).all()
