@@ -17,7 +17,7 @@ from surface.fit.surfaces.build import make_part, with_mesh
 from surface.fit.surfaces.carried import with_expressions
 from surface.fit.surfaces.eyes import Eyeballs, find_eyeballs
 from surface.fit.surfaces.facing import seen
-from surface.fit.surfaces.groupfile import add_group_files
+from surface.fit.surfaces.groupfile import Context, add_group_files
 from surface.fit.surfaces.pieces import Piece, joined, make_pieces, read_pieces, with_face
 from surface.fit.surfaces.placing import Placed, place
 from surface.fit.surfaces.report import SurfaceReport, SurfaceRow, write_report
@@ -103,11 +103,13 @@ def _make(
     progress("groups", 0.8)
     if other is not None:
         head = with_expressions(head, order, other)
-    parts = add_group_files(head.parts, options.groups, placed.placement, titles)
+    ties = {part.name: p.ties for part, p in zip(head.parts, order, strict=True) if p.ties is not None}
+    parts = add_group_files(head.parts, options.groups, Context(placed.placement, titles, ties))
     progress("triangles", 0.9)
     head = replace(head, parts=[with_mesh(part, head) for part in parts])
     notes = [*notes, *placed.notes, *findings(head, placed.marks)]
-    return head, _report(head, titles, notes)
+    deviations = [placed.placement.scale * piece.deviation for piece in order]
+    return head, _report(head, titles, deviations, notes)
 
 
 def _placed(
@@ -162,8 +164,11 @@ def _follows(number: int, eyes: Eyeballs | None) -> str:
     return "skin"
 
 
-def _report(head: HeadData, titles: dict[str, str], notes: list[str]) -> SurfaceReport:
-    rows = [SurfaceRow(p.name, titles[p.name], p.material, p.follows, len(p.points)) for p in head.parts]
+def _report(head: HeadData, titles: dict[str, str], deviations: list[float], notes: list[str]) -> SurfaceReport:
+    rows = [
+        SurfaceRow(p.name, titles[p.name], p.material, p.follows, len(p.points), off)
+        for p, off in zip(head.parts, deviations, strict=True)
+    ]
     moved = {g.name for p in head.parts for g in p.groups}
     shapes = [n for n in SHAPES if n in moved]
     return SurfaceReport(head.name, rows, shapes, [n for n in SHAPES if n not in moved], notes)

@@ -121,7 +121,12 @@ def fit_fields(part: PartData, piece: Piece, fields: Fields) -> FittedFields:
     normals *= sign / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
     wanted = fields.at(points, normals)
     basis = surface.basis_matrix(mesh.uv, side=mesh.side)
-    return solve_fields(basis, _areas(points, mesh.triangles), wanted)
+    if piece.ties is None:
+        return solve_fields(basis, _areas(points, mesh.triangles), wanted)
+    ties = piece.ties
+    shares = csr_matrix((ties.share, (ties.row, ties.column)), shape=(ties.count, len(ties.points)))
+    found = solve_fields(basis @ shares, _areas(points, mesh.triangles), wanted)
+    return replace(found, values=shares @ found.values)
 
 
 def _areas(points: Floats, triangles: np.ndarray) -> Floats:

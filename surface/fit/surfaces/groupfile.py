@@ -34,6 +34,7 @@ from surface.fit.surfaces.build import sparse_group, with_groups
 from surface.head.model.data import Group, PartData
 from surface.head.model.parameters import SHAPES, smoothstep
 from surface.head.model.placement import Placement
+from surface.readers import Ties
 
 HINT = "compare it with the example in docs/surface.md#groups-by-hand"
 KEYS = {
@@ -77,18 +78,37 @@ class _Entry:
         return str(name)
 
 
-def add_group_files(
-    parts: list[PartData], paths: Sequence[Path], placement: Placement, titles: dict[str, str]
-) -> list[PartData]:
-    """The parts with the groups of some files.
+@dataclass(frozen=True)
+class Context:
+    """What the groups of a surface file are about.
 
-    placement : from the surface file's coordinates. titles : names in the surface file, by part.
+    placement : from the file's coordinates. titles : names in the file, by part. ties : of the parts whose control
+    points follow fewer of the file.
+    """
+
+    placement: Placement
+    titles: dict[str, str]
+    ties: dict[str, Ties]
+
+    def points(self, part: PartData) -> Floats:
+        """(m, 3) mm the points of a part that groups move."""
+        tied = self.ties.get(part.name)
+        return part.points if tied is None else self.placement.points(tied.points)
+
+    def spread(self, part: PartData, moves: Floats) -> Floats:
+        """(n, 3) displacements of the control points of a part for those (m, 3) of its points."""
+        tied = self.ties.get(part.name)
+        return moves if tied is None else tied.apply(moves)
+
+
+def add_group_files(parts: list[PartData], paths: Sequence[Path], context: Context) -> list[PartData]:
+    """The parts with the groups of some files.
 
     Raises FitError: a file cannot be read, has a wrong key, or a group of it moves nothing.
     """
     for path in paths:
         for entry in _entries(path):
-            parts = _added(parts, entry, placement, titles)
+            parts = _added(parts, entry, context)
     return parts
 
 
@@ -114,16 +134,16 @@ def _entries(path: Path) -> list[_Entry]:
     return entries
 
 
-def _added(parts: list[PartData], entry: _Entry, placement: Placement, titles: dict[str, str]) -> list[PartData]:
+def _added(parts: list[PartData], entry: _Entry, context: Context) -> list[PartData]:
     """The parts with one entry's group, and its mirror image if it has one."""
     name = entry.parameter("name")
     other = entry.parameter("mirror") if "mirror" in entry.table else None
-    moved = [_moves(part, entry, placement, np.ones(3)) for part in _meant(parts, entry, titles)]
+    moved = [_moves(part, entry, context, np.ones(3)) for part in _meant(parts, entry, context.titles)]
     groups = [(part, sparse_group(name, moves)) for part, moves in moved]
     if other is not None:
         if "ids" in entry.table or "file" in entry.table:
             raise entry.error("mirror", "only places can be mirrored: use at and radius")
-        moved = [_moves(part, entry, placement, FLIP) for part in _meant(parts, entry, titles)]
+        moved = [_moves(part, entry, context, FLIP) for part in _meant(parts, entry, context.titles)]
         groups += [(part, sparse_group(other, moves)) for part, moves in moved]
     for wanted in {name, other} - {None}:
         if not any(len(g.ids) for _, g in groups if g.name == wanted):
@@ -159,43 +179,47 @@ def _dragged(entry: _Entry) -> dict[str, Any]:
     return {"part": table["part"], "ids": table["ids"], "moves_mm": table["moves_mm"]}
 
 
-def _moves(part: PartData, entry: _Entry, placement: Placement, mirror: Floats) -> tuple[PartData, Floats]:
+def _moves(part: PartData, entry: _Entry, context: Context, mirror: Floats) -> tuple[PartData, Floats]:
     """(n, 3) mm displacements of a part's control points at 1.0; ``mirror`` is :data:`FLIP` for the mirror image."""
+    placement, at = context.placement, context.points(part)
     if "file" in entry.table:
         table = _dragged(entry)
         own = replace(entry, table={**entry.table, **table})
         amount = float(own.numbers("amount", ())) if "amount" in own.table else 1.0
-        return part, _by_number(part, own, amount * own.numbers("moves_mm", (-1, 3)))
+        return part, _by_number(part, own, amount * own.numbers("moves_mm", (-1, 3)), len(part.points))
     if "ids" in entry.table:
         rows = entry.table.get("move")
         each = isinstance(rows, list) and bool(rows) and isinstance(rows[0], list)
         move = np.atleast_2d(entry.numbers("move", (-1, 3) if each else (3,)))
-        return part, _by_number(part, entry, placement.moves(move))
+        return part, context.spread(part, _by_number(part, entry, placement.moves(move), len(at)))
     place, radius = placement.points(entry.numbers("at", (3,))), placement.scale * float(entry.numbers("radius", ()))
     if radius <= 0:
         raise entry.error("radius", f"{entry.table['radius']} is not greater than 0")
-    near = np.linalg.norm(part.points * mirror - place, axis=1) / radius
-    share = (1.0 - smoothstep(near, 0.0, 1.0)) * _within(part, entry)
-    return part, share[:, None] * _displacement(part.points * mirror, entry, placement) * mirror
+    near = np.linalg.norm(at * mirror - place, axis=1) / radius
+    share = (1.0 - smoothstep(near, 0.0, 1.0)) * _within(part, entry, tied=part.name in context.ties)
+    moves = share[:, None] * _displacement(at * mirror, entry, placement) * mirror
+    return part, context.spread(part, moves)
 
 
-def _by_number(part: PartData, entry: _Entry, moves: Floats) -> Floats:
-    """(n, 3) displacements ``moves`` (k, 3), or one for all, of control points by number."""
+def _by_number(part: PartData, entry: _Entry, moves: Floats, count: int) -> Floats:
+    """(count, 3) displacements ``moves`` (k, 3), or one for all, of control points by number."""
     ids = entry.numbers("ids", (-1,))
     whole = ids.astype(np.int64)
-    if len(ids) and (not np.array_equal(whole, ids) or whole.min() < 0 or whole.max() >= len(part.points)):
-        raise entry.error("ids", f"must be whole numbers from 0 to {len(part.points) - 1}: {part.name!r} has no others")
+    if len(ids) and (not np.array_equal(whole, ids) or whole.min() < 0 or whole.max() >= count):
+        raise entry.error("ids", f"must be whole numbers from 0 to {count - 1}: {part.name!r} has no others")
     if len(moves) not in (1, len(ids)):
         raise entry.error("move", f"{len(moves)} displacements for {len(ids)} control points")
-    out = np.zeros_like(part.points)
+    out = np.zeros((count, 3))
     np.add.at(out, whole, np.broadcast_to(moves, (len(ids), 3)))
     return out
 
 
-def _within(part: PartData, entry: _Entry) -> Floats:
+def _within(part: PartData, entry: _Entry, *, tied: bool) -> Floats | float:
     """(n,) 1 for control points whose subdomain has its middle where the entry says, else 0."""
     if "inside" not in entry.table:
-        return np.ones(len(part.points))
+        return 1.0
+    if tied:
+        raise entry.error("inside", f"{part.name!r} lies in several charts, not in one (u, v)", "use at and radius")
     u0, u1, v0, v1 = entry.numbers("inside", (4,))
     middles = []
     for knots, degrees in zip((part.knots_u, part.knots_v), part.degrees.T, strict=True):

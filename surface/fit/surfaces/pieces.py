@@ -16,7 +16,7 @@ from surface.fit.source.kinds import kind_of, listed
 from surface.fit.source.mesh import LARGE, SMALL
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
-from surface.readers import NamedSurface, read_surface
+from surface.readers import NamedSurface, Ties, read_surface
 
 FINE = 1.5e-3  # chords of the samples, relative to the whole file's size
 DEEPEST = 6  # levels of the samples' quad trees
@@ -27,7 +27,8 @@ class Piece:
     """One surface of a file, in the file's coordinates.
 
     name : unique, and without "/"; title : as the file has it. material : by which a head draws it.
-    chord : how near its samples are to it, in the file's unit.
+    chord : how near its samples are to it, in the file's unit. ties, deviation : as of
+    :class:`surface.readers.NamedSurface`.
     """
 
     name: str
@@ -36,6 +37,8 @@ class Piece:
     surface: DCPSurface
     domain: Domain
     chord: float
+    ties: Ties | None = None
+    deviation: float = 0.0
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -112,7 +115,8 @@ def make_pieces(items: Sequence[NamedSurface], where: str) -> list[Piece]:
     out = []
     for item, name in zip(items, names, strict=True):
         domain = item.domain or Domain(item.surface.rect)
-        piece = Piece(name, item.name, kind_of(item.name).material, item.surface, domain, FINE * size)
+        material = kind_of(item.name).material
+        piece = Piece(name, item.name, material, item.surface, domain, FINE * size, item.ties, item.deviation)
         if not len(piece.mesh.triangles):
             raise FitError(f"{where}: {item.name!r} covers nothing of its domain", hint=f"--without '{item.name}'")
         out.append(piece)
