@@ -67,7 +67,8 @@ def _skin_points(head: Any) -> np.ndarray:
     """(n, 3) places all over the skin at rest, whatever the pose is; of all parts where none is skin."""
     parts = [p for p in head.parts if p.material == SKIN] or list(head.parts)
     found = [p.surface.evaluate(_inside(p)) for p in parts if len(p.uv)]
-    return np.concatenate(found) if found else np.zeros((0, 3))
+    every = np.concatenate(found) if found else np.zeros((0, 3))
+    return every[np.isfinite(every).all(axis=1)]  # by the same rounding a place may lie beyond its chart
 
 
 def _inside(part: Any) -> np.ndarray:
