@@ -234,7 +234,7 @@ def write_3dm(path: Path) -> None:
         surface.KnotsV[k] = float(knot)
     for i in range(around + 3):
         for j in range(up):
-            surface.Points.SetPoint(i, j, rhino3dm.Point3d(*across[i % around, j]))
+            surface.Points[i, j] = rhino3dm.Point4d(*across[i % around, j].tolist(), 1.0)
     model = rhino3dm.File3dm()
     model.Objects.AddSurface(surface)
     for x in (31.8, -31.8):

@@ -70,6 +70,11 @@ class Complex:
         for number, link in self.file.links.items():
             if link.face >= 0 and link.face not in loops:
                 loops[link.face] = self._around(number)
+        around = {number for loop in loops.values() for number in loop}
+        for number, link in self.file.links.items():
+            if link.face >= 0 and number not in around:
+                why = f"link {number} does not lie around its face {link.face}"
+                raise self.file.error(link.line, why, HINT)
         return loops
 
     def _around(self, first: int) -> list[int]:
@@ -98,13 +103,17 @@ class Complex:
         return (lengths[0], lengths[2]), (lengths[1], lengths[3])
 
     def _irregular(self) -> set[int]:
-        quarters = dict.fromkeys(self.file.vertices, 0)
-        out = set(self.file.missing)
+        quarters, out = dict.fromkeys(self.file.vertices, 0), set()
         for link in self.file.links.values():
             quarters[link.vertex] += 1 + link.turn
             if link.face < 0 and link.turn == 0:
                 out.add(link.vertex)
-        return out | {vertex for vertex, count in quarters.items() if count != 4}
+        out |= {vertex for vertex, count in quarters.items() if count != 4}
+        for vertex, line in self.file.missing.items():
+            if vertex not in out:
+                why = f"vertex {vertex} lacks grips, but is neither a star point nor an inward corner of the outline"
+                raise self.file.error(line, why, HINT)
+        return out
 
     def _grips(self) -> dict[int, list[tuple[int, tuple[int, ...]]]]:
         """By vertex: its grips, and to which sides in the vertex' own frame each lies further in."""
@@ -115,9 +124,13 @@ class Complex:
         for _, vertex, sizes, grips in self.file.extras:
             if vertex not in self.irregular:
                 out[vertex] += [(grip, ways) for grip, ways in zip(grips, directions(sizes), strict=True)]
+        needed = dict.fromkeys(self.file.vertices, 1)
+        needed |= {link.vertex: 2 * link.turn for link in self.file.links.values() if link.face < 0}
         for vertex, (line, *_) in self.file.vertices.items():
-            if not out[vertex]:
-                raise self.file.error(line, f"vertex {vertex} has no grip of its own", HINT)
+            found, most = len(out[vertex]), needed[vertex]
+            if found < 1 or (vertex not in self.irregular and found != most):
+                why = f"vertex {vertex} has {found} grips, {most} belong there with Bezier ends"
+                raise self.file.error(line, why, HINT)
         return out
 
     def quarter(self, vertex: int, leaving: int, way: int) -> int:

@@ -41,7 +41,7 @@ class TsmFile:
     grips : by number: line, [x, y, z, weight]
     owners : line, whether it is the vertex' own grip, and vertex, of every grip in order, deleted ones too
     extras : line, vertex, four counts, grips
-    missing : vertices whose extra grips are not those of a regular one
+    missing : vertices whose extra grips are not those of a regular one, and the line that says so
     """
 
     location: Location
@@ -53,7 +53,7 @@ class TsmFile:
     grips: dict[int, tuple[int, list[float]]] = field(default_factory=dict)
     owners: list[tuple[int, bool, int]] = field(default_factory=list)
     extras: list[tuple[int, int, list[int], list[int]]] = field(default_factory=list)
-    missing: set[int] = field(default_factory=set)
+    missing: dict[int, int] = field(default_factory=dict)
 
     def error(self, line: int, why: str, hint: str = "") -> SurfaceFileError:
         """The error for a line."""
@@ -112,8 +112,10 @@ def _add_other(out: TsmFile, line: int, kind: str, words: list[str]) -> None:
         out.owners.append((line, words[0] == "gvp", _integers(out, line, words[1:2] or ["nothing"])[0]))
     elif kind == "0m" and words[:1] == ["cg"]:
         vertex, *values = _integers(out, line, words[1:]) or [0]
-        if values[:1] != [4] or -1 in values:  # a star point, or a corner of the outline that points inwards
-            out.missing.add(vertex)
+        if not values or values[0] < 1:
+            raise out.error(line, "a vertex with extra grips must have sides, 4 if it is regular")
+        if values[0] != 4 or -1 in values[5:]:  # a star point, or a corner of the outline that points inwards
+            out.missing[vertex] = line
             return
         counts, grips = values[1:5], values[5:]
         sizes = [a + a * b for a, b in zip(counts, counts[1:] + counts[:1], strict=True)]
@@ -148,6 +150,7 @@ def _check_owners(out: TsmFile) -> None:
         (line, vertex, []) for line, own, vertex in out.owners if own or vertex >= 0
     ]
     references += [(line, vertex, grips) for line, vertex, _, grips in out.extras]
+    references += [(line, vertex, []) for vertex, line in out.missing.items()]
     for line, vertex, grips in references:
         if vertex not in out.vertices:
             raise out.error(line, f'refers to "v" {vertex}, which the file does not have')
