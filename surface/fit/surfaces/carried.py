@@ -25,6 +25,7 @@ from surface.head.model.parameters import SHAPES, smoothstep
 from surface.head.posing.head import Head
 
 NORMAL_MM = 14.0  # weight of normals in the search for the nearest place
+FINER = 8.0  # samples than for placing: where a surface is flat its control points need some, too
 NEAR = 4  # places that a field is read off at
 FAR_MM = (12.0, 35.0)  # from the other head's skin: nearer all of a displacement is taken, further none
 PULL = 1e-2  # of the mean over a subdomain, against the samples in it
@@ -114,7 +115,7 @@ class FittedFields:
 
 def fit_fields(part: PartData, piece: Piece, fields: Fields) -> FittedFields:
     """The values of a part's control points whose surface comes nearest to the fields at the piece's samples."""
-    mesh, surface = piece.mesh, make_surface(part)
+    mesh, surface = replace(piece, chord=piece.chord / FINER).mesh, make_surface(part)
     sign = -1.0 if part.flip else 1.0
     points, su, sv = surface.derivatives(mesh.uv, side=mesh.side)
     normals = np.cross(su, sv)

@@ -214,7 +214,7 @@ BAD = {
     "star": (changed("l ", " ".join([*LINKS[:-1], "2"])), r"line \d+: face \d is no rectangle"),
     "closed": (
         re.sub(r"^(l \S+ \S+ \S+ \S+) -1 ", r"\1 0 ", GOOD, flags=re.M),
-        "does not lie around its face 0",
+        "edge 0 is creased inside",
     ),
     "leaving": (changed("v ", "v 1 EAST"), r'line \d+: "v" 0 names link 1'),
     "pieces": (TWICE, r"line \d+: link \d+ belongs to another piece"),

@@ -40,9 +40,8 @@ def other(count: int = 21) -> HeadData:
     ]
     share = np.clip(0.5 - part.points[:, 1] / 200, 0, 1)
     rules = [Rule(n, ({"jawOpen": 1.0},)) for n in ("spiky", "smooth")]
-    return replace(
-        data, parts=[replace(part, groups=groups, jaw=share)], rules=rules, jaw=Jaw((0, 0, 0), 0.3, (0, 0, 0))
-    )
+    finer = replace(part, groups=groups, jaw=share, mesh={}, budget=(0, 0.01, 7))
+    return replace(data, parts=[finer], rules=rules, jaw=Jaw((0, 0, 0), 0.3, (0, 0, 0)))
 
 
 def test_fields_jaw_and_rules_are_carried() -> None:
