@@ -74,7 +74,8 @@ def _skin_points(head: Any) -> np.ndarray:
 def _inside(part: Any) -> np.ndarray:
     """(n, 2) some of a part's places; 32-bit numbers may lie beyond its domain by rounding."""
     u0, u1, v0, v1 = part.surface.rect
-    return np.clip(np.asarray(part.uv[:: -(-len(part.uv) // SAMPLES)], float), (u0, v0), (u1, v1))
+    inside: np.ndarray = np.clip(np.asarray(part.uv[:: -(-len(part.uv) // SAMPLES)], float), (u0, v0), (u1, v1))
+    return inside
 
 
 def _eyes(data: Any, skin: np.ndarray) -> tuple[np.ndarray, bool]:
