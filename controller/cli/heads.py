@@ -16,6 +16,7 @@ from controller.cli.console import console, show_table
 from surface.base.extras import require
 
 if TYPE_CHECKING:
+    from controller.tools.surface_fit import SurfaceFit  # start-up: --help does without it
     from surface.fit.points.report import FitReport  # start-up: --help does without it
 
 _NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
@@ -105,7 +106,8 @@ def fit(
         Path,
         typer.Argument(
             help="Mesh with UVs and shapes: .glb, .gltf, .vrm, .obj, a folder of .obj files, or .npz; "
-            "without them, also .ply, .stl and .off, with --expressions-from."
+            "without them, also .ply, .stl and .off, with --expressions-from. "
+            "Or surfaces, which stay exactly as they are: .3dm, .tsm, .xml (G+Smo), .json."
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the head to write.")],
@@ -120,6 +122,16 @@ def fit(
     without: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="Leave out an object or material; may be repeated.")
     ] = None,
+    only: Annotated[
+        list[str] | None, typer.Option(metavar="NAME", help="Take only this surface of a file; may be repeated.")
+    ] = None,
+    groups: Annotated[
+        list[Path] | None,
+        typer.Option(metavar="FILE", help="Groups of a surface's control points (.toml, .json); may be repeated."),
+    ] = None,
+    strict: Annotated[
+        bool, typer.Option("--strict", help="Refuse a surface file of which anything cannot be read.")
+    ] = False,
     identities: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Identity modes of the mesh (.npz): adds named variations.")
     ] = None,
@@ -129,7 +141,7 @@ def fit(
         typer.Option(
             "--expressions-from",
             metavar="HEAD",
-            help="Head whose expressions a mesh without shapes gets: ict.",
+            help="Head whose expressions a mesh without shapes, or surfaces, get: ict.",
             autocompletion=names_of("heads"),
         ),
     ] = None,
@@ -141,16 +153,29 @@ def fit(
         Path | None, typer.Option(metavar="DIR", help="Folder for a report: figures, tables, error drawn on the face.")
     ] = None,
 ) -> None:
-    """Turn a mesh with UVs and expression shapes into a head of control points.
+    """Turn a mesh with UVs and expression shapes, or a file of surfaces, into a head of control points.
 
     Example: omote fit me.glb -o heads/me --report report; without shapes:
-    omote fit scan.ply -o heads/scan --expressions-from ict
+    omote fit scan.ply -o heads/scan --expressions-from ict; surfaces:
+    omote fit face.3dm -o heads/face --groups groups.toml
     """
     # start-up: --help does without any of these
+    from controller.tools.surface_fit import SurfaceFit, is_surface_file, refuse_surface_options
     from controller.tools.transfer import check_transfer, transfer
     from surface.fit.api import fit_head
     from surface.fit.identities import add_identities
     from surface.fit.source.load import LoadOptions
+
+    if is_surface_file(mesh):
+        meshes_only = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
+        wanted = SurfaceFit(
+            mesh, out, name, unit, up, forward, tuple(without or ()), tuple(only or ()), tuple(groups or ()),
+            strict, expressions_from, landmarks, report,
+        )  # fmt: skip
+        wanted.check(meshes_only)
+        _fit_surfaces(wanted)
+        return
+    refuse_surface_options(mesh, {"--only": only, "--groups": groups, "--strict": strict})
 
     if keep and identities is None:
         raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
@@ -180,6 +205,21 @@ def fit(
         with console.status("fitting identities"):
             added = add_identities(out, mesh, identities)
         console.print(f"identities: {', '.join(added)}", soft_wrap=True)
+
+
+def _fit_surfaces(wanted: SurfaceFit) -> None:
+    """Make a head of a surface file, and say what was found."""
+    with console.status("reading") as status:
+        found = wanted.run(lambda step, done: status.update(f"{step}: {100 * done:.0f} %"))
+    shaded = _decimate_and_shade(wanted.out)
+    title = f"{found.name}: {found.points} control points, {len(found.parameters)} shapes"
+    table = Table("part", "in the file", "material", "follows", "control points", title=title)
+    for row in found.parts:
+        table.add_row(row.name, row.title, row.material, row.follows, str(row.points))
+    show_table(table)
+    for line in [*found.lines(), *([] if shaded else [_NO_SHADE])]:
+        console.print(line, soft_wrap=True, markup=False)
+    console.print(f"wrote {wanted.out}", soft_wrap=True)
 
 
 def _remarks(found: FitReport, shaded: bool) -> list[str]:

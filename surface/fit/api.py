@@ -34,8 +34,8 @@ from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
 from surface.fit.source.naming.shapes import to_arkit
 from surface.fit.source.placing.anatomy import Landmarks
-from surface.fit.source.placing.frame import EYES_AT, head_scale
-from surface.fit.source.placing.place import find_neck, head_size, place
+from surface.fit.source.placing.frame import head_scale
+from surface.fit.source.placing.place import neck_of, place
 from surface.fit.source.repair import repaired
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
@@ -204,12 +204,7 @@ def _neck(mesh: FitMesh, recipe: Recipe, marks: Landmarks = Landmarks()) -> Neck
     if recipe.neck:
         x, y, z = recipe.neck
         return Neck((x, y, z))
-    if marks.eyes is not None:
-        return find_neck(mesh, EYES_AT, head_size(marks))
-    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
-    height = float(high[1] - low[1])
-    pivot = (0.0, float(low[1]) + 0.3 * height, float(0.5 * (low[2] + high[2])))
-    return Neck(pivot, 0.0, float(low[1]) + 0.02 * height, float(low[1]) + 0.2 * height)
+    return neck_of(mesh, marks)
 
 
 def _provenance(recipe: Recipe) -> dict[str, str]:

@@ -8,7 +8,7 @@ suffix content                                     module
 .json  omote's own plain format, read and written  :mod:`surface.readers.plain`
 .3dm   openNURBS: surfaces and trimmed faces       :mod:`surface.readers.rhino`
 .xml   G+Smo: tensor, rational and (T)HB-splines   :mod:`surface.readers.gismo`
-.tsm   T-splines on one rectangle                  :mod:`surface.readers.tsm`
+.tsm   T-splines of any form                       :mod:`surface.readers.tsm`
 ====== =========================================== =================================
 """
 
@@ -19,10 +19,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from . import gismo, plain, rhino, tsm
-from .common import LeaveOut, Location, NamedSurface, summary
+from .common import LeaveOut, Location, NamedSurface, Ties, summary
 from .plain import is_plain, write_surfaces
 
-__all__ = ["SUFFIXES", "NamedSurface", "is_plain", "read_surface", "summary", "write_surfaces"]
+__all__ = ["SUFFIXES", "NamedSurface", "Ties", "is_plain", "read_surface", "summary", "write_surfaces"]
 
 _READERS: dict[str, Callable[[Path], list[NamedSurface]]] = {
     ".json": plain.read, ".3dm": rhino.read, ".xml": gismo.read, ".tsm": tsm.read,

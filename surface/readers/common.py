@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from surface.base.arrays import Floats, Ints
 from surface.base.errors import SurfaceFileError
 from surface.base.files import DATA_LIMIT, TEXT_LIMIT, decode, read_file, reading
 from surface.dcp import DCPSurface
@@ -18,16 +19,50 @@ LeaveOut = Callable[[SurfaceFileError], None]
 
 
 @dataclass(frozen=True)
+class Ties:
+    """Control points (n) that follow fewer of a file (m): sums of shares of these.
+
+    row, column : (k,) int64, control point and point of the file; share : (k,) float64; count : n.
+    points : (m, 3) float64, those of the file.
+    """
+
+    row: Ints
+    column: Ints
+    share: Floats
+    count: int
+    points: Floats
+
+    @classmethod
+    def of(cls, rows: Sequence[Mapping[int, float]], points: Mapping[int, Floats]) -> Ties:
+        """From shares by the file's number of each control point, and the file's points by number."""
+        column = {number: k for k, number in enumerate(sorted(points))}
+        every = [(k, column[number], share) for k, row in enumerate(rows) for number, share in row.items()]
+        at, of, shares = zip(*every, strict=True)
+        own = np.array([points[number] for number in column])
+        return cls(np.array(at), np.array(of), np.array(shares), len(rows), own)
+
+    def apply(self, values: Floats) -> Floats:
+        """(n, c) values of the control points for those of the file's points (m, c)."""
+        out = np.zeros((self.count, values.shape[1]))
+        np.add.at(out, self.row, self.share[:, None] * values[self.column])
+        return out
+
+
+@dataclass(frozen=True)
 class NamedSurface:
     """One surface of a file.
 
     name : as the file has it, or made from its place in the file
     domain : where to draw it; None for everywhere it is covered
+    ties : how its control points follow those of the file, where they are not the same
+    deviation : greatest distance of what is fitted, as at star points of a T-spline, from what it is fitted to; else 0
     """
 
     name: str
     surface: DCPSurface
     domain: Domain | None = None
+    ties: Ties | None = None
+    deviation: float = 0.0
 
 
 def summary(item: NamedSurface) -> str:
@@ -40,6 +75,7 @@ def summary(item: NamedSurface) -> str:
     if domain is not None:
         counts = (("trim loop", len(domain.loops)), ("slit", len(domain.slits)))
         parts += [f"{count} {word}{'s' * (count > 1)}" for word, count in counts if count]
+    parts += [f"fitted near star points within {item.deviation:.3g}"] if item.deviation > 0 else []
     return f"{item.name}: {', '.join(parts)}"
 
 

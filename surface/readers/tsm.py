@@ -1,4 +1,4 @@
-"""Reader of T-splines in Rhino's and Fusion's text format ``.tsm`` (header ``#TS0200``) whose outline is one rectangle.
+"""Reader of T-splines in Rhino's and Fusion's text format ``.tsm`` (header ``#TS0200``).
 
 The n-th line of each kind is entity n; a kind alone is a deleted one::
 
@@ -14,9 +14,9 @@ The n-th line of each kind is entity n; a kind alone is a deleted one::
 
 Knots of a grip are those that rays from it through the T-mesh meet (Sederberg, Zheng, Bakenov and Nasri 2003,
 rule 1). With Bezier end conditions the outline has every knot four times, and its vertices have extra grips one
-knot further in. That is a DCP surface exactly. Star points, creases inside, outlines that are no rectangle and other
-end conditions are refused: no local knot vectors in one (u, v) plane describe them, or the format does not specify
-which.
+knot further in. Where the outline is one rectangle that is a DCP surface exactly. Other forms, closed ones, those with
+star points or with outlines that have corners inwards, become islands of one plane (:mod:`surface.readers.tcharts`),
+exact but near star points. Creases inside and other end conditions are refused.
 """
 
 from __future__ import annotations
@@ -30,10 +30,10 @@ from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 
 from .common import Location, NamedSurface, read_text
-from .tsmfile import COMPASS, HINT, TsmFile, parse
+from .tcharts import read_complex
+from .tlayout import STEP, directions
+from .tsmfile import COMPASS, HINT, Link, TsmFile, parse
 
-STEP = ((1, 0), (0, 1), (-1, 0), (0, -1))
-SIDES = (1, 2, 3, 0)  # the order of counts in "0m cg"
 NEAR = 1e-9  # of the outline's size: knot intervals are sums of decimal numbers
 
 
@@ -50,9 +50,14 @@ def read(path: Path) -> list[NamedSurface]:
     location = Location(path)
     file = parse(location, read_text(path, errors="replace"))  # comments may be in any encoding
     _require(file, "degree", "3", "T-splines of degree 3 are read")
-    _require(file, "force-bezier-end-conditions", "1", "closed forms and other ends are not read, only Bezier ends")
     if not file.links or not file.grips:
         raise location.error('has no links ("l") or no grips ("0g")')
+    outline = [link for link in file.links.values() if link.face < 0]
+    if outline:
+        _require(file, "force-bezier-end-conditions", "1", "an outline with other ends is not read, only Bezier ends")
+    if _is_complex(file, outline):
+        _check_creases(file)
+        return [read_complex(file, path.stem)]
     mesh = TMesh(file)
     anchors = _anchors(file, mesh)
     rows = np.array([file.grips[number][1] for number in anchors])
@@ -62,6 +67,23 @@ def read(path: Path) -> list[NamedSurface]:
     except ValueError as error:
         raise location.error(str(error)) from error
     return [NamedSurface(path.stem, surface)]
+
+
+def _is_complex(file: TsmFile, outline: list[Link]) -> bool:
+    """Whether a form is more than one rectangle: closed, with star points, or with corners that point inwards."""
+    quarters = dict.fromkeys(file.vertices, 0)
+    for link in file.links.values():
+        quarters[link.vertex] += 1 + link.turn  # left 90, straight 180, right 270 degrees
+    stars = any(count != 4 for count in quarters.values())
+    return stars or bool(file.missing) or not outline or any(link.turn == 0 for link in outline)
+
+
+def _check_creases(file: TsmFile) -> None:
+    """``SurfaceFileError`` for a crease inside."""
+    border = {link.edge for link in file.links.values() if link.face < 0}
+    for line, edge in file.creases:
+        if edge not in border:
+            raise file.error(line, f"edge {edge} is creased inside the surface", HINT)
 
 
 def _require(file: TsmFile, key: str, value: str, why: str) -> None:
@@ -80,8 +102,8 @@ def _anchors(file: TsmFile, mesh: TMesh) -> dict[int, Anchor]:
             out[number] = Anchor(mesh.uv[vertex], (0, 0))
             counts[vertex] += 1
     for line, vertex, sizes, grips in file.extras:
-        for directions, grip in zip(_directions(sizes), grips, strict=True):
-            steps = [STEP[mesh.direction(vertex, side)] for side in directions]
+        for sides, grip in zip(directions(sizes), grips, strict=True):
+            steps = [STEP[mesh.direction(vertex, side)] for side in sides]
             anchor = Anchor(mesh.uv[vertex], (sum(u for u, _ in steps), sum(v for _, v in steps)))
             if grip in out or not mesh.allows(anchor):
                 raise file.error(line, f"grip {grip} lies where Bezier ends have none", HINT)
@@ -98,15 +120,6 @@ def _anchors(file: TsmFile, mesh: TMesh) -> dict[int, Anchor]:
     return out
 
 
-def _directions(counts: list[int]) -> list[tuple[int, ...]]:
-    """For every grip of a "0m cg" line the side, or the two sides, that it lies at."""
-    out: list[tuple[int, ...]] = []
-    for k, side in enumerate(SIDES):
-        after = (k + 1) % 4
-        out += [(side,)] * counts[k] + [(side, SIDES[after])] * (counts[k] * counts[after])
-    return out
-
-
 class TMesh:
     """A T-mesh laid out in the plane; ``SurfaceFileError`` where it is no rectangle with regular vertices.
 
@@ -117,27 +130,12 @@ class TMesh:
         self._file = file
         self._direction: dict[int, int] = {}
         self.uv: dict[int, tuple[float, float]] = {}
-        self._check_stars()
         self._lay_out()
         self._merge_equal_knots()
         us, vs = zip(*self.uv.values(), strict=True)
         self._rect = min(us), max(us), min(vs), max(vs)
         self._check_outline()
         self._lines = [self._edges_across(axis) for axis in range(2)]
-
-    def _check_stars(self) -> None:
-        """Corners around a vertex of the plane make 360 degrees, that of the outside included."""
-        file = self._file
-        quarters = dict.fromkeys(file.vertices, 0)
-        for link in file.links.values():
-            quarters[link.vertex] += 1 + link.turn  # left 90, straight 180, right 270 degrees
-        for vertex, count in quarters.items():
-            if count != 4:
-                why = f"vertex {vertex} is a star point: {90 * count} degrees around it; star points are not read"
-                raise file.error(file.vertices[vertex][0], why, HINT)
-        if all(link.face >= 0 for link in file.links.values()):
-            line = next(iter(file.links.values())).line
-            raise file.error(line, "no link borders the outside: the form is closed, which is not read", HINT)
 
     def _lay_out(self) -> None:
         """Give every vertex a position and every link a direction, walking from link to link."""

@@ -41,6 +41,7 @@ class TsmFile:
     grips : by number: line, [x, y, z, weight]
     owners : line, whether it is the vertex' own grip, and vertex, of every grip in order, deleted ones too
     extras : line, vertex, four counts, grips
+    missing : vertices whose extra grips are not those of a regular one, and the line that says so
     """
 
     location: Location
@@ -52,6 +53,7 @@ class TsmFile:
     grips: dict[int, tuple[int, list[float]]] = field(default_factory=dict)
     owners: list[tuple[int, bool, int]] = field(default_factory=list)
     extras: list[tuple[int, int, list[int], list[int]]] = field(default_factory=list)
+    missing: dict[int, int] = field(default_factory=dict)
 
     def error(self, line: int, why: str, hint: str = "") -> SurfaceFileError:
         """The error for a line."""
@@ -74,6 +76,8 @@ def parse(location: Location, text: str) -> TsmFile:
         elif kind:
             _add_other(out, number, kind, words)
     _check_links(out)
+    if not out.owners:  # then grips are those of the vertices, in order
+        out.owners = [(out.vertices.get(k, (1,))[0], k in out.vertices, k) for k in range(count["0g"])]
     _check_owners(out)
     if len(out.owners) != count["0g"]:
         raise location.error(f'has {count["0g"]} grips ("0g") and {len(out.owners)} owners ("0m gv", "0m gvp")')
@@ -108,8 +112,11 @@ def _add_other(out: TsmFile, line: int, kind: str, words: list[str]) -> None:
         out.owners.append((line, words[0] == "gvp", _integers(out, line, words[1:2] or ["nothing"])[0]))
     elif kind == "0m" and words[:1] == ["cg"]:
         vertex, *values = _integers(out, line, words[1:]) or [0]
-        if values[:1] != [4]:
-            raise out.error(line, "a vertex with extra grips must have 4 sides; star points are not read", HINT)
+        if not values or values[0] < 1:
+            raise out.error(line, "a vertex with extra grips must have sides, 4 if it is regular")
+        if values[0] != 4 or -1 in values[5:]:  # a star point, or a corner of the outline that points inwards
+            out.missing[vertex] = line
+            return
         counts, grips = values[1:5], values[5:]
         sizes = [a + a * b for a, b in zip(counts, counts[1:] + counts[:1], strict=True)]
         if len(counts) != 4 or min(counts) < 0 or len(grips) != sum(sizes):
@@ -143,11 +150,10 @@ def _check_owners(out: TsmFile) -> None:
         (line, vertex, []) for line, own, vertex in out.owners if own or vertex >= 0
     ]
     references += [(line, vertex, grips) for line, vertex, _, grips in out.extras]
+    references += [(line, vertex, []) for vertex, line in out.missing.items()]
     for line, vertex, grips in references:
         if vertex not in out.vertices:
             raise out.error(line, f'refers to "v" {vertex}, which the file does not have')
-        if -1 in grips:
-            raise out.error(line, "has missing grips (-1), as at star points and holes; these are not read", HINT)
         if any(grip not in out.grips for grip in grips):
             raise out.error(line, f'refers to a "0g" that the file does not have: {grips}')
 

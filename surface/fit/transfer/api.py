@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,7 @@ from surface.fit.transfer.scan import Scan, read_scan, sample
 from surface.fit.transfer.template import Template, make_template
 from surface.head import Head, HeadData, save_data
 from surface.head.model.file import check_writable
+from surface.head.model.placement import Placement
 
 MANY = 250_000  # samples of the head once it is found
 MARGIN = 0.35  # in heights of the face: around a head, what belongs to it
@@ -81,7 +82,8 @@ def transfer(
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
     parts = [face_report(data, template, warp, samples)]
-    data = scaled(data, factor, data.eyes.mean(axis=0))
+    middle = data.eyes.mean(axis=0)
+    data = replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, options.unit or ""))
     moving = [n for n in head.parameters if any(g.name == n for p in data.parts for g in p.groups)]
     return Transferred(data, FitReport(name, parts, moving, notes=notes, scale=1.0))
 
@@ -133,6 +135,11 @@ def _in_frame(scan: Scan, template: Template, found: Similarity) -> Scan:
     low, high = template.points.min(axis=0) - margin, template.points.max(axis=0) + margin
     at = scan.vertices[scan.triangles].mean(axis=1)
     return scan.kept(((at > low) & (at < high)).all(axis=1))
+
+
+def _placement(found: Similarity, factor: float, middle: Floats, unit: str) -> Placement:
+    """From the scan's own coordinates to the head, which was enlarged by ``factor`` about ``middle``."""
+    return Placement(found.turn, factor * found.scale, middle + factor * (found.shift - middle), unit)
 
 
 def _true_size(found: Similarity, unit: str | None, picked: dict[str, Floats]) -> tuple[float, list[str]]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from surface.base.arrays import Array, Floats, Floats32, Ints
 from surface.head.model.parameters import smoothstep
 from surface.head.model.placement import Placement
+from surface.mesh.domain import Slit
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,10 @@ class PartData:
     jaw : (n,) share of the jaw's rotation that each point follows.
     lids : (n,) signed: how closely a point keeps to the left (+) or right (-) eyeball when lids move.
     mesh : the stored tessellation as arrays (see :mod:`surface.head.model.meshes`); may be empty.
+    closed_u, closed_v : (start, end) of a direction that is joined at its ends; None for one that is not.
+    rect : (u0, u1, v0, v1) in which the part is drawn; None for the rectangle around ``loops``.
+    flip : the outside is where S_v x S_u points, instead of S_u x S_v.
+    cuts : segments of (u, v) along which the mesh is cut; ``slits`` only tell where openings are.
     """
 
     name: str
@@ -54,6 +59,11 @@ class PartData:
     jaw: Floats
     lids: Floats
     mesh: dict[str, Array] = field(default_factory=dict)
+    closed_u: tuple[float, float] | None = None
+    closed_v: tuple[float, float] | None = None
+    rect: tuple[float, float, float, float] | None = None
+    flip: bool = False
+    cuts: tuple[Slit, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,10 @@ from surface.base.errors import HeadFileError
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.meshes import KEYS
 from surface.head.model.placement import Placement
+from surface.mesh.domain import Slit
 
-VERSION = 1
+VERSION = 2
+PLAIN = 1  # of heads whose parts are neither closed nor flipped and have no rectangle: older omotes read them
 ANY = -1  # length of an axis that may have any
 ARRAYS: dict[str, tuple[int | str, ...]] = {  # key of a part: its array's shape; "n" is the number of control points
     "points": ("n", 3), "weights": ("n",), "knots_u": ("n", ANY), "knots_v": ("n", ANY), "degrees": ("n", 2),
@@ -155,8 +157,8 @@ def _read_toml(path: Path) -> _Section:
     version = table.get("format")
     if isinstance(version, int) and version > VERSION:
         raise HeadFileError(f"{path}: format: is {version}, this omote reads up to {VERSION}", hint="update omote")
-    if version != VERSION:
-        raise _error(path, "format", f"is {version!r}, this omote reads {VERSION}")
+    if version not in (PLAIN, VERSION):
+        raise _error(path, "format", f"is {version!r}, this omote reads {PLAIN} and {VERSION}")
     return _Section(path, table)
 
 
@@ -184,7 +186,32 @@ def _part(section: _Section, arrays: _Arrays) -> PartData:
         **table | {"budget": (int(cell), chord, int(depth))}, **a, loops=loops,
         groups=[Group(str(g), i, m) for g, i, m in zip(names, ids, moves, strict=True)],
         mesh={k: arrays.stored[f"{name}/{k}"] for k in KEYS if f"{name}/{k}" in arrays.stored},
+        **_extent(section), cuts=_cuts(arrays, f"{name}/cuts"),
     )  # fmt: skip
+
+
+def _extent(section: _Section) -> dict[str, Any]:
+    """Which directions of a part are closed, its rectangle and its side; what is not there is left out."""
+    shapes: dict[str, tuple[int, ...]] = {"closed_u": (2,), "closed_v": (2,), "rect": (4,)}
+    found = section.read(**{key: shape for key, shape in shapes.items() if key in section.table})
+    for key, ends in found.items():
+        if not all(a < b for a, b in zip(ends[::2], ends[1::2], strict=True)):
+            raise section.error(key, f"{list(ends)} does not rise")
+    flip = section.table.get("flip", False)
+    if not isinstance(flip, bool):
+        raise section.error("flip", f"{flip!r} is neither true nor false")
+    return found | {"flip": flip}
+
+
+def _cuts(arrays: _Arrays, key: str) -> tuple[Slit, ...]:
+    """Cuts of a part's mesh: rows of axis (0 along u, 1 along v), at, start, end."""
+    if key not in arrays.stored:
+        return ()
+    rows = arrays.read(key, (ANY, 4))
+    try:
+        return tuple(Slit("uv"[int(axis)], *map(float, ends)) for axis, *ends in rows)
+    except (ValueError, IndexError) as error:
+        raise _error(arrays.path, key, f"holds what is no cut ({error})") from error
 
 
 def _seam(section: _Section, key: str, arrays: _Arrays, names: list[str]) -> Seam:
@@ -274,6 +301,7 @@ def _part_arrays(p: PartData) -> dict[str, Array]:
         "group_ids": np.concatenate([np.zeros(0, np.int32), *(g.ids for g in p.groups)]),
         "group_ends": np.cumsum([len(g.ids) for g in p.groups]).astype(np.int32),
         "group_moves": np.concatenate([np.zeros((0, 3), np.float32), *(g.moves for g in p.groups)]),
+        **({"cuts": np.array([("uv".index(c.axis), c.at, c.start, c.end) for c in p.cuts])} if p.cuts else {}),
         **p.mesh,
     }
 
@@ -281,7 +309,7 @@ def _part_arrays(p: PartData) -> dict[str, Array]:
 def _table(head: HeadData) -> dict[str, Any]:
     """Everything that goes into head.toml."""
     return {
-        "format": VERSION,
+        "format": VERSION if any(_extent_table(p) or p.cuts for p in head.parts) else PLAIN,
         "name": head.name,
         "provenance": head.provenance,
         "neck": vars(head.neck),
@@ -289,7 +317,7 @@ def _table(head: HeadData) -> dict[str, Any]:
         "jaw": vars(head.jaw) | {"tilts": {k: np.round(v, 6).tolist() for k, v in head.jaw.tilts.items()}},
         "parts": [
             {"name": p.name, "material": p.material, "follows": p.follows, "budget": p.budget,
-             "groups": [g.name for g in p.groups]}
+             "groups": [g.name for g in p.groups], **_extent_table(p)}
             for p in head.parts
         ],
         "seams": [{"a": s.part_a, "b": s.part_b} for s in head.seams],
@@ -298,6 +326,13 @@ def _table(head: HeadData) -> dict[str, Any]:
         "paint": head.paint,
         **({"placement": _placement_table(head.placement)} if head.placement else {}),
     }  # fmt: skip
+
+
+def _extent_table(part: PartData) -> dict[str, Any]:
+    """What :func:`_extent` reads, without what is as usual."""
+    ends = {key: getattr(part, key) for key in ("closed_u", "closed_v", "rect")}
+    table: dict[str, Any] = {key: [float(x) for x in row] for key, row in ends.items() if row is not None}
+    return table | ({"flip": True} if part.flip else {})
 
 
 def _placement_table(placement: Placement) -> dict[str, Any]:

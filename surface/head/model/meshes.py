@@ -24,8 +24,9 @@ LOOP_SHARE = 0.4  # how near a border follows its loop, in chord errors
 def make_surface(data: PartData) -> DCPSurface:
     """The part's DCP surface."""
     return DCPSurface.from_padded(
-        data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1]
-    )
+        data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1],
+        closed_u=data.closed_u, closed_v=data.closed_v,
+    )  # fmt: skip
 
 
 def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) -> Mesh:
@@ -39,6 +40,7 @@ def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) 
             domain=replace(domain_of(data), marks=_ends(seams, data.name)),
             loop_error=LOOP_SHARE * chord,
             measured=False,
+            flip=data.flip,
         )
 
 
@@ -50,10 +52,17 @@ def _ends(seams: Sequence[Seam], part: str) -> Floats:
 
 
 def domain_of(data: PartData) -> Domain:
-    """The rectangle around the part's loops, trimmed by them."""
+    """The part's rectangle, or the one around its loops, trimmed by them.
+
+    ``ValueError`` for a part with neither.
+    """
+    if data.rect is not None:
+        return Domain(data.rect, data.loops, data.cuts)
+    if not data.loops:
+        raise ValueError("has neither loops nor rect, so nothing tells where to draw it")
     every = np.concatenate(data.loops)
     (u0, v0), (u1, v1) = every.min(axis=0), every.max(axis=0)
-    return Domain((u0, u1, v0, v1), data.loops)
+    return Domain((u0, u1, v0, v1), data.loops, data.cuts)
 
 
 def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
@@ -70,9 +79,9 @@ def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
 
 
 def unpack(
-    arrays: dict[str, Array], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool
+    arrays: dict[str, Array], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool, flip: bool = False
 ) -> Mesh | None:
-    """The stored mesh, or None if it is absent, made with another budget, or does not fit the surface.
+    """The stored mesh, or None if it is absent, made with another budget or flip, or does not fit the surface.
 
     ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex is put in the middle
     of its cell's control points.
@@ -82,15 +91,17 @@ def unpack(
     uv, triangles, side, start, list_start, ids, made = (arrays[key] for key in KEYS)
     if made.shape != (5,) or not np.isfinite(made).all() or tuple(made[:3]) != tuple(map(float, budget)):
         return None
+    if bool(made[4]) != flip:
+        return None
     if not _kinds_valid(arrays, uv.shape[:1]):
         return None
     triangles, start, list_start, ids = (a.astype(np.int64) for a in (triangles, start, list_start, ids))
-    if not _indices_valid(uv, triangles, start, list_start, ids, surface.n):
+    if not _indices_valid(uv, triangles, start, list_start, ids, len(surface.shifts) * surface.n):
         return None
     uv, triangles, side = uv.astype(float), triangles.astype(np.int32), side.astype(np.int64)
     cell = np.repeat(np.arange(len(start) - 1, dtype=np.int32), np.diff(start))
     if rough:
-        sums = np.add.reduceat(surface.points[ids], list_start[:-1]) / np.diff(list_start)[:, None]
+        sums = np.add.reduceat(surface.points[ids % surface.n], list_start[:-1]) / np.diff(list_start)[:, None]
         points, normals = sums[cell], np.zeros((len(uv), 3))
     else:
         points, su, sv = surface.derivatives(uv, side=side)

@@ -140,7 +140,7 @@ def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> 
         )
     try:
         surface = make_surface(part)
-        kept = unpack(part.mesh, surface, part.budget, rough=part.follows == "skin")
+        kept = unpack(part.mesh, surface, part.budget, rough=part.follows == "skin", flip=part.flip)
         mesh = kept or tessellate(part, surface, head.seams)
     except ValueError as e:
         raise HeadFileError(f"{where}: part {part.name!r}: {e}", hint="make the head again: omote fit") from e

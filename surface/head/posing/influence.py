@@ -58,7 +58,9 @@ def _rows(part: HeadPart) -> tuple[list[Row], int]:
     """Sums of one part's vertices over its own points, empty for those that a seam has added; and how many points."""
     if isinstance(part, SkinPart):
         lists = build_lists(part.surface, part.mesh, True)
-        rows, count = _skin_rows(lists, -1.0 if part.mesh.flip else 1.0), part.surface.n
+        count = part.surface.n
+        own = _skin_rows(lists, -1.0 if part.mesh.flip else 1.0)
+        rows = [(ids % count, weights) for ids, weights in own]  # copies of a closed surface's points are the same
     else:
         rows, count = _rigid_rows(part), _RIGID_POINTS
     empty: Row = (np.zeros(0, np.int64), np.zeros((0, 3)))

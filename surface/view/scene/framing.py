@@ -66,8 +66,16 @@ def framed(camera: Camera, head: ViewHead) -> Camera:
 def _skin_points(head: Any) -> np.ndarray:
     """(n, 3) places all over the skin at rest, whatever the pose is; of all parts where none is skin."""
     parts = [p for p in head.parts if p.material == SKIN] or list(head.parts)
-    found = [p.surface.evaluate(np.asarray(p.uv[:: -(-len(p.uv) // SAMPLES)], float)) for p in parts if len(p.uv)]
-    return np.concatenate(found) if found else np.zeros((0, 3))
+    found = [p.surface.evaluate(_inside(p)) for p in parts if len(p.uv)]
+    every = np.concatenate(found) if found else np.zeros((0, 3))
+    return every[np.isfinite(every).all(axis=1)]  # by the same rounding a place may lie beyond its chart
+
+
+def _inside(part: Any) -> np.ndarray:
+    """(n, 2) some of a part's places; 32-bit numbers may lie beyond its domain by rounding."""
+    u0, u1, v0, v1 = part.surface.rect
+    inside: np.ndarray = np.clip(np.asarray(part.uv[:: -(-len(part.uv) // SAMPLES)], float), (u0, v0), (u1, v1))
+    return inside
 
 
 def _eyes(data: Any, skin: np.ndarray) -> tuple[np.ndarray, bool]:

@@ -195,9 +195,12 @@ BAD = {
     "header": (GOOD[1:], "line 1: is no T-spline"),
     "truncated": (GOOD[: GOOD.index("\nl ") + 60], r"line \d+: (\"l\" needs 7 values|refers to \"l\")"),
     "cut off": (GOOD[: GOOD.index("0g ")], "the file does not have"),
-    "left out": (changed("0m cg", "0m cg 0 4 1 0 0 1 1 -1 3"), "has missing grips"),
+    "left out": (
+        changed("0m cg", "0m cg 0 4 1 0 0 1 1 -1 3"),
+        "vertex 0 lacks grips, but is neither",
+    ),
     "degree": (GOOD.replace("degree 3", "degree 2"), 'line 3: "degree" is 2'),
-    "ends": (GOOD.replace("conditions 1", "conditions 0"), "line 7: .*closed forms and other ends are not read"),
+    "ends": (GOOD.replace("conditions 1", "conditions 0"), "line 7: .*other ends is not read"),
     "no ends": (GOOD.replace("force-bezier-end-conditions 1\n", ""), "line 1: .*is missing"),
     "no links": (HEAD, "has no links"),
     "NaN": (changed("0g ", "0g nan 0 0 1"), r"line \d+: numbers must be finite"),
@@ -208,8 +211,11 @@ BAD = {
     "sum": (changed("e ", "e 0 1.5"), r"line \d+: vertex \d comes to lie at two places"),
     "whole": (changed("l ", "l 0 x 0 0 0 0 0"), "needs whole numbers"),
     "turn": (changed("l ", " ".join([*LINKS[:-1], "5"])), "turn must be 0, 1 or 2"),
-    "star": (changed("l ", " ".join([*LINKS[:-1], "2"])), r"line \d+: vertex 0 is a star point: 540 degrees"),
-    "closed": (re.sub(r"^(l \S+ \S+ \S+ \S+) -1 ", r"\1 0 ", GOOD, flags=re.M), "form is closed"),
+    "star": (changed("l ", " ".join([*LINKS[:-1], "2"])), r"line \d+: face \d is no rectangle"),
+    "closed": (
+        re.sub(r"^(l \S+ \S+ \S+ \S+) -1 ", r"\1 0 ", GOOD, flags=re.M),
+        "edge 0 is creased inside",
+    ),
     "leaving": (changed("v ", "v 1 EAST"), r'line \d+: "v" 0 names link 1'),
     "pieces": (TWICE, r"line \d+: link \d+ belongs to another piece"),
     "bare corner": (BARE, r"line \d+: vertex 0 has 1 grips, 4 belong there"),
@@ -218,11 +224,11 @@ BAD = {
     "owner": (changed("0m gv ", "0m gv 77"), 'refers to "v" 77'),
     "owners": (changed("0m gv ", ""), r'25 grips \("0g"\) and 24 owners'),
     "counts": (changed("0m cg", "0m cg 0 4 1 0 0 1 1"), "does not fit its counts"),
-    "valence": (changed("0m cg", "0m cg 0 5 1 0 0 1 1 2 3"), "star points"),
+    "valence": (changed("0m cg", "0m cg 0 5 1 0 0 1 1 2 3"), "neither a star point"),
     "outside": (changed("0m cg", "0m cg 0 4 0 1 1 0 1 3 2"), "Bezier ends have none"),
     "lost": (changed("0m cg", ""), r"line \d+: grip \d+ has no place"),
     "crease": (GOOD.replace("ec 0 0", "ec 1 0").replace("ec", "ec", 1), "creased inside"),
-    "outline": (ELL, "outline is no rectangle"),
+    "outline": (ELL, r"vertex \d has 2 grips, 4 belong there"),
 }
 
 

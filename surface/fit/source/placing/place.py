@@ -76,6 +76,16 @@ def eye_middle(eyes: Eyes, size: HeadSize) -> Floats:
     return eyes.middle if eyes.balls else eyes.middle + size.across * INTO_EYE
 
 
+def neck_of(mesh: FitMesh, marks: Landmarks) -> Neck:
+    """The neck of a head in its place, below its eyes; in the lower quarter of one whose eyes are not known."""
+    if marks.eyes is not None:
+        return find_neck(mesh, EYES_AT, head_size(marks))
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    height = float(high[1] - low[1])
+    pivot = (0.0, float(low[1]) + 0.3 * height, float(0.5 * (low[2] + high[2])))
+    return Neck(pivot, 0.0, float(low[1]) + 0.02 * height, float(low[1]) + 0.2 * height)
+
+
 def find_neck(mesh: FitMesh, eyes_at: Floats, size: HeadSize) -> Neck:
     """The neck of a head whose eyes have their middle at ``eyes_at`` (3,): as on the shipped head, over the middle of
     what there is of it."""

@@ -124,7 +124,7 @@ def test_broken_toml(folder):
 
 def test_another_version(folder):
     edit(folder, "format = 1", "format = 99")
-    broken(folder, r"head\.toml: format: is 99, this omote reads up to 1")
+    broken(folder, r"head\.toml: format: is 99, this omote reads up to 2")
 
 
 def test_a_missing_key(folder):

@@ -113,3 +113,18 @@ def test_normals_of_a_flipped_mesh_point_the_other_way() -> None:
         head = Head(replace(data, parts=[part], paint=[]))
         _, normals = summed(head, Influence(head), head.values({}))
         assert (normals * head.parts[0].normals).sum(axis=1).min() > 0.999
+
+
+def test_a_closed_part_is_summed_over_its_own_points():
+    from relief import named, tube
+
+    from surface.fit.surfaces import SurfaceOptions, head_of
+
+    head = Head(head_of(named(tube=tube(60, 200)), name="h", options=SurfaceOptions(unit="mm")))
+    sums = Influence(head)
+    assert sums.points == 60 and sums.ids.max() < 60
+    points, _ = head.place_points(head.values({}))
+    rows = np.repeat(np.arange(len(sums.start) - 1), np.diff(sums.start))
+    at = np.zeros((len(sums.start) - 1, 3))
+    np.add.at(at, rows, sums.weights[:, :1] * points[0][sums.ids])
+    np.testing.assert_allclose(at, head.parts[0].vertices, atol=1e-3)

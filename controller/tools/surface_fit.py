@@ -1,0 +1,69 @@
+"""``omote fit`` of a surface file: options in words to a head's folder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from controller.base.errors import ConfigError
+from controller.base.paths import find_config
+from surface.base.progress import Progress
+
+if TYPE_CHECKING:
+    from surface.fit.surfaces import SurfaceReport  # start-up: only surface files need it
+
+SUFFIXES = (".3dm", ".tsm", ".xml", ".json")
+
+
+def is_surface_file(path: Path) -> bool:
+    """Whether a file is one of surfaces, by its name."""
+    return path.suffix.lower() in SUFFIXES and not path.is_dir()
+
+
+def refuse_surface_options(mesh: Path, given: Mapping[str, object]) -> None:
+    """Raise ConfigError for an option that only surface files have."""
+    for option, value in given.items():
+        if value:
+            why = f"{option}: is for files of surfaces ({', '.join(SUFFIXES)}), not for {mesh}"
+            raise ConfigError(why, hint="leave it out")
+
+
+@dataclass(frozen=True)
+class SurfaceFit:
+    """What the user asked for; see ``omote fit --help``."""
+
+    path: Path
+    out: Path
+    name: str | None
+    unit: str | None
+    up: str | None
+    forward: str | None
+    without: tuple[str, ...]
+    only: tuple[str, ...]
+    groups: tuple[Path, ...]
+    strict: bool
+    expressions_from: str | None
+    landmarks: Path | None
+    report: Path | None
+
+    def check(self, meshes_only: Mapping[str, object]) -> None:
+        """Raise ConfigError for options that do not go together; ``meshes_only`` are those of meshes, by name."""
+        for option, value in meshes_only.items():
+            if value:
+                why = f"{option}: is for meshes; the control points of {self.path} stay as they are"
+                raise ConfigError(why, hint="leave it out; --groups FILE and --expressions-from ict move surfaces")
+        if self.landmarks is not None and self.expressions_from is None:
+            raise ConfigError("--landmarks: only a transfer of expressions uses them", hint="--expressions-from ict")
+
+    def run(self, progress: Progress) -> SurfaceReport:
+        """Make the head. Raises ConfigError: no such head; others as :func:`surface.fit.surfaces.fit_surfaces`."""
+        from surface.fit.surfaces import SurfaceOptions, fit_surfaces  # start-up: only surface files need it
+
+        source = None if self.expressions_from is None else find_config("heads", self.expressions_from)
+        options = SurfaceOptions(
+            self.unit, self.up, self.forward, self.without, self.only, self.strict, self.groups, source, self.landmarks
+        )
+        title = self.name or self.out.resolve().name
+        return fit_surfaces(self.path, self.out, name=title, options=options, progress=progress, report_dir=self.report)

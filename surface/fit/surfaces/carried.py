@@ -1,0 +1,172 @@
+"""Expressions of another head on surfaces that stay as they are.
+
+The other head is given the surfaces' form first (:mod:`surface.fit.transfer`). Then every displacement field of its
+skin is read off at samples of the surfaces, by the nearest place whose normal agrees, and the displacements of the
+surfaces' own control points are those whose surface comes nearest to it in least squares. Control points that the
+samples leave undetermined follow the mean of the field over their subdomains.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
+
+from surface.base.arrays import Floats
+from surface.fit.surfaces.build import sparse_group
+from surface.fit.surfaces.pieces import Piece
+from surface.head.model.data import HeadData, PartData
+from surface.head.model.meshes import make_surface
+from surface.head.model.parameters import SHAPES, smoothstep
+from surface.head.posing.head import Head
+
+NORMAL_MM = 14.0  # weight of normals in the search for the nearest place
+FINER = 8.0  # samples than for placing: where a surface is flat its control points need some, too
+NEAR = 4  # places that a field is read off at
+FAR_MM = (12.0, 35.0)  # from the other head's skin: nearer all of a displacement is taken, further none
+PULL = 1e-2  # of the mean over a subdomain, against the samples in it
+LEAST_MM, LEAST_GROUP_MM = 0.01, 0.25  # displacements, and groups, that are left out
+SHOWN = 0.5  # of a group of a rule, as a wrinkle's: surfaces that cannot show so much of it do without
+
+
+@dataclass(frozen=True)
+class Fields:
+    """Displacements of a head's skin at ``points (m, 3)`` with unit ``normals (m, 3)``, mm.
+
+    values : (m, c), those of the groups ``names``, three columns each, and the share of the jaw's rotation.
+    """
+
+    points: Floats
+    normals: Floats
+    names: tuple[str, ...]
+    values: Floats
+
+    def at(self, points: Floats, normals: Floats) -> Floats:
+        """(k, c) values at other points (k, 3) with unit normals (k, 3)."""
+        tree = cKDTree(np.hstack([self.points, NORMAL_MM * self.normals]))
+        distance, near = tree.query(np.hstack([points, NORMAL_MM * normals]), k=NEAR)
+        weight = 1.0 / (distance + 0.3) ** 2
+        weight /= weight.sum(axis=1, keepdims=True)
+        away = np.linalg.norm(self.points[near[:, 0]] - points, axis=1)
+        weight *= (1.0 - smoothstep(away, *FAR_MM))[:, None]
+        out: Floats = sum(weight[:, k, None] * self.values[near[:, k]] for k in range(NEAR))
+        return out
+
+
+def skin_fields(head: HeadData) -> Fields:
+    """The fields of all parts of a head that are seen as skin, at rest."""
+    made = Head(head)
+    skins = [p for p in head.parts if p.follows == "skin" and p.material == "skin" and p.name != "sockets"]
+    names = tuple(dict.fromkeys(g.name for p in skins for g in p.groups))
+    rows = []
+    for part in skins:
+        own = made.part(part.name)
+        mesh, count = own.mesh, len(own.mesh.uv)  # seams may have added copies
+        basis = own.surface.basis_matrix(mesh.uv, side=mesh.side)
+        points, normals = own.vertices[:count].astype(float), own.normals[:count].astype(float)
+        rows.append((points, normals, basis @ _dense(part, names)))
+    every = [np.concatenate([row[k] for row in rows]) for k in range(3)]
+    return Fields(every[0], every[1], names, every[2])
+
+
+def _dense(part: PartData, names: tuple[str, ...]) -> Floats:
+    """(n, 3 g + 1) displacements of all groups of some names, 0 for those that the part lacks, and the jaw's share."""
+    out = np.zeros((len(part.points), 3 * len(names) + 1))
+    place = {name: 3 * k for k, name in enumerate(names)}
+    for group in part.groups:
+        at = place[group.name]
+        out[group.ids, at : at + 3] += group.moves
+    out[:, -1] = part.jaw
+    return out
+
+
+def with_expressions(head: HeadData, pieces: Sequence[Piece], other: HeadData) -> HeadData:
+    """The head with the groups, the rules and the jaw of another that has its form.
+
+    pieces : those that ``head.parts`` are made of, in the same order.
+    """
+    fields = skin_fields(other)
+    fitted = [
+        None if part.follows != "skin" else fit_fields(part, piece, fields)
+        for part, piece in zip(head.parts, pieces, strict=True)
+    ]
+    kept = _shown(fields, [f for f in fitted if f is not None])
+    parts = [
+        part if found is None else _moved(part, found.values, fields.names, kept)
+        for part, found in zip(head.parts, fitted, strict=True)
+    ]
+    there = {g.name for p in parts for g in p.groups}
+    rules = [r for r in other.rules if r.group in there]
+    return replace(head, parts=parts, rules=rules, jaw=other.jaw, neck=other.neck)
+
+
+@dataclass(frozen=True)
+class FittedFields:
+    """Values (n, c) of control points; squared sums (c,) of the field over the samples, and of what is left of it."""
+
+    values: Floats
+    whole: Floats
+    left: Floats
+
+
+def fit_fields(part: PartData, piece: Piece, fields: Fields) -> FittedFields:
+    """The values of a part's control points whose surface comes nearest to the fields at the piece's samples."""
+    mesh, surface = replace(piece, chord=piece.chord / FINER).mesh, make_surface(part)
+    sign = -1.0 if part.flip else 1.0
+    points, su, sv = surface.derivatives(mesh.uv, side=mesh.side)
+    normals = np.cross(su, sv)
+    normals *= sign / np.maximum(np.linalg.norm(normals, axis=1), 1e-30)[:, None]
+    wanted = fields.at(points, normals)
+    basis = surface.basis_matrix(mesh.uv, side=mesh.side)
+    if piece.ties is None:
+        return solve_fields(basis, _areas(points, mesh.triangles), wanted)
+    ties = piece.ties
+    shares = csr_matrix((ties.share, (ties.row, ties.column)), shape=(ties.count, len(ties.points)))
+    found = solve_fields(basis @ shares, _areas(points, mesh.triangles), wanted)
+    return replace(found, values=shares @ found.values)
+
+
+def _areas(points: Floats, triangles: np.ndarray) -> Floats:
+    """(m,) a third of the area around each vertex, relative to the mean; none is less than a hundredth of that."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    own = np.bincount(triangles.ravel(), np.repeat(area, 3), len(points))
+    return np.maximum(own / max(float(own.mean()), 1e-300), 0.01)
+
+
+def solve_fields(basis: csr_matrix, weight: Floats, wanted: Floats) -> FittedFields:
+    """Values (n, c) with least sum of weight (basis values - wanted)^2, each pulled a little to its subdomain's mean.
+
+    basis : (m, n) sparse. weight : (m,). wanted : (m, c).
+    """
+    weighted = diags(weight) @ basis
+    reach = np.asarray(weighted.sum(axis=0)).ravel()
+    mean = (weighted.T @ wanted) / np.maximum(reach, 1e-12)[:, None]
+    pull = PULL * reach + 1e-9 * max(float(reach.max()), 1e-12)
+    normal = (basis.T @ weighted + diags(pull)).tocsc()
+    values = splu(normal).solve(weighted.T @ wanted + pull[:, None] * mean)
+    left = (weight[:, None] * (basis @ values - wanted) ** 2).sum(axis=0)
+    return FittedFields(values, (weight[:, None] * wanted**2).sum(axis=0), left)
+
+
+def _shown(fields: Fields, fitted: Sequence[FittedFields]) -> set[str]:
+    """Names of the groups that the surfaces can show: all shapes, and of the others those that most remains of."""
+    whole, left = (sum(getattr(f, key) for f in fitted) for key in ("whole", "left"))
+    by_group = np.stack([np.asarray(rows)[:-1].reshape(-1, 3).sum(axis=1) for rows in (whole, left)])
+    shown = by_group[1] < (1.0 - SHOWN) * by_group[0]
+    return {name for name, good in zip(fields.names, shown, strict=True) if good or name in SHAPES}
+
+
+def _moved(part: PartData, values: Floats, names: tuple[str, ...], kept: set[str]) -> PartData:
+    """The part with groups and its share of the jaw."""
+    groups = list(part.groups)
+    for k, name in enumerate(names):
+        moves = values[:, 3 * k : 3 * k + 3]
+        length = np.linalg.norm(moves, axis=1)
+        if name in kept and length.max() > LEAST_GROUP_MM:
+            groups.append(sparse_group(name, np.where(length[:, None] > LEAST_MM, np.round(moves, 4), 0.0)))
+    return replace(part, groups=groups, jaw=np.clip(np.round(values[:, -1], 6), 0.0, 1.0))
