@@ -140,8 +140,8 @@ def _part(
 ) -> tuple[PartRecipe, list[Island]]:  # fmt: skip
     face = name == "face"
     request = FitRequest(
-        points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, slopes=SLOPES, finest=FINEST,
-        growth=GROWTH if face else 1.25, astray_mm=ASTRAY_MM * scale, spare=SPARE if face else 0,
+        points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale, slopes=SLOPES,
+        finest=FINEST, growth=GROWTH if face else 1.25, astray_mm=ASTRAY_MM * scale, spare=SPARE if face else 0,
     )  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth

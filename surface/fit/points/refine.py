@@ -73,7 +73,8 @@ def fit_chart(
     """Control points for neutral and shapes of one chart; ``report`` is called with the fraction done."""
     net = net_at(coarse_places(chart.uv, request.coarse), request.coarse, chart.cuts, chart.uv)
     first = replace(request, points=request.points - request.spare)
-    fitted = _refined(mesh, chart, net, first, Hold(), report)
+    share = first.points / request.points
+    fitted = _refined(mesh, chart, net, first, Hold(), lambda done: report(share * done))
     return fitted if chart.between is None else _mended(mesh, chart, fitted, request, report)
 
 
