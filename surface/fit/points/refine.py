@@ -32,7 +32,8 @@ class FitRequest:
     """How finely and how smoothly a chart is fitted.
 
     points : most control points; coarse : spacing of the first net, in tiles; deepest : its finest level.
-    neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
+    neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness; slopes : factor of
+        the chart's weights of slopes.
     growth : most factor by which the net grows between two solves.
     finest : least spacing of a net, in spacings of the mesh's vertices.
     astray_mm : where the surface is further off, also between samples, it is mended; spare : points kept for that.
@@ -44,6 +45,7 @@ class FitRequest:
     neutral_mm: float = 0.25
     shape_mm: float = 0.3
     fair: float = 1e-4
+    slopes: float = 1.0
     growth: float = 1.25
     finest: float = 1.2
     astray_mm: float = 2.5
@@ -71,7 +73,8 @@ def fit_chart(
     """Control points for neutral and shapes of one chart; ``report`` is called with the fraction done."""
     net = net_at(coarse_places(chart.uv, request.coarse), request.coarse, chart.cuts, chart.uv)
     first = replace(request, points=request.points - request.spare)
-    fitted = _refined(mesh, chart, net, first, Hold(), report)
+    share = first.points / request.points
+    fitted = _refined(mesh, chart, net, first, Hold(), lambda done: report(share * done))
     return fitted if chart.between is None else _mended(mesh, chart, fitted, request, report)
 
 
@@ -95,7 +98,8 @@ def _refined(
     """Solve, and add points where samples are off, until none is or there are enough points."""
     targets, slopes = _targets(mesh, chart.mix), None
     if chart.slopes is not None:
-        slopes = chart.slopes, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
+        weighed = replace(chart.slopes, weight=request.slopes * chart.slopes.weight)
+        slopes = weighed, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
     while True:
         b = basis(net, chart.uv)
         solved = solve(net, b, chart.weight, targets, hold.fair(net, request.fair), slopes)
