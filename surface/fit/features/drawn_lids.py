@@ -172,14 +172,14 @@ class DrawnLids:
         best, least, points = points, np.inf, points.copy()
         if was_open > PART_WAY * self._most_open(part.points):
             return best, was_open, was_open
-        for _ in range(CLOSINGS):
+        for k in range(CLOSINGS):
             posed = _posed(points, FORWARD, solver)
             x, seen = self._open(posed)
             if seen.max() < least:
                 best, least = points.copy(), float(seen.max())
             if least <= PIXEL * self._radius:
                 break
-            solver.move_sides(-self._needs(posed, x, seen), points)
+            solver.move_sides(-(1.0 + k) * self._needs(posed, x, seen), points)  # corners follow only in part
             points = self._cleared(points, FORWARD, solver)
         return best, was_open, least
 
