@@ -10,6 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.progress import Progress, no_progress, part_of
+from surface.fit.features.drawn_lids import seat_drawn_lids
 from surface.fit.features.eye_colours import paint_layers
 from surface.fit.features.eye_lids import fit_lids, gazes_of
 from surface.fit.features.findings import findings
@@ -20,6 +21,8 @@ from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.measures.mend import mend_spikes, turned_faces
+from surface.fit.points.care import POINTS as MORE_POINTS
+from surface.fit.points.care import with_care
 from surface.fit.points.lid_seating import close_lips, draw_brows, seat_lids, strengthen
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart
@@ -88,8 +91,8 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         check_manifold(loaded.mesh, where)
         recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
         plan = make_plan(mesh)
-        mesh, lid_notes = fit_lids(mesh, plan.found) if plan.found else (mesh, [])
-        plan.notes.extend(lid_notes)
+        mesh, seated = fit_lids(mesh, plan.found) if plan.found else (mesh, [])
+        plan.notes.extend(seated)
     sources = sources_of(mesh.names)
     rig = HeadRig(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress)
@@ -102,6 +105,9 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     )  # fmt: skip
     head = finish_head(head, mesh, charts, recipe)
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
+    if plan.found:
+        head, lid_notes = seat_drawn_lids(head)
+        plan.notes.extend(lid_notes)
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
@@ -133,7 +139,11 @@ def _fit_parts(
     still = replace(mesh, names=(), deltas=mesh.deltas[:0])  # for parts that move as a whole
     for (part, islands), low, high in zip(plan.parts, ends, ends[1:], strict=False):
         chart, step = part_chart(mesh, part, islands), part_of(progress, low, high)
-        fitted = fit_chart(mesh if part.follows == "skin" else still, chart, part.request, partial(step, part.name))
+        request = part.request
+        if not parts and plan.found and plan.found.openings:
+            chart = with_care(chart, mesh, *plan.eyes)
+            request = replace(request, points=request.points + len(plan.eyes[0]) * MORE_POINTS)
+        fitted = fit_chart(mesh if part.follows == "skin" else still, chart, request, partial(step, part.name))
         report = measure(part.name, chart, fitted, mesh.names)
         if parts and not recipe.parts and report.neutral.rms > LOOSE_MM * scale:
             plan.notes.append(f"{part.name}: left out: it cannot be fitted, {report.neutral.rms:.1f} mm RMS")

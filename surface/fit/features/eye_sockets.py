@@ -9,6 +9,7 @@ from surface.fit.source.mesh import FitMesh, components, corners, triangles
 from surface.head.model.parameters import rotation
 
 REACH = 1.6  # in radii: a socket lies no further from an eye's centre
+COVER = 3.0  # in radii: so far from it skin hides a socket from who looks from above or aside: brow, nose, cheek
 VIEWS = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.45), (0.0, -0.45))  # yaw and pitch of who looks, rad
 PIXEL = 0.04  # in radii
 BEHIND = 0.06  # in radii: what lies deeper behind what is seen is hidden
@@ -23,13 +24,14 @@ def hidden_faces(mesh: FitMesh, skin: Bools, centre: Floats, radius: float) -> I
     Faces that lead from there to the lids' edges go, too: the hole's rim is seen.
     """
     filled = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
-    close = np.linalg.norm(mesh.vertices - centre, axis=1) < REACH * radius
-    near = np.flatnonzero(skin & close[filled].any(axis=1))
+    away = np.linalg.norm(mesh.vertices - centre, axis=1)
+    close, hiding = away < REACH * radius, away < COVER * radius
+    near, cover = (np.flatnonzero(skin & inside[filled].any(axis=1)) for inside in (close, hiding))
     used = np.unique(filled[near])
     if not len(near):
         return near
     seen = np.ones(len(mesh.vertices), bool)
-    seen[used] = _seen((mesh.vertices[used] - centre) / radius, _local(mesh, near, centre) / radius)
+    seen[used] = _seen((mesh.vertices[used] - centre) / radius, _local(mesh, cover, centre) / radius)
     seen[used[~close[used]]] = True
     hidden = _behind(mesh, near[~seen[filled[near]].any(axis=1)], centre)
     lining = np.zeros(len(seen), bool)
@@ -46,7 +48,7 @@ def _local(mesh: FitMesh, faces: Ints, centre: Floats) -> Floats:
 def _seen(points: Floats, tri: Floats) -> Bools:
     """(m,) which points are seen in one of the views, past triangles (t, 3, 3) and a ball of radius 1 at the origin."""
     out = np.zeros(len(points), bool)
-    size = int(np.ceil(2.0 * (REACH + 1.0) / PIXEL))
+    size = int(np.ceil(2.0 * (COVER + 1.0) / PIXEL))
     samples = _samples(tri)
     for yaw, pitch in VIEWS:
         turn = rotation(yaw, pitch)
@@ -62,7 +64,7 @@ def _seen(points: Floats, tri: Floats) -> Bools:
 
 
 def _pixels(points: Floats, size: int) -> tuple[Ints, Ints]:
-    at = np.clip(((points[:, :2] + REACH + 1.0) / PIXEL).astype(np.int64), 0, size - 1)
+    at = np.clip(((points[:, :2] + COVER + 1.0) / PIXEL).astype(np.int64), 0, size - 1)
     return at[:, 0], at[:, 1]
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from surface.base.arrays import Bools, Floats
+from surface.fit.features.eye_linings import linings
 from surface.fit.features.eye_names import is_beside
 from surface.fit.features.eye_openings import Opening, ball_behind, find_openings
 from surface.fit.features.eye_patches import LOOKS, island_sides, shaped_sides, turns
@@ -79,8 +80,9 @@ def _without_sockets(mesh: FitMesh, eyes: Eyes, skin: Bools, middle: float, near
     if eyes.radius <= 0 or eyes.openings:
         return eyes
     behind = eyes.faces.copy()
-    for centre in eyes.centres:
+    for side, centre in zip(("Left", "Right"), eyes.centres, strict=True):
         behind[hidden_faces(mesh, skin, centre, eyes.radius)] = True
+        behind[linings(mesh, skin & ~behind, centre, eyes.radius, side)] = True
     count = int((behind & skin).sum())
     openings = find_openings(mesh, skin & ~behind, middle, near) if count else []
     if not openings:

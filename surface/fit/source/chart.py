@@ -17,7 +17,7 @@ from surface.fit.source.islands import Island, boundary_loops
 from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, triangles
 
 TILE = 2.0  # distance between the tiles of two islands: supports of one cannot reach the next
-NARROW = 0.7  # a hole lower than this part of its width is a slit
+NARROW = 0.85  # a hole lower than this part of its width is a slit: lids of drawn characters stand wide open
 BORDER_WEIGHT = 8.0  # samples on a border hold the surface to its neighbour
 CLUTTER = (4.5, 7.0)  # stretch, in medians, where a fold of the mesh begins and where it is only held loosely
 CLUTTER_WEIGHT = 0.05
@@ -64,6 +64,7 @@ class Chart:
     loops : closed polylines (k, 2) in (u, v); loop_vertices : the mesh vertex of each of their points.
     cuts : slits of the chart; slopes : what the surface's derivatives should be, if wanted.
     between : places all over the chart between its samples, for looking whether the surface strays there.
+    care : (m,) how much an error of each sample counts when control points are added; all alike without.
     """
 
     uv: Floats
@@ -76,6 +77,7 @@ class Chart:
     cuts: list[Cut] = field(default_factory=list)
     slopes: Slopes | None = None
     between: Places | None = None
+    care: Floats | None = None
 
     def hole_near(self, vertices: Floats, eye: Floats) -> int:
         """Which of the loops has its rim, on a mesh's vertices (n, 3), nearest to an eyeball's centre (3,)."""

@@ -10,6 +10,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
+from surface.fit.features.drawn_lids import seat_drawn_lids
 from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, UNITS
@@ -78,9 +79,10 @@ def transfer(
     provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
     data = carry(head, template, warp, smooth, Matcher(samples), provenance, name)
     progress("lids", 0.75)
-    data = close_lids(data, head.data)
+    data, lid_notes = seat_drawn_lids(close_lids(data, head.data))
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
+    notes += lid_notes
     parts = [face_report(data, template, warp, samples)]
     middle = data.eyes.mean(axis=0)
     data = replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, options.unit or ""))

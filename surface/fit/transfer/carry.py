@@ -9,7 +9,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.fit.transfer.places import place_eyes, place_jaw, place_neck, place_teeth
 from surface.fit.transfer.register import Matcher
-from surface.fit.transfer.skin import Ball, Skin, close_lips, follow_skin, rims_of, seat
+from surface.fit.transfer.skin import Ball, Skin, behind_lids, close_lips, follow_skin, rims_of, seat
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Group, Head, HeadData, PartData
@@ -19,6 +19,7 @@ from surface.head.posing.rig import SkinRig
 REACH_MM = 3.0  # to either side: over so much skin the turn and stretch of a displacement are measured
 STRETCH = (0.6, 1.6)  # least and most of a displacement
 RIGID = ("teeth", "gums", "tongue")
+SOCKETS = "sockets"
 SETTLINGS = 2
 
 
@@ -44,6 +45,8 @@ def carry(
             points = teeth.points(part.points)
         elif part.name in skins:
             points = skins[part.name].points
+        elif part.name == SOCKETS:
+            points = behind_lids(part.points, face, old, new)
         else:
             points = seat(follow_skin(part.points, face, warp), part.points, old, new)
         linear = np.tile(teeth.scale * np.eye(3), (len(points), 1, 1))
@@ -65,8 +68,8 @@ def _skins(head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball) -> di
     lips = next(c for c in head.data.contacts if c.name == "lips")
     out = {}
     for part in head.parts:
-        if part.follows == "skin" and part.material == "skin" and part.name != "sockets":
-            skin = Skin(part, rims, warp)
+        if part.follows == "skin" and part.material == "skin" and part.name != SOCKETS:
+            skin = Skin(part, rims, warp, old)
             skin.follow(matcher, scale)
             skin.at = seat(skin.at, skin.rest, old, new)
             skin.solve()

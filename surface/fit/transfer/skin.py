@@ -39,17 +39,18 @@ class Ball:
 class Skin:
     """One part of skin as triangles: ``rest (n, 3)`` on the head it comes from, ``at (n, 3)`` on the scan.
 
-    ``points (k, 3)`` are the control points of its surface, set by :meth:`solve`.
+    ``points (k, 3)`` are the control points of its surface, set by :meth:`solve`. eyes : of the head it comes from.
     """
 
-    def __init__(self, part: HeadPart, rims: Floats, warp: Warp) -> None:
+    def __init__(self, part: HeadPart, rims: Floats, warp: Warp, eyes: Ball) -> None:
         self.name, self.surface, self.mesh = part.name, part.surface, part.mesh
         n = len(part.mesh.uv)  # seams may have added copies
         self.rest = part.vertices[:n].astype(float)
         self.at = warp(self.rest)
         distance = cKDTree(rims).query(self.rest)[0] if len(rims) else np.full(n, np.inf)
         self.points = part.surface.points.copy()
-        self._seen = smoothstep(distance, *RIM_MM)
+        # lids keep their own form: a scan's are one with its eyes, or lie inside an eyeball
+        self._seen = smoothstep(distance, *RIM_MM) * (1.0 - np.abs(lid_share(self.rest, eyes.centres, eyes.radius)))
         self._matrix = _laplacian(part.mesh.triangles, n)
 
     def follow(self, matcher: Matcher, scale: float) -> None:
@@ -165,6 +166,24 @@ def follow_skin(points: Floats, skin: Skin, warp: Warp) -> Floats:
     fade = 1.0 - smoothstep(nearest, 0.0, NEAR_MM)
     moved: Floats = warp(points) + fade[:, None] * _followed(points, skin.rest, residual)
     return moved
+
+
+def behind_lids(points: Floats, skin: Skin, old: Ball, new: Ball) -> Floats:
+    """Points (n, 3) of what lines the lids from behind, on the new eyeballs as they lie on the old ones, and along them
+    moved as the skin ``skin`` near them is; so high above them as before, so that they stay behind the lids."""
+
+    def carried(at: Floats) -> Floats:
+        side = (at[:, 0] < old.centres[:, 0].mean()).astype(int)
+        on: Floats = new.centres[side] + new.radius / old.radius * (at - old.centres[side])
+        return on
+
+    fade = 1.0 - smoothstep(cKDTree(skin.rest).query(points)[0], 0.0, NEAR_MM)
+    on = carried(points)
+    moved = on + fade[:, None] * _followed(points, skin.rest, skin.at - carried(skin.rest))
+    centre = new.centres[(points[:, 0] < old.centres[:, 0].mean()).astype(int)]
+    offset, height = moved - centre, np.linalg.norm(on - centre, axis=1)
+    laid: Floats = centre + offset * (height / np.maximum(np.linalg.norm(offset, axis=1), 1e-9))[:, None]
+    return laid
 
 
 def rims_of(head: Head) -> Floats:

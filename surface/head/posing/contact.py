@@ -173,9 +173,14 @@ class ContactSolver:
         find_overlap(self._samples[:, :, : self._rows], OVERLAP_MM[self._lids], SOFT_MM, self._overlap)
         if not self._lids:
             self.push += self._overlap.ravel()
-        sides = self._sides
-        move_points(sides.ids, self._overlap.ravel(), self._apart, sides.eye, sides.radius, False, points)
+        self.move_sides(self._overlap, points)
         return float(self._overlap.max())
+
+    def move_sides(self, amounts: Floats, points: Floats) -> None:
+        """Move control points (n, 3) so that the sides go apart by ``amounts (2, k)`` mm in their columns: the upper
+        ones up by the contact's share of it, the lower ones down by the rest; together below 0."""
+        sides = self._sides
+        move_points(sides.ids, amounts.ravel(), self._apart, sides.eye, sides.radius, False, points)
 
 
 class Follower:

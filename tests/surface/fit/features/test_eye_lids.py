@@ -8,14 +8,10 @@ import pytest
 from eye_face import CENTRES, RADIUS, face, joined, pair, shell
 from face_measures import Window
 
-from surface.fit import fit_mesh
-from surface.fit.features import generic
 from surface.fit.features.eye_lids import fit_lids
 from surface.fit.features.generic import make_plan
 from surface.fit.points.eyeball import surface_height
-from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.names import map_names
 from surface.head import Head
 
 
@@ -87,16 +83,6 @@ def test_a_shape_that_hardly_shuts_the_eye_is_no_blink() -> None:
     assert not any("open: its" in n for n in notes) and gap(shut) > 4.0
 
 
-@pytest.fixture(scope="module")
-def head() -> Head:
-    """A small fit of the face, with eyes in halves and a blink that leaves a quarter of the opening."""
-    mesh = joined([("Head", lazy(face(), 0.8)), *pair(lambda c: shell(c, reach=np.pi / 2), ("eye_L", "eye_R"))])
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(generic, "POINTS", 1600)
-        result = fit_mesh(Loaded(mesh, map_names(mesh.names)), "plain", lambda *_: None)
-    return Head(result.head)
-
-
 def seen(head: Head, side: int, **values: float) -> np.ndarray:
     """(h, w) where an eye is seen from the front, past the skin; a pixel is 0.25 mm."""
     head.pose(head.values(values))
@@ -114,9 +100,7 @@ SIDES = ("Left", "Right")
 def test_eyes_are_seen_between_lids_that_shut(head: Head, side: int) -> None:
     open_eye = seen(head, side)
     assert 8.0 < 0.25 * open_eye.sum(axis=0).max() < 13.0  # of 11 mm
-    shut = 0.25 * seen(head, side, **{f"eyeBlink{SIDES[side]}": 1.0}).sum(axis=0)
-    assert (shut > 0.5).sum() <= 0.1 * (open_eye.sum(axis=0) > 2).sum()  # the fit is coarse, lids meet all the same
-    assert shut.max() <= 1.5
+    assert 0.25 * seen(head, side, **{f"eyeBlink{SIDES[side]}": 1.0}).sum(axis=0).max() <= 0.5
     half = seen(head, side, **{f"eyeBlink{SIDES[side]}": 0.5})
     assert 0.2 < half.sum() / open_eye.sum() < 0.9
 

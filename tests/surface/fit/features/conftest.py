@@ -1,0 +1,24 @@
+"""A small fitted head that several tests look at."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from eye_face import face, joined, pair, shell
+
+from surface.fit import fit_mesh
+from surface.fit.features import generic
+from surface.fit.source.load import Loaded
+from surface.fit.source.names import map_names
+from surface.head import Head
+
+
+@pytest.fixture(scope="package")
+def head() -> Head:
+    """A small fit of the face, with eyes in halves and a blink that leaves a fifth of the opening."""
+    lazy = replace(face(), deltas=face().deltas * np.array([0.8, 0.8, 1.0])[:, None, None])
+    mesh = joined([("Head", lazy), *pair(lambda c: shell(c, reach=np.pi / 2), ("eye_L", "eye_R"))])
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(generic, "POINTS", 1600)
+        result = fit_mesh(Loaded(mesh, map_names(mesh.names)), "plain", lambda *_: None)
+    return Head(result.head)
