@@ -10,6 +10,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
+from surface.check.overlaps import overlap_notes
 from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, UNITS
@@ -83,6 +84,7 @@ def transfer(
     parts = [face_report(data, template, warp, samples)]
     data = scaled(data, factor, data.eyes.mean(axis=0))
     moving = [n for n in head.parameters if any(g.name == n for p in data.parts for g in p.groups)]
+    notes += overlap_notes(data)
     return Transferred(data, FitReport(name, parts, moving, notes=notes, scale=1.0))
 
 
