@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from surface.check import borders, motions, spikes, stance
+from surface.check import borders, motions, overlaps, spikes, stance
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import Mouth, find_mouth, lips_gap
 from surface.check.places import Places
@@ -31,7 +31,7 @@ def check_head(head: Head) -> list[Finding]:
             *stance.off_camera(subject, mouth), *stance.missing_eyes(subject), *stance.inside_out(subject),
             *motions.empty_shapes(subject), *motions.swapped_sides(subject), *motions.blind_lids(subject),
             *unsealed_lips(subject, mouth), *borders.holes(subject, mouth, places, edges),
-            *spikes.spikes(subject, places, edges),
+            *spikes.spikes(subject, places, edges), *overlaps.overlapping(subject, places),
         ]  # fmt: skip
     head.pose(head.values({}))
     return found

@@ -10,6 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.progress import Progress, no_progress, part_of
+from surface.check.overlaps import overlap_notes
 from surface.fit.features.drawn_lids import seat_drawn_lids
 from surface.fit.features.eye_colours import paint_layers
 from surface.fit.features.eye_lids import fit_lids, gazes_of
@@ -113,6 +114,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
     notes = [*loaded.notes, *plan.notes, *turned_faces(mesh), *mended, *findings(head, loaded.marks)]
+    notes += overlap_notes(head)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces, dense,

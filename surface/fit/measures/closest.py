@@ -1,7 +1,6 @@
-"""Distances of points from a triangle mesh that moves: a tree of boxes over triangles in the order of a space curve.
+"""Distances of points from a triangle mesh that moves, by a tree of boxes.
 
-The tree is made once, at rest; for a pose only its boxes are made again. The nearest triangle of the pose before gives
-the first bound of a search, so most of the tree is never looked at.
+The nearest triangle of the pose before gives the first bound of a search, so most of the tree is never looked at.
 """
 
 from __future__ import annotations
@@ -12,9 +11,7 @@ import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.base.jit import inlined, kernel
-
-LEAF = 4  # triangles in a leaf
-BITS = 10  # of each coordinate in the space curve
+from surface.mesh.boxtree import LEAF, BoxTree
 
 
 @inlined
@@ -49,24 +46,6 @@ def _square(p: Any, a: Any, b: Any, c: Any) -> Any:
         v, w = vb / whole, vc / whole
     x, y, z = s0 - v * e0 - w * f0, s1 - v * e1 - w * f1, s2 - v * e2 - w * f2
     return x * x + y * y + z * z
-
-
-@kernel
-def _refit(corners: Any, low: Any, high: Any, leaves: int) -> None:
-    """Boxes ``low``, ``high`` (2 leaves, 3) of a complete tree, with root 1, over triangles ``corners (t, 3, 3)``."""
-    for leaf in range(leaves):
-        node = leaves + leaf
-        for k in range(3):
-            low[node, k], high[node, k] = np.inf, -np.inf
-        for t in range(leaf * LEAF, min(len(corners), (leaf + 1) * LEAF)):
-            for c in range(3):
-                for k in range(3):
-                    low[node, k] = min(low[node, k], corners[t, c, k])
-                    high[node, k] = max(high[node, k], corners[t, c, k])
-    for node in range(leaves - 1, 0, -1):
-        for k in range(3):
-            low[node, k] = min(low[2 * node, k], low[2 * node + 1, k])
-            high[node, k] = max(high[2 * node, k], high[2 * node + 1, k])
 
 
 @inlined
@@ -106,40 +85,13 @@ def _search(points: Any, corners: Any, low: Any, high: Any, leaves: int, nearest
         distance[i], nearest[i] = np.sqrt(best), found
 
 
-class ClosestTree:
-    """Distances from a mesh of triangles (t, 3) over vertices at rest (n, 3).
-
-    order : (t,) the triangles in the tree's order, in which it counts them.
-    """
-
-    def __init__(self, rest: Floats, triangles: Ints) -> None:
-        self.order = np.argsort(_curve(rest[triangles].mean(axis=1)), kind="stable")
-        self._triangles = np.asarray(triangles, np.int64)[self.order]
-        self._leaves = 1 << max(0, int(np.ceil(np.log2(max(1, -(-len(triangles) // LEAF))))))
-        self._low, self._high = np.zeros((2 * self._leaves, 3)), np.zeros((2 * self._leaves, 3))
-        self._corners = np.zeros((0, 3, 3))
-        self.move(rest)
-
-    def move(self, vertices: Floats) -> None:
-        """Put the mesh's vertices (n, 3) elsewhere."""
-        self._corners = np.ascontiguousarray(np.asarray(vertices, np.float64)[self._triangles])
-        _refit(self._corners, self._low, self._high, self._leaves)
+class ClosestTree(BoxTree):
+    """Distances from a mesh of triangles (t, 3) over vertices at rest (n, 3)."""
 
     def distances(self, points: Floats, near: Ints) -> Floats:
         """(m,) mm of points (m, 3); ``near (m,)`` is where the search begins, zeros at first, and is brought up to
         date."""
         out = np.empty(len(points))
         at = np.ascontiguousarray(points, np.float64)
-        _search(at, self._corners, self._low, self._high, self._leaves, near, out)
+        _search(at, self.corners, self.low, self.high, self.leaves, near, out)
         return out
-
-
-def _curve(points: Floats) -> Ints:
-    """(m,) places of points (m, 3) on Morton's curve."""
-    low, extent = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-12)
-    cell = ((points - low) / extent * ((1 << BITS) - 1)).astype(np.int64)
-    key = np.zeros(len(points), np.int64)
-    for bit in range(BITS):
-        for k in range(3):
-            key |= ((cell[:, k] >> bit) & 1) << (3 * bit + k)
-    return key

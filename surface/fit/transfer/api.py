@@ -10,6 +10,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
+from surface.check.overlaps import overlap_notes
 from surface.fit.features.drawn_lids import seat_drawn_lids
 from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
@@ -87,6 +88,7 @@ def transfer(
     middle = data.eyes.mean(axis=0)
     data = replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, options.unit or ""))
     moving = [n for n in head.parameters if any(g.name == n for p in data.parts for g in p.groups)]
+    notes += overlap_notes(data)
     return Transferred(data, FitReport(name, parts, moving, notes=notes, scale=1.0))
 
 

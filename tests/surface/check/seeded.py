@@ -167,3 +167,9 @@ def without_parts(head: HeadData, *names: str) -> HeadData:
         contacts=[replace(c, followers=tuple(f for f in c.followers if f not in names)) for c in head.contacts],
         paint=[row for row in head.paint if row.get("part") not in names],
     )  # fmt: skip
+
+
+def swollen_eye(head: HeadData, factor: float = 1.3) -> HeadData:
+    """The left eyeball bigger than its socket: it comes through the lids."""
+    eye = part_of(head, "eye_left")
+    return with_part(head, "eye_left", points=head.eyes[0] + factor * (eye.points - head.eyes[0]))

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from surface.check import Finding, borders, check_head, spikes, stance
+from surface.check import Finding, borders, check_head, overlaps, spikes, stance
 from surface.check.checker import unsealed_lips
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
@@ -61,6 +61,12 @@ def good(root: Path) -> HeadData:
     return load_data(root / "configs" / "heads" / "ict")
 
 
+@pytest.fixture
+def without_overlaps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leaves out the check that takes longest, which has tests of its own."""
+    monkeypatch.setattr("surface.check.overlaps.overlapping", lambda *_: ())
+
+
 def findings(head: HeadData) -> list[Finding]:
     return check_head(Head(head))
 
@@ -70,6 +76,7 @@ def test_the_shipped_head_passes_without_a_warning(good: HeadData) -> None:
 
 
 @pytest.mark.parametrize("kinds", TOGETHER, ids="+".join)
+@pytest.mark.usefixtures("without_overlaps")
 def test_seeded_defects_are_named_and_nothing_else_is(good: HeadData, kinds: tuple[str, ...]) -> None:
     found = findings(functools.reduce(lambda head, kind: DEFECTS[kind][0](head), kinds, good))
     for kind in kinds:
@@ -93,10 +100,23 @@ def test_other_forms_of_defects_are_found(good: HeadData, name: str) -> None:
 
 
 @pytest.mark.parametrize("factor", [0.7, (1.5, 1.3, 1.3)], ids=str)
+@pytest.mark.usefixtures("without_overlaps")
 def test_heads_of_other_sizes_and_proportions_pass(good: HeadData, factor: float | tuple[float, float, float]) -> None:
     assert findings(seeded.scaled(good, factor)) == []
 
 
+def test_an_eye_that_comes_through_the_lids_is_found(good: HeadData) -> None:
+    few = seeded.with_groups(good, lambda g: g if g.name == "eyeBlinkLeft" else None)
+    assert overlaps.overlap_notes(few) == []
+    for factor in (1.0, 2.0):
+        subject = Subject(Head(seeded.scaled(seeded.swollen_eye(few), factor)))
+        (found,) = overlaps.overlapping(subject, Places(subject, None))
+        assert "skin passes through the eyeball" in found.text and "left eye" in found.text
+        assert found.kind == "overlap" and not found.warning
+        assert 2.0 * factor < float(found.text.split(" mm")[0]) < 4.5 * factor  # the radius grew by 3.6 mm
+
+
+@pytest.mark.usefixtures("without_overlaps")
 def test_a_head_without_eyes_or_blinks_is_a_warning(good: HeadData) -> None:
     none = seeded.without_parts(good, "eye_left", "eye_right", "sockets")
     found = findings(replace(none, eye_radius=0.0, contacts=[c for c in none.contacts if c.eye < 0]))
