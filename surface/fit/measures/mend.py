@@ -148,7 +148,8 @@ def _refuse(dense: DenseErrors, parts: Sequence[FittedPart], scale: float) -> No
 def turned_faces(mesh: FitMesh) -> list[str]:
     """Notes of faces that lie the other way round in (u, v) than most of their island: the surface folds there."""
     flipped: dict[str, int] = {}
-    for island in find_islands(mesh):
+    mapped = np.flatnonzero((mesh.face_uv[:, :3] >= 0).all(axis=1))
+    for island in find_islands(mesh, mapped) if len(mapped) else []:
         areas = signed_areas(island)
         count = int(min((areas > 0).sum(), (areas < 0).sum()))
         if count:

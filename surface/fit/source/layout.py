@@ -18,7 +18,8 @@ from surface.fit.source.mesh import FitMesh, components, directed_edges
 from surface.head.model.parameters import smoothstep
 
 LARGE = 0.03  # of an island's area: what runs the other way round in (u, v) and is smaller is a fold, not a half
-TILT, FLAT = 0.35, 0.7  # rad; holes that are tilted more, or higher in parts of their width, do not say what is level
+TILT = 0.35  # rad; holes that are tilted more do not say what is level
+HIGH = 0.7  # of their width: nor do holes that are higher than this
 FLAT = 0.05  # sine of a slope below which a surface has no up
 SMALLEST = 0.12  # tiles are as large as their islands, but never smaller than this
 COLUMNS = 33  # places along a hole at which its middle is looked up
@@ -91,7 +92,7 @@ def _levelled(island: Island) -> Island:
         across = island.uv[loop] - island.uv[loop].mean(axis=0)
         (long, short), (along, _) = np.linalg.svd(across, full_matrices=False)[1:]
         angle = float(np.arctan(along[1] / along[0])) if abs(along[0]) > 1e-9 else np.pi
-        if short < FLAT * long and abs(angle) < TILT:
+        if short < HIGH * long and abs(angle) < TILT:
             tilt.append(angle)
             length.append(long)
     if not tilt:

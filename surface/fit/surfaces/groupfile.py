@@ -36,7 +36,7 @@ from surface.head.model.parameters import SHAPES, smoothstep
 from surface.head.model.placement import Placement
 from surface.readers import Ties
 
-HINT = "compare it with the example in docs/surface.md#groups-by-hand"
+HINT = 'a group has a name, a place and a move: name = "jawOpen", at = [0, -60, 90], radius = 40, move = [0, -12, -3]'
 KEYS = {
     "name", "at", "radius", "ids", "move", "hinge", "axis", "angle_deg", "part", "inside", "mirror", "file", "amount",
 }  # fmt: skip

@@ -85,8 +85,8 @@ def test_of_hidden_faces_those_behind_the_centre_go_and_not_what_lies_beside() -
 
 
 def test_pixels_are_clipped_to_the_picture() -> None:
-    i, j = module._pixels(np.array([[-9.0, 9, 0], [-2.6, -2.6, 0], [-2.6 + 1.5 * 0.04, 0, 0]]), 130)
-    assert i.tolist() == [0, 0, 1] and j.tolist() == [129, 0, 65]
+    i, j = module._pixels(np.array([[-9.0, 9, 0], [-4.0, -4.0, 0], [-4.0 + 1.5 * 0.04, 0, 0]]), 200)
+    assert i.tolist() == [0, 0, 1] and j.tolist() == [199, 0, 100]
 
 
 def test_a_ball_is_as_deep_as_a_sphere_a_little_smaller_than_the_eye(monkeypatch) -> None:

@@ -82,3 +82,10 @@ def test_faces_turned_over_in_the_texture_are_counted(mesh: FitMesh) -> None:
     uv[inner] += [0.09, 0.0]
     (note,) = turned_faces(replace(mesh, uv=uv))
     assert note.endswith("are turned over in (u, v)") and 1 <= int(note.split()[0]) <= 4
+
+
+def test_faces_without_texture_coordinates_are_not_turned_over(mesh: FitMesh) -> None:
+    bare = np.full_like(mesh.face_uv, -1)
+    assert turned_faces(replace(mesh, uv=np.zeros((0, 2)), face_uv=bare)) == []
+    some = np.where(np.arange(len(bare))[:, None] % 3 == 0, -1, mesh.face_uv)
+    assert turned_faces(replace(mesh, face_uv=some)) == []

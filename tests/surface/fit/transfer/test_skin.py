@@ -18,6 +18,10 @@ DIRECTIONS = np.random.default_rng(0).normal(size=(200, 3)) * [0.5, 0.5, 0.2] + 
 DIRECTIONS /= np.linalg.norm(DIRECTIONS, axis=1, keepdims=True)
 
 
+FAR = module.Ball(np.array([[3e3, 0.0, 9e3], [-3e3, 0.0, 9e3]]), 12.0)
+"""Eyeballs so far away that nothing is a lid."""
+
+
 def grid(count: int = 17):
     """A curved sheet as part of a head: (u, v) even, triangles two to a square."""
     u, v = (a.ravel() for a in np.meshgrid(*2 * [np.linspace(0, 1, count)], indexing="ij"))
@@ -40,7 +44,7 @@ def test_the_smoothing_matrix_is_the_square_of_each_points_step_to_the_mean_of_i
 
 def test_normals_are_those_of_the_surface() -> None:
     part = grid(33)
-    made = Skin(part, RIM, lambda p: p)
+    made = Skin(part, RIM, lambda p: p, FAR)
     du, dv = (
         part.surface.evaluate(np.clip(part.mesh.uv + e, 0, 1)) - part.surface.evaluate(np.clip(part.mesh.uv - e, 0, 1))
         for e in ([1e-3, 0], [0, 1e-3])
@@ -66,7 +70,7 @@ class Lifted:
 def test_skin_goes_to_the_scan_and_fills_holes_smoothly() -> None:
     part = grid(21)
     part.vertices = np.column_stack([40 * part.mesh.uv, 0 * part.mesh.uv[:, 0]])
-    made = Skin(part, np.zeros((0, 3)), lambda p: p)
+    made = Skin(part, np.zeros((0, 3)), lambda p: p, FAR)
     hole = np.linalg.norm(part.mesh.uv - 0.5, axis=1) < 0.2
     matcher = Lifted(made.rest, np.array([0, 0, 2.0]), ~hole)
     made.follow(matcher, 1.5)
@@ -79,20 +83,20 @@ def test_skin_at_a_rim_is_carried_along_and_not_pulled_by_itself() -> None:
     part = grid(41)
     part.vertices = np.column_stack([40 * part.mesh.uv, 0 * part.mesh.uv[:, 0]])
     rim = np.column_stack([np.linspace(0, 40, 200), np.zeros(200), np.zeros(200)])
-    made = Skin(part, rim, lambda p: p)
+    made = Skin(part, rim, lambda p: p, FAR)
     y = part.vertices[:, 1]
     height = np.zeros((len(y), 3))
     height[y <= 1.01, 2] = 4.0  # what a scanner sees within an opening is not the skin's
     made.follow(Lifted(made.rest, height, np.ones(len(y), bool)), 1.0)
     assert np.abs(made.at[:, 2]).max() < 0.3
-    free = Skin(part, np.zeros((0, 3)), lambda p: p)
+    free = Skin(part, np.zeros((0, 3)), lambda p: p, FAR)
     free.follow(Lifted(free.rest, height, np.ones(len(y), bool)), 1.0)
     assert free.at[:, 2].max() > 2.0
 
 
 def test_the_surface_is_put_where_the_skin_lies() -> None:
     part = grid(21)
-    made = Skin(part, RIM, lambda p: p)
+    made = Skin(part, RIM, lambda p: p, FAR)
     goal = part.surface.points * [1.1, 0.9, 1.0] + [0, 0, 5.0]
     made.at = part.surface.with_points(goal).evaluate(part.mesh.uv)
     made.solve()
@@ -103,7 +107,7 @@ def test_the_surface_is_put_where_the_skin_lies() -> None:
 def test_a_part_with_copies_at_seams_counts_each_place_once() -> None:
     part = grid(5)
     part.vertices = np.vstack([part.vertices, part.vertices[:3]])
-    assert len(Skin(part, RIM, lambda p: p).rest) == 25
+    assert len(Skin(part, RIM, lambda p: p, FAR).rest) == 25
 
 
 @pytest.mark.parametrize("radius", [12.0, 15.0])
@@ -141,7 +145,7 @@ def test_of_two_lips_the_nearest_places_of_each_column_are_taken() -> None:
 
 def test_lips_that_a_scan_left_open_are_closed_and_their_share_is_kept() -> None:
     part, contact = grid(33), two_lips()
-    made = Skin(part, RIM, lambda p: p)
+    made = Skin(part, RIM, lambda p: p, FAR)
     uv = part.surface.padded
     middle = uv[1][:, 1:4].mean(axis=1)
     made.points = (
@@ -167,7 +171,7 @@ def test_lips_that_a_scan_left_open_are_closed_and_their_share_is_kept() -> None
 
 def test_lips_as_close_as_before_stay_where_they_are() -> None:
     part, contact = grid(17), two_lips(gap=0.05)
-    made = Skin(part, RIM, lambda p: p)
+    made = Skin(part, RIM, lambda p: p, FAR)
     module.close_lips(made, contact, 1.0)
     np.testing.assert_allclose(made.points, part.surface.points, atol=1e-12)
     module.close_lips(made, contact, 0.5)
@@ -190,7 +194,7 @@ def test_control_points_of_either_lip_move_by_its_share_and_those_far_away_not()
 
 def test_another_part_follows_the_skin_near_it_and_the_map_far_from_it() -> None:
     part = grid(21)
-    skin = Skin(part, RIM, lambda p: p + np.array([1.0, 0, 0]))
+    skin = Skin(part, RIM, lambda p: p + np.array([1.0, 0, 0]), FAR)
     skin.at = skin.at + np.array([0.0, 0.0, 2.0])
     on, far = skin.rest[[5, 200]] + [0, 0, 0.01], skin.rest[[5, 200]] + [0, 0, 40.0]
     half = skin.rest[[210]] + [0, 0, 6.0]
@@ -229,7 +233,7 @@ def test_rims_are_the_loops_inside_the_face() -> None:
 def test_detail_of_a_scan_is_followed_along_normals() -> None:
     part = grid(31)
     part.vertices = np.column_stack([40 * part.mesh.uv, 0 * part.mesh.uv[:, 0]])
-    made = Skin(part, np.zeros((0, 3)), lambda p: p)
+    made = Skin(part, np.zeros((0, 3)), lambda p: p, FAR)
     at = np.random.default_rng(0).uniform(0, 40, (4000, 2))
     samples = Samples(
         np.column_stack([at, 0.8 + 0.02 * at[:, 0]]), np.tile([0, 0, 1.0], (4000, 1)), np.zeros(4000, bool)

@@ -89,7 +89,8 @@ def test_normals_of_a_flipped_mesh_are_turned():
     arrays = pack(MESH, BUDGET)
     arrays["mesh_made"] = arrays["mesh_made"].copy()
     arrays["mesh_made"][4] = not MESH.flip
-    got = unpack(arrays, SURFACE, BUDGET, rough=False)
+    assert unpack(arrays, SURFACE, BUDGET, rough=False, flip=MESH.flip) is None  # made for the other side
+    got = unpack(arrays, SURFACE, BUDGET, rough=False, flip=not MESH.flip)
     assert got is not None and got.flip != MESH.flip and got.leaves == MESH.leaves
     np.testing.assert_allclose(got.normals, -MESH.normals, atol=1e-5)
 

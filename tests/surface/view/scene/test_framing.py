@@ -160,7 +160,7 @@ def test_a_few_points_that_move_far_do_not_move_the_middle() -> None:
 ])  # fmt: skip
 def test_a_head_that_hardly_differs_is_seen_from_the_same_places(size: float, shift: tuple, same: bool) -> None:
     crown = size * (CROWN - AT) + AT + shift
-    surface = SimpleNamespace(evaluate=lambda uv: np.tile(crown, (len(uv), 1)))
+    surface = SimpleNamespace(rect=(0.0, 1.0, 0.0, 1.0), evaluate=lambda uv: np.tile(crown, (len(uv), 1)))
     data = one_part([], np.zeros((1, 3)), 31.8)
     data.eyes = data.eyes + shift
     part = SimpleNamespace(material="skin", surface=surface, uv=np.zeros((900, 2)))
