@@ -32,8 +32,7 @@ class FitRequest:
     """How finely and how smoothly a chart is fitted.
 
     points : most control points; coarse : spacing of the first net, in tiles; deepest : its finest level.
-    neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness; slopes : factor of
-        the chart's weights of slopes.
+    neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
     growth : most factor by which the net grows between two solves.
     finest : least spacing of a net, in spacings of the mesh's vertices.
     astray_mm : where the surface is further off, also between samples, it is mended; spare : points kept for that.
@@ -45,7 +44,6 @@ class FitRequest:
     neutral_mm: float = 0.25
     shape_mm: float = 0.3
     fair: float = 1e-4
-    slopes: float = 1.0
     growth: float = 1.25
     finest: float = 1.2
     astray_mm: float = 2.5
@@ -98,8 +96,7 @@ def _refined(
     """Solve, and add points where samples are off, until none is or there are enough points."""
     targets, slopes = _targets(mesh, chart.mix), None
     if chart.slopes is not None:
-        weighed = replace(chart.slopes, weight=request.slopes * chart.slopes.weight)
-        slopes = weighed, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
+        slopes = chart.slopes, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
     while True:
         b = basis(net, chart.uv)
         solved = solve(net, b, chart.weight, targets, hold.fair(net, request.fair), slopes)

@@ -17,7 +17,7 @@ from surface.fit.source.islands import Island, boundary_loops
 from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, triangles
 
 TILE = 2.0  # distance between the tiles of two islands: supports of one cannot reach the next
-NARROW = 0.85  # a hole lower than this part of its width is a slit: lids of drawn characters stand wide open
+NARROW = 0.7  # a hole lower than this part of its width is a slit
 BORDER_WEIGHT = 8.0  # samples on a border hold the surface to its neighbour
 CLUTTER = (4.5, 7.0)  # stretch, in medians, where a fold of the mesh begins and where it is only held loosely
 CLUTTER_WEIGHT = 0.05

@@ -173,8 +173,8 @@ def test_samples_know_the_longest_step_of_the_mesh_around_them() -> None:
     )
 
 
-@pytest.mark.parametrize(("height", "slit"), [(0.0, True), (1.69, True), (1.71, False), (3.0, False)])
-def test_a_hole_lower_than_it_is_wide_by_a_sixth_is_a_slit(height: float, slit: bool) -> None:
+@pytest.mark.parametrize(("height", "slit"), [(0.0, True), (1.39, True), (1.41, False), (3.0, False)])
+def test_a_hole_lower_than_seven_tenths_of_its_width_is_a_slit(height: float, slit: bool) -> None:
     hole = np.array([[1.0, 4.0], [2.0, 4.0 - height / 2], [3.0, 4.1], [2.2, 4.0 + height / 2]])
     found = slit_of(np.where(height == 0.0, hole * [1, 0] + [0, 4.0], hole))
     assert (found is not None) == slit
