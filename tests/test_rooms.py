@@ -198,6 +198,9 @@ for package in sys.argv[1].split():
         importlib.import_module(package)  # once for all: here only the rooms' own imports are looked at
     except ImportError:
         pass
+from surface.base import jit
+jit.kernel = jit.inlined = lambda function: function  # looking for compiled kernels takes most of the time
+jit.declared = lambda *signatures: lambda function: function
 for name in sys.argv[2:]:
     child = os.fork()
     if not child:
@@ -208,7 +211,7 @@ for name in sys.argv[2:]:
         os._exit(0)
     os.waitpid(child, 0)
 """
-HEAVY = "numba numba.core.registry scipy.sparse scipy.optimize pydantic rich.table typer moderngl serial dynamixel_sdk"
+HEAVY = "numba numba.core.registry scipy.sparse scipy.optimize scipy.spatial scipy.ndimage pydantic rich.table typer moderngl serial dynamixel_sdk"
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks, to import every module before all others")

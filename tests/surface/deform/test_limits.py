@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from surface import DCPSurface, Mesh
+from surface import DCPSurface, Domain, Mesh
 from surface.deform.deformation import Deformation
 from tests.surface import shapes
 
@@ -104,7 +104,8 @@ def test_no_history_of_moves_leaves_a_trace(sheet: tuple[DCPSurface, Mesh], seed
 def test_changes_that_would_leave_nothing_at_a_vertex_are_refused_and_change_nothing() -> None:
     along, across = [[0.0, 0.0, 0.0, 1.0], [0.0, 1.0, 2.0, 2.0]], [0.0, 0.5, 1.0, 1.5, 2.0]
     thin = DCPSurface([[0.0, 0, 0], [1, 0, 0]], [1, 1], along, [across] * 2)
-    mesh = thin.tessellate(roots=(2, 2), min_depth=10, max_depth=10)  # to where all weights end, at v = 0 and 2
+    edge = Domain((0.0, 1.0, 0.0, 1 / 64))  # to where all weights end, at v = 0
+    mesh = thin.tessellate(roots=(2, 2), min_depth=5, max_depth=5, domain=edge)
     moving = thin.deformation(mesh)
     moving.set_weights([0, 1], [1e-18, 2e-18])
     before, value = moving.vertices.copy(), np.sort(moving.lists.value[: moving.lists.used])
