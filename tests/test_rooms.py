@@ -211,7 +211,10 @@ for name in sys.argv[2:]:
         os._exit(0)
     os.waitpid(child, 0)
 """
-HEAVY = "numba numba.core.registry scipy.sparse scipy.optimize scipy.spatial scipy.ndimage pydantic rich.table typer moderngl serial dynamixel_sdk"
+HEAVY = (
+    "numba numba.core.registry scipy.sparse scipy.optimize scipy.spatial scipy.ndimage pydantic rich.table typer "
+    "moderngl serial dynamixel_sdk"
+)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks, to import every module before all others")
