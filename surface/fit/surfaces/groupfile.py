@@ -30,6 +30,7 @@ import numpy as np
 from surface.base import files
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
+from surface.fit.source.mesh import LARGE
 from surface.fit.surfaces.build import sparse_group, with_groups
 from surface.head.model.data import Group, PartData
 from surface.head.model.parameters import SHAPES, smoothstep
@@ -63,9 +64,9 @@ class _Entry:
         except (TypeError, ValueError) as error:
             raise self.error(key, "holds what is not a number") from error
         fits = row.ndim == len(shape) and all(w in (-1, g) for g, w in zip(row.shape, shape, strict=True))
-        if not fits or not np.isfinite(row).all():
+        if not fits or not (np.abs(row) < LARGE).all():
             words = " x ".join("any" if w < 0 else str(w) for w in shape) or "one"
-            raise self.error(key, f"must be {words} finite numbers, not {self.table[key]!r:.60}")
+            raise self.error(key, f"must be {words} finite numbers of usable size, not {self.table[key]!r:.60}")
         return row
 
     def parameter(self, key: str) -> str:

@@ -111,6 +111,7 @@ def test_charts_of_a_t_spline_move_as_one(tmp_path: Path) -> None:
         ("[[groups]]\nname = 3\n", r"groups\[0\].name: 3 is no parameter"),
         ('[[groups]]\nname = "mouthSmilLeft"\n', "mouthSmilLeft"),
         (SMILE + "at = [1, 2]\n", r"at: must be 3 finite numbers"),
+        (PLACE.replace("60.0", "1e300"), "radius: must be one finite numbers of usable size"),
         (SMILE + "radius = 1\n", "at: is missing"),
         (PLACE.replace("60.0", "-1"), "radius: -1 is not greater than 0"),
         (PLACE.replace("60.0", "0.01"), "moves no control point for mouthSmileLeft"),
