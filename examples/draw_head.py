@@ -93,7 +93,7 @@ def parts_of(folder: Path, shapes: dict[str, float]) -> Iterator[tuple[str, np.n
             yield table["material"], evaluate(part, posed(head, table, part, shapes)), part["mesh_triangles"]
 
 
-def draw(parts: Iterator[tuple[str, np.ndarray, np.ndarray]], size: int = 720, scale: float = 2.4) -> np.ndarray:
+def draw(parts: Iterator[tuple[str, np.ndarray, np.ndarray]], size: int = 720, scale: float = 2.0) -> np.ndarray:
     """(size, size, 3) uint8: a parallel view from the front; samples fill every triangle, the nearest is seen."""
     picture, nearest = np.full((size * size, 3), 244.0), np.full(size * size, -np.inf)
     for material, vertices, triangles in parts:
