@@ -12,6 +12,7 @@ import sys
 NO_REALTIME = "OMOTE_ORDINARY_PRIORITY"
 """Environment variable: where it is set, no thread requests real-time scheduling."""
 _REALTIME_PRIORITY = 10
+_NICE = 5
 _PR_SET_TIMERSLACK = 29
 _SWITCH_S = 0.2e-3
 _TIME_SLICE_NS = 100_000
@@ -22,9 +23,9 @@ _SCHED_SETATTR = {"x86_64": 314, "aarch64": 274, "riscv64": 274, "armv7l": 380, 
 
 
 def lower_process_priority() -> None:
-    """Lower the priority of this process: a late frame is seen less than a late servo target."""
-    if hasattr(os, "nice"):
-        os.nice(5)
+    """Lower the priority of this process, once: a late frame is seen less than a late servo target."""
+    if hasattr(os, "setpriority"):
+        os.setpriority(os.PRIO_PROCESS, 0, max(_NICE, os.getpriority(os.PRIO_PROCESS, 0)))
 
 
 def reduce_timer_slack() -> None:

@@ -42,6 +42,17 @@ def test_real_time_is_taken_where_it_is_allowed_and_given_back() -> None:
 
 
 @linux
+def test_a_priority_that_is_lowered_twice_is_lowered_once() -> None:
+    """A test that runs a face in its own process must not slow down all tests after it more and more."""
+
+    def lowered() -> int:
+        priority.lower_process_priority()
+        return os.getpriority(os.PRIO_PROCESS, 0)  # on Linux that of the calling thread
+
+    assert in_thread(lambda: (lowered(), lowered())) == (5, 5)
+
+
+@linux
 def test_nobody_asks_for_real_time_who_was_told_not_to(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(priority.NO_REALTIME, "1")
     assert in_thread(priority.request_realtime) is False

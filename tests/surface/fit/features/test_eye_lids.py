@@ -14,6 +14,8 @@ from surface.fit.points.eyeball import surface_height
 from surface.fit.source.mesh import FitMesh
 from surface.head import Head
 
+pytestmark = pytest.mark.usefixtures("given_charts")
+
 
 def lazy(mesh: FitMesh, share: float) -> FitMesh:
     """The face with blinks that go only a share of their way."""

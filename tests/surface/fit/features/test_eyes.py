@@ -11,6 +11,8 @@ from surface.fit.features.eyes import ADDED, MISSING
 from surface.fit.features.generic import make_plan
 from surface.fit.source.mesh import FitMesh, check_manifold
 
+pytestmark = pytest.mark.usefixtures("given_charts")
+
 
 def merged(pieces: list[tuple[str, FitMesh]], name: str) -> list[tuple[str, FitMesh]]:
     """Pieces as one of that name."""
