@@ -183,6 +183,21 @@ class Deformation(Generic[Table]):
         self._sum_weights(cells)
         return cells
 
+    def write_to(self, vertices: np.ndarray, normals: np.ndarray) -> None:
+        """Keep vertices and normals in these arrays (m, 3) float32, contiguous, from now on; they get the current ones.
+
+        Whoever owns them may overwrite rows, which then stay so until their cell is updated. ``ValueError`` for arrays
+        of another kind.
+        """
+        for name, array in (("vertices", vertices), ("normals", normals)):
+            mine = self._arrays[name]
+            if array.size != mine.size or array.dtype != mine.dtype or not array.flags.c_contiguous:
+                raise ValueError(f"{name}: must be contiguous float32 of shape {getattr(self, name).shape}")
+            array.reshape(-1)[:] = mine
+            self._arrays[name] = array.reshape(-1)
+            setattr(self, name, _view(self._arrays[name]))
+        self._bind()
+
     def refresh(self) -> None:
         """Compute everything again from the control points."""
         if self._threads == 1 or self._work.sum() < SMALL:

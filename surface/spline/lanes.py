@@ -115,6 +115,21 @@ def _pick_each(builder, values, picks):
     return out
 
 
+def _loader3(part):
+    @_operation(lanes, None, types.intp)
+    def load_part(context, builder, kinds, args):
+        pointer = _pointer(context, builder, kinds[0], *args)
+        source = builder.bitcast(pointer, ir.VectorType(ir.FloatType(), 3 * LANES).as_pointer())
+        values = builder.load(source, align=4)
+        order = ir.Constant(ir.VectorType(INDEX, LANES), [3 * k + part for k in range(LANES)])
+        return builder.shuffle_vector(values, values, order)
+
+    return load_part
+
+
+load_x, load_y, load_z = (_loader3(part) for part in range(3))  # of eight vectors x0 y0 z0 x1 y1 z1 ... from an index
+
+
 @_operation(types.void, None, types.intp)
 def prefetch(context, builder, kinds, args):
     """Ask for the cache line of ``array[index]``, which may lie beyond the array's end."""
