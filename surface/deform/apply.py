@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.jit import inlined, kernel
-from surface.spline.lanes import add, div, fma, load, mul, prefetch, root, splat, store, store3, sub, zero
+from surface.spline.lanes import add, div, fma, load, mul, prefetch, root, splat, store, store3, store_offset, sub, zero
 
 from .groupsums import HEAD, STEP, join_all, join_values, sum_groups, wide
 
@@ -37,12 +37,10 @@ Kernels unpack that tuple once: each access of an element costs a reference coun
 
 @inlined
 def gather(points, ids, first, rows, origin, c, local):
-    """Copy a cell's control points, relative to its origin, into ``local (>= rows, 3)`` float32."""
+    """Copy a cell's control points, relative to its origin, into ``local (>= rows, 4)`` float32, whose last column gets
+    what lies behind them: ``points`` and ``origin`` are followed by one number more."""
     for k in range(rows):
-        i = ids[first + k]
-        local[k, 0] = points[i, 0] - origin[c, 0]
-        local[k, 1] = points[i, 1] - origin[c, 1]
-        local[k, 2] = points[i, 2] - origin[c, 2]
+        store_offset(points, 3 * ids[first + k], origin, 3 * c, local, 4 * k)
 
 
 @inlined

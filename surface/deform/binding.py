@@ -63,7 +63,7 @@ def _arrays(table):
         _flat(table, 17, np.float32), _flat(table, 18, np.int64), _flat(table, 19, np.float32),
         _flat(table, 20, np.float32), _rows(table, 21, 2, np.int64), _flat(table, 22, np.int64),
         _flat(table, 23, np.int32), _flat(table, 24, np.int32), _flat(table, 25, np.int64),
-        _rows(table, 26, 3, np.float64), _rows(table, 27, 3, np.float32), _flat(table, 28, np.float32),
+        _rows(table, 26, 3, np.float64), _rows(table, 27, 4, np.float32), _flat(table, 28, np.float32),
         _flat(table, 29, np.float64), _flat(table, 30, np.float64), _flat(table, 31, np.float64),
         _flat(table, 32, np.float64),
         _flat(table, 33, np.int64), _flat(table, 34, np.int64), _flat(table, 35, np.int32), _flat(table, 36, np.int32),

@@ -183,6 +183,21 @@ class Deformation(Generic[Table]):
         self._sum_weights(cells)
         return cells
 
+    def write_to(self, vertices: np.ndarray, normals: np.ndarray) -> None:
+        """Keep vertices and normals in these arrays (m, 3) float32, contiguous, from now on; they get the current ones.
+
+        Whoever owns them may overwrite rows, which then stay so until their cell is updated. ``ValueError`` for arrays
+        of another kind.
+        """
+        for name, array in (("vertices", vertices), ("normals", normals)):
+            mine = self._arrays[name]
+            if array.size != mine.size or array.dtype != mine.dtype or not array.flags.c_contiguous:
+                raise ValueError(f"{name}: must be contiguous float32 of shape {getattr(self, name).shape}")
+            array.reshape(-1)[:] = mine
+            self._arrays[name] = array.reshape(-1)
+            setattr(self, name, _view(self._arrays[name]))
+        self._bind()
+
     def refresh(self) -> None:
         """Compute everything again from the control points."""
         if self._threads == 1 or self._work.sum() < SMALL:
@@ -225,7 +240,7 @@ class Deformation(Generic[Table]):
     def _bind(self) -> None:
         """Make room for the longest list and the sums of groups, and take the addresses of all arrays, which may have
         been replaced."""
-        self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)), 3), dtype=np.float32)
+        self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)), 4), dtype=np.float32)
         self._arrays["scratch"] = np.zeros(self.factors.sums, dtype=np.float32)
         self._addresses = address_table(vars(self.lists) | self._arrays | vars(self.factors))
 
@@ -288,9 +303,9 @@ def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[
     m, cells, n = len(mesh.vertices), len(mesh.cell_start) - 1, len(points)
     single, cell = partial(np.zeros, dtype=np.float32), partial(np.zeros, cells)
     return {
-        "origin": _middles(mesh.vertices, mesh.cell_start), "points": points.copy(), "inv_w": single(8 * tiles),
-        "dw": single(16 * tiles * normals), "numerators": single((72 if normals else 24) * tiles),
-        "differences": np.full(cells, NOT_STORED),
+        "origin": _followed(_middles(mesh.vertices, mesh.cell_start)), "points": _followed(points),
+        "inv_w": single(8 * tiles), "dw": single(16 * tiles * normals),
+        "numerators": single((72 if normals else 24) * tiles), "differences": np.full(cells, NOT_STORED),
         "vertices": single(3 * m), "normals": single(3 * m * normals), "ranges": np.zeros((max(cells, 1), 2), np.int64),
         "hits": cell(dtype=np.int64), "affected": cell(dtype=np.int32), "recomputed": cell(dtype=np.int32),
         "moved_ids": np.zeros(n, np.int64), "delta": np.zeros((n, 3)),
@@ -304,6 +319,13 @@ def _middles(vertices: np.ndarray, cell_start: Ints) -> Floats:
         return np.zeros((len(cell_start) - 1, 3))
     middles: Floats = np.add.reduceat(vertices, cell_start[:-1], dtype=np.float64) / np.diff(cell_start)[:, None]
     return middles
+
+
+def _followed(rows: Floats) -> Floats:
+    """A copy of rows (k, 3) that is followed by a row of zeros, since kernels read one number beyond each row."""
+    room = np.zeros((len(rows) + 1, 3))
+    room[:-1] = rows
+    return room[:-1]
 
 
 def _rows(rows: ArrayLike, name: str) -> Floats:

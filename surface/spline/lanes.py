@@ -115,6 +115,35 @@ def _pick_each(builder, values, picks):
     return out
 
 
+def _loader3(part):
+    @_operation(lanes, None, types.intp)
+    def load_part(context, builder, kinds, args):
+        pointer = _pointer(context, builder, kinds[0], *args)
+        source = builder.bitcast(pointer, ir.VectorType(ir.FloatType(), 3 * LANES).as_pointer())
+        values = builder.load(source, align=4)
+        order = ir.Constant(ir.VectorType(INDEX, LANES), [3 * k + part for k in range(LANES)])
+        return builder.shuffle_vector(values, values, order)
+
+    return load_part
+
+
+load_x, load_y, load_z = (_loader3(part) for part in range(3))  # of eight vectors x0 y0 z0 x1 y1 z1 ... from an index
+
+
+@_operation(types.void, None, types.intp, None, types.intp, None, types.intp)
+def store_offset(context, builder, kinds, args):
+    """``out[k : k + 4] = points[i : i + 4] - origin[c : c + 4]``: float32 of float64 numbers; each index comes after
+    its array, and is that of the array laid flat."""
+    double, single = (ir.VectorType(kind(), 4) for kind in (ir.DoubleType, ir.FloatType))
+    place = [
+        builder.gep(context.make_array(kinds[k])(context, builder, args[k]).data, [args[k + 1]]) for k in (0, 2, 4)
+    ]
+    point, origin = (builder.load(builder.bitcast(p, double.as_pointer()), align=8) for p in place[:2])
+    value = builder.fptrunc(builder.fsub(point, origin), single)
+    builder.store(value, builder.bitcast(place[2], single.as_pointer()), align=4)
+    return context.get_dummy_value()
+
+
 @_operation(types.void, None, types.intp)
 def prefetch(context, builder, kinds, args):
     """Ask for the cache line of ``array[index]``, which may lie beyond the array's end."""

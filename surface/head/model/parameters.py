@@ -30,10 +30,9 @@ NAMES = SHAPES + ANGLES
 HEAD_RAD = np.radians([60.0, 40.0, 30.0])  # yaw, pitch, roll at full scale
 EYE_RAD = np.radians([35.0, 30.0])  # yaw, pitch at full scale
 _AT = {name: i for i, name in enumerate(NAMES)}
-_ANGLE = [_AT[n] for n in ANGLES]
-_LOOK = np.array([[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] for s in SIDES])
-_BLINK = np.array([_AT[f"eyeBlink{s}"] for s in SIDES])
-_OPENERS = np.array([[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES])
+_LOOK = [[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] for s in SIDES]
+_BLINK = [_AT[f"eyeBlink{s}"] for s in SIDES]
+_OPENERS = [[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES]
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
 TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # jawOpen at least, for the whole tongue; how much earlier the jaw opens
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
@@ -71,19 +70,21 @@ def read_pose(values: Floats) -> Pose:
         raise ValueError(f"values has shape {v.shape}, expected ({len(NAMES)},)")
     if np.isnan(v).any():
         raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
-    v = np.minimum(np.maximum(v, _LOW), 1.0)
-    needed = TONGUE_NEEDS * min(1.0, TONGUE_FIRST * float(v[_TONGUE]))
-    jaw = v[_JAW] = max(float(v[_JAW]), needed)
-    shapes, angle = v[: len(SHAPES)], v[_ANGLE]
-    gaze = np.array([_gaze(v[_LOOK[side]].tolist(), side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)])
-    for side in (0, 1):
-        yaw, pitch = gaze[side]
+    given = np.minimum(np.maximum(v, _LOW), 1.0).tolist()
+    shapes, angle = given[: len(SHAPES)], given[len(SHAPES) :]
+    needed = TONGUE_NEEDS * min(1.0, TONGUE_FIRST * shapes[_TONGUE])
+    jaw = shapes[_JAW] = max(shapes[_JAW], needed)
+    gaze = [_gaze([shapes[i] for i in _LOOK[side]], side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)]
+    for side, (yaw, pitch) in enumerate(gaze):
         outward = yaw * (1 - 2 * side)
-        shapes[_LOOK[side]] = max(pitch, 0.0), max(-outward, 0.0), max(outward, 0.0), max(-pitch, 0.0)
-        shapes[_OPENERS[side]] *= 1.0 - shapes[_BLINK[side]]  # a closing lid ends closed, wherever it started
+        looks = max(pitch, 0.0), max(-outward, 0.0), max(outward, 0.0), max(-pitch, 0.0)
+        for i, amount in zip(_LOOK[side], looks, strict=True):
+            shapes[i] = amount
+        for i in _OPENERS[side]:  # a closing lid ends closed, wherever it started
+            shapes[i] *= 1.0 - shapes[_BLINK[side]]
     shapes[_CLOSE] = min(shapes[_CLOSE], jaw - needed)
-    closed = float(shapes[_CLOSE] / jaw) if jaw > 0 else 0.0
-    return Pose(shapes, jaw, closed, angle[:3] * HEAD_RAD, gaze * EYE_RAD)
+    closed = shapes[_CLOSE] / jaw if jaw > 0 else 0.0
+    return Pose(np.array(shapes), jaw, closed, np.array(angle[:3]) * HEAD_RAD, np.array(gaze) * EYE_RAD)
 
 
 def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float, float]:

@@ -41,6 +41,6 @@ class Drivers:
         self._of = shapes
         self._amounts[: len(SHAPES)] = shapes
         if len(self._power):
-            terms = np.clip(self._mix @ shapes, 0.0, 1.0)
+            terms = np.minimum(np.maximum(self._mix @ shapes, 0.0), 1.0)
             self._amounts[len(SHAPES) :] = np.multiply.reduceat(terms, self._first) ** self._power
         return self._amounts

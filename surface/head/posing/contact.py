@@ -15,14 +15,8 @@ from surface.dcp import DCPSurface
 from surface.deform.lists import LANES
 from surface.head.model.data import Contact, HeadData
 from surface.head.model.parameters import smoothstep
-from surface.head.posing.contact_kernels import (
-    find_heights,
-    find_lifts,
-    find_overlap,
-    lift_points,
-    move_points,
-    place_samples,
-)
+from surface.head.posing.contact_kernels import find_heights, follow_samples, move_points
+from surface.head.posing.contact_solve import clear_eyeball, gather_near, part_sides, place_all
 from surface.spline.kernels import fill_rows, row_capacity
 
 CONTACT_SHARE = 2 / 3  # of the rows at an opening can touch the other side; in the others the correction fades out
@@ -40,32 +34,18 @@ FAR_MM = 18.0  # from every sample: points with large spans so far away would mo
 LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
 
 
-class HeightLimits:
-    """Finds how far samples of a lid must move so that it lies on an eyeball as it does at rest.
+def height_limits(samples: Floats, radius: float, *, held: bool) -> tuple[Floats, Floats, Floats]:
+    """How high samples of a lid shall lie above an eyeball: least and most, mm, and how firmly they are held down to
+    the most, 0..1; (s,) each.
 
-    Parameters
-    ----------
-    samples : (s, 3) at rest, as :func:`place_samples` gives them, the eye looking ahead; radius : the eyeball's.
-    held : do they stay on the eyeball? If not, they only keep out of it.
-
-    Attributes
-    ----------
-    lifts : (s,) as :meth:`find` found them, mm.
+    samples : (s, 4) at rest, as :func:`.contact_kernels.place_samples` gives them, the eye looking ahead; radius : the
+    eyeball's, 0 for none; held : do they stay on the eyeball? If not, they only keep out of it.
     """
-
-    def __init__(self, samples: Floats, radius: float, *, held: bool) -> None:
-        self._radius = radius
-        self._heights, self.lifts = np.empty(len(samples)), np.empty(len(samples))
-        find_heights(samples, radius, FORWARD, self._heights)
-        self._most = np.maximum(self._heights, TOUCH_MM)
-        self._least = np.minimum(self._most, LID_MM if held else TOUCH_MM)
-        self._hold = smoothstep(self._most, HOLD_MM[1], HOLD_MM[0]) * held
-
-    def find(self, samples: Floats, axis: Floats) -> float:
-        """Fill ``lifts`` for samples (s, 3) over an eye that looks along ``axis (3,)``; returns the largest
-        error, mm."""
-        find_heights(samples, self._radius, axis, self._heights)
-        return float(find_lifts(self._heights, self._least, self._most, self._hold, LIFT_GAIN, self.lifts))
+    heights = np.empty(len(samples))
+    find_heights(samples, radius, FORWARD, heights)
+    most = np.maximum(heights, TOUCH_MM)
+    hold = smoothstep(most, HOLD_MM[1], HOLD_MM[0]) * held
+    return np.minimum(most, LID_MM if held else TOUCH_MM), most, hold
 
 
 class EyeballClearance:
@@ -79,58 +59,48 @@ class EyeballClearance:
     Attributes
     ----------
     ids : (k,) control points that are moved; table : (s, k) how far each moves per sample that moves by 1.
-    samples : (s, 3) as placed last, see :func:`place_samples`.
+    samples : (s, 4) as placed last: x, y and z from the eyeball's centre, and depth.
+    sampling, limits, work : what the kernels of :mod:`.contact_solve` take.
     """
 
     def __init__(self, surface: DCPSurface, places: Floats, eye: Floats, radius: float, *, held: bool = False) -> None:
-        self.eye, self.radius = np.ascontiguousarray(eye, np.float64), radius
+        self.eye, self.radius = np.ascontiguousarray(eye, np.float64), float(radius)
         start, ids, share = weights_at(surface, places)
-        self.near = np.unique(ids)
-        self._tiles, self._scratch = tiled(start, ids, share), np.empty(3 * LANES, np.float32)
         self.ids, self.table = _inverse(start, ids, share, surface.points, REGULARISATION[radius > 0])
-        self._lift, self.samples = self.table.astype(np.float32), np.empty((len(places), 3))
-        self.place(surface.points)
-        self._limits = HeightLimits(self.samples, radius, held=held) if radius > 0 else None
+        near, local = np.unique(ids, return_inverse=True)
+        self.sampling = near, *tiled(start, local, share), np.searchsorted(near, self.ids)
+        self.samples, (s, p) = np.empty((len(places), 4)), (len(places), len(near))
+        self.work = (np.zeros((p, 3)), np.full((p, 3), np.nan), np.zeros((p, 3), np.float32),
+                     np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(3))  # fmt: skip
+        gather_near(surface.points, near, self.eye, self.work[0])
+        place_all(self.radius > 0.0, self.sampling, self.work)
+        limits = height_limits(self.samples, self.radius, held=held)
+        self.limits = (*limits, self.radius, LIFT_GAIN, by_lanes(self.table))
 
-    def place(self, points: Floats) -> None:
-        """Compute ``samples`` from control points (n, 3)."""
-        place_samples(*self._tiles, points, self.eye, self.radius, self._scratch, self.samples)
-
-    def lift(self, axis: Floats, points: Floats, tolerance: float = 0.0) -> float:
-        """Move control points (n, 3), whose samples are placed, once if the largest error, which is returned, is above
-        ``tolerance``, mm."""
-        if self._limits is None:
-            return 0.0
-        error = self._limits.find(self.samples, axis)
-        if error > tolerance:
-            lift_points(self.ids, self._limits.lifts, self.samples, self.radius, self._lift, points)
-        return error
-
-    def apply(self, axis: Floats, points: Floats) -> None:
-        """Move control points (n, 3) in place; ``axis (3,)`` is where the eye looks."""
-        for _ in range(PASSES):
-            self.place(points)
-            if self.lift(axis, points, TOLERANCE_MM) <= TOLERANCE_MM:
-                return
+    def apply(self, axis: Floats, points: Floats) -> float:
+        """Move control points (n, 3) in place; ``axis (3,)`` is where the eye looks. Returns the largest error, mm,
+        that was found last."""
+        return float(clear_eyeball(points, self.eye, axis, PASSES, TOLERANCE_MM, self.sampling, self.limits, self.work))
 
 
 class ContactSolver:
     """Keeps the two sides of one opening apart, and lids on the eyeball, on the part that has the opening.
 
     surface : of the part at rest; head : for the eyes.
+    passes : how often the last call of :meth:`apply` corrected; 0 where it knew the answer.
     """
 
     def __init__(self, contact: Contact, surface: DCPSurface, head: HeadData) -> None:
-        self.contact = contact
+        self.contact, self.passes = contact, 0
         self._sides = EyeballClearance(surface, contact.places.reshape(-1, 2), *eye_of(contact, head), held=True)
-        self._lids = self._sides.radius > 0
-        self._rows = contact_rows(contact)
-        self._samples = self._sides.samples.reshape(*contact.places.shape[:3], 3)
+        lids = self._sides.radius > 0
         self._apart = _column_moves(contact).T @ self._sides.table
-        self._overlap = np.zeros((2, contact.places.shape[1]))
-        self._before = np.empty((2, *self._overlap.shape, self._rows))
-        self.push = np.zeros(self._before.size if self._lids else self._overlap.size)
-        self._found = np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3))
+        columns, rows = contact.places.shape[1:3]
+        profiles = 2, columns, contact_rows(contact), 3
+        self._opening = (np.zeros(profiles), np.zeros(profiles), np.zeros((2, columns)),
+                         np.zeros((len(self._sides.ids), 3)))  # fmt: skip
+        self.push = np.zeros(4 * columns * profiles[2] if lids else 2 * columns)
+        self._press, self._rows = OVERLAP_MM[lids], rows
 
     def apply(self, axis: Floats, points: Floats) -> Floats:
         """Correct control points (n, 3) in place; returns what :meth:`Follower.apply` takes, overwritten by each call.
@@ -139,42 +109,12 @@ class ContactSolver:
         slid and how far they were lifted. ``axis (3,)`` is where the eye looks. Where neither the points near the
         opening nor the eye have moved, the last answer is used again.
         """
-        ids = self._sides.ids
-        before, (last_axis, found, moved) = points[self._sides.near], self._found
-        if np.array_equal(axis, last_axis) and np.array_equal(before, found):
-            points[ids] = moved
-        else:
-            self._resolve(axis, points)
-            self._found = np.array(axis), before, points[ids]
+        sides = self._sides
+        self.passes = part_sides(
+            points, sides.eye, axis, PASSES, TOLERANCE_MM, self._press, SOFT_MM, self._rows, self._apart,
+            self._opening, self.push, sides.sampling, sides.limits, sides.work,
+        )  # fmt: skip
         return self.push
-
-    def _resolve(self, axis: Floats, points: Floats) -> None:
-        """Move control points (n, 3) and set ``push``. Lids are moved onto the eyeball first, which opens them."""
-        self.push[:] = 0.0
-        self._sides.place(points)
-        self._before[:] = self._heights()
-        for _ in range(PASSES):
-            lifted = self._sides.lift(axis, points)
-            if lifted > 0.0:
-                self._sides.place(points)
-            error = max(lifted, self._part_sides(points))
-            self._sides.place(points)
-            if error < TOLERANCE_MM:
-                break
-        if self._lids:
-            self.push[:] = (self._heights() - self._before).ravel()
-
-    def _heights(self) -> Floats:
-        """(2, 2, k, m) height and depth of the samples that can touch, as they are placed."""
-        return self._samples[:, :, : self._rows, 1:].transpose(3, 0, 1, 2)
-
-    def _part_sides(self, points: Floats) -> float:
-        """Move the sides, whose samples are placed, apart where they overlap; returns the deepest overlap, mm."""
-        find_overlap(self._samples[:, :, : self._rows], OVERLAP_MM[self._lids], SOFT_MM, self._overlap)
-        if not self._lids:
-            self.push += self._overlap.ravel()
-        self.move_sides(self._overlap, points)
-        return float(self._overlap.max())
 
     def move_sides(self, amounts: Floats, points: Floats) -> None:
         """Move control points (n, 3) so that the sides go apart by ``amounts (2, k)`` mm in their columns: the upper
@@ -200,19 +140,20 @@ class Follower:
         near = 1.0 - smoothstep(distance[side, np.arange(len(points))], 0.0, contact.reach_mm)
         share = np.ones(len(points)) if self.radius > 0 else np.where(side == 1, contact.share - 1.0, contact.share)
         self.ids = np.flatnonzero(near > 1e-3).astype(np.int64)
-        table = np.zeros((2, columns, rows if self.radius > 0 else 1, len(self.ids)))
+        self._rows = rows if self.radius > 0 else 1
+        self._size, count = 2 * columns * self._rows, len(self.ids)
+        self._beside, self._share = np.zeros((count, 2), np.int64), np.zeros((count, 2))
         for k, i in enumerate(self.ids):
             own = at[side[i]]
             x = np.interp(points[i, 0], own[..., 0].mean(axis=1), np.arange(columns))
             left = min(int(x), columns - 2)
-            row = np.linalg.norm(own[left : left + 2] - points[i], axis=2).argmin(axis=1) % table.shape[2]
-            table[side[i], [left, left + 1], row, k] = near[i] * share[i] * np.array([1 - x + left, x - left])
-        self._table = table.reshape(-1, len(self.ids))
+            row = np.linalg.norm(own[left : left + 2] - points[i], axis=2).argmin(axis=1) % self._rows
+            self._beside[k] = (side[i] * columns + np.array([left, left + 1])) * self._rows + row
+            self._share[k] = near[i] * share[i] * np.array([1 - x + left, x - left])
 
     def apply(self, push: Floats, points: Floats) -> None:
         """Add what :meth:`ContactSolver.apply` returned to control points (n, 3)."""
-        for k, amounts in enumerate(push.reshape(-1, len(self._table))):
-            move_points(self.ids, amounts, self._table, self.eye, self.radius, k == 1, points)
+        follow_samples(self.ids, self._beside, self._share, push, self._size, self.eye, self.radius, points)
 
 
 def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:
@@ -249,6 +190,14 @@ def tiled(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Floats32]:
     packed[back, lane] = share
     tile_start = np.searchsorted(keys, n * np.arange(-(-places // LANES) + 1))
     return tile_start.astype(np.int64), keys % n, packed.ravel()
+
+
+def by_lanes(table: Floats) -> Floats32:
+    """``table (s, k)`` for eight columns at a time, (8 b s,): of the first eight, row after row, then of the next."""
+    rows, columns = table.shape
+    padded = np.zeros((rows, -(-columns // LANES) * LANES), np.float32)
+    padded[:, :columns] = table
+    return np.ascontiguousarray(padded.reshape(rows, -1, LANES).transpose(1, 0, 2)).ravel()
 
 
 def _nearest(points: Floats, others: Floats) -> Floats:

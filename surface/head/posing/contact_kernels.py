@@ -16,29 +16,61 @@ CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
 
 @kernel
 def place_samples(
-    start: Ints, ids: Ints, share: Floats32, points: Floats, eye: Floats, radius: float,
-    room: Floats32, out: Floats,
+    start: Ints, ids: Ints, share: Floats32, local: Floats, around: bool, single: Floats32, room: Floats32, out: Floats
 ) -> None:  # fmt: skip
-    """Samples ``out (s, 3)`` of a surface as (x, height, depth), from control points ``points (n, 3)``.
+    """Samples ``out (s, 4)`` of a surface: x, y and z from the eyeball's centre, and depth, from control points
+    ``local (k, 3)``, which are relative to that centre, too.
 
     Eight samples at a time: those of tile t are the sums of eight ``share`` each times the points ``ids`` between
-    ``start[t]`` and ``start[t + 1]``; ``room (24,)`` is scratch space. Height and depth are y and z, or, with a
-    ``radius`` > 0, the arc above the eyeball's middle and the distance from it.
+    ``start[t]`` and ``start[t + 1]``; ``single (k, 3)`` and ``room (24,)`` are scratch space. Depth is the distance
+    from the centre if samples lie ``around`` an eyeball, else z.
     """
+    for k in range(len(local)):
+        single[k, 0], single[k, 1], single[k, 2] = local[k, 0], local[k, 1], local[k, 2]
     for tile in range(len(start) - 1):
         x, y, z = zero(), zero(), zero()
         for k in range(start[tile], start[tile + 1]):
             i, w = ids[k], load(share, 8 * k)
-            x = fma(w, np.float32(points[i, 0] - eye[0]), x)
-            y = fma(w, np.float32(points[i, 1] - eye[1]), y)
-            z = fma(w, np.float32(points[i, 2] - eye[2]), z)
+            x, y, z = fma(w, single[i, 0], x), fma(w, single[i, 1], y), fma(w, single[i, 2], z)
         store3(room, 0, x, y, z)
         for s in range(8 * tile, min(8 * tile + 8, len(out))):
             at = 3 * (s - 8 * tile)
             a, b, c = room[at], room[at + 1], room[at + 2]
-            out[s, 0] = a
-            out[s, 1] = radius * np.arctan2(b, c) if radius > 0.0 else b
-            out[s, 2] = np.sqrt(a * a + b * b + c * c) if radius > 0.0 else c
+            out[s, 0], out[s, 1], out[s, 2] = a, b, c
+            out[s, 3] = np.sqrt(a * a + b * b + c * c) if around else c
+
+
+@kernel
+def angle(y: float, z: float) -> float:
+    """The angle of (z, y) as np.arctan2(y, z), to 2e-8 rad, in a third of the time; Abramowitz and Stegun, 4.4.49."""
+    a, b = abs(y), abs(z)
+    t = min(a, b) / max(a, b, 1e-300)
+    q, r = t * t, 0.0028662257
+    r = -0.0161657367 + q * r
+    r = 0.0429096138 + q * r
+    r = -0.0752896400 + q * r
+    r = 0.1065626393 + q * r
+    r = -0.1420889944 + q * r
+    r = 0.1999355085 + q * r
+    r = t * (1.0 + q * (-0.3333314528 + q * r))
+    r = np.pi / 2.0 - r if a > b else r
+    r = np.pi - r if z < 0.0 else r
+    return -r if y < 0.0 else r
+
+
+@kernel
+def trace_profiles(samples: Floats, rows: int, radius: float, out: Floats) -> None:
+    """Profiles ``out (2, k, m, 3)`` of an opening's columns as (x, height, depth), from ``samples (s, 4)``, of which
+    every column has ``rows``, m of them in its profile. Height is y, or, with a ``radius`` > 0, the arc above the
+    eyeball's middle."""
+    _, columns, m, _ = out.shape
+    for side in range(2):
+        for k in range(columns):
+            first = (side * columns + k) * rows
+            for j in range(m):
+                sample = samples[first + j]
+                height = radius * angle(sample[1], sample[2]) if radius > 0.0 else sample[1]
+                out[side, k, j, 0], out[side, k, j, 1], out[side, k, j, 2] = sample[0], height, sample[3]
 
 
 @kernel
@@ -100,15 +132,14 @@ def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> No
 
 @kernel
 def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) -> None:
-    """How high samples (s, 3) as (x, height, depth) lie above an eyeball of radius ``size``: ``heights (s,)``.
+    """How high ``samples (s, 4)``, as :func:`place_samples` gives them, lie above an eyeball of radius ``size``:
+    ``heights (s,)``.
 
     The eye looks along ``axis (3,)``; its cornea protrudes.
     """
     for s in range(len(samples)):
-        x, depth = samples[s, 0], max(samples[s, 2], 1e-6)
-        across = np.sqrt(max(depth * depth - x * x, 0.0))
-        y, z = across * np.sin(samples[s, 1] / size), across * np.cos(samples[s, 1] / size)
-        along = (x * axis[0] + y * axis[1] + z * axis[2]) / depth
+        depth = max(samples[s, 3], 1e-6)
+        along = (samples[s, 0] * axis[0] + samples[s, 1] * axis[1] + samples[s, 2] * axis[2]) / depth
         root = CORNEA_RADIUS**2 - CORNEA_AT**2 * (1.0 - along * along)
         ground = 1.0
         if along > 0.0 and root > 0.0:
@@ -136,38 +167,57 @@ def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, gain:
 
 
 @kernel
-def lift_points(ids: Ints, lifts: Floats, samples: Floats, size: float, table: Floats32, points: Floats) -> None:
-    """Move ``points (n, 3)`` with the numbers ``ids (k,)`` by ``lifts (s,) @ table (s, k)``, mm, each lift away from
-    the eyeball of radius ``size`` at its sample (s, 3) as (x, height, depth)."""
-    count = len(ids)
-    x, y, z = np.zeros(count, np.float32), np.zeros(count, np.float32), np.zeros(count, np.float32)
+def lift_points(ids: Ints, lifts: Floats, samples: Floats, table: Floats32, room: Floats32, points: Floats) -> None:
+    """Move ``points (n, 3)`` with the numbers ``ids (k,)`` by ``lifts (s,)``, mm, each away from the eyeball's centre
+    at its sample (s, 4).
+
+    ``table (8 b s,)`` says how far points move per lift: for every eight of them, sample after sample. ``room (24,)``
+    is scratch space.
+    """
+    ways, used, count = np.empty((len(lifts), 3), np.float32), np.empty(len(lifts), np.int64), 0
     for s in range(len(lifts)):
-        if lifts[s] == 0.0:
-            continue
-        depth = max(samples[s, 2], 1e-6)
-        across, share = np.sqrt(max(depth * depth - samples[s, 0] ** 2, 0.0)), lifts[s] / depth
-        a = np.float32(share * samples[s, 0])
-        b = np.float32(share * across * np.sin(samples[s, 1] / size))
-        c = np.float32(share * across * np.cos(samples[s, 1] / size))
-        row = table[s]
-        for k in range(count):
-            x[k] += a * row[k]
-            y[k] += b * row[k]
-            z[k] += c * row[k]
-    for k in range(count):
-        points[ids[k], 0] += x[k]
-        points[ids[k], 1] += y[k]
-        points[ids[k], 2] += z[k]
+        if lifts[s] != 0.0:
+            share = lifts[s] / max(samples[s, 3], 1e-6)
+            for c in range(3):
+                ways[count, c] = share * samples[s, c]
+            used[count] = s
+            count += 1
+    for first in range(0, len(ids), 8):
+        x, y, z = zero(), zero(), zero()
+        for q in range(count):
+            w = load(table, first * len(lifts) + 8 * used[q])
+            x, y, z = fma(w, ways[q, 0], x), fma(w, ways[q, 1], y), fma(w, ways[q, 2], z)
+        store3(room, 0, x, y, z)
+        for k in range(first, min(first + 8, len(ids))):
+            for c in range(3):
+                points[ids[k], c] += room[3 * (k - first) + c]
+
+
+@kernel
+def move_up(i: int, move: float, eye: Floats, radius: float, outward: bool, points: Floats) -> None:
+    """Move point i of ``points (n, 3)`` up by ``move``, mm; with a ``radius`` round the eyeball at ``eye (3,)``, or
+    away from its centre if ``outward``."""
+    if radius <= 0.0:
+        points[i, 1] += move
+        return
+    x, y, z = points[i, 0] - eye[0], points[i, 1] - eye[1], points[i, 2] - eye[2]
+    if outward:
+        scale = move / max(np.sqrt(x * x + y * y + z * z), 1e-6)
+        points[i, 0] += scale * x
+        points[i, 1] += scale * y
+        points[i, 2] += scale * z
+    else:
+        cosine, sine = np.cos(move / radius), np.sin(move / radius)
+        points[i, 1] = eye[1] + cosine * y + sine * z
+        points[i, 2] = eye[2] + cosine * z - sine * y
 
 
 @kernel
 def move_points(
     ids: Ints, amounts: Floats, table: Floats, eye: Floats, radius: float, outward: bool, points: Floats
 ) -> None:
-    """Move ``points (n, 3)`` with the numbers ``ids (k,)`` up by ``amounts (s,) @ table (s, k)``, mm.
-
-    With a ``radius`` they go up round the eyeball at ``eye (3,)``, or away from its centre if ``outward``.
-    """
+    """Move ``points (n, 3)`` with the numbers ``ids (k,)`` up by ``amounts (s,) @ table (s, k)``, mm, as
+    :func:`move_up`."""
     moves, still = np.zeros(len(ids)), True
     for s in range(len(amounts)):
         if amounts[s] != 0.0:
@@ -177,17 +227,21 @@ def move_points(
     if still:
         return
     for k in range(len(ids)):
-        i, move = ids[k], moves[k]
-        if radius <= 0.0:
-            points[i, 1] += move
-            continue
-        x, y, z = points[i, 0] - eye[0], points[i, 1] - eye[1], points[i, 2] - eye[2]
-        if outward:
-            scale = move / max(np.sqrt(x * x + y * y + z * z), 1e-6)
-            points[i, 0] += scale * x
-            points[i, 1] += scale * y
-            points[i, 2] += scale * z
-        else:
-            cosine, sine = np.cos(move / radius), np.sin(move / radius)
-            points[i, 1] = eye[1] + cosine * y + sine * z
-            points[i, 2] = eye[2] + cosine * z - sine * y
+        move_up(ids[k], moves[k], eye, radius, outward, points)
+
+
+@kernel
+def follow_samples(
+    ids: Ints, beside: Ints, share: Floats, push: Floats, size: int, eye: Floats, radius: float, points: Floats
+) -> None:  # fmt: skip
+    """Move ``points (n, 3)`` with the numbers ``ids (k,)`` along with the two samples that each lies beside.
+
+    push : (size,) how far samples went up, mm, or (2 size,): also how far they were lifted off the eyeball;
+    beside (k, 2) : samples of each point; share (k, 2) : how much of their move it takes.
+    """
+    for kind in range(len(push) // size):
+        for k in range(len(ids)):
+            a, b = push[kind * size + beside[k, 0]], push[kind * size + beside[k, 1]]
+            move = share[k, 0] * a + share[k, 1] * b
+            if move != 0.0:
+                move_up(ids[k], move, eye, radius, kind == 1, points)

@@ -43,6 +43,7 @@ class Head:
         for stitch in self._stitches:
             stitch.close()
         self._at = {name: i for i, name in enumerate(self.parameters)}
+        self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
 
     @classmethod
     def load(cls, path: str | Path, identity: Mapping[str, float] | None = None) -> Head:
@@ -117,7 +118,7 @@ class Head:
         Raises ValueError: wrong shape or a value that is not a number; the head keeps its pose.
         """
         pose = read_pose(values)
-        turn = Turn(rotation(*pose.head), self.data.neck.pivot)
+        turn = self._turned(pose.head)
         for part in self.parts:
             part.pose(pose, turn)
         for stitch in self._stitches:
@@ -130,7 +131,14 @@ class Head:
         :class:`surface.head.posing.influence.Influence`.
         """
         pose = read_pose(values)
-        return [part.place_points(pose) for part in self.parts], Turn(rotation(*pose.head), self.data.neck.pivot)
+        return [part.place_points(pose) for part in self.parts], self._turned(pose.head)
+
+    def _turned(self, angles: Floats) -> Turn:
+        """The rotation of a pose by its angles (3,); the last one, if they are the same."""
+        key = angles.tobytes()
+        if key != self._last_turn[0]:
+            self._last_turn = key, Turn(rotation(*angles), self.data.neck.pivot)
+        return self._last_turn[1]
 
 
 def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> HeadPart:

@@ -92,38 +92,6 @@ def keep_on_eyeball(ids: Ints, eye: Floats, hold: Floats, radius: Floats, points
 
 
 @kernel
-def turn_head(
-    vertices: Floats32, normals: Floats32, share: Floats32, matrix: Floats, turn: Floats, pivot: Floats, start: int,
-    stop: int, out_vertices: Floats32, out_normals: Floats32,
-) -> None:  # fmt: skip
-    """Rotate rows start..stop about ``pivot (3,)`` by each one's ``share`` of the rotation.
-
-    ``matrix (3, 3)`` is the whole rotation and ``turn (3,)`` its rotation vector. A vertex that follows in part
-    turns by part of the angle (Rodrigues' formula): the neck bends instead of shearing.
-    """
-    own = matrix.copy()
-    angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
-    a, b, c = turn[0] / angle, turn[1] / angle, turn[2] / angle
-    for i in range(start, stop):
-        whole = share[i] >= 1.0
-        if not whole:
-            s, k = np.sin(share[i] * angle), np.cos(share[i] * angle)
-            m = 1.0 - k
-            own[0, 0], own[0, 1], own[0, 2] = k + a * a * m, a * b * m - c * s, a * c * m + b * s
-            own[1, 0], own[1, 1], own[1, 2] = a * b * m + c * s, k + b * b * m, b * c * m - a * s
-            own[2, 0], own[2, 1], own[2, 2] = a * c * m - b * s, b * c * m + a * s, k + c * c * m
-        x, y, z = vertices[i, 0] - pivot[0], vertices[i, 1] - pivot[1], vertices[i, 2] - pivot[2]
-        p, q, r = normals[i, 0], normals[i, 1], normals[i, 2]
-        for row in range(3):
-            if whole:
-                f, g, h = matrix[row, 0], matrix[row, 1], matrix[row, 2]
-            else:
-                f, g, h = own[row, 0], own[row, 1], own[row, 2]
-            out_vertices[i, row] = pivot[row] + f * x + g * y + h * z
-            out_normals[i, row] = f * p + g * q + h * r
-
-
-@kernel
 def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at: Floats) -> None:
     """For every point of ``uv (m, 2)``: its distance from the polyline ``line (k, 2)``, and how far along it the
     nearest place lies, in the line's points; written to ``distance (m,)`` and ``at (m,)``."""

@@ -15,8 +15,9 @@ from surface.head.model.data import HeadData, PartData
 from surface.head.model.meshes import make_surface as make_surface
 from surface.head.model.parameters import Pose, rotation_vector
 from surface.head.model.rules import Drivers
-from surface.head.posing.kernels import move_rigid, turn_head
+from surface.head.posing.kernels import move_rigid
 from surface.head.posing.rig import SkinRig, motion_key, rigid_motion
+from surface.head.posing.turning import turn_head
 from surface.mesh.mesh import Mesh, border_edges
 
 
@@ -25,7 +26,7 @@ class Turn:
 
     def __init__(self, matrix: Floats, pivot: tuple[float, float, float]) -> None:
         self.matrix, self.vector, self.pivot = matrix, rotation_vector(matrix), np.array(pivot)
-        self.none = not self.vector.any()
+        self.none, self.key = not self.vector.any(), (matrix + 0.0).tobytes()  # 0 is -0
 
     def rotate(
         self, source: Deformation[Any], share: Floats32, rows: tuple[int, int], vertices: Floats32, normals: Floats32
@@ -36,8 +37,7 @@ class Turn:
             vertices[start:stop] = source.vertices[start:stop]
             normals[start:stop] = source.normals[start:stop]
         else:
-            turn_head(source.vertices, source.normals, share, self.matrix, self.vector, self.pivot, start, stop,
-                      vertices, normals)  # fmt: skip
+            turn_head(source.vertices, source.normals, share, self.vector, self.pivot, start, stop, vertices, normals)
 
     def after(self, linear: Floats, shift: Floats) -> tuple[Floats32, Floats32]:
         """Linear part (3, 3) and shift (3,) of an affine motion followed by the whole rotation."""
@@ -123,20 +123,36 @@ class SkinPart(HeadPart):
         super().__init__(data, mesh, surface, attributes)
         self.rig, self._version = SkinRig(data, head, drivers), 0
         self.deformation = Deformation(surface, mesh)
-        self.vertices[:], self.normals[:] = self.deformation.vertices, self.deformation.normals
+        self._straight = True  # does the deformation write to the part's own arrays?
+        self.deformation.write_to(self.vertices, self.normals)
         self._share[:] = head.neck.share(self.vertices.astype(np.float64))
 
     def pose(self, pose: Pose, turn: Turn) -> None:
         points, ranges = self.rig.apply(pose), []
+        turned, self._turn = turn.key != self._turn.key, turn
+        self._direct(turn.none)
         if self._version != self.rig.version:
             self._version = self.rig.version
             self.deformation.set_points(points)
             ranges = self.deformation.changed
-        if not np.array_equal(turn.matrix, self._turn.matrix):
-            ranges = [(0, len(self.deformation.vertices))]
-        self._turn, self.changed = turn, ranges
-        for rows in ranges:
-            turn.rotate(self.deformation, self._share, rows, self.vertices, self.normals)
+        self.changed = [(0, len(self._share))] if turned else ranges
+        if not turn.none:
+            for rows in self.changed:
+                turn.rotate(self.deformation, self._share, rows, self.vertices, self.normals)
+
+    def append(self, like: Ints, triangles: NDArray[np.int32]) -> None:
+        super().append(like, triangles)
+        self._straight = False
+        self._direct(True)
+
+    def _direct(self, straight: bool) -> None:
+        """Let the deformation write straight to the part's own arrays, unless the head is turned: then vertices are
+        kept as they were before that. They are the current ones then, without what seams did to them."""
+        if straight == self._straight:
+            return
+        self._straight, m = straight, len(self._share)
+        aside = np.empty((2, m, 3), np.float32)
+        self.deformation.write_to(*((self.vertices[:m], self.normals[:m]) if straight else aside))
 
     @property
     def control_points(self) -> Floats:
@@ -163,7 +179,7 @@ class RigidPart(HeadPart):
         self._last_key: tuple[object, ...] = ()
 
     def pose(self, pose: Pose, turn: Turn) -> None:
-        key = (*motion_key(self.follows, self._head, pose), turn.matrix.tobytes())
+        key = (*motion_key(self.follows, self._head, pose), turn.key)
         self._turn, self.changed = turn, []
         if key == self._last_key:
             return

@@ -147,6 +147,23 @@ def test_moving_everything_and_back(sheet: tuple[DCPSurface, Mesh]) -> None:
     assert deformation.changed == []
 
 
+def test_vertices_may_be_kept_in_arrays_of_the_callers(sheet: tuple[DCPSurface, Mesh]) -> None:
+    surface, mesh = sheet
+    deformation, twin = surface.deformation(mesh), surface.deformation(mesh)
+    deformation.move([200], [[0.0, 0.0, 1.0]])
+    own = np.full((2, len(mesh.vertices) + 5, 3), 9.0, np.float32)
+    deformation.write_to(own[0, :-5], own[1, :-5])
+    for d in (deformation, twin):
+        d.set_positions([200, 210], surface.points[[200, 210]] + 1.0)
+    np.testing.assert_allclose(own[0, :-5], twin.vertices, atol=1e-6 * SIZE)
+    assert np.shares_memory(deformation.vertices, own) and np.shares_memory(deformation.normals, own)
+    assert not deformation.vertices.flags.writeable and (own[:, -5:] == 9.0).all()
+    check(deformation)
+    for bad in (own[0], own[0, :-5].astype(float), own[0, :-5].T):
+        with pytest.raises(ValueError, match="vertices: must be contiguous float32 of shape"):
+            deformation.write_to(bad, own[1, :-5])
+
+
 def test_a_move_touches_its_own_cells_only(sheet: tuple[DCPSurface, Mesh]) -> None:
     surface, mesh = sheet
     deformation = surface.deformation(mesh)

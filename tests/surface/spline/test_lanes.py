@@ -56,3 +56,21 @@ def test_a_processor_chosen_for_numba_has_what_its_features_say(monkeypatch: pyt
     assert lanes._has_avx2() is False
     monkeypatch.setattr(lanes.config, "CPU_FEATURES", "+avx,+avx2")
     assert lanes._has_avx2() is True
+
+
+@njit
+def separated(rows, points, origin, out, local):
+    """Eight vectors by coordinate, and rows of points relative to origins."""
+    lanes.store(out, 0, lanes.load_x(rows, 3))
+    lanes.store(out, 8, lanes.load_y(rows, 3))
+    lanes.store(out, 16, lanes.load_z(rows, 3))
+    lanes.store_offset(points, 6, origin, 3, local, 4)
+
+
+def test_coordinates_are_separated_and_points_placed_relative_to_origins() -> None:
+    rng = np.random.default_rng(1)
+    rows, points, origin = rng.normal(size=(9, 3)).astype("f4"), rng.normal(size=(4, 3)), rng.normal(size=(3, 3))
+    out, local = np.zeros(24, "f4"), np.zeros((3, 4), "f4")
+    separated(rows.ravel(), points, origin, out, local)
+    assert np.array_equal(out.reshape(3, 8), rows[1:].T)
+    assert np.array_equal(local[1, :3], (points[2] - origin[1]).astype("f4")) and not local[[0, 2]].any()

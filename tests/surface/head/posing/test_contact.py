@@ -19,8 +19,9 @@ from surface.head.posing.contact import (
     ContactSolver,
     EyeballClearance,
     Follower,
-    HeightLimits,
+    by_lanes,
     contact_rows,
+    height_limits,
     tiled,
     weights_at,
 )
@@ -161,24 +162,25 @@ def test_an_error_within_the_tolerance_is_left() -> None:
 
 
 def test_limits_hold_what_rests_near_and_free_what_rests_far() -> None:
-
-    def sample(height: float) -> np.ndarray:
-        return np.array([[0.0, RADIUS * np.arctan2(-0.6, 0.8), RADIUS + height]])
-
-    for height, held, off in (
+    for height, held, firm in (
         (0.5, True, 1.0),
         (1.8, True, 0.5),
         (3.0, True, 0.0),
-        (0.5, False, 1.0),
+        (0.5, False, 0.0),
         (-1.0, True, 1.0),
     ):
-        limits = HeightLimits(sample(height), RADIUS, held=held)
-        most = max(height, TOUCH_MM)
-        assert limits.find(sample(most + 1.0), AHEAD) == pytest.approx(off * held, abs=1e-6), (height, held)
-        assert limits.lifts[0] == pytest.approx(-1.6 * off * held, abs=1e-6)
-        least = min(most, LID_MM if held else TOUCH_MM)
-        assert limits.find(sample(least - 0.25), AHEAD) == pytest.approx(0.25, abs=1e-6)
-        assert limits.lifts[0] == pytest.approx(0.4, abs=1e-6)
+        depth = RADIUS + height
+        least, most, hold = height_limits(np.array([[0.0, -0.6 * depth, 0.8 * depth, depth]]), RADIUS, held=held)
+        assert most[0] == pytest.approx(max(height, TOUCH_MM), abs=1e-6), (height, held)
+        assert least[0] == pytest.approx(min(max(height, TOUCH_MM), LID_MM if held else TOUCH_MM), abs=1e-6)
+        assert hold[0] == pytest.approx(firm, abs=1e-6)
+
+
+def test_tables_lie_in_memory_eight_points_at_a_time() -> None:
+    table = np.random.default_rng(2).random((5, 11)).astype(np.float32)
+    packed = by_lanes(table).reshape(2, 5, 8)
+    np.testing.assert_array_equal(np.hstack([packed[0], packed[1, :, :3]]), table)
+    assert not packed[1, :, 3:].any()
 
 
 def test_weights_are_those_of_the_surface_and_add_up() -> None:
@@ -335,8 +337,8 @@ def test_lips_and_lids_have_their_own_damping_and_lips_no_eyeball() -> None:
     surface, c = lips(1.0), contact()
     places = c.places.reshape(-1, 2)
     plain = EyeballClearance(surface, places, np.zeros(3), 0.0)
-    assert plain.lift(AHEAD, surface.points.copy()) == 0.0
-    np.testing.assert_allclose(plain.samples, surface.evaluate(places), atol=0.15)
+    np.testing.assert_allclose(plain.samples[:, :3], surface.evaluate(places), atol=0.15)
+    np.testing.assert_array_equal(plain.samples[:, 2], plain.samples[:, 3])
     eyed = EyeballClearance(surface, places, np.zeros(3), RADIUS)
     start, ids, share = weights_at(surface, places)
     for clearance, damping in ((plain, 0.02), (eyed, 0.05)):
@@ -361,22 +363,20 @@ def test_an_eye_is_that_of_its_side() -> None:
         assert radius == 12.0 and centre.tolist() == head.eyes[eye].tolist()
 
 
-def test_sides_are_parted_until_little_is_left_and_three_times_at_most(monkeypatch: pytest.MonkeyPatch) -> None:
-    surface, overlaps = lips(1.5), []
-    part = ContactSolver._part_sides
+def overlap_left(points: np.ndarray) -> float:
+    """The deepest overlap of lips beyond what is allowed."""
+    upper, lower = rims(lips(0.0), points)
+    return float((lower - upper).max() - OVERLAP_MM[0])
 
-    def record(self: ContactSolver, points: np.ndarray) -> float:
-        overlaps.append(part(self, points))
-        return overlaps[-1]
 
-    monkeypatch.setattr(ContactSolver, "_part_sides", record)
-    ContactSolver(contact(), surface, small_head()).apply(AHEAD, surface.points.copy())
-    assert 2 <= len(overlaps) <= 3 and (overlaps[-1] < 0.1 or len(overlaps) == 3)
-    assert all(overlap >= 0.1 for overlap in overlaps[:-1])
-    overlaps.clear()
-    ContactSolver(contact(), lips(0.3), small_head()).apply(AHEAD, lips(0.3).points.copy())
-    assert len(overlaps) == 1 and 0.0 < overlaps[0] < 0.1
-    monkeypatch.setattr(contact_module, "move_points", lambda *_: None)  # nothing helps
-    overlaps.clear()
-    ContactSolver(contact(), surface, small_head()).apply(AHEAD, surface.points.copy())
-    assert len(overlaps) == 3
+def test_sides_are_parted_until_little_is_left_and_three_times_at_most() -> None:
+    for overlap, passes in ((0.1, 1), (0.3, 1), (1.5, 2), (3.0, 2)):
+        solver, points = ContactSolver(contact(), lips(overlap), small_head()), lips(overlap).points.copy()
+        solver.apply(AHEAD, points)
+        assert passes <= solver.passes <= (3 if passes > 1 else 1), overlap
+        assert overlap_left(points) < 0.12
+    solver.apply(AHEAD, lips(3.0).points.copy())
+    assert solver.passes == 0  # it knew the answer
+    solver._apart[:] = 0.0  # nothing helps
+    solver.apply(AHEAD, lips(2.9).points.copy())
+    assert solver.passes == 3

@@ -5,15 +5,18 @@ import pytest
 from face_measures import eye_height
 
 from surface.fit.points.eyeball import surface_height
-from surface.head.posing.contact import LID_MM, TOUCH_MM, HeightLimits
+from surface.head.posing.contact import LID_MM, LIFT_GAIN, TOUCH_MM, by_lanes, height_limits
 from surface.head.posing.contact_kernels import (
+    angle,
     find_heights,
     find_lifts,
     find_overlap,
+    follow_samples,
     lift_points,
     move_points,
     overlap_at,
     place_samples,
+    trace_profiles,
 )
 from surface.head.posing.rig import optical_axis
 
@@ -29,12 +32,26 @@ def directions(count: int) -> np.ndarray:
 
 
 def samples_at(points: np.ndarray) -> np.ndarray:
-    """(s, 3) as (x, height, depth) of points (s, 3) from the eyeball's centre."""
+    """(s, 4) as x, y, z and depth of points (s, 3) from the eyeball's centre."""
     start, ids, share = np.arange(len(points) + 1), np.arange(len(points)), np.zeros(8 * len(points), np.float32)
     share[::8] = 1.0
-    out = np.empty((8 * len(points), 3))
-    place_samples(start, ids, share, points, np.zeros(3), RADIUS, np.empty(24, np.float32), out)
+    out, single = np.empty((8 * len(points), 4)), np.empty((len(points), 3), np.float32)
+    place_samples(start, ids, share, points, True, single, np.empty(24, np.float32), out)
     return np.ascontiguousarray(out[::8])
+
+
+def off_limits(rest: np.ndarray, samples: np.ndarray, axis: np.ndarray, *, held: bool) -> tuple[float, np.ndarray]:
+    """Largest error and lifts of samples, of those whose places at rest are given."""
+    heights, lifts = np.empty(len(rest)), np.empty(len(rest))
+    find_heights(samples, RADIUS, axis, heights)
+    return find_lifts(heights, *height_limits(rest, RADIUS, held=held), LIFT_GAIN, lifts), lifts
+
+
+def test_angles_are_those_of_numpy_all_round():
+    rng = np.random.default_rng(4)
+    sides = [(0.0, 1.0), (1.0, 0.0), (-1.0, 0.0), (0.0, -1.0), (0.0, 0.0), (1e-300, 1e-300)]
+    for y, z in [*rng.normal(size=(400, 2)), *sides]:
+        assert angle(y, z) == pytest.approx(np.arctan2(y, z), abs=2e-8)
 
 
 @pytest.mark.parametrize("look", LOOKS)
@@ -46,15 +63,6 @@ def test_heights_are_those_above_ball_and_cornea(look):
     wanted = np.linalg.norm(points, axis=1) - RADIUS * eye_height(way, axis)
     np.testing.assert_allclose(found, wanted, atol=5e-3)
     assert (eye_height(way, axis) > 1.05).any()
-
-
-def test_heights_at_an_eyes_side_are_those_of_its_axis_there():
-    """A sample that stands exactly beside the centre, and one that rounding puts a little further."""
-    axis, found = np.array([0.9, 0.0, np.sqrt(1 - 0.81)]), np.empty(3)
-    find_heights(np.array([[13.0, 0.0, 13.0], [13.0 + 1e-12, 5.0, 13.0], [-13.0, 0.0, 13.0]]), RADIUS, axis, found)
-    wanted = 13.0 - RADIUS * eye_height(np.array([[1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]]), axis)
-    np.testing.assert_allclose(found, wanted[[0, 0, 1]], atol=2e-3)
-    assert wanted[0] < wanted[1] == pytest.approx(13.0 - RADIUS)
 
 
 @pytest.mark.parametrize("look", LOOKS)
@@ -72,13 +80,12 @@ def test_what_is_too_low_is_lifted_and_what_is_too_high_laid_down():
 
 
 def test_a_lift_goes_away_from_the_eyeball_where_its_sample_stands():
-    way = directions(5)
-    points, rest = np.zeros((7, 3)), samples_at(13.0 * way)
-    lift_points(
-        np.arange(len(way)) + 1, np.full(len(way), 0.5), rest, RADIUS, np.eye(len(way), dtype=np.float32), points
-    )
-    np.testing.assert_allclose(points[1 : 1 + len(way)], 0.5 * way, atol=1e-5)
-    assert not points[0].any()
+    way = directions(60)[:21]
+    points, rest, lifts = np.zeros((23, 3)), samples_at(13.0 * way), np.linspace(-0.5, 0.5, 21)
+    table = np.random.default_rng(3).uniform(0, 1, (21, 19))  # three tiles of points, the last one not full
+    lift_points(np.arange(19) + 1, lifts, rest, by_lanes(table), np.empty(24, np.float32), points)
+    np.testing.assert_allclose(points[1:20], (lifts[:, None] * table).T @ way, atol=1e-5)
+    assert not points[0].any() and not points[20:].any() and lifts[10] == 0.0
 
 
 def test_what_lay_on_the_ball_follows_the_cornea_and_what_stood_off_does_not():
@@ -86,20 +93,21 @@ def test_what_lay_on_the_ball_follows_the_cornea_and_what_stood_off_does_not():
     way = np.array([[0.0, 0.1, 1.0], [0.0, 0.1, 1.0], [0.0, 0.1, 1.0]]) / np.hypot(0.1, 1.0)
     ground = RADIUS * eye_height(way, ahead)
     rest = samples_at(way * (ground + np.array([0.3, LID_MM, 4.0]))[:, None])
-    cushion = HeightLimits(rest, RADIUS, held=True)
-    assert cushion.find(rest, ahead) == pytest.approx(0.0, abs=1e-9)
+    assert off_limits(rest, rest, ahead, held=True)[0] == pytest.approx(0.0, abs=1e-9)
     fall = ground[0] - RADIUS * eye_height(way, aside)[0]
     assert fall > 0.9  # the cornea turned away
-    assert cushion.find(rest, aside) == pytest.approx(fall, abs=0.01)
-    assert cushion.lifts[0] < -fall and cushion.lifts[1] < -fall and cushion.lifts[2] == 0.0
+    error, lifts = off_limits(rest, rest, aside, held=True)
+    assert error == pytest.approx(fall, abs=0.01)
+    assert lifts[0] < -fall and lifts[1] < -fall and lifts[2] == 0.0
 
 
 def test_a_lining_only_keeps_out():
     way = np.array([[0.0, 0.3, 1.0]]) / np.hypot(0.3, 1.0)
-    ground = RADIUS * eye_height(way, optical_axis(np.zeros(2)))
-    cushion = HeightLimits(samples_at(way * (ground + 0.5)[:, None]), RADIUS, held=False)
+    ahead = optical_axis(np.zeros(2))
+    ground = RADIUS * eye_height(way, ahead)
+    rest = samples_at(way * (ground + 0.5)[:, None])
     for height, wanted in ((2.0, 0.0), (0.1, 0.0), (-0.4, 0.4 + TOUCH_MM)):
-        off = cushion.find(samples_at(way * (ground + height)[:, None]), optical_axis(np.zeros(2)))
+        off, _ = off_limits(rest, samples_at(way * (ground + height)[:, None]), ahead, held=False)
         assert off == pytest.approx(wanted, abs=5e-3)
 
 
@@ -187,17 +195,43 @@ def test_points_move_up_straight_or_round_the_eyeball_or_away_from_it():
     np.testing.assert_array_equal(around, rest)
 
 
-@pytest.mark.parametrize("radius", [0.0, RADIUS])
-def test_samples_are_sums_of_points_by_tiles_of_eight(radius):
+def test_points_follow_the_two_samples_they_lie_beside():
     rng = np.random.default_rng(6)
-    points, eye = rng.normal(size=(4, 3)) + np.array([0.0, 3.0, 12.0]), np.array([1.0, 2.0, 3.0])
+    ids, beside, share = np.array([3, 1]), np.array([[0, 2], [1, 2]]), rng.random((2, 2))
+    rest, eye = rng.normal(size=(5, 3)) + np.array([0.0, 0.0, 12.0]), np.array([0.5, -0.5, 1.0])
+    for radius in (0.0, RADIUS):
+        slid, lifted = rng.normal(size=3), rng.normal(size=3)
+        wanted, found = rest.copy(), rest.copy()
+        table = np.zeros((3, 2))
+        table[beside, np.arange(2)[:, None]] = share
+        move_points(ids, slid, table, eye, radius, False, wanted)
+        follow_samples(ids, beside, share, slid, 3, eye, radius, found)
+        np.testing.assert_allclose(found, wanted)
+        if radius:
+            move_points(ids, lifted, table, eye, radius, True, wanted)
+            follow_samples(ids, beside, share, np.concatenate([slid, lifted]), 3, eye, radius, found := rest.copy())
+            np.testing.assert_allclose(found, wanted)
+
+
+@pytest.mark.parametrize("around", [False, True])
+def test_samples_are_sums_of_points_by_tiles_of_eight(around):
+    rng = np.random.default_rng(6)
+    local = rng.normal(size=(4, 3)) + np.array([-1.0, 1.0, 9.0])
     start, ids = np.array([0, 2, 3]), np.array([1, 3, 0])
     share = rng.random((3, 8)).astype(np.float32)
-    out = np.empty((11, 3))
-    place_samples(start, ids, share.ravel(), points, eye, radius, np.empty(24, np.float32), out)
-    local = points - eye
+    out, single = np.empty((11, 4)), np.empty((4, 3), np.float32)
+    place_samples(start, ids, share.ravel(), local, around, single, np.empty(24, np.float32), out)
     sums = np.concatenate([share[:2].T @ local[[1, 3]], np.outer(share[2], local[0])])[:11]
-    if radius:
-        x, y, z = sums.T
-        sums = np.column_stack([x, radius * np.arctan2(y, z), np.linalg.norm(sums, axis=1)])
-    np.testing.assert_allclose(out, sums, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(out[:, :3], sums, rtol=1e-4, atol=1e-4)
+    np.testing.assert_allclose(out[:, 3], np.linalg.norm(sums, axis=1) if around else sums[:, 2], rtol=1e-4, atol=1e-4)
+
+
+@pytest.mark.parametrize("radius", [0.0, RADIUS])
+def test_profiles_are_those_of_the_rows_that_can_touch(radius):
+    samples = samples_at(directions(200)[:40] * 13.0)
+    out = np.empty((2, 4, 3, 3))
+    trace_profiles(samples, 5, radius, out)
+    own = samples.reshape(2, 4, 5, 4)[:, :, :3]
+    np.testing.assert_array_equal(out[..., [0, 2]], own[..., [0, 3]])
+    arc = radius * np.arctan2(own[..., 1], own[..., 2]) if radius else own[..., 1]
+    np.testing.assert_allclose(out[..., 1], arc, atol=1e-6)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from surface.head.posing.kernels import (
     add_moves,
@@ -14,7 +13,6 @@ from surface.head.posing.kernels import (
     nearest_on_line,
     stitch_border,
     swing_jaw,
-    turn_head,
 )
 
 
@@ -76,19 +74,6 @@ def test_lids_go_to_their_distance_from_the_eye_by_their_hold(rng: np.random.Gen
     way = (before[ids[:2]] - eye[:2]) / length[:2, None]
     np.testing.assert_allclose((points[ids[:2]] - eye[:2]) / after[:2, None], way, atol=1e-12)
     np.testing.assert_array_equal(points[[1, 2, 4]], before[[1, 2, 4]])
-
-
-def test_vertices_turn_by_their_share_of_the_angle_about_the_pivot(rng: np.random.Generator) -> None:
-    vertices, normals = (rng.normal(size=(6, 3)).astype(np.float32) for _ in range(2))
-    share = np.array([0.0, 0.3, 1.0, 0.7, 1.0, 0.5], np.float32)
-    vector, pivot = np.array([0.3, -0.7, 0.2]), np.array([1.0, 2.0, -3.0])
-    out, out_normals = np.full((6, 3), 9.0, np.float32), np.full((6, 3), 9.0, np.float32)
-    matrix = Rotation.from_rotvec(vector).as_matrix()
-    turn_head(vertices, normals, share, matrix, vector, pivot, 1, 6, out, out_normals)
-    turns = Rotation.from_rotvec(share[:, None] * vector)
-    np.testing.assert_allclose(out[1:], (turns.apply(vertices - pivot) + pivot)[1:], atol=1e-5)
-    np.testing.assert_allclose(out_normals[1:], turns.apply(normals)[1:], atol=1e-5)
-    assert (out[0] == 9.0).all() and (out_normals[0] == 9.0).all()
 
 
 def test_the_nearest_place_of_a_polyline_open_and_closed() -> None:

@@ -1,0 +1,171 @@
+"""Compiled solution of one contact, or of one clearance, in one call: samples are placed, lids laid on the eyeball,
+sides parted, as often as it takes.
+
+Everything happens on a copy of the control points near the opening, relative to the eyeball's centre. The tuples that
+the kernels take are made by :mod:`.contact`:
+
+``sampling`` : near (p,) control points of the samples; start, ids, share as :func:`.contact.tiled` gives them, with
+    indices into ``near``; own (k,) indices into ``near`` of the points that are moved
+``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table of
+    :func:`.contact_kernels.lift_points`
+``work`` : local, found (p, 3) float64; single (p, 3), room (24,) float32; samples (s, 4), heights, lifts (s,) float64;
+    looked (3,) float64
+"""
+
+# mypy: disable-error-code="call-arg, var-annotated, no-untyped-def"
+# mypy: allow-untyped-defs
+from __future__ import annotations
+
+import numpy as np
+
+from surface.base.jit import kernel
+
+from .contact_kernels import (
+    find_heights,
+    find_lifts,
+    find_overlap,
+    lift_points,
+    move_points,
+    place_samples,
+    trace_profiles,
+)
+
+
+@kernel
+def gather_near(points, near, eye, local):
+    """Copy the points ``near (p,)`` of ``points (n, 3)``, relative to ``eye (3,)``, to ``local (p, 3)``."""
+    for k in range(len(near)):
+        for c in range(3):
+            local[k, c] = points[near[k], c] - eye[c]
+
+
+@kernel
+def is_known(local, axis, found, looked):
+    """Whether points and axis are those of the last answer; they are kept as those of the next one if not."""
+    same = True
+    for c in range(3):
+        same = same and looked[c] == axis[c]
+        looked[c] = axis[c]
+    for k in range(len(local)):
+        for c in range(3):
+            same = same and found[k, c] == local[k, c]
+            found[k, c] = local[k, c]
+    return same
+
+
+@kernel
+def lift_once(axis, tolerance, sampling, limits, work):
+    """Move points once where the placed samples are off the eyeball by more than ``tolerance``, mm; returns the largest
+    error."""
+    _, _, _, _, own = sampling
+    least, most, hold, radius, gain, table = limits
+    local, _, _, room, samples, heights, lifts, _ = work
+    find_heights(samples, radius, axis, heights)
+    error = find_lifts(heights, least, most, hold, gain, lifts)
+    if error > tolerance:
+        lift_points(own, lifts, samples, table, room, local)
+    return error
+
+
+@kernel
+def place_all(around, sampling, work):
+    """Place the samples."""
+    _, start, ids, share, _ = sampling
+    local, _, single, room, samples, _, _, _ = work
+    place_samples(start, ids, share, local, around, single, room, samples)
+
+
+@kernel
+def clear_eyeball(points, eye, axis, passes, tolerance, sampling, limits, work):
+    """Move control points (n, 3), at most ``passes`` times, until no sample is off the eyeball by more than
+    ``tolerance``, mm; returns the largest error that was found last."""
+    near, _, _, _, own = sampling
+    local, moved, error = work[0], False, 0.0
+    gather_near(points, near, eye, local)
+    for _ in range(passes):
+        place_all(True, sampling, work)
+        error = lift_once(axis, tolerance, sampling, limits, work)
+        if error <= tolerance:
+            break
+        moved = True
+    if moved:
+        put_back(points, near, own, eye, local)
+    return error
+
+
+@kernel
+def put_back(points, near, own, eye, local):
+    """Write the moved ones of the points near an opening back to ``points (n, 3)``."""
+    for k in range(len(own)):
+        for c in range(3):
+            points[near[own[k]], c] = eye[c] + local[own[k], c]
+
+
+@kernel
+def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work):
+    """One pass of :func:`part_sides` over the placed samples; returns the largest error that it found. Samples are
+    placed again after it."""
+    own, radius, local = sampling[4], limits[3], work[0]
+    _, profiles, overlap, _ = opening
+    error, around = 0.0, radius > 0.0
+    if around:
+        error = lift_once(axis, 0.0, sampling, limits, work)
+        if error > 0.0:
+            place_all(around, sampling, work)
+    trace_profiles(work[4], rows, radius, profiles)
+    find_overlap(profiles, press, soft, overlap)
+    if not around:
+        push += overlap.ravel()
+    deepest = overlap.max()
+    if deepest > 0.0:
+        move_points(own, overlap.ravel(), apart, np.zeros(3), radius, False, local)
+        place_all(around, sampling, work)
+    return max(error, deepest)
+
+
+@kernel
+def part_sides(points, eye, axis, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work):
+    """Correct control points (n, 3) at an opening until what is left is below ``tolerance``, mm, ``passes`` times at
+    most; lids are moved onto the eyeball first, which opens them. Returns how many passes there were, 0 where the last
+    answer still holds.
+
+    press, soft : as in :func:`.contact_kernels.find_overlap`; rows : samples of a column.
+    apart : (2 c, k) how far the moved points go up where the sides of a column part by 1.
+    opening : before, profiles (2, c, m, 3), overlap (2, c), and the answer (k, 3), which are overwritten.
+    push : what :meth:`.contact.ContactSolver.apply` returns.
+    """
+    near, _, _, _, own = sampling
+    local, found, looked, radius = work[0], work[1], work[7], limits[3]
+    before, profiles, _, answer = opening
+    gather_near(points, near, eye, local)
+    done = 0
+    if not is_known(local, axis, found, looked):
+        push[:] = 0.0
+        place_all(radius > 0.0, sampling, work)
+        trace_profiles(work[4], rows, radius, before)
+        error = tolerance
+        while done < passes and error >= tolerance:
+            error = part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work)
+            done += 1
+        if radius > 0.0:
+            trace_profiles(work[4], rows, radius, profiles)
+            tell_moves(before, profiles, push)
+        for k in range(len(own)):
+            for c in range(3):
+                answer[k, c] = eye[c] + local[own[k], c]
+    for k in range(len(own)):
+        points[near[own[k]]] = answer[k]
+    return done
+
+
+@kernel
+def tell_moves(before, after, push):
+    """Heights and depths of all samples of profiles ``after (2, c, m, 3)`` less those ``before``: ``push (4 c m,)``."""
+    _, columns, rows, _ = before.shape
+    at = 0
+    for kind in range(1, 3):
+        for side in range(2):
+            for k in range(columns):
+                for j in range(rows):
+                    push[at] = after[side, k, j, kind] - before[side, k, j, kind]
+                    at += 1
