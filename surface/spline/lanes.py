@@ -176,3 +176,35 @@ def root(context, builder, kinds, args):
 def splat(context, builder, kinds, args):
     """One number in every lane."""
     return _splat(builder, args[0])
+
+
+@_operation(lanes, lanes, None, types.intp, lanes)
+def fma_at(context, builder, kinds, args):
+    """``a * array[index] + c`` as :func:`fma`; the index counts single numbers and is not checked."""
+    data = context.make_array(kinds[1])(context, builder, args[1]).data
+    product = builder.fmul(args[0], _splat(builder, builder.load(builder.gep(data, [args[2]]))), flags=FLAGS)
+    return builder.fadd(product, args[3], flags=FLAGS)
+
+
+@_operation(types.intp, None, types.intp)
+def item(context, builder, kinds, args):
+    """The integer ``array[index]``; the index must not be negative, which is not checked."""
+    found = builder.load(builder.gep(context.make_array(kinds[0])(context, builder, args[0]).data, [args[1]]))
+    if found.type.width == types.intp.bitwidth:
+        return found
+    widen = builder.sext if kinds[0].dtype.signed else builder.zext
+    return widen(found, ir.IntType(types.intp.bitwidth))
+
+
+@_operation(types.void, None, types.intp, None, types.intp, None, types.intp)
+def store_difference(context, builder, kinds, args):
+    """``out[k : k + 4] = a[i : i + 4] - b[j : j + 4]`` for ``out, k, a, i, b, j``; a and b are float64, out float32."""
+    ends = [
+        builder.gep(context.make_array(kinds[at])(context, builder, args[at]).data, [args[at + 1]]) for at in (0, 2, 4)
+    ]
+    wide = ir.VectorType(ir.DoubleType(), 4)
+    a, b = (builder.load(builder.bitcast(end, wide.as_pointer()), align=8) for end in ends[1:])
+    narrow = ir.VectorType(ir.FloatType(), 4)
+    single = builder.fptrunc(builder.fsub(a, b), narrow)
+    builder.store(single, builder.bitcast(ends[0], narrow.as_pointer()), align=4)
+    return context.get_dummy_value()
