@@ -181,13 +181,14 @@ def load_tile(tile, size, sign, inv_w, dw, numerators):
 
 @inlined
 def finish_cell(
-    first, last, tile, ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, order_at, order, touched, scratch
+    first, last, tile, ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, order_at, order, every, touched,
+    scratch,
 ):  # fmt: skip
-    """Write the vertices and normals of the ``touched`` tiles of one cell from its stored numerators."""
+    """Write the vertices and normals of ``every`` tile, or of those ``touched``, of one cell from its numerators."""
     px, py, pz = splat(ox), splat(oy), splat(oz)
     size = 72 if dw.shape[0] > 0 else 24
     for vertex in range(first, last, 8):
-        if touched[tile]:
+        if every or touched[tile] != 0:
             x, y, z, nx, ny, nz = load_tile(tile, size, sign, inv_w, dw, numerators)
             x, y, z = add(x, px), add(y, py), add(z, pz)
             write_lanes(vertices, first, last, vertex, order_at, order, x, y, z, scratch)

@@ -15,7 +15,7 @@ from surface.base.arrays import Bools
 from surface.base.jit import kernel
 from surface.mesh.mesh import Mesh
 
-PER_POINT = 60.0  # cost of a point in a cell's list, in weights (measured; that of the mesh's cells is 10)
+PER_POINT = 45.0  # cost of a point in a cell's list, in weights (measured; that of the mesh's cells is 10)
 MOST = 256  # vertices of a joined cell
 
 

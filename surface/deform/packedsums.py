@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from surface.base.jit import inlined
-from surface.spline.lanes import add, fma, fma_at, item, load, prefetch, store, store3, zero
+from surface.spline.lanes import add, fma, fma_at, item, load, prefetch, store, store3, store3_at, zero
 
 AHEAD = 1024  # weights that are prefetched before they are needed
 
@@ -57,12 +57,15 @@ def write_lanes(out, first, last, vertex, at, order, x, y, z, scratch):
     """
     if at < 0 and vertex + 8 <= last:
         store3(out, 3 * vertex, x, y, z)
+    elif vertex + 8 <= last:
+        store3_at(out, 3 * first, order, at + vertex - first, x, y, z)
     else:
         store3(scratch, 0, x, y, z)
-        for j in range(min(8, last - vertex)):
-            place = 3 * (first + item(order, at + vertex - first + j)) if at >= 0 else 3 * (vertex + j)
-            for k in range(3):
-                out[place + k] = scratch[3 * j + k]
+        for j in range(last - vertex):
+            place = 3 * (vertex + j)
+            if at >= 0:
+                place = 3 * (first + item(order, at + vertex - first + j))
+            out[place], out[place + 1], out[place + 2] = scratch[3 * j], scratch[3 * j + 1], scratch[3 * j + 2]
 
 
 @inlined

@@ -183,7 +183,6 @@ def update_cells(arrays, count, limit, bias, sign):
                     packed, packed_slope, places, touched, numerators,
                 )  # fmt: skip
             elif differences[c] >= 0:
-                touched[tile_start[c] : tile_start[c + 1]] = 1
                 row = rows_at[c] + point_row[e] if rows_at[c] >= 0 else -1
                 add_row(
                     tile_start[c], tile_start[c + 1], at[c] + 8 * point_row[e], room[c] * 8, row, picks_at[c], dx, dy,
@@ -193,6 +192,7 @@ def update_cells(arrays, count, limit, bias, sign):
         c = affected[q]
         if differences[c] == NOT_STORED:
             continue
+        every = packed_at[c] < 0 or differences[c] == STORE
         if differences[c] == STORE:
             gather(points, ids, ids_at[c], rows[c], origin, c, local)
             store_numerators(
@@ -200,14 +200,13 @@ def update_cells(arrays, count, limit, bias, sign):
                 slope, factor_u, factor_v, factors, picks, packed_at[c], tile_entry, entry_row, packed, packed_slope,
                 local, starts, scratch, numerators,
             )  # fmt: skip
-            touched[tile_start[c] : tile_start[c + 1]] = 1
             differences[c] = 0
             span[c], drift[c] = largest(local, rows[c]), 0.0
         ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
         first, last = cell_start[c], cell_start[c + 1]
         finish_cell(
             first, last, tile_start[c], ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, order_at[c], order,
-            touched, scratch,
+            every, touched, scratch,
         )  # fmt: skip
     compute_cells(arrays, recomputed, np.int64(0), again, sign, local, scratch)
     return total

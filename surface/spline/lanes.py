@@ -208,3 +208,19 @@ def store_difference(context, builder, kinds, args):
     single = builder.fptrunc(builder.fsub(a, b), narrow)
     builder.store(single, builder.bitcast(ends[0], narrow.as_pointer()), align=4)
     return context.get_dummy_value()
+
+
+@_operation(types.void, None, types.intp, None, types.intp, lanes, lanes, lanes)
+def store3_at(context, builder, kinds, args):
+    """``out[index + 3 * order[first + k] : ][: 3] = x[k], y[k], z[k]`` for ``out, index, order, first, x, y, z``; the
+    order is uint16."""
+    out = context.make_array(kinds[0])(context, builder, args[0]).data
+    order = context.make_array(kinds[2])(context, builder, args[2]).data
+    wide = ir.IntType(types.intp.bitwidth)
+    for k in range(LANES):
+        place = builder.zext(builder.load(builder.gep(order, [builder.add(args[3], wide(k))])), wide)
+        start = builder.add(args[1], builder.mul(place, wide(3)))
+        for c in range(3):
+            number = builder.extract_element(args[4 + c], ir.Constant(INDEX, k))
+            builder.store(number, builder.gep(out, [builder.add(start, wide(c))]))
+    return context.get_dummy_value()
