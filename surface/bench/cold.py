@@ -14,6 +14,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
+from surface.deform.deformation import Deformation
 from surface.deform.lists import build_lists
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
@@ -29,6 +30,7 @@ Call = Callable[[], object]
 Body = tuple[DCPSurface, Mesh]
 READ, FULL = "one read of the plain weights", "all positions"
 REACH = "<= 2.0"
+ZEROS = "weights that are zero"
 RATIOS = (
     (FULL, (1, 0), READ, ""),
     (f"{FULL} and normals", (2, 1), FULL, ""),
@@ -81,7 +83,8 @@ def cold_rows(
     name: str, bodies: Sequence[Body], seconds: float, reach: str = REACH, flushed: int = FLUSHED_BYTES,
     report: Report = no_report,
 ) -> list[Measure]:  # fmt: skip
-    """All positions of surfaces together against a read of their plain weights, and two peers against all positions.
+    """All positions of surfaces together against a read of their plain weights, and two peers against all positions;
+    what the weights take up.
 
     reach : the bound for the first of these.
     """
@@ -104,7 +107,18 @@ def cold_rows(
         )
     nonzero = sum(4 * int(np.count_nonzero(w)) for w in weights)
     size = sum(d.nbytes for d in plain) / nonzero
-    return [*rows, Measure(f"{name}: memory of weights and lists", 0.0, size, "the weights that are not zero")]
+    return [
+        *rows,
+        Measure(f"{name}: memory of weights and lists", 0.0, size, "the weights that are not zero"),
+        Measure(f"{name}: {ZEROS}", 0.0, zeros(plain), "all that are kept one by one", "<= 0.2"),
+    ]
+
+
+def zeros(deformations: Sequence[Deformation[DCPSurface]]) -> float:
+    """The part of the weights that are kept one by one, not as factors, that is zero; 0 where there are none."""
+    kept = [table for d in deformations for table in (d.lists.value[: d.lists.used], d.storage.packed.packed)]
+    total = sum(len(table) for table in kept)
+    return 1.0 - sum(int(np.count_nonzero(table)) for table in kept) / total if total else 0.0
 
 
 def _each(calls: Sequence[Call]) -> Call:

@@ -12,13 +12,25 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.jit import inlined, kernel
-from surface.spline.lanes import add, div, fma, load, mul, prefetch, root, splat, store, store3, store_offset, sub, zero
+from surface.spline.lanes import (
+    add,
+    div,
+    fma,
+    item,
+    load,
+    mul,
+    prefetch,
+    root,
+    splat,
+    store,
+    store3,
+    store_difference,
+    sub,
+    zero,
+)
 
 from .groupsums import HEAD, STEP, join_all, join_values, sum_groups, wide
-
-LEAST_SUM = 1e-36  # of the weights at a vertex: float32 has fewer digits for smaller numbers
-AHEAD = 1024  # weights that are prefetched before they are needed
-
+from .packedsums import AHEAD, sum_all_packed, sum_packed, write_lanes
 
 NAMES = (
     "cell_start", "tile_start", "rows", "room", "at", "ids_at", "ids", "value", "slope",
@@ -27,9 +39,11 @@ NAMES = (
     "ranges", "hits", "affected", "recomputed", "moved_ids", "delta", "local", "scratch",
     "pull", "span", "drift", "extent",
     "rows_at", "picks_at", "factor_u", "factor_v", "factors", "picks",
+    "packed_at", "tile_entry", "entry_row", "packed", "packed_slope", "places_at", "places", "order_at", "order",
+    "touched",
 )  # fmt: skip
 """The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`,
-then of :class:`.factors.Factors`.
+then of :class:`.factors.Factors` and :class:`.packing.Packed`; then which tiles an update touches.
 
 Kernels unpack that tuple once: each access of an element costs a reference count.
 """
@@ -37,10 +51,12 @@ Kernels unpack that tuple once: each access of an element costs a reference coun
 
 @inlined
 def gather(points, ids, first, rows, origin, c, local):
-    """Copy a cell's control points, relative to its origin, into ``local (>= rows, 4)`` float32, whose last column gets
-    what lies behind them: ``points`` and ``origin`` are followed by one number more."""
+    """Copy a cell's control points, relative to its origin, into ``local (> rows, 3)`` float32.
+
+    Four numbers are copied at once; the fourth is overwritten by the next point, or lies in the last row.
+    """
     for k in range(rows):
-        store_offset(points, 3 * ids[first + k], origin, 3 * c, local, 4 * k)
+        store_difference(local, 3 * k, points, 3 * item(ids, first + k), origin, 3 * c)
 
 
 @inlined
@@ -93,14 +109,6 @@ def unit_cross(ax, ay, az, bx, by, bz, sign):
 
 
 @inlined
-def write_last(out, vertex, last, x, y, z, scratch):
-    """Write the last vectors of a cell, fewer than a tile has, to ``out (m * 3,)``."""
-    store3(scratch, 0, x, y, z)
-    for j in range(3 * (last - vertex)):
-        out[3 * vertex + j] = scratch[j]
-
-
-@inlined
 def positions_of(tile, x, y, z, inv_w):
     """Positions of one tile relative to the cell's origin, from their numerators."""
     w = load(inv_w, 8 * tile)
@@ -118,18 +126,23 @@ def normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw):
 
 @inlined
 def store_numerators(
-    first_tile, end_tile, rows, place, step, row, head, slopes, value, slope, factor_u, factor_v, factors, picks, local,
-    starts, scratch, numerators,
+    first_tile, end_tile, rows, place, step, row, head, slopes, value, slope, factor_u, factor_v, factors, picks,
+    pack_at, tile_entry, entry_row, packed, packed_slope, local, starts, scratch, numerators,
 ):  # fmt: skip
     """Store the numerators of one cell, whose points are in ``local``, for later differences."""
     base, at, groups = first_tile * (72 if slopes else 24), head + HEAD, 0
     wide_u, wide_v = wide(row, head, picks)
     if row >= 0:
         groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, slopes, local, starts, scratch)
-    for _ in range(first_tile, end_tile):
+    for tile in range(first_tile, end_tile):
+        entries = pack_at + tile - first_tile
         if slopes:
             if row >= 0:
                 x, y, z, ax, ay, az, bx, by, bz = join_all(groups, wide_u, wide_v, at, factors, picks, starts, scratch)
+            elif pack_at >= 0:
+                x, y, z, ax, ay, az, bx, by, bz = sum_all_packed(
+                    packed, packed_slope, entry_row, tile_entry[entries], tile_entry[entries + 1], local
+                )
             else:
                 x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, place, rows, local)
             store(numerators, base + 24, ax)
@@ -140,6 +153,8 @@ def store_numerators(
             store(numerators, base + 64, bz)
         elif row >= 0:
             x, y, z = join_values(groups, wide_u, at, factors, picks, starts, scratch)
+        elif pack_at >= 0:
+            x, y, z = sum_packed(packed, entry_row, tile_entry[entries], tile_entry[entries + 1], local)
         else:
             x, y, z = sum_values(value, place, rows, local)
         store(numerators, base, x)
@@ -165,34 +180,26 @@ def load_tile(tile, size, sign, inv_w, dw, numerators):
 
 
 @inlined
-def finish_cell(first, last, tile, ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, scratch):
-    """Write the vertices and normals of one cell from its stored numerators."""
+def finish_cell(
+    first, last, tile, ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, order_at, order, every, touched,
+    scratch,
+):  # fmt: skip
+    """Write the vertices and normals of ``every`` tile, or of those ``touched``, of one cell from its numerators."""
     px, py, pz = splat(ox), splat(oy), splat(oz)
-    size, full = 72 if dw.shape[0] > 0 else 24, last - (last - first) % 8
-    for vertex in range(first, full, 8):
-        x, y, z, nx, ny, nz = load_tile(tile, size, sign, inv_w, dw, numerators)
-        store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
-        if size == 72:
-            store3(normals, 3 * vertex, nx, ny, nz)
+    size = 72 if dw.shape[0] > 0 else 24
+    for vertex in range(first, last, 8):
+        if every or touched[tile] != 0:
+            x, y, z, nx, ny, nz = load_tile(tile, size, sign, inv_w, dw, numerators)
+            x, y, z = add(x, px), add(y, py), add(z, pz)
+            write_lanes(vertices, first, last, vertex, order_at, order, x, y, z, scratch)
+            if size == 72:
+                write_lanes(normals, first, last, vertex, order_at, order, nx, ny, nz, scratch)
+        touched[tile] = 0
         tile += 1
-    if full < last:
-        x, y, z, nx, ny, nz = load_tile(tile, size, sign, inv_w, dw, numerators)
-        write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
-        if size == 72:
-            write_last(normals, full, last, nx, ny, nz, scratch)
 
 
 @inlined
-def write_tile(out, vertex, last, x, y, z, scratch):
-    """Write the vectors of a tile that begins at ``vertex`` of a cell that ends before ``last``."""
-    if vertex + 8 <= last:
-        store3(out, 3 * vertex, x, y, z)
-    else:
-        write_last(out, vertex, last, x, y, z, scratch)
-
-
-@inlined
-def write_plain(first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, scratch, vertices):
+def write_plain(first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, order, scratch, vertices):
     """Positions of a cell with plain weights; the loop over whole tiles is without branches."""
     full = last - (last - first) % 8
     for vertex in range(first, full, 8):
@@ -204,12 +211,12 @@ def write_plain(first, last, tile, place, step, rows, px, py, pz, value, inv_w, 
     if full < last:
         x, y, z = sum_values(value, place, rows, local)
         x, y, z = positions_of(tile, x, y, z, inv_w)
-        write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
+        write_lanes(vertices, first, last, full, -1, order, add(x, px), add(y, py), add(z, pz), scratch)
 
 
 @inlined
 def write_joined(
-    first, last, tile, groups, wide_u, pick_at, px, py, pz, factors, picks, starts, scratch, inv_w, vertices
+    first, last, tile, groups, wide_u, pick_at, px, py, pz, factors, picks, starts, order, scratch, inv_w, vertices
 ):  # fmt: skip
     """Positions of a cell with factors, whose groups have been summed."""
     full = last - (last - first) % 8
@@ -222,7 +229,25 @@ def write_joined(
     if full < last:
         x, y, z = join_values(groups, wide_u, pick_at, factors, picks, starts, scratch)
         x, y, z = positions_of(tile, x, y, z, inv_w)
-        write_last(vertices, full, last, add(x, px), add(y, py), add(z, pz), scratch)
+        write_lanes(vertices, first, last, full, -1, order, add(x, px), add(y, py), add(z, pz), scratch)
+
+
+@inlined
+def write_packed(
+    first, last, tile, entries, px, py, pz, packed, entry_row, tile_entry, inv_w, local, order_at, order, scratch,
+    vertices,
+):  # fmt: skip
+    """Positions of a packed cell, whose tiles start at ``entries`` in ``tile_entry``."""
+    e = tile_entry[entries]
+    for vertex in range(first, last, 8):
+        entries += 1
+        end = tile_entry[entries]
+        x, y, z = sum_packed(packed, entry_row, e, end, local)
+        x, y, z = positions_of(tile, x, y, z, inv_w)
+        x, y, z = add(x, px), add(y, py), add(z, pz)
+        write_lanes(vertices, first, last, vertex, order_at, order, x, y, z, scratch)
+        tile += 1
+        e = end
 
 
 @kernel
@@ -230,100 +255,57 @@ def compute_cells(arrays, cells, begin, end, sign, local, scratch):
     """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored."""
     cell_start, tile_start, all_rows, room, at, ids_at, ids, value, slope = arrays[:9]
     points, origin, inv_w, dw, _, differences, vertices, normals = arrays[13:21]
-    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:]
+    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]
+    packed_at, tile_entry, entry_row, packed, packed_slope, _, _, order_at, order = arrays[39:48]
     starts = np.empty(local.shape[0], np.int32)
     for q in range(begin, end):
         c = cells[q]
         differences[c] = -1
-        rows, first, last = all_rows[c], cell_start[c], cell_start[c + 1]
+        rows, first, last, pack_at = all_rows[c], cell_start[c], cell_start[c + 1], packed_at[c]
         gather(points, ids, ids_at[c], rows, origin, c, local)
         px, py, pz = splat(np.float32(origin[c, 0])), splat(np.float32(origin[c, 1])), splat(np.float32(origin[c, 2]))
         place, step, row, pick_at, tile = at[c], room[c] * 8, rows_at[c], picks_at[c] + HEAD, tile_start[c]
         wide_u, wide_v = wide(row, picks_at[c], picks)
-        if dw.shape[0] == 0 and row < 0:
-            write_plain(
-                first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, scratch, vertices
+        groups = 0
+        if row >= 0:
+            groups = sum_groups(
+                factors, factor_u, factor_v, row, rows, wide_u, dw.shape[0] > 0, local, starts, scratch
+            )  # fmt: skip
+        if dw.shape[0] == 0 and row >= 0:
+            write_joined(
+                first, last, tile, groups, wide_u, pick_at, px, py, pz, factors, picks, starts, order, scratch, inv_w,
+                vertices,
+            )  # fmt: skip
+        elif dw.shape[0] == 0 and pack_at >= 0:
+            write_packed(
+                first, last, tile, pack_at, px, py, pz, packed, entry_row, tile_entry, inv_w, local, order_at[c], order,
+                scratch, vertices,
             )  # fmt: skip
         elif dw.shape[0] == 0:
-            groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, False, local, starts, scratch)
-            write_joined(
-                first, last, tile, groups, wide_u, pick_at, px, py, pz, factors, picks, starts, scratch, inv_w, vertices
+            write_plain(
+                first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, order, scratch, vertices
             )  # fmt: skip
-        elif row < 0:
-            for vertex in range(first, last, 8):
-                x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, place, rows, local)
-                x, y, z = positions_of(tile, x, y, z, inv_w)
-                nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
-                write_tile(vertices, vertex, last, add(x, px), add(y, py), add(z, pz), scratch)
-                write_tile(normals, vertex, last, nx, ny, nz, scratch)
-                place += step
-                tile += 1
         else:
-            groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, True, local, starts, scratch)
             for vertex in range(first, last, 8):
-                x, y, z, ax, ay, az, bx, by, bz = join_all(
-                    groups, wide_u, wide_v, pick_at, factors, picks, starts, scratch
-                )
+                if row >= 0:
+                    x, y, z, ax, ay, az, bx, by, bz = join_all(
+                        groups, wide_u, wide_v, pick_at, factors, picks, starts, scratch
+                    )
+                elif pack_at >= 0:
+                    x, y, z, ax, ay, az, bx, by, bz = sum_all_packed(
+                        packed, packed_slope, entry_row, tile_entry[pack_at], tile_entry[pack_at + 1], local
+                    )
+                    pack_at += 1
+                else:
+                    x, y, z, ax, ay, az, bx, by, bz = sum_all(value, slope, place, rows, local)
                 x, y, z = positions_of(tile, x, y, z, inv_w)
                 nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
-                write_tile(vertices, vertex, last, add(x, px), add(y, py), add(z, pz), scratch)
-                write_tile(normals, vertex, last, nx, ny, nz, scratch)
+                x, y, z = add(x, px), add(y, py), add(z, pz)
+                write_lanes(vertices, first, last, vertex, order_at[c], order, x, y, z, scratch)
+                write_lanes(normals, first, last, vertex, order_at[c], order, nx, ny, nz, scratch)
+                place += step
                 pick_at += STEP
                 tile += 1
-
-
-@kernel
-def denominators(arrays, cells):
-    """Sum the weights of the given cells."""
-    cell_start, tile_start, rows, room, at, _, _, value, slope = arrays[:9]
-    inv_w, dw = arrays[15:17]
-    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:]
-    slopes = dw.shape[0] > 0
-    for q in range(cells.shape[0]):
-        c = cells[q]
-        wide_u, wide_v = wide(rows_at[c], picks_at[c], picks)
-        for tile in range(tile_start[c], tile_start[c + 1]):
-            t = tile - tile_start[c]
-            pick_at = picks_at[c] + HEAD + STEP * t
-            for j in range(8):
-                w, wu, wv = 0.0, 0.0, 0.0
-                for k in range(rows[c]):
-                    if rows_at[c] >= 0:
-                        at_u = factor_u[rows_at[c] + k] + picks[pick_at + 16] + picks[pick_at + j]
-                        at_v = factor_v[rows_at[c] + k] + picks[pick_at + 17] + picks[pick_at + 8 + j]
-                        w += factors[at_u] * factors[at_v]
-                        if slopes:
-                            wu += factors[at_u + wide_u] * factors[at_v]
-                            wv += factors[at_u] * factors[at_v + wide_v]
-                    else:
-                        place = at[c] + (t * room[c] + k) * 8
-                        w += value[place + j]
-                        if slopes:
-                            wu += slope[2 * place + j]
-                            wv += slope[2 * place + 8 + j]
-                if cell_start[c] + 8 * t + j >= cell_start[c + 1]:
-                    w = 1.0  # lanes that fill up the last tile
-                inv_w[8 * tile + j] = 1.0 / w if w >= LEAST_SUM else np.inf
-                if slopes:
-                    dw[16 * tile + j], dw[16 * tile + 8 + j] = wu, wv
-
-
-@kernel
-def unusable(cells, cell_start, tile_start, inv_w, dw):
-    """The first vertex of ``cells`` whose weights add up to less than ``LEAST_SUM`` or to more than float32 has, or
-    whose derivative weights do; -1 if there is none."""
-    for q in range(cells.shape[0]):
-        c = cells[q]
-        for vertex in range(cell_start[c], cell_start[c + 1]):
-            t, j = (vertex - cell_start[c]) // 8, (vertex - cell_start[c]) % 8
-            tile = tile_start[c] + t
-            total = np.float64(inv_w[8 * tile + j])
-            usable = total > 0.0
-            if dw.shape[0] > 0:
-                total += abs(dw[16 * tile + j]) + abs(dw[16 * tile + 8 + j])
-            if not (usable and total < np.inf):
-                return vertex
-    return -1
 
 
 @kernel

@@ -17,7 +17,8 @@ from numba.extending import intrinsic
 
 from surface.base.jit import inlined, kernel
 
-from .apply import NAMES, compute_cells, denominators
+from .apply import NAMES, compute_cells
+from .denominators import denominators
 from .updates import move_points
 
 
@@ -63,11 +64,15 @@ def _arrays(table):
         _flat(table, 17, np.float32), _flat(table, 18, np.int64), _flat(table, 19, np.float32),
         _flat(table, 20, np.float32), _rows(table, 21, 2, np.int64), _flat(table, 22, np.int64),
         _flat(table, 23, np.int32), _flat(table, 24, np.int32), _flat(table, 25, np.int64),
-        _rows(table, 26, 3, np.float64), _rows(table, 27, 4, np.float32), _flat(table, 28, np.float32),
+        _rows(table, 26, 3, np.float64), _rows(table, 27, 3, np.float32), _flat(table, 28, np.float32),
         _flat(table, 29, np.float64), _flat(table, 30, np.float64), _flat(table, 31, np.float64),
         _flat(table, 32, np.float64),
         _flat(table, 33, np.int64), _flat(table, 34, np.int64), _flat(table, 35, np.int32), _flat(table, 36, np.int32),
         _flat(table, 37, np.float32), _flat(table, 38, np.int32),
+        _flat(table, 39, np.int64), _flat(table, 40, np.int64), _flat(table, 41, np.uint16),
+        _flat(table, 42, np.float32), _flat(table, 43, np.float32), _flat(table, 44, np.int64),
+        _flat(table, 45, np.uint16), _flat(table, 46, np.int64), _flat(table, 47, np.uint16),
+        _flat(table, 48, np.uint8),
     )  # fmt: skip
 
 
@@ -85,5 +90,5 @@ def compute_cells_at(table, cells, begin, end, sign, local, scratch):
 
 @kernel
 def denominators_at(table, cells):
-    """:func:`surface.deform.apply.denominators` for the arrays of a table."""
+    """:func:`surface.deform.denominators.denominators` for the arrays of a table."""
     denominators(_arrays(table), cells)

@@ -26,8 +26,10 @@ from surface.spline.controlpoints import ControlPoints
 
 from . import apply, edits
 from .binding import address_table, compute_cells_at, denominators_at, move_points_at
-from .factors import factorize
+from .denominators import unusable
 from .lists import LANES, Basis, build_lists
+from .merging import merged
+from .storage import compress
 from .updates import NOT_STORED, REFUSED
 
 Table = TypeVar("Table", bound=ControlPoints)
@@ -53,8 +55,8 @@ class Deformation(Generic[Table]):
     Attributes
     ----------
     vertices, normals : (m, 3) float32, current, read-only; (0, 3) without normals
-    mesh, basis : the mesh; knots, degrees and weights of the control points
-    lists, factors : their weights by cell, where they are kept one by one, and where as products
+    mesh, basis : the mesh, with larger cells where they are better; knots, degrees and weights of the control points
+    lists, storage : their weights by cell, where these are kept as blocks, and where they are packed or products
 
     ``ValueError`` for no thread at all, a mesh of a surface with other control points or other knots, or weights so
     small, or derivatives so large, at a vertex that 32-bit numbers cannot hold them.
@@ -72,17 +74,17 @@ class Deformation(Generic[Table]):
             raise ValueError(f"mesh: was made from another surface: this one has {surface.n} points")
         if mesh.structure and mesh.structure != surface.structure:
             raise ValueError("mesh: was made from another surface, with other knots: tessellate this one")
-        self.mesh, self.basis = mesh, Basis.of(surface)
-        self.lists = build_lists(surface, mesh, normals, progress)
+        self.mesh, self.basis = merged(mesh), Basis.of(surface)
+        self.lists = build_lists(surface, self.mesh, normals, progress)
         self._work = self.lists.rows * np.diff(self.lists.tile_start) * LANES  # weights by cell, however they are kept
-        self.factors = factorize(self.basis, self.lists, mesh)
+        self.storage = compress(self.basis, self.lists, self.mesh)
         self._sign, self._threads = np.float32(-1 if mesh.flip else 1), threads
         self._most = int(MOST_MOVED * len(surface.arrays()[4]))
         self._pool: ThreadPoolExecutor | None = None  # started when first used
         self._make = partial(type(surface).from_padded, closed_u=surface.closed[0], closed_v=surface.closed[1])
-        self._arrays = _work_arrays(mesh, surface.arrays()[4], int(self.lists.tile_start[-1]), normals)
+        self._arrays = _work_arrays(self.mesh, surface.arrays()[4], int(self.lists.tile_start[-1]), normals)
         self._points, self._ranges, self._count = self._arrays["points"], self._arrays["ranges"], 0
-        self._all, self._cells = np.arange(surface.n), np.arange(len(mesh.cell_start) - 1, dtype=np.int32)
+        self._all, self._cells = np.arange(surface.n), np.arange(len(self.mesh.cell_start) - 1, dtype=np.int32)
         self.vertices, self.normals = _view(self._arrays["vertices"]), _view(self._arrays["normals"])
         self._bind()
         self._sum_weights(np.arange(len(self._cells)))
@@ -111,7 +113,7 @@ class Deformation(Generic[Table]):
     @property
     def nbytes(self) -> int:
         """Bytes of weights and lists."""
-        return self.lists.nbytes + self.factors.nbytes
+        return self.lists.nbytes + self.storage.nbytes
 
     def move(self, ids: ArrayLike, delta: ArrayLike) -> None:
         """Move points by ``delta (k, 3)`` (or one (3,) for all); an id that is given twice moves twice.
@@ -150,7 +152,7 @@ class Deformation(Generic[Table]):
 
     def _change_weights(self, which: Ints, weights: Floats) -> Ints:
         """Give points other weights; returns the cells that changed. ``ValueError`` where a vertex has none then."""
-        cells = edits.change_weights(self.basis, self.lists, self.factors, self.mesh, which, weights)
+        cells = edits.change_weights(self.basis, self.lists, self.storage, self.mesh, which, weights)
         self._bind()
         self._sum_weights(cells)
         self._check_weights("weights", cells)
@@ -177,7 +179,7 @@ class Deformation(Generic[Table]):
     def _change_knots(self, index: int, knots: list[Floats], degrees: list[int]) -> Ints:
         """Give a point other knots; returns the cells that changed, whose weights are summed."""
         try:
-            cells = edits.change_knots(self.basis, self.lists, self.factors, self.mesh, index, knots, degrees)
+            cells = edits.change_knots(self.basis, self.lists, self.storage, self.mesh, index, knots, degrees)
         finally:
             self._bind()
         self._sum_weights(cells)
@@ -232,7 +234,12 @@ class Deformation(Generic[Table]):
             raise ValueError(f"{name}[{bad}]: must be {wanted}, got {target[bad].tolist()}")
 
     def _recentre(self) -> None:
-        """Compute everything again, from origins in the middle of the cells as they are now."""
+        """Compute everything again, from origins in the middle of the cells as they are now.
+
+        To find these, origins are one of the cell's points first: the old ones may be so far away that all digits of
+        the vertices are lost.
+        """
+        self._arrays["origin"][:] = self._points[self.lists.ids[self.lists.ids_at]]
         self.refresh()
         self._arrays["origin"][:] = _middles(self.vertices, self.mesh.cell_start)
         self.refresh()
@@ -240,9 +247,9 @@ class Deformation(Generic[Table]):
     def _bind(self) -> None:
         """Make room for the longest list and the sums of groups, and take the addresses of all arrays, which may have
         been replaced."""
-        self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)), 4), dtype=np.float32)
-        self._arrays["scratch"] = np.zeros(self.factors.sums, dtype=np.float32)
-        self._addresses = address_table(vars(self.lists) | self._arrays | vars(self.factors))
+        self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)) + 1, 3), dtype=np.float32)
+        self._arrays["scratch"] = np.zeros(self.storage.factors.sums, dtype=np.float32)
+        self._addresses = address_table(vars(self.lists) | self._arrays | self.storage.arrays)
 
     def _sum_weights(self, cells: Ints) -> None:
         denominators_at(self._addresses, cells)
@@ -250,7 +257,8 @@ class Deformation(Generic[Table]):
     def _check_weights(self, name: str, cells: Ints) -> None:
         """``ValueError`` for the first vertex of ``cells`` whose weights 32-bit numbers cannot hold."""
         arrays = self._arrays
-        bad = apply.unusable(cells, self.lists.cell_start, self.lists.tile_start, arrays["inv_w"], arrays["dw"])
+        order = self.storage.packed.order_at, self.storage.packed.order
+        bad = unusable(cells, self.lists.cell_start, self.lists.tile_start, arrays["inv_w"], arrays["dw"], *order)
         if bad >= 0:
             u, v = self.mesh.uv[bad]
             raise ValueError(
@@ -303,9 +311,10 @@ def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[
     m, cells, n = len(mesh.vertices), len(mesh.cell_start) - 1, len(points)
     single, cell = partial(np.zeros, dtype=np.float32), partial(np.zeros, cells)
     return {
-        "origin": _followed(_middles(mesh.vertices, mesh.cell_start)), "points": _followed(points),
-        "inv_w": single(8 * tiles), "dw": single(16 * tiles * normals),
-        "numerators": single((72 if normals else 24) * tiles), "differences": np.full(cells, NOT_STORED),
+        "origin": _with_room(_middles(mesh.vertices, mesh.cell_start)), "points": _with_room(points),
+        "inv_w": single(8 * tiles),
+        "dw": single(16 * tiles * normals), "numerators": single((72 if normals else 24) * tiles),
+        "differences": np.full(cells, NOT_STORED), "touched": np.zeros(tiles, np.uint8),
         "vertices": single(3 * m), "normals": single(3 * m * normals), "ranges": np.zeros((max(cells, 1), 2), np.int64),
         "hits": cell(dtype=np.int64), "affected": cell(dtype=np.int32), "recomputed": cell(dtype=np.int32),
         "moved_ids": np.zeros(n, np.int64), "delta": np.zeros((n, 3)),
@@ -321,11 +330,9 @@ def _middles(vertices: np.ndarray, cell_start: Ints) -> Floats:
     return middles
 
 
-def _followed(rows: Floats) -> Floats:
-    """A copy of rows (k, 3) that is followed by a row of zeros, since kernels read one number beyond each row."""
-    room = np.zeros((len(rows) + 1, 3))
-    room[:-1] = rows
-    return room[:-1]
+def _with_room(rows: Floats) -> Floats:
+    """A copy of ``rows (n, 3)``, with room behind it: kernels read four numbers of a row."""
+    return np.concatenate([rows, np.zeros((1, 3))])[: len(rows)]
 
 
 def _rows(rows: ArrayLike, name: str) -> Floats:

@@ -11,12 +11,12 @@ from surface.mesh.mesh import Mesh
 from surface.spline.basis import blending
 from surface.spline.kernels import points_in
 
-from .factors import Factors, expand, remember
 from .lists import LANES, Basis, Lists, cells_by_point, grow, write_rows
+from .storage import Storage, expand, remember
 
 
 def change_weights(
-    basis: Basis, lists: Lists, factors: Factors, mesh: Mesh, which: Ints, weights: Floats
+    basis: Basis, lists: Lists, storage: Storage, mesh: Mesh, which: Ints, weights: Floats
 ) -> Ints:  # fmt: skip
     """Give points ``which (k,)`` other ``weights (k,)``; returns the rising cells that changed, which get plain
     weights."""
@@ -24,23 +24,23 @@ def change_weights(
     basis.weights[which] = np.tile(weights, len(basis.shifts))
     for i in which:
         reached, rows = lists.entries_of(int(i))
-        expand(lists, factors, reached)
+        expand(lists, storage, reached)
         write_rows(basis, lists, mesh, int(i), reached, rows)
         cells.append(reached)
     return np.unique(np.concatenate(cells))
 
 
 def change_knots(
-    basis: Basis, lists: Lists, factors: Factors, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]
+    basis: Basis, lists: Lists, storage: Storage, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]
 ) -> Ints:  # fmt: skip
     """Give point i other knots; returns the rising cells that changed, which get plain weights.
 
     ``ValueError`` where a vertex would be covered by no point; nothing is changed then.
     """
     copies = [(b * basis.n + i, [knots[k] + shift[k] for k in range(2)]) for b, shift in enumerate(basis.shifts)]
-    restore = remember(lists, factors)
+    restore = remember(lists, storage)
     for copy, shifted in copies:
-        expand(lists, factors, np.union1d(lists.entries_of(copy)[0], _cells_in(mesh, shifted)))
+        expand(lists, storage, np.union1d(lists.entries_of(copy)[0], _cells_in(mesh, shifted)))
         vertex = _first_uncovered(lists, mesh, copy, shifted)
         if vertex >= 0:
             restore()
@@ -165,7 +165,7 @@ def _enlarge(lists: Lists, c: int, room: int) -> None:
 
 def _compact(lists: Lists) -> None:
     """Once half of the arrays is no longer used, copy what is used to new ones without gaps."""
-    held = np.where(lists.room > 0, lists.rows, 0)  # none where a cell has factors
+    held = np.where(lists.room > 0, lists.rows, 0)  # none where a cell has no block
     sizes = held * np.diff(lists.tile_start) * LANES
     if lists.used <= 2 * sizes.sum() and lists.point_used <= 2 * int(lists.point_count.sum()) + 1024:
         return

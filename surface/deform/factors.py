@@ -10,19 +10,18 @@ coordinates fit no window.
 # mypy: allow-untyped-defs, disable-error-code="call-arg"
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from surface.base.arrays import Bools, Floats32, Ints
+from surface.base.arrays import Floats32, Ints
 from surface.base.jit import kernel
 from surface.mesh.mesh import Mesh
 from surface.spline.kernels import along, distinct
 from surface.spline.lanes import PICKS_FAST
 
 from .groupsums import HEAD, STEP
-from .lists import LANES, Basis, Lists, cells_by_point, grow
+from .lists import LANES, Basis, Lists, cells_by_point
 
 PLAIN = -1  # in ``rows_at``: the cell has plain weights
 COST = 1.0, 1.5  # without and with normals: factors that need more operations than so many times plain weights are
@@ -66,25 +65,28 @@ def no_factors(cells: int) -> Factors:
     return Factors(np.full(cells, PLAIN), np.zeros(cells, np.int64), single, single, np.zeros(0, np.float32), single)
 
 
-def factorize(basis: Basis, lists: Lists, mesh: Mesh, cost: tuple[float, float] = COST) -> Factors:
-    """Replace plain weights by factors where these need at most ``cost`` times as many operations, see :data:`COST`.
+def factorize(
+    basis: Basis, lists: Lists, mesh: Mesh, entries: Ints | None = None, cost: tuple[float, float] = COST
+) -> Factors:
+    """Find factors of cells where these need at most ``cost`` times as many operations as weights, see :data:`COST`.
 
-    The plain weights of such cells are taken out of ``lists``.
+    entries : (c,) rows of eight weights that a cell needs without factors; as many as its block has if not given
+        The lists of points of such cells are sorted; their blocks stay, see :mod:`.storage`.
     """
-    cells, entries = len(lists.rows), len(lists.ids)
+    cells, listed = len(lists.rows), len(lists.ids)
     made = no_factors(cells)
     if not PICKS_FAST or not cells:
         return made
     tiles, slopes = np.diff(lists.tile_start), len(lists.slope) > 0
-    factor_u, factor_v = np.zeros(entries, np.int32), np.zeros(entries, np.int32)
+    factor_u, factor_v = np.zeros(listed, np.int32), np.zeros(listed, np.int32)
+    entries = lists.rows * tiles if entries is None else entries
     factors = np.zeros(len(lists.value) + len(lists.slope), np.float32)
     picks = np.zeros(HEAD * cells + STEP * int(tiles.sum()), np.int32)
     *used, room = _factor_cells(
         *basis.knots, *basis.degrees, basis.weights, mesh.uv, mesh.side, lists.cell_start, lists.tile_start, lists.rows,
-        lists.ids_at, lists.ids, slopes, cost[slopes], int(tiles.max()), made.rows_at, made.picks_at, factor_u,
-        factor_v, factors, picks, _slots(2 * entries), _slots(cells),
+        lists.ids_at, lists.ids, entries, slopes, cost[slopes], int(tiles.max()), made.rows_at, made.picks_at, factor_u,
+        factor_v, factors, picks, _slots(2 * listed), _slots(cells),
     )  # fmt: skip
-    _take_out(lists, made.rows_at == PLAIN)
     by_point = cells_by_point(lists.ids, lists.rows, len(lists.point_start))
     lists.point_start, lists.point_count, lists.point_cell, lists.point_row = by_point
     arrays = zip((factor_u, factor_v, factors, picks), used, strict=True)
@@ -97,49 +99,9 @@ def _slots(entries: int) -> Ints:
     return np.zeros(1 << (2 * entries).bit_length(), np.int64)
 
 
-def _take_out(lists: Lists, plain: Bools) -> None:
-    """Keep weights only of the cells that are ``plain (c,)``."""
-    sizes = lists.rows * np.diff(lists.tile_start) * LANES
-    lists.value = lists.value[np.repeat(plain, sizes)]
-    if len(lists.slope):
-        lists.slope = lists.slope[np.repeat(plain, 2 * sizes)]
-    sizes[~plain] = 0
-    lists.room[~plain] = 0
-    lists.at = np.cumsum(sizes) - sizes
-    lists.used = len(lists.value)
-
-
-def remember(lists: Lists, factors: Factors) -> Callable[[], None]:
-    """What takes back the next calls of :func:`expand`, if nothing else was changed meanwhile."""
-    value, slope, used = lists.value, lists.slope, lists.used
-    at, room, rows_at = lists.at.copy(), lists.room.copy(), factors.rows_at.copy()
-
-    def restore() -> None:
-        lists.value, lists.slope, lists.used = value, slope, used
-        lists.at[:], lists.room[:], factors.rows_at[:] = at, room, rows_at
-
-    return restore
-
-
-def expand(lists: Lists, factors: Factors, cells: Ints) -> None:
-    """Give ``cells (k,)`` plain weights, at the end of the arrays of ``lists``, before they are changed."""
-    for c in cells[factors.rows_at[cells] >= 0]:
-        rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
-        blocks = _products(factors, c, rows, tiles)
-        filled = int(lists.cell_start[c + 1] - lists.cell_start[c])
-        for block in blocks:
-            block[-1, :, filled - LANES * (tiles - 1) :] = 0.0
-        end = lists.used + rows * tiles * LANES
-        lists.value = grow(lists.value, end)
-        lists.value[lists.used : end] = blocks[0].ravel()
-        if len(blocks) > 1:
-            lists.slope = grow(lists.slope, 2 * end)
-            lists.slope[2 * lists.used : 2 * end] = np.stack(blocks[1:], axis=2).ravel()
-        lists.at[c], lists.room[c], lists.used, factors.rows_at[c] = lists.used, rows, end, PLAIN
-
-
-def _products(factors: Factors, c: int, rows: int, tiles: int) -> list[Floats32]:
-    """(tiles, rows, 8) b w of a cell, and b_u w and b_v w if it has slopes."""
+def products(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
+    """(tiles, rows, 8) b w of a cell with factors, and (tiles, rows, 16) b_u w and b_v w if it has slopes."""
+    rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
     head, first = factors.picks_at[c], factors.rows_at[c]
     wide, picks = factors.picks[head : head + HEAD], factors.picks[head + HEAD : head + HEAD + STEP * tiles]
     of_tile = picks.reshape(tiles, 1, STEP)
@@ -148,9 +110,14 @@ def _products(factors: Factors, c: int, rows: int, tiles: int) -> list[Floats32]
         for k, table in enumerate((factors.factor_u, factors.factor_v))
     )
     a, b = factors.factors[along_u], factors.factors[along_v]
-    if not factors.slopes:
-        return [a * b]
-    return [a * b, factors.factors[along_u + wide[0]] * b, a * factors.factors[along_v + wide[1]]]
+    blocks = [a * b]
+    if factors.slopes:
+        u, v = factors.factors[along_u + wide[0]], factors.factors[along_v + wide[1]]
+        blocks.append(np.concatenate([u * b, a * v], axis=2))
+    filled = int(lists.cell_start[c + 1] - lists.cell_start[c]) - LANES * (tiles - 1)
+    for block in blocks:
+        block.reshape(tiles, rows, -1, LANES)[-1, ..., filled:] = 0.0
+    return blocks
 
 
 @kernel
@@ -237,17 +204,17 @@ def _sort_rows(keys, ids):
 
 
 @kernel
-def _operations(rows, groups, tiles, wide_u, slopes):
+def _operations(rows, entries, groups, tiles, wide_u, slopes):
     """How many operations on eight numbers a cell takes with plain weights and with factors."""
     if slopes:
-        return 9 * rows * tiles, 6 * rows * (wide_u // 8) + 17 * groups * tiles
-    return 3 * rows * tiles, 3 * rows * (wide_u // 8) + 7 * groups * tiles
+        return 9 * entries, 6 * rows * (wide_u // 8) + 17 * groups * tiles
+    return 3 * entries, 3 * rows * (wide_u // 8) + 7 * groups * tiles
 
 
 @kernel
 def _factor_cells(
-    knots_u, knots_v, pu, pv, weights, uv, side, cell_start, tile_start, rows, ids_at, ids, slopes, cost, most, rows_at,
-    picks_at, factor_u, factor_v, factors, picks, slots, pick_slots,
+    knots_u, knots_v, pu, pv, weights, uv, side, cell_start, tile_start, rows, ids_at, ids, entries, slopes, cost, most,
+    rows_at, picks_at, factor_u, factor_v, factors, picks, slots, pick_slots,
 ):  # fmt: skip
     """Fill the arrays of :class:`Factors`; returns how much of the last four is used, and the room for sums."""
     widest, used, each, scratch = 8 * most, np.zeros(3, dtype=np.int64), 1 + slopes, 0
@@ -274,7 +241,7 @@ def _factor_cells(
             used[1] = max(used[1], factor_v[at + k] + each * wide_v)
         points = ids[ids_at[c] : ids_at[c] + rows[c]].copy()
         groups = _sort_rows(factor_v[at : at + rows[c]], points)
-        plain, factored = _operations(rows[c], groups, tiles, wide_u, slopes)
+        plain, factored = _operations(rows[c], entries[c], groups, tiles, wide_u, slopes)
         if factored > cost * plain:
             continue
         for k in range(rows[c]):

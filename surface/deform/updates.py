@@ -14,10 +14,11 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.jit import inlined, kernel
-from surface.spline.lanes import fma, load, store
+from surface.spline.lanes import load
 
 from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
 from .groupsums import HEAD, STEP, product, slope_products, wide
+from .packedsums import accumulate, add_packed_row
 
 NOT_STORED = -1  # in ``differences``: the cell's numerators are not stored
 STORE = -2  # in ``differences``: compute and store them now
@@ -26,12 +27,6 @@ ROUNDING = 6e-8  # half a unit in the last place of float32
 MOST_DRIFT = 8e-7  # of the surface's size
 FARTHEST = 3e38  # coordinates that float32 still has
 REFUSED = 1 << 61  # subtracted from results of :func:`move_points` that mean a bad argument
-
-
-@inlined
-def accumulate(numerators, place, weights, number):
-    """``numerators[place : place + 8] += weights * number``."""
-    store(numerators, place, fma(weights, number, load(numerators, place)))
 
 
 @inlined
@@ -168,7 +163,9 @@ def update_cells(arrays, count, limit, bias, sign):
     point_start, point_count, point_cell, point_row = arrays[9:13]
     points, origin, inv_w, dw, numerators, differences, vertices, normals = arrays[13:21]
     _, hits, affected, recomputed, moved_ids, delta, local, scratch, pull, span, drift, extent = arrays[21:33]
-    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:]
+    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]
+    packed_at, tile_entry, entry_row, packed, packed_slope, places_at, places, order_at, order = arrays[39:48]
+    touched = arrays[48]
     slopes, starts = dw.shape[0] > 0, np.empty(local.shape[0], np.int32)
     total = find_affected(moved_ids, delta, count, point_start, point_count, point_cell, hits, pull, affected)
     again = choose_recomputed(
@@ -179,7 +176,13 @@ def update_cells(arrays, count, limit, bias, sign):
         dx, dy, dz = np.float32(delta[q, 0]), np.float32(delta[q, 1]), np.float32(delta[q, 2])
         for e in range(point_start[i], point_start[i] + point_count[i]):
             c = point_cell[e]
-            if differences[c] >= 0:
+            if differences[c] >= 0 and packed_at[c] >= 0:
+                add_packed_row(
+                    tile_start[c], tile_start[c + 1], packed_at[c],
+                    places_at[c] + point_row[e] * (tile_start[c + 1] - tile_start[c]), dx, dy, dz, slopes, tile_entry,
+                    packed, packed_slope, places, touched, numerators,
+                )  # fmt: skip
+            elif differences[c] >= 0:
                 row = rows_at[c] + point_row[e] if rows_at[c] >= 0 else -1
                 add_row(
                     tile_start[c], tile_start[c + 1], at[c] + 8 * point_row[e], room[c] * 8, row, picks_at[c], dx, dy,
@@ -189,18 +192,21 @@ def update_cells(arrays, count, limit, bias, sign):
         c = affected[q]
         if differences[c] == NOT_STORED:
             continue
+        every = packed_at[c] < 0 or differences[c] == STORE
         if differences[c] == STORE:
             gather(points, ids, ids_at[c], rows[c], origin, c, local)
             store_numerators(
                 tile_start[c], tile_start[c + 1], rows[c], at[c], room[c] * 8, rows_at[c], picks_at[c], slopes, value,
-                slope, factor_u, factor_v, factors, picks, local, starts, scratch, numerators,
+                slope, factor_u, factor_v, factors, picks, packed_at[c], tile_entry, entry_row, packed, packed_slope,
+                local, starts, scratch, numerators,
             )  # fmt: skip
             differences[c] = 0
             span[c], drift[c] = largest(local, rows[c]), 0.0
         ox, oy, oz = np.float32(origin[c, 0]), np.float32(origin[c, 1]), np.float32(origin[c, 2])
         first, last = cell_start[c], cell_start[c + 1]
         finish_cell(
-            first, last, tile_start[c], ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, scratch
+            first, last, tile_start[c], ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, order_at[c], order,
+            every, touched, scratch,
         )  # fmt: skip
     compute_cells(arrays, recomputed, np.int64(0), again, sign, local, scratch)
     return total

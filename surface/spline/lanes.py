@@ -130,20 +130,6 @@ def _loader3(part):
 load_x, load_y, load_z = (_loader3(part) for part in range(3))  # of eight vectors x0 y0 z0 x1 y1 z1 ... from an index
 
 
-@_operation(types.void, None, types.intp, None, types.intp, None, types.intp)
-def store_offset(context, builder, kinds, args):
-    """``out[k : k + 4] = points[i : i + 4] - origin[c : c + 4]``: float32 of float64 numbers; each index comes after
-    its array, and is that of the array laid flat."""
-    double, single = (ir.VectorType(kind(), 4) for kind in (ir.DoubleType, ir.FloatType))
-    place = [
-        builder.gep(context.make_array(kinds[k])(context, builder, args[k]).data, [args[k + 1]]) for k in (0, 2, 4)
-    ]
-    point, origin = (builder.load(builder.bitcast(p, double.as_pointer()), align=8) for p in place[:2])
-    value = builder.fptrunc(builder.fsub(point, origin), single)
-    builder.store(value, builder.bitcast(place[2], single.as_pointer()), align=4)
-    return context.get_dummy_value()
-
-
 @_operation(types.void, None, types.intp)
 def prefetch(context, builder, kinds, args):
     """Ask for the cache line of ``array[index]``, which may lie beyond the array's end."""
@@ -205,3 +191,51 @@ def root(context, builder, kinds, args):
 def splat(context, builder, kinds, args):
     """One number in every lane."""
     return _splat(builder, args[0])
+
+
+@_operation(lanes, lanes, None, types.intp, lanes)
+def fma_at(context, builder, kinds, args):
+    """``a * array[index] + c`` as :func:`fma`; the index counts single numbers and is not checked."""
+    data = context.make_array(kinds[1])(context, builder, args[1]).data
+    product = builder.fmul(args[0], _splat(builder, builder.load(builder.gep(data, [args[2]]))), flags=FLAGS)
+    return builder.fadd(product, args[3], flags=FLAGS)
+
+
+@_operation(types.intp, None, types.intp)
+def item(context, builder, kinds, args):
+    """The integer ``array[index]``; the index must not be negative, which is not checked."""
+    found = builder.load(builder.gep(context.make_array(kinds[0])(context, builder, args[0]).data, [args[1]]))
+    if found.type.width == types.intp.bitwidth:
+        return found
+    widen = builder.sext if kinds[0].dtype.signed else builder.zext
+    return widen(found, ir.IntType(types.intp.bitwidth))
+
+
+@_operation(types.void, None, types.intp, None, types.intp, None, types.intp)
+def store_difference(context, builder, kinds, args):
+    """``out[k : k + 4] = a[i : i + 4] - b[j : j + 4]`` for ``out, k, a, i, b, j``; a and b are float64, out float32."""
+    ends = [
+        builder.gep(context.make_array(kinds[at])(context, builder, args[at]).data, [args[at + 1]]) for at in (0, 2, 4)
+    ]
+    wide = ir.VectorType(ir.DoubleType(), 4)
+    a, b = (builder.load(builder.bitcast(end, wide.as_pointer()), align=8) for end in ends[1:])
+    narrow = ir.VectorType(ir.FloatType(), 4)
+    single = builder.fptrunc(builder.fsub(a, b), narrow)
+    builder.store(single, builder.bitcast(ends[0], narrow.as_pointer()), align=4)
+    return context.get_dummy_value()
+
+
+@_operation(types.void, None, types.intp, None, types.intp, lanes, lanes, lanes)
+def store3_at(context, builder, kinds, args):
+    """``out[index + 3 * order[first + k] : ][: 3] = x[k], y[k], z[k]`` for ``out, index, order, first, x, y, z``; the
+    order is uint16."""
+    out = context.make_array(kinds[0])(context, builder, args[0]).data
+    order = context.make_array(kinds[2])(context, builder, args[2]).data
+    wide = ir.IntType(types.intp.bitwidth)
+    for k in range(LANES):
+        place = builder.zext(builder.load(builder.gep(order, [builder.add(args[3], wide(k))])), wide)
+        start = builder.add(args[1], builder.mul(place, wide(3)))
+        for c in range(3):
+            number = builder.extract_element(args[4 + c], ir.Constant(INDEX, k))
+            builder.store(number, builder.gep(out, [builder.add(start, wide(c))]))
+    return context.get_dummy_value()

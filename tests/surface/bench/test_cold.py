@@ -66,12 +66,23 @@ def test_rows_of_a_surface() -> None:
     rows = cold.cold_rows("some", [body, body], 0.0, "<= 1.0", 64, reported.append)
     assert reported == ["some"] and [row.name.partition(": ")[2] for row in rows] == [
         cold.READ, "all positions", "all positions and normals", "scipy CSR @ dense", "stencil table, row by row",
-        "memory of weights and lists",
+        "memory of weights and lists", "weights that are zero",
     ]  # fmt: skip
     for row in rows[1:5]:
         assert row.ratio is not None and row.interval is not None
         assert row.interval[0] <= row.ratio <= row.interval[1] and row.milliseconds > 0
-    assert [row.reach for row in rows] == ["", "<= 1.0", "", ">= 5", ">= 2", ""]
+    assert [row.reach for row in rows] == ["", "<= 1.0", "", ">= 5", ">= 2", "", "<= 0.2"]
     weights = build_lists(*body, False).value
-    wanted = body[0].deformation(body[1], normals=False).nbytes / (4 * np.count_nonzero(weights))
-    assert rows[5].ratio == pytest.approx(wanted)
+    deformation = body[0].deformation(body[1], normals=False)
+    assert rows[5].ratio == pytest.approx(deformation.nbytes / (4 * np.count_nonzero(weights)))
+    assert rows[6].ratio == cold.zeros([deformation])
+
+
+def test_the_share_of_zeros_is_that_of_all_weights_that_are_not_factors() -> None:
+    body = cold.scattered(100, 500)
+    weights, deformation = build_lists(*body, False).value, body[0].deformation(body[1], normals=False)
+    assert not (deformation.storage.factors.rows_at >= 0).any()
+    kept = len(deformation.storage.packed.packed) + deformation.lists.used
+    assert cold.zeros([deformation]) == pytest.approx(1.0 - np.count_nonzero(weights) / kept)
+    assert 0.0 < cold.zeros([deformation]) < 1.0 - np.count_nonzero(weights) / len(weights)
+    assert cold.zeros([]) == 0.0

@@ -14,7 +14,7 @@ from surface.deform.deformation import Deformation
 
 def arrays_of(deformation: Deformation[DCPSurface]) -> dict[str, np.ndarray]:
     """All arrays of an update by name."""
-    return vars(deformation.lists) | deformation._arrays | vars(deformation.factors)
+    return vars(deformation.lists) | deformation._arrays | deformation.storage.arrays
 
 
 def test_the_table_holds_address_and_length_of_every_array() -> None:

@@ -11,6 +11,7 @@ from surface.bench.bench import sheet
 from surface.deform import factors
 from surface.deform.deformation import Deformation
 from surface.deform.lists import LANES, Basis, Lists, build_lists
+from surface.deform.storage import Storage, compress, expand
 from surface.mesh.domain import Domain, Slit
 from surface.mesh.mesh import Mesh
 
@@ -25,17 +26,18 @@ def weighted_sheet() -> tuple[DCPSurface, Mesh]:
     return DCPSurface(plain.points, rng.uniform(0.5, 2.0, plain.n), list(ku), list(kv)), mesh
 
 
-def factored(surface: DCPSurface, mesh: Mesh) -> tuple[Lists, factors.Factors]:
+def factored(surface: DCPSurface, mesh: Mesh) -> tuple[Lists, Storage]:
     lists = build_lists(surface, mesh, True)
-    return lists, factors.factorize(Basis.of(surface), lists, mesh)
+    return lists, compress(Basis.of(surface), lists, mesh)
 
 
 def test_factors_give_the_weights_of_the_surface() -> None:
     surface, mesh = weighted_sheet()
-    lists, made = factored(surface, mesh)
+    lists, storage = factored(surface, mesh)
+    made = storage.factors
     held = np.flatnonzero(made.rows_at >= 0)
     assert len(held) > 0.8 * len(lists.rows)
-    factors.expand(lists, made, held[::2])
+    expand(lists, storage, held[::2])
     assert set(np.flatnonzero(made.rows_at >= 0)) == set(held[1::2])
     plain = build_lists(surface, mesh, True)
     for c in held[::2]:
@@ -55,7 +57,7 @@ def test_factors_take_less_memory_and_neighbours_share_them() -> None:
     plain = build_lists(surface, mesh, False).value.nbytes
     deformation = surface.deformation(mesh, normals=False)
     assert deformation.nbytes <= 0.6 * plain
-    made = deformation.factors
+    made = deformation.storage.factors
     assert made.nbytes == sum(array.nbytes for array in vars(made).values() if isinstance(array, np.ndarray))
     assert len(np.unique(made.factor_u)) <= 4 * 30  # four rows of factors reach each column of cells, whatever the row
     assert len(made.factors) < 0.02 * plain / 4
@@ -73,7 +75,7 @@ def test_every_point_knows_its_rows() -> None:
 def test_updates_of_any_kind_agree_with_a_new_evaluation(normals: bool) -> None:
     surface, mesh = weighted_sheet()
     deformation, rng = Deformation(surface, mesh, normals=normals), np.random.default_rng(1)
-    assert (deformation.factors.rows_at >= 0).any()
+    assert (deformation.storage.factors.rows_at >= 0).any()
 
     def check() -> None:
         points, su, sv = deformation.surface.derivatives(mesh.uv, mesh.side)
@@ -100,10 +102,10 @@ def test_updates_of_any_kind_agree_with_a_new_evaluation(normals: bool) -> None:
 def test_a_refused_change_of_knots_leaves_factors() -> None:
     surface, mesh = sheet(2_000)
     deformation = surface.deformation(mesh)
-    before, used = deformation.factors.rows_at.copy(), deformation.lists.used
+    before, used = deformation.storage.factors.rows_at.copy(), deformation.lists.used
     with pytest.raises(ValueError, match="uncovered"):
         deformation.set_knots(0, [0.5, 0.6, 0.7], [0.5, 0.6, 0.7])
-    assert np.array_equal(before, deformation.factors.rows_at) and deformation.lists.used == used
+    assert np.array_equal(before, deformation.storage.factors.rows_at) and deformation.lists.used == used
     deformation.move([0, 1], [0.0, 0.0, 1.0])
     assert np.abs(deformation.vertices - deformation.surface.evaluate(mesh.uv)).max() < 2e-5
 
@@ -116,7 +118,7 @@ def test_sides_of_a_slit_have_factors_of_their_own() -> None:
     surface = DCPSurface.from_nurbs(3, 3, knots, knots, net)
     mesh = surface.tessellate(min_depth=3, max_depth=3, domain=Domain((0, 1, 0, 1), slits=[Slit("u", 0.5, 0.0, 1.0)]))
     deformation = surface.deformation(mesh)
-    assert (deformation.factors.rows_at >= 0).any() and len(np.unique(mesh.side)) > 1
+    assert (deformation.storage.factors.rows_at >= 0).any() and len(np.unique(mesh.side)) > 1
     assert np.abs(deformation.vertices - surface.derivatives(mesh.uv, mesh.side)[0]).max() < 1e-6
 
 
@@ -127,4 +129,4 @@ def test_cells_for_which_factors_cost_more_keep_plain_weights() -> None:
     assert (made.rows_at == factors.PLAIN).all() and len(lists.value) == lists.used > 0
     scattered = shapes.scattered(60, 2)  # every point has knots of its own: no groups
     mesh = scattered.tessellate(chord_error=0.3, max_depth=4)
-    assert (scattered.deformation(mesh).factors.rows_at == factors.PLAIN).all()
+    assert (scattered.deformation(mesh).storage.factors.rows_at == factors.PLAIN).all()

@@ -64,7 +64,7 @@ def separated(rows, points, origin, out, local):
     lanes.store(out, 0, lanes.load_x(rows, 3))
     lanes.store(out, 8, lanes.load_y(rows, 3))
     lanes.store(out, 16, lanes.load_z(rows, 3))
-    lanes.store_offset(points, 6, origin, 3, local, 4)
+    lanes.store_difference(local, 4, points, 6, origin, 3)
 
 
 def test_coordinates_are_separated_and_points_placed_relative_to_origins() -> None:

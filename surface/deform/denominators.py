@@ -1,0 +1,88 @@
+"""Compiled sums of the weights at every vertex, whichever way these are kept."""
+
+# mypy: allow-untyped-defs, disable-error-code="call-arg, var-annotated, has-type"
+from __future__ import annotations
+
+import numpy as np
+
+from surface.base.jit import inlined, kernel
+
+from .groupsums import HEAD, STEP, wide
+
+LEAST_SUM = 1e-36  # of the weights at a vertex: float32 has fewer digits for smaller numbers
+
+
+@inlined
+def _sum_entries(value, slope, first, end, slopes, j):
+    """Sums of b w, b_u w and b_v w in lane j of the rows of eight from ``first`` to ``end``."""
+    w, wu, wv = 0.0, 0.0, 0.0
+    for e in range(first, end):
+        w += value[8 * e + j]
+        if slopes:
+            wu += slope[16 * e + j]
+            wv += slope[16 * e + 8 + j]
+    return w, wu, wv
+
+
+@inlined
+def _sum_factors(rows, row, tile, wide_u, wide_v, factor_u, factor_v, factors, picks, slopes, j):
+    """The same sums of a cell with factors, whose tile has its picks at ``tile``."""
+    w, wu, wv = 0.0, 0.0, 0.0
+    for k in range(row, row + rows):
+        at_u = factor_u[k] + picks[tile + 16] + picks[tile + j]
+        at_v = factor_v[k] + picks[tile + 17] + picks[tile + 8 + j]
+        w += factors[at_u] * factors[at_v]
+        if slopes:
+            wu += factors[at_u + wide_u] * factors[at_v]
+            wv += factors[at_u] * factors[at_v + wide_v]
+    return w, wu, wv
+
+
+@kernel
+def denominators(arrays, cells):
+    """Sum the weights of the given cells."""
+    cell_start, tile_start, rows, room, at, _, _, value, slope = arrays[:9]
+    inv_w, dw = arrays[15:17]
+    rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]
+    packed_at, tile_entry, _, packed, packed_slope = arrays[39:44]
+    slopes = dw.shape[0] > 0
+    for q in range(cells.shape[0]):
+        c = cells[q]
+        wide_u, wide_v = wide(rows_at[c], picks_at[c], picks)
+        for lane in range(8 * tile_start[c], 8 * tile_start[c + 1]):
+            t, j = lane // 8 - tile_start[c], lane % 8
+            if rows_at[c] >= 0:
+                pick_at = picks_at[c] + HEAD + STEP * t
+                w, wu, wv = _sum_factors(
+                    rows[c], rows_at[c], pick_at, wide_u, wide_v, factor_u, factor_v, factors, picks, slopes, j
+                )
+            elif packed_at[c] >= 0:
+                first, end = tile_entry[packed_at[c] + t], tile_entry[packed_at[c] + t + 1]
+                w, wu, wv = _sum_entries(packed, packed_slope, first, end, slopes, j)
+            else:
+                first = at[c] // 8 + t * room[c]
+                w, wu, wv = _sum_entries(value, slope, first, first + rows[c], slopes, j)
+            if cell_start[c] + lane - 8 * tile_start[c] >= cell_start[c + 1]:
+                w = 1.0  # lanes that fill up the last tile
+            inv_w[lane] = 1.0 / w if w >= LEAST_SUM else np.inf
+            if slopes:
+                dw[16 * (lane // 8) + j], dw[16 * (lane // 8) + 8 + j] = wu, wv
+
+
+@kernel
+def unusable(cells, cell_start, tile_start, inv_w, dw, order_at, order):
+    """The first vertex of ``cells`` whose weights add up to less than ``LEAST_SUM`` or to more than float32 has, or
+    whose derivative weights do; -1 if there is none."""
+    for q in range(cells.shape[0]):
+        c = cells[q]
+        for vertex in range(cell_start[c], cell_start[c + 1]):
+            t, j = (vertex - cell_start[c]) // 8, (vertex - cell_start[c]) % 8
+            tile = tile_start[c] + t
+            total = np.float64(inv_w[8 * tile + j])
+            usable = total > 0.0
+            if dw.shape[0] > 0:
+                total += abs(dw[16 * tile + j]) + abs(dw[16 * tile + 8 + j])
+            if not (usable and total < np.inf):
+                at = order_at[c] + vertex - cell_start[c]
+                return vertex if order_at[c] < 0 else cell_start[c] + np.int64(order[at])
+    return -1

@@ -1,0 +1,104 @@
+"""Compiled parts of sums over packed weights, see :mod:`.packing`: every tile has a list of its own."""
+
+# mypy: allow-untyped-defs, disable-error-code="call-arg, var-annotated, has-type"
+from __future__ import annotations
+
+from surface.base.jit import inlined
+from surface.spline.lanes import add, fma, fma_at, item, load, prefetch, store, store3, store3_at, zero
+
+AHEAD = 1024  # weights that are prefetched before they are needed
+
+
+@inlined
+def sum_packed(packed, entry_row, e, end, local):
+    """Three sums of the tile with entries ``e`` to ``end``, as :func:`.apply.sum_values`."""
+    x0, y0, z0 = zero(), zero(), zero()
+    x1, y1, z1 = zero(), zero(), zero()
+    x2, y2, z2 = zero(), zero(), zero()
+    x3, y3, z3 = zero(), zero(), zero()
+    while e + 4 <= end:
+        p, q = 3 * item(entry_row, e), 3 * item(entry_row, e + 1)
+        r, s = 3 * item(entry_row, e + 2), 3 * item(entry_row, e + 3)
+        a, b = load(packed, 8 * e), load(packed, 8 * e + 8)
+        c, d = load(packed, 8 * e + 16), load(packed, 8 * e + 24)
+        prefetch(packed, 8 * e + AHEAD)
+        prefetch(packed, 8 * e + 16 + AHEAD)
+        x0, y0, z0 = fma_at(a, local, p, x0), fma_at(a, local, p + 1, y0), fma_at(a, local, p + 2, z0)
+        x1, y1, z1 = fma_at(b, local, q, x1), fma_at(b, local, q + 1, y1), fma_at(b, local, q + 2, z1)
+        x2, y2, z2 = fma_at(c, local, r, x2), fma_at(c, local, r + 1, y2), fma_at(c, local, r + 2, z2)
+        x3, y3, z3 = fma_at(d, local, s, x3), fma_at(d, local, s + 1, y3), fma_at(d, local, s + 2, z3)
+        e += 4
+    while e < end:
+        a, p = load(packed, 8 * e), 3 * item(entry_row, e)
+        x0, y0, z0 = fma_at(a, local, p, x0), fma_at(a, local, p + 1, y0), fma_at(a, local, p + 2, z0)
+        e += 1
+    return add(add(x0, x1), add(x2, x3)), add(add(y0, y1), add(y2, y3)), add(add(z0, z1), add(z2, z3))
+
+
+@inlined
+def sum_all_packed(packed, packed_slope, entry_row, first, end, local):
+    """Nine sums of the tile with entries ``first`` to ``end``, as :func:`.apply.sum_all`."""
+    x, y, z = zero(), zero(), zero()
+    ax, ay, az, bx, by, bz = zero(), zero(), zero(), zero(), zero(), zero()
+    for e in range(first, end):
+        p = 3 * item(entry_row, e)
+        w, u, v = load(packed, 8 * e), load(packed_slope, 16 * e), load(packed_slope, 16 * e + 8)
+        x, y, z = fma_at(w, local, p, x), fma_at(w, local, p + 1, y), fma_at(w, local, p + 2, z)
+        ax, ay, az = fma_at(u, local, p, ax), fma_at(u, local, p + 1, ay), fma_at(u, local, p + 2, az)
+        bx, by, bz = fma_at(v, local, p, bx), fma_at(v, local, p + 1, by), fma_at(v, local, p + 2, bz)
+    return x, y, z, ax, ay, az, bx, by, bz
+
+
+@inlined
+def write_lanes(out, first, last, vertex, at, order, x, y, z, scratch):
+    """Write the vectors of the tile that begins at ``vertex`` of a cell with vertices ``first`` to ``last``.
+
+    ``at`` : where the cell's order starts in ``order``, or less than 0 where lanes follow vertices.
+    """
+    if at < 0 and vertex + 8 <= last:
+        store3(out, 3 * vertex, x, y, z)
+    elif vertex + 8 <= last:
+        store3_at(out, 3 * first, order, at + vertex - first, x, y, z)
+    else:
+        store3(scratch, 0, x, y, z)
+        for j in range(last - vertex):
+            place = 3 * (vertex + j)
+            if at >= 0:
+                place = 3 * (first + item(order, at + vertex - first + j))
+            out[place], out[place + 1], out[place + 2] = scratch[3 * j], scratch[3 * j + 1], scratch[3 * j + 2]
+
+
+@inlined
+def accumulate(numerators, place, weights, number):
+    """``numerators[place : place + 8] += weights * number``."""
+    store(numerators, place, fma(weights, number, load(numerators, place)))
+
+
+@inlined
+def add_packed_row(
+    first_tile, end_tile, at, place, dx, dy, dz, slopes, tile_entry, packed, packed_slope, places, touched, numerators,
+):  # fmt: skip
+    """Eq. (2): add b w dP of one control point to the numerators of a packed cell, in the tiles that it reaches.
+
+    ``at`` : where the cell's tiles start in ``tile_entry``; ``place``: where those of the point's row do in ``places``.
+    ``touched`` gets 1 for these tiles.
+    """
+    size = 72 if slopes else 24
+    for tile in range(first_tile, end_tile):
+        number = item(places, place + tile - first_tile)
+        if number == 0:
+            continue
+        e, base = item(tile_entry, at + tile - first_tile) + number - 1, tile * size
+        touched[tile] = 1
+        a = load(packed, 8 * e)
+        accumulate(numerators, base, a, dx)
+        accumulate(numerators, base + 8, a, dy)
+        accumulate(numerators, base + 16, a, dz)
+        if slopes:
+            u, v = load(packed_slope, 16 * e), load(packed_slope, 16 * e + 8)
+            accumulate(numerators, base + 24, u, dx)
+            accumulate(numerators, base + 32, u, dy)
+            accumulate(numerators, base + 40, u, dz)
+            accumulate(numerators, base + 48, v, dx)
+            accumulate(numerators, base + 56, v, dy)
+            accumulate(numerators, base + 64, v, dz)

@@ -1,0 +1,255 @@
+"""Plain weights without rows of zeros: every tile of a packed cell lists the points that reach one of its vertices.
+
+A cell's list is longer than that of any of its tiles, so a block holds many rows of eight zeros. A packed cell keeps,
+tile after tile, the rows that are not all zero, and for each which point of the cell's list it belongs to. Its vertices
+are put into tiles so that those of a tile share most of their points; ``order`` leads back to the mesh's order. Cells
+that are packed get blocks of plain weights, in the mesh's order, before their weights or knots change.
+"""
+
+# mypy: allow-untyped-defs
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats32, Ints
+from surface.base.jit import kernel
+
+from .lists import LANES, Lists
+
+PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lanes follow the mesh's order
+CHOICE = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
+WORTH = 0.97  # of the rows without reordering: with more than these left, vertices stay in order
+MOST = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
+
+
+@dataclass
+class Packed:
+    """The packed cells of a mesh. An entry is eight weights of one point.
+
+    packed_at : (c,) int64, where every cell's tiles start in ``tile_entry``; PLAIN where the cell is not packed
+    tile_entry : (t,) int64, where every tile's entries start; after a cell's last tile, where these end
+    entry_row : (e,) uint16, the row of each entry's point in the cell's list
+    packed : (8 e,) float32; packed_slope : (16 e,) float32, or empty for a mesh without normals
+    places_at : (c,) int64, where every cell's rows start in ``places``
+    places : (p,) uint16, by row and tile: the entry's number in its tile, from 1 on; 0 if there is none
+    order_at : (c,) int64, where every cell's lanes start in ``order``; PLAIN where they follow the mesh's order
+    order : (o,) uint16, the vertex of every lane, counted from the cell's first one
+    """
+
+    packed_at: Ints
+    tile_entry: Ints
+    entry_row: np.ndarray
+    packed: Floats32
+    packed_slope: Floats32
+    places_at: Ints
+    places: np.ndarray
+    order_at: Ints
+    order: np.ndarray
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all arrays."""
+        return sum(array.nbytes for array in vars(self).values())
+
+
+class Order(NamedTuple):
+    """How vertices are put into tiles: ``order (8 t,)`` uint16 is the vertex of every lane, counted from its cell's
+    first one, ``moved (c,)`` where that is not the mesh's order, ``entries (c,)`` how many rows of tiles are not zero.
+    """
+
+    order: np.ndarray
+    moved: Bools
+    entries: Ints
+
+
+def order_vertices(lists: Lists) -> Order:
+    """Put the vertices of every cell into tiles that share points."""
+    cells, tiles = len(lists.rows), int(lists.tile_start[-1])
+    found = Order(np.zeros(LANES * tiles, np.uint16), np.zeros(cells, np.bool_), np.zeros(cells, np.int64))
+    _order_cells(
+        lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, CHOICE, WORTH, MOST, *found
+    )
+    return found
+
+
+def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
+    """Pack those of the ``wanted (c,)`` cells that have rows of zeros."""
+    tiles = np.diff(lists.tile_start)
+    blocks = lists.rows * tiles
+    chosen = wanted & (order.entries < blocks) & (lists.rows < MOST) & (np.diff(lists.cell_start) <= MOST)
+    entries, moved = int(order.entries[chosen].sum()), chosen & order.moved
+    made = Packed(
+        packed_at=_starts(tiles + 1, chosen), tile_entry=np.zeros(int((tiles + 1)[chosen].sum()), np.int64),
+        entry_row=np.zeros(entries, np.uint16), packed=np.zeros(LANES * entries, np.float32),
+        packed_slope=np.zeros(2 * LANES * entries if len(lists.slope) else 0, np.float32),
+        places_at=_starts(blocks, chosen), places=np.zeros(int(blocks[chosen].sum()), np.uint16),
+        order_at=_starts(LANES * tiles, moved), order=order.order[np.repeat(moved, LANES * tiles)],
+    )  # fmt: skip
+    _pack_cells(
+        lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, *vars(made).values()
+    )
+    return made
+
+
+def _starts(sizes: Ints, chosen: Bools) -> Ints:
+    """(c,) where each of the ``chosen`` cells starts if they follow each other; PLAIN for the others."""
+    held = np.where(chosen, sizes, 0)
+    return np.where(chosen, np.cumsum(held) - held, PLAIN)
+
+
+def unpacked(lists: Lists, made: Packed, c: int) -> list[Floats32]:
+    """(tiles, rows, 8) b w of a packed cell, and (tiles, rows, 16) b_u w and b_v w if it has slopes, in the mesh's
+    order."""
+    rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
+    size = int(lists.cell_start[c + 1] - lists.cell_start[c])
+    first, at = int(made.packed_at[c]), int(made.order_at[c])
+    starts = made.tile_entry[first : first + tiles + 1]
+    which = slice(int(starts[0]), int(starts[-1]))
+    tile = np.repeat(np.arange(tiles), np.diff(starts))
+    row = made.entry_row[which].astype(np.int64)
+    lanes = made.order[at : at + size].astype(np.int64) if at >= 0 else np.arange(size)
+    blocks = []
+    for table, wide in ((made.packed, 1), (made.packed_slope, 2))[: 1 + (len(made.packed_slope) > 0)]:
+        own = np.zeros((rows, wide, tiles, LANES), np.float32)
+        entries = table[LANES * wide * which.start : LANES * wide * which.stop].reshape(-1, wide, LANES)
+        own[row, :, tile] = entries
+        flat = own.reshape(rows, wide, -1)
+        back = np.zeros_like(flat)
+        back[..., lanes] = flat[..., :size]
+        blocks.append(back.reshape(rows, wide, tiles, LANES).transpose(2, 0, 1, 3).reshape(tiles, rows, -1))
+    return blocks
+
+
+@kernel
+def _marks(size, rows, at, value, slope, masks):
+    """Bit k of ``masks[s]`` : does point k of a cell with a block at ``at`` reach its vertex s? Returns how many do."""
+    count = 0
+    for s in range(size):
+        masks[s] = 0
+        start = at + (s // 8) * rows * 8
+        for k in range(rows):
+            w = start + 8 * k
+            j = s % 8
+            found = value[w + j] != 0.0
+            if slope.shape[0] > 0:
+                found = found or slope[2 * w + j] != 0.0 or slope[2 * w + 8 + j] != 0.0
+            if found:
+                masks[s, k >> 6] |= np.uint64(1) << np.uint64(k & 63)
+                count += 1
+    return count
+
+
+@kernel
+def _bits(word):
+    """How many bits of a number are set (Warren, Hacker's Delight 5-1)."""
+    word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
+    word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
+    word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+    return np.int64((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
+
+
+@kernel
+def _entries(size, masks, order, union):
+    """How many rows of tiles of eight vertices in the given order are not all zero."""
+    count = 0
+    for first in range(0, size, 8):
+        union[:] = 0
+        for j in range(first, min(first + 8, size)):
+            union |= masks[order[j]]
+        for word in union:
+            count += _bits(word)
+    return count
+
+
+@kernel
+def _next_vertex(masks, union, left, choice):
+    """Which of the first ``choice`` of the vertices ``left`` adds fewest points to the ``union`` of a tile, and shares
+    most with it."""
+    best, found = 1 << 60, 0
+    for q in range(min(choice, len(left))):
+        more, common = 0, 0
+        for k in range(len(union)):
+            word = masks[left[q], k]
+            more += _bits(word & ~union[k])
+            common += _bits(word & union[k])
+        if (more << 20) - common < best:
+            best, found = (more << 20) - common, q
+    return found
+
+
+@kernel
+def _arrange(size, masks, choice, union, left, order):
+    """Order the vertices of a cell: a tile starts with the first one left and takes those that fit it best."""
+    for s in range(size):
+        left[s] = s
+    for s in range(size):
+        at = s
+        if s % 8 == 0:
+            union[:] = 0
+        else:
+            at += _next_vertex(masks, union, left[s:size], choice)
+        vertex = left[at]
+        for q in range(at, s, -1):
+            left[q] = left[q - 1]
+        order[s] = vertex
+        union |= masks[vertex]
+
+
+@kernel
+def _order_cells(cell_start, tile_start, rows, at, value, slope, choice, worth, most, order, moved, entries):
+    """Fill the arrays of :class:`Order`; cells of more than ``most`` vertices are left as they are."""
+    widest, words = 1, 1
+    for c in range(rows.shape[0]):
+        widest, words = max(widest, cell_start[c + 1] - cell_start[c]), max(words, (rows[c] + 63) >> 6)
+    all_masks, left = np.zeros((widest, words), np.uint64), np.zeros(widest, np.int64)
+    same, other = np.arange(widest), np.zeros(widest, np.int64)
+    for c in range(rows.shape[0]):
+        size, wide = cell_start[c + 1] - cell_start[c], (rows[c] + 63) >> 6
+        masks, union = all_masks[:, :wide], np.zeros(wide, np.uint64)
+        reached = _marks(size, rows[c], at[c], value, slope, masks)
+        entries[c] = _entries(size, masks, same, union)
+        chosen = same
+        if size <= most and reached < rows[c] * size:
+            _arrange(size, masks, choice, union, left, other)
+            count = _entries(size, masks, other, union)
+            if count <= worth * entries[c]:
+                entries[c], moved[c], chosen = count, True, other
+        for s in range(size):
+            order[8 * tile_start[c] + s] = chosen[s]
+
+
+@kernel
+def _pack_cells(
+    cell_start, tile_start, rows, at, value, slope, packed_at, tile_entry, entry_row, packed, packed_slope, places_at,
+    places, order_at, order,
+):  # fmt: skip
+    """Fill the arrays of :class:`Packed` from the blocks of cells."""
+    e, own = 0, np.zeros((3, 8), np.float32)
+    for c in range(rows.shape[0]):
+        if packed_at[c] < 0:
+            continue
+        size, tiles = cell_start[c + 1] - cell_start[c], tile_start[c + 1] - tile_start[c]
+        for t in range(tiles):
+            tile_entry[packed_at[c] + t] = first = e
+            for k in range(rows[c]):
+                own[:] = 0.0
+                found = False
+                for j in range(min(8, size - 8 * t)):
+                    s = np.int64(order[order_at[c] + 8 * t + j]) if order_at[c] >= 0 else 8 * t + j
+                    w = at[c] + ((s // 8) * rows[c] + k) * 8
+                    own[0, j] = value[w + s % 8]
+                    if slope.shape[0] > 0:
+                        own[1, j], own[2, j] = slope[2 * w + s % 8], slope[2 * w + 8 + s % 8]
+                    found = found or own[0, j] != 0.0 or own[1, j] != 0.0 or own[2, j] != 0.0
+                if not found:
+                    continue
+                packed[8 * e : 8 * e + 8] = own[0]
+                if slope.shape[0] > 0:
+                    packed_slope[16 * e : 16 * e + 8], packed_slope[16 * e + 8 : 16 * e + 16] = own[1], own[2]
+                entry_row[e] = k
+                e += 1
+                places[places_at[c] + k * tiles + t] = e - first
+        tile_entry[packed_at[c] + tiles] = e
