@@ -31,6 +31,9 @@ FOLDER = ROOT / "docs" / "pictures"
 ICT = ROOT / "configs" / "heads" / "ict"
 SIZE = 300
 AXIS = np.array([0.0, 10.0, 10.0])  # a point inside the head, mm
+EYES = np.array([[31.8, 36.1, 84.2], [-31.8, 36.1, 84.2]])
+EYE_RADIUS, SOCKET_MM = 12.0, 5.0
+LOWEST_MM = -100.0  # of what is seen from a point: below, the neck widens to the shoulders
 POSES: dict[str, dict[str, float]] = {
     "smile": {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0, "cheekSquintLeft": 0.6, "cheekSquintRight": 0.6},
     "surprise": {"browInnerUp": 1.0, "browOuterUpLeft": 1.0, "browOuterUpRight": 1.0, "jawOpen": 0.35},
@@ -65,9 +68,12 @@ class Radius:
         self._around, shapes = around, []
         for part in (p for p in head.parts if p.material in materials):
             at = self.coordinates(part.vertices.astype(float))
+            triangles = _whole(at, part.triangles)
+            if around == "point":
+                triangles = triangles[part.vertices[triangles, 1].min(axis=1) > LOWEST_MM]
             for turn in (-360.0, 0.0, 360.0):
                 moved = at + np.array([turn, 0.0, 0.0])
-                shapes.append((moved.astype(np.float32), _whole(at, part.triangles)))
+                shapes.append((moved.astype(np.float32), triangles))
         self._view = View((-200.0, 200.0), (-160.0, 160.0), 0.5)
         self._depth = self._view.draw(shapes).depth
         seen = np.flatnonzero(np.isfinite(self._depth).any(axis=0))
@@ -217,16 +223,17 @@ def tsm_text(quads: list[list[int]], points: np.ndarray) -> str:
 
 
 def write_3dm(path: Path) -> None:
-    """A NURBS head that is closed around, with sunken sockets, and two spheres for eyeballs."""
+    """A NURBS head that is closed around and ends in a pole at its top, with round sockets and two spheres in them."""
     import rhino3dm
 
-    skin = Radius("axis", {}, ("skin",))
-    around, up = 72, 44
+    skin = Radius("point", {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}, ("skin",))
+    around, up = 144, 84
     angles = -180.0 + 360.0 * np.arange(around) / around
-    a, h = np.meshgrid(angles, np.linspace(-125.0, 150.0, 241), indexing="ij")
-    rows = skin.points(a, h)
+    a, h = np.meshgrid(angles, np.linspace(-50.0, 89.9, 421), indexing="ij")
+    rows = sunken(skin.points(a, h))
     knots = open_knots(up - 3)
-    across = make_lsq_spline(np.linspace(0.0, 1.0, 241), np.moveaxis(rows, 1, 0), knots, 3).c.transpose(1, 0, 2)
+    across = make_lsq_spline(np.linspace(0.0, 1.0, 421), np.moveaxis(rows, 1, 0), knots, 3).c.transpose(1, 0, 2)
+    across[:, -1] = across[:, -1].mean(axis=0)
     surface = rhino3dm.NurbsSurface.Create(3, False, 4, 4, around + 3, up)
     for k in range(around + 5):
         surface.KnotsU[k] = float(k - 2)
@@ -237,10 +244,19 @@ def write_3dm(path: Path) -> None:
             surface.Points[i, j] = rhino3dm.Point4d(*across[i % around, j].tolist(), 1.0)
     model = rhino3dm.File3dm()
     model.Objects.AddSurface(surface)
-    for x in (31.8, -31.8):
-        ball = rhino3dm.Sphere(rhino3dm.Point3d(x, 36.1, 84.2), 12.0)
-        model.Objects.AddBrep(ball.ToBrep())
+    for eye in EYES:
+        model.Objects.AddBrep(rhino3dm.Sphere(rhino3dm.Point3d(*eye.tolist()), EYE_RADIUS).ToBrep())
     model.Write(str(path), 7)
+
+
+def sunken(points: np.ndarray) -> np.ndarray:
+    """Points (..., 3) of the skin, pressed in around the eyes so that their fronts show."""
+    out = points.copy()
+    for eye in EYES:
+        off = np.hypot(points[..., 0] - eye[0], (points[..., 1] - eye[1]) / 0.72)
+        deep = np.where(points[..., 2] > eye[2] - 5.0, SOCKET_MM * np.exp(-((off / 11.0) ** 4)), 0.0)
+        out[..., 2] -= deep
+    return out
 
 
 KINDS: dict[str, tuple[str, Callable[[Path], None]]] = {
@@ -261,21 +277,22 @@ def draw(kind: str, folder: Path) -> None:
     carried = SurfaceOptions(unit="mm", expressions_from=ICT)
     print("\n".join(fit_surfaces(path, folder / "ict", name=kind, options=carried, progress=say).lines()))  # noqa: T201
     wanted = [("hand", {}), ("hand", HAND), ("ict", POSES["smile"]), ("ict", POSES["surprise"])]
-    images = [picture(folder / name, pose) for name, pose in wanted]
+    camera = framed(Camera.front().orbit(18.0, 0.0), Head.load(folder / "ict"))  # a little from its left
+    images = [picture(folder / name, pose, camera) for name, pose in wanted]
     sheet = Image.new("RGB", (SIZE * len(images), SIZE))
     for k, image in enumerate(images):
         sheet.paste(image, (SIZE * k, 0))
     sheet.save(FOLDER / f"surface-head-{kind}.webp", quality=80, method=6)
 
 
-def picture(folder: Path, pose: dict[str, float]) -> Image.Image:
-    """A head from the front, a little to its left."""
+def picture(folder: Path, pose: dict[str, float], camera: Camera) -> Image.Image:
+    """A head in a pose."""
     if not (folder / "decimated.npz").exists():
         decimate_head(folder)
         shade_head(folder)
     head = Head.load(folder)
     with Offscreen(head, (SIZE, SIZE)) as screen:
-        return Image.fromarray(screen.render(head.values(pose), framed(Camera.front().orbit(18.0, 0.0), head)))
+        return Image.fromarray(screen.render(head.values(pose), camera))
 
 
 if __name__ == "__main__":
