@@ -46,20 +46,21 @@ class HeightLimits:
     Parameters
     ----------
     samples : (s, 3) at rest, as :func:`place_samples` gives them, the eye looking ahead; radius : the eyeball's.
-    held : do they stay on the eyeball? If not, they only keep out of it.
+    held : do they rest on the eyeball, with their thickness? If not, they only keep out of it. cling : are they brought
+        back to it, too?
 
     Attributes
     ----------
     lifts : (s,) as :meth:`find` found them, mm.
     """
 
-    def __init__(self, samples: Floats, radius: float, *, held: bool) -> None:
+    def __init__(self, samples: Floats, radius: float, *, held: bool, cling: bool = True) -> None:
         self._radius = radius
         self._heights, self.lifts = np.empty(len(samples)), np.empty(len(samples))
         find_heights(samples, radius, FORWARD, self._heights)
         self._most = np.maximum(self._heights, TOUCH_MM)
         self._least = np.minimum(self._most, LID_MM if held else TOUCH_MM)
-        self._hold = smoothstep(self._most, HOLD_MM[1], HOLD_MM[0]) * held
+        self._hold = smoothstep(self._most, HOLD_MM[1], HOLD_MM[0]) * (held and cling)
 
     def find(self, samples: Floats, axis: Floats) -> float:
         """Fill ``lifts`` for samples (s, 3) over an eye that looks along ``axis (3,)``; returns the largest
@@ -82,7 +83,9 @@ class EyeballClearance:
     samples : (s, 3) as placed last, see :func:`place_samples`.
     """
 
-    def __init__(self, surface: DCPSurface, places: Floats, eye: Floats, radius: float, *, held: bool = False) -> None:
+    def __init__(
+        self, surface: DCPSurface, places: Floats, eye: Floats, radius: float, *, held: bool = False, cling: bool = True
+    ) -> None:  # fmt: skip
         self.eye, self.radius = np.ascontiguousarray(eye, np.float64), radius
         start, ids, share = weights_at(surface, places)
         self.near = np.unique(ids)
@@ -90,7 +93,7 @@ class EyeballClearance:
         self.ids, self.table = _inverse(start, ids, share, surface.points, REGULARISATION[radius > 0])
         self._lift, self.samples = self.table.astype(np.float32), np.empty((len(places), 3))
         self.place(surface.points)
-        self._limits = HeightLimits(self.samples, radius, held=held) if radius > 0 else None
+        self._limits = HeightLimits(self.samples, radius, held=held, cling=cling) if radius > 0 else None
 
     def place(self, points: Floats) -> None:
         """Compute ``samples`` from control points (n, 3)."""
@@ -122,7 +125,8 @@ class ContactSolver:
 
     def __init__(self, contact: Contact, surface: DCPSurface, head: HeadData) -> None:
         self.contact = contact
-        self._sides = EyeballClearance(surface, contact.places.reshape(-1, 2), *eye_of(contact, head), held=True)
+        places, eye = contact.places.reshape(-1, 2), eye_of(contact, head)
+        self._sides = EyeballClearance(surface, places, *eye, held=True, cling=contact.cling)
         self._lids = self._sides.radius > 0
         self._rows = contact_rows(contact)
         self._samples = self._sides.samples.reshape(*contact.places.shape[:3], 3)

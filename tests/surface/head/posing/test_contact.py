@@ -179,6 +179,9 @@ def test_limits_hold_what_rests_near_and_free_what_rests_far() -> None:
         least = min(most, LID_MM if held else TOUCH_MM)
         assert limits.find(sample(least - 0.25), AHEAD) == pytest.approx(0.25, abs=1e-6)
         assert limits.lifts[0] == pytest.approx(0.4, abs=1e-6)
+        free = HeightLimits(sample(height), RADIUS, held=held, cling=False)  # may lift off, and sinks as little
+        assert free.find(sample(most + 1.0), AHEAD) == 0.0 and free.lifts[0] == 0.0
+        assert free.find(sample(least - 0.25), AHEAD) == pytest.approx(0.25, abs=1e-6)
 
 
 def test_weights_are_those_of_the_surface_and_add_up() -> None:
