@@ -12,6 +12,7 @@ from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress, part_of
 from surface.check.overlaps import overlap_notes
+from surface.fit.features.combs import combed
 from surface.fit.features.drawn_lids import seat_drawn_lids
 from surface.fit.features.eye_colours import paint_layers
 from surface.fit.features.eye_lids import fit_lids, gazes_of
@@ -174,6 +175,8 @@ def _fit_parts(
             plan.notes.append(f"{part.name}: left out: it cannot be fitted, {report.neutral.rms:.1f} mm RMS")
             continue
         parts.append(skin_part(part, chart, fitted, rig))
+        if part.material == "lash" and not recipe.parts and rig.radius > 0:
+            parts[-1] = combed(parts[-1], mesh, islands, rig.eyes, scale)
         reports.append(report)
         fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))
         if recipe.hair and recipe.hair["face"] == part.name:
