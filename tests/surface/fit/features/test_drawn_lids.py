@@ -20,7 +20,8 @@ def spoilt(head: HeadData, sunk_mm: float, share: float) -> HeadData:
     away = np.linalg.norm(off, axis=1)
     inwards = -off / away[:, None] * ((away < 16.0) & (off[:, 2] > 0))[:, None]
     groups = [Group(g.name, g.ids, np.float32(share) * g.moves) if g.name in BLINKS else g for g in face.groups]
-    return replace(head, parts=[replace(face, points=face.points + sunk_mm * inwards, groups=groups), *head.parts[1:]])
+    parts = [replace(face, points=face.points + sunk_mm * inwards, groups=groups), *head.parts[1:]]
+    return replace(head, parts=parts, contacts=[replace(c, cling=True) for c in head.contacts])
 
 
 def eye_seen(head: Head, side: int, yaw: float = 0.0, **values: float) -> float:
