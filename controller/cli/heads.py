@@ -152,6 +152,9 @@ def fit(
     report: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for a report: figures, tables, error drawn on the face.")
     ] = None,
+    force: Annotated[
+        bool, typer.Option("--force", help="Write a head that does not follow its mesh, too; else it is refused.")
+    ] = False,
 ) -> None:
     """Turn a mesh with UVs and expression shapes, or a file of surfaces, into a head of control points.
 
@@ -168,6 +171,7 @@ def fit(
 
     if is_surface_file(mesh):
         meshes_only = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
+        meshes_only |= {"--force": force}
         wanted = SurfaceFit(
             mesh, out, name, unit, up, forward, tuple(without or ()), tuple(only or ()), tuple(groups or ()),
             strict, expressions_from, landmarks, report,
@@ -180,7 +184,7 @@ def fit(
     if keep and identities is None:
         raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
     given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep, "--report": report}
-    check_transfer(expressions_from, landmarks, given)
+    check_transfer(expressions_from, landmarks, given | {"--force": force})
     if not keep:
         options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
         columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -195,10 +199,12 @@ def fit(
             if expressions_from is not None:
                 found = transfer(mesh, expressions_from, out, title, landmarks, options, progress)
             else:
-                found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report)
+                found = fit_head(
+                    mesh, out, name=title, progress=progress, options=options, report_dir=report, force=force
+                )
         shaded = _decimate_and_shade(out)
         show_table(_error_table(found))
-        for line in _remarks(found, shaded):
+        for line in _remarks(found, shaded) + _checked(out):
             console.print(line, soft_wrap=True, markup=False)
         console.print(f"wrote {out}", soft_wrap=True)
     if identities is not None:
@@ -232,7 +238,18 @@ def _remarks(found: FitReport, shaded: bool) -> list[str]:
     lines += [f"left out, not ARKit's: {left_out}"] if left_out else []
     lines += [_NO_SHAPES] if not found.parameters else []
     lines += [] if shaded else [_NO_SHADE]
-    return lines + (found.dense.lines()[::-1] if found.dense else [])
+    lines += found.dense.lines()[::-1] if found.dense else []
+    return lines + [f"written by --force: {fault}" for fault in found.faults]
+
+
+def _checked(out: Path) -> list[str]:
+    """What ``omote check`` would say of a head, in lines; how skin overlaps is among the remarks of a fit already."""
+    # start-up: --help does without these
+    from surface.check import check_head
+    from surface.head import Head
+
+    with console.status("checking"):
+        return [f"check: {f.line(str(out))}" for f in check_head(Head.load(out)) if f.kind != "overlap"]
 
 
 def _decimate_and_shade(out: Path) -> bool:

@@ -18,22 +18,32 @@ from surface.base.jit import kernel
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import Mouth
 from surface.check.places import Places
+from surface.check.raster import View, turned
 from surface.check.subject import Subject, pose_of
+from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import border_edges
 
 SEWN_MM = 0.4  # borders nearer than this are one
+ROUND_MM = 1.2  # of border between two edges: those nearer along it are neighbours, and not sewn to each other
 WIDE_MM = 1.2  # least width of a hole: twice its area by its length
 APART_MM = 1.0  # of borders that are sewn at rest: a seam that opens
 SHEETS = ("skin", "mouth", "tongue")  # materials of which sheets are made that have to be closed
+END_MM = 40.0  # width of an opening that is where the mesh ends: a head without scalp under its hair
+SEEN = 0.1  # of a hole's area: one of which less is seen from outside lies under other skin, as the root of an ear does
+FACING = 0.3  # cosine between a hole's way out and the viewer, from which it is looked into from behind
+CAP_STEPS = 60  # pixels over the cap of a hole
+VIEWS = ((0, 0), (60, 0), (-60, 0), (120, 0), (-120, 0), (180, 0), (0, -60), (0, 60))  # yaw and pitch, degrees
 MOUTH_REACH = 0.75  # in widths of the mouth, from its middle
 EYE_REACH = 1.7  # in radii: a loop whose middle is so near to an eye's centre is its opening
 
 
 @kernel
-def _nearest(middles: Any, own: Any, ends: Any, ids: Any, reach: float, distance: Any, other: Any) -> None:
+def _nearest(
+    middles: Any, own: Any, ends: Any, ids: Any, first: Any, beside: Any, reach: float, distance: Any, other: Any
+) -> None:
     """Distance (q,) of the middles of edges between vertices ``own (q, 2)`` from the nearest of edges ``ends (e, 2,
     3)`` that shares none of its vertices ``ids (e, 2)`` with it, and which one that is; infinite and -1 beyond
-    ``reach``."""
+    ``reach``. Edge i has nothing to do with those of ``beside`` from ``first[i]`` to ``first[i + 1]``."""
     for i in range(len(middles)):
         best, found = reach * reach, -1
         p0, p1, p2 = middles[i, 0], middles[i, 1], middles[i, 2]
@@ -42,6 +52,11 @@ def _nearest(middles: Any, own: Any, ends: Any, ids: Any, reach: float, distance
             if abs(a[0] - p0) > 20.0 * reach or abs(a[1] - p1) > 20.0 * reach:
                 continue
             if ids[j, 0] == own[i, 0] or ids[j, 0] == own[i, 1] or ids[j, 1] == own[i, 0] or ids[j, 1] == own[i, 1]:
+                continue
+            near = False
+            for k in range(first[i], first[i + 1]):
+                near |= beside[k] == j
+            if near:
                 continue
             d0, d1, d2 = ends[j, 1, 0] - a[0], ends[j, 1, 1] - a[1], ends[j, 1, 2] - a[2]
             length = d0 * d0 + d1 * d1 + d2 * d2
@@ -63,6 +78,7 @@ class Borders:
     part : (e,) number of the part; ends : (e, 2) vertices of it, those in one place as one; ids : (e, 2) the same, in
         one count over all parts.
     sewn : (e,); mate : (e,) the edge that each is sewn to, -1 for none.
+    first (e + 1,), beside : the edges that follow each one closely along its border, from ``first[i]`` on.
     """
 
     part: Ints
@@ -70,6 +86,14 @@ class Borders:
     ids: Ints
     sewn: Bools
     mate: Ints
+    first: Ints
+    beside: Ints
+
+    def neighbours(self, rows: Ints) -> tuple[Ints, Ints]:
+        """``first`` and ``beside`` of some edges alone."""
+        count = np.diff(self.first)[rows]
+        first = np.append(0, np.cumsum(count))
+        return first, self.beside[np.repeat(self.first[rows] - first[:-1], count) + np.arange(first[-1])]
 
     def at(self, vertices: list[Floats32]) -> Floats:
         """(e, 2, 3) in a pose."""
@@ -87,11 +111,51 @@ def find_borders(subject: Subject) -> Borders:
     part = np.concatenate([np.full(len(e), k) for k, e in pairs] or [np.zeros(0, int)]).astype(np.int64)
     ends = np.concatenate([e for _, e in pairs] or [np.zeros((0, 2), int)]).astype(np.int64)
     ids = ends + starts[part][:, None]
-    found = Borders(part, ends, ids, np.zeros(len(part), bool), np.full(len(part), -1))
+    found = Borders(part, ends, ids, np.zeros(len(part), bool), np.full(len(part), -1), *_none(len(part)))
     at = found.at(subject.rest)
+    first, beside = _beside(ids, np.linalg.norm(at[:, 1] - at[:, 0], axis=1), ROUND_MM * subject.scale)
     distance, mate = np.full(len(part), np.inf), np.full(len(part), -1, np.int64)
-    _nearest(at.mean(axis=1), ids, at, ids, SEWN_MM * subject.scale, distance, mate)
-    return Borders(part, ends, ids, mate >= 0, mate)
+    _nearest(at.mean(axis=1), ids, at, ids, first, beside, SEWN_MM * subject.scale, distance, mate)
+    return Borders(part, ends, ids, mate >= 0, mate, first, beside)
+
+
+def _none(edges: int) -> tuple[Ints, Ints]:
+    """Edges without any beside them."""
+    return np.zeros(edges + 1, np.int64), np.zeros(0, np.int64)
+
+
+def _beside(ids: Ints, length: Floats, reach: float) -> tuple[Ints, Ints]:
+    """``first (e + 1,)`` and ``beside`` of edges between vertices ``ids (e, 2)``: those that less than ``reach`` mm of
+    border lies between. A border of very short edges is near itself everywhere, and sewn to nothing."""
+    meet: dict[int, list[int]] = {}
+    for edge, pair in enumerate(ids.tolist()):
+        for vertex in pair:
+            meet.setdefault(vertex, []).append(edge)
+    ends, long, short = ids.tolist(), length.tolist(), np.flatnonzero(length < reach).tolist()
+    between: list[set[int]] = [set() for _ in ends]
+    for start in short:  # a path with anything between its ends begins with a short edge
+        for vertex in ends[start]:
+            _walk(start, vertex, meet, ends, long, reach, between)
+    first = np.append(0, np.cumsum([len(b) for b in between])).astype(np.int64)
+    return first, np.array([j for b in between for j in sorted(b)], np.int64)
+
+
+def _walk(
+    start: int, vertex: int, meet: dict[int, list[int]], ends: list[list[int]], long: list[float], reach: float,
+    between: list[set[int]],
+) -> None:  # fmt: skip
+    """Note all pairs of edges that a short way along the border, which begins with edge ``start`` and leaves it at
+    ``vertex``, lies between."""
+    before = [j for j in meet[sum(ends[start]) - vertex] if j != start]
+    ways = [(vertex, long[start], {start})]
+    while ways:
+        at, gone, used = ways.pop()
+        for edge in (j for j in meet[at] if j not in used):
+            for other in before:
+                between[other].add(edge)
+                between[edge].add(other)
+            if gone + long[edge] < reach:
+                ways.append((sum(ends[edge]) - at, gone + long[edge], used | {edge}))
 
 
 def _welded(subject: Subject, number: int) -> Ints:
@@ -105,16 +169,23 @@ def _welded(subject: Subject, number: int) -> Ints:
 
 
 def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Borders) -> Iterator[Finding]:
-    """Holes at rest, and seams that open in a pose."""
+    """Holes at rest, and seams that open in a pose.
+
+    Very wide ones are where the skin of a mesh ends, as under hair. They are warnings, and so are holes of smaller
+    parts of such a head, as the roots of its ears.
+    """
     at = borders.at(subject.rest)
+    found = []
     for loop in _loops(subject, borders):
-        middle, width = _form(at[loop])
-        if width < WIDE_MM * subject.scale or _is_opening(subject, mouth, middle):
-            continue
-        length = float(np.linalg.norm(at[loop, 1] - at[loop, 0], axis=1).sum())
-        part = subject.parts[borders.part[loop[0]]].name
-        text = f"a hole in part {part!r}, {length:.0f} mm round: {places.name(middle)}"
-        yield Finding("hole", text, f"close it in the mesh, then {AGAIN}")
+        (middle, width), part = _form(at[loop]), subject.parts[borders.part[loop[0]]]
+        wide = width >= WIDE_MM * subject.scale and not _is_opening(subject, mouth, middle)
+        if wide and is_seen(subject, part, at[loop]):
+            length = float(np.linalg.norm(at[loop, 1] - at[loop, 0], axis=1).sum())
+            text = f"a hole in part {part.name!r}, {length:.0f} mm round: {places.name(middle)}"
+            found.append((text, width > END_MM * subject.scale, part is subject.parts[subject.skin[0]]))
+    ends = any(large for _, large, _ in found)
+    for text, large, main in found:
+        yield Finding("hole", text, f"close it in the mesh, then {AGAIN}", warning=large or (ends and not main))
     yield from _opening_seams(subject, mouth, borders, places)
 
 
@@ -132,7 +203,7 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
         loose = np.linalg.norm(way - way[borders.mate], axis=1)[sewn] > 0.3 * APART_MM * subject.scale
         asked = sewn[loose]
         distance, mate = np.full(len(asked), np.inf), np.full(len(asked), -1, np.int64)
-        _nearest(middle[asked], borders.ids[asked], at, borders.ids, reach, distance, mate)
+        _nearest(middle[asked], borders.ids[asked], at, borders.ids, *borders.neighbours(asked), reach, distance, mate)
         apart = np.minimum(distance, reach)
         if len(apart) and apart.max() > worst:
             worst, where, pose = float(apart.max()), rest[asked[apart.argmax()]], name
@@ -204,6 +275,29 @@ def _form(ends: Floats) -> tuple[Floats, float]:
     middle = ends.reshape(-1, 3).mean(axis=0)
     area = 0.5 * np.linalg.norm(np.cross(ends[:, 0] - middle, ends[:, 1] - middle).sum(axis=0))
     return middle, float(4.0 * area / max(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum(), 1e-9))
+
+
+def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
+    """Would a cap over a loop of a part's border, edges (e, 2, 3), be seen from outside? From behind only one of skin
+    that faces the viewer counts: a head without a scalp, or a mask, shows the inside of all it has."""
+    middle = ends.reshape(-1, 3).mean(axis=0)
+    cap = np.concatenate([ends.reshape(-1, 3), middle[None]]).astype(np.float32)
+    rows = np.arange(len(ends), dtype=np.int32)
+    triangles = np.column_stack([2 * rows, 2 * rows + 1, np.full_like(rows, 2 * len(ends))])
+    shapes = [*subject.shapes(subject.rest), (cap, triangles)]
+    out = -np.cross(ends[:, 0] - middle, ends[:, 1] - middle)  # triangles have a hole on their right
+    area = 0.5 * float(np.linalg.norm(out, axis=1).sum())
+    for yaw, pitch in VIEWS:
+        turn = turned(yaw, pitch)
+        faces = float(turn[2] @ out.sum(axis=0)) > FACING * 2.0 * area
+        if abs(yaw) > 90 and not (faces and part.material == "skin"):
+            continue
+        (x0, y0, _), (x1, y1, _) = (f(cap @ turn.T, axis=0).tolist() for f in (np.min, np.max))
+        step = max(x1 - x0, y1 - y0, 1e-3) / CAP_STEPS
+        picture = View((x0, x1), (y0, y1), step, turn).draw(shapes)
+        if (picture.parts == len(shapes) - 1).sum() * step**2 > SEEN * area:
+            return True
+    return False
 
 
 def _is_opening(subject: Subject, mouth: Mouth | None, middle: Floats) -> bool:

@@ -19,6 +19,7 @@ FINE = 0.15  # of a pixel where their gap is measured
 TORN = 0.3  # of the largest motion: a step of that height from one pixel to the next is the line of the lips
 LEAST_MM = 3.0  # that the chin must go down
 DEEP_MM, LIPS_MM = 9.0, 15.0  # skin so far behind the lips, and no higher or lower, is the inside of the mouth
+PARTED_MM = 12.0  # of lips at rest: a higher opening is none between lips
 INNER = 0.5  # of the width of the mouth, in which its gap is measured
 
 
@@ -51,14 +52,14 @@ def find_mouth(subject: Subject) -> Mouth | None:
     if drop < LEAST_MM * subject.scale:
         return None
     picture = _front(subject)
-    down = _values(subject, picture, moves)
+    down, below = _over_gaps(_values(subject, picture, moves), round(PARTED_MM / STEP))
     step = np.where(np.isfinite(down[1:]) & np.isfinite(down[:-1]), down[1:] - down[:-1], 0.0)
     torn: Bools = step > TORN * np.nanmax(-down)
     columns = _longest_run(np.asarray(torn.any(axis=0)))
     if len(columns) < 5:
         return None
     rows = np.argmax(step[:, columns], axis=0)
-    y = np.array([picture.at(r, 0)[1] for r in rows]) + 0.5 * picture.view.step
+    y = np.array([picture.at(r, 0)[1] for r in rows]) + 0.5 * (1 + below[rows + 1, columns]) * picture.view.step
     x = np.array([picture.at(0, c)[0] for c in columns])
     return Mouth(x, y, picture.depth[rows, columns], float(np.nanmax(-down)))
 
@@ -78,6 +79,21 @@ def _values(subject: Subject, picture: Picture, of: list[Floats]) -> Floats:
         here = picture.parts == k
         out[here] = of[k][subject.parts[k].triangles].mean(axis=1)[picture.rows[here]]
     return out
+
+
+def _over_gaps(values: Floats, most: int) -> tuple[Floats, Ints]:
+    """Values (h, w) with what is above a gap of at most ``most`` rows in it, too, and how high the gap below is.
+
+    Lips that are parted at rest show nothing between them; the line of the lips runs along the lower one's edge.
+    """
+    known = np.isfinite(values)
+    rows = np.arange(len(values))[:, None]
+    above = np.minimum.accumulate(np.where(known, rows, len(values))[::-1], axis=0)[::-1]
+    under = np.maximum.accumulate(np.where(known, rows, -1), axis=0)
+    gap = np.where((above < len(values)) & (under >= 0), above - under - 1, 0)
+    narrow = ~known & (gap > 0) & (gap <= most)
+    taken = np.take_along_axis(values, np.minimum(above, len(values) - 1), axis=0)
+    return np.where(narrow, taken, values), np.where(narrow, gap, 0)
 
 
 def _longest_run(hits: Bools, most_gap: int = 2) -> Ints:

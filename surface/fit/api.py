@@ -9,8 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress, part_of
 from surface.check.overlaps import overlap_notes
+from surface.fit.features.combs import combed
 from surface.fit.features.drawn_lids import seat_drawn_lids
 from surface.fit.features.eye_colours import paint_layers
 from surface.fit.features.eye_lids import fit_lids, gazes_of
@@ -21,7 +23,7 @@ from surface.fit.features.joins import find_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.wrinkles import with_deep_wrinkles
-from surface.fit.measures.mend import mend_spikes, turned_faces
+from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.points.care import POINTS as MORE_POINTS
 from surface.fit.points.care import with_care
 from surface.fit.points.lid_seating import close_lips, draw_brows, seat_lids, strengthen
@@ -36,6 +38,7 @@ from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
+from surface.fit.source.naming.astray import right_shapes
 from surface.fit.source.naming.shapes import to_arkit
 from surface.fit.source.placing.anatomy import Landmarks
 from surface.fit.source.placing.frame import head_scale
@@ -50,13 +53,14 @@ from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
 
 LOOSE_MM = 3.0  # RMS of a head of usual size: a part beside the face that is further off, as hair, is left out
+REFUSED = "-refused"  # what is put behind the name of a folder
 # pose that decides how finely a part is cut into triangles
 SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
 
 
 def fit_head(
     mesh_path: str | Path, out_dir: str | Path, *, name: str, progress: Progress | None = None,
-    options: LoadOptions = LoadOptions(), report_dir: str | Path | None = None,
+    options: LoadOptions = LoadOptions(), report_dir: str | Path | None = None, force: bool = False,
 ) -> FitReport:  # fmt: skip
     """Fit a head to a mesh and write it.
 
@@ -64,10 +68,12 @@ def fit_head(
     out_dir : folder that gets head.toml and head.npz.
     progress : called with the part being fitted and the fraction done, 0..1.
     options : how to interpret the mesh. report_dir : folder that gets the report (see
-        :func:`surface.fit.reportfile.write_report`).
+        :func:`surface.fit.reportfile.write_report`). force : write a head that does not follow its mesh, too.
 
     Raises FitError: the mesh cannot be read, has no faces, holds NaN, is no manifold, or does
-    not fit together. Nothing is written then. HeadFileError: a folder cannot be written to.
+    not fit together; nothing is written then. Or the head does not follow the mesh (:func:`faults_of`): it is written
+    to the folder ``out_dir`` with :data:`REFUSED` behind its name, to be looked at, and what is in ``out_dir`` stays.
+    HeadFileError: a folder cannot be written to.
     """
     report = progress or no_progress
     for folder in (out_dir, report_dir):
@@ -76,8 +82,26 @@ def fit_head(
     result = fit_mesh(loaded, name, report, str(mesh_path))
     if report_dir is not None:
         write_report(result, report_dir, report)
-    save_data(out_dir, result.head)
+    refused = bool(result.report.faults) and not force
+    save_data(refused_folder(out_dir) if refused else out_dir, result.head)
+    if refused:
+        raise _refusal(result.report, refused_folder(out_dir))
     return result.report
+
+
+def refused_folder(out_dir: str | Path) -> Path:
+    """Where a head goes that is refused."""
+    folder = Path(out_dir).resolve()
+    return folder.with_name(folder.name + REFUSED)
+
+
+def _refusal(report: FitReport, folder: Path) -> FitError:
+    said = "; ".join(report.faults)
+    hint = (
+        f"look at it (omote render --head {folder} -o out.png), correct the mesh there or leave out what hides it "
+        "(--without NAME), or use --force to write it nevertheless"
+    )
+    return FitError(f"the head is refused: {said}; it was written to {folder} instead", hint=hint)
 
 
 def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh") -> FitResult:
@@ -90,8 +114,9 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     else:
         loaded = _repaired(place(loaded))
         check_manifold(loaded.mesh, where)
-        recipe, mesh = Recipe([]), to_arkit(loaded.mesh, loaded.named)
+        recipe, (mesh, exchanged) = Recipe([]), right_shapes(to_arkit(loaded.mesh, loaded.named))
         plan = make_plan(mesh)
+        plan.notes.extend(exchanged)
         mesh, seated = fit_lids(mesh, plan.found) if plan.found else (mesh, [])
         plan.notes.extend(seated)
     sources = sources_of(mesh.names)
@@ -118,6 +143,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces, dense,
+        tuple(faults_of(dense, fitted_parts, scale)),
     )  # fmt: skip
     return FitResult(head, report, fitted_parts)
 
@@ -151,6 +177,8 @@ def _fit_parts(
             plan.notes.append(f"{part.name}: left out: it cannot be fitted, {report.neutral.rms:.1f} mm RMS")
             continue
         parts.append(skin_part(part, chart, fitted, rig))
+        if part.material == "lash" and not recipe.parts and rig.radius > 0:
+            parts[-1] = combed(parts[-1], mesh, islands, rig.eyes, scale)
         reports.append(report)
         fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))
         if recipe.hair and recipe.hair["face"] == part.name:

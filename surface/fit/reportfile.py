@@ -63,6 +63,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
         "format": FORMAT, "version": VERSION, "head": report.name, "scale": report.scale,
         "control_points": report.points, "parameters": report.parameters,
         "missing": list(report.missing), "left_out": list(report.left_out), "notes": list(report.notes),
+        "faults": list(report.faults),
         "shapes": report.shapes, "empty": list(report.empty), "presets": list(report.presets), "pieces": report.pieces,
         "parts": [
             {
@@ -72,7 +73,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
             }
             for p in report.parts
         ],
-        "distances": asdict(replace(report.dense, sticking={})) if report.dense else None,
+        "distances": asdict(replace(report.dense, sticking={}, turned={})) if report.dense else None,
         "nurbs": {
             "control_points": nets[0].points, "rms_mm": nets[0].rms, "uniform_nets": [asdict(n) for n in nets[1:]],
         },

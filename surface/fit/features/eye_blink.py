@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.features.eye_openings import Opening
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import sources_of
@@ -18,6 +18,10 @@ BLINKS = 0.6  # of the opening's height: a shape that leaves more open is no who
 REACH = 0.7  # rad round the eyeball from a lid's edge: where the change has faded out
 CORNER = 0.12  # of the opening's width: how far beyond its corners the change has faded out
 COLUMNS = 33
+SPREAD = 9  # columns to either side over which what is missing in one fades: lids are no curtains
+LEAST_MM = 0.3  # of the way of an edge: in the corners it is none
+STILL = 0.2  # of the way of the other lid: one that a blink takes no further follows as a whole
+MOVED = 0.5  # of the way that a blink takes a lid: skin that it moves so far follows wholly, what it leaves alone stays
 
 
 @dataclass(frozen=True)
@@ -75,13 +79,33 @@ def _edges(local: Floats, edge: Ints, rest: Floats) -> _Edges:
     return _Edges(x, *sides)
 
 
+def _spread(need: Floats) -> Floats:
+    """What is missing in every column, or a share of what is missing in others beside it."""
+    columns = np.arange(len(need))
+    share = 1.0 - smoothstep(np.abs(columns[:, None] - columns), 0.0, SPREAD)
+    out: Floats = (share * need).max(axis=1)
+    return out
+
+
+def _moved(rest: Floats, move: Floats, is_upper: Bools, before: _Edges, after: _Edges, radius: float) -> Floats:
+    """(n,) how much skin follows: as far as the blink itself moves it, by the way of the lid's edge in that column."""
+    far, out = np.linalg.norm(move, axis=1), np.ones(len(rest))
+    ways = [radius * np.abs(a - b) for a, b in ((before.upper, after.upper), (before.lower, after.lower))]
+    most = max(float(way.max()) for way in ways)
+    for side, way in zip((is_upper, ~is_upper), ways, strict=True):
+        if way.max() > STILL * most:
+            edge = np.maximum(np.interp(rest[:, 0], before.x, way), LEAST_MM)
+            out = np.where(side, smoothstep(far / (MOVED * edge)), out)
+    return out
+
+
 def _lengthened(rest: Floats, move: Floats, before: _Edges, after: _Edges, radius: float) -> Floats:
     """(n, 3) what to add to a blink's displacements, so that both edges meet and overlap a little."""
     local = rest + move
     along = (local[:, 0] - after.x[0]) / (after.x[-1] - after.x[0])
     inner = 1.0 - smoothstep(np.maximum(-along, along - 1.0), 0.0, CORNER)
     overlap = OVERLAP_MM / radius * np.clip(4.0 * before.gap / max(float(before.gap.max()), 1e-9), 0.0, 1.0)
-    need = np.maximum(after.gap + overlap, 0.0)
+    need = _spread(np.maximum(after.gap + overlap, 0.0))
     own, angle = np.interp(local[:, 0], after.x, need) * inner, _angle(rest)
     upper, lower = (np.interp(rest[:, 0], before.x, side) for side in (before.upper, before.lower))
     is_upper = angle >= 0.5 * (upper + lower)
@@ -89,6 +113,7 @@ def _lengthened(rest: Floats, move: Floats, before: _Edges, after: _Edges, radiu
     fade = (
         (1.0 - smoothstep(off, 0.0, REACH)) * (local[:, 2] > 0.3 * radius) * (np.linalg.norm(rest, axis=1) < 2 * radius)
     )
+    fade = fade * _moved(rest, move, is_upper, before, after, radius)
     turn = own * fade * np.where(is_upper, -UPPER, 1.0 - UPPER)
     c, s = np.cos(turn), np.sin(turn)
     y, z = c * local[:, 1] + s * local[:, 2], c * local[:, 2] - s * local[:, 1]

@@ -35,7 +35,7 @@ def fit_lids(mesh: FitMesh, eyes: Eyes) -> tuple[FitMesh, list[str]]:
     ball = Eyeball(left, eyes.radius, right)
     lids = _lids(mesh, eyes.centres, eyes.radius, eyes.faces)
     least = _least_height(mesh, lids, eyes.radius)
-    seated = seat_lids(shut, ball, ball, lids, gazes_of(mesh), under_gaze=True, least=least)
+    seated = seat_lids(shut, ball, ball, lids, gazes_of(mesh), under_gaze=True, least=least, cling=False)
     most = float(np.linalg.norm(seated.vertices - mesh.vertices, axis=1).max(initial=0.0))
     notes += [f"lids were moved by up to {most:.1f} mm, out of the eyeballs"] if most > TELL_MM else []
     return seated, notes

@@ -37,7 +37,7 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     rules = [DROOP_RULE] if any(g.name == DROOP for p in head.parts for g in p.groups) else []
     wrinkled, folds = add_wrinkles(face, charts[face.name], mesh, recipe.wrinkles)
     names = tuple(p.name for p in head.parts)
-    contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names)
+    contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names, cling=bool(recipe.parts))
     parts = [wrinkled if p is face else p for p in head.parts]
     head = add_correctives(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.correctives)
     rest = read_pose(np.zeros(59))
@@ -70,11 +70,15 @@ def _corrected(part: PartData, name: str, shares: dict[str, float]) -> PartData:
     return replace(part, groups=[*part.groups, Group(name, ids, field[ids])]) if len(ids) else part
 
 
-def find_contacts(face: PartData, eyes: Floats, radius: float, parts: tuple[str, ...]) -> list[Contact]:
+def find_contacts(
+    face: PartData, eyes: Floats, radius: float, parts: tuple[str, ...], *, cling: bool = True
+) -> list[Contact]:  # fmt: skip
     """Contacts at the holes of a face that are cut by slits: lids where an eyeball is behind, else lips.
 
     face : the part with the holes. eyes : (2, 3) centres; radius : 0 for a head without known eyes.
     parts : names of all parts; those that line an opening or are rooted at it are its followers.
+    cling : do lids follow the eyeball as closely in every shape as at rest? Those of a mesh without a recipe are
+        coarser than its cornea, which would show in them as a bump.
     """
     surface = make_surface(face)
     out = []
@@ -88,7 +92,7 @@ def find_contacts(face: PartData, eyes: Floats, radius: float, parts: tuple[str,
         lining = [p for p in (LID_LINING if lids else LIP_LINING) if p in parts]
         depth, reach, share = (0.58 * radius, 0.5 * radius, 0.8) if lids else (15.0, 12.0, 0.5)
         places = sample_places(surface, loop, depth, reach)
-        out.append(Contact(NAMES[eye], face.name, tuple(lining), eye, reach, share, places))
+        out.append(Contact(NAMES[eye], face.name, tuple(lining), eye, reach, share, places, cling))
     return out
 
 

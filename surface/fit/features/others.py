@@ -11,8 +11,12 @@ import numpy as np
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.kinds import SKIN, Kind, kind_of, kinds
 from surface.fit.source.mesh import FitMesh, renumbered
+from surface.fit.source.textures import sample_colours
 
 TOOTH_MM, TEETH = 24.0, 12  # so many pieces no larger than this are teeth
+INNER = ("teeth", "mouth")  # kinds whose texture often draws teeth, gums and tongue alike
+RED, PALE = 0.45, 0.65  # green by red, linear: at most that of a tongue, at least that of teeth
+BRIGHT = 0.3  # linear: least mean of the channels of teeth
 
 
 def by_object(mesh: FitMesh, label: Ints, pieces: list[int], scale: float) -> dict[tuple[str, Kind], list[int]]:
@@ -24,7 +28,7 @@ def by_object(mesh: FitMesh, label: Ints, pieces: list[int], scale: float) -> di
     small: dict[str, list[int]] = {}
     for k in pieces:
         name = mesh.piece_of(int(np.argmax(label == k)))
-        kind = kind_of(name)
+        kind = _by_colour(mesh, label == k, kind_of(name))
         tiny = np.ptp(points_of(mesh, label == k), axis=0).max() < TOOTH_MM * scale
         if kind.name == SKIN and tiny:
             small.setdefault(name, []).append(k)
@@ -33,6 +37,18 @@ def by_object(mesh: FitMesh, label: Ints, pieces: list[int], scale: float) -> di
     for name, own in small.items():
         out.setdefault((name, kinds()["teeth" if len(own) >= TEETH else SKIN]), []).extend(own)
     return out
+
+
+def _by_colour(mesh: FitMesh, chosen: Bools, kind: Kind) -> Kind:
+    """What a piece inside the mouth is by its colour, where the mesh tells it: one object often holds teeth and tongue,
+    and as teeth all of it would be a white wall."""
+    found = sample_colours(mesh, np.flatnonzero(chosen), steps=2) if kind.name in INNER else None
+    if found is None:
+        return kind
+    red, green, blue = np.average(found.colour[:, :3], axis=0, weights=found.weight + 1e-12)
+    if green < RED * red:
+        return kinds()["tongue"] if kind.name == "teeth" else kind
+    return kinds()["teeth"] if green > PALE * red and red + green + blue > 3.0 * BRIGHT else kind
 
 
 def points_of(mesh: FitMesh, chosen: Bools) -> Floats:

@@ -96,10 +96,10 @@ def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: 
         at + reach * (0.55 * LASH_LEAN * away + 0.12 * LASH_LIFT * up),
         at + reach * (LASH_LEAN * away + LASH_LIFT * up),
     ]
-    return fit_strip(np.stack(rows, axis=2), 10, 3, [_comb(hairs, lean=0.012, thick=0.42 if upper else 0.36)])
+    return fit_strip(np.stack(rows, axis=2), 10, 3, [comb(hairs, lean=0.012, thick=0.42 if upper else 0.36)])
 
 
-def _comb(hairs: int, *, lean: float, thick: float) -> Floats:
+def comb(hairs: int, *, lean: float, thick: float) -> Floats:
     """One closed line: a thin continuous root, and hairs that taper to :data:`TIP`; ``thick`` in their distances."""
     rng, root = np.random.default_rng(5), 0.22 * thick
     tops = []

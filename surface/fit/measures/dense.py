@@ -11,7 +11,8 @@ from surface.check.mouth import find_mouth
 from surface.check.places import Places
 from surface.check.subject import Subject, pose_of
 from surface.fit.measures.closest import ClosestTree
-from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, errors_of
+from surface.fit.measures.turned import TurnedFaces
+from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, Turned, errors_of
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.head import Head
 from surface.head.model.data import HeadData
@@ -28,6 +29,7 @@ class _Pair:
         self.name, self.number = part.name, number
         self._uv = np.asarray(subject.parts[number].uv, np.float64)
         faces = mesh.faces[faces_of(mesh, part)]
+        self.turned = TurnedFaces(part, subject.parts[number])
         self._cut = subject.parts[number].triangles.astype(np.int64), triangles(faces)
         self._used = np.unique(self._cut[0]), np.unique(self._cut[1])
         at = subject.rest[number].astype(np.float64), mesh.vertices
@@ -75,6 +77,7 @@ def measure_dense(
     found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
     worst: dict[bool, Spot] = {}
     sticking: dict[tuple[str, str], Floats] = {}
+    turned: dict[tuple[str, str], Turned] = {}
     for shape in (NEUTRAL, *(n for n in sources if n in subject.claimed)):
         posed = subject.rest if shape == NEUTRAL else subject.at_one(shape)
         moved = mesh.vertices + _displacement(mesh, sources, shape)
@@ -82,6 +85,9 @@ def measure_dense(
             both = pair.distances(posed[pair.number].astype(np.float64), moved)
             if len(places_out := pair.sticking(*both[0], limit)):
                 sticking[pair.name, shape] = places_out
+            over = Turned(*pair.turned.find(posed[pair.number].astype(np.float64), moved))
+            if over.mm2 > 0.0:
+                turned[pair.name, shape] = over
             in_folds = np.concatenate([d[fold] for d, fold in both])
             found[pair.name][shape] = Both(*_outside_folds(both), errors_of(in_folds))
             for spot, fold in _greatest(pair, both, shape, places, subject.parts[pair.number].material):
@@ -89,7 +95,7 @@ def measure_dense(
     rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
     added = tuple(p.name for p in subject.parts if p.name not in found)
     samples = sum(len(r) for p in pairs for r in p.rest)
-    return DenseErrors(found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking)
+    return DenseErrors(found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned)
 
 
 def _outside_folds(both: list[tuple[Floats, Bools]]) -> tuple[Errors, Errors]:

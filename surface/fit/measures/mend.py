@@ -1,7 +1,8 @@
-"""Mend what sticks out of a fitted head though the mesh has nothing there: control points that the samples hardly hold.
+"""Mend what sticks out of a fitted head though the mesh has nothing there, and what is turned over: control points that
+the samples hardly hold.
 
 Such a point is put where its neighbours say, at rest or in one shape. A mend that does not bring the surface nearer to
-the mesh is taken back. A face that still sticks out far is refused, so that no such head is written.
+the mesh is taken back. What a face is refused for after that is told by :func:`faults_of`.
 """
 
 from __future__ import annotations
@@ -12,9 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.base.errors import FitError
 from surface.fit.measures.dense import measure_dense
-from surface.fit.points.report import NEUTRAL, DenseErrors, FittedPart
+from surface.fit.points.report import NEUTRAL, Both, DenseErrors, FittedPart
 from surface.fit.source.islands import find_islands, signed_areas
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, HeadData, PartData
@@ -22,9 +22,12 @@ from surface.head.model.meshes import make_surface
 from surface.head.posing.contact import weights_at
 
 STICKS_OUT_MM = 6.0  # of a head of usual size: a surface so far from the mesh is mended
-REFUSED_MM = 20.0  # a face so far from it is not written
+TURNED_MM2 = 10.0  # of a head of usual size: so much surface that is turned over is mended
+REFUSED_MM, REFUSED_MM2 = 20.0, 100.0  # a face so far from the mesh, or of which so much is turned over, is refused
+ASTRAY_MM = 4.0  # and one of which at rest a hundredth is further from it
 ROUNDS = 3
 HOLDS = 0.1  # least weight of a control point at a place that sticks out
+NOWHERE = np.zeros((0, 2))
 NEIGHBOURS = 12  # that say where a point belongs
 
 
@@ -33,51 +36,69 @@ def mend_spikes(
 ) -> tuple[HeadData, DenseErrors, list[str]]:  # fmt: skip
     """The head without spikes, its errors, and what was mended, in words.
 
-    scale : size of the head relative to a usual one. Raises FitError: the face still sticks out of the mesh by far.
+    scale : size of the head relative to a usual one.
     """
     limit = STICKS_OUT_MM * scale
     notes: list[str] = []
     dense = measure_dense(head, mesh, sources, parts, limit)
     for _ in range(ROUNDS):
-        wanted = _wanted(dense, limit)
+        wanted = _wanted(dense, limit) + _turned(dense, scale)
         if not wanted:
             break
         trial, moved = head, 0
-        for part, shape, _ in wanted:
+        for part, shape in dict.fromkeys((part, shape) for part, shape, _ in wanted):
             trial, count = _smoothed(trial, part, shape, dense)
             moved += count
         after = measure_dense(trial, mesh, sources, parts, limit)
         if not moved or not _is_better(after, dense, wanted):
             break
-        told = ", ".join(f"{part} ({shape}: {most:.1f} mm)" for part, shape, most in wanted[:3])
-        notes.append(f"mended: {moved} control points stuck out of the mesh: {told}")
+        notes.append(f"mended: {moved} control points stuck out or were turned over: {_told(wanted)}")
         head, dense = trial, after
-    _refuse(dense, parts, scale)
     return head, dense, notes
 
 
-def _wanted(dense: DenseErrors, limit: float) -> list[tuple[str, str, float]]:
+def _told(wanted: list[tuple[str, str, str]]) -> str:
+    return ", ".join(f"{part} ({shape}: {much})" for part, shape, much in wanted[:3])
+
+
+def _wanted(dense: DenseErrors, limit: float) -> list[tuple[str, str, str]]:
     """Parts and shapes that stick out, and by how much; of a part that does at rest only that, for all shapes show
     it."""
     out = []
     for part, by_shape in dense.parts.items():
         far = {s: b.to_mesh.max for s, b in by_shape.items() if b.to_mesh.max > limit}
-        out += [(part, s, most) for s, most in far.items() if NEUTRAL not in far or s == NEUTRAL]
+        out += [(part, s, f"{most:.1f} mm") for s, most in far.items() if NEUTRAL not in far or s == NEUTRAL]
     return out
 
 
-def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, str, float]]) -> bool:
-    """Does everything that was mended stick out less, and nothing else more?"""
-    now = {(p, s): both.to_mesh.max for p, by_shape in after.parts.items() for s, both in by_shape.items()}
-    gained = all(now[part, shape] < 0.8 * most for part, shape, most in wanted)
-    return gained and max(now.values()) <= max(b.to_mesh.max for x in before.parts.values() for b in x.values())
+def _turned(dense: DenseErrors, scale: float) -> list[tuple[str, str, str]]:
+    """Parts and shapes that are turned over somewhere, and how much; of a part that is at rest only that."""
+    far = {key: over.mm2 for key, over in dense.turned.items() if over.mm2 > TURNED_MM2 * scale**2}
+    return [(p, s, f"{mm2:.0f} mm²") for (p, s), mm2 in far.items() if s == NEUTRAL or (p, NEUTRAL) not in far]
+
+
+def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, str, str]]) -> bool:
+    """Does everything that was mended stick out less, or is less of it turned over, and nothing else more?"""
+    was, now = _furthest(before), _furthest(after)
+    over, left = (
+        {key: both.mm2 for key, both in d.turned.items() if key in {w[:2] for w in wanted}} for d in (before, after)
+    )
+    gained = all(now[w[:2]] < 0.8 * was[w[:2]] for w in wanted if w[2].endswith("mm"))
+    gained &= sum(left.values()) <= 0.5 * sum(over.values()) or not any(w[2].endswith("²") for w in wanted)
+    return gained and max(now.values()) <= max(was.values())
+
+
+def _furthest(dense: DenseErrors) -> dict[tuple[str, str], float]:
+    return {(p, s): both.to_mesh.max for p, by_shape in dense.parts.items() for s, both in by_shape.items()}
 
 
 def _smoothed(head: HeadData, name: str, shape: str, dense: DenseErrors) -> tuple[HeadData, int]:
     """The head with the control points of one part put right in one shape, and how many they are."""
     part = next(p for p in head.parts if p.name == name)
-    rows = dense.sticking.get((name, shape))
-    if rows is None or not len(rows):
+    over = dense.turned.get((name, shape))
+    found = [dense.sticking.get((name, shape), NOWHERE), over.uv if over is not None else NOWHERE]
+    rows = np.concatenate(found)
+    if not len(rows):
         return head, 0
     bad = _holding(part, rows)
     if shape == NEUTRAL:
@@ -129,20 +150,33 @@ def _sees(part: PartData, place: Floats, others: Floats) -> Bools:
     return out
 
 
-def _refuse(dense: DenseErrors, parts: Sequence[FittedPart], scale: float) -> None:
-    """Raise FitError for a face that is far out where the mesh is near the face: a spike, and no coarse fit."""
+def faults_of(dense: DenseErrors, parts: Sequence[FittedPart], scale: float) -> list[str]:
+    """What a fitted head is refused for, in words: a face, the first part, that does not follow its mesh, that sticks
+    out of it by far, or that is turned over."""
     shapes = dense.parts.get(parts[0].name, {}) if parts else {}
-    far = [
-        (b.to_mesh.max, s) for s, b in shapes.items() if not b.to_mesh.max <= 2.0 * max(b.to_surface.max, b.folds.max)
-    ]
-    worst = max(far, default=(0.0, ""), key=lambda x: (x[1] == NEUTRAL, x[0]))
-    if not worst[0] <= REFUSED_MM * scale:
-        where = f": {dense.worst.place}" if dense.worst and dense.worst.shape == worst[1] else ""
-        when = "at rest" if worst[1] == NEUTRAL else f"with {worst[1]} = 1"
-        raise FitError(
-            f"the fitted face sticks out of the mesh by {worst[0]:.0f} mm {when}{where}",
-            hint="unwrap the mesh anew so that no faces overlap or are turned over in (u, v), or leave that shape out",
-        )
+    out = []
+    if NEUTRAL in shapes and not all(x <= ASTRAY_MM * scale for x in _both(shapes[NEUTRAL], "p99")):
+        most = max(_both(shapes[NEUTRAL], "p99"))
+        out.append(f"the fitted face does not follow the mesh: a hundredth of it is {most:.0f} mm off or more")
+    far = [(max(_both(b, "max")), s == NEUTRAL, s) for s, b in shapes.items()]
+    far = [x for x in far if not x[0] <= REFUSED_MM * scale]
+    if far:
+        most, _, shape = max(far, key=lambda x: (x[1], x[0]))
+        where = f": {dense.worst.place}" if dense.worst and dense.worst.shape == shape else ""
+        out.append(f"the fitted face is {most:.0f} mm off the mesh {_when(shape)}{where}")
+    over = {s: x.mm2 for (p, s), x in dense.turned.items() if shapes and p == parts[0].name}
+    shape = max(over, key=lambda s: over[s], default=NEUTRAL)
+    if over.get(shape, 0.0) > REFUSED_MM2 * scale**2:
+        out.append(f"{over[shape]:.0f} mm² of the fitted face are turned over {_when(shape)}")
+    return out
+
+
+def _both(errors: Both, key: str) -> list[float]:
+    return [getattr(errors.to_mesh, key), getattr(errors.to_surface, key)]
+
+
+def _when(shape: str) -> str:
+    return "at rest" if shape == NEUTRAL else f"with {shape} = 1"
 
 
 def turned_faces(mesh: FitMesh) -> list[str]:

@@ -47,13 +47,14 @@ def fit_sphere(points: Floats) -> tuple[Floats, float]:
 
 def seat_lids(
     mesh: FitMesh, old: Eyeball, new: Eyeball, vertices: Ints, gazes: Floats | None = None, *,
-    under_gaze: bool = False, least: float = LID_MM[0],
+    under_gaze: bool = False, least: float = LID_MM[0], cling: bool = True,
 ) -> FitMesh:  # fmt: skip
     """Move the chosen vertices so that what touched the old eyeballs touches the new ones, their corneas included.
 
     gazes : (k, 2, 3) where the left and the right eye look in every shape; straight ahead if not given.
     least : height above an eyeball, mm, that nothing falls short of: more for large faces, whose middles lie deeper.
     under_gaze : whether lids that a shape leaves alone are moved, too, where the cornea comes under them.
+    cling : whether lids that a shape lifts higher above the eyeball than they are at rest are brought back.
     """
     ahead = np.tile(AHEAD, (2, 1))
     rest, deltas = mesh.vertices.copy(), mesh.deltas.copy()
@@ -61,7 +62,7 @@ def seat_lids(
     thick = np.clip(_above(warped, new, ahead), least, LID_MM[1])
     rest[vertices] = _lay(warped, new, ahead, thick, np.full(len(vertices), np.inf))
     most = _above(rest[vertices], new, ahead)
-    most[most > LOOSE_MM] = np.inf
+    most[(most > LOOSE_MM) | (not cling)] = np.inf
     for k, delta in enumerate(mesh.deltas):
         gaze = ahead if gazes is None else gazes[k]
         whole = under_gaze and not np.array_equal(gaze, ahead)

@@ -72,6 +72,14 @@ class Both:
 
 
 @dataclass(frozen=True)
+class Turned:
+    """Surface that faces the other way than the mesh: its area, mm², and places (k, 2) in (u, v)."""
+
+    mm2: float
+    uv: Floats
+
+
+@dataclass(frozen=True)
 class DenseErrors:
     """Errors by part, then by shape, :data:`NEUTRAL` first; the greatest of all; and what was not measured.
 
@@ -79,6 +87,7 @@ class DenseErrors:
     added : parts of the head that the mesh does not have. left_out : pieces of the mesh that the head does not have.
     samples : measured in every shape, both ways.
     sticking : by part and shape, (k, 2) in (u, v): vertices of the surface that are further from the mesh than a limit.
+    turned : by part and shape, what of the surface is turned over.
     """
 
     parts: dict[str, dict[str, Both]]
@@ -88,6 +97,7 @@ class DenseErrors:
     left_out: tuple[str, ...]
     samples: int
     sticking: dict[tuple[str, str], Floats] = field(default_factory=dict)
+    turned: dict[tuple[str, str], Turned] = field(default_factory=dict)
 
     def lines(self) -> list[str]:
         """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
@@ -111,6 +121,7 @@ class FitReport:
         vowels, visemes and moods that are understood, and made from parameters instead.
     pieces : the mesh's objects and what kind each is, left out or not.
     dense : errors of the posed head by true distances, both ways.
+    faults : what a head is refused for, in words; none of a usable one.
     """
 
     name: str
@@ -125,6 +136,7 @@ class FitReport:
     presets: tuple[str, ...] = ()
     pieces: dict[str, str] = field(default_factory=dict)
     dense: DenseErrors | None = None
+    faults: tuple[str, ...] = ()
 
     @property
     def points(self) -> int:

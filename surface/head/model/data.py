@@ -113,6 +113,7 @@ class Contact:
     reach_mm : distance from the rim at which the correction has faded out. share : the upper side's part of it, 0..1.
     places : (2, columns, rows, 2) samples in (u, v), the upper side first, columns in the order of x, rows from the
         rim on; two thirds of the rows can touch the other side, in the rest the correction fades out.
+    cling : are lids brought back onto the eyeball where shapes lift them off it? If not, they only keep out of it.
     """
 
     name: str
@@ -122,6 +123,7 @@ class Contact:
     reach_mm: float
     share: float
     places: Floats
+    cling: bool = True
 
 
 @dataclass(frozen=True)

@@ -232,7 +232,10 @@ def _contact(section: _Section, places: Floats, names: list[str]) -> Contact:
             raise section.error("followers", f"no part named {follower!r} stands after {t['part']!r}")
     if t["eye"] not in (-1, 0, 1):
         raise section.error("eye", f"{t['eye']} is not -1 (lips), 0 (left eye) or 1 (right eye)")
-    return Contact(**t | {"followers": tuple(t["followers"])}, places=places.astype(float))
+    cling = section.table.get("cling", True)
+    if not isinstance(cling, bool):
+        raise section.error("cling", f"{cling!r} is neither true nor false")
+    return Contact(**t | {"followers": tuple(t["followers"])}, places=places.astype(float), cling=cling)
 
 
 def _rule(section: _Section) -> Rule:
@@ -321,7 +324,9 @@ def _table(head: HeadData) -> dict[str, Any]:
             for p in head.parts
         ],
         "seams": [{"a": s.part_a, "b": s.part_b} for s in head.seams],
-        "contacts": [{k: v for k, v in vars(c).items() if k != "places"} for c in head.contacts],
+        "contacts": [
+            {k: v for k, v in vars(c).items() if k != "places" and not (k == "cling" and v)} for c in head.contacts
+        ],
         "rules": [vars(r) for r in head.rules],
         "paint": head.paint,
         **({"placement": _placement_table(head.placement)} if head.placement else {}),

@@ -34,17 +34,20 @@ FAR_MM = 18.0  # from every sample: points with large spans so far away would mo
 LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
 
 
-def height_limits(samples: Floats, radius: float, *, held: bool) -> tuple[Floats, Floats, Floats]:
+def height_limits(
+    samples: Floats, radius: float, *, held: bool, cling: bool = True
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """How high samples of a lid shall lie above an eyeball: least and most, mm, and how firmly they are held down to
     the most, 0..1; (s,) each.
 
     samples : (s, 4) at rest, as :func:`.contact_kernels.place_samples` gives them, the eye looking ahead; radius : the
-    eyeball's, 0 for none; held : do they stay on the eyeball? If not, they only keep out of it.
+    eyeball's, 0 for none; held : do they rest on the eyeball, with their thickness? If not, they only keep out of it.
+    cling : are they brought back to it, too?
     """
     heights = np.empty(len(samples))
     find_heights(samples, radius, FORWARD, heights)
     most = np.maximum(heights, TOUCH_MM)
-    hold = smoothstep(most, HOLD_MM[1], HOLD_MM[0]) * held
+    hold = smoothstep(most, HOLD_MM[1], HOLD_MM[0]) * (held and cling)
     return np.minimum(most, LID_MM if held else TOUCH_MM), most, hold
 
 
@@ -63,7 +66,9 @@ class EyeballClearance:
     sampling, limits, work : what the kernels of :mod:`.contact_solve` take.
     """
 
-    def __init__(self, surface: DCPSurface, places: Floats, eye: Floats, radius: float, *, held: bool = False) -> None:
+    def __init__(
+        self, surface: DCPSurface, places: Floats, eye: Floats, radius: float, *, held: bool = False, cling: bool = True
+    ) -> None:  # fmt: skip
         self.eye, self.radius = np.ascontiguousarray(eye, np.float64), float(radius)
         start, ids, share = weights_at(surface, places)
         self.ids, self.table = _inverse(start, ids, share, surface.points, REGULARISATION[radius > 0])
@@ -74,7 +79,7 @@ class EyeballClearance:
                      np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(3))  # fmt: skip
         gather_near(surface.points, near, self.eye, self.work[0])
         place_all(self.radius > 0.0, self.sampling, self.work)
-        limits = height_limits(self.samples, self.radius, held=held)
+        limits = height_limits(self.samples, self.radius, held=held, cling=cling)
         self.limits = (*limits, self.radius, LIFT_GAIN, by_lanes(self.table))
 
     def apply(self, axis: Floats, points: Floats) -> float:
@@ -92,7 +97,8 @@ class ContactSolver:
 
     def __init__(self, contact: Contact, surface: DCPSurface, head: HeadData) -> None:
         self.contact, self.passes = contact, 0
-        self._sides = EyeballClearance(surface, contact.places.reshape(-1, 2), *eye_of(contact, head), held=True)
+        places, eye = contact.places.reshape(-1, 2), eye_of(contact, head)
+        self._sides = EyeballClearance(surface, places, *eye, held=True, cling=contact.cling)
         lids = self._sides.radius > 0
         self._apart = _column_moves(contact).T @ self._sides.table
         columns, rows = contact.places.shape[1:3]

@@ -101,10 +101,11 @@ def fitted(monkeypatch):
     neutral = SimpleNamespace(rms=0.1234, p99=0.5678, max=1.2345)
     part = SimpleNamespace(name="face", points=77, neutral=neutral, mean_shape_rms=0.0456)
     report = SimpleNamespace(name="me", points=123, parameters=["a", "b"], parts=[part], missing=[], left_out=[],
-                             notes=["a note [x]"], dense=None, pieces={})  # fmt: skip
+                             notes=["a note [x]"], dense=None, pieces={}, faults=())  # fmt: skip
     calls = []
 
-    def fit_head(mesh, out, *, name, progress, options, report_dir):
+    def fit_head(mesh, out, *, name, progress, options, report_dir, force):
+        report.forced = force
         calls.append((mesh, out, name, options, report_dir))
         progress("face", 0.5)
         progress("report", 0.75)
@@ -117,6 +118,7 @@ def fitted(monkeypatch):
 
     monkeypatch.setattr("surface.fit.api.fit_head", fit_head)
     monkeypatch.setattr("surface.fit.points.report.face_bounds", lambda found: "face: 1.2 mm [max]")
+    monkeypatch.setattr("controller.cli.heads._checked", lambda out: [])
     monkeypatch.setattr("surface.view.draw.decimate.decimate_head", lambda out: calls.append(("decimate", out)))
     monkeypatch.setattr("surface.view.pictures.occlusion.shade_head", shade)
     monkeypatch.setattr(
@@ -165,6 +167,29 @@ def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path):
     calls.clear()
     said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out), "--keep", "--identities", "i.npz"])
     assert said.output == "identities: broad, long\n" and [call[0] for call in calls] == ["identities"]
+
+
+def test_a_fit_can_be_forced_and_then_says_what_is_wrong(fitted, tmp_path, monkeypatch):
+    _, report = fitted
+    words = ["fit", "a.glb", "-o", str(tmp_path / "mine")]
+    assert CliRunner().invoke(make_app(), words).exit_code == 0 and not report.forced
+    report.faults = ("48 mm off", "all turned over")
+    monkeypatch.setattr("controller.cli.heads._checked", lambda out: [f"check: {out.name} has a spike"])
+    said = CliRunner().invoke(make_app(), [*words, "--force"])
+    assert report.forced
+    wanted = ["written by --force: 48 mm off", "written by --force: all turned over", "check: mine has a spike"]
+    assert said.output.splitlines()[-4:-1] == wanted
+    for more in (["--expressions-from", "ict"], ["-o", "x"]):
+        file = "a.3dm" if more[0] == "-o" else "a.glb"
+        refused = CliRunner().invoke(make_app(), ["fit", file, "-o", str(tmp_path / "mine"), "--force", *more])
+        assert isinstance(refused.exception, ConfigError) and "--force: " in str(refused.exception)
+
+
+def test_a_fit_ends_with_what_a_check_says(sheet):
+    _, head, output = sheet
+    said = CliRunner().invoke(make_app(), ["check", str(head)])
+    assert isinstance(said.exception, ConfigError) and "unsealed lips: the neutral face" in str(said.exception)
+    assert "check: unsealed lips: the neutral face" in " ".join(output.split())
 
 
 def test_a_terminal_keeps_no_bar_of_a_fit(fitted, tmp_path, monkeypatch):

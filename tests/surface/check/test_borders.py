@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
@@ -46,7 +48,7 @@ def test_the_nearest_edge_that_shares_no_vertex(reach: float) -> None:
     ends[3, 1] = ends[3, 0]  # an edge of no length
     middles = ends.mean(axis=1)
     distance, other = np.zeros(14), np.zeros(14, np.int64)
-    borders._nearest(middles, ids, ends, ids, reach, distance, other)
+    borders._nearest(middles, ids, ends, ids, *borders._none(14), reach, distance, other)
     for i in range(14):
         away = [np.inf if set(ids[j]) & set(ids[i]) else brute(middles[i], ends[j]) for j in range(14)]
         best = int(np.argmin(away))
@@ -62,7 +64,7 @@ def test_a_long_edge_is_found_from_its_far_end() -> None:
     for far in ([15.0, 0, 0], [0, 15.0, 0], [-15.0, 0, 0], [0, -15.0, 0]):
         ends, middle = np.array([[[0.0, 0, 0], far]]), np.array([[0.0, 0.0, 0.5]]) + far
         distance, other = np.zeros(1), np.zeros(1, np.int64)
-        borders._nearest(middle, own, ends, ids, 1.0, distance, other)
+        borders._nearest(middle, own, ends, ids, *borders._none(1), 1.0, distance, other)
         assert other[0] == 0 and distance[0] == pytest.approx(0.5)
 
 
@@ -180,7 +182,7 @@ def test_a_seam_that_slides_along_itself_stays_shut() -> None:
     kept = borders.find_borders(head)
     distance, mate = np.zeros(len(kept.part)), np.zeros(len(kept.part), np.int64)
     at = kept.at(head.posed({"mouthLeft": 1.0}))
-    borders._nearest(at.mean(axis=1), kept.ids, at, kept.ids, 4.0, distance, mate)
+    borders._nearest(at.mean(axis=1), kept.ids, at, kept.ids, kept.first, kept.beside, 4.0, distance, mate)
     inner = kept.sewn & (np.abs(at.mean(axis=1)[:, 1]) < 30.0)
     assert distance[inner].max() < 1e-3
 
@@ -203,7 +205,7 @@ def test_chains_are_edges_that_share_ends() -> None:
 def test_ends_that_lie_together_are_one() -> None:
     at = np.array([[[0.0, 0, 0], [5, 0, 0]], [[5.2, 0, 0], [9, 0, 0]], [[9.5, 0, 0], [12, 0, 0]]]) + 30.0
     pairs = np.array([[4, 7], [9, 2], [11, 3]])
-    found = borders.Borders(np.zeros(3), pairs, pairs, np.zeros(3, bool), np.full(3, -1))
+    found = borders.Borders(np.zeros(3), pairs, pairs, np.zeros(3, bool), np.full(3, -1), *borders._none(3))
     joined = borders._joined(found, at, np.arange(3), 0.4)
     assert joined[0, 1] == joined[1, 0] and len(set(joined.ravel().tolist())) == 5
     assert len(borders._joined(found, at, np.array([0, 2]), 0.4)) == 2
@@ -215,3 +217,54 @@ def test_sheets_are_joined_by_triangles_and_by_seams() -> None:
     label = borders._sheets(head, borders.find_borders(head))
     first, second, third = np.split(label, np.cumsum([len(r) for r in head.rest])[:-1])
     assert set(first) == set(second) == {0} and set(third) == {len(first) + len(second)}
+
+
+def ragged(length: float) -> Subject:
+    """A sheet whose upper border has teeth of very short edges, each ``length`` mm long."""
+    x = np.concatenate([np.arange(-40.0, -5.0, 4.0), np.arange(-5.0, 5.0, length), np.arange(5.0, 41.0, 4.0)])
+    upper = np.column_stack([x, np.where(np.arange(len(x)) % 2, 40.0, 40.0 - 0.3 * length), np.zeros(len(x))])
+    lower = np.column_stack([x, np.full(len(x), 0.0), np.zeros(len(x))])
+    a = np.arange(len(x) - 1)
+    b, up = a + 1, len(x)
+    triangles = np.vstack([np.column_stack([a, b, b + up]), np.column_stack([a, b + up, a + up])])
+    return plain.subject(plain.part("face", np.vstack([lower, upper]), triangles), eyes=ABOVE)
+
+
+@pytest.mark.parametrize("length", [0.15, 0.3, 3.0])
+def test_a_border_of_very_short_edges_is_not_sewn_to_itself(length: float) -> None:
+    """The edge after the next lies within the reach of a seam, and the border would fall into pieces, all but one of
+    them holes."""
+    head = ragged(length)
+    found = borders.find_borders(head)
+    assert not found.sewn.any()
+    assert len(list(borders._loops(head, found))) == 0 and texts(head) == []
+
+
+def test_edges_beside_each_other_are_those_with_little_border_between() -> None:
+    ids = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [7, 8]])
+    first, beside = borders._beside(ids, np.array([5.0, 0.4, 0.4, 0.5, 5.0, 0.1]), 1.0)
+    rows = [beside[a:b].tolist() for a, b in pairwise(first)]
+    assert rows == [[2, 3], [3, 4], [0, 4], [0, 1], [1, 2], []]
+
+
+def behind(part: str) -> Subject:
+    """A sheet of skin with a hole, in front of or behind a whole one."""
+    hole = holed((8, 28), (40, 52), 0.0 if part == "front" else -20.0)
+    whole = plain.part("over", *plain.sheet((-90, 90), (-90, 90), 4.0, -20.0 if part == "front" else 0.0))
+    return plain.subject(hole, whole)
+
+
+def test_a_hole_under_other_skin_is_none() -> None:
+    assert len(texts(behind("front"))) == 1
+    assert texts(behind("back")) == []
+
+
+def test_where_the_skin_of_a_mesh_ends_is_a_warning() -> None:
+    points, triangles = plain.sheet((-80, 80), (-80, 80), 4.0)
+    ended = plain.without(points, triangles, (-40, 40), (0, 60))
+    ear = plain.sheet((-80, 80), (-80, 80), 4.0, 30.0)
+    lobe = plain.part("ear", ear[0] + [300.0, 0, 0], plain.without(*ear, (8, 28), (40, 52)))
+    for faces, warned in ((ended, True), (triangles, False)):
+        head = plain.subject(plain.part("face", points, faces), lobe, eyes=ABOVE)
+        found = list(borders.holes(head, None, Places(head, None), borders.find_borders(head)))
+        assert [f.warning for f in found] == [warned] * len(found) and len(found) == 1 + warned

@@ -44,6 +44,15 @@ def test_the_middle_of_a_mouth_lies_between_its_corners_at_its_foremost_depth() 
     assert line.width == 40.0
 
 
+@pytest.mark.parametrize(("gap", "parted"), [(3.0, True), (9.0, True), (14.0, False)])
+def test_lips_that_are_parted_at_rest_have_a_line_in_their_middle(gap: float, parted: bool) -> None:
+    found = find_mouth(plain.subject(*jaw(gap, at=(-20.0, 20.0))))
+    assert (found is not None and found.width == pytest.approx(2 * HALF, abs=2.5)) == parted
+    if parted:
+        assert found is not None
+        assert np.interp(0.0, found.x, found.y) == pytest.approx(LIPS_Y - 0.5 * gap, abs=0.5)
+
+
 def test_a_jaw_that_does_not_open_has_no_line_of_lips() -> None:
     assert find_mouth(plain.subject(*jaw(drop=2.9))) is None
     assert find_mouth(plain.subject(*jaw(drop=3.1))) is not None

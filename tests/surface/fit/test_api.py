@@ -13,6 +13,7 @@ from surface.fit.api import eyes_of, fit_mesh, part_chart, prepare, recipe_plan
 from surface.fit.features.eye_lids import gazes_of
 from surface.fit.points.recipe import PartRecipe, Recipe
 from surface.fit.points.refine import FitRequest
+from surface.fit.points.report import FitResult
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names
@@ -84,6 +85,18 @@ def test_nothing_is_written_for_a_bad_mesh(tmp_path):
     with pytest.raises(FitError):
         fit_head(path, tmp_path / "head", name="bad")
     assert not (tmp_path / "head").exists()
+
+
+def test_a_head_that_does_not_follow_its_mesh_is_put_elsewhere_unless_forced(tmp_path, fitted, monkeypatch):
+    folder, report, _ = fitted
+    bad = FitResult(Head.load(folder).data, replace(report, faults=("it is 48 mm off the mesh",)), [])
+    monkeypatch.setattr(api, "fit_mesh", lambda *_: bad)
+    path, out = write_npz(tmp_path / "m.npz", slit_sheet()), tmp_path / "head"
+    with pytest.raises(FitError, match="refused: it is 48 mm off the mesh; it was written to ") as caught:
+        fit_head(path, out, name="bad")
+    assert "--force" in caught.value.hint and not out.exists()
+    assert Head.load(tmp_path / "head-refused").data.name == "sheet"
+    assert fit_head(path, out, name="bad", force=True).faults and Head.load(out).data.name == "sheet"
 
 
 def sphere(centre: np.ndarray, radius: float) -> np.ndarray:

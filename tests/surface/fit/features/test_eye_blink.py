@@ -115,8 +115,9 @@ def test_edges_are_angles_about_the_eye_over_even_places() -> None:
     assert (moved.upper >= moved.lower - 1e-9).all() and moved.lower[16] < 0 < moved.lower[0]
 
 
-def test_lids_turn_by_the_gap_and_an_overlap_that_fades_towards_the_corners() -> None:
+def test_lids_turn_by_the_gap_and_an_overlap_that_fades_towards_the_corners(monkeypatch) -> None:
     """Closed form: the gap left and a millimetre more, of which the upper lid goes 85 hundredths."""
+    monkeypatch.setattr(module, "SPREAD", 0.5)
     x, radius = np.linspace(-13, 13, module.COLUMNS), 12.0
     opening = np.clip(1.0 - (x / 13) ** 2, 0.0, None)
     before = module._Edges(x, 0.5 * opening + 0.1, -0.3 * opening + 0.1)
@@ -124,16 +125,38 @@ def test_lids_turn_by_the_gap_and_an_overlap_that_fades_towards_the_corners() ->
     for at in (0.0, 6.5, -12.1875):
         share = 1.0 - (at / 13) ** 2
         need = 0.3 * share + min(4.0 * share, 1.0) / radius
-        for edge, way in ((0.5 * share + 0.1, -0.85), (-0.3 * share + 0.1, 0.15)):
-            rest = np.array([[at, radius * np.sin(edge), radius * np.cos(edge)]])
-            more = module._lengthened(rest, 0 * rest, before, after, radius)
-            after_move = rest + more
-            turned = np.arctan2(after_move[0, 1], after_move[0, 2]) - edge
+        for opened, edge, way in (
+            (0.5 * share + 0.1, 0.2 * share + 0.1, -0.85),
+            (-0.3 * share + 0.1, -0.1 * share + 0.1, 0.15),
+        ):
+            rest, local = (np.array([[at, radius * np.sin(k), radius * np.cos(k)]]) for k in (opened, edge))
+            more = module._lengthened(rest, local - rest, before, after, radius)
+            turned = np.arctan2((local + more)[0, 1], (local + more)[0, 2]) - edge
             assert turned == pytest.approx(way * need, abs=1e-6), (at, way)
     none = np.array([[0.0, radius * np.sin(0.5 + 0.1 + 0.71), radius * np.cos(1.31)]])
     assert not module._lengthened(none, 0 * none, before, after, radius).any()  # a forehead does not turn
     ahead = np.array([[0.0, 24.5 * np.sin(0.6), 24.5 * np.cos(0.6)], [0.0, -11.6, 3.0]])
     assert not module._lengthened(ahead, 0 * ahead, before, after, radius).any()  # far before it; beside it
+
+
+def test_what_is_missing_in_one_column_is_shared_by_those_beside_it() -> None:
+    """Lengthened in one column alone, a lid would have a trench."""
+    need = np.zeros(module.COLUMNS)
+    need[10] = 2.0
+    spread = module._spread(need)
+    assert spread[10] == 2.0 and (np.diff(spread[:11]) >= 0).all() and (np.diff(spread[10:]) <= 0).all()
+    assert np.abs(np.diff(spread)).max() < 0.4 and spread[10 + module.SPREAD :].max() == 0.0
+    np.testing.assert_array_equal(module._spread(np.full(5, 0.7)), 0.7)
+
+
+def test_skin_that_the_blink_leaves_alone_stays_when_it_is_lengthened(plain, openings) -> None:
+    """A lid's crease and the side of the nose are within reach of the lid, but do not move."""
+    short = shortened(plain, 0.7)
+    still = np.linalg.norm(short.deltas[0], axis=1) < 1e-9
+    upper = plain.vertices[:, 1] > 40.5
+    made, _ = shut(short, openings)
+    assert not (made.deltas[0] - short.deltas[0])[still & upper].any()
+    assert np.abs(made.deltas[0] - short.deltas[0])[~still & upper].max() > 1.0
 
 
 def test_lids_are_told_apart_by_a_line_between_corners_that_need_not_be_level() -> None:

@@ -8,6 +8,7 @@ import pytest
 from surface.fit.features.others import by_object, is_skin, points_of, why_out
 from surface.fit.source.kinds import kinds
 from surface.fit.source.mesh import FitMesh
+from surface.readers.meshdata import Material
 
 
 def squares(count: int, size: float, names: tuple[str, ...]) -> FitMesh:
@@ -38,6 +39,22 @@ def test_objects_are_sorted_by_their_kinds():
     assert {(name, kind.name): own for (name, kind), own in found.items()} == {
         ("Tongue", "tongue"): [1], ("Hair", "hair"): [2], ("EyeIris", "iris"): [3, 4],
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("name", "colour", "kind"),
+    [
+        ("Teeth", (0.49, 0.35, 0.35), "teeth"), ("Teeth", (0.12, 0.024, 0.025), "tongue"),
+        ("Teeth", (0.2, 0.1, 0.1), "teeth"), ("Mouth", (0.97, 0.96, 0.97), "teeth"),
+        ("Mouth", (0.25, 0.06, 0.05), "mouth"), ("Mouth", (0.1, 0.09, 0.09), "mouth"),
+        ("Hair", (0.5, 0.1, 0.1), "hair"),
+    ],
+)  # fmt: skip
+def test_pieces_inside_the_mouth_are_told_apart_by_their_colours(name, colour, kind):
+    """One object of an avatar often holds teeth, gums and tongue, and its texture tells them apart."""
+    mesh = replace(squares(2, 30.0, ("Head", name)), materials=(None, Material("m", (*colour, 1.0))))
+    ((found, own),) = by_object(mesh, np.arange(2), [1], 1.0).items()
+    assert found[1].name == kind and own == [1]
 
 
 def test_what_may_be_skin_is_told_by_the_first_face_of_each_piece():

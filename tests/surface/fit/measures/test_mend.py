@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from surface.base.errors import FitError
 from surface.fit.measures import mend
 from surface.fit.measures.dense import measure_dense
-from surface.fit.measures.mend import mend_spikes, turned_faces
-from surface.fit.points.report import FitResult
+from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
+from surface.fit.points.report import Both, DenseErrors, Errors, FitResult, Turned
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import sources_of
 from surface.head.model.data import Group, HeadData
@@ -66,13 +66,54 @@ def test_a_good_fit_is_left_as_it_is(result: FitResult, mesh: FitMesh) -> None:
     assert head is result.head and notes == []
 
 
-def test_what_cannot_be_mended_is_refused(
-    result: FitResult, mesh: FitMesh, monkeypatch: pytest.MonkeyPatch
-) -> None:  # fmt: skip
+def test_what_cannot_be_mended_is_a_fault(result: FitResult, mesh: FitMesh, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mend, "NEIGHBOURS", 0)
-    with pytest.raises(FitError, match="the fitted face sticks out of the mesh by") as caught:
-        mend_spikes(spiked(result.head, 300.0), mesh, sources_of(mesh.names), result.parts, 1.0)
-    assert "at rest" in str(caught.value) and "unwrap the mesh" in caught.value.hint
+    _, dense, _ = mend_spikes(spiked(result.head, 300.0), mesh, sources_of(mesh.names), result.parts, 1.0)
+    faults = faults_of(dense, result.parts, 1.0)
+    assert any("mm off the mesh at rest" in f for f in faults)
+    good = measure_dense(result.head, mesh, sources_of(mesh.names), result.parts)
+    assert faults_of(good, result.parts, 1.0) == [] and faults_of(good, [], 1.0) == []
+
+
+def measured(*shapes: tuple[str, float, float], turned: float = 0.0) -> DenseErrors:
+    """Errors of a face, 99 % and greatest by shape, and how much of it is turned over."""
+    both = {s: Both(Errors(0.0, p99, 0.0), Errors(0.0, 0.0, most), Errors(0.0, 0.0, 0.0)) for s, p99, most in shapes}
+    over = {("face", "jawOpen"): Turned(turned, np.zeros((1, 2)))}
+    return DenseErrors({"face": both}, None, None, (), (), 1, {}, over)
+
+
+@pytest.mark.parametrize(
+    ("dense", "scale", "said"),
+    [
+        (measured(("neutral", 3.9, 19.0), ("jawOpen", 9.0, 19.0), turned=99.0), 1.0, []),
+        (measured(("neutral", 4.1, 9.0)), 1.0, ["does not follow the mesh: a hundredth of it is 4 mm off or more"]),
+        (measured(("neutral", np.nan, 9.0)), 1.0, ["does not follow the mesh"]),
+        (measured(("neutral", 1.0, 19.0), ("jawOpen", 1.0, 48.0)), 1.0, ["48 mm off the mesh with jawOpen = 1"]),
+        (measured(("neutral", 1.0, 48.0), ("jawOpen", 1.0, 49.0)), 1.0, ["48 mm off the mesh at rest"]),
+        (measured(("neutral", 1.0, 1.0), turned=101.0), 1.0, ["101 mm² of the fitted face are turned over with jaw"]),
+        (measured(("neutral", 7.0, 39.0), turned=390.0), 2.0, []),
+        (measured(("neutral", 9.0, 41.0), turned=410.0), 2.0, ["does not follow", "41 mm off", "410 mm²"]),
+    ],
+)
+def test_a_face_that_is_far_off_or_turned_over_is_faulty(dense: DenseErrors, scale: float, said: list[str]) -> None:
+    faults = faults_of(dense, [SimpleNamespace(name="face")], scale)  # type: ignore[list-item]
+    assert len(faults) == len(said) and all(word in fault for word, fault in zip(said, faults, strict=True))
+
+
+def test_surface_that_is_turned_over_is_found_and_mended(result: FitResult, mesh: FitMesh) -> None:
+    """Control points far beyond their neighbours, along the surface: nothing sticks out, but it runs back."""
+    part, bad = result.head.parts[0], fine_point(result.head)
+    points = part.points.copy()
+    near = np.linalg.norm(points - points[bad], axis=1) < 14.0
+    points[near, 0] -= 2.0 * (points[near, 0] - points[bad, 0])  # mirrored
+    head = replace(result.head, parts=[replace(part, points=points), *result.head.parts[1:]])
+    good = measure_dense(result.head, mesh, sources_of(mesh.names), result.parts)
+    before = measure_dense(head, mesh, sources_of(mesh.names), result.parts)
+    assert good.turned == {} and before.turned[part.name, "neutral"].mm2 > mend.TURNED_MM2
+    mended, after, notes = mend_spikes(head, mesh, sources_of(mesh.names), result.parts, 1.0)
+    assert after.turned.get((part.name, "neutral"), Turned(0.0, points)).mm2 < 1.0 and "mm²" in notes[0]
+    off = np.linalg.norm(mended.parts[0].points - part.points, axis=1)
+    assert off.max() < 5.0
 
 
 def test_faces_turned_over_in_the_texture_are_counted(mesh: FitMesh) -> None:

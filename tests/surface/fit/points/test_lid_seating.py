@@ -154,6 +154,9 @@ def test_what_is_up_to_loosely_on_the_ball_stays_as_near_and_the_rest_comes_off(
     points = np.array([beside(h) for h in (0.5, 1.55, 1.65)])
     mesh = seat_lids(cloud(points, np.array([beside(4.0)] * 3) - points), NEW, NEW, np.arange(3))
     np.testing.assert_allclose(above(mesh.vertices + mesh.deltas[0]), [0.5, 1.55, 4.0], atol=1e-6)
+    free = seat_lids(cloud(points, np.array([beside(4.0)] * 3) - points), NEW, NEW, np.arange(3), cling=False)
+    np.testing.assert_allclose(above(free.vertices + free.deltas[0]), 4.0, atol=1e-6)
+    np.testing.assert_array_equal(free.vertices, mesh.vertices)
 
 
 def test_only_chosen_vertices_and_moved_ones_are_touched() -> None:

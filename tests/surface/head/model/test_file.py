@@ -72,12 +72,16 @@ def test_any_name_of_a_part_comes_back(tmp_path, name):
 
 def test_contacts_come_back(folder):
     places = np.arange(36.0).reshape(2, 3, 3, 2)
-    want = Contact("lids", "a", ("b", "tooth"), 1, 5.5, 0.75, places)
-    save_data(folder, small_head(contacts=[want]))
-    (got,) = load_data(folder).contacts
-    assert replace(got, places=want.places) == want
-    np.testing.assert_array_equal(got.places, places)
-    assert got.places.dtype == float
+    for cling in (True, False):
+        want = Contact("lids", "a", ("b", "tooth"), 1, 5.5, 0.75, places, cling)
+        save_data(folder, small_head(contacts=[want]))
+        (got,) = load_data(folder).contacts
+        assert replace(got, places=want.places) == want
+        np.testing.assert_array_equal(got.places, places)
+        assert got.places.dtype == float
+        assert ("cling" in (folder / "head.toml").read_text()) == (not cling)
+    edit(folder, "cling = false", "cling = 0")
+    broken(folder, "cling: 0 is neither true nor false")
 
 
 def test_a_truth_value_is_no_number(folder):

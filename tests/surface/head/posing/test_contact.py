@@ -174,6 +174,8 @@ def test_limits_hold_what_rests_near_and_free_what_rests_far() -> None:
         assert most[0] == pytest.approx(max(height, TOUCH_MM), abs=1e-6), (height, held)
         assert least[0] == pytest.approx(min(max(height, TOUCH_MM), LID_MM if held else TOUCH_MM), abs=1e-6)
         assert hold[0] == pytest.approx(firm, abs=1e-6)
+        loose = height_limits(np.array([[0.0, -0.6 * depth, 0.8 * depth, depth]]), RADIUS, held=held, cling=False)
+        assert loose[:2] == (least, most) and loose[2][0] == 0.0  # may lift off, and sinks as little
 
 
 def test_tables_lie_in_memory_eight_points_at_a_time() -> None:
