@@ -17,6 +17,7 @@ from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, UNITS
 from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.carry import carry
+from surface.fit.transfer.colours import with_colours
 from surface.fit.transfer.errors import face_report
 from surface.fit.transfer.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.lids import close_lids
@@ -84,6 +85,9 @@ def transfer(
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
     notes += lid_notes
+    if scan.colours is not None:
+        data, told = with_colours(data, scan.colours)
+        notes += told
     parts = [face_report(data, template, warp, samples)]
     middle = data.eyes.mean(axis=0)
     data = replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, options.unit or ""))
