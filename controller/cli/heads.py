@@ -179,7 +179,7 @@ def fit(
 
     if keep and identities is None:
         raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
-    given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep, "--report": report}
+    given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
     check_transfer(expressions_from, landmarks, given)
     if not keep:
         options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
@@ -193,7 +193,7 @@ def fit(
 
             title = name or out.resolve().name
             if expressions_from is not None:
-                found = transfer(mesh, expressions_from, out, title, landmarks, options, progress)
+                found = transfer(mesh, expressions_from, out, title, landmarks, options, progress, report)
             else:
                 found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report)
         shaded = _decimate_and_shade(out)

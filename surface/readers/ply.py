@@ -96,7 +96,8 @@ def _strips(index: Ints, starts: Ints) -> Ints:
     odd = (at - begin[at]) % 2
     tri = np.column_stack([index[at], index[at + 1 + odd], index[at + 2 - odd]])
     a, b, c = tri.T
-    return tri[(a != b) & (b != c) & (c != a)]
+    solid: Ints = tri[(a != b) & (b != c) & (c != a)]
+    return solid
 
 
 def _mapped(

@@ -126,7 +126,7 @@ def _placed(
     placement = made.head.placement
     assert placement is not None  # a transfer finds one
     eyes = Eyes(made.head.eyes, True, True, "the head that expressions come from")
-    return Placed(placement, Landmarks(eyes), made.head.neck, tuple(made.report.notes)), made.head
+    return Placed(placement, Landmarks(eyes), made.head.neck, tuple(made.report.fit.notes)), made.head
 
 
 def _bare_head(pieces: list[Piece], placed: Placed, name: str, where: str) -> tuple[HeadData, list[Piece]]:

@@ -73,7 +73,9 @@ def with_colours(data: HeadData, samples: Samples) -> tuple[HeadData, list[str]]
     for part in head.parts:
         own = [la for la in data.paint if la["part"] == part.name]
         if part.material == "skin":
-            own = _painted(part, own, skin, skin / np.maximum(old, 1e-3), *_looked_up(part.vertices, tree, rgb))
+            own = _painted(
+                part, own, skin, skin / np.maximum(old, 1e-3), *_looked_up(part.vertices.astype(float), tree, rgb)
+            )
         layers += own
     layers, eyes = _with_eyes(layers, data, samples, skin)
     told = [f"skin {_words(skin)}", *eyes]

@@ -38,7 +38,7 @@ def picked(face, *names, noise: float = 0.0):
 
 
 def find(face, scan, marks, **options):
-    return api._find(scan, face, marks, LoadOptions(**options), "x.obj")
+    return api.find_face(scan, face, marks, LoadOptions(**options), "x.obj")
 
 
 def test_a_face_is_found_by_four_landmarks_and_searched_for_with_fewer(face, scan, monkeypatch) -> None:
@@ -91,7 +91,7 @@ def test_landmarks_are_off_by_the_root_mean_square_in_heights(face) -> None:
 
 def test_in_the_heads_frame_only_what_is_near_a_head_is_kept(face, scan) -> None:
     found = find(face, scan, picked(face))
-    kept = api._in_frame(scan, face, found)
+    kept = api.in_frame(scan, face, found)
     assert len(kept.triangles) == len(face.triangles)
     at = kept.vertices[kept.triangles].reshape(-1, 3)
     np.testing.assert_allclose(
@@ -105,7 +105,7 @@ def test_in_the_heads_frame_only_what_is_near_a_head_is_kept(face, scan) -> None
     ids = np.arange(12).reshape(4, 3)
     bits = make_scan(small, ids, "x")
     still = Similarity(np.eye(3), 1.0, np.zeros(3))
-    middles = bits.vertices[api._in_frame(bits, face, still).triangles].mean(axis=1)[:, 1]
+    middles = bits.vertices[api.in_frame(bits, face, still).triangles].mean(axis=1)[:, 1]
     assert len(middles) == 2 and np.abs(middles).max() < 100 + 0.35 * h
 
 
