@@ -14,7 +14,7 @@ from surface.base.arrays import Floats, Ints
 from surface.base.extras import importing
 from surface.check.raster import NOTHING, View
 from surface.fit.transfer.align import Similarity
-from surface.fit.transfer.scan import Scan, sample
+from surface.fit.transfer.scan import Scan
 from surface.fit.transfer.template import NAMES
 
 if TYPE_CHECKING:
@@ -27,10 +27,8 @@ LIGHT = np.array([-0.3, 0.5, 0.8]) / np.linalg.norm([-0.3, 0.5, 0.8])
 PAPER, DARK, BRIGHT = 236, 40, 225
 RING, TEXT = 5, 17
 COLOURS = {"given": (30, 90, 220), "found": (200, 30, 30), "carried": (230, 130, 0)}
-SAMPLES = 200_000
 FULL_MM, FAR_MM = 1.0, 20.0  # errors at the end of the colour scale; what is not compared
 SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0.75, 0.24, 0.04], [0.55, 0.02, 0.02]])
-NEAR = 3.0  # pixels: so far from one the scan is looked for
 
 
 @dataclass(frozen=True)
@@ -49,16 +47,24 @@ class Frontal:
 
     def place(self, scan: Scan, column: float, row: float) -> Floats | None:
         """(3,) the foremost place of a scan at a pixel, in the file's coordinates; None where it shows nothing."""
-        points = np.vstack([sample(scan, SAMPLES).points, scan.vertices])
-        at = self.pixels(points)
-        off = np.linalg.norm(at[:, :2] - [column, row], axis=1)
-        near = off < NEAR
-        if not near.any():
+        at = self.pixels(scan.vertices)[scan.triangles]
+        hit = (at[:, :, :2].min(axis=1) <= [column, row]) & (at[:, :, :2].max(axis=1) >= [column, row])
+        depth = _depth(at[hit.all(axis=1)], np.array([column, row]))
+        if not len(depth):
             return None
-        foremost = near & (at[:, 2] > at[near, 2].max() - 2.0 * NEAR)
-        z = float(at[foremost, 2][off[foremost].argmin()])
-        found: Floats = (np.array([column, -row, z]) - self.shift) @ self.turn / self.scale
+        found: Floats = (np.array([column, -row, depth.max()]) - self.shift) @ self.turn / self.scale
         return found
+
+
+def _depth(at: Floats, pixel: Floats) -> Floats:
+    """(k,) the third coordinate of triangles (t, 3, 3) where they lie over a pixel (2,); others are left out."""
+    a, b, c = (at[:, k, :2] - pixel for k in range(3))
+    p, q, r = (u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0] for u, v in ((b, c), (c, a), (a, b)))
+    area = p + q + r
+    over = (np.abs(area) > 1e-12) & (np.minimum(np.minimum(p * area, q * area), r * area) >= 0)
+    share = np.column_stack([p, q, r])[over] / area[over, None]
+    depth: Floats = (share * at[over, :, 2]).sum(axis=1)
+    return depth
 
 
 def frontal(found: Similarity, low: Floats, high: Floats) -> Frontal:

@@ -90,11 +90,15 @@ def _by_trimesh(path: Path, kind: str) -> tuple[Floats, Ints]:
     import trimesh  # only for these formats
 
     data = read_bytes(path)
+    log = trimesh.util.log
+    was, log.disabled = log.disabled, True  # it prints what it gets over by itself, as normals that are no numbers
     try:
         mesh = trimesh.load_mesh(BytesIO(data), file_type=kind[1:], process=False)
         return np.array(mesh.vertices, np.float64).reshape(-1, 3), np.array(mesh.faces, np.int64).reshape(-1, 3)
     except Exception as e:
         raise FitError(f"{path}: is damaged or no {kind[1:].upper()} file ({e})", hint="export the scan again") from e
+    finally:
+        log.disabled = was
 
 
 def make_scan(vertices: Floats, faces: Ints, where: str) -> Scan:
