@@ -1,11 +1,17 @@
 """Files of picked landmarks."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from surface.base.errors import FitError
 from surface.fit.transfer.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.scan import make_scan
+from surface.fit.transfer.template import NAMES
+
+ROOT = Path(__file__).parents[4]
 
 SCAN = make_scan(np.array([[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 9]], float), np.array([[0, 1, 2], [0, 2, 3]]), "x")
 PICKED = """<!DOCTYPE PickedPoints><PickedPoints><DocumentData/>
@@ -96,3 +102,16 @@ def test_pixels_and_views_that_are_none_are_named(tmp_path, text, message):
     with pytest.raises(FitError, match=message) as caught:
         read_landmarks(tmp_path / "a.toml", SCAN)
     assert "a.toml" in str(caught.value) and caught.value.hint
+
+
+def test_the_example_of_the_documentation_is_read(tmp_path):
+    blocks = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / "heads.md").read_text(encoding="utf-8"), re.DOTALL)
+    (example,) = (block for block in blocks if "[landmarks]" in block)
+    (tmp_path / "a.toml").write_text(example)
+    x, y = (a.ravel() for a in np.meshgrid(np.linspace(-8, 8, 70), np.linspace(-9, 14, 70)))
+    at = np.arange(4900).reshape(70, 70)
+    triangles = np.stack([at[:-1, :-1], at[:-1, 1:], at[1:, 1:]], axis=-1).reshape(-1, 3)
+    scan = make_scan(np.column_stack([x, y, 14 - 0.1 * x**2]), triangles, "scan.obj")
+    found = read_landmarks(tmp_path / "a.toml", scan)
+    assert len(found) >= 8 and set(found) <= set(NAMES)
+    np.testing.assert_array_equal(found["mouth_left"], scan.vertices[scan.original[3512]])
