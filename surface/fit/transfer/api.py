@@ -18,7 +18,7 @@ from surface.fit.source.placing.frame import AXES, UNITS
 from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.carry import carry
 from surface.fit.transfer.colours import with_colours
-from surface.fit.transfer.errors import face_report
+from surface.fit.transfer.errors import face_reports
 from surface.fit.transfer.gaps import measure_gaps
 from surface.fit.transfer.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.lids import close_lids
@@ -92,13 +92,14 @@ def transfer(
     carried = carry(head, template, done.warp, done.smooth, matcher, provenance, name)
     progress("lids", 0.75)
     data, lid_notes = seat_drawn_lids(close_lids(carried, head.data))
+    changed = reseated(carried, data)
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
     notes += lid_notes
     if scan.colours is not None:
         data, told = with_colours(data, scan.colours)
         notes += told
-    parts = [face_report(data, template, done.warp, samples)]
+    parts = face_reports(data, template, done.warp, samples)
     face = Head(data)
     landmarks, openings = landmarks_of(face, done.marks, found), openings_of(face, samples)
     middle = data.eyes.mean(axis=0)
@@ -110,7 +111,7 @@ def transfer(
     report = TransferReport(
         FitReport(name, parts, moving, notes=notes, scale=1.0), head.name,
         *registration_errors(template, done, matcher, STAGES[-1].farthest), landmarks, openings,
-        reseated(carried, data), gaps,
+        changed, gaps,
     )  # fmt: skip
     return Transferred(data, report, found)
 

@@ -53,11 +53,10 @@ def write_transfer_report(
 
 def as_table(report: TransferReport) -> dict[str, Any]:
     """The report as plain values."""
-    face = report.fit.parts[0]
     return {
         "format": FORMAT, "version": VERSION, "head": report.fit.name, "expressions_from": report.source,
         "control_points": report.fit.points, "parameters": report.fit.parameters, "notes": report.fit.notes,
-        "scan_to_head_mm": asdict(face.neutral), "samples": face.samples,
+        "scan_to_head_mm": {p.name: {"samples": p.samples, **asdict(p.neutral)} for p in report.fit.parts},
         "registration_mm": asdict(report.registration), "registration_matched": report.matched,
         "landmarks": {m.name: {k: v for k, v in asdict(m).items() if k != "name"} for m in report.landmarks},
         "openings": report.openings,
@@ -73,8 +72,8 @@ def as_markdown(report: TransferReport, pictures: list[str]) -> str:
     title = f"# {fit.name}: the expressions of {report.source}, {counts}"
     lines = [title, "", *(f"- {note}" for note in [face_bounds(fit), *fit.notes]), ""]
     lines += ["## Errors, mm", "", "| from, to | RMS | 99 % | max |", "|---|---|---|---|"]
-    face, map_ = fit.parts[0].neutral, report.registration
-    lines.append(f"| scan, head: {fit.parts[0].samples} samples of the face's front | {_row(face)} |")
+    map_ = report.registration
+    lines += [f"| scan, head: {p.samples} samples of {p.name} | {_row(p.neutral)} |" for p in fit.parts]
     lines.append(
         f"| the map alone, scan: where the scan shows {100 * report.matched:.0f} % of the front | {_row(map_)} |"
     )

@@ -137,10 +137,12 @@ def test_the_report_tells_where_landmarks_are_what_was_open_and_what_is_shut(shi
         assert off < (8.0 if mark.how == "carried" else 4.0), mark
         assert mark.off_mm < 8.0 and (mark.sure > 0.5) == (mark.how == "found"), mark
     assert {m.name for m in report.landmarks} == set(own) and report.matched > 0.8 and report.registration.rms < 1.0
+    assert {"eyeBlinkLeft", "eyeBlinkRight"} >= {n for n, (low, high) in report.reseated.items() if high > 1.4}
+    assert len(report.reseated) < 40  # most shapes stay as the map makes them
     assert set(report.openings) == {"mouth", "left eye", "right eye"}
     assert len(report.gaps) == 4 and all(gap.mm <= gap.most_mm for gap in report.gaps)
     table = json.loads((scan_file.parent / "report" / "report.json").read_text())
-    assert table["scan_to_head_mm"]["rms"] == pytest.approx(report.fit.parts[0].neutral.rms)
+    assert table["scan_to_head_mm"]["face"]["rms"] == pytest.approx(report.fit.parts[0].neutral.rms)
     text = (scan_file.parent / "report" / "report.md").read_text()
     assert all(f"| {name} |" in text for name in own) and "eyeBlinkLeft 1: closed" in text
     for name in ("landmarks.png", "error.png"):
