@@ -150,10 +150,11 @@ class Finder:
         return found
 
     def refine(self, at: Floats, marks: dict[str, Floats], search: float) -> dict[str, tuple[Floats, float]]:
-        """As :meth:`find`, but each landmark by itself, and eyeballs as deep as were found last."""
+        """As :meth:`find`, but each landmark by itself; corners and edges of sunken eyes, which have another form than
+        lids that lie on a ball, are left where they were found together."""
         own = self._relief_of(at, marks, self._sunk)
         found: dict[str, tuple[Floats, float]] = {}
-        for name in SINGLE:
+        for name in (n for n in SINGLE if not (self._sunk and "_eye_" in n)):
             score = correlate(own, self._scan, marks[name], SINGLE_MM, search)
             if (other := mirrored(name)) != name:  # a face is symmetric: both sides are found together
                 score = 0.5 * (score + correlate(own, self._scan, marks[other], SINGLE_MM, search)[:, ::-1])
