@@ -18,15 +18,15 @@ from surface.fit.source.placing.frame import AXES, UNITS
 from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.carry import carry
 from surface.fit.transfer.colours import with_colours
-from surface.fit.transfer.errors import face_reports
-from surface.fit.transfer.gaps import measure_gaps
-from surface.fit.transfer.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.places import scaled
 from surface.fit.transfer.register import STAGES, Matcher, register
-from surface.fit.transfer.report import TransferReport, landmarks_of, openings_of, registration_errors, reseated
-from surface.fit.transfer.reportfile import write_transfer_report
 from surface.fit.transfer.scan import Scan, read_scan, sample
+from surface.fit.transfer.telling.errors import face_reports
+from surface.fit.transfer.telling.gaps import measure_gaps
+from surface.fit.transfer.telling.landmarkfile import read_landmarks, swapped
+from surface.fit.transfer.telling.report import TransferReport, landmarks_of, openings_of, registration_errors, reseated
+from surface.fit.transfer.telling.reportfile import write_transfer_report
 from surface.fit.transfer.template import Template, make_template
 from surface.head import Head, HeadData, save_data
 from surface.head.model.file import check_writable
@@ -58,9 +58,9 @@ def transfer_head(
 
     mesh_path : .obj, .glb, .gltf, .vrm, .npz, .ply, .stl or .off; its own shapes and texture coordinates are not used.
     source : folder of the head that the expressions come from. out_dir : folder that gets head.toml and head.npz.
-    landmarks : file of places on the mesh (see :func:`surface.fit.transfer.landmarkfile.read_landmarks`).
+    landmarks : file of places on the mesh (see :func:`surface.fit.transfer.telling.landmarkfile.read_landmarks`).
     options : ``unit``, ``up``, ``forward`` and ``without``; what is not given is found.
-    report_dir : folder that gets the report (see :func:`surface.fit.transfer.reportfile.write_transfer_report`).
+    report_dir : folder that gets the report (see :mod:`surface.fit.transfer.telling.reportfile`).
 
     Raises FitError: the mesh or the landmarks cannot be read, no face was found, or the head has no eyes or openings.
     HeadFileError: the head cannot be read, or the folder not be written to. Nothing is written then.

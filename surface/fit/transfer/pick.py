@@ -14,11 +14,11 @@ from surface.base.progress import Progress, no_progress
 from surface.fit.source.load import LoadOptions
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.api import find_face, in_frame
-from surface.fit.transfer.landmarkfile import read_landmarks
-from surface.fit.transfer.picture import Frontal, draw_landmarks
 from surface.fit.transfer.register import Mark, register
-from surface.fit.transfer.reportfile import view_of
 from surface.fit.transfer.scan import Scan, read_scan, sample
+from surface.fit.transfer.telling.landmarkfile import read_landmarks
+from surface.fit.transfer.telling.picture import Frontal, draw_landmarks
+from surface.fit.transfer.telling.reportfile import view_of
 from surface.fit.transfer.template import NAMES, make_template
 from surface.head import Head
 

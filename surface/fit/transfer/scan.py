@@ -20,7 +20,7 @@ from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MOST_VERTICES, read_bytes
 from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj
-from surface.readers.ply import read_ply
+from surface.readers.ply.mesh import read_ply
 
 OWN = {
     ".glb": read_gltf, ".gltf": read_gltf, ".vrm": read_gltf, ".npz": read_npz, ".obj": read_obj, ".ply": read_ply,

@@ -7,7 +7,7 @@ import pytest
 
 from surface.base.errors import FitError
 from surface.fit.source.mesh import triangles
-from surface.readers.ply import read_ply
+from surface.readers.ply.mesh import read_ply
 
 POINTS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 1]], float)
 RGB = np.array([[255, 0, 0], [0, 128, 0], [0, 0, 64], [255, 255, 255], [0, 0, 0]])

@@ -9,7 +9,7 @@ import numpy as np
 from surface.base.arrays import Array, Bools, Floats, Ints
 from surface.readers.meshdata import Material, MeshData, check_size, linear
 from surface.readers.mtl import picture_beside
-from surface.readers.plyfile import Element, PlyFile
+from surface.readers.ply.rows import Element, PlyFile
 
 INDICES = ("vertex_indices", "vertex_index")
 COLOURS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from surface.base.errors import FitError
-from surface.fit.transfer.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.scan import make_scan
+from surface.fit.transfer.telling.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.template import NAMES
 
-ROOT = Path(__file__).parents[4]
+ROOT = Path(__file__).parents[5]
 
 SCAN = make_scan(np.array([[0, 0, 0], [9, 0, 0], [9, 9, 0], [0, 9, 9]], float), np.array([[0, 1, 2], [0, 2, 3]]), "x")
 PICKED = """<!DOCTYPE PickedPoints><PickedPoints><DocumentData/>
