@@ -183,8 +183,8 @@ def fit(
 
     if keep and identities is None:
         raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
-    given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep, "--report": report}
-    check_transfer(expressions_from, landmarks, given | {"--force": force})
+    given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep, "--force": force}
+    check_transfer(expressions_from, landmarks, given)
     if not keep:
         options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
         columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -197,7 +197,7 @@ def fit(
 
             title = name or out.resolve().name
             if expressions_from is not None:
-                found = transfer(mesh, expressions_from, out, title, landmarks, options, progress)
+                found = transfer(mesh, expressions_from, out, title, landmarks, options, progress, report)
             else:
                 found = fit_head(
                     mesh, out, name=title, progress=progress, options=options, report_dir=report, force=force

@@ -33,6 +33,7 @@ class _Primitive:
     uv: Floats | None
     deltas: dict[str, Floats]
     material: int | None = None
+    colours: Floats | None = None
 
 
 def read_gltf(path: Path) -> MeshData:
@@ -148,12 +149,25 @@ def _primitive(
     triangles = _triangles(file, table, len(vertices), where)
     if np.median(np.linalg.det(linear)) < 0:  # a mirroring matrix turns the surface inside out
         triangles = triangles[:, [0, 2, 1]]
+    colours = _colours(file, attributes, len(vertices), where) if "COLOR_0" in attributes else None
     material = table.get("material")
     if isinstance(material, int) and len(file.items("materials")) > material >= 0:
         name = f"{name}/{file.item('materials', material, where).get('name', material)}"
     else:
         material = None
-    return _Primitive(name, _apply(linear, vertices) + matrix[..., :3, 3], triangles, uv, deltas, material)
+    return _Primitive(name, _apply(linear, vertices) + matrix[..., :3, 3], triangles, uv, deltas, material, colours)
+
+
+def _colours(file: Gltf, attributes: dict[str, Any], count: int, where: str) -> Floats | None:
+    """(count, 3) linear RGB of vertices, 0..1 (glTF 2.0 specification, section 3.7.2.1); None where they are damaged,
+    for they do not change where a mesh lies."""
+    index, name = attributes["COLOR_0"], f"{where}.COLOR_0"
+    try:
+        width = 4 if file.item("accessors", index, name).get("type") == "VEC4" else 3
+        rgb: Floats = np.clip(file.floats(index, width, name)[:, :3], 0.0, 1.0)
+    except FitError:
+        return None
+    return rgb if len(rgb) == count else None
 
 
 def _apply(matrices: Floats, rows: Floats) -> Floats:
@@ -238,9 +252,12 @@ def _join(found: list[_Primitive], materials: list[Material]) -> MeshData:
     has_uv = np.array([p.uv is not None for p in found])[piece]
     uv = np.concatenate([np.zeros((len(p.vertices), 2)) if p.uv is None else p.uv for p in found])
     colours = tuple(None if p.material is None else materials[p.material] for p in found)
+    of_vertices = None
+    if any(p.colours is not None for p in found):
+        of_vertices = np.concatenate([np.ones_like(p.vertices) if p.colours is None else p.colours for p in found])
     return MeshData(
         np.concatenate([p.vertices for p in found]), faces, uv, np.where(has_uv[:, None], faces, -1), names, deltas,
-        piece, tuple(p.name for p in found), colours,
+        piece, tuple(p.name for p in found), colours, colours=of_vertices,
     )  # fmt: skip
 
 
@@ -260,7 +277,7 @@ def _weld(mesh: MeshData) -> MeshData:
     good = _has_area(faces)
     return replace(
         mesh, vertices=mesh.vertices[kept], faces=faces[good], face_uv=mesh.face_uv[good], deltas=mesh.deltas[:, kept],
-        piece=mesh.piece[good],
+        piece=mesh.piece[good], colours=None if mesh.colours is None else mesh.colours[kept],
     )  # fmt: skip
 
 

@@ -64,6 +64,7 @@ class MeshData:
     piece : (f,) int64 into ``pieces``, the names of the objects or materials that faces belong to.
     materials : one for each of ``pieces``, None where the file gives it none; empty where the format has none.
     expressions : what the file makes of its shapes.
+    colours : (n, 3) linear RGB of vertices; None where the file has none.
     """
 
     vertices: Floats
@@ -76,6 +77,12 @@ class MeshData:
     pieces: tuple[str, ...]
     materials: tuple[Material | None, ...] = ()
     expressions: tuple[Expression, ...] = ()
+    colours: Floats | None = None
+
+
+def linear(srgb: Floats) -> Floats:
+    """Linear intensities of sRGB ones, 0..1 (IEC 61966-2-1)."""
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def kind_of_picture(data: bytes) -> str:

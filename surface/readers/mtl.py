@@ -27,6 +27,13 @@ def read_mtl(folder: Path, names: str) -> dict[str, Material]:
     return {name: _material(folder, name, row) for name, row in out.items()}
 
 
+def picture_beside(folder: Path, name: str) -> tuple[bytes | None, str]:
+    """A PNG, JPEG or WebP file in the folder, and its MIME type; None and "" where there is none of that name."""
+    data = _data(folder, name)
+    mime = kind_of_picture(data or b"")
+    return (data, mime) if mime else (None, "")
+
+
 def _beside(folder: Path, name: str) -> Path | None:
     """The path of a file in the folder or below it; None for any other."""
     relative = Path(name.replace("\\", "/"))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
-from surface.readers.meshdata import MeshData, check_size, read_bytes
+from surface.readers.meshdata import MeshData, check_size, linear, read_bytes
 from surface.readers.mtl import read_mtl
 
 Corner = tuple[int, int]
@@ -49,7 +50,7 @@ def read_obj(path: Path, shapes: Path | None = None) -> MeshData:
             hint = "export shapes and neutral face from one mesh, keeping the order of vertices"
             raise FitError(f"{file}: {why}", hint=hint)
         deltas[k] = points - vertices
-    return parser.mesh(vertices, tuple(f.stem for f in files), deltas)
+    return replace(parser.mesh(vertices, tuple(f.stem for f in files), deltas), colours=parser.colours())
 
 
 def _obj_files(folder: Path) -> list[Path]:
@@ -117,6 +118,19 @@ class _Parser:
         if len(wrong):
             raise self._error(lines[wrong[0]][0], f"{word} number {wrong[0]} is not a finite number")
         return out
+
+    def colours(self) -> Floats | None:
+        """(n, 3) linear RGB of vertices, where every one has three numbers from 0 to 1 behind its place, as ZBrush and
+        MeshLab write them (sRGB); None elsewhere."""
+        rows = [text.split() for _, text in self.vertices]
+        if not rows or any(len(row) not in (6, 7) for row in rows):
+            return None
+        try:
+            srgb = np.array([row[3:6] for row in rows], float)
+        except ValueError:
+            return None
+        known = bool(np.isfinite(srgb).all()) and float(srgb.min()) >= 0.0 and float(srgb.max()) <= 1.0
+        return linear(srgb) if known else None
 
     def _face(self, number: int, text: bytes, piece: str) -> None:
         """Add a face; more than four corners become a fan of triangles."""

@@ -9,6 +9,7 @@ import struct
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +28,7 @@ from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.posing.baked import write_decimated, write_shade
 from surface.readers.common import NamedSurface
 from surface.readers.plain import write_surfaces
+from tests.fuzz import scans
 from tests.fuzz.outcome import PROCESSOR_S
 from tests.fuzz.reading import check, reports, run_command
 from tests.surface.meshfiles import GlbBuilder, glb, write_obj
@@ -131,7 +133,9 @@ class Kind:
 
 
 FIT = ("fit", "{}", "-o", "{out}")
+SCAN = (*FIT, "--expressions-from", "ict", "--up", "y", "--forward", "z")  # known axes: the search is short
 FIT_S = 60.0
+"""Processor time of a command that goes on to fit what a damaged file still holds; reading it has the usual limit."""
 
 
 def kinds() -> list[Kind]:
@@ -142,6 +146,8 @@ def kinds() -> list[Kind]:
             *_takes(Path(folder)),
             *_surfaces(Path(folder)),
             *_meshes(Path(folder)),
+            *_scans(Path(folder)),
+            *_groups(Path(folder)),
             *_heads(Path(folder)),
         ]
 
@@ -282,6 +288,39 @@ def _meshes(folder: Path) -> list[Kind]:
              reports(lambda path: read_modes(path, grid, path.with_name("mesh.npz"))),
              {"mesh.npz": (folder / "mesh.npz").read_bytes()}),
     ]  # fmt: skip
+
+
+def _scans(folder: Path) -> list[Kind]:
+    """Bare meshes, and landmarks on one."""
+    grid = _grid()
+    given = {"ply": scans.plys(grid.vertices, grid.faces), "stl": scans.stls(grid.vertices, grid.faces),
+             "off": [scans.off(grid.vertices, grid.faces)]}  # fmt: skip
+    kinds = [
+        Kind(name, f"scan.{name}", seeds, reports(scans.read_scan), words=SCAN, most_s=FIT_S)
+        for name, seeds in given.items()
+    ]
+    (folder / "scan.ply").write_bytes(given["ply"][0])
+    scan = scans.read_scan(folder / "scan.ply")
+    command = ("fit", "{folder}/scan.ply", *SCAN[2:], "--landmarks", "{}")
+    for file, seeds in scans.landmark_files().items():
+        name = "landmarks" + Path(file).suffix.replace(".toml", "")
+        read = reports(partial(scans.read_marks, scan))
+        kinds.append(Kind(name, file, seeds, read, {"scan.ply": given["ply"][0]}, command, FIT_S))
+    return kinds
+
+
+def _groups(folder: Path) -> list[Kind]:
+    """Groups of a surface's control points, made by hand and by dragging."""
+    surface = sheet(-20.0)
+    write_surfaces(folder / "groups.json", [NamedSurface("sheet", surface)])
+    beside = {"sheet.json": (folder / "groups.json").read_bytes()}
+    axes = ("--unit", "mm", "--up", "y", "--forward", "z")
+    words = ("fit", "{folder}/sheet.json", "-o", "{out}", *axes, "--groups", "{}")
+    read = reports(partial(scans.read_groups, surface))
+    return [
+        Kind("groups", "groups.toml", [scans.GROUPS], read, beside, words, FIT_S),
+        Kind("groups.json", "dragged.json", [json.dumps(scans.DRAGGED).encode()], read, beside, words, FIT_S),
+    ]
 
 
 def _with_shapes(path: Path) -> Loaded:

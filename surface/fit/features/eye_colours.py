@@ -91,7 +91,7 @@ def _one(mesh: FitMesh, faces: Ints, centre: Floats, usual: float) -> EyeColours
         own, rest = sample_colours(mesh, faces[iris]), sample_colours(mesh, faces[~cover])
         return EyeColours(_of_iris_piece(own), None if rest is None else _most(rest, _all(rest), EYE_RANGE), usual)
     samples = sample_colours(mesh, faces[~cover])
-    return EyeColours(None, None, usual) if samples is None else _by_rings(samples, centre, usual)
+    return EyeColours(None, None, usual) if samples is None else by_rings(samples, centre, usual)
 
 
 def _all(samples: Samples) -> Bools:
@@ -109,7 +109,7 @@ def _of_iris_piece(samples: Samples | None) -> Floats | None:
     return _most(samples, (off > WITHIN[0]) & (off < WITHIN[1]), EYE_RANGE)
 
 
-def _by_rings(samples: Samples, centre: Floats, usual: float) -> EyeColours:
+def by_rings(samples: Samples, centre: Floats, usual: float) -> EyeColours:
     """Colours of an eyeball with a texture: the iris ends where rings round the axis become white."""
     local = samples.points - centre
     angle = np.arctan2(np.hypot(local[:, 0], local[:, 1]), local[:, 2])

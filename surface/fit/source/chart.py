@@ -113,7 +113,7 @@ def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
     n = len(mesh.vertices)
     fold = _fold(mesh, island)
     sampled = np.clip(rows @ fold, 0, 1)
-    around = boundary_loops(island)
+    around = [loop for k, loop in enumerate(boundary_loops(island)) if k == 0 or _is_open(island.uv[loop])]
     return Chart(
         rows @ island.uv, rows @ identity(n, format="csr")[island.vertex],
         _loosened(sampled) * np.where(on_border, BORDER_WEIGHT, 1.0), rows @ _spacing(island), sampled > 0.5,
@@ -122,6 +122,12 @@ def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
         face_slopes(island, n, SLOPE_WEIGHT * _loosened(fold), doubt_slivers=doubt_slivers),
         _between(island, n, fold),
     )  # fmt: skip
+
+
+def _is_open(ring: Floats) -> bool:
+    """Has a loop (k, 2) at least three points that follow each other in different places? A rim of vertices that share
+    their texture coordinates is no hole in (u, v)."""
+    return int((ring != np.roll(ring, 1, axis=0)).any(axis=1).sum()) >= 3
 
 
 def _between(island: Island, vertices: int, fold: Floats) -> Places:

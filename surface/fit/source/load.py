@@ -20,6 +20,7 @@ from surface.fit.source.placing.anatomy import Eyes, Landmarks
 from surface.fit.source.placing.conventions import convention_of
 from surface.fit.source.placing.frame import Frame, find_frame
 from surface.fit.source.placing.orient import shapes_of_sides
+from surface.fit.source.textures import tinted
 from surface.head.model.placement import Placement
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MeshData
@@ -70,7 +71,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     """
     path = Path(path)
     raw = _read(path, options.shapes)
-    mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)})
+    mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)} | {"materials": tinted(raw)})
     if options.without:
         mesh = keep_faces(mesh, wanted_faces(mesh, options.without, str(path)))
     kept, notes = unworn(mesh)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.fit.source.mesh import FitMesh, triangles
-from surface.readers.meshdata import Material
+from surface.readers.meshdata import Material, MeshData, linear
 
 LARGEST = 1024  # pixels of a side that are kept: colours of areas need no more
 MOST_PIXELS = 64_000_000  # of a picture that is decoded at all
@@ -24,27 +24,50 @@ class Samples:
     weight: Floats
 
 
-def sample_colours(mesh: FitMesh, faces: Ints, *, steps: int = 4) -> Samples | None:
+def sample_colours(
+    mesh: FitMesh, faces: Ints, *, steps: int = 4, tint: Floats | None = None
+) -> Samples | None:  # fmt: skip
     """Samples all over faces (k,) of materials whose colour is known; None where none is.
 
-    steps : a triangle gets (steps + 1) (steps + 2) / 2 of them.
+    steps : a triangle gets (steps + 1) (steps + 2) / 2 of them. tint : (n, 3) linear RGB of the mesh's vertices, by
+    which colours of materials are multiplied.
     """
-    if not mesh.materials or not len(faces):
+    if (not mesh.materials and tint is None) or not len(faces):
         return None
-    pieces = mesh.piece[faces]
-    found = [_of_piece(mesh, faces[pieces == k], mesh.materials[k], steps) for k in np.unique(pieces)]
+    pieces, materials = mesh.piece[faces], mesh.materials or (None,) * (int(mesh.piece.max(initial=0)) + 1)
+    found = [_of_piece(mesh, faces[pieces == k], materials[k], steps, tint) for k in np.unique(pieces)]
     own = [s for s in found if s is not None]
     if not own:
         return None
     return Samples(*(np.concatenate([getattr(s, key) for s in own]) for key in ("points", "colour", "weight")))
 
 
-def _of_piece(mesh: FitMesh, faces: Ints, material: Material | None, steps: int) -> Samples | None:
-    if material is None:
+def tinted(mesh: MeshData) -> tuple[Material | None, ...]:
+    """The materials of a mesh's pieces; those without a texture that have colours of vertices get their median."""
+    if mesh.colours is None:
+        return mesh.materials
+    every = mesh.materials or (None,) * len(mesh.pieces)
+    out: list[Material | None] = []
+    for k, material in enumerate(every):
+        used = np.unique(mesh.faces[mesh.piece == k])
+        own, old = mesh.colours[used[used >= 0]], material or Material()
+        if old.texture is None and len(own) and not (own == 1.0).all():
+            r, g, b = (np.median(own, axis=0) * old.colour[:3]).tolist()
+            material = replace(old, colour=(r, g, b, old.colour[3]))
+        out.append(material)
+    return tuple(out)
+
+
+def _of_piece(
+    mesh: FitMesh, faces: Ints, material: Material | None, steps: int, tint: Floats | None
+) -> Samples | None:  # fmt: skip
+    if material is None and tint is None:
         return None
+    material = material or Material()
     picture = _picture(material.texture) if material.texture is not None else None
     mapped = bool((mesh.face_uv[faces][:, :3] >= 0).all()) and len(mesh.uv) > 0
-    if picture is None and (material.texture is not None or material.colour[:3] == (1.0, 1.0, 1.0)):
+    plain = tint is None and material.colour[:3] == (1.0, 1.0, 1.0)
+    if picture is None and (material.texture is not None or plain):
         return None  # a texture that cannot be read, or nothing said
     tri, tri_uv = triangles(mesh.faces[faces]), triangles(mesh.face_uv[faces])
     share = _inside(steps)
@@ -57,6 +80,8 @@ def _of_piece(mesh: FitMesh, faces: Ints, material: Material | None, steps: int)
             return None
         uv = np.einsum("sk,tkx->tsx", share, mesh.uv[tri_uv]).reshape(-1, 2)
         colour = colour * _looked_up(picture, material.in_picture(uv))
+    if tint is not None:
+        colour[:, :3] *= np.einsum("sk,tkc->tsc", share, tint[tri]).reshape(-1, 3)
     if material.alpha == "OPAQUE":
         colour[:, 3] = 1.0
     elif material.alpha == "MASK":
@@ -88,11 +113,6 @@ def _picture(data: bytes) -> Floats | None:
         return None
     pixels[..., :3] = linear(pixels[..., :3])
     return pixels
-
-
-def linear(srgb: Floats) -> Floats:
-    """Linear intensities of sRGB ones, 0..1 (IEC 61966-2-1)."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def _looked_up(picture: Floats, at: Floats) -> Floats:

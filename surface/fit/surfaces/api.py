@@ -22,8 +22,8 @@ from surface.fit.surfaces.pieces import Piece, joined, make_pieces, read_pieces,
 from surface.fit.surfaces.placing import Placed, place
 from surface.fit.surfaces.report import SurfaceReport, SurfaceRow, write_report
 from surface.fit.transfer.api import transfer
-from surface.fit.transfer.landmarkfile import read_landmarks
 from surface.fit.transfer.scan import make_scan
+from surface.fit.transfer.telling.landmarkfile import read_landmarks
 from surface.head import Head
 from surface.head.model.data import HeadData, Jaw
 from surface.head.model.file import check_writable, save_data
@@ -42,7 +42,7 @@ class SurfaceOptions:
     strict : refuse a file of which anything cannot be read, instead of leaving it out by name.
     groups : files of groups, see :mod:`surface.fit.surfaces.groupfile`.
     expressions_from : folder of a head whose expressions the surfaces get; landmarks : a file for that, see
-        :func:`surface.fit.transfer.landmarkfile.read_landmarks`.
+        :func:`surface.fit.transfer.telling.landmarkfile.read_landmarks`.
     """
 
     unit: str | None = None
@@ -126,7 +126,7 @@ def _placed(
     placement = made.head.placement
     assert placement is not None  # a transfer finds one
     eyes = Eyes(made.head.eyes, True, True, "the head that expressions come from")
-    return Placed(placement, Landmarks(eyes), made.head.neck, tuple(made.report.notes)), made.head
+    return Placed(placement, Landmarks(eyes), made.head.neck, tuple(made.report.fit.notes)), made.head
 
 
 def _bare_head(pieces: list[Piece], placed: Placed, name: str, where: str) -> tuple[HeadData, list[Piece]]:

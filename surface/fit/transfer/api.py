@@ -17,12 +17,16 @@ from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, UNITS
 from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.carry import carry
-from surface.fit.transfer.errors import face_report
-from surface.fit.transfer.landmarkfile import read_landmarks, swapped
+from surface.fit.transfer.colours import with_colours
 from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.places import scaled
-from surface.fit.transfer.register import Matcher, register
+from surface.fit.transfer.register import STAGES, Matcher, register
 from surface.fit.transfer.scan import Scan, read_scan, sample
+from surface.fit.transfer.telling.errors import face_reports
+from surface.fit.transfer.telling.gaps import measure_gaps
+from surface.fit.transfer.telling.landmarkfile import read_landmarks, swapped
+from surface.fit.transfer.telling.report import TransferReport, landmarks_of, openings_of, registration_errors, reseated
+from surface.fit.transfer.telling.reportfile import write_transfer_report
 from surface.fit.transfer.template import Template, make_template
 from surface.head import Head, HeadData, save_data
 from surface.head.model.file import check_writable
@@ -38,30 +42,36 @@ LEAST_PICKED = 4  # landmarks that a scan is aligned by; with fewer its face is 
 
 @dataclass(frozen=True)
 class Transferred:
-    """A head in the form of a scan, and how well it fits."""
+    """A head in the form of a scan, and how well it fits. ``found`` leads from the scan to the frame of the report's
+    landmarks."""
 
     head: HeadData
-    report: FitReport
+    report: TransferReport
+    found: Similarity
 
 
 def transfer_head(
     mesh_path: str | Path, source: str | Path, out_dir: str | Path, *, name: str, landmarks: Path | None = None,
-    options: LoadOptions = LoadOptions(), progress: Progress | None = None,
-) -> FitReport:  # fmt: skip
+    options: LoadOptions = LoadOptions(), progress: Progress | None = None, report_dir: str | Path | None = None,
+) -> TransferReport:  # fmt: skip
     """Give a bare mesh the expressions of a head, and write the new head.
 
     mesh_path : .obj, .glb, .gltf, .vrm, .npz, .ply, .stl or .off; its own shapes and texture coordinates are not used.
     source : folder of the head that the expressions come from. out_dir : folder that gets head.toml and head.npz.
-    landmarks : file of places on the mesh (see :func:`surface.fit.transfer.landmarkfile.read_landmarks`).
+    landmarks : file of places on the mesh (see :func:`surface.fit.transfer.telling.landmarkfile.read_landmarks`).
     options : ``unit``, ``up``, ``forward`` and ``without``; what is not given is found.
+    report_dir : folder that gets the report (see :mod:`surface.fit.transfer.telling.reportfile`).
 
     Raises FitError: the mesh or the landmarks cannot be read, no face was found, or the head has no eyes or openings.
     HeadFileError: the head cannot be read, or the folder not be written to. Nothing is written then.
     """
-    check_writable(out_dir)
+    for folder in (out_dir, report_dir):
+        check_writable(folder or out_dir)
     scan = read_scan(mesh_path, options.without)
     picked = read_landmarks(landmarks, scan) if landmarks is not None else {}
     made = transfer(scan, Head.load(source), name, picked, options, progress or no_progress, str(mesh_path))
+    if report_dir is not None:
+        write_transfer_report(made.report, scan, made.head, made.found, report_dir)
     save_data(out_dir, made.head)
     return made.report
 
@@ -72,30 +82,47 @@ def transfer(
     """As :func:`transfer_head`, in memory; ``picked`` are landmarks (3,) on the scan, ``where`` is its name."""
     template = make_template(head, head.name)
     progress("face", 0.02)
-    found = _find(scan, template, picked, options, where)
-    scan, marks = _in_frame(scan, template, found), {n: found.points(p) for n, p in picked.items()}
+    found = find_face(scan, template, picked, options, where)
+    scan, marks = in_frame(scan, template, found), {n: found.points(p) for n, p in picked.items()}
     samples = sample(scan, MANY)
     progress("face", 0.15)
-    warp, smooth = register(template, samples, marks, lambda done: progress("face", 0.15 + 0.5 * done))
+    done = register(template, samples, marks, lambda share: progress("face", 0.15 + 0.5 * share))
+    matcher = Matcher(samples)
     provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
-    data = carry(head, template, warp, smooth, Matcher(samples), provenance, name)
+    carried = carry(head, template, done.warp, done.smooth, matcher, provenance, name)
     progress("lids", 0.75)
-    data, lid_notes = seat_drawn_lids(close_lids(data, head.data))
+    data, lid_notes = seat_drawn_lids(close_lids(carried, head.data))
+    changed = reseated(carried, data)
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
     notes += lid_notes
-    parts = [face_report(data, template, warp, samples)]
+    if scan.colours is not None:
+        data, told = with_colours(data, scan.colours)
+        notes += told
+    parts = face_reports(data, template, done.warp, samples)
+    face = Head(data)
+    landmarks, openings = landmarks_of(face, done.marks, found), openings_of(face, samples)
     middle = data.eyes.mean(axis=0)
     data = replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, options.unit or ""))
     moving = [n for n in head.parameters if any(g.name == n for p in data.parts for g in p.groups)]
     notes += overlap_notes(data)
-    return Transferred(data, FitReport(name, parts, moving, notes=notes, scale=1.0))
+    gaps = measure_gaps(data)
+    notes += [str(gap) for gap in gaps]
+    report = TransferReport(
+        FitReport(name, parts, moving, notes=notes, scale=1.0), head.name,
+        *registration_errors(template, done, matcher, STAGES[-1].farthest), landmarks, openings,
+        changed, gaps,
+    )  # fmt: skip
+    return Transferred(data, report, found)
 
 
-def _find(
+def find_face(
     scan: Scan, template: Template, picked: dict[str, Floats], options: LoadOptions, where: str
 ) -> Similarity:  # fmt: skip
-    """The similarity from the scan to the head's frame."""
+    """The similarity from the scan to the head's frame, by landmarks where there are enough, else by its form.
+
+    Raises FitError: no face is there, or the landmarks or options are wrong.
+    """
     up, forward = (_direction(f"--{n}", w) for n, w in (("up", options.up), ("forward", options.forward)))
     if up is not None and forward is not None and abs(float(up @ forward)) > 0.5:
         raise FitError(f"--up {options.up} --forward {options.forward}: are one axis", hint="--up y --forward z")
@@ -132,7 +159,7 @@ def _direction(option: str, word: str | None) -> Floats | None:
     return unit
 
 
-def _in_frame(scan: Scan, template: Template, found: Similarity) -> Scan:
+def in_frame(scan: Scan, template: Template, found: Similarity) -> Scan:
     """The scan in the head's frame, without what is far from a head, such as the rest of a body."""
     scan = scan.turned(found.turn, found.scale, found.shift)
     margin = MARGIN * template.height

@@ -50,6 +50,27 @@ SLIDE = 0.35  # share of a match along the surface; the rest goes along the norm
 
 
 @dataclass(frozen=True)
+class Mark:
+    """A landmark on a scan: its ``place (3,)``, who it is from, and how sure a found one is, 0..1.
+
+    how : ``given`` by hand, ``found`` in the relief, or ``carried`` there by the map from its neighbours.
+    """
+
+    place: Floats
+    how: str
+    sure: float = 1.0
+
+
+@dataclass(frozen=True)
+class Registered:
+    """The map from a template to a scan, a stiffer one, and the scan's landmarks by name."""
+
+    warp: Warp
+    smooth: Warp
+    marks: dict[str, Mark]
+
+
+@dataclass(frozen=True)
 class Matches:
     """For every point: whether it has a match on the scan, and where it should go, (n, 3)."""
 
@@ -98,6 +119,7 @@ class Registration:
         self._marks = np.array([template.landmarks[n] for n in self._names])
         self._goals = self._marks.copy()
         self._held = np.full(len(self._names), STILL)
+        self._sure: dict[str, float] = {}
         for k, name in enumerate(self._names):
             if name in given:
                 self._goals[k], self._held[k] = given[name], LANDMARK
@@ -118,6 +140,17 @@ class Registration:
             if name in found and name not in self._given:
                 self._goals[k], sure = found[name]
                 self._held[k] = FOUND[single] * sure**2
+                self._sure[name] = sure
+
+    def marks(self) -> dict[str, Mark]:
+        """Every landmark where it was given or found, else where the map has it now."""
+        carried = self.warp(self._marks)
+        return {
+            name: Mark(self._goals[k].copy(), "given") if name in self._given
+            else Mark(self._goals[k].copy(), "found", self._sure[name]) if name in self._sure
+            else Mark(carried[k], "carried", 0.0)
+            for k, name in enumerate(self._names)
+        }  # fmt: skip
 
     def hold(self) -> None:
         """Keep nodes that will have no match where the map has them now."""
@@ -149,8 +182,8 @@ class Registration:
 
 def register(
     template: Template, samples: Samples, given: dict[str, Floats], progress: Callable[[float], None]
-) -> tuple[Warp, Warp]:  # fmt: skip
-    """The map of space from a template to the samples of a scan, which is aligned with it, and a stiffer one.
+) -> Registered:  # fmt: skip
+    """The map of space from a template to the samples of a scan, which is aligned with it.
 
     given : places (3,) of landmarks on the scan by the template's names.
     """
@@ -165,4 +198,4 @@ def register(
         if stage.stiffness >= SMOOTH:
             smooth = run.warp
         progress((k + 1) / len(STAGES))
-    return run.warp, smooth
+    return Registered(run.warp, smooth, run.marks())

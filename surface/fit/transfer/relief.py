@@ -36,6 +36,7 @@ SINGLE = (
     "lower_lip", "left_eye_upper", "left_eye_lower", "right_eye_upper", "right_eye_lower",
 )  # fmt: skip
 SINGLE_MM = (8.0, 8.0)
+SUNK_MM = (0.0, 4.0)  # behind their place: eyeballs of people, and those of sculptures, which lie behind their lids
 
 
 @dataclass(frozen=True)
@@ -127,26 +128,33 @@ class Finder:
         face, self._share = spread(template.points, tri, COUNT)
         self._corners = tri[face]
         self._behind: dict[str, float] = {}
+        self._eye, self._sunk = template.eye >= 0, SUNK_MM[0]
 
     def find(self, at: Floats, marks: dict[str, Floats], search: float) -> dict[str, tuple[Floats, float]]:
         """Places (3,) of features' landmarks in the scan, and how sure each is, 0..1.
 
         at : (n, 3) the template's points, and marks : its landmarks, as a map brings them near the scan.
         """
-        own = self._relief_of(at, marks)
         found: dict[str, tuple[Floats, float]] = {}
-        maps = [correlate(own, self._scan, _middle(marks, names), half, search) for names, half in FEATURES]
-        both = 0.5 * (maps[0] + maps[1][:, ::-1])  # eyes are found together: a face is symmetric
-        for (names, _), score, mirrored in zip(FEATURES, (both, both, *maps[2:]), (1, -1, 1, 1), strict=True):
+        eyes = {}
+        for sunk in SUNK_MM:
+            own = self._relief_of(at, marks, sunk)
+            pair = [correlate(own, self._scan, _middle(marks, names), half, search) for names, half in FEATURES[:2]]
+            eyes[sunk] = 0.5 * (pair[0] + pair[1][:, ::-1])  # they are found together: a face is symmetric
+        self._sunk = max(SUNK_MM, key=lambda sunk: _shift(eyes[sunk])[1])
+        rest = [correlate(own, self._scan, _middle(marks, names), half, search) for names, half in FEATURES[2:]]
+        both = eyes[self._sunk]
+        for (names, _), score, mirrored in zip(FEATURES, (both, both, *rest), (1, -1, 1, 1), strict=True):
             shift, sure = _shift(score)
             self._add(found, marks, names, shift * [mirrored, 1.0], sure)
         return found
 
     def refine(self, at: Floats, marks: dict[str, Floats], search: float) -> dict[str, tuple[Floats, float]]:
-        """As :meth:`find`, but each landmark by itself."""
-        own = self._relief_of(at, marks)
+        """As :meth:`find`, but each landmark by itself; corners and edges of sunken eyes, which have another form than
+        lids that lie on a ball, are left where they were found together."""
+        own = self._relief_of(at, marks, self._sunk)
         found: dict[str, tuple[Floats, float]] = {}
-        for name in SINGLE:
+        for name in (n for n in SINGLE if not (self._sunk and "_eye_" in n)):
             score = correlate(own, self._scan, marks[name], SINGLE_MM, search)
             if (other := mirrored(name)) != name:  # a face is symmetric: both sides are found together
                 score = 0.5 * (score + correlate(own, self._scan, marks[other], SINGLE_MM, search)[:, ::-1])
@@ -154,7 +162,8 @@ class Finder:
             self._add(found, marks, (name,), shift, sure)
         return found
 
-    def _relief_of(self, at: Floats, marks: dict[str, Floats]) -> Relief:
+    def _relief_of(self, at: Floats, marks: dict[str, Floats], sunk: float) -> Relief:
+        at = at - np.outer(self._eye, [0.0, 0.0, sunk])
         points = np.einsum("mk,mkc->mc", self._share, at[self._corners])
         tree = cKDTree(points[:, :2])
         self._behind = {}

@@ -14,13 +14,18 @@ from surface.base.errors import FitError
 from surface.base.extras import require
 from surface.fit.source.load import wanted_faces
 from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
+from surface.fit.source.textures import Samples as Colours
+from surface.fit.transfer.colours import moved, scan_colours
 from surface.readers.gltfmesh import read_gltf
 from surface.readers.meshdata import MOST_VERTICES, read_bytes
 from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj
+from surface.readers.ply.mesh import read_ply
 
-OWN = {".glb": read_gltf, ".gltf": read_gltf, ".vrm": read_gltf, ".npz": read_npz, ".obj": read_obj}
-OTHERS = (".ply", ".stl", ".off")  # read by trimesh
+OWN = {
+    ".glb": read_gltf, ".gltf": read_gltf, ".vrm": read_gltf, ".npz": read_npz, ".obj": read_obj, ".ply": read_ply,
+}  # fmt: skip
+OTHERS = (".stl", ".off")  # read by trimesh
 SAMPLES = 120_000
 SAME = 1e-6  # of the mesh's size: vertices nearer than this are one
 
@@ -30,15 +35,18 @@ class Scan:
     """Triangles of a bare mesh, in any unit and axes.
 
     vertices : (n, 3); triangles : (t, 3); original : (m,) int64, for each vertex of the file its place in ``vertices``.
+    colours : samples of its colours; None where it has none.
     """
 
     vertices: Floats
     triangles: Ints
     original: Ints
+    colours: Colours | None = None
 
     def turned(self, turn: Floats, scale: float, shift: Floats) -> Scan:
         """The scan with every vertex p at scale * turn @ p + shift."""
-        return replace(self, vertices=scale * self.vertices @ turn.T + shift)
+        colours = None if self.colours is None else moved(self.colours, turn, scale, shift)
+        return replace(self, vertices=scale * self.vertices @ turn.T + shift, colours=colours)
 
     def kept(self, faces: Bools) -> Scan:
         """The scan with some of its triangles (t,)."""
@@ -65,7 +73,9 @@ def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
     kind = path.suffix.lower()
     if kind in OWN:
         raw = OWN[kind](path)
-        return make_scan(raw.vertices, triangles(raw.faces[wanted_faces(raw, without, str(path))]), str(path))
+        kept = wanted_faces(raw, without, str(path))
+        scan = make_scan(raw.vertices, triangles(raw.faces[kept]), str(path))
+        return replace(scan, colours=scan_colours(raw, kept))
     if kind not in OTHERS:
         raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
                        hint=f"export it as {', '.join([*OWN, *OTHERS])}")  # fmt: skip
@@ -80,11 +90,15 @@ def _by_trimesh(path: Path, kind: str) -> tuple[Floats, Ints]:
     import trimesh  # only for these formats
 
     data = read_bytes(path)
+    log = trimesh.util.log
+    was, log.disabled = log.disabled, True  # it prints what it gets over by itself, as normals that are no numbers
     try:
         mesh = trimesh.load_mesh(BytesIO(data), file_type=kind[1:], process=False)
         return np.array(mesh.vertices, np.float64).reshape(-1, 3), np.array(mesh.faces, np.int64).reshape(-1, 3)
     except Exception as e:
         raise FitError(f"{path}: is damaged or no {kind[1:].upper()} file ({e})", hint="export the scan again") from e
+    finally:
+        log.disabled = was
 
 
 def make_scan(vertices: Floats, faces: Ints, where: str) -> Scan:

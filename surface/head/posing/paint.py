@@ -62,7 +62,7 @@ def _lay_on(out: dict[str, Floats], layer: dict[str, Any], uv: Floats) -> None:
         raise ValueError(f"value: must have {len(base)} numbers, not shape {value.shape}")
     if name not in out:
         out[name] = np.tile(base, (len(uv), 1))
-    strength = _number(layer, "amount", 1.0) * _field(layer, uv)[:, None]
+    strength = _number(layer, "amount", 1.0) * layer_field(layer, uv)[:, None]
     out[name] += strength * (value - out[name])
 
 
@@ -89,7 +89,7 @@ def _number(layer: dict[str, Any], key: str, default: float | None = None) -> fl
     return float(found)
 
 
-def _field(layer: dict[str, Any], uv: Floats) -> Floats:
+def layer_field(layer: dict[str, Any], uv: Floats) -> Floats:
     """(m,) how strongly a layer shows at each vertex."""
     kind = _word(layer, "kind", KINDS)
     if kind == "all":

@@ -211,3 +211,16 @@ def test_faces_without_area_are_no_folds_and_do_not_count_in_the_median() -> Non
         mesh = apart(stretches)
         fold = chart_module._fold(mesh, Island(np.arange(len(mesh.uv)), mesh.uv, mesh.faces)).reshape(-1, 4)
         np.testing.assert_allclose(fold[:, 0], 0.5 * (np.array(stretches) == 11.5), atol=1e-9)
+
+
+def test_a_rim_without_extent_in_uv_is_no_hole() -> None:
+    corner = np.arange(16).reshape(4, 4)
+    faces = np.stack([corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]], axis=-1).reshape(-1, 4)
+    x, y = np.meshgrid(np.arange(4.0), np.arange(4.0), indexing="ij")
+    points = np.column_stack([x.ravel(), y.ravel(), 0 * x.ravel()])
+    holed = faces[np.arange(9) != 4]  # without the one in the middle
+    inner = np.abs(points[:, :2] - 1.5).max(axis=1, keepdims=True) < 1
+    for squeezed, loops in ((points, 2), (np.where(inner, 1.5, points), 1)):
+        mesh = FitMesh(100 * points, holed, squeezed[:, :2] / 3, holed.copy(), (), np.zeros((0, 16, 3)))
+        chart = make_chart(mesh, find_islands(mesh), normalise=False)
+        assert len(chart.loops) == len(chart.loop_vertices) == loops

@@ -1,5 +1,6 @@
 """What a transfer makes of options, landmarks and sizes, before and after it registers anything."""
 
+import json
 from dataclasses import replace
 
 import made_face
@@ -11,8 +12,8 @@ from surface.base.errors import FitError
 from surface.fit.source.load import LoadOptions
 from surface.fit.transfer import api
 from surface.fit.transfer.align import Similarity
-from surface.fit.transfer.landmarkfile import swapped
 from surface.fit.transfer.scan import make_scan
+from surface.fit.transfer.telling.landmarkfile import read_landmarks, swapped
 
 TURN = Rotation.from_euler("x", 90, degrees=True).as_matrix()
 SHIFT = np.array([0.5, -1.0, 2.0])
@@ -38,7 +39,7 @@ def picked(face, *names, noise: float = 0.0):
 
 
 def find(face, scan, marks, **options):
-    return api._find(scan, face, marks, LoadOptions(**options), "x.obj")
+    return api.find_face(scan, face, marks, LoadOptions(**options), "x.obj")
 
 
 def test_a_face_is_found_by_four_landmarks_and_searched_for_with_fewer(face, scan, monkeypatch) -> None:
@@ -91,7 +92,7 @@ def test_landmarks_are_off_by_the_root_mean_square_in_heights(face) -> None:
 
 def test_in_the_heads_frame_only_what_is_near_a_head_is_kept(face, scan) -> None:
     found = find(face, scan, picked(face))
-    kept = api._in_frame(scan, face, found)
+    kept = api.in_frame(scan, face, found)
     assert len(kept.triangles) == len(face.triangles)
     at = kept.vertices[kept.triangles].reshape(-1, 3)
     np.testing.assert_allclose(
@@ -105,7 +106,7 @@ def test_in_the_heads_frame_only_what_is_near_a_head_is_kept(face, scan) -> None
     ids = np.arange(12).reshape(4, 3)
     bits = make_scan(small, ids, "x")
     still = Similarity(np.eye(3), 1.0, np.zeros(3))
-    middles = bits.vertices[api._in_frame(bits, face, still).triangles].mean(axis=1)[:, 1]
+    middles = bits.vertices[api.in_frame(bits, face, still).triangles].mean(axis=1)[:, 1]
     assert len(middles) == 2 and np.abs(middles).max() < 100 + 0.35 * h
 
 
@@ -142,3 +143,34 @@ def test_nothing_is_read_where_nothing_can_be_written(tmp_path) -> None:
     with pytest.raises(Exception, match="file"):
         api.transfer_head("nowhere.obj", "nowhere", tmp_path / "file" / "head", name="x")
     assert replace(LoadOptions(), unit="m").unit == "m"
+
+
+DOZEN = (
+    "nose_tip", "chin", "left_eye_inner", "left_eye_outer", "right_eye_inner", "right_eye_outer", "mouth_left",
+    "mouth_right", "upper_lip", "lower_lip", "left_eye_upper", "right_eye_upper",
+)  # fmt: skip
+
+
+def a_dozen(face, kind: str) -> str:
+    """Landmarks picked by hand, a millimetre off, as a file of some kind."""
+    marks = {n: p.tolist() for n, p in picked(face, *DOZEN, noise=1.0).items()}
+    if kind == ".json":
+        return json.dumps({"landmarks": marks})
+    if kind == ".pp":
+        points = (f'<point x="{x}" y="{y}" z="{z}" name="{n}" active="1"/>' for n, (x, y, z) in marks.items())
+        return f"<!DOCTYPE PickedPoints><PickedPoints>{''.join(points)}</PickedPoints>"
+    return "\n".join(f"{n} = {p}" for n, p in marks.items())
+
+
+@pytest.mark.parametrize("kind", [".toml", ".json", ".pp"])
+def test_a_dozen_landmarks_by_hand_place_a_scan_without_a_search(face, scan, tmp_path, monkeypatch, kind) -> None:
+    monkeypatch.setattr(api, "align", None)
+    path = tmp_path / f"marks{kind}"
+    path.write_text(a_dozen(face, kind))
+    marks = read_landmarks(path, scan)
+    assert len(marks) == 12
+    found = find(face, scan, marks)
+    off = np.degrees(np.arccos(np.clip((np.trace(found.turn @ TURN.T) - 1) / 2, -1, 1)))
+    assert off < 2 and found.scale == pytest.approx(1000, rel=0.03)
+    nose = found.points(0.001 * face.landmarks["nose_tip"] @ TURN + SHIFT)
+    assert np.linalg.norm(nose - face.landmarks["nose_tip"]) < 2.0

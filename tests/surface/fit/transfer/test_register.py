@@ -189,6 +189,9 @@ def test_stages_follow_each_other_and_the_smooth_map_is_the_last_stiff_one(monke
         def hold(self) -> None:
             heard.append("hold")
 
+        def marks(self) -> dict[str, object]:
+            return {"chin": self.warp}
+
         def look(self, search, single) -> None:
             heard.append((search, single))
 
@@ -199,7 +202,8 @@ def test_stages_follow_each_other_and_the_smooth_map_is_the_last_stiff_one(monke
     monkeypatch.setattr(module, "Registration", Run)
     monkeypatch.setattr(module, "STAGES", (Stage(900.0, 9.0, 2), Stage(500.0, 8.0, 1, 4.0, True), Stage(60.0, 6.0, 1)))
     shares: list[float] = []
-    assert register(None, None, {}, shares.append) == (60.0, 500.0)
+    found = register(None, None, {}, shares.append)
+    assert (found.warp, found.smooth, found.marks) == (60.0, 500.0, {"chin": 60.0})
     assert heard == ["hold", (900.0, 9.0, "step"), (900.0, 9.0, "step"), "hold", (4.0, True), (500.0, 8.0, "step"),
                      "hold", (60.0, 6.0, "step")]  # fmt: skip
     assert shares == pytest.approx([1 / 3, 2 / 3, 1])
@@ -216,7 +220,8 @@ def test_a_known_map_is_found_between_a_template_and_a_scan(face, monkeypatch) -
         return p * [1.04, 1.0, 1.0] + np.column_stack([0 * p[:, 0], 0 * p[:, 0], 3.0 * np.sin(p[:, 1] / 40)])
 
     moved = Samples(bent(scan.points), scan.normals, scan.border)
-    warp, smooth = register(face, moved, {}, lambda _: None)
+    done = register(face, moved, {}, lambda _: None)
+    warp, smooth = done.warp, done.smooth
     inner = (np.abs(face.points) < [55, 85, 999]).all(axis=1)
     tree = cKDTree(moved.points)
     off = [tree.query(w(face.points[inner]))[0].mean() for w in (warp, smooth, lambda p: p)]

@@ -169,3 +169,19 @@ def test_a_piece_of_an_image_is_zero_outside_and_a_place_beyond_it_is_at_its_edg
             for i in range(r - 2, r + 3)
         ]
         np.testing.assert_array_equal(module._cut(image, row, column, 2, 3), wanted)
+
+
+@pytest.mark.parametrize("sunk", [0.0, 4.0])
+def test_eyes_are_found_where_they_lie_behind_their_lids_too(face, monkeypatch, sunk) -> None:
+    monkeypatch.setattr(module, "COUNT", 50_000)
+    balled = replace(face, points=face.points + np.outer(face.eye >= 0, [0, 0, 3.0]))  # eyes of people stand out
+    samples = made_face.samples(60_000)
+    x, y = np.abs(samples.points[:, 0]), samples.points[:, 1]
+    inside = ((x - 33) / 11) ** 2 + ((y - 36) / 5) ** 2 < 1.0
+    carved = replace(samples, points=samples.points + np.outer(inside, [0, 0, 3.0 - sunk]) + [0, 4.0, 0])
+    finder = Finder(balled, carved)
+    found = finder.find(balled.points, balled.landmarks, 8.0)
+    for name in ("left_eye_inner", "right_eye_outer"):
+        np.testing.assert_allclose(found[name][0][:2], balled.landmarks[name][:2] + np.array([0, 4.0]), atol=0.9)
+    alone = {n for n in finder.refine(balled.points, balled.landmarks, 3.0) if "_eye_" in n}
+    assert bool(alone) == (sunk == 0.0)

@@ -73,3 +73,15 @@ def test_a_missing_file_and_numbers_that_are_none():
         make_scan(np.array([[0, 0, 0], [np.nan, 0, 0], [1, 0, 0]]), TWO[:1], "x")
     with pytest.raises(FitError, match="not there"):
         make_scan(SQUARE, TWO + 2, "x")
+
+
+def test_normals_that_are_no_numbers_are_passed_over_in_silence(tmp_path, caplog):
+    facet = "facet normal 0 0 {}\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 {}\nendloop\nendfacet\n"
+    path = tmp_path / "scan.stl"
+    path.write_text("solid x\n" + facet.format("1", 0) + facet.format("one", 1) + "endsolid x\n")
+    with caplog.at_level("DEBUG", logger="trimesh.util"):
+        try:
+            assert len(read_scan(path).triangles) in (1, 2)
+        except FitError as error:
+            assert "STL" in str(error)
+    assert "Traceback" not in caplog.text and "normals" not in caplog.text

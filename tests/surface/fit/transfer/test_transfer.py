@@ -3,6 +3,7 @@
 The map is the oracle: where it puts a place of the shipped head, the new head must have it.
 """
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ ICT = Path(__file__).parents[4] / "configs" / "heads" / "ict"
 TURN = Rotation.from_euler("xyz", [85, 4, 17], degrees=True).as_matrix()  # about z up
 METRES = 0.001
 SHIFT = np.array([0.4, -0.2, 1.6])
+SKIN = (0.5, 0.36, 0.3)  # sRGB
 
 
 def other_face(p: np.ndarray) -> np.ndarray:
@@ -40,7 +42,8 @@ def scan_file(shipped, tmp_path_factory) -> Path:
     template = make_template(shipped, "ict")
     points = METRES * other_face(template.points) @ TURN.T + SHIFT
     path = tmp_path_factory.mktemp("scan") / "scan.obj"
-    lines = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in points]
+    colour = " ".join(map(str, SKIN))
+    lines = [f"v {x:.6f} {y:.6f} {z:.6f} {colour}" for x, y, z in points]
     path.write_text("\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in template.triangles]) + "\n")
     return path
 
@@ -49,7 +52,10 @@ def scan_file(shipped, tmp_path_factory) -> Path:
 def made(scan_file):
     out = scan_file.parent / "head"
     heard: list[float] = []
-    report = transfer_head(scan_file, ICT, out, name="other", progress=lambda _, done: heard.append(done))
+    folder = scan_file.parent / "report"
+    report = transfer_head(
+        scan_file, ICT, out, name="other", progress=lambda _, done: heard.append(done), report_dir=folder
+    )
     return Head.load(out), report, heard
 
 
@@ -90,7 +96,7 @@ def test_the_face_has_the_form_of_the_scan(shipped, made):
     assert np.sqrt(((after - before) ** 2).sum(axis=1).mean()) > 2.0  # the map is no trifle
     off = np.linalg.norm(aligned(after, wanted) - wanted, axis=1)
     assert np.sqrt((off**2).mean()) < 1.3  # along the skin, too
-    assert report.parts[0].neutral.rms < 0.3 and report.parts[0].samples > 10_000
+    assert report.fit.parts[0].neutral.rms < 0.3 and report.fit.parts[0].samples > 10_000
     assert heard == sorted(heard) and heard[0] > 0 and heard[-1] <= 1
 
 
@@ -106,7 +112,7 @@ def test_eyes_sit_in_their_sockets(shipped, made):
 
 def test_every_expression_is_there_and_moves_as_on_the_shipped_head(shipped, made):
     head, report, _ = made
-    assert set(report.parameters) == set(shipped.groups) and not report.missing
+    assert set(report.fit.parameters) == set(shipped.groups) and not report.fit.missing
     for name, most in (("jawOpen", 0.15), ("mouthSmileLeft", 0.2), ("browInnerUp", 0.15), ("cheekPuff", 0.2)):
         rest, moved = corresponding(shipped, head, {}), corresponding(shipped, head, {name: 1.0})
         theirs, ours = moved[0] - rest[0], moved[1] - rest[1]
@@ -122,9 +128,38 @@ def test_lips_seal_and_lids_close(made):
         assert gaps(head, side, {shape: 1.0}).max() < 0.5
 
 
+def test_the_report_tells_where_landmarks_are_what_was_open_and_what_is_shut(shipped, made, scan_file):
+    _, report, _ = made
+    own = make_template(shipped, "ict").landmarks
+    for mark in report.landmarks:
+        place = METRES * other_face(own[mark.name][None])[0] @ TURN.T + SHIFT
+        off = np.linalg.norm(mark.place - place) / METRES
+        assert off < (8.0 if mark.how == "carried" else 4.0), mark
+        assert mark.off_mm < 8.0 and (mark.sure > 0.5) == (mark.how == "found"), mark
+    assert {m.name for m in report.landmarks} == set(own) and report.matched > 0.8 and report.registration.rms < 1.0
+    assert {"eyeBlinkLeft", "eyeBlinkRight"} >= {n for n, (low, high) in report.reseated.items() if high > 1.4}
+    assert len(report.reseated) < 40  # most shapes stay as the map makes them
+    assert set(report.openings) == {"mouth", "left eye", "right eye"}
+    assert len(report.gaps) == 4 and all(gap.mm <= gap.most_mm for gap in report.gaps)
+    table = json.loads((scan_file.parent / "report" / "report.json").read_text())
+    assert table["scan_to_head_mm"]["face"]["rms"] == pytest.approx(report.fit.parts[0].neutral.rms)
+    text = (scan_file.parent / "report" / "report.md").read_text()
+    assert all(f"| {name} |" in text for name in own) and "eyeBlinkLeft 1: closed" in text
+    for name in ("landmarks.png", "error.png"):
+        assert (scan_file.parent / "report" / name).read_bytes().startswith(b"\x89PNG")
+
+
+def test_the_skin_has_the_scans_colour(made):
+    head, report, _ = made
+    linear = ((np.array(SKIN) + 0.055) / 1.055) ** 2.4  # IEC 61966-2-1
+    albedo = head.part("face").attributes["albedo"]
+    np.testing.assert_allclose(np.median(albedo, axis=0), linear, atol=0.01)
+    assert any("colours taken from the scan" in note for note in report.fit.notes)
+
+
 def test_unit_and_turn_are_said(made):
     _, report, _ = made
-    notes = " ".join(report.notes)
+    notes = " ".join(report.fit.notes)
     assert "unit taken for m" in notes and "by its form" in notes
 
 

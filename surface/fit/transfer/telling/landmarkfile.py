@@ -1,4 +1,7 @@
-"""Read landmarks that somebody picked on a mesh: TOML, JSON, or MeshLab's picked points (.pp)."""
+"""Read landmarks that somebody picked on a mesh: TOML, JSON, or MeshLab's picked points (.pp).
+
+A value is a place in the mesh's coordinates, a vertex, or a pixel of the picture that ``omote landmarks`` drew.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,14 @@ from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.fit.transfer.relief import mirrored
 from surface.fit.transfer.scan import Scan
+from surface.fit.transfer.telling.picture import Frontal
 from surface.fit.transfer.template import NAMES
 
 FAR = 0.05  # of a mesh's size: a landmark further from it was picked on another mesh, or in another unit
+LARGEST = 1e12  # of a number in a file: further out lies nothing
 EXAMPLE = "nose_tip = [0.0, 1.2, 9.8], or nose_tip = 3512 for a vertex, counted from 0"
+
+_Table = tuple[dict[str, Any], Frontal | None]
 
 
 def read_landmarks(path: Path, scan: Scan) -> dict[str, Floats]:
@@ -31,39 +38,54 @@ def read_landmarks(path: Path, scan: Scan) -> dict[str, Floats]:
     kind = path.suffix.lower()
     if kind not in readers:
         raise FitError(f"--landmarks {path}: is none of {', '.join(readers)}", hint=EXAMPLE)
-    table = readers[kind](path)
+    table, view = readers[kind](path)
     if not table:
         raise FitError(f"{path}: holds no landmark", hint=EXAMPLE)
     found = {}
     for name, value in table.items():
         if name not in NAMES:
             raise FitError(f"{path}: {name}: is no landmark", hint=f"there are {', '.join(NAMES)}")
-        found[name] = _place(value, scan, f"{path}: {name}")
+        found[name] = _place(value, scan, view, f"{path}: {name}")
     _check_near(found, scan, path)
     return found
 
 
-def _read_toml(path: Path) -> dict[str, Any]:
+def _read_toml(path: Path) -> _Table:
     with files.reading(path, FitError, hint=EXAMPLE):
         table = files.read_toml(path)
     return _inner(table, path)
 
 
-def _read_json(path: Path) -> dict[str, Any]:
+def _read_json(path: Path) -> _Table:
     with files.reading(path, FitError, hint='{"nose_tip": [0.0, 1.2, 9.8]}'):
         table = files.read_json(path)
     return _inner(table, path)
 
 
-def _inner(table: Any, path: Path) -> dict[str, Any]:
-    """The table of landmarks: the file itself, or its key ``landmarks``."""
+def _inner(table: Any, path: Path) -> _Table:
+    """The table of landmarks: the file itself, or its key ``landmarks``; and the view of its ``picture``."""
     inner = table.get("landmarks", table) if isinstance(table, dict) else None
     if not isinstance(inner, dict):
         raise FitError(f"{path}: is no table of landmarks by name", hint=EXAMPLE)
-    return inner
+    picture = table.get("picture") if inner is not table else None
+    return inner, None if picture is None else _view(picture, path)
 
 
-def _read_picked(path: Path) -> dict[str, Any]:
+def _view(table: Any, path: Path) -> Frontal:
+    """The front view of a table ``turn`` (9 numbers), ``scale``, ``shift`` (3 numbers)."""
+    try:
+        turn, shift = np.array(table["turn"], float).reshape(3, 3), np.array(table["shift"], float).reshape(3)
+        scale = float(table["scale"])
+        sound = bool((np.abs(turn) < 2.0).all() and (np.abs(shift) < LARGEST).all() and 0.0 < scale < LARGEST)
+        if not sound or np.abs(turn @ turn.T - np.eye(3)).max() > 1e-3:
+            raise ValueError
+    except (TypeError, KeyError, ValueError, OverflowError):
+        hint = "leave [picture] as omote landmarks wrote it, or write it again"
+        raise FitError(f"{path}: picture: is no view that omote landmarks writes", hint=hint) from None
+    return Frontal(turn, scale, shift)
+
+
+def _read_picked(path: Path) -> _Table:
     """Points that MeshLab's tool PickPoints saved; those that are not active are left out."""
     with files.reading(path, FitError, hint="save it again in MeshLab: Edit, PickPoints"):
         text = files.read_file(path, files.TEXT_LIMIT)
@@ -80,7 +102,7 @@ def _read_picked(path: Path) -> dict[str, Any]:
             if name in out:
                 raise FitError(f"{path}: {name}: is picked twice", hint="delete one of the two points")
             out[name] = [_number(point.get(axis)) for axis in "xyz"]
-    return out
+    return out, None
 
 
 def _number(text: str | None) -> float:
@@ -90,8 +112,10 @@ def _number(text: str | None) -> float:
         return math.nan
 
 
-def _place(value: Any, scan: Scan, where: str) -> Floats:
+def _place(value: Any, scan: Scan, view: Frontal | None, where: str) -> Floats:
     """Where one landmark is."""
+    if isinstance(value, Mapping) and "pixel" in value:
+        return _at_pixel(value["pixel"], scan, view, where)
     if isinstance(value, Mapping):
         value = value.get("point", value.get("vertex"))
     if isinstance(value, int) and not isinstance(value, bool):
@@ -99,10 +123,28 @@ def _place(value: Any, scan: Scan, where: str) -> Floats:
             raise FitError(f"{where}: there is no vertex {value}", hint=f"the mesh has 0 to {len(scan.original) - 1}")
         vertex: Floats = scan.vertices[scan.original[value]]
         return vertex
-    numbers = isinstance(value, list) and len(value) == 3
-    if not numbers or not all(isinstance(x, int | float) and math.isfinite(x) for x in value):
+    if not _are_numbers(value, 3):
         raise FitError(f"{where}: {value!r} is neither a place nor a vertex", hint=EXAMPLE)
     return np.array(value, float)
+
+
+def _are_numbers(value: Any, count: int) -> bool:
+    """Is a value a list of so many usable numbers?"""
+    numbers = isinstance(value, list) and len(value) == count
+    return numbers and all(isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST for x in value)
+
+
+def _at_pixel(value: Any, scan: Scan, view: Frontal | None, where: str) -> Floats:
+    """The place of a scan at a pixel of its front view."""
+    if not _are_numbers(value, 2):
+        raise FitError(f"{where}: {value!r} is no pixel", hint="{ pixel = [412, 388] }: right and down, from 0")
+    if view is None:
+        hint = "pixels belong to the picture of omote landmarks MESH -o FILE.toml, which writes [picture]"
+        raise FitError(f"{where}: a pixel, but the file has no table [picture]", hint=hint)
+    place = view.place(scan, float(value[0]), float(value[1]))
+    if place is None:
+        raise FitError(f"{where}: the scan shows nothing at pixel {value}", hint="take one on the left half's face")
+    return place
 
 
 def _check_near(found: dict[str, Floats], scan: Scan, path: Path) -> None:

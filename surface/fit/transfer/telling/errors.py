@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
-from surface.fit.points.report import Errors, PartReport
+from surface.fit.points.report import PartReport, errors_of
 from surface.fit.transfer.align import face_region, foremost
 from surface.fit.transfer.register import LEAST_COSINE
 from surface.fit.transfer.scan import Samples, make_scan, sample
@@ -15,19 +15,29 @@ from surface.fit.transfer.warp import Warp
 from surface.head import Head, HeadData
 
 REACH_MM, SEEN_MM = 20.0, 3.0  # of the face: what lies further away is hair, or clothes; width of a line of sight
+NEAR_MM = 6.0  # beside the face's own front, as it is seen: what lies further off is an ear, or a crown
+EYES = 1.6  # in radii from an eyeball's axis: eyes and lids
 COUNT = 150_000
 
 
-def face_report(data: HeadData, template: Template, warp: Warp, samples: Samples) -> PartReport:
+def face_reports(data: HeadData, template: Template, warp: Warp, samples: Samples) -> list[PartReport]:
     """Distances from the scan's samples on the front of the face to the nearest skin or eyeball of the head, whose
-    control points are counted together."""
-    own = distances(Head(data), warp(template.points[face_region(template)]), samples)
-    return PartReport("face", sum(len(p.points) for p in data.parts), len(own), 0, _errors(own), {})
+    control points are counted together; and those of eyes and lids by themselves.
+
+    Eyeballs of the head are balls of its own size, and lids lie on them, whatever a scan has there: flat, carved,
+    closed or noisy eyes. Their distances are told, and are no errors of the face's skin.
+    """
+    at, own = distances(Head(data), warp(template.points[face_region(template)]), samples)
+    off = np.linalg.norm(at[:, None, :2] - data.eyes[:, :2], axis=2).min(axis=1)
+    eyes = off < EYES * data.eye_radius
+    count = sum(len(p.points) for p in data.parts)
+    pairs = (("face", ~eyes, count), ("eyes and lids", eyes, 0))
+    return [PartReport(n, points, int(k.sum()), 0, errors_of(own[k]), {}) for n, k, points in pairs]
 
 
-def distances(head: Head, front: Floats, samples: Samples) -> Floats:
-    """(m,) mm from each sample of the scan that is seen from the front, within the region of the points ``front``, to
-    the head's own surface."""
+def distances(head: Head, front: Floats, samples: Samples) -> tuple[Floats, Floats]:
+    """Samples (m, 3) of the scan that are seen from the front, near the points ``front``, and how far each is from the
+    head's own surface, (m,) mm."""
     own = [p for p in head.parts if p.material in ("skin", "eye")]
     first = np.cumsum([0, *(len(p.vertices) for p in own)])
     faces = np.concatenate([p.triangles + k for p, k in zip(own, first, strict=False)]).astype(np.int64)
@@ -37,15 +47,11 @@ def distances(head: Head, front: Floats, samples: Samples) -> Floats:
     inside = ((at > low) & (at < high)).all(axis=1) & (samples.normals[:, 2] > 0.2)
     inside[inside] = foremost(at[inside], SEEN_MM)
     inside &= ~samples.border
+    inside[inside] = cKDTree(front[:, :2]).query(at[inside, :2], distance_upper_bound=NEAR_MM)[0] < NEAR_MM
     at = at[inside]
     far, near = cKDTree(mine.points).query(at)
     off = np.abs(((at - mine.points[near]) * mine.normals[near]).sum(axis=1))
     same = (mine.normals[near] * samples.normals[inside]).sum(axis=1) > LEAST_COSINE
-    distance: Floats = np.where(far < 2.0, off, far)[same | (far > 2.0)]
-    return distance[distance < REACH_MM]
-
-
-def _errors(distance: Floats) -> Errors:
-    if not len(distance):
-        return Errors(0.0, 0.0, 0.0)
-    return Errors(float(np.sqrt((distance**2).mean())), float(np.percentile(distance, 99)), float(distance.max()))
+    distance: Floats = np.where(far < 2.0, off, far)
+    counted = (same | (far > 2.0)) & (distance < REACH_MM)
+    return at[counted], distance[counted]

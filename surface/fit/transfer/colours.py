@@ -1,0 +1,168 @@
+"""The colours of a scan, of its vertices or its textures, as paint of the head that is made in its form.
+
+A head is painted in layers over (u, v). Where the scan shows a layer's place, its value becomes the one that gives the
+place the scan's colour; other layers keep their relation to the skin. So cheeks, lips and brows get the scan's own
+colours, and stay what a user may edit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from surface.base.arrays import Bools, Floats
+from surface.fit.features.eye_colours import EYE_RANGE, SKIN_RANGE, USUAL_IRIS, by_rings
+from surface.fit.points.eyeball import IRIS
+from surface.fit.source.mesh import FitMesh, triangles
+from surface.fit.source.textures import Samples, sample_colours
+from surface.head import Head, HeadData, HeadPart
+from surface.head.posing.paint import BASE, layer_field
+from surface.readers.meshdata import MeshData
+
+MANY = 300_000  # samples of a scan's colours
+PLAIN = 0.02  # standard deviation of colours that say nothing: one grey, or white, all over
+NEAR_MM = 2.0  # from a vertex of the head to the sample whose colour it has
+FRONT = 0.3  # least z of the normals of skin whose colour counts for all of it
+STRONG, LEAST = 0.6, 20  # field of a layer where its colour is taken from, and how many vertices that needs
+SHOWN = 0.3  # least amount by which a layer is taken to show
+EYE_REACH = (0.93, 1.12)  # in radii: samples so far from an eyeball's centre are its own
+WHITER = 0.75  # the saturation of an eye's white is at most so much of the skin's
+LEAST_EYE = 60  # samples
+
+
+def scan_colours(raw: MeshData, kept: Bools | None = None) -> Samples | None:
+    """Samples of the colours of a mesh, in its own coordinates; None where it has none, or one grey all over.
+
+    kept : (f,) which faces belong to it.
+    """
+    if raw.colours is None and not any(raw.materials):
+        return None
+    mesh = FitMesh(
+        raw.vertices, raw.faces, raw.uv, raw.face_uv, (), np.zeros((0, len(raw.vertices), 3)), raw.piece, raw.pieces,
+        raw.materials,
+    )  # fmt: skip
+    faces = np.arange(len(raw.faces)) if kept is None else np.flatnonzero(kept)
+    steps = int(np.clip(np.sqrt(2.0 * MANY / max(len(triangles(raw.faces[faces])), 1)) - 1.5, 0, 12))
+    found = sample_colours(mesh, faces, steps=steps, tint=raw.colours)
+    if found is None:
+        return None
+    rgb = found.colour[found.colour[:, 3] > 0.5, :3]
+    grey = len(rgb) and float(np.ptp(rgb.mean(axis=0))) < PLAIN
+    return None if not len(rgb) or (grey and float(rgb.std(axis=0).max()) < PLAIN) else found
+
+
+def moved(samples: Samples, turn: Floats, scale: float, shift: Floats) -> Samples:
+    """Samples with every point p at scale * turn @ p + shift."""
+    return replace(samples, points=scale * samples.points @ turn.T + shift)
+
+
+def with_colours(data: HeadData, samples: Samples) -> tuple[HeadData, list[str]]:
+    """A head in the place of a scan, painted with the scan's colours; and which were found, in words."""
+    solid = samples.colour[:, 3] > 0.5
+    tree, rgb = cKDTree(samples.points[solid]), np.sqrt(samples.colour[solid, :3])  # means of roots look right
+    head = Head(data)
+    face = max((p for p in head.parts if p.material == "skin" and p.follows == "skin"), key=lambda p: len(p.vertices))
+    skin = _front_colour(face, *_looked_up(face.vertices.astype(float), tree, rgb))
+    if skin is None:
+        return data, []
+    old = np.asarray(next((la["value"] for la in data.paint if _is_base(la, face.name)), BASE["albedo"]), float)
+    layers: list[dict[str, Any]] = []
+    for part in head.parts:
+        own = [la for la in data.paint if la["part"] == part.name]
+        if part.material == "skin":
+            own = _painted(
+                part, own, skin, skin / np.maximum(old, 1e-3), *_looked_up(part.vertices.astype(float), tree, rgb)
+            )
+        layers += own
+    layers, eyes = _with_eyes(layers, data, samples, skin)
+    told = [f"skin {_words(skin)}", *eyes]
+    return replace(data, paint=layers), [f"colours taken from the scan (linear RGB): {'; '.join(told)}"]
+
+
+def _is_base(layer: dict[str, Any], part: str) -> bool:
+    return bool(layer["part"] == part and layer["attribute"] == "albedo" and layer["kind"] == "all")
+
+
+def _looked_up(points: Floats, tree: cKDTree, rgb: Floats) -> tuple[Floats, Bools]:
+    """(m, 3) linear colours of the scan at points (m, 3), and (m,) where it has any."""
+    count = min(6, tree.n)
+    off, near = tree.query(points, k=count, distance_upper_bound=NEAR_MM)
+    off, near = np.asarray(off).reshape(-1, count), np.asarray(near).reshape(-1, count)
+    weight = np.where(np.isfinite(off), 1.0 / (0.2 + off), 0.0)
+    total = weight.sum(axis=1)
+    mean = np.einsum("mk,mkc->mc", weight, np.vstack([rgb, np.zeros((1, 3))])[near]) / np.maximum(total, 1e-9)[:, None]
+    return mean**2, total > 0
+
+
+def _front_colour(face: HeadPart, seen: Floats, known: Bools) -> Floats | None:
+    """(3,) the median colour of what of a face looks forward; None where the scan tells too little."""
+    chosen = known & (face.normals[:, 2] > FRONT)
+    return np.clip(np.median(seen[chosen], axis=0), *SKIN_RANGE) if chosen.sum() >= LEAST else None
+
+
+def _painted(
+    part: HeadPart, layers: list[dict[str, Any]], skin: Floats, ratio: Floats, seen: Floats, known: Bools
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Layers of a part of skin whose albedo has the scan's colours where they are seen, else the skin's times ratio."""
+    uv = part.uv.astype(float)
+    at = np.tile(np.asarray(BASE["albedo"]), (len(uv), 1))
+    out = [] if any(_is_base(la, part.name) for la in layers) else [_all_over(part.name, "albedo", skin)]
+    for layer in layers:
+        if layer["attribute"] == "albedo":
+            amount, field = float(layer.get("amount", 1.0)), layer_field(layer, uv)
+            strong = known & (field > STRONG)
+            if _is_base(layer, part.name):
+                value = skin if part.follows == "skin" and part.name != "sockets" else layer["value"] * ratio
+            elif strong.sum() >= LEAST:
+                below = np.median(at[strong], axis=0)
+                wanted = np.median(seen[strong], axis=0)
+                value = below + (wanted - below) / max(amount, SHOWN)
+                if (value < SKIN_RANGE[0]).any() or (value > SKIN_RANGE[1]).any():  # no colour so strong: all of it
+                    value, amount = wanted, 1.0
+            else:
+                value = layer["value"] * ratio
+            value = np.clip(value, *SKIN_RANGE)
+            at += amount * field[:, None] * (value - at)
+            layer = {**layer, "value": np.round(value, 4).tolist(), "amount": amount}
+        out.append(layer)
+    return out
+
+
+def _with_eyes(
+    layers: list[dict[str, Any]], data: HeadData, samples: Samples, skin: Floats
+) -> tuple[list[dict[str, Any]], list[str]]:  # fmt: skip
+    """Layers with the colours of eyes that the scan shows open; closed ones, as red as skin, tell nothing."""
+    usual = USUAL_IRIS * float(np.linalg.norm(data.eyes[0] - data.eyes[1])) / data.eye_radius
+    told = []
+    for side, name in enumerate(("left_eye", "right_eye")):
+        local = (samples.points - data.eyes[side]) / data.eye_radius
+        off = np.linalg.norm(local, axis=1)
+        own = (off > EYE_REACH[0]) & (off < EYE_REACH[1]) & (local[:, 2] > 0.0)
+        if own.sum() < LEAST_EYE:
+            continue
+        found = by_rings(Samples(samples.points[own], samples.colour[own], samples.weight[own]), data.eyes[side], usual)
+        if found.white is None or found.iris is None or _saturation(found.white) > WHITER * _saturation(skin):
+            continue
+        parts = [p.name for p in data.parts if p.follows == name]
+        values = {"iris": found.iris, "sclera": found.white}
+        values |= {"iris_radius": np.array([found.iris_radius])} if abs(found.iris_radius - IRIS) > 0.01 else {}
+        layers = [la for la in layers if not (la["part"] in parts and la["attribute"] in values)]
+        layers += [_all_over(part, key, np.clip(v, *EYE_RANGE)) for part in parts for key, v in values.items()]
+        told.append(f"iris of the {name.replace('_', ' ')} {_words(found.iris)}")
+    return layers, told
+
+
+def _saturation(colour: Floats) -> float:
+    root = np.sqrt(colour)
+    return float(1.0 - root.min() / max(float(root.max()), 1e-6))
+
+
+def _all_over(part: str, attribute: str, value: Floats) -> dict[str, Any]:
+    return {"part": part, "attribute": attribute, "kind": "all", "value": np.round(value, 4).tolist()}
+
+
+def _words(colour: Floats) -> str:
+    return " ".join(f"{c:.2f}" for c in colour)

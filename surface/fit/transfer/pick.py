@@ -1,0 +1,99 @@
+"""Find landmarks on a bare mesh and write them into a file, with a picture, to be corrected by hand."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from surface.base.arrays import Floats
+from surface.base.errors import FitError
+from surface.base.progress import Progress, no_progress
+from surface.fit.source.load import LoadOptions
+from surface.fit.transfer.align import Similarity
+from surface.fit.transfer.api import find_face, in_frame
+from surface.fit.transfer.register import Mark, register
+from surface.fit.transfer.scan import Scan, read_scan, sample
+from surface.fit.transfer.telling.landmarkfile import read_landmarks
+from surface.fit.transfer.telling.picture import Frontal, draw_landmarks
+from surface.fit.transfer.telling.reportfile import view_of
+from surface.fit.transfer.template import NAMES, make_template
+from surface.head import Head
+
+MANY = 250_000  # samples of the head once it is found
+
+
+def pick_landmarks(
+    mesh_path: str | Path, source: str | Path, out: Path, *, keep: bool = False,
+    options: LoadOptions = LoadOptions(), progress: Progress | None = None,
+) -> tuple[dict[str, Mark], Path]:  # fmt: skip
+    """Find the landmarks of a face and write them, and beside the file a picture of the same name that ends in .png.
+
+    mesh_path, options : as of :func:`surface.fit.transfer.api.transfer_head`. source : folder of a head of which the
+    face has the form. out : .toml. keep : the landmarks that ``out`` has are kept, and only the others found.
+
+    Returns the landmarks in the mesh's own coordinates, and the picture's path.
+
+    Raises FitError: the mesh cannot be read, no face was found in it, ``out`` is there and not to be kept, or it or the
+    picture cannot be written. MissingPackage: Pillow is not installed. Nothing is written then.
+    """
+    if out.suffix.lower() != ".toml":
+        raise FitError(f"{out}: landmarks are written as TOML", hint=f"-o {out.with_suffix('.toml')}")
+    if out.exists() and not keep:
+        raise FitError(f"{out}: is there already", hint="--keep keeps its landmarks, finds the others, draws all again")
+    report = progress or no_progress
+    scan = read_scan(mesh_path, options.without)
+    given = read_landmarks(out, scan) if out.exists() else {}
+    template = make_template(Head.load(source), str(source))
+    report("face", 0.05)
+    found = find_face(scan, template, given, options, str(mesh_path))
+    report("face", 0.25)
+    samples, held = sample(in_frame(scan, template, found), MANY), {n: found.points(p) for n, p in given.items()}
+    done = register(template, samples, held, lambda share: report("landmarks", 0.25 + 0.7 * share))
+    marks = {n: Mark(_in_file(found, m), m.how, m.sure) for n, m in done.marks.items()}
+    view = view_of(found, np.array([m.place for m in marks.values()]))
+    return marks, _write(Path(mesh_path), out, scan, view, marks)
+
+
+def _in_file(found: Similarity, mark: Mark) -> Floats:
+    place: Floats = (mark.place - found.shift) @ found.turn / found.scale
+    return place
+
+
+def _write(mesh: Path, out: Path, scan: Scan, view: Frontal, marks: Mapping[str, Mark]) -> Path:
+    """Write file and picture, both or none."""
+    picture = out.with_suffix(".png")
+    new = {path: path.with_name(f".{path.name}.new") for path in (picture, out)}
+    try:
+        draw_landmarks(scan, view, {n: (m.place, m.how) for n, m in marks.items()}, new[picture])
+        new[out].write_text(as_toml(mesh, out, view, marks), encoding="utf-8")
+        for path, made in new.items():
+            os.replace(made, path)
+    except OSError as e:
+        raise FitError(f"{out}: cannot be written ({e})", hint="choose another -o FILE") from e
+    finally:
+        for made in new.values():
+            made.unlink(missing_ok=True)
+    return picture
+
+
+def as_toml(mesh: Path, out: Path, view: Frontal, marks: Mapping[str, Mark]) -> str:
+    """The text of a file of landmarks, with what to do with it."""
+    digits = max(0, 2 - int(np.floor(np.log10(1.0 / view.scale))))  # a hundredth of a pixel
+    lines = [
+        f"# Landmarks of {mesh.name}; the numbers are those in {out.with_suffix('.png').name}.",
+        "# Correct a place, or give a pixel of the picture's left half, as nose_tip = { pixel = [412, 388] },",
+        f"# or delete a line. Then draw again: omote landmarks {mesh} -o {out} --keep",
+        f"# and fit: omote fit {mesh} -o heads/me --expressions-from ict --landmarks {out}",
+        "[landmarks]",
+    ]
+    for name in (n for n in NAMES if n in marks):
+        mark = marks[name]
+        place = ", ".join(f"{x:.{digits}f}" for x in mark.place)
+        sure = f", {mark.sure:.2f} sure" if mark.how == "found" else ""
+        lines.append(f"{name} = [{place}]  # {NAMES.index(name) + 1}, {mark.how}{sure}")
+    turn, shift = (", ".join(f"{x:.9g}" for x in values) for values in (view.turn.ravel(), view.shift))
+    lines += ["", "[picture]  # how a place becomes a pixel; leave it as it is"]
+    return "\n".join([*lines, f"turn = [{turn}]", f"scale = {view.scale:.9g}", f"shift = [{shift}]", ""])

@@ -1,0 +1,109 @@
+"""Landmarks that are found, written, drawn and read again."""
+
+from pathlib import Path
+
+import made_face
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.spatial.transform import Rotation
+
+from surface.base.errors import FitError
+from surface.fit.transfer import pick
+from surface.fit.transfer.align import Similarity
+from surface.fit.transfer.register import Mark, Registered
+from surface.fit.transfer.scan import make_scan, read_scan
+from surface.fit.transfer.telling.landmarkfile import read_landmarks
+from surface.fit.transfer.telling.picture import COLOURS
+
+TURN, SHIFT = Rotation.from_euler("xyz", [80, 10, 20], degrees=True).as_matrix(), np.array([0.5, -1.0, 2.0])
+
+
+@pytest.fixture(scope="module")
+def face():
+    return made_face.template()
+
+
+@pytest.fixture
+def scan_file(face, tmp_path) -> Path:
+    """The made face in metres, turned."""
+    points = 0.001 * face.points @ TURN.T + SHIFT
+    lines = [f"v {x:.7f} {y:.7f} {z:.7f}" for x, y, z in points]
+    path = tmp_path / "scan.obj"
+    path.write_text("\n".join(lines + [f"f {a + 1} {b + 1} {c + 1}" for a, b, c in face.triangles]) + "\n")
+    return path
+
+
+@pytest.fixture
+def known(face, monkeypatch):
+    """The search is tested elsewhere: here it finds what is there; the chin is 5 mm off, as searches may be."""
+    heard = []
+
+    def register(template, samples, given, progress):
+        marks = {n: Mark(p.copy(), "found", 0.9) for n, p in face.landmarks.items()} | {
+            n: Mark(p, "given") for n, p in given.items()
+        }
+        if "chin" not in given:
+            marks["chin"] = Mark(face.landmarks["chin"] + np.array([0, 5.0, 0]), "carried", 0.0)
+        heard.append(given)
+        return Registered(None, None, marks)
+
+    monkeypatch.setattr(pick, "make_template", lambda *_: face)
+    monkeypatch.setattr(pick.Head, "load", lambda *_: None)
+    monkeypatch.setattr(pick, "find_face", lambda *_: Similarity(TURN.T, 1000.0, -1000.0 * TURN.T @ SHIFT))
+    monkeypatch.setattr(pick, "register", register)
+    return heard
+
+
+def in_file(face, name) -> np.ndarray:
+    return 0.001 * face.landmarks[name] @ TURN.T + SHIFT
+
+
+def test_landmarks_are_written_where_they_are_and_read_again(face, scan_file, known, tmp_path):
+    out = tmp_path / "marks.toml"
+    marks, picture = pick.pick_landmarks(scan_file, "ict", out)
+    read = read_landmarks(out, read_scan(scan_file))
+    assert set(read) == set(marks) == set(face.landmarks)
+    for name in set(read) - {"chin"}:
+        np.testing.assert_allclose(read[name], in_file(face, name), atol=2e-6)
+    text = out.read_text()
+    assert "chin = " in text and ", carried" in text and "--landmarks" in text and "--keep" in text
+    drawn = np.asarray(Image.open(picture).convert("RGB"))
+    for how in ("found", "carried"):
+        assert (drawn == COLOURS[how]).all(axis=2).sum() > 30, how
+
+
+def test_a_pixel_of_the_picture_corrects_a_landmark(face, scan_file, known, tmp_path):
+    out = tmp_path / "marks.toml"
+    pick.pick_landmarks(scan_file, "ict", out)
+    lines = out.read_text().splitlines()
+    view = pick.read_landmarks.__globals__["_read_toml"](out)[1]
+    column, row, _ = view.pixels(in_file(face, "chin"))
+    corrected = [f"chin = {{ pixel = [{column:.0f}, {row:.0f}] }}" if x.startswith("chin") else x for x in lines]
+    out.write_text("\n".join(corrected))
+    marks, picture = pick.pick_landmarks(scan_file, "ict", out, keep=True)
+    assert marks["chin"].how == "given" and set(known[-1]) == set(face.landmarks)
+    assert np.linalg.norm(marks["chin"].place - in_file(face, "chin")) < 0.001  # 1 mm: a pixel is 0.3
+    assert (np.asarray(Image.open(picture).convert("RGB")) == COLOURS["given"]).all(axis=2).sum() > 30
+
+
+def test_nothing_is_overwritten_unasked_and_files_are_toml(scan_file, known, tmp_path):
+    out = tmp_path / "marks.toml"
+    out.write_text("chin = 3\n")
+    with pytest.raises(FitError, match="is there already") as caught:
+        pick.pick_landmarks(scan_file, "ict", out)
+    assert "--keep" in caught.value.hint and out.read_text() == "chin = 3\n"
+    with pytest.raises(FitError, match="as TOML"):
+        pick.pick_landmarks(scan_file, "ict", tmp_path / "marks.txt")
+    with pytest.raises(FitError, match="cannot be written"):
+        pick.pick_landmarks(scan_file, "ict", tmp_path / "nowhere" / "marks.toml")
+    assert not list(tmp_path.glob(".marks*"))
+
+
+def test_a_scan_shows_nothing_beside_it(face):
+    scan = make_scan(face.points, face.triangles, "x")
+    view = pick.view_of(Similarity(np.eye(3), 1.0, np.zeros(3)), np.array(list(face.landmarks.values())))
+    inside = face.points[(np.abs(face.points[:, :2]) < 40).all(axis=1)][::40]
+    for point in np.vstack([inside, face.points[face.triangles[500]].mean(axis=0)]):
+        np.testing.assert_allclose(view.place(scan, *view.pixels(point)[:2]), point, atol=1e-6)
+    assert view.place(scan, -500.0, 10.0) is None
