@@ -12,10 +12,10 @@ from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress, part_of
 from surface.check.overlaps import overlap_notes
+from surface.fit.eyes.colours import paint_layers
+from surface.fit.eyes.drawn_lids import seat_drawn_lids
+from surface.fit.eyes.lids import fit_lids, gazes_of
 from surface.fit.features.combs import combed
-from surface.fit.features.drawn_lids import seat_drawn_lids
-from surface.fit.features.eye_colours import paint_layers
-from surface.fit.features.eye_lids import fit_lids, gazes_of
 from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan

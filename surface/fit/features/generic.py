@@ -1,6 +1,6 @@
 """Split a mesh that has no recipe into parts: eyeballs, face, back of the head, what is inside the mouth.
 
-Pieces are connected by vertices. Eyes are found by :mod:`surface.fit.features.eyes`; the largest of the others is skin;
+Pieces are connected by vertices. Eyes are found by :mod:`surface.fit.eyes.search`; the largest of the others is skin;
 the rest is identified by the names of its objects and materials.
 """
 
@@ -13,11 +13,11 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
-from surface.fit.features.eyes import Eyes, find_eyes, middle_x
+from surface.fit.eyes.search import Eyes, find_eyes, middle_x
 from surface.fit.features.others import by_object, is_skin, why_out
-from surface.fit.features.rigging import rigid_fit
 from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
+from surface.fit.points.rigidfit import rigid_fit
 from surface.fit.source.chart import TILE
 from surface.fit.source.islands import Island
 from surface.fit.source.kinds import kind_name

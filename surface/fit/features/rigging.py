@@ -8,6 +8,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from surface.base.arrays import Floats, Ints
+from surface.fit.points.rigidfit import rigid_fit
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, Jaw, Rule
 from surface.head.model.parameters import TONGUE_NEEDS, smoothstep
@@ -32,15 +33,6 @@ def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: Ints, hinge: F
     glide[0] = 0.0
     tilts = {n: affine_fit(rest, move) for n, move in moves.items()}
     return Jaw(tuple(hinge.tolist()), angle, tuple(glide.tolist()), tilts)
-
-
-def rigid_fit(before: Floats, after: Floats) -> tuple[Floats, Floats]:
-    """Rotation (3, 3) and shift (3,) that bring points nearest to others (Kabsch, 1976)."""
-    b0, a0 = before.mean(axis=0), after.mean(axis=0)
-    u, _, vt = np.linalg.svd((before - b0).T @ (after - a0))
-    sign = float(np.sign(np.linalg.det(vt.T @ u.T)))
-    turn = vt.T @ np.diag([1.0, 1.0, sign]) @ u.T
-    return turn, a0 - turn @ b0
 
 
 def affine_fit(points: Floats, moves: Floats) -> Floats:

@@ -11,7 +11,7 @@ from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
 from surface.check.overlaps import overlap_notes
-from surface.fit.features.drawn_lids import seat_drawn_lids
+from surface.fit.eyes.drawn_lids import seat_drawn_lids
 from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, UNITS

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats
-from surface.fit.features.eye_colours import EYE_RANGE, SKIN_RANGE, USUAL_IRIS, by_rings
+from surface.fit.eyes.colours import EYE_RANGE, SKIN_RANGE, USUAL_IRIS, by_rings
 from surface.fit.points.eyeball import IRIS
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.fit.source.textures import Samples, sample_colours

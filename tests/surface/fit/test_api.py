@@ -10,7 +10,7 @@ from slit_sheet import slit_sheet, write_npz
 from surface.base.errors import FitError
 from surface.fit import api, fit_head
 from surface.fit.api import eyes_of, fit_mesh, part_chart, prepare, recipe_plan
-from surface.fit.features.eye_lids import gazes_of
+from surface.fit.eyes.lids import gazes_of
 from surface.fit.points.recipe import PartRecipe, Recipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.points.report import FitResult

@@ -14,7 +14,7 @@ from small_head import small_head
 from surface.base.errors import FitError, ViewError
 from surface.fit import reportfile
 from surface.fit.api import fit_mesh
-from surface.fit.features.eyes import MISSING
+from surface.fit.eyes.search import MISSING
 from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds, kinds_line
 from surface.fit.reportfile import EXCLUDED, SCALE, _colours, as_markdown, as_table, write_report

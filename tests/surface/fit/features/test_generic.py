@@ -8,8 +8,8 @@ import pytest
 from meshfiles import remapped
 from slit_sheet import SIZE_MM, slit_sheet
 
+from surface.fit.eyes.search import middle_x
 from surface.fit.features import generic
-from surface.fit.features.eyes import middle_x
 from surface.fit.features.generic import MOST_ISLANDS, POINTS, make_plan
 from surface.fit.source.islands import Island, boundary_loops, signed_areas
 from surface.fit.source.mesh import FitMesh, check_manifold, face_areas

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, face, with_sockets
 
-from surface.fit.features.eye_linings import linings
+from surface.fit.eyes.linings import linings
 
 LINED = with_sockets(face())  # what goes on from the lids' edges does not move in a blink
 SKIN = len(face().faces)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, face, shell, with_sockets
 
-from surface.fit.features import eye_sockets as module
-from surface.fit.features.eye_sockets import hidden_faces
+from surface.fit.eyes import sockets as module
+from surface.fit.eyes.sockets import hidden_faces
 
 
 @pytest.fixture(scope="module")

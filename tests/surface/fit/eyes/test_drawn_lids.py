@@ -7,7 +7,7 @@ import pytest
 from eye_face import CENTRES
 from face_measures import Window
 
-from surface.fit.features.drawn_lids import BLINKS, seat_drawn_lids
+from surface.fit.eyes.drawn_lids import BLINKS, seat_drawn_lids
 from surface.head import Group, Head, HeadData
 
 AHEAD = 40.0 + 6.0  # z of what lies before the middle of an eyeball

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, disc, face, joined, looking, pair, shell, with_sockets
 
-from surface.fit.features.eyes import ADDED, MISSING
+from surface.fit.eyes.search import ADDED, MISSING
 from surface.fit.features.generic import make_plan
 from surface.fit.source.mesh import FitMesh, check_manifold
 

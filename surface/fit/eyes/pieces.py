@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from surface.base.arrays import Floats, Ints
-from surface.fit.features.eye_names import is_cover, is_eye, is_iris
+from surface.fit.eyes.names import is_cover, is_eye, is_iris
 from surface.fit.points.ballfit import Ball, fit_ball, front_ball
 from surface.fit.source.mesh import FitMesh, components, face_areas, renumbered
 

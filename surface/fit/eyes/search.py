@@ -12,12 +12,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from surface.base.arrays import Bools, Floats
-from surface.fit.features.eye_linings import linings
-from surface.fit.features.eye_names import is_beside
-from surface.fit.features.eye_openings import Opening, ball_behind, find_openings
-from surface.fit.features.eye_patches import LOOKS, island_sides, shaped_sides, turns
-from surface.fit.features.eye_pieces import Side, around, named_sides, pieces_of, round_sides
-from surface.fit.features.eye_sockets import hidden_faces
+from surface.fit.eyes.linings import linings
+from surface.fit.eyes.names import is_beside
+from surface.fit.eyes.openings import Opening, ball_behind, find_openings
+from surface.fit.eyes.patches import LOOKS, island_sides, shaped_sides, turns
+from surface.fit.eyes.pieces import Side, around, named_sides, pieces_of, round_sides
+from surface.fit.eyes.sockets import hidden_faces
 from surface.fit.points.ballfit import Ball, turning_centre
 from surface.fit.source.mesh import FitMesh
 

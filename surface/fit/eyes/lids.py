@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.features.eye_blink import shut_blinks
-from surface.fit.features.eyes import Eyes
+from surface.fit.eyes.blink import shut_blinks
+from surface.fit.eyes.search import Eyes
 from surface.fit.points.eyeball import CORNEA
 from surface.fit.points.lid_seating import AHEAD, LID_MM, Eyeball, seat_lids
 from surface.fit.source.mesh import FitMesh, directed_edges, renumbered

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.features.eye_pieces import USUAL, mirrored
+from surface.fit.eyes.pieces import USUAL, mirrored
 from surface.fit.points.ballfit import Ball
 from surface.fit.points.lid_seating import LID_MM
 from surface.fit.source.islands import Island, boundary_loops

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, disc, joined, pair, shell
 
-from surface.fit.features import eye_pieces
-from surface.fit.features.eye_pieces import (
+from surface.fit.eyes import pieces as eye_pieces
+from surface.fit.eyes.pieces import (
     MIRRORED,
     ROUND,
     SIZES,

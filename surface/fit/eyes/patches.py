@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.features.eye_pieces import SIZES, Piece, Side, round_sides, weighted_points
-from surface.fit.features.rigging import rigid_fit
+from surface.fit.eyes.pieces import SIZES, Piece, Side, round_sides, weighted_points
 from surface.fit.points.ballfit import Ball, fit_ball, turn_angle
+from surface.fit.points.rigidfit import rigid_fit
 from surface.fit.source.islands import find_islands
 from surface.fit.source.mesh import FitMesh, components, corners, face_areas, renumbered, triangles
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from eye_face import ABOVE, CENTRES, HALF_HEIGHT, HALF_WIDTH, RADIUS, face
 
-from surface.fit.features import eye_openings as module
-from surface.fit.features.eye_openings import (
+from surface.fit.eyes import openings as module
+from surface.fit.eyes.openings import (
     Opening,
     ball_behind,
     find_openings,

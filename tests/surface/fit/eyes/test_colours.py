@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, disc, face, joined, pair, shell
 
-from surface.fit.features import eye_colours
-from surface.fit.features.eye_colours import paint_layers
+from surface.fit.eyes import colours as eye_colours
+from surface.fit.eyes.colours import paint_layers
 from surface.fit.features.generic import make_plan
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.textures import Samples, linear

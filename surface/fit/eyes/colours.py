@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.features.eye_names import is_cover, is_iris
-from surface.fit.features.eyes import Eyes
+from surface.fit.eyes.names import is_cover, is_iris
+from surface.fit.eyes.search import Eyes
 from surface.fit.points.eyeball import IRIS
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.textures import Samples, sample_colours

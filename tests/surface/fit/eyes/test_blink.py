@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, face
 
-from surface.fit.features import eye_blink as module
-from surface.fit.features.eye_blink import shut_blinks
-from surface.fit.features.eye_openings import find_openings
+from surface.fit.eyes import blink as module
+from surface.fit.eyes.blink import shut_blinks
+from surface.fit.eyes.openings import find_openings
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ import pytest
 from eye_face import CENTRES, RADIUS, face, joined, pair, shell
 from face_measures import Window
 
-from surface.fit.features.eye_lids import fit_lids
+from surface.fit.eyes.lids import fit_lids
 from surface.fit.features.generic import make_plan
 from surface.fit.points.eyeball import surface_height
 from surface.fit.source.mesh import FitMesh

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.features.eye_openings import Opening
+from surface.fit.eyes.openings import Opening
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import sources_of
 from surface.head.model.parameters import smoothstep

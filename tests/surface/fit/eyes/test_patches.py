@@ -7,8 +7,8 @@ import pytest
 from eye_face import CENTRES, RADIUS, face, joined, looking, pair, shell
 from scipy.spatial.transform import Rotation
 
-from surface.fit.features import eye_patches as module
-from surface.fit.features.eye_patches import bulges, grown, island_sides, shaped_sides, turns
+from surface.fit.eyes import patches as module
+from surface.fit.eyes.patches import bulges, grown, island_sides, shaped_sides, turns
 from surface.fit.source.mesh import FitMesh
 
 LOOKS = [f"eyeLook{k}Left" for k in ("Up", "Down", "In", "Out")]
