@@ -14,8 +14,9 @@ import tomli_w
 from surface.base import files
 from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
-from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
+from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seal, Seam
 from surface.head.model.meshes import KEYS
+from surface.head.model.parameters import SHAPES
 from surface.head.model.placement import Placement
 from surface.mesh.domain import Slit
 
@@ -232,7 +233,19 @@ def _contact(section: _Section, places: Floats, names: list[str]) -> Contact:
             raise section.error("followers", f"no part named {follower!r} stands after {t['part']!r}")
     if t["eye"] not in (-1, 0, 1):
         raise section.error("eye", f"{t['eye']} is not -1 (lips), 0 (left eye) or 1 (right eye)")
-    return Contact(**t | {"followers": tuple(t["followers"])}, places=places.astype(float))
+    seal = _seal(section.section("seal")) if "seal" in section.table else None
+    return Contact(**t | {"followers": tuple(t["followers"])}, places=places.astype(float), seal=seal)
+
+
+def _seal(section: _Section) -> Seal:
+    shares = section.section("opens")
+    seal = Seal(opens=shares.read(**dict.fromkeys(shares.table, ())), **section.read(closed=(), parted=()))
+    for name in seal.opens:
+        if name not in SHAPES:
+            raise section.error("opens", f"no shape {name!r}")
+    if not seal.closed < seal.parted:
+        raise section.error("parted", f"{seal.parted:g} is not greater than closed, {seal.closed:g}")
+    return seal
 
 
 def _rule(section: _Section) -> Rule:
@@ -321,11 +334,17 @@ def _table(head: HeadData) -> dict[str, Any]:
             for p in head.parts
         ],
         "seams": [{"a": s.part_a, "b": s.part_b} for s in head.seams],
-        "contacts": [{k: v for k, v in vars(c).items() if k != "places"} for c in head.contacts],
+        "contacts": [_contact_table(c) for c in head.contacts],
         "rules": [vars(r) for r in head.rules],
         "paint": head.paint,
         **({"placement": _placement_table(head.placement)} if head.placement else {}),
     }  # fmt: skip
+
+
+def _contact_table(contact: Contact) -> dict[str, Any]:
+    """A contact without its places; its seal, if it has one."""
+    table = {k: v for k, v in vars(contact).items() if k not in ("places", "seal")}
+    return table | ({"seal": vars(contact.seal)} if contact.seal else {})
 
 
 def _extent_table(part: PartData) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from surface.base.arrays import Floats, Floats32, Ints
 from surface.head.model.data import Group, HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.parameters import SHAPES, Pose, rotation
-from surface.head.model.rules import Drivers
+from surface.head.model.rules import Drivers, SealDriver
 from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import add_moves, keep_on_eyeball, mix_rows, swing_jaw
 
@@ -85,6 +85,7 @@ class SkinRig:
         others = [c for c in head.contacts if c.part != part.name and part.name in c.followers]
         surfaces = {p.name: make_surface(p) for p in head.parts if p.name in {c.part for c in (*own, *others)}}
         self._solvers = [ContactSolver(c, surfaces[c.part], head) for c in own]
+        self._seals = [SealDriver(c.seal) for c in own]
         self._followers = [(c.name, Follower(c, part.points, surfaces[c.part], head)) for c in others]
         self._clearances = _clearances(part, head)
         self._lids = Lids(part, head, self._moves)
@@ -114,9 +115,9 @@ class SkinRig:
     def apply_contacts(self, pose: Pose, points: Floats) -> None:
         """Correct control points (n, 3), moved by everything else, at the part's own contacts and at those it follows;
         corrections at its own are put into ``pose.pushes``."""
-        for solver in self._solvers:
+        for solver, seal in zip(self._solvers, self._seals, strict=True):
             axis = optical_axis(pose.gaze[max(solver.contact.eye, 0)])
-            pose.pushes[solver.contact.name] = solver.apply(axis, points)
+            pose.pushes[solver.contact.name] = solver.apply(axis, points, seal.amount(pose.shapes))
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)
@@ -127,8 +128,9 @@ class SkinRig:
         """Everything in a pose that the part's points depend on."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
         gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
+        seals = (seal.amount(pose.shapes) for seal in self._seals)
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
-        return self._amounts.tobytes(), jaw, gaze, *pushes
+        return self._amounts.tobytes(), jaw, gaze, *seals, *pushes
 
     def _evaluate(self, pose: Pose) -> None:
         """Groups, jaw, lids and contacts, one after the other."""
