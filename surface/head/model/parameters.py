@@ -35,6 +35,8 @@ _BLINK = [_AT[f"eyeBlink{s}"] for s in SIDES]
 _LOOK_DOWN = [_AT[f"eyeLookDown{s}"] for s in SIDES]
 _OPENERS = [[_AT[f"eye{e}{s}"] for e in ("LookUp", "Wide")] for s in SIDES]
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
+_BELOW = [_AT[n] for n in ("mouthRollLower", "mouthShrugLower", "mouthPressLeft", "mouthPressRight")]
+GIVE_WAY, GIVEN = 0.75, 0.5  # share of what raises the lower lip that a tongue takes away; tongueOut from which on
 TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # jawOpen at least, for the whole tongue; how much earlier the jaw opens
 LID_SHARE = 0.72  # of a blink, which the upper lid goes down at a whole look down
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
@@ -47,6 +49,7 @@ class Pose:
     shapes : (52,) amount of each group; lids already follow the gaze.
     jaw : how far the jaw is open, 0..1; closed : share of it that mouthClose takes back, 0..1.
     head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
+    lip : (k, 3) samples of the lower lip where the contact left them, mm, for the tongue, which lies on them.
     pushes : corrections at contacts by their names, mm, from :class:`surface.head.posing.contact.ContactSolver`; the
         part with the opening sets them for parts after it.
     """
@@ -57,6 +60,7 @@ class Pose:
     head: Floats
     gaze: Floats
     pushes: dict[str, Floats] = field(default_factory=dict)
+    lip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 def read_pose(values: Floats) -> Pose:
@@ -77,6 +81,9 @@ def read_pose(values: Floats) -> Pose:
     shapes, angle = given[: len(SHAPES)], given[len(SHAPES) :]
     needed = TONGUE_NEEDS * min(1.0, TONGUE_FIRST * shapes[_TONGUE])
     jaw = shapes[_JAW] = max(shapes[_JAW], needed)
+    given = 1.0 - GIVE_WAY * min(1.0, shapes[_TONGUE] / GIVEN)
+    for i in _BELOW:  # the lower lip gives way to the tongue
+        shapes[i] *= given
     gaze = [_gaze([shapes[i] for i in _LOOK[side]], side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)]
     for side, (yaw, pitch) in enumerate(gaze):
         outward = yaw * (1 - 2 * side)

@@ -119,6 +119,14 @@ class ContactSolver:
         )  # fmt: skip
         return self.push
 
+    @property
+    def lower(self) -> Floats:
+        """(k, 3) samples of the lower side that can touch the upper one, as the last call of :meth:`apply` left them;
+        for lips."""
+        columns, rows = self.contact.places.shape[1:3]
+        samples = self._sides.samples.reshape(2, columns, rows, 4)[1, :, : contact_rows(self.contact), :3]
+        return samples.reshape(-1, 3)
+
     def move_sides(self, amounts: Floats, points: Floats) -> None:
         """Move control points (n, 3) so that the sides go apart by ``amounts (2, k)`` mm in their columns: the upper
         ones up by the contact's share of it, the lower ones down by the rest; together below 0."""
