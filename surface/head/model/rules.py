@@ -50,15 +50,20 @@ class SealDriver:
     """Computes how firmly a pose keeps lips together, from the shapes; 0 without a seal."""
 
     def __init__(self, seal: Seal | None) -> None:
-        self._seal = seal
+        self._seal, self._amount = seal, 0.0
+        self._of: Floats | None = None
         shares = seal.opens if seal else {}
         self._rows = np.array([[0.0 if n.endswith(other) else shares.get(n, 0.0) for n in SHAPES]
                                for other in reversed(SIDES)])  # fmt: skip
 
     def amount(self, shapes: Floats) -> float:
-        """1 while lips stay together, 0 where they are parted, smooth between; ``shapes (52,)``."""
-        if self._seal is None:
-            return 0.0
-        low, high = self._seal.closed, self._seal.parted
+        """1 while lips stay together, 0 where they are parted, smooth between; ``shapes (52,)``. Computed once for the
+        same array."""
+        if self._seal is not None and shapes is not self._of:
+            self._of, self._amount = shapes, self._at(shapes, self._seal)
+        return self._amount
+
+    def _at(self, shapes: Floats, seal: Seal) -> float:
+        low, high = seal.closed, seal.parted
         t = min(max((float((self._rows @ shapes).max()) - low) / (high - low), 0.0), 1.0)
         return 1.0 - t * t * (3.0 - 2.0 * t)

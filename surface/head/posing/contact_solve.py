@@ -31,6 +31,8 @@ from .contact_kernels import (
     trace_profiles,
 )
 
+SEAL_PASSES = 2  # of bringing sides together: the second finds what bending left
+
 
 @kernel
 def gather_near(points, near, eye, local):
@@ -162,8 +164,9 @@ def part_sides(
         push[:] = 0.0
         place_all(radius > 0.0, sampling, work)
         if seal > 0.0 and radius <= 0.0:
-            close_sides(seal, passes, tolerance, rows, apart, opening, push, sampling, work)
-        trace_profiles(work[4], rows, radius, before)
+            close_sides(seal, SEAL_PASSES, tolerance, rows, apart, opening, push, sampling, work)
+        if radius > 0.0:
+            trace_profiles(work[4], rows, radius, before)
         error = tolerance
         while done < passes and error >= tolerance:
             error = part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work)

@@ -29,7 +29,7 @@ SLICE_MM = 2.5  # half the length of a slice in which its height and width are f
 BEND_MM = 16.0  # along the tongue, over which a rise fades
 SIDEWAYS = 0.8  # of the way of the lower lip to a side, which the tongue goes along
 PUT_OUT = (0.02, 0.3)  # tongueOut, from none to all of the correction: a tongue in the mouth lies as it was fitted
-PASSES = 4
+PASSES = 3
 
 
 @kernel
@@ -40,14 +40,31 @@ def find_rise(under: Floats, below: Floats, reach: float, clear: float, soft: fl
     for s in range(len(under)):
         rise[s] = 0.0
         for k in range(len(below)):
-            square = ((under[s, 0] - below[k, 0]) ** 2 + (under[s, 2] - below[k, 2]) ** 2) / reach**2
             need = below[k, 1] + clear - under[s, 1]
-            if square < 1.0 and need > -soft:
+            if need <= -soft:
+                continue
+            square = ((under[s, 0] - below[k, 0]) ** 2 + (under[s, 2] - below[k, 2]) ** 2) / reach**2
+            if square < 1.0:
                 near = min(need + soft, 2.0 * soft)
                 need = need if need > soft else near * near / (4.0 * soft)
                 rise[s] = max(rise[s], need * (1.0 - square) ** 2)
         most = max(most, rise[s])
     return most
+
+
+@kernel
+def lift_sections(rise: Floats, fade: Floats, part: Floats, share: float, points: Floats) -> None:
+    """Move points (n, 3) up by ``share`` times their ``part (n,)`` of the greatest ``rise (s k,)`` of k stations of
+    each of s cross-sections, times ``fade (s, n)``."""
+    sections, across = len(fade), len(rise) // len(fade)
+    lift = np.zeros(len(points))
+    for s in range(sections):
+        most = rise[s * across : (s + 1) * across].max()
+        if most > 0.0:
+            for i in range(len(points)):
+                lift[i] = max(lift[i], most * fade[s, i])
+    for i in range(len(points)):
+        points[i, 1] += share * part[i] * lift[i]
 
 
 class TongueRest:
@@ -65,6 +82,7 @@ class TongueRest:
         away[0, z > along[0]] = 0.0  # the tip goes as its first station
         self._fade = 1.0 - smoothstep(away / BEND_MM)
         self._sideways = smoothstep(z, along[0] - LENGTH_MM, along[0] - 0.4 * LENGTH_MM)
+        self._whole = np.ones(len(z))
         low, high = _thickness(at, z)
         self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
         self._lower, self._upper = (_edges(head, follows, sign) for follows, sign in (("jaw", 1.0), ("skull", -1.0)))
@@ -78,10 +96,10 @@ class TongueRest:
         aside = float(lip[:, 0].mean() - self._sideways @ points[:, 0] / self._sideways.sum())
         points[:, 0] += share * SIDEWAYS * aside * self._sideways
         below = np.concatenate([lip, self._lower @ linear.T + shift])
-        self._press(0, below, 1.0, share, points)
+        self._press(0, below, self._whole, share, points)
         self._press(1, self._upper, self._thick, share, points)
 
-    def _press(self, side: int, against: Floats, part: Floats | float, share: float, points: Floats) -> None:
+    def _press(self, side: int, against: Floats, part: Floats, share: float, points: Floats) -> None:
         """Move points away from what lies ``against`` the under (0) or the upper (1) side, by their ``part`` of it."""
         sign, (ids, shares) = 1.0 - 2.0 * side, self._sides[side]
         way, rise = np.array([1.0, sign, 1.0]), np.zeros(len(shares))
@@ -89,8 +107,7 @@ class TongueRest:
         for _ in range(PASSES):
             if find_rise(shares @ points[ids] * way, mirrored, REACH_MM, CLEAR_MM, SOFT_MM, rise) < SOFT_MM / 4.0:
                 break
-            station = rise.reshape(STATIONS, -1).max(axis=1)
-            points[:, 1] += sign * share * part * (station[:, None] * self._fade).max(axis=0)
+            lift_sections(rise, self._fade, part, sign * share, points)
 
 
 def _grid(part: PartData) -> Floats:
