@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from surface.base import files
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 from surface.fit.features.rigging import DROOP, DROOP_RULE
@@ -15,11 +17,12 @@ from surface.fit.points.recipe import Recipe
 from surface.fit.points.strokes import arc_length
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
-from surface.head.model.data import Contact, Group, HeadData, PartData, Rule
+from surface.head.model.data import Contact, Group, HeadData, PartData, Rule, Seal
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import read_pose
 from surface.head.posing.rig import SkinRig
 
+LIPS = Path(__file__).with_name("lips.toml")  # what parts the lips of a fitted head
 SETTLINGS = 4  # each halves what contacts still move at rest
 COLUMNS, ROWS, FADE_ROWS = 21, 10, 5
 FINE_U, FINE_V = 61, 49  # grid that columns are interpolated in, along and across an opening
@@ -92,7 +95,8 @@ def find_contacts(
         lining = [p for p in (LID_LINING if lids else LIP_LINING) if p in parts]
         depth, reach, share = (0.58 * radius, 0.5 * radius, 0.8) if lids else (15.0, 12.0, 0.5)
         places = sample_places(surface, loop, depth, reach)
-        out.append(Contact(NAMES[eye], face.name, tuple(lining), eye, reach, share, places, cling))
+        seal = None if lids else Seal(**files.read_toml(LIPS))
+        out.append(Contact(NAMES[eye], face.name, tuple(lining), eye, reach, share, places, cling, seal))
     return out
 
 

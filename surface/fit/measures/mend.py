@@ -50,7 +50,7 @@ def mend_spikes(
             trial, count = _smoothed(trial, part, shape, dense)
             moved += count
         after = measure_dense(trial, mesh, sources, parts, limit)
-        if not moved or not _is_better(after, dense, wanted):
+        if not moved or not _is_better(after, dense, wanted, limit):
             break
         notes.append(f"mended: {moved} control points stuck out or were turned over: {_told(wanted)}")
         head, dense = trial, after
@@ -77,15 +77,18 @@ def _turned(dense: DenseErrors, scale: float) -> list[tuple[str, str, str]]:
     return [(p, s, f"{mm2:.0f} mm²") for (p, s), mm2 in far.items() if s == NEUTRAL or (p, NEUTRAL) not in far]
 
 
-def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, str, str]]) -> bool:
-    """Does everything that was mended stick out less, or is less of it turned over, and nothing else more?"""
+def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, str, str]], limit: float) -> bool:
+    """Does everything that was mended stick out less, or is less of it turned over, and nothing else more?
+
+    limit : what sticks out by less than half of it, mm, may do so: points along a bent surface end a little off it.
+    """
     was, now = _furthest(before), _furthest(after)
     over, left = (
         {key: both.mm2 for key, both in d.turned.items() if key in {w[:2] for w in wanted}} for d in (before, after)
     )
     gained = all(now[w[:2]] < 0.8 * was[w[:2]] for w in wanted if w[2].endswith("mm"))
     gained &= sum(left.values()) <= 0.5 * sum(over.values()) or not any(w[2].endswith("²") for w in wanted)
-    return gained and max(now.values()) <= max(was.values())
+    return gained and max(now.values()) <= max(*was.values(), 0.5 * limit)
 
 
 def _furthest(dense: DenseErrors) -> dict[tuple[str, str], float]:

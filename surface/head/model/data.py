@@ -105,6 +105,20 @@ class Neck:
 
 
 @dataclass(frozen=True)
+class Seal:
+    """How lips stay together until a pose really opens them.
+
+    opens : shares of shapes, by name, of what opens them; below 0 of what keeps them closed. Those of a Left or Right
+        shape count for that side, and the greater side counts. Up to ``closed`` lips that lie together at rest stay so;
+        from ``parted`` on they are where the groups take them.
+    """
+
+    opens: dict[str, float]
+    closed: float
+    parted: float
+
+
+@dataclass(frozen=True)
 class Contact:
     """Two sides of an opening that meet and do not pass through each other.
 
@@ -114,6 +128,7 @@ class Contact:
     places : (2, columns, rows, 2) samples in (u, v), the upper side first, columns in the order of x, rows from the
         rim on; two thirds of the rows can touch the other side, in the rest the correction fades out.
     cling : are lids brought back onto the eyeball where shapes lift them off it? If not, they only keep out of it.
+    seal : of lips; None for sides that only keep off each other.
     """
 
     name: str
@@ -124,6 +139,7 @@ class Contact:
     share: float
     places: Floats
     cling: bool = True
+    seal: Seal | None = None
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,9 @@ import tomli_w
 from surface.base import files
 from surface.base.arrays import Array, Floats
 from surface.base.errors import HeadFileError
-from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
+from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seal, Seam
 from surface.head.model.meshes import KEYS
+from surface.head.model.parameters import SHAPES
 from surface.head.model.placement import Placement
 from surface.mesh.domain import Slit
 
@@ -235,7 +236,20 @@ def _contact(section: _Section, places: Floats, names: list[str]) -> Contact:
     cling = section.table.get("cling", True)
     if not isinstance(cling, bool):
         raise section.error("cling", f"{cling!r} is neither true nor false")
-    return Contact(**t | {"followers": tuple(t["followers"])}, places=places.astype(float), cling=cling)
+    seal = _seal(section.section("seal")) if "seal" in section.table else None
+    followers = tuple(t.pop("followers"))
+    return Contact(**t, followers=followers, places=places.astype(float), cling=cling, seal=seal)
+
+
+def _seal(section: _Section) -> Seal:
+    shares = section.section("opens")
+    seal = Seal(opens=shares.read(**dict.fromkeys(shares.table, ())), **section.read(closed=(), parted=()))
+    for name in seal.opens:
+        if name not in SHAPES:
+            raise section.error("opens", f"no shape {name!r}")
+    if not seal.closed < seal.parted:
+        raise section.error("parted", f"{seal.parted:g} is not greater than closed, {seal.closed:g}")
+    return seal
 
 
 def _rule(section: _Section) -> Rule:
@@ -324,13 +338,18 @@ def _table(head: HeadData) -> dict[str, Any]:
             for p in head.parts
         ],
         "seams": [{"a": s.part_a, "b": s.part_b} for s in head.seams],
-        "contacts": [
-            {k: v for k, v in vars(c).items() if k != "places" and not (k == "cling" and v)} for c in head.contacts
-        ],
+        "contacts": [_contact_table(c) for c in head.contacts],
         "rules": [vars(r) for r in head.rules],
         "paint": head.paint,
         **({"placement": _placement_table(head.placement)} if head.placement else {}),
     }  # fmt: skip
+
+
+def _contact_table(contact: Contact) -> dict[str, Any]:
+    """A contact without its places and what is as usual; its seal, if it has one."""
+    usual = ("places", "seal", "cling") if contact.cling else ("places", "seal")
+    table = {k: v for k, v in vars(contact).items() if k not in usual}
+    return table | ({"seal": vars(contact.seal)} if contact.seal else {})
 
 
 def _extent_table(part: PartData) -> dict[str, Any]:

@@ -32,9 +32,13 @@ EYE_RAD = np.radians([35.0, 30.0])  # yaw, pitch at full scale
 _AT = {name: i for i, name in enumerate(NAMES)}
 _LOOK = [[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] for s in SIDES]
 _BLINK = [_AT[f"eyeBlink{s}"] for s in SIDES]
-_OPENERS = [[_AT[f"eye{e}{s}"] for e in ("LookDown", "LookUp", "Wide")] for s in SIDES]
+_LOOK_DOWN = [_AT[f"eyeLookDown{s}"] for s in SIDES]
+_OPENERS = [[_AT[f"eye{e}{s}"] for e in ("LookUp", "Wide")] for s in SIDES]
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
+_BELOW = [_AT[n] for n in ("mouthRollLower", "mouthShrugLower", "mouthPressLeft", "mouthPressRight")]
+GIVE_WAY, GIVEN = 0.75, 0.5  # share of what raises the lower lip that a tongue takes away; tongueOut from which on
 TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # jawOpen at least, for the whole tongue; how much earlier the jaw opens
+LID_SHARE = 0.72  # of a blink, which the upper lid goes down at a whole look down
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
 
 
@@ -45,6 +49,7 @@ class Pose:
     shapes : (52,) amount of each group; lids already follow the gaze.
     jaw : how far the jaw is open, 0..1; closed : share of it that mouthClose takes back, 0..1.
     head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
+    lip : (k, 3) samples of the lower lip where the contact left them, mm, for the tongue, which lies on them.
     pushes : corrections at contacts by their names, mm, from :class:`surface.head.posing.contact.ContactSolver`; the
         part with the opening sets them for parts after it.
     """
@@ -55,13 +60,15 @@ class Pose:
     head: Floats
     gaze: Floats
     pushes: dict[str, Floats] = field(default_factory=dict)
+    lip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 def read_pose(values: Floats) -> Pose:
     """Parameter values (59,) in the order of NAMES, clipped, as a pose.
 
     mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
-    opens the jaw as far as it needs, ahead of the tongue, and keeps the lips off it.
+    opens the jaw as far as it needs, ahead of the tongue, and keeps the lips off it. Blink and look down do not add up:
+    the lid goes as far as the greater of the two takes it (:func:`lid_down`).
 
     Raises ValueError: wrong shape, or a value that is not a number (names the parameter).
     """
@@ -74,17 +81,35 @@ def read_pose(values: Floats) -> Pose:
     shapes, angle = given[: len(SHAPES)], given[len(SHAPES) :]
     needed = TONGUE_NEEDS * min(1.0, TONGUE_FIRST * shapes[_TONGUE])
     jaw = shapes[_JAW] = max(shapes[_JAW], needed)
+    given = 1.0 - GIVE_WAY * min(1.0, shapes[_TONGUE] / GIVEN)
+    for i in _BELOW:  # the lower lip gives way to the tongue
+        shapes[i] *= given
     gaze = [_gaze([shapes[i] for i in _LOOK[side]], side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)]
     for side, (yaw, pitch) in enumerate(gaze):
         outward = yaw * (1 - 2 * side)
         looks = max(pitch, 0.0), max(-outward, 0.0), max(outward, 0.0), max(-pitch, 0.0)
         for i, amount in zip(_LOOK[side], looks, strict=True):
             shapes[i] = amount
+        down = _LOOK_DOWN[side]
+        shapes[down] = lid_down(shapes[down], shapes[_BLINK[side]])
         for i in _OPENERS[side]:  # a closing lid ends closed, wherever it started
             shapes[i] *= 1.0 - shapes[_BLINK[side]]
     shapes[_CLOSE] = min(shapes[_CLOSE], jaw - needed)
     closed = shapes[_CLOSE] / jaw if jaw > 0 else 0.0
     return Pose(np.array(shapes), jaw, closed, np.array(angle[:3]) * HEAD_RAD, np.array(gaze) * EYE_RAD)
+
+
+def lid_down(look: float, blink: float) -> float:
+    """What a look down, 0..1, adds to a blink, 0..1, as a look down: how much further than the blink it takes the lid.
+
+    The lid, in blinks, is at the greater of ``blink`` and LID_SHARE times ``look``, smooth where they are equal
+    (a polynomial minimum; Quilez, "Smooth minimum", 2013); the width of that is none for an open and for a closed eye.
+    """
+    if look <= 0.0 or blink <= 0.0:
+        return look
+    width, apart = blink * (1.0 - blink), abs(LID_SHARE * look - blink)
+    smooth = max(width - apart, 0.0) ** 2 / (4.0 * width) if width > 0.0 else 0.0
+    return (max(LID_SHARE * look - blink, 0.0) + smooth) / LID_SHARE
 
 
 def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float, float]:

@@ -6,8 +6,8 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.errors import HeadFileError
-from surface.head.model.data import Rule
-from surface.head.model.parameters import SHAPES
+from surface.head.model.data import Rule, Seal
+from surface.head.model.parameters import SHAPES, SIDES
 
 
 class Drivers:
@@ -44,3 +44,26 @@ class Drivers:
             terms = np.minimum(np.maximum(self._mix @ shapes, 0.0), 1.0)
             self._amounts[len(SHAPES) :] = np.multiply.reduceat(terms, self._first) ** self._power
         return self._amounts
+
+
+class SealDriver:
+    """Computes how firmly a pose keeps lips together, from the shapes; 0 without a seal."""
+
+    def __init__(self, seal: Seal | None) -> None:
+        self._seal, self._amount = seal, 0.0
+        self._of: Floats | None = None
+        shares = seal.opens if seal else {}
+        self._rows = np.array([[0.0 if n.endswith(other) else shares.get(n, 0.0) for n in SHAPES]
+                               for other in reversed(SIDES)])  # fmt: skip
+
+    def amount(self, shapes: Floats) -> float:
+        """1 while lips stay together, 0 where they are parted, smooth between; ``shapes (52,)``. Computed once for the
+        same array."""
+        if self._seal is not None and shapes is not self._of:
+            self._of, self._amount = shapes, self._at(shapes, self._seal)
+        return self._amount
+
+    def _at(self, shapes: Floats, seal: Seal) -> float:
+        low, high = seal.closed, seal.parted
+        t = min(max((float((self._rows @ shapes).max()) - low) / (high - low), 0.0), 1.0)
+        return 1.0 - t * t * (3.0 - 2.0 * t)

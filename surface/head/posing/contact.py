@@ -15,7 +15,7 @@ from surface.dcp import DCPSurface
 from surface.deform.lists import LANES
 from surface.head.model.data import Contact, HeadData
 from surface.head.model.parameters import smoothstep
-from surface.head.posing.contact_kernels import find_heights, follow_samples, move_points
+from surface.head.posing.contact_kernels import find_gaps, find_heights, follow_samples, move_points, trace_profiles
 from surface.head.posing.contact_solve import clear_eyeball, gather_near, part_sides, place_all
 from surface.spline.kernels import fill_rows, row_capacity
 
@@ -76,7 +76,7 @@ class EyeballClearance:
         self.sampling = near, *tiled(start, local, share), np.searchsorted(near, self.ids)
         self.samples, (s, p) = np.empty((len(places), 4)), (len(places), len(near))
         self.work = (np.zeros((p, 3)), np.full((p, 3), np.nan), np.zeros((p, 3), np.float32),
-                     np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(3))  # fmt: skip
+                     np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(4))  # fmt: skip
         gather_near(surface.points, near, self.eye, self.work[0])
         place_all(self.radius > 0.0, self.sampling, self.work)
         limits = height_limits(self.samples, self.radius, held=held, cling=cling)
@@ -104,23 +104,34 @@ class ContactSolver:
         columns, rows = contact.places.shape[1:3]
         profiles = 2, columns, contact_rows(contact), 3
         self._opening = (np.zeros(profiles), np.zeros(profiles), np.zeros((2, columns)),
-                         np.zeros((len(self._sides.ids), 3)))  # fmt: skip
+                         np.zeros((len(self._sides.ids), 3)), *np.zeros((2, 2, columns)))  # fmt: skip
+        trace_profiles(self._sides.samples, rows, self._sides.radius, self._opening[0])
+        find_gaps(self._opening[0], self._opening[4])
         self.push = np.zeros(4 * columns * profiles[2] if lids else 2 * columns)
         self._press, self._rows = OVERLAP_MM[lids], rows
 
-    def apply(self, axis: Floats, points: Floats) -> Floats:
+    def apply(self, axis: Floats, points: Floats, seal: float = 0.0) -> Floats:
         """Correct control points (n, 3) in place; returns what :meth:`Follower.apply` takes, overwritten by each call.
 
         For lips that is the overlap (2 k,) in mm that was found in each column, for lids how far their samples (2 k m,)
-        slid and how far they were lifted. ``axis (3,)`` is where the eye looks. Where neither the points near the
-        opening nor the eye have moved, the last answer is used again.
+        slid and how far they were lifted. ``axis (3,)`` is where the eye looks; ``seal``, 0..1, how
+        firmly lips stay together. Where neither the points near the opening nor the eye nor the seal have changed, the
+        last answer is used again.
         """
         sides = self._sides
         self.passes = part_sides(
-            points, sides.eye, axis, PASSES, TOLERANCE_MM, self._press, SOFT_MM, self._rows, self._apart,
+            points, sides.eye, axis, seal, PASSES, TOLERANCE_MM, self._press, SOFT_MM, self._rows, self._apart,
             self._opening, self.push, sides.sampling, sides.limits, sides.work,
         )  # fmt: skip
         return self.push
+
+    @property
+    def lower(self) -> Floats:
+        """(k, 3) samples of the lower side that can touch the upper one, as the last call of :meth:`apply` left them;
+        for lips."""
+        columns, rows = self.contact.places.shape[1:3]
+        samples = self._sides.samples.reshape(2, columns, rows, 4)[1, :, : contact_rows(self.contact), :3]
+        return samples.reshape(-1, 3)
 
     def move_sides(self, amounts: Floats, points: Floats) -> None:
         """Move control points (n, 3) so that the sides go apart by ``amounts (2, k)`` mm in their columns: the upper

@@ -131,6 +131,45 @@ def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> No
 
 
 @kernel
+def find_gaps(samples: Floats, gaps: Floats) -> None:
+    """How far an opening stands open as seen from the front, ``gaps (2, k)``, from ``samples (2, k, m, 3)`` as
+    :func:`find_overlap` takes them: from the lowest of each column of the upper side to the highest of the lower side
+    at the same x, below 0 where one hides behind the other; and for each column of the lower side in turn."""
+    _, columns, rows, _ = samples.shape
+    edge, middle = np.empty((2, columns)), np.zeros((2, columns))
+    for side in range(2):
+        for k in range(columns):
+            heights = samples[side, k, :, 1]
+            edge[side, k] = heights.max() if side else heights.min()
+            for j in range(rows):
+                middle[side, k] += samples[side, k, j, 0] / rows
+    for side in range(2):
+        x, at, sign = middle[1 - side], 0, 1.0 - 2.0 * side
+        for k in range(columns):
+            while at < columns - 2 and x[at + 1] < middle[side, k]:
+                at += 1
+            t = min(max((middle[side, k] - x[at]) / max(x[at + 1] - x[at], 1e-9), 0.0), 1.0)
+            other = edge[1 - side, at] + t * (edge[1 - side, at + 1] - edge[1 - side, at])
+            gaps[side, k] = sign * (edge[side, k] - other)
+
+
+@kernel
+def find_closing(samples: Floats, seal: float, least: Floats, wanted: Floats, first: bool, push: Floats) -> float:
+    """How far the sides of an opening must come together, ``push (2, k)``, not above 0, so that ``seal`` of what it
+    stands open beyond ``least (2, k)`` closes; ``wanted (2, k)`` is where that ends, set at the ``first`` call. Returns
+    the farthest."""
+    most = 0.0
+    find_gaps(samples, push)
+    for side in range(2):
+        for k in range(push.shape[1]):
+            if first:
+                wanted[side, k] = push[side, k] - seal * max(push[side, k] - least[side, k], 0.0)
+            push[side, k] = min(wanted[side, k] - push[side, k], 0.0)
+            most = max(most, -push[side, k])
+    return most
+
+
+@kernel
 def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) -> None:
     """How high ``samples (s, 4)``, as :func:`place_samples` gives them, lie above an eyeball of radius ``size``:
     ``heights (s,)``.

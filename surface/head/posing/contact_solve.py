@@ -9,7 +9,7 @@ the kernels take are made by :mod:`.contact`:
 ``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table of
     :func:`.contact_kernels.lift_points`
 ``work`` : local, found (p, 3) float64; single (p, 3), room (24,) float32; samples (s, 4), heights, lifts (s,) float64;
-    looked (3,) float64
+    looked (4,) float64
 """
 
 # mypy: disable-error-code="call-arg, var-annotated, no-untyped-def"
@@ -21,6 +21,7 @@ import numpy as np
 from surface.base.jit import kernel
 
 from .contact_kernels import (
+    find_closing,
     find_heights,
     find_lifts,
     find_overlap,
@@ -29,6 +30,8 @@ from .contact_kernels import (
     place_samples,
     trace_profiles,
 )
+
+SEAL_PASSES = 2  # of bringing sides together: the second finds what bending left
 
 
 @kernel
@@ -40,9 +43,10 @@ def gather_near(points, near, eye, local):
 
 
 @kernel
-def is_known(local, axis, found, looked):
-    """Whether points and axis are those of the last answer; they are kept as those of the next one if not."""
-    same = True
+def is_known(local, axis, seal, found, looked):
+    """Whether points, axis and seal are those of the last answer; they are kept as those of the next one if not."""
+    same = looked[3] == seal
+    looked[3] = seal
     for c in range(3):
         same = same and looked[c] == axis[c]
         looked[c] = axis[c]
@@ -106,7 +110,7 @@ def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, w
     """One pass of :func:`part_sides` over the placed samples; returns the largest error that it found. Samples are
     placed again after it."""
     own, radius, local = sampling[4], limits[3], work[0]
-    _, profiles, overlap, _ = opening
+    _, profiles, overlap, _, _, _ = opening
     error, around = 0.0, radius > 0.0
     if around:
         error = lift_once(axis, 0.0, sampling, limits, work)
@@ -124,25 +128,45 @@ def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, w
 
 
 @kernel
-def part_sides(points, eye, axis, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work):
-    """Correct control points (n, 3) at an opening until what is left is below ``tolerance``, mm, ``passes`` times at
-    most; lids are moved onto the eyeball first, which opens them. Returns how many passes there were, 0 where the last
-    answer still holds.
+def close_sides(seal, passes, tolerance, rows, apart, opening, push, sampling, work):
+    """Bring the placed sides of an opening together by ``seal``, 0..1; samples are placed again after it."""
+    own, local = sampling[4], work[0]
+    _, profiles, overlap, _, least, wanted = opening
+    for k in range(passes):
+        trace_profiles(work[4], rows, 0.0, profiles)
+        if find_closing(profiles, seal, least, wanted, k == 0, overlap) < tolerance:
+            break
+        push += overlap.ravel()
+        move_points(own, overlap.ravel(), apart, np.zeros(3), 0.0, False, local)
+        place_all(False, sampling, work)
+
+
+@kernel
+def part_sides(
+    points, eye, axis, seal, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work
+):  # fmt: skip
+    """Correct control points (n, 3) at an opening, of which ``seal``, 0..1, is closed first, until what is left is
+    below ``tolerance``, mm, ``passes`` times at most; lids are moved onto the eyeball first, which opens them. Returns
+    how many passes there were, 0 where the last answer still holds.
 
     press, soft : as in :func:`.contact_kernels.find_overlap`; rows : samples of a column.
     apart : (2 c, k) how far the moved points go up where the sides of a column part by 1.
-    opening : before, profiles (2, c, m, 3), overlap (2, c), and the answer (k, 3), which are overwritten.
+    opening : before, profiles (2, c, m, 3), overlap (2, c), the answer (k, 3), gaps at rest (2, c), and room for
+        those that are wanted (2, c); all but those at rest are overwritten.
     push : what :meth:`.contact.ContactSolver.apply` returns.
     """
     near, _, _, _, own = sampling
     local, found, looked, radius = work[0], work[1], work[7], limits[3]
-    before, profiles, _, answer = opening
+    before, profiles, _, answer, _, _ = opening
     gather_near(points, near, eye, local)
     done = 0
-    if not is_known(local, axis, found, looked):
+    if not is_known(local, axis, seal, found, looked):
         push[:] = 0.0
         place_all(radius > 0.0, sampling, work)
-        trace_profiles(work[4], rows, radius, before)
+        if seal > 0.0 and radius <= 0.0:
+            close_sides(seal, SEAL_PASSES, tolerance, rows, apart, opening, push, sampling, work)
+        if radius > 0.0:
+            trace_profiles(work[4], rows, radius, before)
         error = tolerance
         while done < passes and error >= tolerance:
             error = part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work)

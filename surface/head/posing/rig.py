@@ -8,9 +8,10 @@ from surface.base.arrays import Floats, Floats32, Ints
 from surface.head.model.data import Group, HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.parameters import SHAPES, Pose, rotation
-from surface.head.model.rules import Drivers
+from surface.head.model.rules import Drivers, SealDriver
 from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import add_moves, keep_on_eyeball, mix_rows, swing_jaw
+from surface.head.posing.tongue import TongueRest
 
 GAP = 16  # greatest number of unmoved points within one run of a group's points
 CLEARANCE_GRID = (72, 36)  # samples of the part behind the lids, along u and v
@@ -85,8 +86,12 @@ class SkinRig:
         others = [c for c in head.contacts if c.part != part.name and part.name in c.followers]
         surfaces = {p.name: make_surface(p) for p in head.parts if p.name in {c.part for c in (*own, *others)}}
         self._solvers = [ContactSolver(c, surfaces[c.part], head) for c in own]
+        self._seals = [SealDriver(c.seal) for c in own]
         self._followers = [(c.name, Follower(c, part.points, surfaces[c.part], head)) for c in others]
         self._clearances = _clearances(part, head)
+        lips = any(c.eye < 0 and c.part != part.name for c in head.contacts)
+        out = lips and any(g.name == "tongueOut" for g in part.groups)
+        self._head, self._rest = head, TongueRest(part, head) if out else None
         self._lids = Lids(part, head, self._moves)
         self._amounts = np.zeros(len(self._moves.used))
         self._last_key: tuple[object, ...] = ()
@@ -104,6 +109,9 @@ class SkinRig:
             self._evaluate(pose)
             self.version += 1
         pose.pushes.update(self._pushes)
+        for solver in self._solvers:
+            if solver.contact.eye < 0:
+                pose.lip = solver.lower
         return self.points
 
     def invalidate(self) -> None:
@@ -114,12 +122,14 @@ class SkinRig:
     def apply_contacts(self, pose: Pose, points: Floats) -> None:
         """Correct control points (n, 3), moved by everything else, at the part's own contacts and at those it follows;
         corrections at its own are put into ``pose.pushes``."""
-        for solver in self._solvers:
+        for solver, seal in zip(self._solvers, self._seals, strict=True):
             axis = optical_axis(pose.gaze[max(solver.contact.eye, 0)])
-            pose.pushes[solver.contact.name] = solver.apply(axis, points)
+            pose.pushes[solver.contact.name] = solver.apply(axis, points, seal.amount(pose.shapes))
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)
+        if self._rest is not None:
+            self._rest.apply(pose, pose.lip, *rigid_motion("jaw", self._head, pose), points)
         for eye, clearance in self._clearances:
             clearance.apply(optical_axis(pose.gaze[eye]), points)
 
@@ -127,8 +137,10 @@ class SkinRig:
         """Everything in a pose that the part's points depend on."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
         gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
+        seals = (seal.amount(pose.shapes) for seal in self._seals)
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
-        return self._amounts.tobytes(), jaw, gaze, *pushes
+        rest = (pose.lip.tobytes(), motion_key("jaw", self._head, pose)) if self._rest is not None else ()
+        return self._amounts.tobytes(), *rest, jaw, gaze, *seals, *pushes
 
     def _evaluate(self, pose: Pose) -> None:
         """Groups, jaw, lids and contacts, one after the other."""

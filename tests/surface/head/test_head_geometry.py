@@ -136,8 +136,8 @@ def test_lips_meet_at_rest_and_over_an_open_jaw(head, jaw):
 
 
 def test_the_measure_of_the_lips_gap_finds_one(head):
-    head.pose(head.values({"jawOpen": 0.1}))
-    assert 2.0 < lips_gap(head) < 6.0
+    head.pose(head.values({"jawOpen": 0.3}))
+    assert 8.0 < lips_gap(head) < 12.0
 
 
 @pytest.mark.parametrize("pair", HARD, ids=" ".join)
@@ -261,3 +261,36 @@ def test_brows_come_down_and_together(head):
     head.pose(head.values({"browDownLeft": 1, "browDownRight": 1}))
     move = (brows.vertices - rest)[inner].mean(axis=0)
     assert move[0] < -3.0 and move[1] < -2.5
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [{"mouthFunnel": 0.15}, {"mouthShrugUpper": 0.16}, {"mouthShrugUpper": 1.0}, {"jawOpen": 0.08},
+     {"noseSneerLeft": 1.0, "noseSneerRight": 1.0}, {"mouthUpperUpLeft": 0.3, "mouthUpperUpRight": 0.3}],
+)  # fmt: skip
+def test_lips_stay_together_until_something_opens_them(head, pose):
+    head.pose(head.values({}))
+    rest = lips_gap(head)
+    head.pose(head.values(pose))
+    assert lips_gap(head) < rest + 0.25
+
+
+@pytest.mark.parametrize("name, least", [("jawOpen", 30.0), ("mouthFunnel", 12.0), ("mouthUpperUp", 6.5)])
+def test_what_opens_the_lips_parts_them_smoothly_and_at_1_in_full(head, name, least):
+    """No step of a hundredth opens them by more than five times the mean step, and none closes them."""
+    names = [n for n in head.parameters if n.startswith(name)]
+    gaps = []
+    for amount in np.linspace(0.0, 1.0, 51):
+        head.pose(head.values(dict.fromkeys(names, amount)))
+        gaps.append(lips_gap(head, 0.05))
+    steps = np.diff(gaps)
+    assert gaps[-1] > least and steps.min() > -0.11 and steps.max() < 5.0 * (gaps[-1] - gaps[0]) / 50 + 0.11
+
+
+def test_blink_and_look_down_do_not_add_up(head):
+    """The lid goes as far as the greater of the two takes it, and nearly no further (0.3 mm where they are equal)."""
+    tops = []
+    for blink, look in ((0.27, 0.0), (0.0, 0.36), (0.27, 0.36)):
+        head.pose(head.values({"eyeBlinkLeft": blink, "eyeLookDownLeft": look}))
+        tops.append(eye_opening(head, 0)[1])
+    assert min(tops[:2]) - 0.75 < tops[2] <= min(tops[:2])

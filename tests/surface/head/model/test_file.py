@@ -9,7 +9,7 @@ import tomli_w
 from small_head import small_head
 
 from surface.base.errors import HeadFileError
-from surface.head.model.data import Contact, Rule
+from surface.head.model.data import Contact, Rule, Seal
 from surface.head.model.file import check_writable, load_data, save_data
 
 
@@ -82,6 +82,16 @@ def test_contacts_come_back(folder):
         assert ("cling" in (folder / "head.toml").read_text()) == (not cling)
     edit(folder, "cling = false", "cling = 0")
     broken(folder, "cling: 0 is neither true nor false")
+
+
+def test_a_seal_comes_back_and_names_shapes(folder):
+    lips = Contact("lips", "a", ("b",), -1, 5.5, 0.5, np.zeros((2, 3, 3, 2)), Seal({"jawOpen": 3.0}, 0.25, 0.75))
+    save_data(folder, small_head(contacts=[lips]))
+    assert load_data(folder).contacts[0].seal == lips.seal
+    edit(folder, "parted = 0.75", "parted = 0.25")
+    broken(folder, r"contacts\[0\]\.seal\.parted: 0\.25 is not greater than closed, 0\.25")
+    edit(folder, "jawOpen = 3.0", "grin = 3.0")
+    broken(folder, r"contacts\[0\]\.seal\.opens: no shape 'grin'")
 
 
 def test_a_truth_value_is_no_number(folder):

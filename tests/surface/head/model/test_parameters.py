@@ -8,9 +8,11 @@ import pytest
 from surface.head.model.parameters import (
     EYE_RAD,
     HEAD_RAD,
+    LID_SHARE,
     NAMES,
     SHAPES,
     TONGUE_NEEDS,
+    lid_down,
     read_pose,
     rotation,
     rotation_vector,
@@ -100,3 +102,14 @@ def test_rotation_vector_is_the_rotations_axis_and_angle():
 def test_a_whole_turn_of_the_head_and_of_the_eyes_is_as_many_degrees_as_documented():
     np.testing.assert_allclose(np.degrees(HEAD_RAD), [60.0, 40.0, 30.0])
     np.testing.assert_allclose(np.degrees(EYE_RAD), [35.0, 30.0])
+
+
+def test_a_lid_goes_as_far_as_the_greater_of_blink_and_look_down():
+    amounts = np.linspace(0.0, 1.0, 41)
+    for look in amounts:
+        left = np.array([lid_down(look, blink) for blink in amounts])
+        lids = amounts + LID_SHARE * left  # in blinks
+        assert left[0] == look and left[-1] == 0.0  # exact at 0 and 1
+        greater = np.maximum(amounts, LID_SHARE * look)
+        assert (lids >= greater - 1e-12).all() and (lids - greater).max() < 0.0626
+        assert (np.diff(lids) >= -1e-12).all()  # a growing blink never lifts the lid

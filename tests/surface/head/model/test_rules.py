@@ -6,9 +6,10 @@ from small_head import all_points, part, small_head
 
 from surface.base.errors import HeadFileError
 from surface.head import Head, Rule
+from surface.head.model.data import Seal
 from surface.head.model.file import load_data, save_data
 from surface.head.model.parameters import SHAPES
-from surface.head.model.rules import Drivers
+from surface.head.model.rules import Drivers, SealDriver
 
 
 def shapes(**given: float) -> np.ndarray:
@@ -43,3 +44,14 @@ def test_a_rule_moves_its_group_and_survives_the_file(tmp_path):
     rest = head.part("a").vertices.copy()
     head.pose(head.values({"browInnerUp": 0.5}))
     np.testing.assert_allclose((head.part("a").vertices - rest)[:, 2], 1.0, atol=1e-5)
+
+
+def test_a_seal_opens_smoothly_with_the_greater_side():
+    driver = SealDriver(Seal({"jawOpen": 2.0, "mouthUpperUpLeft": 1.0, "mouthUpperUpRight": 1.0, "mouthPucker": -0.5},
+                             0.4, 0.8))  # fmt: skip
+    assert driver.amount(shapes()) == driver.amount(shapes(jawOpen=0.2)) == 1.0
+    assert driver.amount(shapes(jawOpen=0.3)) == pytest.approx(0.5)
+    assert driver.amount(shapes(jawOpen=0.4)) == driver.amount(shapes(mouthUpperUpRight=0.8)) == 0.0
+    assert driver.amount(shapes(mouthUpperUpLeft=0.4, mouthUpperUpRight=0.4)) == 1.0  # sides do not add up
+    assert driver.amount(shapes(mouthUpperUpLeft=1.0, mouthPucker=0.8)) == pytest.approx(0.5)
+    assert SealDriver(None).amount(shapes(jawOpen=0.1)) == 0.0

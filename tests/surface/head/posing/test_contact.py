@@ -382,3 +382,20 @@ def test_sides_are_parted_until_little_is_left_and_three_times_at_most() -> None
     solver._apart[:] = 0.0  # nothing helps
     solver.apply(AHEAD, lips(2.9).points.copy())
     assert solver.passes == 3
+
+
+@pytest.mark.parametrize("seal", [0.5, 1.0])
+def test_a_seal_closes_its_share_of_an_opening_that_was_closed_at_rest(seal: float) -> None:
+    rest, opened = lips(0.0), lips(-3.0)
+    points = opened.points.copy()
+    push = ContactSolver(contact(), rest, small_head()).apply(AHEAD, points, seal)
+    upper, lower = rims(opened, points)
+    np.testing.assert_allclose(upper - lower, 3.0 * (1.0 - seal), atol=0.2)
+    assert push.max() < 0.0  # followers come along
+
+
+def test_a_seal_leaves_an_opening_that_stands_open_at_rest() -> None:
+    surface = lips(-3.0)
+    points = surface.points.copy()
+    ContactSolver(contact(), surface, small_head()).apply(AHEAD, points, 1.0)
+    np.testing.assert_allclose(points, surface.points, atol=1e-6)

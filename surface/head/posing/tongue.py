@@ -1,0 +1,164 @@
+"""The tongue that is put out lies on the lower lip and over the lower teeth, and is pressed flat by the upper ones.
+
+Stations lie along its sides, some across each. How far one of the underside is too low is found against samples of the
+lower lip, as the lips' contact left them, and of the lower teeth; the tongue's cross-sections go up by it, soft along
+its length. Where its upper side meets the upper teeth then, it becomes thinner. It goes sideways with the lower lip.
+"""
+
+# mypy: disable-error-code="call-arg"
+from __future__ import annotations
+
+import numpy as np
+
+from surface.base.arrays import Floats, Ints
+from surface.base.jit import kernel
+from surface.dcp import DCPSurface
+from surface.head.model.data import HeadData, PartData
+from surface.head.model.meshes import domain_of, make_surface
+from surface.head.model.parameters import SHAPES, Pose, smoothstep
+from surface.head.posing.contact import weights_at
+
+TONGUE = SHAPES.index("tongueOut")
+GRID = 56  # samples of the tongue and of the teeth along u and v, out of which stations are chosen
+STATIONS, LENGTH_MM = 18, 55.0  # along the tongue, from its tip backwards
+ACROSS = (-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9)  # places of a station, in half widths of the tongue there
+BIN_MM = 2.0  # width of the columns in which the highest samples of teeth are kept
+REACH_MM = 5.0  # from a station, seen from above: what is further away does not lift it
+CLEAR_MM, SOFT_MM = 0.6, 0.4  # between tongue and what it lies on; correction sets in so much earlier
+SLICE_MM = 2.5  # half the length of a slice in which its height and width are found
+BEND_MM = 16.0  # along the tongue, over which a rise fades
+SIDEWAYS = 0.8  # of the way of the lower lip to a side, which the tongue goes along
+PUT_OUT = (0.02, 0.3)  # tongueOut, from none to all of the correction: a tongue in the mouth lies as it was fitted
+PASSES = 3
+
+
+@kernel
+def find_rise(under: Floats, below: Floats, reach: float, clear: float, soft: float, rise: Floats) -> float:
+    """How far stations ``under (s, 3)`` are too low, ``rise (s,)``, over points ``below (k, 3)`` within ``reach``, of
+    which each counts less the further away it is, seen from above. Returns the farthest."""
+    most = 0.0
+    for s in range(len(under)):
+        rise[s] = 0.0
+        for k in range(len(below)):
+            need = below[k, 1] + clear - under[s, 1]
+            if need <= -soft:
+                continue
+            square = ((under[s, 0] - below[k, 0]) ** 2 + (under[s, 2] - below[k, 2]) ** 2) / reach**2
+            if square < 1.0:
+                near = min(need + soft, 2.0 * soft)
+                need = need if need > soft else near * near / (4.0 * soft)
+                rise[s] = max(rise[s], need * (1.0 - square) ** 2)
+        most = max(most, rise[s])
+    return most
+
+
+@kernel
+def lift_sections(rise: Floats, fade: Floats, part: Floats, share: float, points: Floats) -> None:
+    """Move points (n, 3) up by ``share`` times their ``part (n,)`` of the greatest ``rise (s k,)`` of k stations of
+    each of s cross-sections, times ``fade (s, n)``."""
+    sections, across = len(fade), len(rise) // len(fade)
+    lift = np.zeros(len(points))
+    for s in range(sections):
+        most = rise[s * across : (s + 1) * across].max()
+        if most > 0.0:
+            for i in range(len(points)):
+                lift[i] = max(lift[i], most * fade[s, i])
+    for i in range(len(points)):
+        points[i, 1] += share * part[i] * lift[i]
+
+
+class TongueRest:
+    """Keeps a part with the group tongueOut above the lower lip and the lower teeth, and below the upper teeth.
+
+    part : the tongue; head : for its teeth and lips.
+    """
+
+    def __init__(self, part: PartData, head: HeadData) -> None:
+        surface, z = make_surface(part), part.points[:, 2]
+        at = surface.evaluate(_grid(part))
+        along = at[:, 2].max() - np.linspace(1.0, LENGTH_MM, STATIONS)
+        self._sides = [_dense_weights(surface, _stations(part, surface, along, sign)) for sign in (-1.0, 1.0)]
+        away = np.abs(z[None] - along[:, None])
+        away[0, z > along[0]] = 0.0  # the tip goes as its first station
+        self._fade = 1.0 - smoothstep(away / BEND_MM)
+        self._sideways = smoothstep(z, along[0] - LENGTH_MM, along[0] - 0.4 * LENGTH_MM)
+        self._whole = np.ones(len(z))
+        low, high = _thickness(at, z)
+        self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
+        self._lower, self._upper = (_edges(head, follows, sign) for follows, sign in (("jaw", 1.0), ("skull", -1.0)))
+
+    def apply(self, pose: Pose, lip: Floats, linear: Floats, shift: Floats, points: Floats) -> None:
+        """Move control points (n, 3) in place; ``lip (k, 3)`` are samples of the lower lip, and the lower teeth are
+        moved by ``linear (3, 3)`` and ``shift (3,)``."""
+        share = float(smoothstep(pose.shapes[TONGUE : TONGUE + 1], *PUT_OUT)[0])
+        if share <= 0.0 or not len(lip):
+            return
+        aside = float(lip[:, 0].mean() - self._sideways @ points[:, 0] / self._sideways.sum())
+        points[:, 0] += share * SIDEWAYS * aside * self._sideways
+        below = np.concatenate([lip, self._lower @ linear.T + shift])
+        self._press(0, below, self._whole, share, points)
+        self._press(1, self._upper, self._thick, share, points)
+
+    def _press(self, side: int, against: Floats, part: Floats, share: float, points: Floats) -> None:
+        """Move points away from what lies ``against`` the under (0) or the upper (1) side, by their ``part`` of it."""
+        sign, (ids, shares) = 1.0 - 2.0 * side, self._sides[side]
+        way, rise = np.array([1.0, sign, 1.0]), np.zeros(len(shares))
+        mirrored = against * way
+        for _ in range(PASSES):
+            if find_rise(shares @ points[ids] * way, mirrored, REACH_MM, CLEAR_MM, SOFT_MM, rise) < SOFT_MM / 4.0:
+                break
+            lift_sections(rise, self._fade, part, sign * share, points)
+
+
+def _grid(part: PartData) -> Floats:
+    """(k, 2) places all over a part, in (u, v)."""
+    domain = domain_of(part)
+    u0, u1, v0, v1 = domain.rect
+    grid = np.stack(np.meshgrid(np.linspace(u0, u1, GRID), np.linspace(v0, v1, GRID)), axis=-1).reshape(-1, 2)
+    inside: Floats = grid[domain.inside(grid)]
+    return inside
+
+
+def _stations(part: PartData, surface: DCPSurface, along: Floats, sign: float) -> Floats:
+    """(STATIONS * len(ACROSS), 2) places on the tongue's upper (1) or under (-1) side at z of ``along``."""
+    places = _grid(part)
+    at = surface.evaluate(places)
+    out = []
+    for z in along:
+        here = at[np.abs(at[:, 2] - z) < SLICE_MM]
+        half, middle = np.abs(here[:, 0]).max(), 0.5 * (here[:, 1].min() + here[:, 1].max())
+        own = np.flatnonzero(sign * (at[:, 1] - middle) >= 0.0)
+        for x in ACROSS:
+            away = (at[own, 0] - x * half) ** 2 + (at[own, 2] - z) ** 2
+            out.append(places[own[away.argmin()]])
+    return np.array(out)
+
+
+def _thickness(at: Floats, z: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest y (n,) of the tongue, of which ``at (m, 3)`` are samples, at each of ``z (n,)``."""
+    knots = np.linspace(at[:, 2].min(), at[:, 2].max() - SLICE_MM, 30)
+    slices = [at[np.abs(at[:, 2] - k) < SLICE_MM, 1] for k in knots]
+    return np.interp(z, knots, [s.min() for s in slices]), np.interp(z, knots, [s.max() for s in slices])
+
+
+def _dense_weights(surface: DCPSurface, places: Floats) -> tuple[Ints, Floats]:
+    """Control points (k,) that reach places (s, 2), and their weights (s, k)."""
+    start, ids, share = weights_at(surface, places)
+    used, local = np.unique(ids, return_inverse=True)
+    table = np.zeros((len(places), len(used)))
+    np.add.at(table, (np.repeat(np.arange(len(places)), np.diff(start)), local), share)
+    return used, table
+
+
+def _edges(head: HeadData, follows: str, sign: float) -> Floats:
+    """(k, 3) the highest (1) or lowest (-1) sample of teeth at jaw or skull in each cell of BIN_MM, seen from above."""
+    teeth = [p for p in head.parts if p.follows == follows and p.material == "teeth"]
+    return np.concatenate([np.zeros((0, 3)), *(_edge(p, sign) for p in teeth)])
+
+
+def _edge(part: PartData, sign: float) -> Floats:
+    at = make_surface(part).evaluate(_grid(part))
+    cell = np.floor(at[:, [0, 2]] / BIN_MM).astype(np.int64)
+    order = np.lexsort((sign * at[:, 1], cell[:, 1], cell[:, 0]))
+    last = np.append((np.diff(cell[order], axis=0) != 0).any(axis=1), True)
+    return np.ascontiguousarray(at[order[last]])

@@ -1,0 +1,54 @@
+"""surface.head.posing.tongue: what the tongue lies on; measured by crossing triangles, not by the contact's samples."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from surface.head import Head
+from surface.head.posing.tongue import find_rise
+
+ROOT = Path(__file__).parents[4]
+sys.path.insert(0, str(ROOT / "benchmarks"))
+from head_pairs import TongueCrossings  # noqa: E402
+
+
+@pytest.fixture(scope="module")
+def head() -> Head:
+    return Head.load(ROOT / "configs" / "heads" / "ict")
+
+
+@pytest.fixture(scope="module")
+def crossings(head: Head) -> TongueCrossings:
+    return TongueCrossings(head)
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [*({"tongueOut": amount} for amount in (0.2, 0.4, 0.6, 0.8, 1.0)), {"tongueOut": 0.5, "mouthRollLower": 0.8},
+     {"tongueOut": 1.0, "mouthShrugLower": 1.0}, {"tongueOut": 1.0, "mouthPucker": 1.0}],
+)  # fmt: skip
+def test_the_tongue_pierces_neither_lips_nor_teeth(
+    head: Head, crossings: TongueCrossings, pose: dict[str, float]
+) -> None:
+    head.pose(head.values(pose))
+    assert max(crossings.depths().values()) < 0.5
+
+
+def test_the_tongue_comes_out_without_a_jump(head: Head) -> None:
+    tongue, tips = head.part("tongue"), []
+    for amount in np.linspace(0.0, 1.0, 101):
+        head.pose(head.values({"tongueOut": amount}))
+        tips.append(tongue.vertices.astype(float).copy())
+    assert max(np.linalg.norm(b - a, axis=1).max() for a, b in itertools.pairwise(tips)) < 2.0
+
+
+def test_a_station_rises_over_what_is_below_it_and_less_over_what_is_beside() -> None:
+    under, rise = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [20.0, 0.0, 0.0]]), np.zeros(3)
+    most = find_rise(under, np.array([[0.0, 2.0, 0.0]]), 5.0, 0.5, 0.4, rise)
+    np.testing.assert_allclose(rise, [2.5, 2.5 * (1.0 - 0.64) ** 2, 0.0])
+    assert most == 2.5
