@@ -101,8 +101,8 @@ def test_neutral_releases_everything(face: Face) -> None:
     face.state.neutral(0.3, face.now)
     assert np.abs(face.run(3.0)).max() < 1e-3
     assert face.state.status() | {"ticks": 0} == {
-        "expression": "neutral", "intensity": 1.0, "gaze": "off", "life": 0.0, "manual": 0, "capture": 0,
-        "limited": 0, "ticks": 0, "layers": "expression", "failed": "none",
+        "expression": "neutral", "intensity": 1.0, "gaze": "off", "life": 0.0, "manner": "alone",
+        "manual": 0, "capture": 0, "limited": 0, "ticks": 0, "layers": "expression", "failed": "none",
     }  # fmt: skip
 
 
