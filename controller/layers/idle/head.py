@@ -36,8 +36,9 @@ class Turn:
     def follow(self, shift: Shift) -> None:
         """Take its share of a shift, beyond what the eyes reach in comfort."""
         turn, size = self._settings, math.hypot(shift.yaw_deg, shift.pitch_deg)
-        share = turn.share * max(0.0, 1.0 - turn.comfort_deg / size) if size > 0.0 else 0.0
-        goal = [math.radians(share * shift.yaw_deg), math.radians(share * shift.pitch_deg)]
+        beyond = max(0.0, 1.0 - turn.comfort_deg / size) if size > 0.0 else 0.0
+        yaw_deg, pitch_deg = turn.share * shift.yaw_deg, turn.pitch_share * shift.pitch_deg
+        goal = [math.radians(beyond * yaw_deg), math.radians(beyond * pitch_deg)]
         way = math.degrees(math.dist(goal, self._steps.goal))
         if way > 0.0:
             self._steps.go(goal, shift.time_s + turn.delay_s, turn.base_s + turn.per_deg_s * way)

@@ -101,6 +101,7 @@ class MannerSettings(Settings):
 class TurnSettings(Settings):
     comfort_deg: Degrees
     share: Share
+    pitch_share: Share
     delay_s: Delay
     base_s: Seconds
     per_deg_s: Delay

@@ -159,7 +159,7 @@ SHIPPED = {
     "vocabularies/affect.toml": "moods affect.toml: 9 anchors",
     "vocabularies/visemes.toml": "visemes visemes.toml: 15, 41 phonemes",
     "vocabularies/layers.toml": "layers layers.toml: expression, idle, gaze, speech, capture, manual",
-    "life/natural.toml": "life natural.toml: a blink every 4.2 s on average, 13 gestures",
+    "life/natural.toml": "life natural.toml: a blink every 4.5 s on average, 13 gestures",
 }
 
 

@@ -32,7 +32,7 @@ def test_intervals_have_the_mean_of_the_file_and_long_tails(blink: BlinkSettings
     single = blink.model_copy(update={"double_share": 0.0})
     starts = np.array([each.lids[0].start_s for each in all_of(single, 7200.0)])
     pauses = np.diff(starts) - 0.28
-    assert np.mean(pauses) == pytest.approx(4.2, abs=0.25) and np.std(pauses) == pytest.approx(2.6, abs=0.3)
+    assert np.mean(pauses) == pytest.approx(4.5, abs=0.25) and np.std(pauses) == pytest.approx(2.8, abs=0.3)
     assert np.median(pauses) < np.mean(pauses) and pauses.min() > 0.75
     assert len(all_of(single, 3600.0, rate=2.0)) > 1.7 * len(all_of(single, 3600.0))
 
