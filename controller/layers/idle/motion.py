@@ -25,6 +25,8 @@ from controller.vocabulary.sides import spread
 _EYES = ("leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
 _HEAD = ("headYaw", "headPitch", "headRoll")
 
+Angles = tuple[float, float, float]
+
 
 class IdleMotion:
     """Idle motion of one face.
@@ -180,15 +182,18 @@ class IdleMotion:
             self.values[self._lids] += left * blinking, right * blinking
 
     def _write_head(self, now_s: float, glancing: float, looking: bool) -> None:
-        """Head and eyes: the eyes turn back by as much as the head turns, when it arrives (the limits delay it)."""
-        alive = self.liveliness
-        self.head_rad[:] = self._head_at(now_s, glancing)
+        """Head and eyes: the eyes turn back by as much as the head turns, when it arrives (the limits delay it).
+
+        Sway is so slow that the delay does not matter: 0.2 degrees at most.
+        """
+        alive, sway = self.liveliness, self._sway.at(now_s)
+        self.head_rad[:] = self._head_at(now_s, glancing, sway)
         self.head_rad *= alive
         self.values[self._head_indices] += self.head_rad / self._head_scale
         self.eye_yaw_rad, self.eye_pitch_rad = (alive * angle for angle in self._eyes.unrest(now_s))
         if looking:
             return
-        yaw, pitch, _ = self._head_at(now_s - self._lag_s, glancing)
+        yaw, pitch, _ = self._head_at(now_s - self._lag_s, glancing, sway)
         gaze_yaw, gaze_pitch = self._eyes.direction(now_s)
         yaw = alive * (glancing * gaze_yaw - yaw) + self.eye_yaw_rad
         pitch = alive * (glancing * gaze_pitch - pitch) + self.eye_pitch_rad
@@ -196,9 +201,9 @@ class IdleMotion:
         for index, angle, full in zip(self._eye_indices, angles, self._eye_scale, strict=True):
             self.values[index] = min(max(angle / full, -1.0), 1.0)
 
-    def _head_at(self, now_s: float, glancing: float) -> tuple[float, float, float]:
-        """Yaw, pitch and roll (rad) of the head at full liveliness."""
-        sway, posture, nods = self._sway.at(now_s), self._posture.at(now_s), self._nods.at(now_s)
+    def _head_at(self, now_s: float, glancing: float, sway: Angles) -> Angles:
+        """Yaw, pitch and roll (rad) of the head at full liveliness, with its ``sway``."""
+        posture, nods = self._posture.at(now_s), self._nods.at(now_s)
         turn_yaw, turn_pitch, _ = self._turn.at(now_s)
         yaw = sway[0] + posture[0] + glancing * turn_yaw
         return yaw, sway[1] + posture[1] + nods[1] + glancing * turn_pitch, sway[2] + posture[2]

@@ -60,7 +60,7 @@ def test_the_gaze_stays_where_it_is_while_the_head_moves(settings: IdleSettings)
     assert 0.05 < late < 0.15
     for i in range(2000):
         rows.append(life.update(i * 0.01, looking=False).copy())
-        heads.append(np.degrees(life._head_at(i * 0.01 - late, 1.0)[:2]))
+        heads.append(np.degrees(life._head_at(i * 0.01 - late, 1.0, life._sway.at(i * 0.01 - late))[:2]))
     path = np.array(rows)
     gaze = np.array(heads) + path[:, EYES] * DEG[EYES]
     speed = speed_of(gaze, 100.0)
