@@ -66,7 +66,8 @@ class Body:
             self._record(options.record)
         self.clock = HurriedClock(stage.settings.control_hz)
         self.state.on_command = self.clock.hurry
-        self.state.live(0.0 if options.mirror else stage.settings.liveliness, 0)  # 0: no command set it
+        liveliness = 0.0 if options.mirror else stage.settings.liveliness
+        self.state.live(liveliness, 0, stage.settings.manner)  # 0: no command set it
         self.links: list[LinkPart] = []
         self.buses = [loop for robot in stage.robots for loop in self._bus_loops(robot, parameters, options.mirror)]
         self.measured_face: MeasuredFace | None = None

@@ -20,7 +20,8 @@ from controller.base.parts import Parts
 from controller.base.stop_latch import StopLatch
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
-from controller.layers.idle import IdleMotion, IdleSettings
+from controller.layers.idle.motion import IdleMotion
+from controller.layers.idle.settings import IdleSettings, check_manner
 from controller.layers.layer_part import LayerPart
 from controller.layers.mixer import Layer, LayerSettings, Mixer
 from controller.layers.settings import default_layers
@@ -88,8 +89,11 @@ class CommandSink(Protocol):
     def neutral(self, seconds: float, stamp_ns: int) -> None:
         """Release everything that was commanded and return to neutral."""
 
-    def live(self, amount: float, stamp_ns: int) -> None:
-        """Set the amount of idle motion, 0..1."""
+    def live(self, amount: float, stamp_ns: int, manner: str | None = None) -> None:
+        """Set the amount of idle motion, 0..1, and how the face behaves; the present manner without.
+
+        ``manner`` : one of :data:`controller.layers.idle.settings.MANNERS`, or ``auto``.
+        """
 
     def snapshot(self, out: Floats) -> None:
         """Copy the present parameters to ``out`` : (P,)."""
@@ -159,7 +163,7 @@ class CommandState:
         self._mixed, self._present = parameters.neutral(), parameters.neutral()
         self._expression, self._looking = self.mixer["expression"], self.mixer["gaze"]
         self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
-        self._speech = self.mixer["speech"]
+        self._speech, self._jaw = self.mixer["speech"], parameters.index("jawOpen")
         self._everything = np.ones(len(parameters), dtype=bool)
         self._blocks = (0.0, 0.0, 0.0)  # how much the expression holds back blinks, gaze and speech
         self._expressions = self._part("expressions", self._expression, self._write_expression, self._renew_expression)
@@ -239,15 +243,20 @@ class CommandState:
     def _write_idle(self, now_s: float) -> None:
         life, (blink_block, gaze_block, _) = self._life, self._blocks
         if life.liveliness > 0.0:
-            life.update(now_s, looking=self._gaze.active, blink_block=blink_block, gaze_block=gaze_block)
+            how = {"blink_block": blink_block, "gaze_block": gaze_block, "loudness": self._loudness()}
+            life.update(now_s, looking=self._gaze.active, **how)
             self._idle.write_masked(_finite(life.values), self._everything, now_s)
         elif self._idle.holding:
             life.update(now_s, looking=False)
             self._idle.release()
 
+    def _loudness(self) -> float:
+        """How loud the face speaks, 0..1, as the jaw of speech shows; 0 without speech."""
+        return float(self._speech.values[self._jaw]) if self._speech.held[self._jaw] else 0.0
+
     def _renew_idle(self) -> None:
-        liveliness, self._life = self._life.liveliness, IdleMotion(self.parameters, self._life_settings, self._seed)
-        self._life.liveliness = liveliness
+        old, self._life = self._life, IdleMotion(self.parameters, self._life_settings, self._seed)
+        self._life.liveliness, self._life.chosen = old.liveliness, old.chosen
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         with self._journaled("set_parameters", indices, values, stamp_ns, stamp_ns=stamp_ns):
@@ -286,10 +295,14 @@ class CommandState:
             self._stop_looking(seconds)
             self._player.rest(seconds, self._time(stamp_ns))
 
-    def live(self, amount: float, stamp_ns: int) -> None:
+    def live(self, amount: float, stamp_ns: int, manner: str | None = None) -> None:
         _check_finite("LIFE", amount)
-        with self._journaled("live", amount, stamp_ns, stamp_ns=stamp_ns):
+        known = check_manner(manner)
+        given = (amount, stamp_ns) if manner is None else (amount, stamp_ns, manner)
+        with self._journaled("live", *given, stamp_ns=stamp_ns):
             self._life.liveliness = min(max(amount, 0.0), 1.0)
+            if manner is not None:
+                self._life.chosen = known
 
     def capture(self, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
         """Give the live-capture layer ``values`` : (P,) where ``mask`` : (P,) bool; released after 1 s of silence."""
@@ -340,6 +353,7 @@ class CommandState:
                 "intensity": round(self._player.intensity, 3),
                 "gaze": f"{yaw:.1f},{pitch:.1f}" if self._gaze.active else "off",
                 "life": self._life.liveliness,
+                "manner": self._life.manner,
                 "manual": self._manual.holding,
                 "capture": self.mixer["capture"].holding,
                 "limited": int(np.count_nonzero(self.limiter.limited)),

@@ -70,7 +70,7 @@ def dry_run(
     found = Rehearsal()
     for robot in stage.robots:
         state = stage.state(parameters)
-        state.live(stage.settings.liveliness, 0)
+        state.live(stage.settings.liveliness, 0, stage.settings.manner)
         feed, length_s = _feed(stage, take, state, voice, alone)
         anchors = load_anchors(robot, stage.head, parameters)
         offline = OfflineRun(robot, state, feed, stage.settings.control_hz, anchors)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
@@ -15,7 +15,7 @@ from controller.base.errors import ConfigError, ParameterError, TakeError
 from controller.base.parameters import Parameters
 from controller.base.paths import find_config
 from controller.layers.commands import CommandState
-from controller.layers.idle import IdleSettings
+from controller.layers.idle.settings import IdleSettings
 from controller.layers.mixer import LayerSettings
 from controller.layers.settings import load_layers
 from controller.links.line.script import load_script
@@ -87,6 +87,7 @@ class StageSettings(Settings):
     control_hz: Annotated[float, Field(ge=10, le=1000)] = 100.0
     liveliness: Annotated[float, Field(ge=0, le=1)] = 0.0
     life: str = "natural"
+    manner: Literal["auto", "alone", "listen", "speak"] = "auto"
     seed: Annotated[int, Field(ge=0)] = 0
     vocabularies: Annotated[list[str], Field(max_length=64)] = []
     show: str | None = None

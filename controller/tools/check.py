@@ -10,7 +10,8 @@ from controller.base.config import load, read_toml
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.paths import config_dir, find_config
-from controller.layers.idle import IdleSettings
+from controller.layers.idle.draws import mean_of
+from controller.layers.idle.settings import IdleSettings
 from controller.layers.settings import load_layers
 from controller.links.line.script import load_script
 from controller.robot.calibration import CalibrationFile
@@ -144,8 +145,8 @@ def _describe_expressions(path: Path) -> Iterator[str]:
 
 def _describe_life(path: Path) -> Iterator[str]:
     settings = IdleSettings.named(str(path), PARAMETERS)
-    shortest, longest = settings.blink.interval_s
-    yield f"life {path.name}: a blink every {shortest:g} to {longest:g} s"
+    poses = sum(len(each.poses) for each in (settings.fidget, settings.smile, settings.swallow))
+    yield f"life {path.name}: a blink every {mean_of(settings.blink.interval_s):g} s on average, {poses} gestures"
 
 
 def _describe_parameters(path: Path) -> Iterator[str]:

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from controller.layers.idle import IdleSettings
+from controller.layers.idle.settings import IdleSettings
 from controller.layers.settings import LayerTable
 from controller.robot.calibration import CalibrationFile
 from controller.robot.settings import RobotSettings

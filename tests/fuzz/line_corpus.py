@@ -25,7 +25,8 @@ class Lines:
             "SET": self._settings, "FRAME": lambda: [self._number() for _ in range(self._draw.choice((1, 58, 59, 59)))],
             "RELEASE": self._names, "GET": self._names, "MEASURED": self._names, "INFO": self._names,
             "EXPR": self._expression, "GAZE": self._gaze, "NEUTRAL": lambda: [self._pick("0", "0", "0.05", "1", "61")],
-            "LIFE": lambda: [self._pick("0", "1", "0.5", "2")], "SHOW": self._show, "READ": self._reading,
+            "LIFE": lambda: [self._pick("0", "1", "0.5", "2"), *self._draw.choice(([], ["LISTEN"], ["auto"], ["x"]))],
+            "SHOW": self._show, "READ": self._reading,
             "LIST": lambda: [self._pick(*LISTS)], "SUB": self._stream, "PING": lambda: ["x" * self._draw.randrange(40)],
             "HELLO": lambda: self._draw.choice(([], [], ["checksum=latched"], ["checksum=required"], ["checksum=x"])),
         }  # fmt: skip

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean
 from controller.base.plain_numbers import plain_number
+from controller.layers.idle.settings import AUTO, MANNERS
 from controller.links.line.checksums import CHECKSUMS
 from controller.links.line.protocol import Code, LineError, Words, parse_words
 
@@ -240,8 +241,10 @@ def _neutral(_: Grammar, given: Sequence[str]) -> Command:
 
 
 def _life(_: Grammar, given: Sequence[str]) -> Command:
-    (amount,) = given
-    return Command("LIFE", values=(in_range("amount", amount, 0.0, 1.0),))
+    words = tuple(word.upper() for word in given[1:])
+    if words and words[0].lower() not in (AUTO, *MANNERS):
+        raise LineError(Code.NAME, f"unknown manner {quoted(given[1])}; {_usage('LIFE')}")
+    return Command("LIFE", values=(in_range("amount", given[0], 0.0, 1.0),), words=words)
 
 
 def _named(name: str) -> Callable[[Grammar, Sequence[str]], Command]:
@@ -263,7 +266,7 @@ _RULES: dict[str, Rule] = {
     "EXPR": (1, 3, "EXPR name [intensity [duration_s]]", Grammar.read_expr),
     "GAZE": (1, 4, "GAZE yaw_deg pitch_deg, GAZE AT x_mm y_mm z_mm, or GAZE OFF", _gaze),
     "NEUTRAL": (0, 1, "NEUTRAL [seconds]", _neutral),
-    "LIFE": (1, 1, "LIFE amount", _life),
+    "LIFE": (1, 2, "LIFE amount [AUTO|ALONE|LISTEN|SPEAK]", _life),
     "SHOW": (1, 2, "SHOW name, SHOW PLAY, SHOW PAUSE, SHOW STOP, or SHOW SEEK mark (or seconds)", _show),
     "GET": (1, None, "GET name ... or GET ALL", _named("GET")),
     "MEASURED": (1, None, "MEASURED name ... or MEASURED ALL", _named("MEASURED")),

@@ -220,7 +220,7 @@ class LineSession:
             case "NEUTRAL":
                 sink.neutral(values[0], now_ns)
             case "LIFE":
-                sink.live(values[0], now_ns)
+                sink.live(values[0], now_ns, *(word.lower() for word in command.words))
             case "SHOW":
                 _play(sink.shows, *command.words)
             case _:
@@ -304,8 +304,10 @@ def _receipt(command: Command) -> str:
         return " ".join([name, number(command.values[0]), *kind, *(question.words or (str(len(question.indices)),))])
     if name in ("SET", "RELEASE"):
         return f"{name} {len(command.indices)}"
-    if name in ("EXPR", "LIFE"):
+    if name == "EXPR":
         return " ".join([name, *command.words, number(command.values[0])])
+    if name == "LIFE":
+        return " ".join([name, number(command.values[0]), *command.words])
     return " ".join([name.partition(" ")[0], *command.words])
 
 

@@ -26,6 +26,7 @@ TURNED_MM2 = 10.0  # of a head of usual size: so much surface that is turned ove
 REFUSED_MM, REFUSED_MM2 = 20.0, 100.0  # a face so far from the mesh, or of which so much is turned over, is refused
 ASTRAY_MM = 4.0  # and one of which at rest a hundredth is further from it
 ROUNDS = 3
+RINGS = (0, 1, 3)  # of neighbours that are put right with the points that hold a place, until it gets better
 HOLDS = 0.1  # least weight of a control point at a place that sticks out
 NOWHERE = np.zeros((0, 2))
 NEIGHBOURS = 12  # that say where a point belongs
@@ -45,16 +46,27 @@ def mend_spikes(
         wanted = _wanted(dense, limit) + _turned(dense, scale)
         if not wanted:
             break
-        trial, moved = head, 0
-        for part, shape in dict.fromkeys((part, shape) for part, shape, _ in wanted):
-            trial, count = _smoothed(trial, part, shape, dense)
-            moved += count
-        after = measure_dense(trial, mesh, sources, parts, limit)
-        if not moved or not _is_better(after, dense, wanted, limit):
+        for rings in RINGS:
+            trial, moved = _mended(head, wanted, dense, rings)
+            after = measure_dense(trial, mesh, sources, parts, limit)
+            if better := moved > 0 and _is_better(after, dense, wanted, limit):
+                break
+        if not better:
             break
         notes.append(f"mended: {moved} control points stuck out or were turned over: {_told(wanted)}")
         head, dense = trial, after
     return head, dense, notes
+
+
+def _mended(
+    head: HeadData, wanted: list[tuple[str, str, str]], dense: DenseErrors, rings: int
+) -> tuple[HeadData, int]:  # fmt: skip
+    """The head with its wanted parts and shapes put right, and how many control points that took."""
+    moved = 0
+    for part, shape in dict.fromkeys((part, shape) for part, shape, _ in wanted):
+        head, count = _smoothed(head, part, shape, dense, rings)
+        moved += count
+    return head, moved
 
 
 def _told(wanted: list[tuple[str, str, str]]) -> str:
@@ -95,7 +107,7 @@ def _furthest(dense: DenseErrors) -> dict[tuple[str, str], float]:
     return {(p, s): both.to_mesh.max for p, by_shape in dense.parts.items() for s, both in by_shape.items()}
 
 
-def _smoothed(head: HeadData, name: str, shape: str, dense: DenseErrors) -> tuple[HeadData, int]:
+def _smoothed(head: HeadData, name: str, shape: str, dense: DenseErrors, rings: int) -> tuple[HeadData, int]:
     """The head with the control points of one part put right in one shape, and how many they are."""
     part = next(p for p in head.parts if p.name == name)
     over = dense.turned.get((name, shape))
@@ -103,7 +115,7 @@ def _smoothed(head: HeadData, name: str, shape: str, dense: DenseErrors) -> tupl
     rows = np.concatenate(found)
     if not len(rows):
         return head, 0
-    bad = _holding(part, rows)
+    bad = _grown(part, _holding(part, rows), rings)
     if shape == NEUTRAL:
         fixed = replace(part, points=_filled(part, part.points, bad))
     else:
@@ -116,6 +128,16 @@ def _holding(part: PartData, uv: Floats) -> Bools:
     _, ids, share = weights_at(make_surface(part), uv)
     out = np.zeros(len(part.points), bool)
     out[ids[share > HOLDS]] = True
+    return out
+
+
+def _grown(part: PartData, bad: Bools, rings: int) -> Bools:
+    """Control points (n,) that are bad, and their nearest neighbours in (u, v), several times over."""
+    centres = np.column_stack([part.knots_u.mean(axis=1), part.knots_v.mean(axis=1)])
+    out = bad.copy()
+    for _ in range(rings):
+        for i in np.flatnonzero(out):
+            out[np.argsort(np.linalg.norm(centres - centres[i], axis=1))[:NEIGHBOURS]] = True
     return out
 
 

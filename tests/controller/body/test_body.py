@@ -120,6 +120,14 @@ def test_a_link_that_does_not_come_up_is_raised_where_there_is_nothing_else(tmp_
     assert "/dev/none" in str(caught.value)
 
 
+def test_a_stage_chooses_how_the_face_behaves(tmp_path: Path) -> None:
+    stage = stage_of(tmp_path, 'liveliness = 0.5\nmanner = "listen"\n')
+    with Mailbox.create(len(P)) as mailbox:
+        state = Body(stage, P, mailbox).state
+    state.tick(10**9, 0.01, P.neutral())
+    assert (state.status()["life"], state.status()["manner"]) == (0.5, "listen")
+
+
 def test_a_stage_mirrors_its_servos_and_leaves_simulated_links_out(tmp_path: Path) -> None:
     stage = stage_of(
         tmp_path, 'robots = ["head24"]\nliveliness = 1.0\n[[links]]\nport = "simulated"\nscript = "tour"\n'

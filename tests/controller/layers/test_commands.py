@@ -101,8 +101,8 @@ def test_neutral_releases_everything(face: Face) -> None:
     face.state.neutral(0.3, face.now)
     assert np.abs(face.run(3.0)).max() < 1e-3
     assert face.state.status() | {"ticks": 0} == {
-        "expression": "neutral", "intensity": 1.0, "gaze": "off", "life": 0.0, "manual": 0, "capture": 0,
-        "limited": 0, "ticks": 0, "layers": "expression", "failed": "none",
+        "expression": "neutral", "intensity": 1.0, "gaze": "off", "life": 0.0, "manner": "alone",
+        "manual": 0, "capture": 0, "limited": 0, "ticks": 0, "layers": "expression", "failed": "none",
     }  # fmt: skip
 
 
@@ -189,6 +189,46 @@ def test_the_amount_of_life_stays_between_none_and_all(face: Face) -> None:
     for amount, kept in ((-1.0, 0.0), (0.25, 0.25), (2.0, 1.0)):
         face.state.live(amount, face.now)
         assert face.state.status()["life"] == kept
+
+
+def test_a_manner_stays_until_another_is_chosen(face: Face) -> None:
+    for manner, shown in (("listen", "listen"), (None, "listen"), ("speak", "speak"), ("auto", "alone")):
+        face.state.live(1.0, face.now, manner)
+        face.run(0.02)
+        assert face.state.status()["manner"] == shown
+    with pytest.raises(ParameterError, match="unknown manner 'dance'"):
+        face.state.live(0.5, face.now, "dance")
+    assert face.state.status()["life"] == 1.0  # what is refused changes nothing
+
+
+def test_life_goes_along_with_speech_and_listens_after_it(face: Face) -> None:
+    mask, mouth = np.zeros(59, dtype=bool), P.neutral()
+    mask[JAW], mouth[JAW] = True, 0.4
+    face.state.live(1.0, face.now)
+    face.run(0.1)
+    seen = [face.state.status()["manner"]]
+    for i in range(400):
+        if i < 100:
+            face.state.write_layer("speech", mouth, mask, face.now)
+        face.run(0.01)
+        if face.state.status()["manner"] != seen[-1]:
+            seen.append(face.state.status()["manner"])
+    assert seen == ["alone", "speak", "listen"]
+    face.state.expression("surprise", 1.0, None, face.now)  # an open mouth is no speech
+    face.run(14.0)
+    assert face.state.status()["manner"] == "alone"
+
+
+def test_the_gaze_stays_on_its_target_while_the_head_is_limited(face: Face) -> None:
+    """Through the motion limits, too: of what is shown, eyes and head add up to steady fixations."""
+    face.state.live(1.0, face.now)
+    rows = []
+    for _ in range(3000):
+        face.run(0.01)
+        rows.append(face.values[P.indices(["headYaw", "leftEyeYaw"])] * (60.0, 35.0))
+    yaw = np.array(rows)
+    slip = np.abs(np.diff(yaw.sum(axis=1))) * 100
+    assert np.mean(slip < 4.0) > 0.8 and np.ptp(yaw[:, 0]) > 6.0  # deg/s, deg
 
 
 def test_life_gives_way_to_set(face: Face) -> None:

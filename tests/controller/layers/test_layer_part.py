@@ -56,7 +56,7 @@ def test_a_source_that_fails_lets_its_layer_fade_and_begins_again(
     face = Face()
     old = getattr(face.state, source)
     if how is nan_values and source == "_life":
-        monkeypatch.setattr(old, "_sway", [(math.nan, 0.0)] * 9)  # all that is computed of it is no number
+        monkeypatch.setattr(old._sway, "_phases", np.full((3, 3), math.nan))  # all that is computed of it is no number
     else:
         monkeypatch.setattr(old, "update", how)
     path = face.run(0.9)

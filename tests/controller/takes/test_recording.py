@@ -63,6 +63,20 @@ def test_a_recording_ends_with_its_block_and_the_state_goes_on(tmp_path: Path) -
     assert len(calls) == 2
 
 
+def test_a_manner_of_idle_motion_is_replayed(tmp_path: Path) -> None:
+    state, path, out = CommandState(P, seed=3), tmp_path / "a", P.neutral()
+    with recorded(state, path, seed=3):
+        state.live(1.0, 0, "listen")
+        for i in range(300):
+            state.tick(i * STEP_NS, 0.01, out)
+        state.live(0.5, 0)
+        state.tick(300 * STEP_NS, 0.01, out)
+    replayed = [values.copy() for _, values in replay(path, P)]
+    assert len(replayed) == 301 and np.array_equal(replayed[-1], out)
+    calls = [json.loads(line) for line in path.read_text().splitlines() if "live" in line]
+    assert calls == [["live", 1.0, 0, "listen"], ["live", 0.5, 0]]
+
+
 def test_an_error_in_the_block_ends_the_recording(tmp_path: Path) -> None:
     state, path = CommandState(P), tmp_path / "a"
     with pytest.raises(KeyError), recorded(state, path):

@@ -50,6 +50,8 @@ def parse(line: str) -> Command:
         ("NEUTRAL", Command("NEUTRAL", (), (0.5,))),
         ("NEUTRAL 60", Command("NEUTRAL", (), (60.0,))),
         ("LIFE 0.25", Command("LIFE", (), (0.25,))),
+        ("LIFE 1 listen", Command("LIFE", (), (1.0,), ("LISTEN",))),
+        ("LIFE 0 AUTO", Command("LIFE", (), (0.0,), ("AUTO",))),
         ("SHOW tour", Command("SHOW", words=("tour",))),
         ("SHOW play", Command("SHOW", words=("PLAY",))),
         ("SHOW seek Chorus", Command("SHOW", words=("SEEK", "Chorus"))),
@@ -145,6 +147,7 @@ def test_only_measured_and_read_measured_ask_for_the_servos() -> None:
         ("GAZE AT 1 2 3 4", Code.ARGUMENTS, "5 arguments; usage: GAZE"),
         ("NEUTRAL 1 2", Code.ARGUMENTS, "2 arguments; usage: NEUTRAL"),
         ("LIFE", Code.ARGUMENTS, "0 arguments; usage: LIFE"),
+        ("LIFE 1 dance", Code.NAME, "unknown manner 'dance'; usage: LIFE"),
         ("INFO jawOpen headYaw", Code.ARGUMENTS, "2 arguments; usage: INFO"),
         ("LIST LAYERS COMMANDS", Code.ARGUMENTS, "2 arguments; usage: LIST"),
         ("SET jawOpen", Code.ARGUMENTS, "1 argument; usage: SET"),
@@ -194,7 +197,7 @@ def test_commands_that_need_arguments_say_so(name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "most"),
     [
-        ("HELLO", 1), ("VERSION", 0), ("EXPR", 3), ("GAZE", 4), ("NEUTRAL", 1), ("LIFE", 1), ("SHOW", 2), ("READ", 2),
+        ("HELLO", 1), ("VERSION", 0), ("EXPR", 3), ("GAZE", 4), ("NEUTRAL", 1), ("LIFE", 2), ("SHOW", 2), ("READ", 2),
         ("INFO", 1), ("STATUS", 0), ("UNSUB", 0), ("LIST", 1),
     ],
 )  # fmt: skip

@@ -66,7 +66,7 @@ def test_every_command_is_acknowledged(talk: Talk) -> None:
         "HELLO": "HELLO omote", "PING a b": "PONG a b", "PING": "PONG", "FRAME " + "0.5 " * 59: "SET 59",
         "RELEASE jawOpen": "RELEASE 1", "RELEASE ALL": "RELEASE 59", "EXPR Happy .5 2": "EXPR happiness 0.5",
         "GAZE 10 -5": "GAZE", "GAZE AT 0 0 500": "GAZE", "GAZE OFF": "GAZE", "NEUTRAL 1": "NEUTRAL",
-        "LIFE .5": "LIFE 0.5", "LIFE 0": "LIFE 0",
+        "LIFE .5": "LIFE 0.5", "LIFE .7 listen": "LIFE 0.7 LISTEN", "LIFE 0": "LIFE 0",
         "GET ALL": "GET ALL 0", "STATUS": "STATUS expression=neutral", "SUB 20": "SUB 20 59", "UNSUB": "UNSUB",
         "LIST PARAMETERS": "LIST PARAMETERS eyeBlinkLeft", "LIST EXPRESSIONS": "LIST EXPRESSIONS neutral",
         "LIST LAYERS": "LIST LAYERS expression", "LIST HOLDERS": "LIST HOLDERS expression",

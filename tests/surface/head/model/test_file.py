@@ -85,7 +85,7 @@ def test_contacts_come_back(folder):
 
 
 def test_a_seal_comes_back_and_names_shapes(folder):
-    lips = Contact("lips", "a", ("b",), -1, 5.5, 0.5, np.zeros((2, 3, 3, 2)), Seal({"jawOpen": 3.0}, 0.25, 0.75))
+    lips = Contact("lips", "a", ("b",), -1, 5.5, 0.5, np.zeros((2, 3, 3, 2)), seal=Seal({"jawOpen": 3.0}, 0.25, 0.75))
     save_data(folder, small_head(contacts=[lips]))
     assert load_data(folder).contacts[0].seal == lips.seal
     edit(folder, "parted = 0.75", "parted = 0.25")
