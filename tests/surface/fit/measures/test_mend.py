@@ -112,8 +112,7 @@ def test_surface_that_is_turned_over_is_found_and_mended(result: FitResult, mesh
     assert good.turned == {} and before.turned[part.name, "neutral"].mm2 > mend.TURNED_MM2
     mended, after, notes = mend_spikes(head, mesh, sources_of(mesh.names), result.parts, 1.0)
     assert after.turned.get((part.name, "neutral"), Turned(0.0, points)).mm2 < 1.0 and "mm²" in notes[0]
-    off = np.linalg.norm(mended.parts[0].points - part.points, axis=1)
-    assert off.max() < 5.0
+    assert greatest(mended, result, mesh) < 4.0  # points may stay elsewhere along the surface
 
 
 def test_faces_turned_over_in_the_texture_are_counted(mesh: FitMesh) -> None:
