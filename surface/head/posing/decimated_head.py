@@ -126,7 +126,7 @@ class JoinedRig(SkinRig):
         return super().apply(pose)
 
     def _pose_key(self, pose: Pose) -> tuple[object, ...]:
-        return *super()._pose_key(pose), pose.gaze.tobytes()
+        return *super()._pose_key(pose), pose.gaze.tobytes(), pose.shapes.tobytes()
 
     def _evaluate(self, pose: Pose) -> None:
         super()._evaluate(pose)

@@ -11,7 +11,7 @@ from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers, SealDriver
 from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import add_moves, keep_on_eyeball, mix_rows, swing_jaw
-from surface.head.posing.tongue import TongueRest
+from surface.head.posing.tongue import tongue_rest
 
 GAP = 16  # greatest number of unmoved points within one run of a group's points
 CLEARANCE_GRID = (72, 36)  # samples of the part behind the lids, along u and v
@@ -90,8 +90,8 @@ class SkinRig:
         self._followers = [(c.name, Follower(c, part.points, surfaces[c.part], head)) for c in others]
         self._clearances = _clearances(part, head)
         lips = any(c.eye < 0 and c.part != part.name for c in head.contacts)
-        out = lips and any(g.name == "tongueOut" for g in part.groups)
-        self._head, self._rest = head, TongueRest(part, head) if out else None
+        out = lips and part.name and any(g.name == "tongueOut" for g in part.groups)  # parts joined in one have no name
+        self._head, self._rest = head, tongue_rest(part, head) if out else None
         self._lids = Lids(part, head, self._moves)
         self._amounts = np.zeros(len(self._moves.used))
         self._last_key: tuple[object, ...] = ()
@@ -125,6 +125,8 @@ class SkinRig:
         for solver, seal in zip(self._solvers, self._seals, strict=True):
             axis = optical_axis(pose.gaze[max(solver.contact.eye, 0)])
             pose.pushes[solver.contact.name] = solver.apply(axis, points, seal.amount(pose.shapes))
+            if solver.contact.eye < 0:
+                pose.lip = solver.lower
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)

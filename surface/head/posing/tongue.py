@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.base.jit import kernel
 from surface.dcp import DCPSurface
 from surface.head.model.data import HeadData, PartData
@@ -30,6 +30,7 @@ BEND_MM = 16.0  # along the tongue, over which a rise fades
 SIDEWAYS = 0.8  # of the way of the lower lip to a side, which the tongue goes along
 PUT_OUT = (0.02, 0.3)  # tongueOut, from none to all of the correction: a tongue in the mouth lies as it was fitted
 PASSES = 3
+LEAST_SAMPLES, LEAST_MM = 50, 5.0  # of a part that is a tongue, and its length
 
 
 @kernel
@@ -67,6 +68,12 @@ def lift_sections(rise: Floats, fade: Floats, part: Floats, share: float, points
         points[i, 1] += share * part[i] * lift[i]
 
 
+def tongue_rest(part: PartData, head: HeadData) -> TongueRest | None:
+    """The correction of a tongue; None for one that is too short to be told from a button, or has no surface."""
+    at = _samples(part, make_surface(part))[1]
+    return TongueRest(part, head) if len(at) >= LEAST_SAMPLES and np.ptp(at[:, 2]) > LEAST_MM else None
+
+
 class TongueRest:
     """Keeps a part with the group tongueOut above the lower lip and the lower teeth, and below the upper teeth.
 
@@ -75,13 +82,14 @@ class TongueRest:
 
     def __init__(self, part: PartData, head: HeadData) -> None:
         surface, z = make_surface(part), part.points[:, 2]
-        at = surface.evaluate(_grid(part))
-        along = at[:, 2].max() - np.linspace(1.0, LENGTH_MM, STATIONS)
+        at = _samples(part, surface)[1]
+        length = min(LENGTH_MM, 0.8 * float(np.ptp(at[:, 2])))
+        along = at[:, 2].max() - np.linspace(1.0, length, STATIONS)
         self._sides = [_dense_weights(surface, _stations(part, surface, along, sign)) for sign in (-1.0, 1.0)]
         away = np.abs(z[None] - along[:, None])
         away[0, z > along[0]] = 0.0  # the tip goes as its first station
         self._fade = 1.0 - smoothstep(away / BEND_MM)
-        self._sideways = smoothstep(z, along[0] - LENGTH_MM, along[0] - 0.4 * LENGTH_MM)
+        self._sideways = smoothstep(z, along[0] - length, along[0] - 0.4 * length)
         self._whole = np.ones(len(z))
         low, high = _thickness(at, z)
         self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
@@ -119,13 +127,26 @@ def _grid(part: PartData) -> Floats:
     return inside
 
 
-def _stations(part: PartData, surface: DCPSurface, along: Floats, sign: float) -> Floats:
-    """(STATIONS * len(ACROSS), 2) places on the tongue's upper (1) or under (-1) side at z of ``along``."""
+def _samples(part: PartData, surface: DCPSurface) -> tuple[Floats, Floats]:
+    """(k, 2) places all over a part, in (u, v), and (k, 3) where they lie; without those that nothing covers."""
     places = _grid(part)
     at = surface.evaluate(places)
+    covered = np.isfinite(at).all(axis=1)
+    return places[covered], at[covered]
+
+
+def _slice(at: Floats, z: float) -> Bools:
+    """(k,) samples in a slice at z; where there are none, the nearest."""
+    away = np.abs(at[:, 2] - z)
+    return away <= max(SLICE_MM, float(away.min()))
+
+
+def _stations(part: PartData, surface: DCPSurface, along: Floats, sign: float) -> Floats:
+    """(STATIONS * len(ACROSS), 2) places on the tongue's upper (1) or under (-1) side at z of ``along``."""
+    places, at = _samples(part, surface)
     out = []
     for z in along:
-        here = at[np.abs(at[:, 2] - z) < SLICE_MM]
+        here = at[_slice(at, z)]
         half, middle = np.abs(here[:, 0]).max(), 0.5 * (here[:, 1].min() + here[:, 1].max())
         own = np.flatnonzero(sign * (at[:, 1] - middle) >= 0.0)
         for x in ACROSS:
@@ -136,8 +157,8 @@ def _stations(part: PartData, surface: DCPSurface, along: Floats, sign: float) -
 
 def _thickness(at: Floats, z: Floats) -> tuple[Floats, Floats]:
     """Lowest and highest y (n,) of the tongue, of which ``at (m, 3)`` are samples, at each of ``z (n,)``."""
-    knots = np.linspace(at[:, 2].min(), at[:, 2].max() - SLICE_MM, 30)
-    slices = [at[np.abs(at[:, 2] - k) < SLICE_MM, 1] for k in knots]
+    knots = np.linspace(at[:, 2].min(), max(at[:, 2].max() - SLICE_MM, at[:, 2].min()), 30)
+    slices = [at[_slice(at, k), 1] for k in knots]
     return np.interp(z, knots, [s.min() for s in slices]), np.interp(z, knots, [s.max() for s in slices])
 
 
@@ -157,7 +178,7 @@ def _edges(head: HeadData, follows: str, sign: float) -> Floats:
 
 
 def _edge(part: PartData, sign: float) -> Floats:
-    at = make_surface(part).evaluate(_grid(part))
+    at = _samples(part, make_surface(part))[1]
     cell = np.floor(at[:, [0, 2]] / BIN_MM).astype(np.int64)
     order = np.lexsort((sign * at[:, 1], cell[:, 1], cell[:, 0]))
     last = np.append((np.diff(cell[order], axis=0) != 0).any(axis=1), True)

@@ -156,7 +156,8 @@ def open_lips(head: HeadData, mm: float = 4.0) -> HeadData:
 
 
 def weak_mouth_close(head: HeadData) -> HeadData:
-    return scaled_group(head, "mouthClose", 0.8)
+    weak = scaled_group(head, "mouthClose", 0.8)
+    return replace(weak, contacts=[replace(c, seal=None) for c in weak.contacts])  # which would close them all the same
 
 
 def without_parts(head: HeadData, *names: str) -> HeadData:

@@ -123,7 +123,7 @@ def ringed(edge_deg: float, iris=(0.05, 0.1, 0.2), white=(0.7, 0.6, 0.5)):
 
 @pytest.mark.parametrize("edge", [20.0, 30.0, 40.0])
 def test_an_iris_ends_where_rings_become_white(edge: float) -> None:
-    found = eye_colours._by_rings(ringed(edge), np.array([3.0, 4.0, 5.0]), 0.5)
+    found = eye_colours.by_rings(ringed(edge), np.array([3.0, 4.0, 5.0]), 0.5)
     assert found.iris_radius == pytest.approx(np.sin(np.radians(edge)), abs=0.045)
     np.testing.assert_allclose(found.iris, [0.05, 0.1, 0.2])
     np.testing.assert_allclose(found.white, [0.7, 0.6, 0.5])
@@ -133,18 +133,18 @@ def test_the_white_beside_an_iris_counts_and_not_that_in_the_shade_of_lids() -> 
     angle = np.radians(np.arange(0.5, 90, 0.5))
     degrees = np.degrees(angle)[:, None]
     colours = np.where(degrees < 30, [[0.05, 0.1, 0.2]], np.where(degrees < 47, [[0.7, 0.7, 0.7]], [[0.6, 0.6, 0.6]]))
-    found = eye_colours._by_rings(dots(angle, colours), np.array([3.0, 4.0, 5.0]), 0.5)
+    found = eye_colours.by_rings(dots(angle, colours), np.array([3.0, 4.0, 5.0]), 0.5)
     np.testing.assert_allclose(found.white, 0.7)
 
 
 def test_an_eye_of_one_colour_has_no_iris_and_one_without_white_tells_nothing() -> None:
-    plain = eye_colours._by_rings(ringed(30, (0.7, 0.6, 0.5)), np.array([3.0, 4.0, 5.0]), 0.44)
+    plain = eye_colours.by_rings(ringed(30, (0.7, 0.6, 0.5)), np.array([3.0, 4.0, 5.0]), 0.44)
     assert plain.iris is None and plain.iris_radius == 0.44
     np.testing.assert_allclose(plain.white, [0.7, 0.6, 0.5])
     front = dots(np.radians(np.arange(0.5, 40, 0.5)), np.tile([0.1, 0.2, 0.3], (79, 1)))
-    none = eye_colours._by_rings(front, np.array([3.0, 4.0, 5.0]), 0.44)
+    none = eye_colours.by_rings(front, np.array([3.0, 4.0, 5.0]), 0.44)
     assert none.iris is None and none.white is None and none.iris_radius == 0.44
-    faint = eye_colours._by_rings(ringed(30, (0.68, 0.58, 0.5)), np.array([3.0, 4.0, 5.0]), 0.44)
+    faint = eye_colours.by_rings(ringed(30, (0.68, 0.58, 0.5)), np.array([3.0, 4.0, 5.0]), 0.44)
     assert faint.iris is None  # hardly another colour
 
 
@@ -155,7 +155,7 @@ def test_the_pupil_and_the_rim_do_not_colour_an_iris() -> None:
         share < 0.4, [[0.004, 0.004, 0.004]], np.where(share < 0.87, [[0.1, 0.2, 0.05]], [[0.01, 0.01, 0.01]])
     )
     colours = np.where(np.degrees(angle)[:, None] > 30, [[0.7, 0.7, 0.7]], colours)
-    found = eye_colours._by_rings(dots(angle, colours), np.array([3.0, 4.0, 5.0]), 0.5)
+    found = eye_colours.by_rings(dots(angle, colours), np.array([3.0, 4.0, 5.0]), 0.5)
     np.testing.assert_allclose(found.iris, [0.1, 0.2, 0.05])
     disc = np.linspace(0, 1, 60)[1:]
     around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
