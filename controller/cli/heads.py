@@ -18,6 +18,7 @@ from surface.base.extras import require
 if TYPE_CHECKING:
     from controller.tools.surface_fit import SurfaceFit  # start-up: --help does without it
     from surface.fit.points.report import FitReport  # start-up: --help does without it
+    from surface.fit.source.load import LoadOptions  # start-up: --help does without it
 
 _NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
 _NO_SHAPES = "the mesh has no shapes: --expressions-from ict gives it those of another head"
@@ -164,8 +165,7 @@ def fit(
     """
     # start-up: --help does without any of these
     from controller.tools.surface_fit import SurfaceFit, is_surface_file, refuse_surface_options
-    from controller.tools.transfer import check_transfer, transfer
-    from surface.fit.api import fit_head
+    from controller.tools.transfer import check_transfer
     from surface.fit.identities import add_identities
     from surface.fit.source.load import LoadOptions
 
@@ -187,30 +187,38 @@ def fit(
     check_transfer(expressions_from, landmarks, given)
     if not keep:
         options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
-        columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
-        with Progress(*columns, console=console, transient=True) as bar:
-            task = bar.add_task("reading", total=1.0)
-
-            def progress(part: str, done: float) -> None:
-                step = "writing the report" if part == "report" else f"fitting {part}"
-                bar.update(task, description=step, completed=done)
-
-            title = name or out.resolve().name
-            if expressions_from is not None:
-                found = transfer(mesh, expressions_from, out, title, landmarks, options, progress, report)
-            else:
-                found = fit_head(
-                    mesh, out, name=title, progress=progress, options=options, report_dir=report, force=force
-                )
-        shaded = _decimate_and_shade(out)
-        show_table(_error_table(found))
-        for line in _remarks(found, shaded) + _checked(out):
-            console.print(line, soft_wrap=True, markup=False)
-        console.print(f"wrote {out}", soft_wrap=True)
+        _fit_mesh(mesh, out, name or out.resolve().name, options, expressions_from, landmarks, report, force)
     if identities is not None:
         with console.status("fitting identities"):
             added = add_identities(out, mesh, identities)
         console.print(f"identities: {', '.join(added)}", soft_wrap=True)
+
+
+def _fit_mesh(
+    mesh: Path, out: Path, title: str, options: LoadOptions, expressions_from: str | None, landmarks: Path | None,
+    report: Path | None, force: bool,
+) -> None:  # fmt: skip
+    """Make a head of a mesh, by its own shapes or another head's, and say what was found."""
+    from controller.tools.transfer import transfer  # start-up: --help does without either
+    from surface.fit.api import fit_head
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as bar:
+        task = bar.add_task("reading", total=1.0)
+
+        def progress(part: str, done: float) -> None:
+            step = "writing the report" if part == "report" else f"fitting {part}"
+            bar.update(task, description=step, completed=done)
+
+        if expressions_from is not None:
+            found = transfer(mesh, expressions_from, out, title, landmarks, options, progress, report)
+        else:
+            found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report, force=force)
+    shaded = _decimate_and_shade(out)
+    show_table(_error_table(found))
+    for line in _remarks(found, shaded) + _checked(out):
+        console.print(line, soft_wrap=True, markup=False)
+    console.print(f"wrote {out}", soft_wrap=True)
 
 
 def _fit_surfaces(wanted: SurfaceFit) -> None:

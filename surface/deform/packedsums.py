@@ -75,6 +75,14 @@ def accumulate(numerators, place, weights, number):
 
 
 @inlined
+def add_products(numerators, place, weights, dx, dy, dz):
+    """``numerators[place : place + 24] += weights * d``, eight numbers each for x, y and z; Eq. (2) for one tile."""
+    accumulate(numerators, place, weights, dx)
+    accumulate(numerators, place + 8, weights, dy)
+    accumulate(numerators, place + 16, weights, dz)
+
+
+@inlined
 def add_packed_row(
     first_tile, end_tile, at, place, dx, dy, dz, slopes, tile_entry, packed, packed_slope, places, touched, numerators,
 ):  # fmt: skip
@@ -91,14 +99,8 @@ def add_packed_row(
         e, base = item(tile_entry, at + tile - first_tile) + number - 1, tile * size
         touched[tile] = 1
         a = load(packed, 8 * e)
-        accumulate(numerators, base, a, dx)
-        accumulate(numerators, base + 8, a, dy)
-        accumulate(numerators, base + 16, a, dz)
+        add_products(numerators, base, a, dx, dy, dz)
         if slopes:
             u, v = load(packed_slope, 16 * e), load(packed_slope, 16 * e + 8)
-            accumulate(numerators, base + 24, u, dx)
-            accumulate(numerators, base + 32, u, dy)
-            accumulate(numerators, base + 40, u, dz)
-            accumulate(numerators, base + 48, v, dx)
-            accumulate(numerators, base + 56, v, dy)
-            accumulate(numerators, base + 64, v, dz)
+            add_products(numerators, base + 24, u, dx, dy, dz)
+            add_products(numerators, base + 48, v, dx, dy, dz)

@@ -18,7 +18,7 @@ from surface.spline.lanes import load
 
 from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
 from .groupsums import HEAD, STEP, product, slope_products, wide
-from .packedsums import accumulate, add_packed_row
+from .packedsums import add_packed_row, add_products
 
 NOT_STORED = -1  # in ``differences``: the cell's numerators are not stored
 STORE = -2  # in ``differences``: compute and store them now
@@ -48,20 +48,14 @@ def add_row(
         else:
             at_u, at_v = 0, 0
             a = load(value, place)
-        accumulate(numerators, base, a, dx)
-        accumulate(numerators, base + 8, a, dy)
-        accumulate(numerators, base + 16, a, dz)
+        add_products(numerators, base, a, dx, dy, dz)
         if slopes:
             if row >= 0:
                 _, u, v = slope_products(factors, picks, at_u, at_v, wide_u, wide_v, at)
             else:
                 u, v = load(slope, 2 * place), load(slope, 2 * place + 8)
-            accumulate(numerators, base + 24, u, dx)
-            accumulate(numerators, base + 32, u, dy)
-            accumulate(numerators, base + 40, u, dz)
-            accumulate(numerators, base + 48, v, dx)
-            accumulate(numerators, base + 56, v, dy)
-            accumulate(numerators, base + 64, v, dz)
+            add_products(numerators, base + 24, u, dx, dy, dz)
+            add_products(numerators, base + 48, v, dx, dy, dz)
         place += step
         at += STEP
 

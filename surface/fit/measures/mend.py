@@ -108,7 +108,8 @@ def _furthest(dense: DenseErrors) -> dict[tuple[str, str], float]:
 
 
 def _smoothed(head: HeadData, name: str, shape: str, dense: DenseErrors, rings: int) -> tuple[HeadData, int]:
-    """The head with the control points of one part put right in one shape, and how many they are."""
+    """The head with the control points of one part put right in one shape, ``rings`` of neighbours with them, and how
+    many they are."""
     part = next(p for p in head.parts if p.name == name)
     over = dense.turned.get((name, shape))
     found = [dense.sticking.get((name, shape), NOWHERE), over.uv if over is not None else NOWHERE]

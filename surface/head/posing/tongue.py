@@ -70,22 +70,25 @@ def lift_sections(rise: Floats, fade: Floats, part: Floats, share: float, points
 
 def tongue_rest(part: PartData, head: HeadData) -> TongueRest | None:
     """The correction of a tongue; None for one that is too short to be told from a button, or has no surface."""
-    at = _samples(part, make_surface(part))[1]
-    return TongueRest(part, head) if len(at) >= LEAST_SAMPLES and np.ptp(at[:, 2]) > LEAST_MM else None
+    surface = make_surface(part)
+    places, at = _samples(part, surface)
+    if len(at) < LEAST_SAMPLES or np.ptp(at[:, 2]) <= LEAST_MM:
+        return None
+    return TongueRest(part, head, surface, places, at)
 
 
 class TongueRest:
     """Keeps a part with the group tongueOut above the lower lip and the lower teeth, and below the upper teeth.
 
-    part : the tongue; head : for its teeth and lips.
+    part : the tongue, and its surface; head : for its teeth. places : (k, 2) samples all over the tongue, in (u, v);
+    at : (k, 3) where they lie, mm.
     """
 
-    def __init__(self, part: PartData, head: HeadData) -> None:
-        surface, z = make_surface(part), part.points[:, 2]
-        at = _samples(part, surface)[1]
+    def __init__(self, part: PartData, head: HeadData, surface: DCPSurface, places: Floats, at: Floats) -> None:
+        z = part.points[:, 2]
         length = min(LENGTH_MM, 0.8 * float(np.ptp(at[:, 2])))
         along = at[:, 2].max() - np.linspace(1.0, length, STATIONS)
-        self._sides = [_dense_weights(surface, _stations(part, surface, along, sign)) for sign in (-1.0, 1.0)]
+        self._sides = [_dense_weights(surface, _stations(places, at, along, sign)) for sign in (-1.0, 1.0)]
         away = np.abs(z[None] - along[:, None])
         away[0, z > along[0]] = 0.0  # the tip goes as its first station
         self._fade = 1.0 - smoothstep(away / BEND_MM)
@@ -141,9 +144,9 @@ def _slice(at: Floats, z: float) -> Bools:
     return away <= max(SLICE_MM, float(away.min()))
 
 
-def _stations(part: PartData, surface: DCPSurface, along: Floats, sign: float) -> Floats:
-    """(STATIONS * len(ACROSS), 2) places on the tongue's upper (1) or under (-1) side at z of ``along``."""
-    places, at = _samples(part, surface)
+def _stations(places: Floats, at: Floats, along: Floats, sign: float) -> Floats:
+    """(STATIONS * len(ACROSS), 2) places on the tongue's upper (1) or under (-1) side at z of ``along``, out of samples
+    at ``places (k, 2)``, which lie ``at (k, 3)``."""
     out = []
     for z in along:
         here = at[_slice(at, z)]
