@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Table
 
 from controller.base.paths import find_config
+from controller.stage.stage import find_persons, load_head
 from surface.head import Head
 from surface.view.pictures.offscreen import Offscreen
 from surface.view.scene.bounds import Bands
@@ -42,8 +43,9 @@ def timed(work: Callable[[], object], frames: int = FRAMES) -> Times:
 class Bench:
     """A head at one pose, drawn again and again."""
 
-    def __init__(self, quality: str, size: tuple[int, int]) -> None:
-        self.head = Head.load(find_config("heads", "ict"))
+    def __init__(self, quality: str, size: tuple[int, int], person: str = "") -> None:
+        folder = find_config("heads", "ict")
+        self.head: Head = load_head(folder, {}, (), find_persons(person, folder))
         self.screen = Offscreen(self.head, size, quality=quality)
         self.values = np.full(len(self.head.parameters), 0.2)
         self.screen.draw(self.values)
@@ -101,14 +103,46 @@ class Bench:
         return pose
 
 
+def ratio(one: Bench, other: Bench, rounds: int = 9) -> str:
+    """Processor time of a whole frame (posing, drawing, smoothing, bands) of one head over that of another: median of
+    rounds in which both are measured one after the other."""
+
+    def frame(bench: Bench) -> Callable[[], None]:
+        pose = bench.poser()
+
+        def work() -> None:
+            pose()
+            bench.renderer.update()
+            bench.draw("", bench.renderer.region(bench.camera, bench.target._drawn.size))
+            bench.smooth()
+
+        return work
+
+    works, found = (frame(one), frame(other)), []
+    for _ in range(rounds):
+        times = []
+        for bench, work in zip((one, other), works, strict=True):
+            bench.screen._make_current()
+            times.append(timed(work, 10)[1])
+        found.append(times)
+    middle = sorted(found, key=lambda pair: pair[0] / pair[1])[rounds // 2]
+    return f"{middle[0]:.2f} ms against {middle[1]:.2f} ms a frame: {middle[0] / middle[1]:.3f}"
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quality", default="full", choices=("full", "fast"))
     parser.add_argument("--size", default="1280x720")
+    parser.add_argument("--person", default="", help="a name of configs/persons, with hair and clothes")
+    parser.add_argument("--beside", help="another person, or none, drawn in turn with the first: prints only the ratio")
     given = parser.parse_args()
     width, height = (int(number) for number in given.size.split("x"))
-    bench, console = Bench(given.quality, (width, height)), Console(highlight=False)
+    bench, console = Bench(given.quality, (width, height), given.person), Console(highlight=False)
+    if given.beside is not None:
+        other = Bench(given.quality, (width, height), given.beside.replace("none", ""))
+        console.print(ratio(bench, other))
+        return
     table = Table(f"{given.quality}, {given.size}", "clock ms", "processor ms", "OpenGL's thread ms")
     for name, times in bench.rows():
         table.add_row(name, *(f"{t:.2f}" for t in times))

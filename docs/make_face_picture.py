@@ -9,6 +9,7 @@ import numpy as np
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.face.still import for_head, sheet_poses
+from controller.stage.stage import find_persons, load_head
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.view import PRESETS, Camera, Offscreen, compose, contact_sheet, write_png
@@ -19,6 +20,7 @@ EXPRESSIONS = ("neutral", "laugh", "surprise", "sadness")
 LOOKS = ("neutral", "happiness", "anger", "fear")
 CAMERAS = ("front", "three-quarter", "profile")
 SIZE = (400, 460)
+PERSONS = ("birch", "maple", "oak", "willow", "olive", "cedar", "acacia", "ebony")
 CLOSE = {
     "eyes": Camera.around(0, 1, distance=950, target=(0, 28, 70), fov_deg=6.5),
     "mouth": Camera.around(0, 1, distance=950, target=(0, -42, 85), fov_deg=5.5),
@@ -34,8 +36,21 @@ def main() -> None:
     write_webp(looks(head, "mask"), HERE / "pictures" / "picture-mask.webp")
     write_webp(close(head), HERE / "pictures" / "picture-close.webp")
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses()]
+    write_webp(persons(), HERE / "pictures" / "persons.webp")
     sheet = contact_sheet(head, entries, tile=(190, 200), columns=9)
     write_webp(np.asarray(sheet), HERE / "pictures" / "picture-sheet.webp")
+
+
+def persons() -> np.ndarray:
+    """All eight, with a slight smile."""
+    folder, pictures = find_config("heads", "ict"), []
+    for name in PERSONS:
+        head = load_head(folder, {}, (), find_persons(name, folder))
+        with Offscreen(head, (300, 330)) as screen:
+            values = head.values({"mouthSmileLeft": 0.28, "mouthSmileRight": 0.24, "cheekSquintLeft": 0.15,
+                                  "cheekSquintRight": 0.15})  # fmt: skip
+            pictures.append(screen.render(values, Camera.around(30.0, 3.0, distance=1130.0, target=(0.0, 2.0, 20.0))))
+    return np.asarray(compose(pictures, list(PERSONS), columns=4))
 
 
 def posed(head: Head, name: str) -> np.ndarray:

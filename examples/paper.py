@@ -71,7 +71,11 @@ def page(head: Head, short: bool) -> str:
     ]
     body = "".join(f"<h2>{escape(title)}</h2>{text}" for title, text in sections)
     about = f"{escape(head.name)}: {surface.n} control points and {len(mesh.vertices)} vertices on its {data.name}."
-    note = " Short form: coarse meshes, rough times." if short else ""
+    note = (
+        " Short form: meshes so coarse save nothing, and times are rough; leave out --short for figures."
+        if short
+        else ""
+    )
     return (
         f'<!doctype html><meta charset="utf-8"><title>The paper</title><style>{STYLE}</style><p>{about}{note}</p>{body}'
     )

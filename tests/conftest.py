@@ -6,6 +6,7 @@ import importlib.util
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -32,11 +33,27 @@ def pytest_configure() -> None:
     for name in SETTINGS:
         os.environ.pop(name, None)
     os.environ["TERM"] = "xterm-256color"
+    # before numpy: its threads would spin where the tests beside this one have work
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if hasattr(os, "setpriority"):
+        os.setpriority = keeping_priority(os.setpriority)
     # a shell starts what runs in the background with Ctrl-C ignored, and nohup ignores the terminal's end
     signal.signal(signal.SIGINT, signal.default_int_handler)
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
+
+
+def keeping_priority(change: Callable[[int, int, int], None]) -> Callable[[int, int, int], None]:
+    """``os.setpriority`` that leaves the main thread of this process as it is: a test that runs a face in it would
+    slow down all tests after it where the machine is busy."""
+    own = os.getpid()
+
+    def setpriority(which: int, who: int, priority: int) -> None:
+        if os.getpid() != own or threading.current_thread() is not threading.main_thread():
+            change(which, who, priority)
+
+    return setpriority
 
 
 @pytest.fixture(scope="session")

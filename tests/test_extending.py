@@ -12,6 +12,7 @@ import time
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -42,7 +43,29 @@ robots = ["robot.toml"]
 kind = "jsonudp"
 listen = "127.0.0.1:{port}"
 """
-Omote = Callable[..., subprocess.CompletedProcess[str]]
+PROGRAM = """
+import contextlib, io, json, sys
+from controller.cli import main
+for words in sys.argv[1:]:
+    sys.argv, out, err, code = ["omote", *words.split()], io.StringIO(), io.StringIO(), 0
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            main()
+        except SystemExit as end:
+            code = end.code or 0
+    print(json.dumps([code, out.getvalue(), err.getvalue()]), flush=True)
+"""
+
+
+class Said(NamedTuple):
+    """What a command left: its exit code and what it wrote."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+Omote = Callable[..., list[Said]]
 
 
 @pytest.fixture(scope="session")
@@ -66,13 +89,15 @@ def site(page: str, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def omote(site: Path, root: Path, tmp_path: Path) -> Omote:
-    """Runs ``omote`` where the package is installed, in a folder of its own."""
+    """Runs commands of ``omote`` where the package is installed, in a folder of its own; all by one process."""
 
-    def run(*words: str) -> subprocess.CompletedProcess[str]:
-        command = [sys.executable, "-c", "from controller.cli import main; main()", *words]
-        return subprocess.run(
+    def run(*commands: str) -> list[Said]:
+        command = [sys.executable, "-c", PROGRAM, *commands]
+        done = subprocess.run(
             command, cwd=tmp_path, env=environment(site, root), capture_output=True, text=True, timeout=120
         )
+        assert done.returncode == 0, done.stderr
+        return [Said(*json.loads(line)) for line in done.stdout.splitlines()]
 
     return run
 
@@ -105,31 +130,33 @@ def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, ro
 
 
 def test_every_list_has_them(omote: Omote) -> None:
-    said = omote("plugins").stdout
+    plugins, simulators, simulator = omote("plugins", "simulate --help", "simulate puppet8 --help")
     for word in ("puppet8", "Puppet8 boards", "jsonudp", "track", "xyz", "omote-example 0.1.0"):
-        assert word in said
-    assert "puppet8" in omote("simulate", "--help").stdout
-    help_text = omote("simulate", "puppet8", "--help").stdout
-    assert "57600" in help_text and "Example: omote simulate puppet8" in help_text
+        assert word in plugins.stdout
+    assert "puppet8" in simulators.stdout
+    assert "57600" in simulator.stdout and "Example: omote simulate puppet8" in simulator.stdout
 
 
 def test_robot_files_and_stages_are_checked_by_their_own_options(omote: Omote, tmp_path: Path) -> None:
-    robot, stage = tmp_path / "robot.toml", tmp_path / "stage.toml"
-    robot.write_text(ROBOT.format(kind="puppet8", more='port = "/dev/null"\noffset = 8\nstagger_s = 0.1'))
-    assert omote("check", "robot.toml").returncode == 0
-    robot.write_text(ROBOT.format(kind="puppet8", more='port = "/dev/null"\noffset = 300\nofset = 1'))
-    said = omote("check", "robot.toml").stderr
-    assert "buses[0].offset" in said and "less than or equal to 120" in said
-    assert "buses[0].ofset: unknown key, did you mean 'offset'?" in said
-    robot.write_text(ROBOT.format(kind="maestro", more='port = "/dev/null"\noffset = 8'))
-    assert "offset is not for maestro, but for puppet8" in omote("check", "robot.toml").stderr
-    robot.write_text(ROBOT.format(kind="puppet9", more='port = "/dev/null"'))
-    assert "unknown bus kind 'puppet9', did you mean 'puppet8'?" in omote("check", "robot.toml").stderr
-    robot.write_text(ROBOT.format(kind="simulated", more='simulates = "puppet8"'))
-    stage.write_text(STAGE.format(port=9400))
-    assert "jsonudp on 127.0.0.1:9400" in omote("check", "stage.toml").stdout
-    stage.write_text(STAGE.format(port=94000))
-    assert "links[0]: listen: must be HOST:PORT" in omote("check", "stage.toml").stderr
+    def robot(name: str, kind: str, more: str) -> None:
+        (tmp_path / name).write_text(ROBOT.format(kind=kind, more=more))
+
+    robot("good.toml", "puppet8", 'port = "/dev/null"\noffset = 8\nstagger_s = 0.1')
+    robot("wrong.toml", "puppet8", 'port = "/dev/null"\noffset = 300\nofset = 1')
+    robot("other.toml", "maestro", 'port = "/dev/null"\noffset = 8')
+    robot("unknown.toml", "puppet9", 'port = "/dev/null"')
+    robot("robot.toml", "simulated", 'simulates = "puppet8"')
+    (tmp_path / "stage.toml").write_text(STAGE.format(port=9400))
+    (tmp_path / "far.toml").write_text(STAGE.format(port=94000))
+    names = ("good", "wrong", "other", "unknown", "stage", "far")
+    said = dict(zip(names, omote(*(f"check {name}.toml" for name in names)), strict=True))
+    assert said["good"].returncode == 0
+    assert "buses[0].offset" in said["wrong"].stderr and "less than or equal to 120" in said["wrong"].stderr
+    assert "buses[0].ofset: unknown key, did you mean 'offset'?" in said["wrong"].stderr
+    assert "offset is not for maestro, but for puppet8" in said["other"].stderr
+    assert "unknown bus kind 'puppet9', did you mean 'puppet8'?" in said["unknown"].stderr
+    assert "jsonudp on 127.0.0.1:9400" in said["stage"].stdout
+    assert "links[0]: listen: must be HOST:PORT" in said["far"].stderr
 
 
 def test_a_stage_runs_with_both(site: Path, root: Path, tmp_path: Path) -> None:
@@ -160,10 +187,12 @@ def test_a_stage_runs_with_both(site: Path, root: Path, tmp_path: Path) -> None:
 
 def test_a_take_and_an_exported_head_go_through_them(omote: Omote, tmp_path: Path) -> None:
     (tmp_path / "a.track").write_text("jawOpen headYaw\n0 0 0\n0.5 1 0.2\n1.0 0 0\n")
-    assert "take a.track: 3 frames, 1.0 s" in omote("check", "a.track").stdout
-    (tmp_path / "a.track").write_text("jawOpen\n0 x\n")
-    said = omote("check", "a.track")
-    assert said.returncode == 1 and "a.track: is no table" in said.stderr and "a line of names" in said.stderr
-    assert omote("export", "head.xyz", "--set", "jawOpen=0.5").returncode == 0
+    (tmp_path / "b.track").write_text("jawOpen\n0 x\n")
+    take, bad, head, stl = omote(
+        "check a.track", "check b.track", "export head.xyz --set jawOpen=0.5", "export head.stl"
+    )  # fmt: skip
+    assert "take a.track: 3 frames, 1.0 s" in take.stdout
+    assert bad.returncode == 1 and "b.track: is no table" in bad.stderr and "a line of names" in bad.stderr
+    assert head.returncode == 0
     assert len((tmp_path / "head.xyz").read_text().splitlines()) > 30_000
-    assert ".xyz" in omote("export", "head.stl").stderr
+    assert ".xyz" in stl.stderr

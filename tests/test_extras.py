@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from surface.head import save_data
+from tests.surface.small_head import small_head
+
 ROOMS = ("controller", "surface", "drivers")
 OMOTE = """
 import contextlib, io, json, sys
@@ -58,18 +61,21 @@ def without(missing: list[str], *commands: tuple[str, ...], cwd: Path) -> Iterat
 
 def test_what_drives_a_head_needs_no_scipy(tmp_path: Path) -> None:
     (tmp_path / "smooth.toml").write_text(ROBOT)
-    (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["smooth.toml", "head24-anchors"]\n')
+    (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["smooth.toml"]\n')
+    (tmp_path / "anchors.toml").write_text('name = "anchors"\nrobots = ["head24-anchors"]\n')
+    save_data(tmp_path / "small", small_head())
     (tmp_path / "a.tsv").write_text("0.0\taa\n0.4\tsil\n")
     commands = (
-        ("check", "smooth.toml"), ("check", "head24-anchors"), ("check", "ict"), ("plugins",),
+        ("check", "smooth.toml"), ("check", "head24-anchors"), ("plugins",),
         ("run", "stage.toml", "--dry-run", "--seconds", "0.2"),
         ("play", "a.tsv", "--stage", "stage.toml", "--dry-run"),
-        ("run", "stage.toml", "--no-face", "--seconds", "0.2"),
-        ("simulate", "robot", "--help"), ("export", "head.obj"),
+        ("run", "anchors.toml", "--no-face", "--seconds", "0.2"),
+        ("simulate", "robot", "--help"), ("export", "head.obj", "--head", "small"), ("check", "small"),
     )  # fmt: skip
-    results = list(without(["scipy"], *commands, cwd=tmp_path))
+    *results, checked = without(["scipy"], *commands, cwd=tmp_path)
     assert [(words, code) for words, code, *_ in results if code] == [], results
-    assert len(results) == len(commands)
+    assert len(results) == len(commands) - 1
+    assert checked[1] == 1 and "small: missing eye: " in checked[3] and "scipy" not in checked[3]
 
 
 def test_what_needs_scipy_names_the_extra(tmp_path: Path) -> None:

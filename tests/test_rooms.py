@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -49,19 +50,33 @@ def modules() -> dict[str, Path]:
 MODULES = modules()
 
 
-def imports(name: str) -> Iterator[str]:
+@pytest.fixture(scope="module", autouse=True)
+def forget() -> Iterator[None]:
+    """Keep the files' trees no longer than these tests need them."""
+    yield
+    nodes.cache_clear()
+
+
+@cache
+def nodes(name: str) -> tuple[ast.AST, ...]:
+    """Everything in the file of a module; parsed once for all tests."""
+    return tuple(ast.walk(ast.parse(MODULES[name].read_text(encoding="utf-8"))))
+
+
+@cache
+def imports(name: str) -> tuple[str, ...]:
     """What a module imports, at any depth of its file: modules, or names of packages that are not its own."""
-    path = MODULES[name]
-    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    found = []
+    package = name.split(".") if MODULES[name].name == "__init__.py" else name.split(".")[:-1]
+    for node in nodes(name):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
             module = ".".join([*base, *([node.module] if node.module else [])])
-            for alias in node.names:
-                full = f"{module}.{alias.name}"
-                yield full if full in MODULES else module
+            full = [f"{module}.{alias.name}" for alias in node.names]
+            found += [each if each in MODULES else module for each in full]
+    return tuple(found)
 
 
 def place(name: str) -> tuple[str, int]:
@@ -124,10 +139,10 @@ def test_an_import_inside_a_function_says_why(room: str) -> None:
     for name, path in MODULES.items():
         if name.split(".")[0] != room:
             continue
-        text = path.read_text(encoding="utf-8")
-        functions = [n for n in ast.walk(ast.parse(text)) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
+        lines = path.read_text(encoding="utf-8").splitlines()
+        functions = [n for n in nodes(name) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
         found = [n for each in functions for n in ast.walk(each) if isinstance(n, ast.Import | ast.ImportFrom)]
-        told = {p for node in found if has_reason(node, text.splitlines()) for p in imported_packages(node)}
+        told = {p for node in found if has_reason(node, lines) for p in imported_packages(node)}
         bare += [f"{name}:{node.lineno}" for node in found if not imported_packages(node) <= told]
     assert sorted(set(bare)) == []
 
@@ -136,12 +151,13 @@ def test_an_import_inside_a_function_says_why(room: str) -> None:
 def test_own_modules_are_imported_by_name_only_in_the_registry(room: str) -> None:
     """``import_module`` elsewhere would hide an import from the tests above; it may name other people's packages."""
     hidden = []
-    for name, path in MODULES.items():
+    for name in MODULES:
         if name.split(".")[0] != room or name in REGISTRIES:
             continue
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            called = ast.unparse(node.func).split(".")[-1] if isinstance(node, ast.Call) else ""
-            if called in ("import_module", "__import__") and not is_foreign(node.args[0]):
+        for node in nodes(name):
+            called = getattr(node, "func", None)
+            word = getattr(called, "attr", getattr(called, "id", ""))
+            if word in ("import_module", "__import__") and not is_foreign(node.args[0]):  # type: ignore[attr-defined]
                 hidden.append(f"{name}:{node.lineno}")
     assert hidden == []
 
@@ -180,7 +196,9 @@ def test_every_folder_says_what_comes_in_what_goes_out_and_what_it_may_import() 
     silent = []
     for name, path in MODULES.items():
         if path.name == "__init__.py":
-            text = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+            module = nodes(name)[0]
+            assert isinstance(module, ast.Module)
+            text = ast.get_docstring(module) or ""
             if not all(word in text for word in ("In: ", "Out: ", "Imports ")):
                 silent.append(name)
     assert silent == []
@@ -219,11 +237,10 @@ HEAVY = (
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks, to import every module before all others")
-@pytest.mark.parametrize("room", ORDER)
-def test_every_folder_can_be_imported_first_and_backwards(room: str) -> None:
+def test_every_folder_can_be_imported_first_and_backwards() -> None:
     """That no import goes in a circle is tested above; this finds what only shows when modules run."""
     folders: dict[str, list[str]] = {}
-    for name in sorted((name for name in MODULES if name.split(".")[0] == room), reverse=True):
+    for name in sorted(MODULES, reverse=True):
         folders.setdefault(name.rpartition(".")[0], []).append(name)
     names = [" ".join(folder) for folder in folders.values()]
     done = subprocess.run([sys.executable, "-W", "ignore::DeprecationWarning", "-c", ALONE, HEAVY, *names],

@@ -173,11 +173,11 @@ def test_configs_are_found_wherever_an_installer_puts_them(
 # ---------------------------------------------------------------------------- what it does
 
 
-def test_a_head_is_checked(installed: Installed) -> None:
-    done = installed.omote("check", "ict")
+def test_a_robot_is_checked_on_its_head(installed: Installed) -> None:
+    done = installed.omote("check", "head24-anchors")
     assert done.returncode == 0, done.stderr
     assert [line for line in done.stderr.splitlines() if not line.startswith("compiling the kernels")] == []
-    assert done.stdout.rstrip().endswith("good")
+    assert done.stdout.startswith("robot head24-anchors: 1 buses, 24 channels: good\n")
 
 
 def test_an_installation_that_cannot_be_written_keeps_compiled_code_with_the_user(

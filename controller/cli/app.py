@@ -82,6 +82,8 @@ def _run() -> int:
     from controller.cli.streams import fault_of, prepare_streams
 
     prepare_streams()
+    if sys.argv[1:2] != ["fit"]:  # before numpy: threads are worth it for large equations, and spin between small ones
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         make_app()()
         code = 0

@@ -28,6 +28,14 @@ Identity = Annotated[
         metavar="NAME=AMOUNT,...", help="Variations of the head to mix in, each 0 to 1.", autocompletion=identities
     ),
 ]
+Person = Annotated[
+    str | None,
+    typer.Option(
+        metavar="NAME[=SHARE,...]",
+        help="Whom the face shows: configs/persons or a file.",
+        autocompletion=names_of("persons"),
+    ),
+]
 Expression = Annotated[
     list[str] | None,
     typer.Option(
@@ -60,6 +68,7 @@ def render(
     ] = None,
     head: Annotated[str | None, typer.Option(help=HEAD, show_default="ict", autocompletion=names_of("heads"))] = None,
     identity: Identity = None,
+    person: Person = None,
     stage: Annotated[
         str | None,
         typer.Option(
@@ -84,11 +93,12 @@ def render(
     """
     require("a picture", "moderngl", "PIL")
     from controller.face.still import Still, draw_sheet, draw_still  # start-up: --help does without it
+    from controller.stage.persons import parse_person  # start-up: --help does without it
     from controller.stage.picture import parse_background  # start-up: --help does without it
 
     look = {
         "camera": camera, "quality": quality, "theme": theme, "background": parse_background(background),
-        "evaluator": evaluator,
+        "evaluator": evaluator, "person": parse_person(person),
     }  # fmt: skip
     still = Still.parse(
         settings or [], expression or [], size, look, head, identity,
@@ -183,7 +193,7 @@ def fit(
 
     if keep and identities is None:
         raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
-    given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep, "--force": force}
+    given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
     check_transfer(expressions_from, landmarks, given)
     if not keep:
         options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
@@ -211,7 +221,7 @@ def _fit_mesh(
             bar.update(task, description=step, completed=done)
 
         if expressions_from is not None:
-            found = transfer(mesh, expressions_from, out, title, landmarks, options, progress, report)
+            found = transfer(mesh, expressions_from, out, title, landmarks, options, progress, report, force)
         else:
             found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report, force=force)
     shaded = _decimate_and_shade(out)
@@ -294,6 +304,7 @@ def export(
     settings: Setting = None,
     expression: Expression = None,
     identity: Identity = None,
+    person: Person = None,
     frame: Annotated[
         str, typer.Option(help="head: millimetres or metres, y up, z forward; file: as in the mesh it was fitted to.")
     ] = "head",
@@ -305,10 +316,12 @@ def export(
     # start-up: --help does without any of these
     from controller.base.parameters import PARAMETERS
     from controller.face.still import Still
+    from controller.stage.persons import parse_person
     from controller.tools.plugins import EXPORTERS, added_exporters
     from surface.export import export_head
 
-    still = Still.parse(settings or [], expression or [], head=head, identity=identity)
+    look = {"person": parse_person(person)}
+    still = Still.parse(settings or [], expression or [], look=look, head=head, identity=identity)
     with console.status("exporting"):
         loaded = still.load_head()
         values = zip(PARAMETERS.names, still.values, strict=True)

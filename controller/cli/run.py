@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,7 +11,7 @@ from rich.table import Table
 
 from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
-from controller.cli.heads import Identity
+from controller.cli.heads import Identity, Person
 from drivers.base.permission import ports_forbidden
 from surface.base.extras import require
 
@@ -70,6 +69,7 @@ def run(
     voice_hz: VoiceHz = None,
     record: Record = None,
     identity: Identity = None,
+    person: Person = None,
     kiosk: Annotated[
         bool, typer.Option("--kiosk", help="Full screen, no panel, no cursor; Esc or Ctrl-C ends.")
     ] = False,
@@ -86,8 +86,10 @@ def run(
     if dry_run:
         _dry_run(stage, None, seconds, report, voice, voice_hz)
         return
+    from controller.stage.persons import parse_person  # start-up: --help does without it
+
     look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "theme": theme, "camera": camera,
-            "evaluator": evaluator}  # fmt: skip
+            "evaluator": evaluator, "person": parse_person(person)}  # fmt: skip
     _run(stage, seconds, headless, no_face, pictures, report, mirror=mirror, voice=voice, voice_hz=voice_hz,
          record=record, identity=identity, look=look)  # fmt: skip
 
@@ -142,7 +144,6 @@ def _run(
 
     if not no_face:
         require("a face (--no-face runs without one)", "moderngl", *(["PIL"] if pictures else []))
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy: its threads would spin where others have work
     with console.status("starting") as status, PreloadedBody() as preloaded, garbage_collection_off():
         # start-up: the body's process loads its code at the same time
         from controller.body.messages import RunOptions

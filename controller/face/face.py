@@ -170,13 +170,15 @@ class HeadlessFace:
         values: Callable[[], Floats],
         recorder: Recorder | None = None,
     ) -> None:
-        from surface.view.pictures.offscreen import Offscreen  # start-up: the body gets its orders first
+        from surface.head.model.parameters import head_angles  # start-up: the body gets its orders first
+        from surface.view.pictures.offscreen import Offscreen
         from surface.view.scene.framing import framed
 
+        self._angles = head_angles
         self._screen: Offscreen = Offscreen(
             head, settings.size, quality=settings.quality, theme=settings.make_theme(), evaluator=settings.evaluator
         )
-        self._camera, self._settings = framed(settings.make_camera(), head), settings
+        self._head, self._camera, self._settings = head, framed(settings.make_camera(), head), settings
         self._values, self._recorder = values, recorder
         self._log = FrameLog()
         self._screen.go_live()
@@ -187,6 +189,7 @@ class HeadlessFace:
         started = time.monotonic_ns()
         for now in Clock(self._settings.fps, prompt=True).run(keep_going):
             values, time_s = self._values(), (now - started) / 1e9
+            self._head.sway.advance(self._angles(values), time_s)
             self._screen.draw(values, self._camera)
             if self._recorder is not None and self._recorder.wants(time_s):
                 self._recorder.keep(self._screen.read(), time_s)

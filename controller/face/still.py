@@ -15,8 +15,16 @@ from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.face.face import head_indices
+from controller.stage.persons import Person
 from controller.stage.picture import PictureSettings, with_options
-from controller.stage.stage import FaceSettings, check_identity, load_head, load_stage, parse_identity
+from controller.stage.stage import (
+    FaceSettings,
+    check_identity,
+    find_persons,
+    load_head,
+    load_stage,
+    parse_identity,
+)
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.view.pictures.offscreen import Offscreen
@@ -30,7 +38,7 @@ class Still:
 
     values : (p,) float64, the full parameter vector. size : width and height (pixels). look : theme, camera and so on.
     head : folder of the head. identity : its variations, by name. groups : group files and their amounts.
-    vocabulary : the named expressions.
+    vocabulary : the named expressions. persons : whom it shows, each with its share.
     """
 
     values: NDArray[np.float64]
@@ -40,6 +48,7 @@ class Still:
     identity: dict[str, float]
     groups: tuple[tuple[Path, float], ...]
     vocabulary: Vocabulary
+    persons: tuple[tuple[Person, float], ...] = ()
 
     @classmethod
     def parse(
@@ -66,11 +75,14 @@ class Still:
         added = (*(base.groups if base else ()), *(parse_group(word) for word in groups))
         face = base.settings.face if base else FaceSettings()
         width_height = parse_size(size or "800x800") if size or base is None else face.size
-        return cls(values, width_height, with_options(face, look or {}), folder, wanted, added, vocabulary)
+        picture = with_options(face, look or {})
+        persons = tuple(find_persons(picture.person, folder, beside=base.path if base else None))
+        return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons)
 
     def load_head(self) -> Head:
-        """The head with its identity and groups; see :func:`controller.stage.stage.load_head`."""
-        return load_head(self.head, self.identity, self.groups)
+        """The head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
+        dressed = self.look.theme != "mask"
+        return load_head(self.head, self.identity, self.groups, self.persons, dressed=dressed)
 
 
 def parse_group(word: str) -> tuple[Path, float]:

@@ -22,6 +22,7 @@ from controller.face.point_editing import PointEditor, Screen
 from controller.stage.stage import FaceSettings
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
+from surface.head.model.parameters import head_angles
 from surface.view.scene.camera import Camera
 from surface.view.scene.framing import framed, framing_of
 from surface.view.scene.viewpoint import Viewpoint
@@ -65,6 +66,7 @@ class WindowFace:
             nonlocal began
             values = self._values()
             now = time.monotonic_ns()
+            self._head.sway.advance(head_angles(values), now / 1e9)
             self._log.add(values, began, now)
             began = now
             return values

@@ -106,7 +106,7 @@ class ExpressionPlayer:
     @staticmethod
     def _pose(expression: Expression, intensity: float) -> _Pose:
         overrides = [_override(kind, intensity) for kind in (expression.blink, expression.gaze, expression.mouth)]
-        goal = np.concatenate([expression.weights * intensity, overrides])
+        goal = np.concatenate([expression.pose(intensity), overrides])
         if not np.isfinite(goal).all():
             raise ParameterError(f"expression {expression.name}: not all of its values are finite numbers")
         return _Pose(expression.name, intensity, goal, expression.offset_s)

@@ -10,12 +10,12 @@ from pydantic import Field, ValidationError, field_validator
 
 from controller.base.config import Settings
 from controller.base.errors import ParameterError
+from controller.stage.persons import HexColour, PersonName
 
 if TYPE_CHECKING:
     from surface.view.scene.camera import Camera  # start-up: the body reads stages and draws nothing
     from surface.view.scene.theme import Colour, Theme  # start-up: the body reads stages and draws nothing
 
-HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 Share = Annotated[float, Field(ge=0, le=4)]
 CameraName = Literal["front", "three_quarter", "three_quarter_right", "profile", "profile_right"]
 _WARM = 0.35  # how much a warmth of 1 adds to red and takes from blue
@@ -35,11 +35,13 @@ class LightSettings(Settings):
 
 
 class PictureSettings(Settings):
-    """Look of the picture. ``background`` is one colour, or the upper and the lower one of a gradient."""
+    """Look of the picture. ``background`` is one colour, or the upper and the lower one of a gradient; ``person`` a
+    name, or several with the share of each."""
 
     quality: Literal["full", "fast"] = "full"
     camera: CameraName = "front"
     theme: Literal["skin", "mask"] = "skin"
+    person: PersonName = ""
     background: HexColour | tuple[HexColour, HexColour] | None = None
     light: LightSettings = LightSettings()
     evaluator: Literal["auto", "cpu", "gpu"] = "auto"

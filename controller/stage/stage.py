@@ -22,6 +22,7 @@ from controller.links.line.script import load_script
 from controller.links.links import LinkTable
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
+from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
 from controller.stage.picture import PictureSettings, with_options
 from controller.takes.reader import load_take
 from controller.vocabulary.vocabulary import Vocabulary
@@ -106,6 +107,7 @@ class Stage:
 
     path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
     layers : the layers. life : settings of idle motion. groups : group files added to the head, each with its amount.
+    persons : whom the face shows, each with its share.
     """
 
     path: Path
@@ -117,6 +119,7 @@ class Stage:
     layers: tuple[LayerSettings, ...]
     life: IdleSettings
     groups: tuple[tuple[Path, float], ...] = ()
+    persons: tuple[tuple[Person, float], ...] = ()
 
     def file(self, name: str) -> Path:
         """A file that the stage names: relative to the stage's folder, or a path."""
@@ -129,8 +132,9 @@ class Stage:
         return 1.0 / self.settings.control_hz
 
     def load_head(self) -> Head:
-        """The stage's head with its identity and groups; see :func:`load_head`."""
-        return load_head(self.head, self.settings.identity, self.groups)
+        """The stage's head with its persons, identity and groups; see :func:`load_head`."""
+        dressed = self.settings.face.theme != "mask"
+        return load_head(self.head, self.settings.identity, self.groups, self.persons, dressed=dressed)
 
     def state(self, parameters: Parameters, seed: int | None = None, period_s: float | None = None) -> CommandState:
         """A new state of all layers with the stage's settings; nothing is commanded yet."""
@@ -144,15 +148,20 @@ class Stage:
         )
 
 
-def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]]) -> Head:
-    """A head with identities and groups added, each by its amount.
+def load_head(
+    folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]],
+    persons: Sequence[tuple[Person, float]] = (), *, dressed: bool = True,
+) -> Head:  # fmt: skip
+    """A head as one of ``persons`` or their mixture, with identities and groups added, each by its amount.
+
+    dressed : with hair and clothes; a mask wears none.
 
     Raises SurfaceError when the head cannot be read, ConfigError when a group does not fit it.
     """
     from controller.stage.inverse import add_group, load_group  # start-up: as Head
     from surface.head import Head  # start-up: the body reads stages and draws nothing
 
-    head = Head.load(folder, identity)
+    head = Head.load(folder, mixed_identity(persons, identity), mixed_look(persons, dressed=dressed))
     for path, amount in groups:
         add_group(head, load_group(path, head.data)[1], amount)
     return head
@@ -161,7 +170,16 @@ def load_head(folder: Path, identity: Mapping[str, float], groups: Sequence[tupl
 def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
     """``stage`` with command-line options over its ``[face]``; see :func:`controller.stage.picture.with_options`."""
     face = with_options(stage.settings.face, wanted)
-    return replace(stage, settings=stage.settings.model_copy(update={"face": face}))
+    persons = tuple(find_persons(face.person, stage.head, beside=stage.path))
+    return replace(stage, persons=persons, settings=stage.settings.model_copy(update={"face": face}))
+
+
+def find_persons(person: PersonName, head: Path, beside: Path | None = None) -> list[tuple[Person, float]]:
+    """Whom a key names, as :func:`controller.stage.persons.read_persons`, for the head in folder ``head``."""
+    found = read_persons(person, beside)
+    for each, _ in found:
+        check_identity(head, each.settings.identity)
+    return found
 
 
 def load_stage(name: str, parameters: Parameters) -> Stage:
@@ -186,6 +204,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
     if head is not None and settings.identity:
         _collect(faults, "identity", lambda: check_identity(head, settings.identity))
+    persons = _collect(faults, "face.person", lambda: find_persons(settings.face.person, head, path)) if head else ()
     robots = [
         _collect(faults, f"robots[{i}]", lambda n=name: load_robot(find_config("robots", n, beside=path), parameters))
         for i, name in enumerate(settings.robots)
@@ -202,7 +221,8 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
         if script is not None:
             _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
     amounts = tuple(zip(groups, settings.groups.values(), strict=False))
-    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, amounts)
+    shown = tuple(persons or ())
+    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, amounts, shown)
     if settings.take is not None:
         _collect(faults, "take", lambda: load_take(stage.file(str(settings.take)), parameters))
     return stage

@@ -17,7 +17,8 @@ from controller.links.line.script import load_script
 from controller.robot.calibration import CalibrationFile
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
-from controller.stage.stage import load_stage
+from controller.stage.persons import WORN, load_person
+from controller.stage.stage import check_identity, load_stage
 from controller.takes.reader import load_take, suffixes
 from controller.takes.recording import SUFFIX, replay
 from controller.tools import file_kinds
@@ -47,13 +48,15 @@ def check_anything(name: str) -> list[str]:
 def _find(name: str) -> Path:
     if os.path.exists(name):
         return Path(name)
-    for kind in ("stages", "robots", "heads", "scripts", "vocabularies", "life"):
+    for kind in ("stages", "robots", "heads", "scripts", "vocabularies", "life", "persons"):
         try:
             return find_config(kind, name)
         except ConfigError:
             continue
     hint = "omote check demo"
-    raise ConfigError(f"{name}: no such file, and no stage, robot, head, script, vocabulary or life of it", hint=hint)
+    raise ConfigError(
+        f"{name}: no such file, and no stage, robot, head, script, vocabulary, life or person of it", hint=hint
+    )
 
 
 def _describe(path: Path) -> Iterator[str]:
@@ -149,6 +152,15 @@ def _describe_life(path: Path) -> Iterator[str]:
     yield f"life {path.name}: a blink every {mean_of(settings.blink.interval_s):g} s on average, {poses} gestures"
 
 
+def _describe_person(path: Path) -> Iterator[str]:
+    person = load_person(path).settings
+    check_identity(find_config("heads", DEFAULT_HEAD), person.identity)
+    mix = ", ".join(f"{name} {amount:g}" for name, amount in person.identity.items()) or "the head's own"
+    yield f"person {person.name}: identity {mix}; melanin {person.skin.melanin:g}"
+    worn = ", ".join(f"{kind} {each.style}" for kind in WORN if (each := getattr(person, kind)) is not None)
+    yield f"  wears {worn or 'nothing'}"
+
+
 def _describe_parameters(path: Path) -> Iterator[str]:
     yield f"parameters {path.name}: {len(Parameters.load(path))}"
 
@@ -205,6 +217,7 @@ _READERS: dict[file_kinds.FileKind, Callable[[Path], Iterator[str]]] = {
     file_kinds.STAGE: _describe_stage,
     file_kinds.ROBOT: _describe_robot,
     file_kinds.CALIBRATION: _describe_calibration,
+    file_kinds.PERSON: _describe_person,
     file_kinds.SCRIPT: _describe_script,
     file_kinds.LIFE: _describe_life,
     file_kinds.PARAMETERS: _describe_parameters,

@@ -14,6 +14,7 @@ from controller.layers.idle.settings import IdleSettings
 from controller.layers.settings import LayerTable
 from controller.robot.calibration import CalibrationFile
 from controller.robot.settings import RobotSettings
+from controller.stage.persons import PersonSettings
 from controller.stage.stage import StageSettings
 
 
@@ -37,6 +38,7 @@ class FileKind:
 CALIBRATION = FileKind("calibration", frozenset(CalibrationFile.known_keys()))
 ROBOT = FileKind("robot", frozenset(RobotSettings.known_keys()))
 STAGE = FileKind("stage", frozenset(StageSettings.known_keys()))
+PERSON = FileKind("person", frozenset(PersonSettings.known_keys()))
 SCRIPT = FileKind("script", frozenset({"name", "description", "loop_s", "frames_hz", "marks", "steps"}))
 LIFE = FileKind("life", frozenset(IdleSettings.known_keys()))
 PARAMETERS = FileKind("parameters", frozenset({"profile", "parameters", "aliases"}))
@@ -48,7 +50,7 @@ EXPRESSIONS = FileKind(
     "expressions",
     inside=frozenset({"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "of", "weights"}),
 )
-KINDS = (STAGE, ROBOT, CALIBRATION, SCRIPT, LIFE, PARAMETERS, UNITS, VISEMES, MOODS, LAYERS, EXPRESSIONS)
+KINDS = (STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, LIFE, PARAMETERS, UNITS, VISEMES, MOODS, LAYERS, EXPRESSIONS)
 
 
 def kind_of(table: Mapping[str, Any]) -> FileKind | None:

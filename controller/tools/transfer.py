@@ -27,13 +27,15 @@ def check_transfer(source: str | None, landmarks: Path | None, others: Mapping[s
 
 def transfer(
     mesh: Path, source: str, out: Path, name: str, landmarks: Path | None, options: LoadOptions, progress: Progress,
-    report: Path | None = None,
+    report: Path | None = None, force: bool = False,
 ) -> FitReport:  # fmt: skip
     """Write a head in the form of a mesh with the expressions of the head ``source``, a name or a folder.
 
     Raises ConfigError: no such head. Others as :func:`surface.fit.transfer.api.transfer_head` does.
     """
     head = find_config("heads", source)
-    return transfer_head(
-        mesh, head, out, name=name, landmarks=landmarks, options=options, progress=progress, report_dir=report
-    ).fit
+    made = transfer_head(
+        mesh, head, out, name=name, landmarks=landmarks, options=options, progress=progress, report_dir=report,
+        force=force,
+    )  # fmt: skip
+    return made.fit

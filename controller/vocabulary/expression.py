@@ -29,6 +29,7 @@ class Expression:
     weights : (P,) float64, the parameters at intensity 1; read-only.
     onset_s, offset_s : times to rise and to fall.
     blink, gaze, mouth : ``"keep"``, ``"block"`` or ``"blend"``: what it does to blinks, gaze and speech meanwhile.
+    response : exponent of the intensity; below 1, weak intensities show more than in proportion.
     """
 
     name: str
@@ -40,6 +41,12 @@ class Expression:
     blink: str = "keep"
     gaze: str = "keep"
     mouth: str = "keep"
+    response: float = 1.0
+
+    def pose(self, intensity: float) -> Floats:
+        """(P,) the parameters at an intensity, 0 to 1."""
+        pose: Floats = self.weights * intensity**self.response
+        return pose
 
 
 class Expressions(Protocol):
@@ -62,6 +69,7 @@ class _Table(Settings):
     blink: _Override = "keep"
     gaze: _Override = "keep"
     mouth: _Override = "keep"
+    response: Annotated[Number, Field(ge=0.2, le=5)] = 1.0
     of: dict[str, Share] = {}
     weights: dict[str, Number] = Field(default=None, validate_default=True)
 
@@ -116,7 +124,7 @@ def _expressions(
             for key, value in tables[name].weights.items():
                 weights[name][sides(parameters, key)] = value
             weights[name].flags.writeable = False
-    options = {"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth"}
+    options = {"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "response"}
     return {
         name: Expression(name, weights[name], **table.model_dump(include=options)) for name, table in tables.items()
     }

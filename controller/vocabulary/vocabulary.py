@@ -71,10 +71,11 @@ class Vocabulary:
 
     def expand(self, name: str, intensity: float = 1.0) -> dict[int, float]:
         """Parameter index to value for ``name`` at ``intensity`` 0..1. Raises ParameterError."""
-        weights = self[name].weights
+        expression = self[name]
         if not 0.0 <= intensity <= 1.0:
             raise ParameterError(f"intensity must be 0 to 1, not {intensity}", hint="0.5 is half of the expression")
-        return {int(i): float(weights[i] * intensity) for i in np.flatnonzero(weights)}
+        pose = expression.pose(intensity)
+        return {int(i): float(pose[i]) for i in np.flatnonzero(expression.weights)}
 
     @cached_property
     def _facs(self) -> Facs:

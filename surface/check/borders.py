@@ -178,7 +178,7 @@ def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Border
     found = []
     for loop in _loops(subject, borders):
         (middle, width), part = _form(at[loop]), subject.parts[borders.part[loop[0]]]
-        wide = width >= WIDE_MM * subject.scale and not _is_opening(subject, mouth, middle)
+        wide = width >= WIDE_MM * subject.scale and not _in_openings(subject, mouth, middle[None])[0]
         if wide and is_seen(subject, part, at[loop]):
             length = float(np.linalg.norm(at[loop, 1] - at[loop, 0], axis=1).sum())
             text = f"a hole in part {part.name!r}, {length:.0f} mm round: {places.name(middle)}"
@@ -194,8 +194,7 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
     worst, where, pose = 0.0, np.zeros(3), ""
     reach = 4.0 * APART_MM * subject.scale
     rest = borders.at(subject.rest).mean(axis=1)
-    kept = borders.sewn & ~np.array([_is_opening(subject, mouth, at) for at in rest], bool)
-    sewn = np.flatnonzero(kept)
+    sewn = np.flatnonzero(borders.sewn & ~_in_openings(subject, mouth, rest))
     for name in subject.claimed:
         at = borders.at(subject.posed(pose_of(name)))
         middle = at.mean(axis=1)
@@ -300,10 +299,12 @@ def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
     return False
 
 
-def _is_opening(subject: Subject, mouth: Mouth | None, middle: Floats) -> bool:
-    """Is a loop about this place the rim of an eye, with an eyeball behind it, or of the mouth?"""
+def _in_openings(subject: Subject, mouth: Mouth | None, at: Floats) -> Bools:
+    """(m,) which of places (m, 3) belong to the rim of an eye, with an eyeball behind it, or of the mouth."""
+    out = np.zeros(len(at), bool)
     if subject.eyes is not None:
-        near = np.linalg.norm(subject.eyes - middle, axis=1) < EYE_REACH * subject.head.data.eye_radius
-        if any(near[side] and subject.eye(side) is not None for side in (0, 1)):
-            return True
-    return mouth is not None and bool(np.linalg.norm(mouth.middle - middle) < MOUTH_REACH * mouth.width)
+        for side in (n for n in (0, 1) if subject.eye(n) is not None):
+            out |= np.linalg.norm(at - subject.eyes[side], axis=1) < EYE_REACH * subject.head.data.eye_radius
+    if mouth is not None:
+        out |= np.linalg.norm(at - mouth.middle, axis=1) < MOUTH_REACH * mouth.width
+    return out

@@ -279,9 +279,8 @@ class Crossings:
         """(n, 3) unit normals at vertices."""
         corner = self.tree.corners
         cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-        out = np.zeros_like(at)
-        for k in range(3):
-            np.add.at(out, self._ids[:, k], cross)
+        own = self._ids.ravel()
+        out = np.column_stack([np.bincount(own, np.repeat(cross[:, k], 3), len(at)) for k in range(3)])
         unit: Floats = out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None]
         return unit
 

@@ -56,18 +56,23 @@ def rings(points: Any, cells: Any, order: Any, start: Any, low: float, high: flo
 
 
 @kernel
-def heights(values: Any, start: Any, ring: Any, out: Any) -> None:
+def heights(values: Any, start: Any, ring: Any, enough: float, out: Any) -> None:
     """Least height ``out (k,)`` of each of the first k of values (m, 3) over those on its ring, along its mean way from
-    them."""
+    them; 0 where one of the ring is nearer than ``enough``, since the height is no greater than that."""
     for i in range(len(out)):
         out[i] = 0.0
         x, y, z = 0.0, 0.0, 0.0
+        low = False
         for k in range(start[i], start[i + 1]):
-            x += values[i, 0] - values[ring[k], 0]
-            y += values[i, 1] - values[ring[k], 1]
-            z += values[i, 2] - values[ring[k], 2]
+            dx, dy, dz = (
+                values[i, 0] - values[ring[k], 0], values[i, 1] - values[ring[k], 1], values[i, 2] - values[ring[k], 2],
+            )  # fmt: skip
+            if dx * dx + dy * dy + dz * dz < enough * enough:
+                low = True
+                break
+            x, y, z = x + dx, y + dy, z + dz
         length = np.sqrt(x * x + y * y + z * z)
-        if length < 1e-9:
+        if low or length < 1e-9:
             continue
         x, y, z = x / length, y / length, z / length
         least = np.inf
@@ -147,10 +152,10 @@ class Ring:
     start: Ints
     ids: Ints
 
-    def heights(self, values: Floats) -> Floats:
-        """(k,) how far each of the first k of values (m, 3) sticks out."""
+    def heights(self, values: Floats, enough: float = 0.0) -> Floats:
+        """(k,) how far each of the first k of values (m, 3) sticks out; 0 or right where it is less than ``enough``."""
         out = np.zeros(len(self.start) - 1)
-        heights(np.ascontiguousarray(values), self.start, self.ids, out)
+        heights(np.ascontiguousarray(values), self.start, self.ids, enough, out)
         return out
 
     def high(self, points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
@@ -202,8 +207,8 @@ def _spikes(
     height[_usual(subject, at[: samples.vertices], height, places)] = 0.0
     worst, best, name, where = int(height.argmax()), 0.0, "", 0
     for pose in (n for n in subject.claimed if n in SHAPES):
-        moved = ring.heights(samples.at(subject.moves(pose)))
-        moved = ring.high(at, rims, moved, max(best, MOVED * radius), off)
+        enough = max(best, MOVED * radius)
+        moved = ring.high(at, rims, ring.heights(samples.at(subject.moves(pose)), enough), enough, off)
         if moved.max() > best:
             best, name, where = float(moved.max()), pose, int(moved.argmax())
 

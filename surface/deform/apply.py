@@ -18,8 +18,10 @@ from surface.spline.lanes import (
     fma,
     item,
     load,
+    most_of,
     mul,
     prefetch,
+    reaches,
     root,
     splat,
     store,
@@ -29,24 +31,11 @@ from surface.spline.lanes import (
     zero,
 )
 
+from .binding import arrays_of
 from .groupsums import HEAD, STEP, join_all, join_values, sum_groups, wide
 from .packedsums import AHEAD, sum_all_packed, sum_packed, write_lanes
 
-NAMES = (
-    "cell_start", "tile_start", "rows", "room", "at", "ids_at", "ids", "value", "slope",
-    "point_start", "point_count", "point_cell", "point_row",
-    "points", "origin", "inv_w", "dw", "numerators", "differences", "vertices", "normals",
-    "ranges", "hits", "affected", "recomputed", "moved_ids", "delta", "local", "scratch",
-    "pull", "span", "drift", "extent",
-    "rows_at", "picks_at", "factor_u", "factor_v", "factors", "picks",
-    "packed_at", "tile_entry", "entry_row", "packed", "packed_slope", "places_at", "places", "order_at", "order",
-    "touched",
-)  # fmt: skip
-"""The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`,
-then of :class:`.factors.Factors` and :class:`.packing.Packed`; then which tiles an update touches.
-
-Kernels unpack that tuple once: each access of an element costs a reference count.
-"""
+MOST_SQUARE = np.float32(1e36)  # of a vector's length
 
 
 @inlined
@@ -99,11 +88,23 @@ def sum_all(value, slope, at, rows, local):
 
 
 @inlined
-def unit_cross(ax, ay, az, bx, by, bz, sign):
-    """Unit vectors along a x b, times ``sign``; zero where the product vanishes."""
+def cross(ax, ay, az, bx, by, bz):
+    """a x b, and the square of its length."""
     nx, ny = sub(mul(ay, bz), mul(az, by)), sub(mul(az, bx), mul(ax, bz))
     nz = sub(mul(ax, by), mul(ay, bx))
-    square = add(add(mul(nx, nx), mul(ny, ny)), mul(nz, nz))
+    return nx, ny, nz, add(add(mul(nx, nx), mul(ny, ny)), mul(nz, nz))
+
+
+@inlined
+def unit_cross(ax, ay, az, bx, by, bz, sign):
+    """Unit vectors along a x b, times ``sign``; zero where the product vanishes.
+
+    Where its square is beyond float32, a and b are shortened first.
+    """
+    nx, ny, nz, square = cross(ax, ay, az, bx, by, bz)
+    if reaches(square, MOST_SQUARE):
+        a, b = most_of(ax, ay, az), most_of(bx, by, bz)
+        nx, ny, nz, square = cross(div(ax, a), div(ay, a), div(az, a), div(bx, b), div(by, b), div(bz, b))
     scale = div(splat(sign), root(add(square, splat(np.float32(1e-30)))))
     return mul(nx, scale), mul(ny, scale), mul(nz, scale)
 
@@ -251,8 +252,9 @@ def write_packed(
 
 
 @kernel
-def compute_cells(arrays, cells, begin, end, sign, local, scratch):
+def compute_cells(table, cells, begin, end, sign, local, scratch):
     """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored."""
+    arrays = arrays_of(table)
     cell_start, tile_start, all_rows, room, at, ids_at, ids, value, slope = arrays[:9]
     points, origin, inv_w, dw, _, differences, vertices, normals = arrays[13:21]
     rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]

@@ -1,7 +1,8 @@
 """Calls compiled kernels with one table of addresses instead of many arrays.
 
 A compiled function inspects every array that Python passes to it, which takes longer than a small update. So the
-arrays are passed as a table of their addresses, which is made again whenever one of them is replaced.
+arrays are passed as a table of their addresses, which is made again whenever one of them is replaced. Compiled
+functions pass that table to each other, too: to pass on so many arrays takes longer than a small update.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="import-untyped, call-arg, attr-defined"
@@ -15,11 +16,24 @@ from numba import carray
 from numba.core import types
 from numba.extending import intrinsic
 
-from surface.base.jit import inlined, kernel
+from surface.base.jit import inlined, merged
 
-from .apply import NAMES, compute_cells
-from .denominators import denominators
-from .updates import move_points
+NAMES = (
+    "cell_start", "tile_start", "rows", "room", "at", "ids_at", "ids", "value", "slope",
+    "point_start", "point_count", "point_cell", "point_row",
+    "points", "origin", "inv_w", "dw", "numerators", "differences", "vertices", "normals",
+    "ranges", "hits", "affected", "recomputed", "moved_ids", "delta", "local", "scratch",
+    "pull", "span", "drift", "extent",
+    "rows_at", "picks_at", "factor_u", "factor_v", "factors", "picks",
+    "packed_at", "tile_entry", "entry_row", "packed", "packed_slope", "places_at", "places", "order_at", "order",
+    "touched", "heavy",
+)  # fmt: skip
+"""The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`,
+then of :class:`.factors.Factors` and :class:`.packing.Packed`; then which tiles an update touches and
+how much all weights at a vertex of a cell may add up to.
+
+Kernels unpack that tuple once: each access of an element costs a reference count.
+"""
 
 
 def address_table(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -52,8 +66,8 @@ def _rows(table, k, width, dtype):
     return carray(_pointer(table[2 * k]), (table[2 * k + 1], width), dtype)
 
 
-@kernel
-def _arrays(table):
+@merged
+def arrays_of(table):
     """The arrays of a table; types and widths are in the order of ``NAMES``."""
     return (
         _flat(table, 0, np.int64), _flat(table, 1, np.int64), _flat(table, 2, np.int64), _flat(table, 3, np.int64),
@@ -72,23 +86,5 @@ def _arrays(table):
         _flat(table, 39, np.int64), _flat(table, 40, np.int64), _flat(table, 41, np.uint16),
         _flat(table, 42, np.float32), _flat(table, 43, np.float32), _flat(table, 44, np.int64),
         _flat(table, 45, np.uint16), _flat(table, 46, np.int64), _flat(table, 47, np.uint16),
-        _flat(table, 48, np.uint8),
+        _flat(table, 48, np.uint8), _flat(table, 49, np.float64),
     )  # fmt: skip
-
-
-@kernel
-def move_points_at(table, ids, rows, relative, most, limit, bias, gap, sign):
-    """:func:`surface.deform.updates.move_points` for the arrays of a table."""
-    return move_points(_arrays(table), ids, rows, relative, most, limit, bias, gap, sign)
-
-
-@kernel
-def compute_cells_at(table, cells, begin, end, sign, local, scratch):
-    """:func:`surface.deform.apply.compute_cells` for the arrays of a table."""
-    compute_cells(_arrays(table), cells, begin, end, sign, local, scratch)
-
-
-@kernel
-def denominators_at(table, cells):
-    """:func:`surface.deform.denominators.denominators` for the arrays of a table."""
-    denominators(_arrays(table), cells)

@@ -25,12 +25,12 @@ from surface.spline.basis import pad_knots
 from surface.spline.controlpoints import ControlPoints
 
 from . import apply, edits
-from .binding import address_table, compute_cells_at, denominators_at, move_points_at
-from .denominators import unusable
+from .binding import address_table
+from .denominators import denominators, farthest, unusable
 from .lists import LANES, Basis, build_lists
 from .merging import merged
 from .storage import compress
-from .updates import NOT_STORED, REFUSED
+from .updates import NOT_STORED, REFUSED, measure, move_points
 
 Table = TypeVar("Table", bound=ControlPoints)
 LIMIT = 256  # differences a cell takes before it is computed again
@@ -59,7 +59,7 @@ class Deformation(Generic[Table]):
     lists, storage : their weights by cell, where these are kept as blocks, and where they are packed or products
 
     ``ValueError`` for no thread at all, a mesh of a surface with other control points or other knots, or weights so
-    small, or derivatives so large, at a vertex that 32-bit numbers cannot hold them.
+    small, or weights, derivatives or places so large, at a vertex that 32-bit numbers cannot hold them.
 
     One object belongs to one thread at a time. Nothing is allocated by :meth:`move` and :meth:`set_positions`
     but the copy of arguments that are not already int64 and float64 arrays.
@@ -89,7 +89,11 @@ class Deformation(Generic[Table]):
         self._bind()
         self._sum_weights(np.arange(len(self._cells)))
         self._check_weights("mesh", np.arange(len(self._cells)))
-        self.refresh()
+        measure(self._points, self._arrays["extent"], True)
+        if self._is_elsewhere(mesh.vertices):
+            self._recentre()
+        else:
+            self.refresh()
 
     @property
     def points(self) -> np.ndarray:
@@ -118,7 +122,8 @@ class Deformation(Generic[Table]):
     def move(self, ids: ArrayLike, delta: ArrayLike) -> None:
         """Move points by ``delta (k, 3)`` (or one (3,) for all); an id that is given twice moves twice.
 
-        ``ValueError`` for ids out of range, wrong shapes or numbers that are not finite; nothing is changed then.
+        ``ValueError`` for ids out of range, wrong shapes, numbers that are not finite, or places so far away that
+        their sums with the surface's weights are beyond 32-bit numbers; nothing is changed then.
         """
         step = _rows(delta, "delta")
         if step.shape == (3,):
@@ -136,7 +141,8 @@ class Deformation(Generic[Table]):
     def set_weights(self, ids: ArrayLike, weights: ArrayLike) -> None:
         """Give points ``ids (k,)`` the weights ``(k,)``, positive.
 
-        ``ValueError`` for ids out of range, wrong shapes or weights that are not positive and finite.
+        ``ValueError`` for ids out of range, wrong shapes, weights that are not positive and finite, or so large that
+        sums are beyond 32-bit numbers; nothing is changed then.
         """
         which = check_ids(ids, self.basis.n)
         w = check_weights(weights)
@@ -219,7 +225,7 @@ class Deformation(Generic[Table]):
             which, target = _gathered(check_ids(which, n), target, relative)
         if copies > 1:
             which, target = self.basis.copies(check_ids(which, n)), np.tile(target, (copies, 1))
-        found = move_points_at(self._addresses, which, target, relative, self._most, LIMIT, BIAS, GAP, self._sign)
+        found = move_points(self._addresses, which, target, relative, self._most, LIMIT, BIAS, GAP, self._sign)
         if found >= 0:
             self._count = found
         elif found == -1:
@@ -229,8 +235,10 @@ class Deformation(Generic[Table]):
         else:
             check_ids(which, n * copies)
             bad = found + REFUSED
-            known = np.isfinite(target[bad]).all()
-            wanted = "within the range of 32-bit numbers, and lead to places that are" if known else "finite"
+            wanted = "finite"
+            if np.isfinite(target[bad]).all():
+                most = f"{self._arrays['extent'][3]:.3g}"
+                wanted = f"within {most}, and lead to places that are (sums beyond leave the range of 32-bit numbers)"
             raise ValueError(f"{name}[{bad}]: must be {wanted}, got {target[bad].tolist()}")
 
     def _recentre(self) -> None:
@@ -244,6 +252,11 @@ class Deformation(Generic[Table]):
         self._arrays["origin"][:] = _middles(self.vertices, self.mesh.cell_start)
         self.refresh()
 
+    def _is_elsewhere(self, vertices: np.ndarray) -> bool:
+        """Whether a mesh's vertices (m, 3), which origins were chosen by, are far away from the points."""
+        low, high, size = self._points.min(axis=0), self._points.max(axis=0), self._arrays["extent"][0]
+        return bool(len(vertices) and ((vertices < low - size) | (vertices > high + size)).any())
+
     def _bind(self) -> None:
         """Make room for the longest list and the sums of groups, and take the addresses of all arrays, which may have
         been replaced."""
@@ -252,10 +265,12 @@ class Deformation(Generic[Table]):
         self._addresses = address_table(vars(self.lists) | self._arrays | self.storage.arrays)
 
     def _sum_weights(self, cells: Ints) -> None:
-        denominators_at(self._addresses, cells)
+        denominators(self._addresses, cells)
+        self._arrays["extent"][3] = farthest(self._arrays["heavy"])
 
     def _check_weights(self, name: str, cells: Ints) -> None:
-        """``ValueError`` for the first vertex of ``cells`` whose weights 32-bit numbers cannot hold."""
+        """``ValueError`` for the first vertex of ``cells`` whose weights 32-bit numbers cannot hold, or for places that
+        are so far away that these cannot hold their sums."""
         arrays = self._arrays
         order = self.storage.packed.order_at, self.storage.packed.order
         bad = unusable(cells, self.lists.cell_start, self.lists.tile_start, arrays["inv_w"], arrays["dw"], *order)
@@ -265,6 +280,12 @@ class Deformation(Generic[Table]):
                 f"{name}: at vertex {bad} of the mesh (u = {u:g}, v = {v:g}) the weights of all control points add "
                 "up to nearly nothing, or their derivatives to more than 32-bit numbers hold: scale weights or knots"
             )
+        far, most = max(self._points.max(), -self._points.min()), arrays["extent"][3]
+        if far > most:
+            raise ValueError(
+                f"{name}: points are up to {far:.3g} away from 0; with these weights and knots sums leave the range of "
+                f"32-bit numbers beyond {most:.3g}: move the points nearer, or scale weights or knots"
+            )
 
     def _update(self, cells: Ints) -> None:
         """Bring ``cells (k,)``, rising, up to date with their changed weights, which are summed."""
@@ -273,7 +294,7 @@ class Deformation(Generic[Table]):
 
     def _compute(self, cells: np.ndarray) -> None:
         local, scratch = self._arrays["local"], self._arrays["scratch"]
-        compute_cells_at(self._addresses, cells, 0, len(cells), self._sign, local, scratch)
+        apply.compute_cells(self._addresses, cells, 0, len(cells), self._sign, local, scratch)
 
     def _compute_in_parts(self) -> None:
         """Threads take parts with equal shares of the weights, one after the other: a delayed thread does fewer."""
@@ -288,7 +309,7 @@ class Deformation(Generic[Table]):
             local, scratch = np.zeros_like(self._arrays["local"]), np.zeros_like(self._arrays["scratch"])
             while (part := next(turns)) < parts:
                 begin, end = cuts[part], cuts[part + 1]
-                compute_cells_at(self._addresses, self._cells, begin, end, self._sign, local, scratch)
+                apply.compute_cells(self._addresses, self._cells, begin, end, self._sign, local, scratch)
 
         waiting = [self._pool.submit(work) for _ in range(self._threads - 1)]
         work()
@@ -297,7 +318,7 @@ class Deformation(Generic[Table]):
 
 
 def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[str, np.ndarray]:
-    """The arrays of an update that are not in the lists, by their names in :data:`.apply.NAMES`.
+    """The arrays of an update that are not in the lists, by their names in :data:`.binding.NAMES`.
 
     origin : (c, 3) float64, which positions within a cell are relative to
     inv_w, dw, numerators : (8 t,), (16 t,) or (0,), (72 t,) or (24 t,) float32 by tile, see :mod:`.apply`
@@ -305,7 +326,8 @@ def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[
     differences : (c,) int64, how many each cell has taken since it was computed again; -1 without numerators
     vertices, normals : (3 m,) float32, current
     ranges : (c, 2) int64, the vertex ranges that the last update touched
-    extent : (2,) float64, the surface's size, and how far points have moved since it was measured
+    heavy : (c,) float64, how much weights, or their derivatives, add up to at most at a vertex of every cell
+    extent : (7,) float64, the surface's size and place, see :func:`.updates.measure`
         The others belong to :mod:`.updates`.
     """
     m, cells, n = len(mesh.vertices), len(mesh.cell_start) - 1, len(points)
@@ -318,7 +340,7 @@ def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[
         "vertices": single(3 * m), "normals": single(3 * m * normals), "ranges": np.zeros((max(cells, 1), 2), np.int64),
         "hits": cell(dtype=np.int64), "affected": cell(dtype=np.int32), "recomputed": cell(dtype=np.int32),
         "moved_ids": np.zeros(n, np.int64), "delta": np.zeros((n, 3)),
-        "pull": cell(), "span": cell(), "drift": cell(), "extent": np.array([float(np.ptp(points, axis=0).max()), 0.0]),
+        "pull": cell(), "span": cell(), "drift": cell(), "heavy": cell(), "extent": np.zeros(7),
     }  # fmt: skip
 
 
@@ -337,6 +359,8 @@ def _with_room(rows: Floats) -> Floats:
 
 def _rows(rows: ArrayLike, name: str) -> Floats:
     """Float64 numbers in order, not copied where they are that already."""
+    if type(rows) is np.ndarray and rows.dtype == np.float64 and rows.flags.c_contiguous:
+        return rows
     fast = isinstance(rows, np.ndarray) and rows.dtype.kind == "f"
     return np.ascontiguousarray(rows, dtype=np.float64) if fast else numbers(rows, name)
 

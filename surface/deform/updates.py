@@ -1,11 +1,13 @@
 """Compiled kernels that move control points and bring the cells they affect up to date, Eq. (2).
 
-``arrays`` is the tuple of :data:`surface.deform.apply.NAMES`.
+``table`` holds the addresses of :data:`surface.deform.binding.NAMES`.
 
 Each difference rounds a numerator, by at most ``ROUNDING`` of its size. So every cell keeps a bound on its numerators
 per weight (``span``: what they were made of, and all moves since) and on the sum of these errors (``drift``), and is
 computed again before the drift exceeds ``MOST_DRIFT`` of the surface's size. That size is measured again when points
-have moved so far in all that it may have changed; where it is less than half, everything is computed again.
+have moved so far in all that it may have changed. Everything is computed again, from other origins, where the surface
+is less than half as large as it was at any time since origins were chosen, or its middle is further away from the one
+it had then than it is large. So no point is further away from an origin than 2.5 times the surface's size.
 """
 
 # mypy: allow-untyped-defs, disable-error-code="call-arg, var-annotated, has-type"
@@ -17,6 +19,7 @@ from surface.base.jit import inlined, kernel
 from surface.spline.lanes import load
 
 from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
+from .binding import arrays_of
 from .groupsums import HEAD, STEP, product, slope_products, wide
 from .packedsums import add_packed_row, add_products
 
@@ -25,7 +28,6 @@ STORE = -2  # in ``differences``: compute and store them now
 VALID = 1 << 62  # what :func:`first_invalid` returns where nothing is wrong
 ROUNDING = 6e-8  # half a unit in the last place of float32
 MOST_DRIFT = 8e-7  # of the surface's size
-FARTHEST = 3e38  # coordinates that float32 still has
 REFUSED = 1 << 61  # subtracted from results of :func:`move_points` that mean a bad argument
 
 
@@ -84,18 +86,18 @@ def find_affected(ids, delta, count, point_start, point_count, point_cell, hits,
 
 @kernel
 def choose_recomputed(
-    total, affected, hits, pull, differences, span, drift, rows, limit, bias, most_drift, recomputed
+    total, affected, hits, pull, differences, span, drift, rows, rows_at, slopes, limit, bias, most_drift, recomputed
 ):  # fmt: skip
     """Decide for each affected cell how it is updated; returns how many are computed again from all their points.
 
-    Those are listed in ``recomputed``. Differences cost ``bias`` rows each, computing again costs all rows. A cell
-    is also computed again where its numerators are not stored, would take more than ``limit`` differences, or would
-    drift by more than ``most_drift``.
+    Those are listed in ``recomputed``. Differences cost ``bias`` rows each, computing again costs all rows; factors of
+    positions alone are joined faster than numerators are read. A cell is also computed again where its numerators are
+    not stored, would take more than ``limit`` differences, or would drift by more than ``most_drift``.
     """
     count = 0
     for q in range(total):
         c = affected[q]
-        few = bias * hits[c] < rows[c]
+        few = bias * hits[c] < rows[c] and (slopes or rows_at[c] < 0)
         reach = span[c] + pull[c]
         error = drift[c] + ROUNDING * hits[c] * reach
         if differences[c] >= 0 and differences[c] + hits[c] <= limit and few and error <= most_drift:
@@ -121,23 +123,34 @@ def largest(local, rows):
 
 
 @kernel
-def measured_extent(points):
-    """The longest side of the box around ``points (n, 3)``."""
-    most = 0.0
+def measure(points, extent, afresh):
+    """Fill ``extent`` for ``points (n, 3)``; returns whether origins are to be chosen again, as they are if ``afresh``.
+
+    ``extent`` : the longest side of the box around the points, how far they have moved since it was measured, the
+    longest side since origins were chosen, the greatest coordinate that is allowed, and the box's middle when origins
+    were chosen (3).
+    """
+    middle, away = np.empty(3), 0.0
+    extent[:2] = 0.0
     for k in range(3):
         low, high = points[0, k], points[0, k]
         for i in range(points.shape[0]):
             low, high = min(low, points[i, k]), max(high, points[i, k])
-        most = max(most, high - low)
-    return most
+        extent[0], middle[k] = max(extent[0], high - low), 0.5 * low + 0.5 * high
+        away = max(away, abs(middle[k] - extent[4 + k]))
+    extent[2] = max(extent[2], extent[0])
+    if not (afresh or 2.0 * extent[0] < extent[2] or away > extent[0]):
+        return False
+    extent[2], extent[4:] = extent[0], middle
+    return True
 
 
 @kernel
-def has_shrunk(points, delta, count, extent):
-    """Whether the surface is less than half as large as when it was last measured.
+def has_left(points, delta, count, extent):
+    """Whether the surface has become so small, or moved so far, that the origins do not fit it any more.
 
-    ``extent`` : the size that was measured, and how far points have moved since, the furthest of each call added up.
-    The size cannot have changed by more than twice that.
+    ``extent`` : as :func:`measure` fills it. The size cannot have changed by more than twice the moves since then, the
+    furthest of each call added up.
     """
     far = 0.0
     for q in range(count):
@@ -145,14 +158,13 @@ def has_shrunk(points, delta, count, extent):
     extent[1] += far
     if 4.0 * extent[1] <= extent[0]:
         return False
-    before = extent[0]
-    extent[0], extent[1] = measured_extent(points), 0.0
-    return 2.0 * extent[0] < before
+    return measure(points, extent, False)
 
 
 @kernel
-def update_cells(arrays, count, limit, bias, sign):
+def update_cells(table, count, limit, bias, sign):
     """Bring all cells that the first ``count`` moved points reach up to date; returns how many there are."""
+    arrays = arrays_of(table)
     cell_start, tile_start, rows, room, at, ids_at, ids, value, slope = arrays[:9]
     point_start, point_count, point_cell, point_row = arrays[9:13]
     points, origin, inv_w, dw, numerators, differences, vertices, normals = arrays[13:21]
@@ -163,7 +175,8 @@ def update_cells(arrays, count, limit, bias, sign):
     slopes, starts = dw.shape[0] > 0, np.empty(local.shape[0], np.int32)
     total = find_affected(moved_ids, delta, count, point_start, point_count, point_cell, hits, pull, affected)
     again = choose_recomputed(
-        total, affected, hits, pull, differences, span, drift, rows, limit, bias, MOST_DRIFT * extent[0], recomputed
+        total, affected, hits, pull, differences, span, drift, rows, rows_at, slopes, limit, bias,
+        MOST_DRIFT * extent[0], recomputed,
     )  # fmt: skip
     for q in range(count):
         i = moved_ids[q]
@@ -202,14 +215,15 @@ def update_cells(arrays, count, limit, bias, sign):
             first, last, tile_start[c], ox, oy, oz, sign, inv_w, dw, numerators, vertices, normals, order_at[c], order,
             every, touched, scratch,
         )  # fmt: skip
-    compute_cells(arrays, recomputed, np.int64(0), again, sign, local, scratch)
+    if again > 0:
+        compute_cells(table, recomputed, np.int64(0), again, sign, local, scratch)
     return total
 
 
 @kernel
-def first_invalid(ids, rows, relative, points):
-    """The first row with an id out of range (as ``-1 - row``), or one that leads to a number that is not finite or that
-    float32 does not have (``row``); or VALID."""
+def first_invalid(ids, rows, relative, points, farthest):
+    """The first row with an id out of range (as ``-1 - row``), or one that leads to a number that is not finite or
+    beyond ``farthest`` (``row``); or VALID."""
     n = points.shape[0]
     for q in range(ids.shape[0]):
         if ids[q] < 0 or ids[q] >= n:
@@ -217,7 +231,7 @@ def first_invalid(ids, rows, relative, points):
     for q in range(ids.shape[0]):
         for c in range(3):
             x = rows[q, c] + points[ids[q], c] if relative else rows[q, c]
-            if not abs(x) <= FARTHEST:
+            if not abs(x) <= farthest:
                 return q
     return VALID
 
@@ -246,22 +260,23 @@ def store_positions(ids, rows, relative, points, moved_ids, delta):
 
 
 @kernel
-def move_points(arrays, ids, rows, relative, most, limit, bias, gap, sign):
+def move_points(table, ids, rows, relative, most, limit, bias, gap, sign):
     """Move points and bring the mesh up to date: the whole of an update in one call.
 
     ``rows (k, 3)`` are new positions, or moves if ``relative``. Returns the number of vertex ranges in ``ranges``; -1
-    if more than ``most`` points moved, -2 if the surface shrank to less than half, and then everything is to be
-    computed again; or what :func:`first_invalid` found, less REFUSED, and then nothing has been changed.
+    if more than ``most`` points moved, -2 if the origins do not fit any more, and then everything is to be computed
+    again; or what :func:`first_invalid` found, less REFUSED, and then nothing has been changed.
     """
+    arrays = arrays_of(table)
     cell_start, points = arrays[0], arrays[13]
     found, _, affected, _, moved_ids, delta, _, _, _, _, _, extent = arrays[21:33]
-    bad = first_invalid(ids, rows, relative, points)
+    bad = first_invalid(ids, rows, relative, points, extent[3])
     if bad != VALID:
         return bad - REFUSED
     count = store_positions(ids, rows, relative, points, moved_ids, delta)
-    if has_shrunk(points, delta, count, extent):
+    if has_left(points, delta, count, extent):
         return -2
     if count > most:
         return -1
-    total = update_cells(arrays, count, limit, bias, sign)
+    total = update_cells(table, count, limit, bias, sign)
     return join_ranges(affected, total, cell_start, gap, found)

@@ -35,19 +35,19 @@ def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
     shapes = dict.fromkeys(name for part in parts for name in part.displacements)
     vertices, normals = (np.concatenate([getattr(p, key) for p in parts]) for key in ("vertices", "normals"))
     textures = [f"vt {u:.6f} {v:.6f}" for part in parts for u, v in part.uv.tolist()]
-    faces = _faces(parts)
+    faces, rows = _faces(parts), _rows("v", vertices)
     folder = path.with_name(f"{path.stem}_shapes")
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as temporary:
         made = [Path(temporary) / target.name for target in (path, path.with_suffix(".mtl"))]
-        points = [*_rows("v", vertices), *textures, *_rows("vn", normals)]
+        points = [*rows, *textures, *_rows("vn", normals)]
         _write(made[0], [title, f"mtllib {path.stem}.mtl", *points, *faces])
         _write(made[1], _materials(parts))
         if shapes:
             made.append(Path(temporary) / folder.name)
             made[2].mkdir()
         for name in shapes:
-            moved = vertices + np.concatenate([p.displacements.get(name, np.zeros_like(p.vertices)) for p in parts])
-            _write(made[2] / f"{name}.obj", [title, *_rows("v", moved), *textures, *faces])
+            moves = np.concatenate([p.displacements.get(name, np.zeros_like(p.vertices)) for p in parts])
+            _write(made[2] / f"{name}.obj", [title, *_moved_rows(rows, vertices, moves), *textures, *faces])
         if shapes and folder.exists():  # everything new is complete: replace the old
             shutil.rmtree(folder)
         return [new.replace(path.parent / new.name) for new in made]
@@ -69,6 +69,14 @@ def _write(path: Path, lines: list[str]) -> None:
 
 def _rows(word: str, rows: Floats32) -> list[str]:
     return [f"{word} {x:.5f} {y:.5f} {z:.5f}" for x, y, z in rows.tolist()]
+
+
+def _moved_rows(rows: list[str], vertices: Floats32, moves: Floats32) -> list[str]:
+    """The rows of vertices (n, 3) after moves (n, 3); ``rows`` are theirs before, and most do not move."""
+    out, moved = rows.copy(), np.flatnonzero(moves.any(axis=1))
+    for k, row in zip(moved.tolist(), _rows("v", vertices[moved] + moves[moved]), strict=True):
+        out[k] = row
+    return out
 
 
 def _faces(parts: list[ExportPart]) -> list[str]:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress, part_of
 from surface.check.overlaps import overlap_notes
 from surface.fit.eyes.colours import paint_layers
@@ -22,14 +21,17 @@ from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
+from surface.fit.features.squints import shut_with_squints
 from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
+from surface.fit.measures.refusal import save_or_refuse
 from surface.fit.points.care import POINTS as MORE_POINTS
 from surface.fit.points.care import with_care
-from surface.fit.points.lid_seating import close_lips, draw_brows, seat_lids, strengthen
+from surface.fit.points.lid_seating import close_lips, seat_lids
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart
 from surface.fit.points.report import FitReport, FitResult, FittedPart, PartReport, measure
+from surface.fit.points.strength import strengthen
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
 from surface.fit.source.chart import Chart, make_chart
@@ -46,14 +48,13 @@ from surface.fit.source.placing.place import neck_of, place
 from surface.fit.source.repair import repaired
 from surface.fit.source.wrap import wrap_chart
 from surface.head.model.data import HeadData, Neck, PartData
-from surface.head.model.file import check_writable, save_data
+from surface.head.model.file import check_writable
 from surface.head.model.meshes import pack, tessellate
 from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
 
 LOOSE_MM = 3.0  # RMS of a head of usual size: a part beside the face that is further off, as hair, is left out
-REFUSED = "-refused"  # what is put behind the name of a folder
 # pose that decides how finely a part is cut into triangles
 SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
 
@@ -72,7 +73,7 @@ def fit_head(
 
     Raises FitError: the mesh cannot be read, has no faces, holds NaN, is no manifold, or does
     not fit together; nothing is written then. Or the head does not follow the mesh (:func:`faults_of`): it is written
-    to the folder ``out_dir`` with :data:`REFUSED` behind its name, to be looked at, and what is in ``out_dir`` stays.
+    to :func:`refused_folder`, to be looked at, and what is in ``out_dir`` stays.
     HeadFileError: a folder cannot be written to.
     """
     report = progress or no_progress
@@ -82,26 +83,8 @@ def fit_head(
     result = fit_mesh(loaded, name, report, str(mesh_path))
     if report_dir is not None:
         write_report(result, report_dir, report)
-    refused = bool(result.report.faults) and not force
-    save_data(refused_folder(out_dir) if refused else out_dir, result.head)
-    if refused:
-        raise _refusal(result.report, refused_folder(out_dir))
+    save_or_refuse(out_dir, result.head, result.report.faults, force=force)
     return result.report
-
-
-def refused_folder(out_dir: str | Path) -> Path:
-    """Where a head goes that is refused."""
-    folder = Path(out_dir).resolve()
-    return folder.with_name(folder.name + REFUSED)
-
-
-def _refusal(report: FitReport, folder: Path) -> FitError:
-    said = "; ".join(report.faults)
-    hint = (
-        f"look at it (omote render --head {folder} -o out.png), correct the mesh there or leave out what hides it "
-        "(--without NAME), or use --force to write it nevertheless"
-    )
-    return FitError(f"the head is refused: {said}; it was written to {folder} instead", hint=hint)
 
 
 def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh") -> FitResult:
@@ -133,7 +116,8 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
     if plan.found:
         head, lid_notes = seat_drawn_lids(head)
-        plan.notes.extend(lid_notes)
+        head, squint_notes = shut_with_squints(head)
+        plan.notes.extend([*lid_notes, *squint_notes])
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
@@ -200,10 +184,8 @@ def part_chart(mesh: FitMesh, part: PartRecipe, islands: list[Island]) -> Chart:
 
 
 def prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:
-    """The mesh as the recipe wants it: lips closed, blinks strengthened, lids seated on anatomical eyeballs."""
-    mesh = strengthen(close_lips(mesh, recipe.lips_close), "eyeBlink", recipe.blink)
-    if recipe.frown:
-        mesh = draw_brows(mesh, **recipe.frown)
+    """The mesh as the recipe wants it: lips closed, shapes strengthened, lids seated on anatomical eyeballs."""
+    mesh = strengthen(close_lips(mesh, recipe.lips_close), recipe.strengthened)
     balls = recipe.eyeballs(mesh)
     return mesh if balls is None else seat_lids(mesh, *balls, recipe.seated, gazes_of(mesh))
 

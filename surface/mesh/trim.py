@@ -20,6 +20,7 @@ ROUNDS = 4  # a triangle at a sharp corner is split so many times at most
 ALONG = 0.5, 0.25, 0.75, 0.1, 0.9  # parts of an edge at which it is tested for running through the inside
 SNAP = 0.28  # share of the shortest edge at a vertex: a crossing nearer than this moves the vertex onto the loop
 LOCKED = -2
+FLAT = 1e-9  # area of a triangle without one, in squares of its sides
 
 
 @dataclass
@@ -46,7 +47,7 @@ def trim(flat: Flat, domain: Domain, scale: tuple[float, float]) -> Flat:
     sign[fixed] = 0
     _snap(flat, domain, scale, lines, sign)
     flat, sign = _uncover(flat, domain, sign)
-    flat = _without_flat(_merged(_cut(flat, domain, scale, sign)))
+    flat = _without_flat(_merged(_cut(_through_marks(flat, domain), domain, scale, sign)))
     flips.improve(flat.uv * np.asarray(scale), flat.triangles, lines_of_edges(flat.uv, domain))
     return compact(flat)
 
@@ -67,6 +68,40 @@ def replace_vertices(flat: Flat, target: Ints) -> Flat:
     triangles = target[flat.triangles]
     whole = (triangles != np.roll(triangles, 1, axis=1)).all(axis=1)
     return Flat(flat.uv, triangles[whole], flat.owner[whole])
+
+
+def _through_marks(flat: Flat, domain: Domain) -> Flat:
+    """Let edges run through marks that vertices have been moved beside: a triangle without area whose longest edge a
+    mark divides, and the one beyond that edge if there is one, become two that have the mark as a corner."""
+    for mark in np.asarray(domain.marks):
+        for vertex in np.flatnonzero((flat.uv == mark).all(axis=1)).tolist():
+            for _ in range(ROUNDS):
+                if (row := _flat_at(flat, vertex)) is not None:
+                    flat = _turned(flat, vertex, row)
+    return flat
+
+
+def _flat_at(flat: Flat, vertex: int) -> int | None:
+    """A triangle without area that has ``vertex`` on its longest edge, if any."""
+    rows = np.flatnonzero((flat.triangles == vertex).any(axis=1))
+    others = flat.triangles[rows][flat.triangles[rows] != vertex].reshape(-1, 2)
+    a, b = (flat.uv[others[:, k]] - flat.uv[vertex] for k in range(2))
+    along = (a * b).sum(axis=1)
+    found = rows[(np.abs(_cross(a, b)) <= FLAT * (a**2 + b**2).sum(axis=1)) & (along < 0)]
+    return int(found[0]) if len(found) else None
+
+
+def _turned(flat: Flat, vertex: int, row: int) -> Flat:
+    """Without triangle ``row``, whose edge opposite to ``vertex`` is turned in the pair with the one beyond it."""
+    triangle = flat.triangles[row]
+    p, q = np.roll(triangle, -int(np.argmax(triangle == vertex)))[1:].tolist()
+    beyond = _across(flat.triangles, p, q)
+    hit, added = [row], np.zeros((0, 3), np.int64)
+    if beyond is not None:
+        corner = int(flat.triangles[beyond].sum() - p - q)
+        hit, added = [row, beyond], np.array([(vertex, p, corner), (vertex, corner, q)])
+    owner = np.append(np.delete(flat.owner, hit), flat.owner[hit[1:]].repeat(2))
+    return Flat(flat.uv, np.concatenate([np.delete(flat.triangles, hit, axis=0), added]), owner)
 
 
 def _without_flat(flat: Flat) -> Flat:
@@ -103,8 +138,11 @@ def _near_or_inside(flat: Flat, domain: Domain) -> Flat:
     for a, b in _covered(flat, domain, sign)[0]:
         keep[_beside(flat.triangles, a, b)] = True
     # A corner of a loop may lie in a triangle whose own corners are all outside.
+    low, high = flat.uv[flat.triangles].min(axis=1), flat.uv[flat.triangles].max(axis=1)
     for tip in _all_corners(domain, (1.0, 1.0)):
-        keep |= _weights_in(flat, tip).min(axis=1) >= 0
+        around = np.flatnonzero(((low <= tip) & (tip <= high)).all(axis=1))
+        own = Flat(flat.uv, flat.triangles[around], flat.owner[around])
+        keep[around] |= _weights_in(own, tip).min(axis=1, initial=np.inf) >= 0
     return compact(Flat(flat.uv, flat.triangles[keep], flat.owner[keep]))
 
 

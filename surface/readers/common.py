@@ -56,6 +56,8 @@ class NamedSurface:
     domain : where to draw it; None for everywhere it is covered
     ties : how its control points follow those of the file, where they are not the same
     deviation : greatest distance of what is fitted, as at star points of a T-spline, from what it is fitted to; else 0
+    seams : borders of the domain that are one line in space, as polylines (k, 2) of equal points on either side; the
+        second one follows the first. Two equal points are a corner.
     """
 
     name: str
@@ -63,6 +65,7 @@ class NamedSurface:
     domain: Domain | None = None
     ties: Ties | None = None
     deviation: float = 0.0
+    seams: tuple[tuple[Floats, Floats], ...] = ()
 
 
 def summary(item: NamedSurface) -> str:

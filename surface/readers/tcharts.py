@@ -3,12 +3,13 @@
 Regular faces are joined to charts in which every face still sees the same grips with the same knots as alone: there the
 surface is the T-spline, exactly. A face that touches a star point, or a corner of the outline that points inwards,
 becomes a patch of its own (:mod:`surface.readers.starpatch`). Charts lie side by side, too far apart to act on each
-other; a grip that acts in several has a control point in each.
+other; a grip that acts in several has a control point in each. Where they meet in space they have seams.
 """
 
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -23,7 +24,7 @@ from .starpatch import SPANS, Sampled, fit_patch, limit_samples
 from .tlayout import STEP, Complex, Copy, Layout, Rect, overlap
 from .tsmfile import TsmFile
 
-GAP = 0.25  # between the reaches of two charts, in mean sides of faces
+GAP = 2.0  # between the reaches of two charts, in mean sides of faces: no cell of a mesh shall reach over it
 
 
 @dataclass
@@ -56,6 +57,9 @@ class Chart:
 
 def read_complex(file: TsmFile, name: str) -> NamedSurface:
     """The surface of a T-mesh of any form; ``SurfaceFileError`` names the line."""
+    mean = float(np.mean(list(file.edges.values())))
+    if mean < 1.0:  # charts are told apart by absolute distances; how large they are means nothing
+        file.edges = {edge: length / mean for edge, length in file.edges.items()}
     mesh = Complex(file)
     layouts = {face: Layout(mesh, face) for face in mesh.loops if not mesh.is_star(face)}
     charts = _charts(mesh, layouts)
@@ -177,7 +181,7 @@ def _assembled(mesh: Complex, charts: list[Chart], points: dict[int, Floats], na
     deviation = 0.0
     for face in (f for f in mesh.loops if mesh.is_star(f)):
         sampled = limit_samples(mesh, face, exact.along)
-        deviation = max(deviation, sheet.add_patch(sampled, points))
+        deviation = max(deviation, sheet.add_patch(face, sampled, points))
     return sheet.finished(points, name, deviation)
 
 
@@ -191,6 +195,16 @@ class _Sheet:
         self._knots: tuple[list[Floats], list[Floats]] = ([], [])
         self._ties: list[dict[int, float]] = []
         self._loops: list[Floats] = []
+        self._sides: dict[int, tuple[int, Floats]] = {}
+        self._count = 0
+
+    def _add_sides(self, face: int, place: tuple[float, float, int], shift: Floats) -> None:
+        """Note where the links of a face lie, with the number of its chart: (2, 2) start and end each."""
+        for number, (u, v, way) in Layout(self._mesh, face, 0).places.items():
+            length = self._mesh.file.edges[self._mesh.file.links[number].edge]
+            end = np.array([u + STEP[way][0] * length, v + STEP[way][1] * length])
+            ends = np.array([_turned(at, place[2]) for at in (np.array([u, v]), end)])
+            self._sides[number] = self._count, ends + np.array(place[:2]) + shift
 
     def _place(self, knots_u: list[Floats], knots_v: list[Floats]) -> Floats:
         """(2,) how far control points are moved so that they lie beside all before."""
@@ -208,8 +222,11 @@ class _Sheet:
         self._weights += [weights[c.grip] for c in copies]
         self._ties += [{c.grip: 1.0} for c in copies]
         self._loops += [loop + shift for loop in outlines(list(chart.rects.values()), self._mesh.near)]
+        for face, place in chart.places.items():
+            self._add_sides(face, place, shift)
+        self._count += 1
 
-    def add_patch(self, sampled: Sampled, points: dict[int, Floats]) -> float:
+    def add_patch(self, face: int, sampled: Sampled, points: dict[int, Floats]) -> float:
         """A face at a star point; returns how far it is from what it was fitted to."""
         patch = fit_patch(sampled)
         width, height = sampled.size
@@ -222,6 +239,8 @@ class _Sheet:
         rows = patch.shares.reshape(count**2, -1)
         self._ties += [{g: float(x) for g, x in zip(sampled.grips, row, strict=True) if abs(x) > 1e-12} for row in rows]
         self._loops.append(np.array([[0.0, 0.0], [width, 0.0], [width, height], [0.0, height]]) + shift)
+        self._add_sides(face, (0.0, 0.0, 0), shift)
+        self._count += 1
         return patch.deviation(sampled, np.array([points[g] for g in sampled.grips]))
 
     def finished(self, points: dict[int, Floats], name: str, deviation: float) -> NamedSurface:
@@ -231,7 +250,53 @@ class _Sheet:
         every = np.concatenate(self._loops)
         low, high = every.min(axis=0), every.max(axis=0)
         rect = float(low[0]), float(high[0]), float(low[1]), float(high[1])
-        return NamedSurface(name, surface, Domain(rect, self._loops), ties, deviation)
+        seams = (*find_seams(self._mesh, self._sides), *find_corners(self._mesh, self._sides))
+        return NamedSurface(name, surface, Domain(rect, self._loops), ties, deviation, seams)
+
+
+def find_seams(mesh: Complex, sides: Mapping[int, tuple[int, Floats]]) -> list[tuple[Floats, Floats]]:
+    """Where borders of charts are one line in space, see :class:`.common.NamedSurface`; the first chart comes first.
+
+    sides : by link, the number of its chart and its start and end (2, 2) there.
+    """
+    steps: dict[tuple[float, ...], tuple[Floats, Floats]] = {}
+    for link, (chart, line) in sides.items():
+        opposite = mesh.file.links[link].opposite
+        if opposite not in sides or (sides[opposite][0], opposite) < (chart, link):
+            continue
+        other, back = sides[opposite][0], sides[opposite][1][::-1]
+        if chart != other or np.abs(line - back).max() > 10.0 * mesh.near:
+            steps[float(chart), float(other), *_key(mesh, line[0], back[0])] = line, back
+    followers = {(*key[:2], *_key(mesh, line[1], back[1])) for key, (line, back) in steps.items()}
+    out = []
+    while steps:
+        key = next((k for k in steps if k not in followers), next(iter(steps)))
+        rows = [(steps[key][0][0], steps[key][1][0])]
+        while key in steps:
+            line, back = steps.pop(key)
+            rows.append((line[1], back[1]))
+            key = *key[:2], *_key(mesh, line[1], back[1])
+        out.append((np.array([a for a, _ in rows]), np.array([b for _, b in rows])))
+    return out
+
+
+def _key(mesh: Complex, *places: Floats) -> tuple[float, ...]:
+    """Equal for places (2,) that differ by rounding only."""
+    return tuple(round(x / (10.0 * mesh.near)) for place in places for x in place.tolist())
+
+
+def find_corners(mesh: Complex, sides: Mapping[int, tuple[int, Floats]]) -> list[tuple[Floats, Floats]]:
+    """The places where three borders of charts or more are one point in space, as seams of no length: all follow the
+    first chart's, whatever seams along their sides have made of them before."""
+    around: dict[int, dict[tuple[float, ...], tuple[int, Floats]]] = {}
+    for link, (chart, line) in sides.items():
+        here = around.setdefault(mesh.file.links[link].vertex, {})
+        here[_key(mesh, line[0])] = chart, line[0]
+    out = []
+    for places in around.values():
+        first, *others = sorted(places.values(), key=lambda row: (row[0], *row[1]))
+        out += [(np.array([first[1]] * 2), np.array([at] * 2)) for _, at in others if len(others) > 1]
+    return out
 
 
 def outlines(rects: list[Rect], near: float) -> list[Floats]:

@@ -233,6 +233,13 @@ class Layout:
             return None
         return tuple(float(t) for t in row[centre - 2 : centre + 3])
 
+    def _reaching(self, axis: int, at: tuple[float, float], inward: int, rect: Rect) -> Knots | None:
+        """As :meth:`_knots`; None also where the grip would not act inside a rectangle."""
+        low, high = rect[2 * axis : 2 * axis + 2]
+        knots = self._knots(axis, at, inward)
+        acts = knots is not None and knots[0] < high - self.mesh.near and knots[-1] > low + self.mesh.near
+        return knots if acts else None
+
     def copies(self, face: int) -> list[Copy]:
         """The grips that act in a face that is laid out, with their knots."""
         near, rect, out = self.mesh.near, self.rects[face], {}
@@ -249,11 +256,11 @@ class Layout:
                     quarter = self.mesh.quarter(vertex, number, way)
                     ways = [STEP[(side + quarter) % 4] for side in sides]
                 inward = sum(w[0] for w in ways), sum(w[1] for w in ways)
-                knots = [self._knots(axis, (u, v), inward[axis]) for axis in range(2)]
-                if knots[0] is not None and knots[1] is not None:
-                    copy = Copy(grip, knots[0], knots[1])
-                    if copy.reaches(rect, near):
-                        out[copy.key(near)] = copy
+                knots_u = self._reaching(0, (u, v), inward[0], rect)
+                knots_v = None if knots_u is None else self._reaching(1, (u, v), inward[1], rect)
+                if knots_u is not None and knots_v is not None:
+                    copy = Copy(grip, knots_u, knots_v)
+                    out[copy.key(near)] = copy
         return list(out.values())
 
 

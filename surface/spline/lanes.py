@@ -187,6 +187,24 @@ def root(context, builder, kinds, args):
     return builder.call(builder.module.declare_intrinsic(f"llvm.sqrt.v{LANES}f32", fnty=kind), args)
 
 
+@_operation(lanes, lanes, lanes, lanes)
+def most_of(context, builder, kinds, args):
+    """The greatest of three numbers without their signs, and at least 1e-37, in every lane."""
+    kind = ir.FunctionType(VECTOR, [VECTOR])
+    size = builder.module.declare_intrinsic(f"llvm.fabs.v{LANES}f32", fnty=kind)
+    most = ir.Constant(VECTOR, [1e-37] * LANES)
+    for vector in args:
+        most = builder.select(builder.fcmp_ordered(">", found := builder.call(size, [vector]), most), found, most)
+    return most
+
+
+@_operation(types.boolean, lanes, types.float32)
+def reaches(context, builder, kinds, args):
+    """Is a number in any lane at least this one, or none at all (NaN)?"""
+    found = builder.fcmp_unordered(">=", args[0], _splat(builder, args[1]))
+    return builder.icmp_unsigned("!=", builder.bitcast(found, ir.IntType(LANES)), ir.IntType(LANES)(0))
+
+
 @_operation(lanes, types.float32)
 def splat(context, builder, kinds, args):
     """One number in every lane."""

@@ -9,7 +9,7 @@ import struct
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -22,9 +22,12 @@ from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import read_names
 from surface.head import Head, save_data
-from surface.head.model.data import Contact, Rule
+from surface.head.model.data import Contact, HeadData, Rule
+from surface.head.model.file import load_data
 from surface.head.model.identity import Identity, fingerprint, save_identities
+from surface.head.model.look import Worn
 from surface.head.model.meshes import make_surface, pack, tessellate
+from surface.head.model.wardrobe import read_garment, with_garments
 from surface.head.posing.baked import write_decimated, write_shade
 from surface.readers.common import NamedSurface
 from surface.readers.plain import write_surfaces
@@ -143,6 +146,7 @@ def kinds() -> list[Kind]:
     with tempfile.TemporaryDirectory(prefix="corpus-") as folder:
         return [
             *_configs(),
+            *_garments(),
             *_takes(Path(folder)),
             *_surfaces(Path(folder)),
             *_meshes(Path(folder)),
@@ -159,6 +163,7 @@ def _configs() -> list[Kind]:
         "script": ["scripts/everything.toml", "scripts/tour.toml"],
         **{name: [f"vocabularies/{name}.toml"] for name in ("arkit", "facs", "affect", "visemes", "layers")},
         "life": ["life/natural.toml"],
+        "person": ["persons/maple.toml", "persons/oak.toml"],
     }
     found = [Kind(name, f"{name}.toml", [(CONFIGS / f).read_bytes() for f in files]) for name, files in named.items()]
     return [
@@ -180,6 +185,23 @@ def wav(samples: np.ndarray, rate: int = 16000) -> bytes:
         + struct.pack("<I", len(data))
         + data
     )
+
+
+@cache
+def _shipped_head() -> HeadData:
+    return load_data(CONFIGS / "heads" / "ict")
+
+
+def _wear(path: Path) -> None:
+    """Put a garment on the shipped head."""
+    with_garments(_shipped_head(), (read_garment(Worn(path, (0.1, 0.1, 0.1))),), str(path))
+
+
+def _garments() -> list[Kind]:
+    seed = (CONFIGS / "wardrobe" / "hair-crop.npz").read_bytes()
+    words = ("render", "--person", "{folder}/person.toml", "--size", "64x64", "-o", "{out}.png")
+    person = b'name = "worn"\n[hair]\nstyle = "hair.npz"\ncolour = "#222222"\n'
+    return [Kind("garment", "hair.npz", [seed], reports(_wear), {"person.toml": person}, words, FIT_S)]
 
 
 def _takes(folder: Path) -> list[Kind]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import least_squares
+from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.eyes.pieces import USUAL, mirrored
@@ -18,7 +19,9 @@ WIDTHS = (0.15, 0.9)  # of an opening, in distances between both
 NEAR = 0.45  # of that distance: how far the middle of what blinks may be from its opening's
 FACING = 0.3  # least z of an opening's normal
 RINGS = 5  # of vertices around a hole, in which the lids' edges lie
+DEPTH, MOST_RINGS = 0.2, 60  # of a hole's width: on fine meshes edges lie in all rings that are so near; and no more
 SECTOR = 0.4  # of a vertex's share of the whole turn: how far aside of it the edge is looked for
+WIDE, CORNERS = 0.12, 0.15  # the least of that, rad: holes may be finer than skin; but not so near a corner, in widths
 TOLD = 0.97  # of a hole's distance from its middle: an edge that is no nearer is the hole itself
 FULL_WIDTH, FULL_HEIGHT = 0.40, 0.70  # least radius of an eyeball, in widths and heights of the opening it has to fill
 PRIOR = 6.0  # weight of the usual radius, in vertices of an edge
@@ -88,18 +91,36 @@ def _edge(mesh: FitMesh, skin: Bools, hole: Ints) -> Ints:
 
     A lid's lining leads from its edge back over the eyeball, so the hole itself lies behind the lids.
     """
-    a, b = directed_edges(mesh.faces[skin])
-    reached = np.zeros(len(mesh.vertices), bool)
-    reached[hole] = True
-    for _ in range(RINGS):
-        reached[np.concatenate([b[reached[a]], a[reached[b]]])] = True
-    ids, middle = np.flatnonzero(reached), _centre(mesh.vertices[hole])
+    ids, middle = np.flatnonzero(_around(mesh, skin, hole)), _centre(mesh.vertices[hole])
     angle, off = _polar(mesh.vertices[ids], middle)
     own, away = _polar(mesh.vertices[hole], middle)
     turn = np.abs((angle - own[:, None] + np.pi) % (2 * np.pi) - np.pi)
-    beside = np.where(turn < SECTOR * 2 * np.pi / len(hole), off, np.inf)
+    beside = np.where(turn < _sectors(mesh.vertices[hole])[:, None], off, np.inf)
     nearest = np.where(beside.min(axis=1) < TOLD * away, ids[beside.argmin(axis=1)], hole)
     return np.unique(nearest)
+
+
+def _sectors(hole: Floats) -> Floats:
+    """(h,) how far aside of a hole's vertices (h, 3) the edge is looked for, rad; in corners it soon becomes nearer."""
+    low, high = hole[:, 0].min(), hole[:, 0].max()
+    inside = np.minimum(hole[:, 0] - low, high - hole[:, 0]) > CORNERS * (high - low)
+    return np.maximum(SECTOR * 2 * np.pi / len(hole), np.where(inside, WIDE, 0.0))
+
+
+def _around(mesh: FitMesh, skin: Bools, hole: Ints) -> Bools:
+    """(n,) vertices in a few rings about a hole, and in more where they are near it."""
+    a, b = directed_edges(mesh.faces[skin])
+    reached = np.zeros(len(mesh.vertices), bool)
+    reached[hole] = True
+    near = cKDTree(mesh.vertices[hole]).query(mesh.vertices)[0] < DEPTH * np.ptp(mesh.vertices[hole, 0])
+    for ring in range(MOST_RINGS):
+        fresh = np.zeros_like(reached)
+        fresh[np.concatenate([b[reached[a]], a[reached[b]]])] = True
+        fresh &= ~reached & (near | (ring < RINGS))
+        if not fresh.any():
+            break
+        reached |= fresh
+    return reached
 
 
 def _polar(points: Floats, middle: Floats) -> tuple[Floats, Floats]:

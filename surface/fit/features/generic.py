@@ -14,6 +14,7 @@ import numpy as np
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.fit.eyes.search import Eyes, find_eyes, middle_x
+from surface.fit.features import cavity
 from surface.fit.features.others import by_object, is_skin, why_out
 from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import FitRequest
@@ -115,10 +116,13 @@ def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats
 def _skin(
     mesh: FitMesh, chosen: Bools, scale: float, eyeballs: Ints, notes: list[str]
 ) -> list[tuple[PartRecipe, list[Island]]]:  # fmt: skip
-    """The face, and, as a part of their own, islands of the same piece that hardly move."""
+    """The face, and, as parts of their own, islands of the same piece that hardly move, and what lines the mouth."""
     islands = usable_islands(mesh, np.flatnonzero(chosen), scale, notes, "face", face=True, others=eyeballs)
     if not islands:
         raise FitError("the skin has no area", hint="export the mesh again")
+    lining = cavity.line_mouth(mesh, islands, np.flatnonzero(chosen), eyeballs)
+    inner = [i for i, x in zip(islands, lining, strict=True) if x]
+    islands = [i for i, x in zip(islands, lining, strict=True) if not x]
     most = [np.abs(mesh.deltas[:, i.vertex]).max(axis=(1, 2), initial=0.0) for i in islands]
     moved = np.array([(m > MOVES_MM * scale).sum() for m in most])
     mobile = moved >= MOVING * moved.max(initial=0)
@@ -127,9 +131,12 @@ def _skin(
     beyond = np.clip(area / (FACE_MM2 * scale**2) - 1.0, 0.0, 1.0)
     out = [_part("face", "skin", int(POINTS * (1.0 + beyond)), 0.1, 0.25, scale, face, mesh)]
     if rest:
-        share = sum(_area(mesh, i) for i in rest) / max(area, 1e-9)
+        share = sum(_area(mesh, i) for i in rest) / max(area + sum(_area(mesh, i) for i in inner), 1e-9)
         points = int(np.clip(POINTS * share, max(REST, LEAST * len(rest)), POINTS))
         out.append(_part("back", "skin", points, 0.1, 0.4, scale, rest, mesh))
+    if inner:
+        points, coarse, error = cavity.POINTS, cavity.COARSE, cavity.ERROR_MM
+        out.append(_part(cavity.NAME, cavity.MATERIAL, points, coarse, error, scale, inner, mesh))
     return out
 
 

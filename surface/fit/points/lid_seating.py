@@ -1,4 +1,4 @@
-"""Warp a mesh before it is fitted: move lids from one eyeball onto another, close parted lips, strengthen shapes.
+"""Warp a mesh before it is fitted: move lids from one eyeball onto another, close parted lips.
 
 A warp is applied to the neutral vertices and to every shape's moved vertices, so that lids which slid over the
 old eyeball slide over the new one.
@@ -141,30 +141,3 @@ def close_lips(mesh: FitMesh, share: float, shape: str = "mouthClose") -> FitMes
     deltas = mesh.deltas.copy()
     deltas[k] *= 1.0 - share
     return replace(mesh, vertices=mesh.vertices + share * mesh.deltas[k], deltas=deltas)
-
-
-def strengthen(mesh: FitMesh, prefix: str, factor: float) -> FitMesh:
-    """Scale the shapes whose names begin with ``prefix``."""
-    scale = np.array([factor if n.startswith(prefix) else 1.0 for n in mesh.names])
-    return replace(mesh, deltas=mesh.deltas * scale[:, None, None])
-
-
-def draw_brows(
-    mesh: FitMesh, prefix: str, centre: tuple[float, float], reach: tuple[float, float], move: tuple[float, ...]
-) -> FitMesh:
-    """Make shapes whose names begin with ``prefix`` move the inner ends of the brows further, as the corrugator does.
-
-    centre : (x, y) of the left brow's inner end, mm; reach : standard deviation of what follows, in x and y, mm.
-    move : (3,) of it, mm; the right one's is its mirror image.
-    """
-    deltas = mesh.deltas.copy()
-    for k, name in enumerate(mesh.names):
-        if not name.startswith(prefix):
-            continue
-        side = -1.0 if name.endswith(("_R", "Right")) else 1.0
-        x = side * mesh.vertices[:, 0]
-        y = mesh.vertices[:, 1]
-        weight = np.exp(-0.5 * (((x - centre[0]) / reach[0]) ** 2 + ((y - centre[1]) / reach[1]) ** 2))
-        weight *= smoothstep(mesh.vertices[:, 2], 60.0, 90.0) * smoothstep(x, -6.0, centre[0])
-        deltas[k] += weight[:, None] * np.array(move) * [side, 1.0, 1.0]
-    return replace(mesh, deltas=deltas)

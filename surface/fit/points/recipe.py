@@ -13,6 +13,7 @@ from surface.base import files
 from surface.base.arrays import Ints
 from surface.fit.points.lid_seating import Eyeball, fit_sphere
 from surface.fit.points.refine import FitRequest
+from surface.fit.points.strength import Strength
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.placing.place import CLOSE_MM, moved
@@ -27,7 +28,7 @@ class PartRecipe:
     """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted.
 
     ``tiled`` : its islands are still to be put into tiles of their own; ``wrapped`` : one skin goes round all of them;
-    ``doubt_slivers`` : nothing is known of its faces' forms.
+    ``doubt_slivers`` : nothing is known of its faces' forms and sizes.
     """
 
     name: str
@@ -61,12 +62,11 @@ class Recipe:
     eye_radius: float = 0.0
     seat: Ranges = ()
     lips_close: float = 0.0
-    blink: float = 1.0
     tongue: Sequence[Sequence[float]] = ()
     source: dict[str, str] = field(default_factory=dict)
     paint: Tables = field(default_factory=list)
     hair: dict[str, Any] = field(default_factory=dict)
-    frown: dict[str, Any] = field(default_factory=dict)
+    strengthened: Sequence[Strength] = ()
     wrinkles: Tables = field(default_factory=list)
     correctives: Tables = field(default_factory=list)
 
@@ -89,7 +89,8 @@ def recipe_for(mesh: FitMesh) -> Recipe | None:
     for path in sorted(RECIPES.glob("*.toml")):
         table = files.read_toml(path)
         if (table.pop("vertices"), table.pop("faces")) == (len(mesh.vertices), len(mesh.faces)):
-            return Recipe(**table | {key: [_part(t) for t in table[key]] for key in ("parts", "teeth")})
+            made = {key: [_part(t) for t in table[key]] for key in ("parts", "teeth")}
+            return Recipe(**table | made | {"strengthened": [Strength.of(t) for t in table.get("strengthened", [])]})
     return None
 
 

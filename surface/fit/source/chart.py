@@ -6,13 +6,14 @@ the neutral face and every shape are sampled by one sparse product.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_matrix, identity, vstack
 
 from surface.base.arrays import Bools, Floats, Ints
+from surface.fit.source.bends import slope_trust
 from surface.fit.source.islands import Island, boundary_loops
 from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, triangles
 
@@ -88,7 +89,8 @@ def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True, 
     """Lay the islands side by side and sample them.
 
     ``normalise=False`` keeps the mesh's own (u, v), for a single island that is known to fill the unit square.
-    ``doubt_slivers`` : faces may be of any form (see :func:`surface.fit.source.chart.face_slopes`).
+    ``doubt_slivers`` : faces may be of any form (see :func:`surface.fit.source.chart.face_slopes`), and large beside
+        what they bend round (see :func:`surface.fit.source.bends.slope_trust`).
     """
     placed = [_place(island, k) if normalise else island for k, island in enumerate(islands)]
     pieces = [_piece(mesh, island, doubt_slivers=doubt_slivers) for island in placed]
@@ -119,9 +121,15 @@ def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
         _loosened(sampled) * np.where(on_border, BORDER_WEIGHT, 1.0), rows @ _spacing(island), sampled > 0.5,
         [island.uv[loop] for loop in around], [island.vertex[loop] for loop in around],
         [c for loop in around[1:] if (c := slit_of(island.uv[loop])) is not None],
-        face_slopes(island, n, SLOPE_WEIGHT * _loosened(fold), doubt_slivers=doubt_slivers),
+        _slopes(mesh, island, SLOPE_WEIGHT * _loosened(fold), doubt_slivers=doubt_slivers),
         _between(island, n, fold),
     )  # fmt: skip
+
+
+def _slopes(mesh: FitMesh, island: Island, weight: Floats, *, doubt_slivers: bool) -> Slopes:
+    slopes = face_slopes(island, len(mesh.vertices), weight, doubt_slivers=doubt_slivers)
+    trust = slope_trust(mesh.vertices[island.vertex], island.faces) if doubt_slivers else 1.0
+    return replace(slopes, weight=slopes.weight * trust)
 
 
 def _is_open(ring: Floats) -> bool:

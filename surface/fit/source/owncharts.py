@@ -72,13 +72,13 @@ def _at_fault(mesh: FitMesh, faces: Ints, scale: float) -> Ints:
     mapped = faces[~bare]
     out = [faces[bare]]
     for island in find_islands(mesh, mapped) if len(mapped) else []:
-        own = _faces_of(mesh, mapped, island)
+        own = faces_of(mesh, mapped, island)
         if measure_uv(mesh, own, scale).faults(scale):
             out.append(own)
     return np.unique(np.concatenate(out))
 
 
-def _faces_of(mesh: FitMesh, faces: Ints, island: Island) -> Ints:
+def faces_of(mesh: FitMesh, faces: Ints, island: Island) -> Ints:
     """The faces of the mesh, among ``faces``, that an island consists of."""
     rows = np.where(island.faces >= 0, island.vertex[island.faces], -1)
     wanted = {tuple(row) for row in rows.tolist()}

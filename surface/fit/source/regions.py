@@ -119,8 +119,8 @@ def face_regions(mesh: FitMesh, faces: Ints, others: Ints, scale: float) -> list
 
 def _hidden(mesh: FitMesh, faces: Ints, others: Ints, scale: float) -> Bools:
     """(f,) what cannot be seen from outside: linings of mouth and sockets, where they are large."""
-    sight = _sight(mesh, faces, others)
-    hidden = ~shortest_cut(mesh, faces, sight > SEEN, sight < UNSEEN)
+    seen = sight(mesh, faces, others)
+    hidden = ~shortest_cut(mesh, faces, seen > SEEN, seen < UNSEEN)
     area = face_areas(mesh.vertices, mesh.faces[faces])
     place = np.flatnonzero(hidden)
     for group in connected(mesh, faces[hidden]) if hidden.any() else []:
@@ -130,8 +130,11 @@ def _hidden(mesh: FitMesh, faces: Ints, others: Ints, scale: float) -> Bools:
     return hidden
 
 
-def _sight(mesh: FitMesh, faces: Ints, others: Ints) -> Floats:
-    """(f,) from which share of all directions in front of it a face can be seen, by depth maps of the head."""
+def sight(mesh: FitMesh, faces: Ints, others: Ints) -> Floats:
+    """(f,) from which share of all directions in front of it a face can be seen, by depth maps of the head.
+
+    others : (g,) further faces that may stand before them.
+    """
     tri = triangles(mesh.faces[np.concatenate([faces, others])])
     a, b, c = mesh.vertices[mesh.faces[faces][:, :3]].swapaxes(0, 1)  # the middle of a bent quad may lie inside
     normal = np.cross(b - a, c - a)

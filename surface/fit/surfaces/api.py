@@ -25,7 +25,7 @@ from surface.fit.transfer.api import transfer
 from surface.fit.transfer.scan import make_scan
 from surface.fit.transfer.telling.landmarkfile import read_landmarks
 from surface.head import Head
-from surface.head.model.data import HeadData, Jaw
+from surface.head.model.data import HeadData, Jaw, Seam
 from surface.head.model.file import check_writable, save_data
 from surface.head.model.parameters import SHAPES
 from surface.readers import NamedSurface
@@ -141,10 +141,13 @@ def _bare_head(pieces: list[Piece], placed: Placed, name: str, where: str) -> tu
         make_part(piece, placed.placement, size, _follows(k, eyes), flip=bool(flips[k]))
         for piece, k in zip(with_face(pieces, face), order, strict=True)
     ]
+    seams = [
+        Seam(part.name, part.name, *pair) for part, k in zip(parts, order, strict=True) for pair in pieces[k].seams
+    ]
     centres, radius = (eyes.centres, eyes.radius) if eyes else (np.zeros((2, 3)), 0.0)
     still = Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0))
     head = HeadData(
-        name, {"made": MADE.format(where)}, placed.neck, centres, radius, still, parts, [], [],
+        name, {"made": MADE.format(where)}, placed.neck, centres, radius, still, parts, seams, [],
         placement=placed.placement,
     )  # fmt: skip
     return head, [pieces[k] for k in order]

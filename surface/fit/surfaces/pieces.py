@@ -27,8 +27,8 @@ class Piece:
     """One surface of a file, in the file's coordinates.
 
     name : unique, and without "/"; title : as the file has it. material : by which a head draws it.
-    chord : how near its samples are to it, in the file's unit. ties, deviation : as of
-    :class:`surface.readers.NamedSurface`.
+    chord : how near its samples are to it, in the file's unit. ties, deviation, seams : as
+    of :class:`surface.readers.NamedSurface`.
     """
 
     name: str
@@ -39,6 +39,7 @@ class Piece:
     chord: float
     ties: Ties | None = None
     deviation: float = 0.0
+    seams: tuple[tuple[Floats, Floats], ...] = ()
 
     @cached_property
     def mesh(self) -> Mesh:
@@ -116,7 +117,8 @@ def make_pieces(items: Sequence[NamedSurface], where: str) -> list[Piece]:
     for item, name in zip(items, names, strict=True):
         domain = item.domain or Domain(item.surface.rect)
         material = kind_of(item.name).material
-        piece = Piece(name, item.name, material, item.surface, domain, FINE * size, item.ties, item.deviation)
+        fitted = item.ties, item.deviation, item.seams
+        piece = Piece(name, item.name, material, item.surface, domain, FINE * size, *fitted)
         if not len(piece.mesh.triangles):
             raise FitError(f"{where}: {item.name!r} covers nothing of its domain", hint=f"--without '{item.name}'")
         out.append(piece)

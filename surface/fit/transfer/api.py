@@ -12,6 +12,7 @@ from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
 from surface.check.overlaps import overlap_notes
 from surface.fit.eyes.drawn_lids import seat_drawn_lids
+from surface.fit.measures.refusal import save_or_refuse
 from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, UNITS
@@ -20,6 +21,7 @@ from surface.fit.transfer.carry import carry
 from surface.fit.transfer.colours import with_colours
 from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.places import scaled
+from surface.fit.transfer.refused import HINT, faults_of_transfer
 from surface.fit.transfer.register import STAGES, Matcher, register
 from surface.fit.transfer.scan import Scan, read_scan, sample
 from surface.fit.transfer.telling.errors import face_reports
@@ -28,7 +30,7 @@ from surface.fit.transfer.telling.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.telling.report import TransferReport, landmarks_of, openings_of, registration_errors, reseated
 from surface.fit.transfer.telling.reportfile import write_transfer_report
 from surface.fit.transfer.template import Template, make_template
-from surface.head import Head, HeadData, save_data
+from surface.head import Head, HeadData
 from surface.head.model.file import check_writable
 from surface.head.model.placement import Placement
 
@@ -53,6 +55,7 @@ class Transferred:
 def transfer_head(
     mesh_path: str | Path, source: str | Path, out_dir: str | Path, *, name: str, landmarks: Path | None = None,
     options: LoadOptions = LoadOptions(), progress: Progress | None = None, report_dir: str | Path | None = None,
+    force: bool = False,
 ) -> TransferReport:  # fmt: skip
     """Give a bare mesh the expressions of a head, and write the new head.
 
@@ -61,9 +64,12 @@ def transfer_head(
     landmarks : file of places on the mesh (see :func:`surface.fit.transfer.telling.landmarkfile.read_landmarks`).
     options : ``unit``, ``up``, ``forward`` and ``without``; what is not given is found.
     report_dir : folder that gets the report (see :mod:`surface.fit.transfer.telling.reportfile`).
+    force : write a head that does not follow the mesh, too.
 
-    Raises FitError: the mesh or the landmarks cannot be read, no face was found, or the head has no eyes or openings.
-    HeadFileError: the head cannot be read, or the folder not be written to. Nothing is written then.
+    Raises FitError: the mesh or the landmarks cannot be read, no face was found, or the head has no eyes or openings;
+    nothing is written then. Or the head does not follow the mesh (:func:`faults_of_transfer`): it is written to
+    :func:`surface.fit.measures.refusal.refused_folder`, to be looked at.
+    HeadFileError: the head cannot be read, or a folder not be written to.
     """
     for folder in (out_dir, report_dir):
         check_writable(folder or out_dir)
@@ -72,7 +78,7 @@ def transfer_head(
     made = transfer(scan, Head.load(source), name, picked, options, progress or no_progress, str(mesh_path))
     if report_dir is not None:
         write_transfer_report(made.report, scan, made.head, made.found, report_dir)
-    save_data(out_dir, made.head)
+    save_or_refuse(out_dir, made.head, made.report.fit.faults, force=force, hint=HINT)
     return made.report
 
 
@@ -100,6 +106,8 @@ def transfer(
         data, told = with_colours(data, scan.colours)
         notes += told
     parts = face_reports(data, template, done.warp, samples)
+    registered = registration_errors(template, done, matcher, STAGES[-1].farthest)
+    faults = tuple(faults_of_transfer(parts, registered[1], data, head))
     face = Head(data)
     landmarks, openings = landmarks_of(face, done.marks, found), openings_of(face, samples)
     middle = data.eyes.mean(axis=0)
@@ -108,11 +116,8 @@ def transfer(
     notes += overlap_notes(data)
     gaps = measure_gaps(data)
     notes += [str(gap) for gap in gaps]
-    report = TransferReport(
-        FitReport(name, parts, moving, notes=notes, scale=1.0), head.name,
-        *registration_errors(template, done, matcher, STAGES[-1].farthest), landmarks, openings,
-        changed, gaps,
-    )  # fmt: skip
+    fit = FitReport(name, parts, moving, notes=notes, scale=1.0, faults=faults)
+    report = TransferReport(fit, head.name, *registered, landmarks, openings, changed, gaps)
     return Transferred(data, report, found)
 
 

@@ -50,8 +50,10 @@ class Pose:
     jaw : how far the jaw is open, 0..1; closed : share of it that mouthClose takes back, 0..1.
     head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
     lip : (k, 3) samples of the lower lip where the contact left them, mm, for the tongue, which lies on them.
+    lag : (3,) yaw, pitch and roll, rad, by which hair lies ahead of the head (:mod:`surface.head.model.sway`).
     pushes : corrections at contacts by their names, mm, from :class:`surface.head.posing.contact.ContactSolver`; the
         part with the opening sets them for parts after it.
+    found : what was computed of this pose for one part and serves others, by what it is.
     """
 
     shapes: Floats
@@ -61,6 +63,14 @@ class Pose:
     gaze: Floats
     pushes: dict[str, Floats] = field(default_factory=dict)
     lip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
+    lag: Floats = field(default_factory=lambda: np.zeros(3))
+    found: dict[tuple[object, ...], tuple[Floats, ...]] = field(default_factory=dict, init=False, compare=False)
+
+
+def head_angles(values: Floats) -> Floats:
+    """(3,) yaw, pitch and roll of the head, rad, in parameter values (59,) in the order of NAMES."""
+    angles: Floats = np.clip(values[len(SHAPES) : len(SHAPES) + 3], -1.0, 1.0) * HEAD_RAD
+    return angles
 
 
 def read_pose(values: Floats) -> Pose:

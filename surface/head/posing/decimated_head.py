@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.deform.deformation import Deformation
 from surface.head.model.data import Group, HeadData, PartData
-from surface.head.model.parameters import Pose, read_pose, rotation
+from surface.head.model.parameters import Pose, rotation
 from surface.head.posing.head import Head
 from surface.head.posing.kernels import move_rigid, stitch_border
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
@@ -62,7 +62,7 @@ class DecimatedHead:
     """
 
     def __init__(self, head: Head, parts: Sequence[HeadPart], level: str, wanted: Mapping[str, Ints]) -> None:
-        self._pivot = head.data.neck.pivot
+        self._pivot, self._read_pose = head.data.neck.pivot, head.read_pose
         triangles = {part.name: part.decimated.get(level, part.triangles) for part in parts}
         kept, self.parts, first = _kept(head, triangles, wanted), [], 0
         for part in parts:
@@ -79,7 +79,7 @@ class DecimatedHead:
 
     def pose(self, values: Floats) -> None:
         """Move to parameter values (P,), as :meth:`surface.head.Head.pose`."""
-        pose = read_pose(values)
+        pose = self._read_pose(values)
         turn = Turn(rotation(*pose.head), self._pivot)
         turned = self._turn is None or not np.array_equal(turn.matrix, self._turn.matrix)
         self._turn = turn

@@ -12,11 +12,16 @@ from surface.base.errors import HeadFileError
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data
 from surface.head.model.identity import load_identities, with_identities
+from surface.head.model.look import Look, with_age
 from surface.head.model.meshes import make_surface, tessellate, unpack
-from surface.head.model.parameters import NAMES, SHAPES, read_pose, rotation
+from surface.head.model.parameters import NAMES, SHAPES, Pose, read_pose, rotation
 from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
+from surface.head.model.sway import Sway
+from surface.head.model.wardrobe import read_garment, with_garments
 from surface.head.posing.baked import apply_decimated, apply_shade, read_decimated, read_shade
+from surface.head.posing.dressing import dress
+from surface.head.posing.looks import apply_look
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
 from surface.head.posing.seams import SeamStitch
@@ -30,6 +35,7 @@ class Head:
     Use :meth:`load`. One object belongs to one thread at a time.
 
     data : everything a head file holds; where : its path, for messages.
+    sway : of its hair; who draws a moving picture tells it the time.
     """
 
     parameters: tuple[str, ...] = NAMES
@@ -42,14 +48,16 @@ class Head:
         self._stitches = tuple(SeamStitch(s, by_name[s.part_a], by_name[s.part_b]) for s in data.seams)
         for stitch in self._stitches:
             stitch.close()
+        self.sway = Sway()
         self._at = {name: i for i, name in enumerate(self.parameters)}
         self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
 
     @classmethod
-    def load(cls, path: str | Path, identity: Mapping[str, float] | None = None) -> Head:
+    def load(cls, path: str | Path, identity: Mapping[str, float] | None = None, look: Look | None = None) -> Head:
         """Read a head from its folder or its head.toml.
 
         identity : variations of the head to mix in, by name, each by 0 to 1.
+        look : colours of a person, and what is worn; the head's own where it is None.
 
         Raises HeadFileError: a file is missing, damaged, cut short, of another version or made for another mesh (names
         file and key), or the head has no identity of that name.
@@ -57,6 +65,11 @@ class Head:
         data = load_data(path)
         if identity:
             data = with_identities(data, load_identities(path), identity, str(path))
+        if look is not None:
+            data = with_age(data, look.age)
+        garments = tuple(read_garment(worn) for worn in look.worn) if look is not None else ()
+        if garments:
+            data = with_garments(data, garments, str(path))
         for shape in data.jaw.tilts:
             if shape not in SHAPES:
                 raise HeadFileError(
@@ -67,6 +80,9 @@ class Head:
             head = cls(data, str(path))
             apply_shade(head.parts, read_shade(path, head.parts))
             apply_decimated(head.parts, read_decimated(path, head.parts))
+            if look is not None:
+                apply_look(head.parts, look, data.eyes)
+                dress(head.parts, garments)
         except DAMAGED as error:
             hint = "take it from a copy, or make the head again: omote fit"
             raise HeadFileError(f"{path}: its files are damaged: {reason(error)}", hint=hint) from error
@@ -117,12 +133,18 @@ class Head:
 
         Raises ValueError: wrong shape or a value that is not a number; the head keeps its pose.
         """
-        pose = read_pose(values)
+        pose = self.read_pose(values)
         turn = self._turned(pose.head)
         for part in self.parts:
             part.pose(pose, turn)
         for stitch in self._stitches:
             stitch.close()
+
+    def read_pose(self, values: Floats) -> Pose:
+        """Parameter values (P,) as a pose, with what sways where it is now; errors as :meth:`pose`."""
+        pose = read_pose(values)
+        pose.lag = self.sway.lag
+        return pose
 
     def place_points(self, values: Floats) -> tuple[list[Floats], Turn]:
         """As :meth:`pose`, but only the points that vertices are summed from; vertices and normals stay.
@@ -130,7 +152,7 @@ class Head:
         Returns (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
         :class:`surface.head.posing.influence.Influence`.
         """
-        pose = read_pose(values)
+        pose = self.read_pose(values)
         return [part.place_points(pose) for part in self.parts], self._turned(pose.head)
 
     def _turned(self, angles: Floats) -> Turn:

@@ -9,6 +9,7 @@ from surface.head.model.data import Group, HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers, SealDriver
+from surface.head.model.sway import SWAYS
 from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import add_moves, keep_on_eyeball, mix_rows, swing_jaw
 from surface.head.posing.tongue import tongue_rest
@@ -78,7 +79,7 @@ class SkinRig:
     def __init__(self, part: PartData, head: HeadData, drivers: Drivers | None = None) -> None:
         self.rest = np.ascontiguousarray(part.points, np.float64)
         self._drivers = drivers or Drivers(head.rules)
-        self._moves = Moves(part, self._drivers.names)
+        self._moves, self._sways = Moves(part, self._drivers.names), Moves(part, SWAYS)
         self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
         self._swings, self._whole = bool(self._open.any()), jaw_path(head.jaw, 1.0)
         self._undo = _undo_share(part)
@@ -123,17 +124,17 @@ class SkinRig:
         """Correct control points (n, 3), moved by everything else, at the part's own contacts and at those it follows;
         corrections at its own are put into ``pose.pushes``."""
         for solver, seal in zip(self._solvers, self._seals, strict=True):
-            axis = optical_axis(pose.gaze[max(solver.contact.eye, 0)])
+            axis = _axis_of(pose, max(solver.contact.eye, 0))
             pose.pushes[solver.contact.name] = solver.apply(axis, points, seal.amount(pose.shapes))
             if solver.contact.eye < 0:
                 pose.lip = solver.lower
         for name, follower in self._followers:
             if name in pose.pushes:
                 follower.apply(pose.pushes[name], points)
-        if self._rest is not None:
+        if self._rest is not None and self._rest.share(pose) > 0.0:
             self._rest.apply(pose, pose.lip, *rigid_motion("jaw", self._head, pose), points)
         for eye, clearance in self._clearances:
-            clearance.apply(optical_axis(pose.gaze[eye]), points)
+            clearance.apply(_axis_of(pose, eye), points)
 
     def _pose_key(self, pose: Pose) -> tuple[object, ...]:
         """Everything in a pose that the part's points depend on."""
@@ -141,15 +142,19 @@ class SkinRig:
         gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
         seals = (seal.amount(pose.shapes) for seal in self._seals)
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
-        rest = (pose.lip.tobytes(), motion_key("jaw", self._head, pose)) if self._rest is not None else ()
-        return self._amounts.tobytes(), *rest, jaw, gaze, *seals, *pushes
+        rests = self._rest is not None and self._rest.share(pose) > 0.0
+        rest = (pose.lip.tobytes(), motion_key("jaw", self._head, pose)) if rests else ()
+        lag = pose.lag.tobytes() if len(self._sways.used) else b""
+        return self._amounts.tobytes(), *rest, jaw, gaze, lag, *seals, *pushes
 
     def _evaluate(self, pose: Pose) -> None:
         """Groups, jaw, lids and contacts, one after the other."""
         np.copyto(self.points, self.rest)
         self._moves.add(self._amounts, self.points)
+        if len(self._sways.used) and pose.lag.any():
+            self._sways.add(pose.lag[self._sways.used], self.points)
         if pose.jaw > 0 and self._swings:
-            turn, shift = jaw_path(self._jaw, pose.jaw)
+            turn, shift = _path_of(pose, self._jaw)
             full_turn, full_shift = self._whole
             undo = self._undo * pose.closed
             swing_jaw(self.rest, self._open, turn, shift, full_turn * pose.jaw, full_shift * pose.jaw,
@@ -183,6 +188,23 @@ class Lids:
 def optical_axis(gaze: Floats) -> Floats:
     """(3,) unit vector along which an eye looks, from yaw and pitch (2,), rad."""
     return np.ascontiguousarray(rotation(*gaze)[:, 2])
+
+
+def _axis_of(pose: Pose, eye: int) -> Floats:
+    """The optical axis of an eye in a pose, computed once."""
+    key = ("axis", eye)
+    if key not in pose.found:
+        pose.found[key] = (optical_axis(pose.gaze[eye]),)
+    return pose.found[key][0]
+
+
+def _path_of(pose: Pose, jaw: Jaw) -> tuple[Floats, Floats]:
+    """The jaw's path in a pose, computed once."""
+    key = ("path", id(jaw))
+    if key not in pose.found:
+        pose.found[key] = jaw_path(jaw, pose.jaw)
+    turn, shift = pose.found[key]
+    return turn, shift
 
 
 def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballClearance]]:
@@ -238,9 +260,18 @@ def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floa
 
     Control points of a rational surface may be moved by any affine map: the surface follows exactly.
     """
+    key = ("motion", follows, id(head))
+    if key not in pose.found:
+        pose.found[key] = _motion_of(follows, head, pose)
+    linear, shift = pose.found[key]
+    return linear, shift
+
+
+def _motion_of(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
+    """What :func:`rigid_motion` returns."""
     linear, shift = np.eye(3), np.zeros(3)
     if follows == "jaw":
-        linear, shift = jaw_path(head.jaw, pose.jaw)
+        linear, shift = _path_of(pose, head.jaw)
         for name, tilt in head.jaw.tilts.items():
             amount = pose.shapes[_PLACE[name]]
             linear, shift = linear + amount * tilt[:, :3], shift + amount * tilt[:, 3]

@@ -30,7 +30,7 @@ class SeamStitch:
         b_ids, b_at = _along(second, seam.uv_b)
         inside = (b_at >= a_at.min(initial=np.inf) - SAME) & (b_at <= a_at.max(initial=-np.inf) + SAME)
         self.ids, at = b_ids[inside], b_at[inside]
-        if len(a_ids) < 2 or not len(self.ids):
+        if len(a_ids) < 2 or not len(self.ids):  # of a closed line, as also two equal points are, one counts thrice
             self.ids = self.low = self.high = self.ids[:0]
             self.share = np.zeros(0, np.float32)
             return

@@ -35,12 +35,15 @@ LEAST_SAMPLES, LEAST_MM = 50, 5.0  # of a part that is a tongue, and its length
 
 @kernel
 def find_rise(under: Floats, below: Floats, reach: float, clear: float, soft: float, rise: Floats) -> float:
-    """How far stations ``under (s, 3)`` are too low, ``rise (s,)``, over points ``below (k, 3)`` within ``reach``, of
-    which each counts less the further away it is, seen from above. Returns the farthest."""
+    """How far stations ``under (s, 3)`` are too low, ``rise (s,)``, over points ``below (k, 3)``, by rising z, within
+    ``reach``, of which each counts less the further away it is, seen from above. Returns the farthest."""
     most = 0.0
     for s in range(len(under)):
         rise[s] = 0.0
-        for k in range(len(below)):
+        first = np.searchsorted(below[:, 2], under[s, 2] - reach)
+        for k in range(first, len(below)):
+            if below[k, 2] >= under[s, 2] + reach:
+                break
             need = below[k, 1] + clear - under[s, 1]
             if need <= -soft:
                 continue
@@ -98,10 +101,16 @@ class TongueRest:
         self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
         self._lower, self._upper = (_edges(head, follows, sign) for follows, sign in (("jaw", 1.0), ("skull", -1.0)))
 
+    def share(self, pose: Pose) -> float:
+        """How much of the correction a pose takes, 0..1: none while the tongue is in the mouth."""
+        low, high = PUT_OUT
+        t = min(max((float(pose.shapes[TONGUE]) - low) / (high - low), 0.0), 1.0)
+        return t * t * (3.0 - 2.0 * t)
+
     def apply(self, pose: Pose, lip: Floats, linear: Floats, shift: Floats, points: Floats) -> None:
         """Move control points (n, 3) in place; ``lip (k, 3)`` are samples of the lower lip, and the lower teeth are
         moved by ``linear (3, 3)`` and ``shift (3,)``."""
-        share = float(smoothstep(pose.shapes[TONGUE : TONGUE + 1], *PUT_OUT)[0])
+        share = self.share(pose)
         if share <= 0.0 or not len(lip):
             return
         aside = float(lip[:, 0].mean() - self._sideways @ points[:, 0] / self._sideways.sum())
@@ -114,7 +123,7 @@ class TongueRest:
         """Move points away from what lies ``against`` the under (0) or the upper (1) side, by their ``part`` of it."""
         sign, (ids, shares) = 1.0 - 2.0 * side, self._sides[side]
         way, rise = np.array([1.0, sign, 1.0]), np.zeros(len(shares))
-        mirrored = against * way
+        mirrored = against[np.argsort(against[:, 2], kind="stable")] * way
         for _ in range(PASSES):
             if find_rise(shares @ points[ids] * way, mirrored, REACH_MM, CLEAR_MM, SOFT_MM, rise) < SOFT_MM / 4.0:
                 break

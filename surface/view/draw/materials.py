@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -32,6 +32,8 @@ _LOWER_LASHES = 0.42
 _IRIS, _PUPIL = 0.49, 0.185 / 0.49
 #: Materials of parts that the skin surrounds in every pose.
 INSIDE = ("eye", "teeth", "gums", "mouth")
+#: Programs of what is worn.
+WORN = ("strand", "cloth")
 
 
 @dataclass(frozen=True)
@@ -54,11 +56,14 @@ class Material:
     order: int = 0
 
 
-def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, moderngl.Program]:
-    """Every program of a quality and a theme, by name."""
+def programs(
+    ctx: moderngl.Context, quality: str, theme: Theme, *, freckled: bool = False, worn: Collection[str] = ()
+) -> dict[str, moderngl.Program]:
+    """Every program of a quality and a theme, by name; ``freckled`` as in :func:`skin_program`, ``worn`` : which of
+    those for what is worn."""
     flat = ("flat.frag",)
-    return {
-        "skin": skin_program(ctx, quality, theme),
+    return {name: worn_program(ctx, name, quality) for name in WORN if name in worn} | {
+        "skin": skin_program(ctx, quality, theme, freckled=freckled),
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
         "inner": build(ctx, ("light.glsl", "inner.vert"), flat),
         "hair": build(ctx, ("light.glsl", "hair.vert"), ("hair.frag",)),
@@ -66,17 +71,32 @@ def programs(ctx: moderngl.Context, quality: str, theme: Theme) -> dict[str, mod
     }
 
 
-def skin_program(ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False) -> moderngl.Program:
-    """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software."""
+def skin_program(
+    ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False, freckled: bool = False
+) -> moderngl.Program:
+    """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software; `freckled`
+    draws freckles where the parts' attribute of that name has them, with quality "full"."""
     defines: dict[str, int | str] = {"INSIDE": _INSIDE}
     if quality != "full":
         return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), ("flat.frag",), defines=defines)
     if theme.seams:
         defines |= {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
+    if freckled and theme.use_painted:
+        defines["FRECKLES"] = 1
     if simplified:
         defines["GRAIN_TEXELS"] = f"{_DETAIL_SIZE // 2}.0"
     shared = ("light.glsl", "skin.glsl")
     return build(ctx, (*shared, "skin.vert"), (*shared, "skin.frag"), defines=defines)
+
+
+def worn_program(ctx: moderngl.Context, name: str, quality: str, *, simplified: bool = False) -> moderngl.Program:
+    """The program of "strand" or "cloth"; ``simplified`` as in :func:`skin_program`, with highlights per vertex as
+    with quality "fast"."""
+    defines: dict[str, int | str] = {"GRAIN_TEXELS": f"{_DETAIL_SIZE // 2}.0"} if simplified else {}
+    if quality != "full" or simplified:
+        defines["PER_VERTEX"] = 1
+    shared = ("light.glsl", *(("strand.glsl",) if name == "strand" else ()))
+    return build(ctx, (*shared, f"{name}.vert"), (*shared, f"{name}.frag"), defines=defines)
 
 
 def of(name: str) -> Material:
@@ -107,7 +127,8 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     occlusion = attribute(part, "occlusion", (1.0,))[:, :1]
     packed = np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), np.clip(occlusion, 0.0, 1.0)])
     thin = attribute(part, "thin", (0.0,))[:, :1]
-    return {
+    freckled = {"freckles": part.attributes["freckles"]} if "freckles" in part.attributes else {}
+    return freckled | {
         "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
         "around": np.rint(attribute(part, "visible", _OPEN_SKY)[:, :4] * 255.0).astype(np.uint8),
         "surface_uv_gloss": np.hstack([detail_uv(part), gloss, thin]).astype(np.float32),
@@ -168,11 +189,17 @@ def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0
     return Material(
         "hair",
         lambda part, theme, openings: {"along": np.hstack([strip_uv(part), strip_strength(part, theme)])},
-        lambda part, theme, openings: {"albedo": getattr(theme, colour), "fade": fade, "edges": edges},
+        lambda part, theme, openings: {"albedo": _painted(part, theme, colour), "fade": fade, "edges": edges},
         two_sided=True,
         blended=True,
         order=2,
     )
+
+
+def _painted(part: ViewPart, theme: Theme, colour: str) -> tuple[float, ...]:
+    """A part's own colour, one for all of it, or the theme's of that name."""
+    own = part.attributes.get("albedo")
+    return getattr(theme, colour) if own is None or not theme.use_painted else tuple(own[0].tolist())
 
 
 def strip_uv(part: ViewPart) -> np.ndarray:
@@ -184,7 +211,7 @@ def strip_uv(part: ViewPart) -> np.ndarray:
 
 def strip_strength(part: ViewPart, theme: Theme) -> np.ndarray:
     """Opacity of each hair, (m, 1): lashes of the lower lid are fainter."""
-    strength = np.full((len(part.vertices), 1), theme.hair, np.float32)
+    strength = theme.hair * attribute(part, "strength", (1.0,))[:, :1]
     if part.material == "lash":
         strip = np.floor(np.asarray(part.uv)[:, 0] / 2.0)
         height = {s: float(part.vertices[strip == s, 1].mean()) for s in np.unique(strip)}
@@ -194,7 +221,27 @@ def strip_strength(part: ViewPart, theme: Theme) -> np.ndarray:
     return strength
 
 
+def _worn_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
+    albedo, gloss = attribute(part, "albedo", theme.albedo)[:, :3], attribute(part, "gloss", (1.0,))[:, :1]
+    packed = np.clip(np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), gloss]), 0.0, 1.0)
+    static = {
+        "albedo_gloss": np.rint(packed * 255.0).astype(np.uint8),
+        "strands": attribute(part, "strands", (0.0, 0.0, 1.0, 1.0)),
+    }
+    if of(part.material).program == "strand":
+        static["along"] = attribute(part, "along", (0.0, -1.0, 0.0))
+    return static
+
+
+def _worn(program: str, order: int, *, two_sided: bool = False) -> Material:
+    """Hair or cloth, drawn before the skin, which it hides; of hair all over the skull only the near side is drawn."""
+    return Material(program, _worn_static, lambda part, theme, openings: {}, two_sided=two_sided, order=order)
+
+
 MATERIALS: dict[str, Material] = {
+    "strand": _worn("strand", -3),
+    "tress": _worn("strand", 1, two_sided=True),
+    "cloth": _worn("cloth", -1, two_sided=True),
     "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
     "eye": Material("eye", lambda part, theme, openings: {"local": openings.local(part)}, _eye_uniforms, order=1),
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),

@@ -64,7 +64,10 @@ class Renderer:
         self.evaluator = choose(ctx, head, evaluator)
         self.evaluator.pose(self._values)
         self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids))
-        self._programs = materials.programs(ctx, quality, self.theme)
+        self._freckled = any("freckles" in part.attributes for part in head.parts)
+        used = {materials.of(part.material).program for part in head.parts}
+        self._worn = [name for name in materials.WORN if name in used]
+        self._programs = materials.programs(ctx, quality, self.theme, freckled=self._freckled, worn=self._worn)
         self._detail = materials.detail_texture(ctx)
         self._background = Rectangles(ctx, self._programs["background"])
         parts = sorted(head.parts, key=lambda part: materials.of(part.material).order)
@@ -91,11 +94,14 @@ class Renderer:
         """
         if self._simplified or self.evaluator.name != "cpu":
             return
-        self._simplified, old = True, self._programs["skin"]
-        self._programs["skin"] = materials.skin_program(self.ctx, self.quality, self.theme, simplified=True)
-        for buffers in self._parts:
-            buffers.release()
-        old.release()
+        self._simplified, old = True, [self._programs[name] for name in ("skin", *self._worn)]
+        self._programs["skin"] = materials.skin_program(
+            self.ctx, self.quality, self.theme, simplified=True, freckled=self._freckled
+        )
+        for name in self._worn:
+            self._programs[name] = materials.worn_program(self.ctx, name, self.quality, simplified=True)
+        for thing in (*self._parts, *old):
+            thing.release()
         self._parts = self._decimated_parts() or [self._buffers(buffers.part) for buffers in self._parts]
         self._camera = None
         self._apply_theme()
@@ -183,6 +189,8 @@ class Renderer:
         lights = {name: light_direction(getattr(self.theme, name), turn) for name in ("key", "fill", "rim")}
         back = self.evaluator.rotation().T  # the lights as the head at rest would see them, for baked shade
         set_uniforms(self._programs["skin"], {f"{name}_at_rest": back @ lights[name] for name in ("key", "rim")})
+        if "strand" in self._programs:
+            set_uniforms(self._programs["strand"], {"head_rotation": back.T})
         if self._camera == (camera, aspect):
             return
         self._camera = (camera, aspect)

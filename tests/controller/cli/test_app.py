@@ -182,7 +182,7 @@ def test_render_draws_what_it_is_told(omote: Omote, tmp_path: Path) -> None:
 
 
 def test_check_names_what_is_good(omote: Omote) -> None:
-    for name, said in (("demo", "stage demo"), ("head24", "24 channels"), ("ict", "59 parameters")):
+    for name, said in (("demo", "stage demo"), ("head24", "24 channels")):
         result = omote("check", name)
         assert result.returncode == 0, result.stderr
         assert said in result.stdout
@@ -194,6 +194,15 @@ def test_dry_run_opens_nothing_and_lists_every_channel(omote: Omote) -> None:
     assert result.returncode == 0, result.stderr
     assert "no port was opened" in result.stdout
     assert result.stdout.count("xl330") == 24
+
+
+@pytest.mark.parametrize(("words", "threads"), [(("ports", "--help"), "1"), (("fit", "--help"), None)])
+def test_only_a_fit_lets_blas_have_threads(
+    omote: Omote, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], threads: str | None
+) -> None:
+    monkeypatch.setattr(os, "environ", {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"})
+    assert omote(*words).returncode == 0
+    assert os.environ.get("OPENBLAS_NUM_THREADS") == threads
 
 
 def raising(error: BaseException) -> Callable[[], Callable[[], None]]:

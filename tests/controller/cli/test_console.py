@@ -35,9 +35,8 @@ def test_forced_colours_bring_no_codes_that_move_a_cursor(tmp_path: Path) -> Non
     assert "\x1b" not in said("plugins", NO_COLOR="1").stdout
 
 
-@pytest.mark.parametrize("columns", ["60", "30"])
-def test_a_narrow_terminal_loses_nothing(columns: str) -> None:
-    result = said("run", "demo", "--dry-run", COLUMNS=columns)
+def test_a_narrow_terminal_loses_nothing() -> None:
+    result = said("run", "demo", "--dry-run", COLUMNS="30")
     assert result.returncode == 0, result.stderr
     assert result.stdout.split().count("xl330-m288;") == 24
 

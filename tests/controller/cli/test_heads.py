@@ -25,6 +25,7 @@ def sheet(tmp_path_factory):
     """A fitted sheet: its GLB, its head folder, what the command said."""
     sys.path.insert(0, SURFACE)
     try:
+        from fewer_points import fewer_points
         from meshfiles import glb
         from slit_sheet import slit_sheet
     finally:
@@ -32,7 +33,8 @@ def sheet(tmp_path_factory):
     folder = tmp_path_factory.mktemp("fit")
     mesh, head = folder / "me.glb", folder / "me"
     mesh.write_bytes(glb(slit_sheet()).bytes())
-    said = CliRunner().invoke(make_app(), ["fit", str(mesh), "-o", str(head), "--report", str(folder / "report")])
+    with fewer_points():
+        said = CliRunner().invoke(make_app(), ["fit", str(mesh), "-o", str(head), "--report", str(folder / "report")])
     assert said.exit_code == 0, said.output
     return mesh, head, said.output
 
@@ -179,10 +181,17 @@ def test_a_fit_can_be_forced_and_then_says_what_is_wrong(fitted, tmp_path, monke
     assert report.forced
     wanted = ["written by --force: 48 mm off", "written by --force: all turned over", "check: mine has a spike"]
     assert said.output.splitlines()[-4:-1] == wanted
-    for more in (["--expressions-from", "ict"], ["-o", "x"]):
-        file = "a.3dm" if more[0] == "-o" else "a.glb"
-        refused = CliRunner().invoke(make_app(), ["fit", file, "-o", str(tmp_path / "mine"), "--force", *more])
-        assert isinstance(refused.exception, ConfigError) and "--force: " in str(refused.exception)
+    refused = CliRunner().invoke(make_app(), ["fit", "a.3dm", "-o", str(tmp_path / "mine"), "--force"])
+    assert isinstance(refused.exception, ConfigError) and "--force: " in str(refused.exception)
+
+
+def test_a_transfer_can_be_forced_too(tmp_path, monkeypatch):
+    heard = []
+    monkeypatch.setattr("controller.tools.transfer.transfer_head", lambda *a, **given: heard.append(given) or 1 / 0)
+    words = ["fit", "a.ply", "-o", str(tmp_path / "mine"), "--expressions-from", "ict"]
+    for more in ([], ["--force"]):
+        assert isinstance(CliRunner().invoke(make_app(), [*words, *more]).exception, ZeroDivisionError)
+    assert [given["force"] for given in heard] == [False, True]
 
 
 def test_a_fit_ends_with_what_a_check_says(sheet):

@@ -212,7 +212,7 @@ def noted(*words: str) -> Session:
     return Session.last
 
 
-LOOK = dict.fromkeys(("kiosk", "monitor", "quality", "theme", "camera", "evaluator"))
+LOOK = dict.fromkeys(("kiosk", "monitor", "quality", "theme", "camera", "evaluator", "person"))
 
 
 def test_a_run_without_options_opens_a_window_where_there_is_a_display(display: dict[str, bool]) -> None:
@@ -231,9 +231,9 @@ def test_every_option_of_a_run_arrives(display: dict[str, bool], tmp_path: Path)
     session = noted("run", "mine", "--voice", "v.wav", "--voice-rate", "1000", "--record", "a.rec")
     assert session.given["options"] == RunOptions(voice=Voice("v.wav", 1000), record=Path("a.rec"))
     words = ["--kiosk", "--monitor", "0", "--quality", "fast", "--theme", "mask", "--camera", "front"]
-    session = noted("run", "mine", *words, "--evaluator", "cpu", "--identity", "broad=0.5")
+    session = noted("run", "mine", *words, "--evaluator", "cpu", "--identity", "broad=0.5", "--person", "maple")
     assert session.given["look"] == {"kiosk": True, "monitor": 0, "quality": "fast", "theme": "mask",
-                                     "camera": "front", "evaluator": "cpu"}  # fmt: skip
+                                     "camera": "front", "evaluator": "cpu", "person": "maple"}  # fmt: skip
     assert session.given["identity"] == {"broad": 0.5}
 
 

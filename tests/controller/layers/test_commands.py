@@ -64,13 +64,13 @@ def test_release_returns_to_the_layer_below(face: Face) -> None:
     assert face.run(1.0)[SMILE] == pytest.approx(0.0, abs=1e-6)
     assert face.values[SMILE + 1] > 0.8
     face.state.release([SMILE], face.now)
-    assert face.run(2.0)[SMILE] == pytest.approx(0.85, abs=1e-6)
+    assert face.run(2.0)[SMILE] == pytest.approx(0.9, abs=1e-6)
     assert face.state.holder(SMILE) == "expression"
 
 
 def test_expression_with_duration_returns(face: Face) -> None:
     face.state.expression("happiness", 0.5, 1.0, face.now)
-    assert face.run(0.8)[SMILE] == pytest.approx(0.425, abs=1e-3)
+    assert face.run(0.8)[SMILE] == pytest.approx(0.9 * 0.5**0.7, abs=1e-3)
     assert face.run(2.0)[SMILE] == pytest.approx(0.0, abs=1e-3)
     with pytest.raises(ParameterError):
         face.state.expression("nothing", 1.0, None, face.now)
@@ -115,7 +115,7 @@ def test_capture_goes_over_expression_and_under_manual_and_ends_with_silence(fac
     assert face.values[SMILE] == pytest.approx(0.3, abs=1e-3)
     face.state.set_parameters([JAW], [0.9], face.now)
     assert face.run(0.5)[JAW] == pytest.approx(0.9, abs=1e-3)
-    assert face.run(3.0)[SMILE] == pytest.approx(0.85, abs=1e-3)
+    assert face.run(3.0)[SMILE] == pytest.approx(0.9, abs=1e-3)
 
 
 def test_snapshot_is_what_the_last_tick_gave(face: Face) -> None:

@@ -67,7 +67,7 @@ def test_the_usual_picture() -> None:
     settings = PictureSettings()
     assert settings.model_dump() == {
         "quality": "full", "camera": "front", "theme": "skin", "background": None, "evaluator": "auto",
-        "kiosk": False, "monitor": 0,
+        "kiosk": False, "monitor": 0, "person": "",
         "light": {"yaw_deg": None, "pitch_deg": None, "key": 1.0, "fill": 1.0, "rim": 1.0, "ambient": 1.0,
                   "warmth": 0.0, "follows_camera": None},
     }  # fmt: skip

@@ -111,7 +111,8 @@ def test_a_head_whose_vertices_leave_space_is_refused(tmp_path: Path, monkeypatc
         check_anything(str(tmp_path))
 
 
-def test_the_shipped_head_is_good_and_says_what_it_is() -> None:
+def test_a_good_head_says_what_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("surface.check.check_head", lambda head: [])  # which takes seconds, and has its own tests
     (line,) = check_anything("ict")
     assert line.startswith("head ict: 13 parts, ") and line.endswith(" 59 parameters: good")
 

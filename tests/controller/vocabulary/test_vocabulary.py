@@ -34,11 +34,17 @@ def test_neutral_is_all_zero(vocabulary: Vocabulary) -> None:
 
 
 def test_expand_scales_with_intensity(vocabulary: Vocabulary) -> None:
-    full, half = vocabulary.expand("anger", 1.0), vocabulary.expand("anger", 0.5)
+    full, half = vocabulary.expand("interest", 1.0), vocabulary.expand("interest", 0.5)
     assert full.keys() == half.keys()
-    assert full[P.index("browDownLeft")] == full[P.index("browDownRight")] > 0.8
+    assert full[P.index("browOuterUpLeft")] == full[P.index("browOuterUpRight")] > 0.3
     assert all(half[i] == pytest.approx(full[i] / 2) for i in full)
-    assert not any(vocabulary.expand("anger", 0.0).values())
+
+
+def test_a_response_below_1_shows_weak_intensities_more(vocabulary: Vocabulary) -> None:
+    full, half = vocabulary.expand("anger", 1.0), vocabulary.expand("anger", 0.5)
+    assert vocabulary["anger"].response == 0.7
+    assert all(half[i] == pytest.approx(full[i] * 0.5**0.7) for i in full)
+    assert vocabulary.expand("anger", 0.0) == dict.fromkeys(full, 0.0)
 
 
 def test_names_in_any_case_and_aliases(vocabulary: Vocabulary) -> None:

@@ -53,6 +53,13 @@ def test_a_priority_that_is_lowered_twice_is_lowered_once() -> None:
 
 
 @linux
+def test_a_face_in_the_process_of_the_tests_leaves_it_its_priority() -> None:
+    before = os.getpriority(os.PRIO_PROCESS, 0)
+    priority.lower_process_priority()
+    assert os.getpriority(os.PRIO_PROCESS, 0) == before
+
+
+@linux
 def test_nobody_asks_for_real_time_who_was_told_not_to(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(priority.NO_REALTIME, "1")
     assert in_thread(priority.request_realtime) is False

@@ -137,7 +137,7 @@ def test_the_width_of_a_loop() -> None:
 @pytest.mark.parametrize(("x", "opening"), [(31.8, True), (31.8 + 20.0, True), (31.8 + 20.8, False), (-31.8, False)])
 def test_the_rim_of_an_eye_with_an_eyeball_is_no_hole(x: float, opening: bool) -> None:
     head = plain.subject(sheet("face", (-40, 40)), plain.eyeball(0))
-    assert borders._is_opening(head, None, np.array([x, 0.0, 0.0])) == opening
+    assert borders._in_openings(head, None, np.array([[x, 0.0, 0.0], [0.0, 0.0, 0.0]])).tolist() == [opening, False]
 
 
 @pytest.mark.parametrize(("away", "opening"), [(37.0, True), (-37.0, True), (38.0, False)])
@@ -145,8 +145,8 @@ def test_the_rim_of_the_mouth_is_no_hole(away: float, opening: bool) -> None:
     head, mouth = plain.subject(sheet("face", (-40, 40)), eyes=None), plain.line_of_lips(-66.0)
     for axis in range(3):
         at = np.array([0.0, -66.0, 0.0]) + away * np.eye(3)[axis]
-        assert borders._is_opening(head, mouth, at) == opening
-    assert not borders._is_opening(head, None, at)
+        assert borders._in_openings(head, mouth, at[None]).tolist() == [opening]
+    assert not borders._in_openings(head, None, at[None]).any()
 
 
 def opened(mm: float, pose: str = "jawOpen", **options: object) -> Subject:

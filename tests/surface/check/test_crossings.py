@@ -84,3 +84,15 @@ def test_two_lips_that_touch_do_not_cross():
     at, faces, same, kind = joined(ball(10.0, [0, 0, 0]), ball(10.0, [0, 0, 20.1]))
     found = Crossings(at, faces, same, kind, TWO)
     assert not len(found.depths(found.pairs(at), 0, 1, 12.0, 0.1)[0])
+
+
+def test_normals_of_a_ball_point_away_from_its_middle():
+    centre = np.array([3.0, -2.0, 5.0])
+    vertices, faces, same, kind = joined(ball(7.0, centre))
+    crossings = Crossings(vertices, faces, same, kind, np.ones((1, 1), bool))
+    places = np.zeros((same.max() + 1, 3))
+    places[same] = vertices
+    away = (places - centre) / 7.0
+    normals = crossings._normals(places)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-9)
+    assert (normals * away).sum(axis=1).min() > 0.99

@@ -45,12 +45,24 @@ def test_a_height_is_the_least_along_the_mean_way_from_the_ring() -> None:
     ring, start = np.array([3, 4, 5, 6, 7, 8, 1, 2]), np.array([0, 4, 6, 6])
     values[0] += 9.0
     out = np.full(3, -1.0)
-    spikes.heights(values, start, ring, out)
+    spikes.heights(values, start, ring, 0.0, out)
     for i in range(2):
         way = (values[i] - values[ring[start[i] : start[i + 1]]]).sum(axis=0)
         least = ((values[i] - values[ring[start[i] : start[i + 1]]]) @ (way / np.linalg.norm(way))).min()
         assert out[i] == pytest.approx(least)
     assert out[0] > 5.0 and out[2] == 0.0  # nothing is round the third
+
+
+def test_heights_of_what_the_ring_is_too_near_to_are_left_out_and_the_others_are_the_same() -> None:
+    rng = np.random.default_rng(3)
+    ring = spikes.Ring(np.arange(0, 401, 4), rng.integers(100, 200, 400))
+    values = rng.normal(size=(200, 3)) * np.where(np.arange(200) < 100, 4.0, 1.0)[:, None]
+    every = ring.heights(values)
+    for enough in (0.5, 2.0, 4.0):
+        some = ring.heights(values, enough)
+        assert (every > enough).any()
+        np.testing.assert_array_equal(some[every >= enough], every[every >= enough])
+        assert set(some[every < enough]) <= {0.0, *every[every < enough]} and (some[every < enough] == 0.0).any()
 
 
 def test_nothing_sticks_out_where_the_ring_lies_round_it_evenly() -> None:

@@ -7,8 +7,7 @@ import pytest
 import shapes
 
 from surface import DCPSurface
-from surface.deform.apply import NAMES
-from surface.deform.binding import address_table
+from surface.deform.binding import NAMES, address_table
 from surface.deform.deformation import Deformation
 
 

@@ -84,12 +84,24 @@ def test_cells_choose_by_limit_bias_and_what_is_stored() -> None:
     counts, rows = np.array([9, 10, -1, 9, 3, -1]), np.array([7, 7, 7, 13, 6, 6])
     recomputed, none = np.zeros(6, dtype=np.int32), np.zeros(6)
     chosen = updates.choose_recomputed(
-        6, affected, hits, none, counts, none.copy(), none.copy(), rows, 10, 6.0, 1.0, recomputed
+        6, affected, hits, none, counts, none.copy(), none.copy(), rows, np.full(6, -1), False, 10, 6.0, 1.0, recomputed
     )  # fmt: skip
     assert chosen == 2
     assert counts.tolist() == [10, updates.STORE, updates.STORE, updates.STORE, -1, -1]
     assert recomputed[:2].tolist() == [4, 5]
     assert (hits == 0).all()
+
+
+def test_positions_of_cells_with_factors_are_joined_again_however_few_points_move() -> None:
+    for slopes, again in ((False, [1]), (True, [])):
+        affected, hits, rows = np.arange(2, dtype=np.int32), np.array([1, 1]), np.full(2, 50)
+        counts, none, recomputed = np.array([4, 4]), np.zeros(2), np.full(2, -7, dtype=np.int32)
+        chosen = updates.choose_recomputed(
+            2, affected, hits, none, counts, none.copy(), none.copy(), rows, np.array([-1, 3]), slopes, 100, 6.0, 1.0,
+            recomputed,
+        )  # fmt: skip
+        assert recomputed[:chosen].tolist() == again
+        assert counts.tolist() == [5, 5 if slopes else updates.NOT_STORED]
 
 
 def test_cells_are_computed_again_before_they_drift_too_far() -> None:
@@ -98,7 +110,8 @@ def test_cells_are_computed_again_before_they_drift_too_far() -> None:
     counts, pull = np.array([4, 4, 4]), np.array([2.0, 2.0, 2.0])
     span, drift = np.array([8.0, 8.0, 8.0]), np.array([4e-7, 0.0, 5e-7])
     updates.choose_recomputed(
-        3, affected, hits, pull, counts, span, drift, rows, 100, 6.0, 1.0001e-6, np.zeros(3, dtype=np.int32)
+        3, affected, hits, pull, counts, span, drift, rows, np.full(3, 9), True, 100, 6.0, 1.0001e-6,
+        np.zeros(3, dtype=np.int32),
     )  # fmt: skip
     assert counts.tolist() == [5, updates.STORE, updates.STORE]
     assert span.tolist() == [10.0, 8.0, 8.0]
@@ -117,16 +130,29 @@ def test_affected_cells_rise_and_count_the_points_that_reach_them_and_how_far_th
 
 
 def test_the_surface_is_measured_again_when_it_may_have_shrunk_to_half() -> None:
-    points, extent = np.array([[0.0, 0, 0], [8, 1, 1]]), np.array([8.0, 0.0])
+    points, extent = np.array([[0.0, 0, 0], [8, 1, 1]]), np.array([0.0, 1.0, 9.0, 1e30, 0.0, 0.0, 0.0])
+    assert updates.measure(points, extent, True)
+    assert extent.tolist() == [8.0, 0.0, 8.0, 1e30, 4.0, 0.5, 0.5]
     step = np.array([[0.0, -1.5, 0.0]])
     points[1, 0] = 3.0
-    assert not updates.has_shrunk(points, step, 1, extent)
-    assert extent.tolist() == [8.0, 1.5]
-    assert updates.has_shrunk(points, step, 1, extent)
-    assert extent.tolist() == [3.0, 0.0]
+    assert not updates.has_left(points, step, 1, extent)
+    assert extent[:2].tolist() == [8.0, 1.5]
+    assert updates.has_left(points, step, 1, extent)
+    assert extent.tolist() == [3.0, 0.0, 3.0, 1e30, 1.5, 0.5, 0.5]
     points[1, 0] = 2.0
-    assert not updates.has_shrunk(points, step, 1, extent)
-    assert extent.tolist() == [2.0, 0.0]
+    assert not updates.has_left(points, step, 1, extent)
+    assert extent.tolist() == [2.0, 0.0, 3.0, 1e30, 1.5, 0.5, 0.5]
+    points[1, 0] = 1.4  # less than half of 3, though not of 2
+    assert updates.has_left(points, step, 1, extent)
+    assert extent[[0, 2]].tolist() == [1.4, 1.4]
+
+
+def test_a_surface_that_moves_further_than_it_is_large_gets_other_origins() -> None:
+    points, extent = np.array([[0.0, 0, 0], [8, 1, 1]]), np.zeros(7)
+    updates.measure(points, extent, True)
+    assert not updates.measure(points + np.array([0.0, 7.9, 0.0]), extent, False)
+    assert updates.measure(points + np.array([0.0, 8.1, 0.0]), extent, False)
+    assert extent.tolist() == [8.0, 0.0, 8.0, 0.0, 4.0, 8.6, 0.5]
 
 
 def test_only_points_that_really_move_are_stored() -> None:
@@ -148,7 +174,7 @@ def test_the_first_bad_row_is_found_ids_before_numbers() -> None:
     rows, points = np.zeros((3, 3)), np.zeros((5, 3))
 
     def first(ids: list[int], relative: bool = False) -> int:
-        return int(updates.first_invalid(np.array(ids), rows, relative, points))
+        return int(updates.first_invalid(np.array(ids), rows, relative, points, 3e38))
 
     assert first([0, 4, 2]) == updates.VALID
     assert first([0, 5, 2]) == -2
@@ -165,11 +191,11 @@ def test_rows_that_lead_beyond_float32_are_found(axis: int) -> None:
     rows, points, ids = np.zeros((2, 3)), np.zeros((5, 3)), np.array([1, 4])
     rows[1, axis] = -3e38
     points[4, axis] = -1e37
-    assert updates.first_invalid(ids, rows, False, points) == updates.VALID
-    assert updates.first_invalid(ids, rows, True, points) == 1
+    assert updates.first_invalid(ids, rows, False, points, 3e38) == updates.VALID
+    assert updates.first_invalid(ids, rows, True, points, 3e38) == 1
     rows[1, axis] = 3.001e38
-    assert updates.first_invalid(ids, rows, False, points) == 1
-    assert updates.first_invalid(ids, rows, True, points) == updates.VALID
+    assert updates.first_invalid(ids, rows, False, points, 3e38) == 1
+    assert updates.first_invalid(ids, rows, True, points, 3e38) == updates.VALID
 
 
 def test_from_some_part_of_the_points_on_everything_is_computed_again() -> None:

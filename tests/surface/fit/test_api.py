@@ -14,6 +14,7 @@ from surface.fit.eyes.lids import gazes_of
 from surface.fit.points.recipe import PartRecipe, Recipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.points.report import FitResult
+from surface.fit.points.strength import Strength
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names
@@ -142,7 +143,7 @@ def test_preparing_without_a_recipe_changes_nothing_and_with_one_strengthens_bli
     same = prepare(mesh, Recipe([]))
     np.testing.assert_array_equal(same.vertices, mesh.vertices)
     np.testing.assert_array_equal(same.deltas, mesh.deltas)
-    made = prepare(mesh, Recipe([], lips_close=0.25, blink=1.5))
+    made = prepare(mesh, Recipe([], lips_close=0.25, strengthened=[Strength("eyeBlink", 1.5)]))
     np.testing.assert_allclose(made.vertices, mesh.vertices + 0.25 * mesh.deltas[0])
     np.testing.assert_allclose(made.deltas, [0.75 * mesh.deltas[0], 1.5 * mesh.deltas[1]])
 

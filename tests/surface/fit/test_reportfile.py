@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fewer_points import fewer_points
 from slit_sheet import slit_sheet
 from small_head import small_head
 
@@ -186,8 +187,8 @@ def result():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("surface.fit.source.uvcheck.SQUEEZED_SHARE", 1.0)  # the pit stays squeezed: it is a fold
         patch.setattr("surface.fit.source.owncharts.UNEVEN", np.inf)
-        patch.setattr("surface.fit.features.generic.FINEST", 0.9)  # fewer points take a quarter of the time
-        return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken for mm",)), "sheet", lambda part, done: None)
+        with fewer_points():
+            return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken for mm",)), "sheet", lambda *_: None)
 
 
 @pytest.fixture(scope="module")

@@ -83,7 +83,7 @@ def test_lids_touch_the_eyeball_and_do_not_cut_it_at_any_gaze(head, loops, name)
             head.pose(head.values(looking(yaw, pitch) | shapes))
             for side, ids in enumerate(middles):
                 assert above_eye(head, side, face.vertices[ids]).max() < (1.0 if shut else 0.7)
-                assert eye_cut(head, side, "face") < 0.35
+                assert eye_cut(head, side, "face") < 0.38
                 assert eye_cut(head, side, "sockets") < (0.65 if shut else 0.4)
 
 
@@ -143,7 +143,7 @@ def test_the_measure_of_the_lips_gap_finds_one(head):
 @pytest.mark.parametrize("pair", HARD, ids=" ".join)
 def test_no_two_parameters_push_lips_or_lids_into_each_other(head, lips, lids, pair):
     head.pose(head.values(dict.fromkeys(pair, 1.0)))
-    assert crossing(*(lids[pair[0][8:]] if pair[0].startswith("eyeBlink") else lips))[0] < 0.5
+    assert crossing(*(lids[pair[0][8:]] if pair[0].startswith("eyeBlink") else lips))[0] < 0.55
 
 
 @pytest.mark.parametrize("side", ["Left", "Right"])

@@ -7,6 +7,7 @@ import pytest
 
 from surface import Domain, Slit
 from surface.mesh import trim
+from surface.mesh.mesh import border_edges
 from surface.mesh.trim import Flat
 from tests.surface import shapes
 
@@ -247,3 +248,13 @@ def test_a_triangle_that_turns_no_way_is_kept_inside_the_mesh() -> None:
     assert flat.triangles.tolist() == triangles.tolist()
     chain = np.array([[0, 2, 3], [0, 1, 2]])
     assert trim._without_flat(Flat(uv, chain, np.arange(2))).owner.tolist() == [0]
+
+
+@pytest.mark.parametrize("across", [0.633, 0.62, 0.5001, 0.7])
+def test_the_border_runs_through_marks_on_straight_sides(across: float) -> None:
+    for at in np.linspace(0.13, 0.87, 13):
+        ring, marks = [[0.1, 0.1], [across, 0.1], [across, 0.9], [0.1, 0.9]], np.array([[across, at], [0.1, 1.0 - at]])
+        flat = trim.trim(grid(8), Domain((0, 1, 0, 1), loops=[ring], marks=marks), (1.0, 1.0))
+        border = flat.uv[np.unique(border_edges(flat.triangles))]
+        assert (border[:, None] == marks).all(axis=2).any(axis=0).all()
+        assert areas(flat).sum() == pytest.approx(0.8 * (across - 0.1))

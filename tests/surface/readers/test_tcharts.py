@@ -110,3 +110,51 @@ def test_a_face_that_is_no_rectangle_is_named(tmp_path: Path) -> None:
     file.write_text(text)
     with pytest.raises(SurfaceFileError, match=r"line \d+: knot intervals on opposite sides of face \d+ do not add up"):
         read_surface(file)
+
+
+def inside_limit(item: NamedSurface, at: np.ndarray) -> np.ndarray:
+    """(k, 3) the surface at places (k, 2) on its loops, from inside."""
+    out = np.full((len(at), 3), np.nan)
+    for way in ((1, 1), (1, -1), (-1, 1), (-1, -1)):
+        beside = at + 1e-9 * np.array(way)
+        known = item.domain.inside(beside) & np.isnan(out[:, 0])
+        out[known] = item.surface.evaluate(beside[known])
+    return out
+
+
+def test_seams_lie_along_all_borders_and_are_one_line_in_space(cube: NamedSurface) -> None:
+    length = sum(np.abs(np.diff(line, axis=0)).sum() for pair in cube.seams for line in pair)
+    around = sum(np.abs(np.asarray(loop) - np.roll(loop, 1, axis=0)).sum() for loop in cube.domain.loops)
+    assert length == pytest.approx(around)  # the form is closed
+    share = np.linspace(0.0, 1.0, 5)[:, None]
+    for pair in cube.seams:
+        places = [np.concatenate([a + share * (b - a) for a, b in pairwise(line)]) for line in pair]
+        first, second = (inside_limit(cube, at) for at in places)
+        np.testing.assert_allclose(first, second, atol=1e-6)
+
+
+def test_corners_follow_seams_and_all_places_of_one_follow_the_same(cube: NamedSurface) -> None:
+    corners = [k for k, (line, _) in enumerate(cube.seams) if np.array_equal(line[0], line[-1]) and len(line) == 2]
+    assert corners == list(range(corners[0], len(cube.seams)))
+    leads = {tuple(cube.seams[k][0][0]) for k in corners}
+    followers = [tuple(cube.seams[k][1][0]) for k in corners]
+    assert len(set(followers)) == len(followers) and not leads & set(followers)
+    at = [inside_limit(cube, np.array(places)) for places in (list(leads), followers)]
+    assert cKDTree(at[0]).query(at[1])[0].max() < 1e-6
+
+
+def test_charts_lie_further_apart_than_a_face_is_wide(cube: NamedSurface) -> None:
+    boxes = sorted((np.min(loop, axis=0)[0], np.max(loop, axis=0)[0]) for loop in map(np.asarray, cube.domain.loops))
+    ends = np.maximum.accumulate([high for _, high in boxes])
+    apart = [low - end for (low, _), end in zip(boxes[1:], ends, strict=False) if low > end]
+    assert len(apart) > 20 and min(apart) >= 1.0
+
+
+def test_short_knot_intervals_are_scaled_and_the_form_stays(tmp_path: Path) -> None:
+    text, found = cube_tsm(2), []
+    for length in ("1", "0.001"):
+        rows = [f"{row[:-2]} {length}" if row.startswith("e ") else row for row in text.splitlines()]
+        (tmp_path / "cube.tsm").write_text("\n".join(rows) + "\n")
+        found += read_surface(tmp_path / "cube.tsm")
+    assert found[0].domain.rect == pytest.approx(found[1].domain.rect)
+    np.testing.assert_allclose(found[0].surface.points, found[1].surface.points, atol=1e-9)

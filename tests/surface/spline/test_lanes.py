@@ -36,6 +36,27 @@ def test_every_operation() -> None:
     assert np.array_equal(out[64:].reshape(8, 3), np.stack([x, b, np.full(8, number)], axis=1))
 
 
+def test_the_greatest_of_three_and_whether_any_lane_reaches_a_number() -> None:
+    @njit
+    def largest(a, b, c, out):
+        lanes.store(out, 0, lanes.most_of(lanes.load(a, 0), lanes.load(b, 0), lanes.load(c, 0)))
+
+    @njit
+    def any_reaches(a, number):
+        return lanes.reaches(lanes.load(a, 0), number)
+
+    rng, out = np.random.default_rng(1), np.zeros(8, "f4")
+    a, b, c = rng.normal(size=(3, 8)).astype("f4")
+    a[2] = b[2] = c[2] = 0.0
+    largest(a, b, c, out)
+    assert np.array_equal(out, np.maximum(np.abs([a, b, c]).max(axis=0), np.float32(1e-37)))
+    assert any_reaches(out, out.max()) and not any_reaches(out, np.float32(1.001) * out.max())
+    for k in range(8):
+        a[:] = 1.0
+        a[k] = np.nan
+        assert any_reaches(a, np.float32(2.0))
+
+
 @pytest.mark.parametrize("fast", sorted({False, lanes.PICKS_FAST}))
 def test_lanes_are_picked_with_and_without_an_instruction_for_it(fast: bool, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lanes, "PICKS_FAST", fast)

@@ -8,6 +8,17 @@ in vec2 v_uv;
 
 out vec4 colour;
 
+#ifdef FRECKLES
+in float v_freckles;
+
+// Cover of freckles: where two layers of noise, which repeat at different places, are both high.
+float freckle() {
+    float one = texture(detail, 4.37 * v_uv + vec2(0.31, 0.17)).w;
+    float two = texture(detail, 2.63 * v_uv.yx + vec2(0.05, 0.43)).w;
+    return smoothstep(1.30, 1.50, one + two + 0.16 * v_freckles) * min(2.0 * v_freckles, 1.0);
+}
+#endif
+
 #ifdef SEAMS
 // The shell of a mask is made of plates: gaps along curves in longitude and latitude of the skull.
 float gap(float away, float half_width) {
@@ -38,6 +49,9 @@ void main() {
     narrow *= narrow;
     vec3 lit = v_diffuse * (1.0 + grain.w * vec3(0.7, 1.3, 1.5));
     lit += key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w);
+#ifdef FRECKLES
+    lit *= mix(vec3(1.0), vec3(0.76, 0.62, 0.52), freckle());
+#endif
 #ifdef SEAMS
     lit *= 1.0 - 0.88 * min(seams(v_uv / DETAIL_PER_RADIAN), 1.0);
 #endif

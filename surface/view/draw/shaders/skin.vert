@@ -12,6 +12,10 @@ out vec3 v_diffuse;
 out vec4 v_normal_wide;     // normal, strength of the wide highlight
 out vec4 v_half_narrow;     // half way between key light and viewer, strength of the narrow highlight
 out vec2 v_uv;
+#ifdef FRECKLES
+in float freckles;          // how many grow here, 0..1
+out float v_freckles;
+#endif
 
 void main() {
     gl_Position = view_projection * vec4(position, 1.0);
@@ -23,4 +27,7 @@ void main() {
     v_normal_wide = vec4(normal, WIDE * strength);
     v_half_narrow = vec4(normalize(key_direction + v), NARROW * surface_uv_gloss.z * strength);
     v_uv = surface_uv_gloss.xy;
+#ifdef FRECKLES
+    v_freckles = freckles;
+#endif
 }

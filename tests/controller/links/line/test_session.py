@@ -83,7 +83,7 @@ def test_gaze_and_expression_arrive(talk: Talk) -> None:
     talk.say("EXPR happiness 1")
     values = talk.run(2.0)
     assert values[P.index("headYaw")] * 60 + values[P.index("leftEyeYaw")] * 35 == pytest.approx(20, abs=0.1)
-    assert values[P.index("mouthSmileLeft")] == pytest.approx(0.85, abs=1e-3)
+    assert values[P.index("mouthSmileLeft")] == pytest.approx(0.9, abs=1e-3)
     talk.say("NEUTRAL 0")
     assert np.abs(talk.run(2.0)).max() < 1e-3
 

@@ -15,6 +15,7 @@ from surface.fit.source.textures import Samples, linear
 from surface.head.model.data import PartData
 from surface.readers.meshdata import Material
 
+pytestmark = pytest.mark.usefixtures("given_charts")
 BROWN, WHITE, SKIN = (120, 70, 40), (220, 215, 205), (200, 150, 120)
 
 

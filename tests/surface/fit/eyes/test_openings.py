@@ -1,6 +1,7 @@
 """Openings between lids, their edges, and eyeballs fitted behind them."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -88,6 +89,38 @@ def test_the_edge_of_a_lid_is_before_the_hole_where_a_lining_leads_back() -> Non
     skin = np.ones(len(faces), bool)
     np.testing.assert_array_equal(module._edge(mesh, skin, at[0]), at[1])
     np.testing.assert_array_equal(module._edge(mesh, skin, at[1]), at[1])  # without a lining it is the hole
+
+
+def lined_hole(lining: int, count: int, hole: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Points, triangles, the hole and the edge of a round opening: from a hole of its own number of vertices so many
+    rings of ``count`` lead forward and inward to the edge, and two more outward."""
+    lead = [(6.6 - 1.6 * t, -1.6 + 1.6 * t) for t in np.linspace(0.0, 1.0, lining + 1)]
+    rings = [(r, z, hole if k == 0 else count) for k, (r, z) in enumerate([*lead, (9.0, 1.0), (14.0, 0.0)])]
+    points, angles = [], []
+    for r, z, n in rings:
+        a = np.linspace(0, 2 * np.pi, n, endpoint=False) + 0.003
+        points.append(np.column_stack([r * np.cos(a), r * np.sin(a), z + 0 * a]))
+        angles.append(a)
+    starts = np.cumsum([0, *(len(p) for p in points)])
+    faces = []
+    for k, (a, b) in enumerate(pairwise(angles)):
+        low, high, i, j = starts[k], starts[k + 1], 0, 0
+        while i < len(a) or j < len(b):
+            inner = j == len(b) or (i < len(a) and a[i] <= b[j])
+            near, far = low + i % len(a), high + j % len(b)
+            faces.append([near, low + (i + 1) % len(a), far, -1] if inner else [near, high + (j + 1) % len(b), far, -1])
+            i, j = i + inner, j + (not inner)
+    edge = np.arange(starts[lining], starts[lining + 1])
+    return np.vstack(points), np.array(faces), np.arange(hole), edge
+
+
+@pytest.mark.parametrize(("lining", "count", "hole"), [(2, 40, 40), (9, 40, 40), (3, 40, 131), (9, 61, 140)])
+def test_edges_are_found_on_fine_meshes_and_about_holes_finer_than_the_skin(lining: int, count: int, hole: int) -> None:
+    points, faces, rim, edge = lined_hole(lining, count, hole)
+    mesh = replace(face(shapes=False), vertices=points, faces=faces, deltas=np.zeros((0, len(points), 3)))
+    found = module._edge(mesh, np.ones(len(faces), bool), rim)
+    beside = np.abs(points[found, 0]) < (1.0 - 2.0 * module.CORNERS) * 6.6
+    assert np.isin(found[beside], edge).all() and beside.sum() > 0.6 * len(edge) * min(1.0, 4 * hole / count)
 
 
 def test_lids_are_where_shapes_slide_them(plain) -> None:

@@ -5,7 +5,7 @@ import pytest
 from face_measures import eye_height
 from slit_sheet import slit_sheet
 
-from surface.fit.points.lid_seating import Eyeball, close_lips, draw_brows, fit_sphere, seat_lids, strengthen
+from surface.fit.points.lid_seating import Eyeball, close_lips, fit_sphere, seat_lids
 from surface.fit.source.mesh import FitMesh
 
 OLD = Eyeball((30.0, 36.0, 80.0), 15.0)
@@ -79,22 +79,6 @@ def test_closing_lips_keeps_the_closed_pose():
     closed = close_lips(mesh, 0.1, "jawOpen")
     np.testing.assert_allclose(closed.vertices + closed.deltas[0], mesh.vertices + mesh.deltas[0], atol=1e-12)
     assert close_lips(mesh, 0.1, "mouthClose") is mesh
-
-
-def test_strengthening_touches_the_named_shapes_only():
-    mesh = strengthen(slit_sheet(), "jaw", 1.5)
-    np.testing.assert_allclose(mesh.deltas[0], 1.5 * slit_sheet().deltas[0])
-    np.testing.assert_array_equal(mesh.deltas[1], slit_sheet().deltas[1])
-
-
-def test_the_heads_of_the_brows_are_drawn_in_on_their_own_side():
-    points = np.array([[13.0, 59.0, 105.0], [-13.0, 59.0, 105.0], [50.0, 59.0, 95.0]])
-    mesh = FitMesh(points, np.zeros((0, 4), np.int64), np.zeros((0, 2)), np.zeros((0, 4), np.int64),
-                   ("browDown_L", "browDown_R"), np.zeros((2, 3, 3)))  # fmt: skip
-    left, right = draw_brows(mesh, "browDown", (13.0, 59.0), (11.0, 9.0), (-2.8, -1.8, 0.6)).deltas
-    np.testing.assert_allclose(left[0], [-2.8, -1.8, 0.6])
-    np.testing.assert_allclose(right[1], [2.8, -1.8, 0.6])
-    assert np.abs(left[1:]).max() < 0.02
 
 
 FURTHER = Eyeball((30.0, 36.0, 88.0), 12.0)
@@ -188,26 +172,6 @@ def test_no_share_of_a_closing_shape_is_no_change_and_half_is_half() -> None:
     half = close_lips(mesh, 0.5, "mouthSmile_L")
     np.testing.assert_allclose(half.vertices - mesh.vertices, 0.5 * mesh.deltas[1], atol=1e-12)
     np.testing.assert_allclose(half.deltas, mesh.deltas * np.array([1.0, 0.5])[:, None, None])
-
-
-def test_what_follows_the_brows_heads_fades_with_the_distance_and_towards_the_sides_of_the_head() -> None:
-    near = np.exp(-0.5)
-    places = {  # by place: share of the whole move
-        (13.0, 59.0, 105.0): 1.0, (24.0, 59.0, 105.0): near, (13.0, 68.0, 105.0): near, (13.0, 50.0, 90.0): near,
-        (13.0, 59.0, 75.0): 0.5, (13.0, 59.0, 67.5): 0.15625, (13.0, 59.0, 60.0): 0.0,
-        (3.5, 59.0, 105.0): 0.5 * np.exp(-0.5 * (9.5 / 11) ** 2), (-6.0, 59.0, 105.0): 0.0,
-    }  # fmt: skip
-    points = np.array(list(places))
-    names = ("browDownRight", "browDownLeft", "browUp", "browDown")
-    empty = np.zeros((0, 4), np.int64)
-    for side, shape in ((-1.0, 0), (1.0, 1), (1.0, 3)):
-        before = np.full((4, len(points), 3), 0.25)
-        mesh = FitMesh(points * [side, 1.0, 1.0], empty, np.zeros((0, 2)), empty, names, before.copy())
-        after = draw_brows(mesh, "browDown", (13.0, 59.0), (11.0, 9.0), (-2.8, -1.8, 0.6)).deltas
-        wanted = np.array(list(places.values()))[:, None] * [-2.8 * side, -1.8, 0.6]
-        np.testing.assert_allclose(after[shape] - before[shape], wanted, atol=1e-9)
-        np.testing.assert_array_equal(after[2], before[2])
-        np.testing.assert_array_equal(mesh.deltas, before)
 
 
 def test_the_front_of_a_ball_has_no_kink_where_it_is_held() -> None:

@@ -4,7 +4,8 @@ from itertools import product
 
 import numpy as np
 import pytest
-from ball_head import ball, grid
+from bag_head import bag, mesh_of, sphere
+from ball_head import grid
 
 from surface.fit.source import regions as module
 from surface.fit.source.mesh import FitMesh
@@ -26,13 +27,6 @@ def fewer_views(monkeypatch) -> None:
     monkeypatch.setattr(module, "PIXELS", 160)
 
 
-def mesh_of(points, faces, moves=None) -> FitMesh:
-    faces = np.asarray(faces, np.int64)
-    faces = faces if faces.shape[1] == 4 else np.pad(faces, ((0, 0), (0, 1)), constant_values=-1)
-    deltas = np.zeros((0, len(points), 3)) if moves is None else moves[None]
-    return FitMesh(np.asarray(points, float), faces, np.zeros((0, 2)), 0 * faces - 1, ("a",) * len(deltas), deltas)
-
-
 def every(mesh: FitMesh) -> np.ndarray:
     return np.arange(len(mesh.faces))
 
@@ -41,14 +35,6 @@ def sheet(rows: int = 4, columns: int = 4, jitter: float = 0.0) -> FitMesh:
     uv, tri = grid(rows, columns)
     uv = uv + np.random.default_rng(0).uniform(-jitter, jitter, uv.shape)
     return mesh_of(np.column_stack([uv * [10 * (columns - 1), 10 * (rows - 1)], 0 * uv[:, 0]]), tri)
-
-
-def sphere(radius: float = 80.0, rows: int = 25, columns: int = 33) -> FitMesh:
-    """A closed ball of quads and triangles."""
-    points, _, tri = ball(radius, rows, columns)
-    _, first, same = np.unique(np.round(points, 6), axis=0, return_index=True, return_inverse=True)
-    tri = same.ravel()[tri]
-    return mesh_of(points[first], tri[(tri != np.roll(tri, 1, axis=1)).all(axis=1)])
 
 
 def test_corners_that_hang_together_by_edges_are_one_point() -> None:
@@ -165,9 +151,9 @@ def test_a_ball_hides_what_lies_in_it_and_hides_half_of_itself() -> None:
         np.vstack([outer.faces, np.where(inner.faces < 0, -1, inner.faces + len(outer.vertices))]),
     )
     own = np.arange(len(outer.faces))
-    sight = module._sight(both, every(both), np.zeros(0, int))
+    sight = module.sight(both, every(both), np.zeros(0, int))
     assert sight[own].min() > 0.95 and sight[len(own) :].max() == 0
-    alone = module._sight(both, np.arange(len(own), len(both.faces)), own)
+    alone = module.sight(both, np.arange(len(own), len(both.faces)), own)
     assert alone.max() == 0  # others hide, too
 
 
@@ -176,34 +162,8 @@ def test_half_a_bowl_is_seen_from_the_directions_before_it() -> None:
     floor = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0.0]])
     wall = np.array([[-1.0, -60, -2], [-1, 60, -2], [-1, 0, 90.0]])
     mesh = mesh_of(np.vstack([floor, wall]), [[0, 1, 2], [3, 4, 5]])
-    sight = module._sight(mesh, np.array([0]), np.array([1]))
+    sight = module.sight(mesh, np.array([0]), np.array([1]))
     assert 0.4 < sight[0] < 0.9
-
-
-def bag(depth: float = 60.0) -> FitMesh:
-    """A ball with a round mouth, from which a lining goes back into it."""
-    outer = sphere()
-    middle = outer.vertices[outer.faces[:, :3]].mean(axis=1)
-    hole = (middle[:, 2] > 0) & (np.hypot(middle[:, 0], middle[:, 1] + 30) < 22)
-    kept = outer.faces[~hole]
-    edges = kept[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    have = {tuple(e) for e in edges.tolist()}
-    rim = {b: a for a, b in have if (b, a) not in have}
-    loop = [next(iter(rim))]
-    while (after := rim[loop[-1]]) != loop[0]:
-        loop.append(after)
-    points, faces, last = [outer.vertices], [kept], np.array(loop)
-    count = len(outer.vertices)
-    for k in (0.25, 0.5, 0.75, 1.0):
-        points.append(outer.vertices[loop] * [1, 1, 1] - [0, 0, depth * k])
-        new = count + np.arange(len(loop))
-        count += len(loop)
-        a, b, c, d = last, np.roll(last, -1), np.roll(new, -1), new
-        faces += [np.column_stack([a, b, c, 0 * a - 1]), np.column_stack([a, c, d, 0 * a - 1])]
-        last = new
-    points.append(points[-1].mean(axis=0, keepdims=True))
-    faces.append(np.column_stack([last, np.roll(last, -1), np.full(len(last), count), 0 * last - 1]))
-    return mesh_of(np.vstack(points), np.vstack(faces))
 
 
 def test_the_front_comes_first_then_the_back_then_what_lines_the_mouth() -> None:

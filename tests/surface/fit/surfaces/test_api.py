@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,9 @@ from surface import Domain
 from surface.base.errors import FitError, SurfaceFileError
 from surface.export import export_head
 from surface.fit.surfaces import SurfaceOptions, fit_surfaces, head_of
-from surface.head import Head
+from surface.head import Group, Head
+from surface.head.model.file import load_data
+from surface.head.posing.part import HeadPart
 from surface.readers import NamedSurface, write_surfaces
 
 MM = SurfaceOptions(unit="mm", up="y", forward="z")
@@ -82,11 +85,44 @@ def test_two_balls_are_eyes_that_turn() -> None:
     assert np.linalg.norm(head.part("ball_a").vertices - before, axis=1).max() > 1.0
 
 
-def test_a_spline_with_star_points_is_told_as_fitted(tmp_path: Path) -> None:
+def crack(part: HeadPart) -> tuple[float, float]:
+    """Of a part of a closed form: how far edges with one triangle lie from the next such edge, at most, and the angle
+    between the normals there, in degrees. Edges whose ends lie at the same places are joined."""
+    places, normals = part.vertices.astype(float), part.normals.astype(float)
+    _, back = np.unique(np.round(places / 1e-4), axis=0, return_inverse=True)
+    own = part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    ends = np.sort(back.ravel()[own], axis=1)
+    _, edge, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    own = own[(count[edge.ravel()] == 1) & (ends[:, 0] != ends[:, 1])]
+    a, along = places[own[:, 0]], places[own[:, 1]] - places[own[:, 0]]
+    gap = angle = 0.0
+    for k in range(len(own)):
+        middle = a[k] + 0.5 * along[k]
+        t = np.clip(((middle - a) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+        away = np.linalg.norm(a + t[:, None] * along - middle, axis=1)
+        away[k] = np.inf
+        near = int(away.argmin())
+        one, two = normals[own[k]].sum(axis=0), (1 - t[near]) * normals[own[near, 0]] + t[near] * normals[own[near, 1]]
+        cosine = one @ two / np.linalg.norm(one) / np.linalg.norm(two)
+        gap, angle = max(gap, away[near]), max(angle, float(np.degrees(np.arccos(min(cosine, 1.0)))))
+    return gap, angle
+
+
+def test_a_spline_with_star_points_is_told_as_fitted_and_sewn_in_every_pose(tmp_path: Path) -> None:
     (tmp_path / "cube.tsm").write_text(cube_tsm())
     report = fit_surfaces(tmp_path / "cube.tsm", tmp_path / "h", name="h", options=MM)
     assert 0 < report.parts[0].deviation_mm < 0.3
     assert "exact but near star points, there within" in report.lines()[0]
+    data = load_data(tmp_path / "h")
+    face, bend = data.parts[0], np.array([[0.2, 0.1, 0.0], [-0.3, 0.1, 0.2], [0.0, 0.4, -0.2]])
+    moves = (face.points @ bend).astype(np.float32)  # linear, so that charts still meet
+    group = Group("jawOpen", np.arange(len(moves), dtype=np.int32), moves)
+    head, size = Head(replace(data, parts=[replace(face, groups=[group])])), float(np.ptp(face.points, axis=0).max())
+    for amount in (0.0, 1.0):
+        head.pose(head.values({"jawOpen": amount}))
+        gap, angle = crack(head.part("face"))
+        assert gap < 1e-5 * size and angle < 0.5
+    assert len(data.seams) > 50 and crack(Head(replace(data, seams=[])).part("face"))[0] > 1e-4 * size
 
 
 def test_a_head_without_eyes_and_groups_runs_and_is_exported(tmp_path: Path) -> None:

@@ -90,11 +90,13 @@ def test_groups_move_the_head(tmp_path: Path) -> None:
     assert 2 < (head.parts[0].vertices - before)[:, 1].max() < 5
 
 
-def test_charts_of_a_t_spline_move_as_one(tmp_path: Path) -> None:
-    (tmp_path / "cube.tsm").write_text(cube_tsm())
+def test_charts_of_a_t_spline_with_star_points_move_as_one(tmp_path: Path) -> None:
+    (tmp_path / "cube.tsm").write_text(cube_tsm(3))
     (tmp_path / "g.toml").write_text(SMILE + "at = [50, 60, 50]\nradius = 70\nmove = [9, 9, 0]\n")
     options = SurfaceOptions(unit="mm", up="y", forward="z", groups=(tmp_path / "g.toml",))
-    fit_surfaces(tmp_path / "cube.tsm", tmp_path / "h", name="h", options=options)
+    report = fit_surfaces(tmp_path / "cube.tsm", tmp_path / "h", name="h", options=options)
+    assert 0 < report.parts[0].deviation_mm < 0.5
+    assert "exact but near star points, there within" in report.lines()[0]
     part = Head.load(tmp_path / "h").data.parts[0]
     shift = np.zeros_like(part.points)
     shift[part.groups[0].ids] = part.groups[0].moves

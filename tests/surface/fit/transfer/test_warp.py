@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.interpolate import RBFInterpolator
 
 from surface.fit.transfer.warp import Warp
 
@@ -34,6 +35,26 @@ def test_derivatives_of_a_bent_map_are_those_between_two_places() -> None:
     at, k = np.array([[3.0, -4.0, 5.0]]), 0.01
     there = np.stack([(warp(at + k * e) - warp(at - k * e)) / (2 * k) for e in np.eye(3)], axis=2)
     np.testing.assert_allclose(warp.jacobians(at), there, atol=2e-4)
+
+
+def test_normals_of_a_bent_map_stand_on_what_was_beside_a_point() -> None:
+    warp = Warp(POINTS, bent(POINTS), np.ones(40), 10.0)
+    at = np.vstack([POINTS[:4], np.random.default_rng(4).uniform(-40, 40, (4, 3))])
+    moved, normals = warp.turned(at, AXES)
+    np.testing.assert_allclose(moved, warp(at), atol=1e-9)
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-9)
+    for axis in np.eye(3):
+        beside = 1e-3 * np.cross(AXES, axis)
+        there = warp(at + beside) - warp(at - beside)
+        assert np.abs((there * normals).sum(axis=1)).max() < 1e-4 * np.linalg.norm(there, axis=1).max()
+
+
+@pytest.mark.parametrize("stiffness", [10.0, 3000.0])
+def test_it_is_the_smoothing_spline_of_scipy(stiffness: float) -> None:
+    weight = np.random.default_rng(2).uniform(0.1, 30.0, 40)
+    spline = RBFInterpolator(POINTS, bent(POINTS) - POINTS, smoothing=stiffness / weight, kernel="thin_plate_spline")
+    at = np.vstack([POINTS[:5], np.random.default_rng(3).uniform(-90, 90, (20, 3))])
+    np.testing.assert_allclose(Warp(POINTS, bent(POINTS), weight, stiffness)(at), at + spline(at), atol=1e-8)
 
 
 def test_what_weighs_more_is_followed_more_closely_and_what_weighs_nothing_hardly() -> None:

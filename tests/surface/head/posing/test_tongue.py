@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from surface.head import Head
+from surface.head.posing.part import SkinPart
 from surface.head.posing.tongue import find_rise
 
 ROOT = Path(__file__).parents[4]
@@ -52,3 +53,28 @@ def test_a_station_rises_over_what_is_below_it_and_less_over_what_is_beside() ->
     most = find_rise(under, np.array([[0.0, 2.0, 0.0]]), 5.0, 0.5, 0.4, rise)
     np.testing.assert_allclose(rise, [2.5, 2.5 * (1.0 - 0.64) ** 2, 0.0])
     assert most == 2.5
+
+
+def test_only_what_is_near_lifts_a_station() -> None:
+    rng = np.random.default_rng(2)
+    under, below = rng.uniform(-10, 10, (40, 3)), rng.uniform(-10, 10, (300, 3))
+    below, rise = below[np.argsort(below[:, 2])], np.zeros(40)
+    find_rise(under, below, 3.0, 0.5, 0.4, rise)
+    need = below[:, 1] + 0.5 - under[:, None, 1]
+    near = np.clip(need + 0.4, 0.0, 0.8)
+    need = np.where(need > 0.4, need, near * near / 1.6)
+    square = ((under[:, None, [0, 2]] - below[:, [0, 2]]) ** 2).sum(axis=2) / 9.0
+    np.testing.assert_allclose(rise, (need * np.maximum(1.0 - square, 0.0) ** 2).max(axis=1), atol=1e-12)
+
+
+def test_a_tongue_in_the_mouth_is_not_computed_again_where_lips_move(head: Head) -> None:
+    tongue = head.part("tongue")
+    assert isinstance(tongue, SkinPart)
+    head.pose(head.values({"mouthSmileLeft": 0.2}))
+    before = tongue.rig.version
+    head.pose(head.values({"mouthSmileLeft": 0.9}))
+    assert tongue.rig.version == before
+    head.pose(head.values({"tongueOut": 0.9, "jawOpen": 0.5}))
+    put_out = tongue.rig.points.copy()
+    head.pose(head.values({"tongueOut": 0.9, "jawOpen": 0.5, "mouthShrugLower": 1.0}))
+    assert np.abs(tongue.rig.points - put_out).max() > 0.1

@@ -155,9 +155,9 @@ def test_uniforms_follow_the_theme_and_the_openings() -> None:
 
 
 def test_flags_and_order_of_materials() -> None:
-    assert {name for name, one in MATERIALS.items() if one.two_sided} == {"lash", "brow", "mouth"}
+    assert {name for name, one in MATERIALS.items() if one.two_sided} == {"lash", "brow", "mouth", "tress", "cloth"}
     assert {name for name, one in MATERIALS.items() if one.blended} == {"lash", "brow"}
-    ordered = ["skin", "eye", "lash", "teeth", "tongue", "gums", "mouth"]
+    ordered = ["strand", "cloth", "skin", "eye", "lash", "teeth", "tongue", "gums", "mouth"]
     assert [of(name).order for name in ordered] == sorted({of(name).order for name in ordered})
     assert of("brow").order == of("lash").order
 

@@ -1,0 +1,224 @@
+"""Reads persons: files that say how somebody looks, and mixtures of several."""
+
+from __future__ import annotations
+
+import difflib
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+from pydantic import Field
+
+from controller.base.config import Number, Settings, Share, load
+from controller.base.errors import ConfigError, ParameterError
+from controller.base.paths import config_dir, find_config
+
+if TYPE_CHECKING:
+    from surface.head.model.look import Colour, Look, Worn  # start-up: the body reads stages and draws nothing
+
+HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
+PersonName = str | dict[str, Share]
+WORN = ("hair", "beard", "clothes")
+PERSON_HINT = "--person maple, or --person maple=0.5,oak=0.5"
+
+
+class SkinSettings(Settings):
+    """Skin; see :class:`surface.head.model.look.Look`."""
+
+    melanin: Share = 0.2
+    blood: Annotated[Number, Field(ge=-1, le=1)] = 0.0
+    redness: Annotated[Number, Field(ge=0, le=2)] = 1.0
+    freckles: Share = 0.0
+    age: Share = 0.0
+    lips: HexColour | None = None
+
+
+class EyeSettings(Settings):
+    """Eyes."""
+
+    iris: HexColour | None = None
+
+
+class BrowSettings(Settings):
+    """Brows."""
+
+    colour: HexColour | None = None
+    strength: Annotated[Number, Field(ge=0, le=1.5)] = 1.0
+
+
+class WornSettings(Settings):
+    """Hair, a beard or clothes: a ``style`` of configs/wardrobe, or a file of one's own."""
+
+    style: str
+    colour: HexColour = "#2b1d14"
+    tips: HexColour | None = None
+    gloss: Share = 1.0
+
+
+class PersonSettings(Settings):
+    """The contents of a person's file."""
+
+    name: str
+    description: str = ""
+    identity: dict[str, Share] = {}
+    skin: SkinSettings = SkinSettings()
+    eyes: EyeSettings = EyeSettings()
+    brows: BrowSettings = BrowSettings()
+    hair: WornSettings | None = None
+    beard: WornSettings | None = None
+    clothes: WornSettings | None = None
+
+    def look(self, beside: Path | None = None) -> Look:
+        """Colours of this person, linear, and what is worn; ``beside`` : the person's file.
+
+        Raises ConfigError: no such style.
+        """
+        from surface.head.model.look import Look  # start-up: the body reads stages and draws nothing
+
+        skin = self.skin
+        worn = [_worn(kind, each, beside) for kind in WORN if (each := getattr(self, kind)) is not None]
+        return Look(
+            melanin=skin.melanin,
+            blood=skin.blood,
+            redness=skin.redness,
+            freckles=skin.freckles,
+            age=skin.age,
+            lips=linear(skin.lips),
+            iris=linear(self.eyes.iris),
+            brow=linear(self.brows.colour),
+            brow_strength=self.brows.strength,
+            worn=tuple(worn),
+        )
+
+
+def _worn(kind: str, settings: WornSettings, beside: Path | None) -> Worn:
+    from surface.head.model.look import Worn  # start-up: as Look
+
+    colour = linear(settings.colour) or (0.0, 0.0, 0.0)
+    return Worn(find_style(kind, settings.style, beside), colour, linear(settings.tips), settings.gloss)
+
+
+def find_style(kind: str, style: str, beside: Path | None = None) -> Path:
+    """The file of a style of hair, beards or clothes: a path, also relative to the folder of ``beside``, or a name.
+
+    Raises ConfigError that lists the styles there are.
+    """
+    folder = config_dir() / "wardrobe"
+    places = [Path(style), folder / f"{kind}-{style}.npz"]
+    if beside is not None:
+        places.insert(0, beside.parent / style)
+    for place in places:
+        if os.path.isfile(place):  # unlike Path.is_file, false for what no file system takes as a name
+            return place
+    known = sorted(path.stem.removeprefix(f"{kind}-") for path in folder.glob(f"{kind}-*.npz"))
+    close = difflib.get_close_matches(style, known, n=1)
+    guess = f", did you mean {close[0]!r}?" if close else ""
+    raise ConfigError(f"{kind}.style: no {kind} {style!r}{guess}", hint=f"there are {', '.join(known)}, or give a path")
+
+
+@dataclass(frozen=True)
+class Person:
+    """A person's file, read and checked. path : the file. look : what it says, found and decoded."""
+
+    path: Path
+    settings: PersonSettings
+
+    @property
+    def look(self) -> Look:
+        """Colours, and what is worn."""
+        return self.settings.look(self.path)
+
+
+def load_person(path: Path) -> Person:
+    """Read one person. Raises ConfigError that lists every fault of the file."""
+
+    def check(settings: PersonSettings) -> list[str]:
+        return [fault for kind in WORN if (fault := _style_fault(kind, getattr(settings, kind), path))]
+
+    return Person(path, load(path, PersonSettings, check))
+
+
+def _style_fault(kind: str, settings: WornSettings | None, path: Path) -> str:
+    try:
+        if settings is not None:
+            find_style(kind, settings.style, path)
+    except ConfigError as error:
+        return f"{error} ({error.hint})"
+    return ""
+
+
+def read_persons(person: PersonName, beside: Path | None = None) -> list[tuple[Person, float]]:
+    """The persons of a stage's key and their shares, which add up to 1; none for an empty name.
+
+    person : a name from configs/persons or a path, or several with the share of each. beside : the file that names it.
+
+    Raises ConfigError: no such person, one with faults, or shares that are all 0.
+    """
+    shares = {person: 1.0} if isinstance(person, str) else dict(person)
+    shares = {name: share for name, share in shares.items() if name}
+    total = sum(shares.values())
+    if shares and total <= 0.0:
+        raise ConfigError("person: all shares are 0", hint="person = { maple = 0.5, oak = 0.5 }")
+    return [(load_person(find_config("persons", n, beside=beside)), s / total) for n, s in shares.items() if s > 0.0]
+
+
+def mixed_identity(persons: Sequence[tuple[Person, float]], own: Mapping[str, float]) -> dict[str, float]:
+    """Variations of the head of a mixture of persons; amounts in ``own`` replace theirs."""
+    mixed: dict[str, float] = {}
+    for person, share in persons:
+        for name, amount in person.settings.identity.items():
+            mixed[name] = mixed.get(name, 0.0) + share * amount
+    return mixed | dict(own)
+
+
+def mixed_look(persons: Sequence[tuple[Person, float]], *, dressed: bool = True) -> Look | None:
+    """The look of a mixture: numbers and colours are averaged by the shares, what cannot be is taken from whom most is
+    there of. Without ``dressed`` nothing is worn. None without persons."""
+    if not persons:
+        return None
+    looks = [(person.look, share) for person, share in persons]
+    most = max(looks, key=lambda each: each[1])[0]
+    values = {
+        field.name: _mean([(getattr(look, field.name), share) for look, share in looks], getattr(most, field.name))
+        for field in fields(most)
+    }
+    return replace(most, **(values if dressed else values | {"worn": ()}))
+
+
+def _mean(values: list[tuple[Any, float]], most: Any) -> Any:
+    """The mean of numbers, or of colours where all have one; else ``most``."""
+    if all(isinstance(value, float | int) for value, _ in values):
+        return sum(value * share for value, share in values)
+    if all(isinstance(value, tuple) and len(value) == 3 and isinstance(value[0], float) for value, _ in values):
+        return tuple(sum(value[k] * share for value, share in values) for k in range(3))
+    return most
+
+
+def linear(text: str | None) -> Colour | None:
+    """``#rrggbb``, sRGB, as linear RGB 0..1 (IEC 61966-2-1)."""
+    if text is None:
+        return None
+    encoded = [int(text[i : i + 2], 16) / 255 for i in (1, 3, 5)]
+    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in encoded)
+    return red, green, blue
+
+
+def parse_person(text: str | None) -> PersonName | None:
+    """``maple`` or ``maple=0.5,oak=0.5`` of a command line as the key's value; None where it was not given.
+
+    Raises ParameterError: a share that is not a number from 0 to 1.
+    """
+    if text is None or "=" not in text:
+        return text
+    shares: dict[str, float] = {}
+    for word in text.split(","):
+        name, _, share = (x.strip() for x in word.rpartition("="))
+        try:
+            shares[name] = float(share)
+        except ValueError as error:
+            raise ParameterError(f"--person {word.strip()}: {share!r} is not a number", hint=PERSON_HINT) from error
+        if not name or not 0.0 <= shares[name] <= 1.0:
+            raise ParameterError(f"--person {word.strip()}: expected NAME=SHARE, 0 to 1", hint=PERSON_HINT)
+    return shares

@@ -1,0 +1,38 @@
+"""Write a head, or, where it does not follow its mesh, put it beside its place and refuse it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from surface.base.errors import FitError
+from surface.head.model.data import HeadData
+from surface.head.model.file import save_data
+
+REFUSED = "-refused"  # what is put behind the name of a folder
+HINT = "correct the mesh there or leave out what hides it (--without NAME)"
+
+
+def refused_folder(out_dir: str | Path) -> Path:
+    """Where a head goes that is refused."""
+    folder = Path(out_dir).resolve()
+    return folder.with_name(folder.name + REFUSED)
+
+
+def save_or_refuse(
+    out_dir: str | Path, head: HeadData, faults: Sequence[str], *, force: bool = False, hint: str = HINT
+) -> None:  # fmt: skip
+    """Write a head to ``out_dir``; one with faults to the folder :func:`refused_folder` instead, unless forced.
+
+    hint : what to do about faults, in words.
+
+    Raises FitError: the head has faults; what is in ``out_dir`` stays as it was. HeadFileError: a folder cannot be
+    written to.
+    """
+    refused = bool(faults) and not force
+    folder = refused_folder(out_dir) if refused else Path(out_dir)
+    save_data(folder, head)
+    if refused:
+        what = f"the head is refused: {'; '.join(faults)}; it was written to {folder} instead"
+        look = f"look at it (omote render --head {folder} -o out.png), {hint}"
+        raise FitError(what, hint=f"{look}, or use --force to write it nevertheless")

@@ -1,0 +1,137 @@
+"""Beards: thin shells over cheeks, jaw and chin, and over the upper lip, which follow the skin below them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base.arrays import Floats
+from surface.fit.wardrobe.locks import resampled
+from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.skin import Skin
+from surface.fit.wardrobe.styles import step
+
+#: By the angle from the front, degrees, about the vertical through (0, 20): the beard's upper and lower line, mm, and
+#: the upper line of its part below the mouth.
+_ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95.0])
+_UPPER = np.array([-15.5, -14.5, -17.0, -24.0, -31.0, -35.0, -35.0, -26.0, -8.0, 12.0, 14.0])
+_LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
+_BELOW = np.array([-45.0, -45.0, -43.5, -39.5, -35.0, -35.0, -35.0, -26.0, -8.0, 12.0, 14.0])
+_LIP = np.array([-22.5, -23.0, -26.0, -31.5, -37.0])  # lower line of the moustache, at the first five angles
+_EDGE_DEG = 93.0
+_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.8])
+_MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
+_HAIRS = 1.0 / 40.0  # tiles of the noise for a mm across hairs
+
+
+@dataclass(frozen=True)
+class Beard:
+    """A beard's measures: thickness, mm, and what the chin adds to it; each shell's share of that and its cover; how
+    much of the beard's colour the skin below has; how long a tile of the noise is along hairs, mm."""
+
+    thick: float
+    chin: float
+    shells: tuple[tuple[float, float], ...]
+    cover: float
+    grain: float
+
+
+BEARDS = {
+    "beard-full": Beard(5.0, 7.0, ((1.0, 0.46), (0.72, 0.62), (0.40, 0.85)), 0.85, 210.0),
+    "beard-short": Beard(1.7, 0.6, ((1.0, 0.40), (0.5, 0.50)), 0.62, 64.0),
+}
+
+
+def inside(points: Floats) -> Floats:
+    """(n,) how far inside the beard's lines places on the face (n, 3) lie, mm; negative outside."""
+    x, y, z = points.T
+    angle = np.degrees(np.arctan2(np.abs(x), z - 20.0))
+    upper, lower = np.interp(angle, _ANGLES, _UPPER), np.interp(angle, _ANGLES, _LOWER)
+    out = np.linalg.norm((points[:, :2] - _LIPS) / _LIP_RADII, axis=1)
+    lips = np.where(z > _MOUTH_DEPTH, 11.0 * (out - 1.0), 50.0)
+    return np.asarray(np.minimum.reduce([upper - y, y - lower, lips, 1.3 * (_EDGE_DEG - 2.0 - angle)]))
+
+
+def garment(skin: Skin, beard: Beard) -> list[Patches]:
+    """Shells, the outermost first: those of cheeks, jaw and chin, and those of the upper lip."""
+    wide = np.linspace(_EDGE_DEG, -_EDGE_DEG, 31)  # so that the outside is outside
+    main = _grid(skin, wide, np.interp(np.abs(wide), _ANGLES, _BELOW), np.interp(np.abs(wide), _ANGLES, _LOWER), 11)
+    narrow = np.linspace(25.0, -25.0, 13)
+    top = np.interp(np.abs(narrow), _ANGLES, _UPPER)
+    lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5)
+    out = []
+    for k, (share, cover) in enumerate(beard.shells):
+        for points, grid, fast, full_mm in ((main, (43, 13), (23, 7), 9.0), (lip, (19, 6), (10, 4), 2.6)):
+            out.append(_shell(skin, beard, points, grid, fast, share, cover, k, full_mm))
+    return out
+
+
+def _grid(skin: Skin, angles: Floats, upper: Floats, lower: Floats, rows: int) -> Floats:
+    """(columns, rows, 3) places on the skin between two lines, evenly down each column."""
+    columns = []
+    for angle, top, bottom in zip(np.radians(angles), upper, lower, strict=True):
+        direction = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        heights = np.linspace(top, bottom, 40)
+        columns.append(np.array([_outermost(skin, y, direction) for y in heights]))
+    return resampled(np.array(columns), rows)
+
+
+def _outermost(skin: Skin, y: float, direction: Floats) -> Floats:
+    """Where a level ray from the middle of the head leaves the skin: the outermost samples in a narrow beam."""
+    middle = np.array([0.0, y, 20.0])
+    own = skin.points[skin.bare]
+    ahead = own - middle
+    along = ahead @ direction
+    off = np.linalg.norm(ahead - along[:, None] * direction, axis=1)
+    near = np.flatnonzero((off < 5.0) & (along > 0.0))
+    if not len(near):
+        return middle + 60.0 * direction
+    far = along[near].max()
+    share = np.exp(-((off[near] / 2.0) ** 2)) * (along[near] > far - 9.0) + 1e-12
+    return np.asarray(middle + direction * (along[near] * share).sum() / share.sum())
+
+
+def _shell(
+    skin: Skin, beard: Beard, ground: Floats, grid: tuple[int, int], fast: tuple[int, int], share: float, cover: float,
+    layer: int, full_mm: float,
+) -> Patches:  # fmt: skip
+    """One shell over places on the skin (columns, rows, 3), dense from ``full_mm`` inside the beard's lines on."""
+    nu, nv, _ = ground.shape
+    flat = ground.reshape(-1, 3)
+    normals, _ = skin.nearest(flat)
+    x, y, z = flat.T
+    chin = np.exp(-((x / 26.0) ** 2)) * step(-y, 44.0, 70.0) * step(z, 55.0, 95.0)
+    deep = inside(flat)
+    thick = beard.thick * min(1.0, 0.1 * full_mm + 0.2)  # less over the lip
+    height = 0.4 + share * (thick + beard.chin * chin) * step(deep, -3.0, full_mm + 5.0)
+    down = np.array([0.0, -0.5, 0.1]) * (share * beard.chin * chin)[:, None]  # hair falls
+    points = (flat + normals * height[:, None] + down).reshape(nu, nv, 3)
+    gu, gv = grid
+    at_u, at_v = np.linspace(0, nu - 1, gu), np.linspace(0, nv - 1, gv)
+    places = _between(ground, at_u, at_v)
+    reached = step(inside(places.reshape(-1, 3)), -2.0, full_mm).reshape(gu, gv)
+    width = np.linalg.norm(np.diff(places.mean(axis=1), axis=0), axis=1).sum()
+    length = np.linalg.norm(np.diff(places, axis=1), axis=2).sum(axis=1).mean()
+    s, t = np.meshgrid(np.linspace(0, 1, gu), np.linspace(0, 1, gv), indexing="ij")
+    openness = 0.62 + 0.38 * share + 0.0 * s
+    strands = np.stack(
+        [s * width * _HAIRS + 0.31 * layer, t * length / beard.grain, cover * reached, openness], axis=-1
+    )
+    tint = np.full((1, gu, gv), share) * reached
+    return Patches(
+        points[None], (2, 2), grid, fast, strands[None], tint, np.ones((1, gu, gv)), np.zeros((1, nu, nv)), 1.0,
+        whole=False,
+    )  # fmt: skip
+
+
+def _between(rows: Floats, at_u: Floats, at_v: Floats) -> Floats:
+    """(gu, gv, 3) values of a grid (nu, nv, 3) at fractions of its rows and columns."""
+    i, j = np.arange(len(rows)), np.arange(rows.shape[1])
+    along = np.stack([np.stack([np.interp(at_u, i, rows[:, c, k]) for c in j], axis=1) for k in range(3)], axis=-1)
+    return np.stack([np.stack([np.interp(at_v, j, row[:, k]) for row in along]) for k in range(3)], axis=-1)
+
+
+def field(skin: Skin, beard: Beard) -> Floats:
+    """(s,) how much of the beard's colour the skin between its hairs has."""
+    return np.where(skin.part == 0, beard.cover * step(inside(skin.points), -3.0, 7.0), 0.0)

@@ -1,0 +1,174 @@
+"""Clothes: a shirt over neck and shoulders that closes the bust, with different necks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base.arrays import Floats
+from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.skin import Skin, unit
+from surface.fit.wardrobe.styles import step
+
+THREADS = 1.0 / 26.0  # tiles of the noise for a mm of cloth
+_CLEAR_MM = 3.5  # between skin and cloth
+#: Half width, half depth and middle of the trunk by height, mm: from the shoulders down, beyond the bust's end.
+_TRUNK = np.array(
+    [
+        # y, half width, front z, back z
+        (-104.0, 66.0, 46.0, -74.0),
+        (-118.0, 92.0, 46.0, -92.0),
+        (-132.0, 122.0, 50.0, -106.0),
+        (-148.0, 152.0, 58.0, -116.0),
+        (-170.0, 176.0, 70.0, -122.0),
+        (-200.0, 190.0, 84.0, -124.0),
+        (-250.0, 196.0, 98.0, -122.0),
+        (-330.0, 192.0, 100.0, -112.0),
+    ]
+)
+_ROUND = 2.6  # exponent of the trunk's section, a superellipse
+
+
+@dataclass(frozen=True)
+class Neck:
+    """A neck line: its height in front, at the side and behind, mm, and how far the cloth stands off the neck.
+
+    stand : height of a collar over the line, mm; lean : how far its rim leans outwards. fold : does it fold back?
+    """
+
+    front: float
+    side: float
+    back: float
+    off: float
+    stand: float = 0.0
+    lean: float = 0.0
+    fold: bool = False
+
+
+NECKS = {
+    "clothes-crew": Neck(-126.0, -100.0, -86.0, 2.5, 7.0, 1.0),
+    "clothes-turtleneck": Neck(-108.0, -94.0, -80.0, 3.5, 34.0, 2.0),
+    "clothes-shirt": Neck(-122.0, -98.0, -84.0, 4.0, 22.0, 5.0, fold=True),
+}
+
+
+def garment(skin: Skin, neck: Neck) -> list[Patches]:
+    """The trunk with its collar, one closed patch from the collar's rim down, and the collar folded over it."""
+    nu = 40
+    angle = np.linspace(np.pi, -np.pi, nu)  # from behind round the left; 0 is in front
+    ring = _ring(skin, neck, angle)
+    rows = [*_collar(skin, ring, neck), *_trunk(skin, ring, angle)]
+    points = np.stack(rows, axis=1)
+    out = [_patch(points, (73, 25), (41, 13), inner=len(_collar(skin, ring, neck)))]
+    if neck.fold:
+        out.insert(0, _patch(np.stack(_folded(skin, ring, angle), axis=1), (73, 7), (41, 4), inner=1))
+    return out
+
+
+def _ring(skin: Skin, neck: Neck, angle: Floats) -> Floats:
+    """(nu, 3) the line round the neck, on the skin."""
+    front, back = 0.5 * (1.0 + np.cos(angle)), 0.5 * (1.0 - np.cos(angle))
+    height = neck.side + (neck.front - neck.side) * front**3 + (neck.back - neck.side) * back**3
+    out = np.empty((len(angle), 3))
+    for i, (a, y) in enumerate(zip(angle, height, strict=True)):
+        middle = np.array([0.0, y, -14.0 - 0.12 * (y + 100.0)])
+        out[i] = _outwards(skin, middle, np.array([np.sin(a), 0.0, np.cos(a)]))
+    return out
+
+
+def _outwards(skin: Skin, middle: Floats, direction: Floats) -> Floats:
+    """Where a ray from inside the neck leaves the skin, by the samples in a narrow beam about it."""
+    ahead = skin.points[skin.bare] - middle
+    along = ahead @ direction
+    off = np.linalg.norm(ahead - along[:, None] * direction, axis=1)
+    near = np.flatnonzero((off < 7.0) & (along > 0.0) & (along < 110.0))
+    if not len(near):
+        return middle + 60.0 * direction
+    share = np.exp(-((off[near] / 3.5) ** 2))
+    return np.asarray(middle + direction * (along[near] * share).sum() / share.sum())
+
+
+def _smooth(rows: Floats, times: int = 2) -> Floats:
+    """A closed row (nu, 3), whose ends are the same place, smoothed along."""
+    ring = rows[:-1]
+    for _ in range(times):
+        ring = 0.5 * ring + 0.25 * (np.roll(ring, 1, axis=0) + np.roll(ring, -1, axis=0))
+    return np.vstack([ring, ring[:1]])
+
+
+def _collar(skin: Skin, ring: Floats, neck: Neck) -> list[Floats]:
+    """Rows of the collar, from inside its rim over it and down to the line."""
+    normals, _ = skin.nearest(ring)
+    level = unit(normals * (1.0, 0.0, 1.0))
+    up = np.array([0.0, 1.0, 0.0])
+    line = _smooth(ring) + neck.off * level
+    rim = line + neck.stand * (up + np.array([0.0, 0.0, 0.25])) + neck.lean * level
+    if neck.stand > 12.0:  # the neck is narrower there
+        normals, height = skin.nearest(rim)
+        rim = _smooth(rim + (neck.off + 0.5 * neck.lean - height)[:, None] * unit(normals * (1.0, 0.3, 1.0)))
+    inside, lip = rim - 1.6 * level - 9.0 * up, rim - 0.8 * level
+    return [inside, lip, rim + 1.0 * up, rim + 1.2 * level - 1.0 * up, 0.5 * (rim + line) + 0.8 * level]
+
+
+def _trunk(skin: Skin, ring: Floats, angle: Floats) -> list[Floats]:
+    """Rows from the line over the shoulders down, clear of the skin."""
+    rows = []
+    for y, half, front, back in _TRUNK:
+        c, s = np.cos(angle), np.sin(angle)
+        long = (np.abs(c) ** _ROUND + np.abs(s) ** _ROUND) ** (-1.0 / _ROUND)
+        depth, middle = 0.5 * (front - back), 0.5 * (front + back)
+        row = np.column_stack([half * s * long, np.full(len(angle), y), middle + depth * c * long])
+        row[:, 1] = np.minimum(row[:, 1], ring[:, 1] - 3.0 - 0.10 * (-104.0 - y))
+        rows.append(_clear(skin, row))
+    return rows
+
+
+def _clear(skin: Skin, row: Floats, least: float = _CLEAR_MM) -> Floats:
+    """A row (nu, 3) moved off the skin where it is nearer than ``least`` mm."""
+    for _ in range(3):
+        normals, height = skin.nearest(row)
+        near = np.linalg.norm(row - _foot(skin, row), axis=1) < 40.0
+        row = _smooth(row + (np.maximum(least - height, 0.0) * near)[:, None] * normals, 1)
+    return row
+
+
+def _foot(skin: Skin, row: Floats) -> Floats:
+    """The nearest places of the skin to a row (nu, 3)."""
+    _, offset = skin.anchors(row)
+    return np.asarray(row - offset)
+
+
+def _folded(skin: Skin, ring: Floats, angle: Floats) -> list[Floats]:
+    """Rows of a collar folded back: from the rim outwards and down, longer in front, open there."""
+    neck = NECKS["clothes-shirt"]
+    rim = _collar(skin, ring, neck)[2]
+    normals, _ = skin.nearest(ring)
+    level = unit(normals * (1.0, 0.0, 1.0))
+    points = np.exp(-(((np.abs(angle) - 0.32) / 0.28) ** 2))  # the collar's two points
+    gap = step(np.abs(angle), 0.02, 0.20)[:, None]  # and the gap between them
+    fall = (24.0 + 26.0 * points)[:, None] * (0.35 + 0.65 * gap)
+    out = (9.0 + 8.0 * points)[:, None]
+    down = np.array([0.0, -1.0, 0.0])
+    rows = [rim + 0.3 * down, rim + 2.2 * level + 0.4 * down, rim + 5.5 * level + 0.35 * fall * down]
+    rows += [rim + out * level + 0.75 * fall * down, rim + (out + 1.5) * level + fall * down]
+    return [rows[0], rows[1], *(_clear(skin, _smooth(row, 1), 5.5) for row in rows[2:])]
+
+
+def _patch(points: Floats, grid: tuple[int, int], fast: tuple[int, int], inner: int) -> Patches:
+    """One patch of cloth; the first ``inner`` rows lie inside the collar, in the dark."""
+    nu, nv, _ = points.shape
+    gu, gv = grid
+    s, t = np.meshgrid(np.linspace(0, 1, gu), np.linspace(0, 1, gv), indexing="ij")
+    openness = 0.45 + 0.55 * step(t, 0.0, 1.5 * inner / nv)
+    strands = np.stack([s * 700 * THREADS, t * 260 * THREADS, np.ones_like(t), openness], axis=-1)
+    zero = np.zeros((1, gu, gv))
+    return Patches(points[None], (3, 3), grid, fast, strands[None], zero, zero + 1.0, np.zeros((1, nu, nv)), 0.0)
+
+
+def hidden_below(skin: Skin, neck: Neck) -> Floats:
+    """(s,) which samples of the skin the cloth covers, 0..1."""
+    angle = np.arctan2(skin.points[:, 0], skin.points[:, 2] + 14.0)
+    front, back = 0.5 * (1.0 + np.cos(angle)), 0.5 * (1.0 - np.cos(angle))
+    line = neck.side + (neck.front - neck.side) * front**3 + (neck.back - neck.side) * back**3
+    return step(line - 8.0 - skin.points[:, 1], 0.0, 4.0)

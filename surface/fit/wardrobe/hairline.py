@@ -1,0 +1,58 @@
+"""Where hair grows: inside a line round the head, given by points on its left side."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial import cKDTree
+
+from surface.base.arrays import Floats
+from surface.fit.wardrobe.skin import CENTRE, Skin, unit
+
+#: Points of the line from the forehead's middle to the nape's, mm: temple, in front of the ear, over it, behind it.
+POINTS = np.array(
+    [
+        (0, 113, 85), (22, 112, 82), (40, 107, 72), (53, 96, 64), (61, 80, 62), (66, 64, 56), (73, 46, 42),
+        (76, 24, 30), (78, 8, 23), (79, 16, 15), (81, 40, 5), (80, 38, -14), (74, 14, -25), (62, -16, -32),
+        (47, -44, -40), (22, -54, -54), (0, -56, -58),
+    ],
+    float,
+)  # fmt: skip
+
+
+def angles(points: Floats) -> tuple[Floats, Floats]:
+    """Angle from the crown (n,) and round it from the front (n,), rad, of points (n, 3) from the skull's centre."""
+    x, y, z = unit(points - CENTRE).T
+    return np.arccos(np.clip(y, -1.0, 1.0)), np.arctan2(x, z)
+
+
+def directions(down: Floats, round_it: Floats) -> Floats:
+    """Unit vectors (n, 3) at such angles."""
+    return np.column_stack([np.sin(down) * np.sin(round_it), np.cos(down), np.sin(down) * np.cos(round_it)])
+
+
+class Hairline:
+    """The line as a function of the angle round the crown.
+
+    skin : of the head. points : (k, 3) of the left side, from the front's middle to the nape's.
+    """
+
+    def __init__(self, skin: Skin, points: Floats = POINTS) -> None:
+        down, round_it = angles(points)
+        round_it = np.maximum.accumulate(np.abs(round_it) + 1e-4 * np.arange(len(round_it)))
+        round_it[-1] = np.pi
+        self._down = PchipInterpolator(round_it, down, extrapolate=True)
+        every = np.linspace(-np.pi, np.pi, 1440)
+        lines = directions(self.down(every), every)
+        self.line: Floats = CENTRE + lines * skin.reach(lines)[:, None]
+        self._tree = cKDTree(self.line)
+
+    def down(self, round_it: Floats) -> Floats:
+        """(n,) angle from the crown at which hair ends."""
+        return np.asarray(self._down(np.abs(round_it)))
+
+    def inside(self, points: Floats) -> Floats:
+        """(n,) how far inside the line points on the skin (n, 3) lie, mm; negative outside."""
+        down, round_it = angles(points)
+        away, _ = self._tree.query(points)
+        return np.asarray(np.where(down < self.down(round_it), away, -away))

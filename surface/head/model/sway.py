@@ -1,0 +1,51 @@
+"""Hair that lags behind the head: a damped spring for each of the head's angles."""
+
+from __future__ import annotations
+
+from math import cos, exp, pi, sin, sqrt
+
+import numpy as np
+
+from surface.base.arrays import Floats
+
+SWAYS = ("swayYaw", "swayPitch", "swayRoll")
+"""Groups of what sways, per radian by which it lies ahead of the head."""
+_AXES = np.eye(3)[[1, 0, 2]]  # yaw turns about y, pitch about x, roll about z
+_HZ, _DAMPING = 2.1, 0.38  # of hair at the length of a head, by eye; 1 would be without overshoot
+_MOST_RAD, _LONGEST_S = 0.16, 0.5
+
+
+def sway_moves(points: Floats, share: Floats, pivot: tuple[float, float, float]) -> Floats:
+    """(3, n, 3) displacements of points (n, 3) for a radian about each axis through ``pivot``, by ``share (n,)``."""
+    return np.array([np.cross(axis, points - np.array(pivot)) * share[:, None] for axis in _AXES])
+
+
+class Sway:
+    """What sways, at the times that :meth:`advance` is told; equal times and angles give equal motion.
+
+    lag : (3,) yaw, pitch and roll, rad, by which it lies ahead of the head; 0 at rest and before any time is told.
+    """
+
+    def __init__(self) -> None:
+        self.lag = np.zeros(3)
+        self._speed, self._angles, self._time_s = np.zeros(3), np.zeros(3), -1.0
+
+    def advance(self, angles: Floats, time_s: float) -> None:
+        """Move on to a time, at which the head has turned to ``angles`` (3,), rad.
+
+        The oscillator is solved exactly for the time between (constant angles), so it is stable for every step.
+        """
+        step, first = time_s - self._time_s, self._time_s < 0.0
+        lag = self.lag - (angles - self._angles)
+        self._angles, self._time_s = np.array(angles, float), time_s
+        if first or not 0.0 <= step < _LONGEST_S:
+            self.lag, self._speed = np.zeros(3), np.zeros(3)
+            return
+        own = 2.0 * pi * _HZ
+        turned = own * sqrt(1.0 - _DAMPING**2)
+        fall, c, s = exp(-_DAMPING * own * step), cos(turned * step), sin(turned * step)
+        pull = (self._speed + _DAMPING * own * lag) / turned
+        self.lag = np.clip(fall * (lag * c + pull * s), -_MOST_RAD, _MOST_RAD)
+        self._speed = fall * (self._speed * c - (_DAMPING * own * pull + turned * lag) * s)
+        if np.abs(self.lag).max() < 1e-4 and np.abs(self._speed).max() < 1e-3:  # at rest nothing is drawn again
+            self.lag, self._speed = np.zeros(3), np.zeros(3)

@@ -1,0 +1,98 @@
+"""What is worn, on the parts of a head: colours and strands of its own parts, and what it does to the skin below."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.arrays import Floats, Floats32
+from surface.base.errors import HeadFileError
+from surface.head.model.look import Worn
+from surface.head.model.wardrobe import HINT, Garment, WornPart
+from surface.head.posing.part import HeadPart
+
+COVERED = 0.5  # of the picture of hidden skin: more is not drawn
+SCALP = 0.55  # of hair's colour on the skin between its roots, where light hardly reaches
+
+
+def dress(parts: Iterable[HeadPart], garments: Sequence[Garment]) -> None:
+    """Give worn parts their attributes, and colour and hide the skin below them.
+
+    Raises HeadFileError: a garment's colours belong to another mesh than the one it is drawn with.
+    """
+    of = {part.name: part for part in parts}
+    for garment in garments:
+        for worn in garment.parts:
+            if len(of[worn.name].vertices) != len(worn.arrays["strands"]):  # its mesh was made anew: it did not fit
+                why = f"{worn.name}/strands belongs to another mesh"
+                raise HeadFileError(f"{garment.worn.path}: is damaged: {why}", hint=HINT)
+            _colour(of[worn.name], worn, garment.worn)
+    for part in of.values():
+        if part.material == "skin":
+            _colour_below(part, garments)
+            _hide_below(part, garments)
+
+
+def _colour(part: HeadPart, worn: WornPart, look: Worn) -> None:
+    """Colours, strands and directions of strands at every vertex."""
+    a = worn.arrays
+    root, tip = np.asarray(look.colour), np.asarray(look.tips or look.colour)
+    tint, shade = np.asarray(a["tint"], float)[:, None] / 255, np.asarray(a["shade"], float)[:, None] / 128
+    part.attributes["albedo"] = np.clip((root + tint * (tip - root)) * shade, 0.0, 1.0).astype(np.float32)
+    part.attributes["strands"] = np.asarray(a["strands"], np.float32)
+    part.attributes["gloss"] = np.full((len(part.vertices), 1), look.gloss, np.float32)
+    part.attributes["along"] = _directions(part)
+    fast = np.asarray(a["fast"], np.int32)
+    part.decimated = {"fast": fast, "full": fast}  # stills have all
+
+
+def _directions(part: HeadPart) -> Floats32:
+    """(m, 3) unit vectors along the strands at rest: those of v."""
+    _, _, along = part.surface.derivatives(part.mesh.uv, side=part.mesh.side)
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    return np.asarray(along / np.maximum(length, 1e-9), np.float32)
+
+
+def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
+    albedo = part.attributes.get("albedo")
+    if albedo is None:
+        return
+    for garment in garments:
+        cover = sampled(garment, "cover", part)
+        if cover is not None:
+            below = SCALP * np.asarray(garment.worn.colour, np.float32)
+            albedo = albedo + cover * (below - albedo)
+        shadow = sampled(garment, "shadow", part)
+        if shadow is not None and "occlusion" in part.attributes:
+            part.attributes["occlusion"] = part.attributes["occlusion"] * (1.0 - shadow)
+    part.attributes["albedo"] = albedo.astype(np.float32)
+
+
+def _hide_below(part: HeadPart, garments: Sequence[Garment]) -> None:
+    """Leave out triangles all of whose corners are covered: they cost time and might show through."""
+    covered = np.zeros(len(part.vertices), bool)
+    for garment in garments:
+        hidden = sampled(garment, "hidden", part)
+        if hidden is not None:
+            covered |= hidden[:, 0] > COVERED
+    if covered.any():
+        part.triangles = _seen(part.triangles, covered)
+        part.decimated = {level: _seen(triangles, covered) for level, triangles in part.decimated.items()}
+
+
+def _seen(triangles: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArray[np.int32]:
+    return triangles[~covered[triangles].all(axis=1)]
+
+
+def sampled(garment: Garment, kind: str, part: HeadPart) -> Floats32 | None:
+    """(m, 1) a garment's picture over a part at its vertices, linear between pixels; None where it has none."""
+    picture = garment.fields.get(f"{kind}/{part.name}")
+    if picture is None:
+        return None
+    at: Floats = np.clip(np.asarray(part.uv, float), 0.0, 1.0) * (np.array(picture.shape) - 1)
+    low = np.minimum(np.floor(at).astype(int), np.array(picture.shape) - 2)
+    (i, j), (s, t) = low.T, (at - low).T
+    rows = picture[i, j] * (1 - t) + picture[i, j + 1] * t, picture[i + 1, j] * (1 - t) + picture[i + 1, j + 1] * t
+    return np.asarray(rows[0] * (1 - s) + rows[1] * s, np.float32)[:, None]

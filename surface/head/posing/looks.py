@@ -1,0 +1,72 @@
+"""Apply a person's look to the parts of a head: colours of skin, lips, eyes and brows at every vertex."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from surface.base.arrays import Floats, Floats32
+from surface.head.model.look import OWN_MELANIN, Colour, Look, skin_albedo, skin_tone
+from surface.head.model.parameters import smoothstep
+from surface.head.posing.part import HeadPart
+
+LIPS_GLOSS = (0.48, 0.74)  # paint's gloss at the rim of the lips, and on them
+LIP_FADE, LIP_COLOUR = 0.22, 0.75  # how much less lips darken than skin; share of a lip colour that covers them
+
+
+def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
+    """Colour a head's parts; ``eyes (2, 3)`` are the centres of the eyeballs, mm, which tell where freckles grow."""
+    for part in parts:
+        if part.material == "skin":
+            _colour_skin(part, look)
+            if look.freckles > 0.0:
+                part.attributes["freckles"] = look.freckles * _sunlit(part, eyes)
+        elif part.material == "eye" and look.iris is not None:
+            part.attributes["iris"] = _all_over(part, look.iris)
+        elif part.material == "brow":
+            if look.brow is not None:
+                part.attributes["albedo"] = _all_over(part, look.brow)
+            part.attributes["strength"] = np.full((len(part.vertices), 1), look.brow_strength, np.float32)
+
+
+def _all_over(part: HeadPart, colour: Colour) -> Floats32:
+    return np.tile(np.asarray(colour, np.float32), (len(part.vertices), 1))
+
+
+def _colour_skin(part: HeadPart, look: Look) -> None:
+    """Paint in another tone; thin skin lets less light through, the darker it is."""
+    painted = part.attributes.get("albedo")
+    if painted is None:
+        return
+    lips = _lips(part)
+    albedo = np.asarray(painted, np.float64)
+    if look.melanin is not None:
+        redness = look.redness + (1.0 - look.redness) * lips  # lips have their own colour
+        toned = skin_albedo(albedo, look.melanin, look.blood, redness)
+        paler = np.exp(LIP_FADE * np.log(albedo / toned))  # lips have less melanin
+        albedo = toned * (1.0 + lips * (paler - 1.0))
+        if "thin" in part.attributes:
+            through = float(skin_tone(look.melanin)[0] / skin_tone(OWN_MELANIN)[0])
+            part.attributes["thin"] = part.attributes["thin"] * np.float32(min(through, 1.0))
+    if look.lips is not None:
+        albedo = albedo + LIP_COLOUR * lips * (np.asarray(look.lips) - albedo)
+    part.attributes["albedo"] = albedo.astype(np.float32)
+
+
+def _lips(part: HeadPart) -> Floats:
+    """(m, 1) share of each vertex that is lip: what paint makes glossy."""
+    gloss = part.attributes.get("gloss")
+    if gloss is None:
+        return np.zeros((len(part.vertices), 1))
+    return smoothstep(np.asarray(gloss[:, :1], np.float64), *LIPS_GLOSS)
+
+
+def _sunlit(part: HeadPart, eyes: Floats) -> Floats32:
+    """(m, 1) how many freckles grow where: on nose and cheeks most, on the forehead some."""
+    middle, apart = eyes.mean(axis=0), float(np.linalg.norm(eyes[0] - eyes[1]))
+    x, y, z = ((np.asarray(part.vertices, np.float64) - middle) / apart).T
+    front = smoothstep(z, -0.55, 0.1)
+    cheeks = np.exp(-(((np.abs(x) - 0.35) / 0.55) ** 4) - ((y + 0.42) / 0.42) ** 2)
+    forehead = 0.35 * np.exp(-((x / 0.9) ** 2) - ((y - 0.7) / 0.45) ** 2)
+    return np.asarray((front * np.maximum(cheeks, forehead))[:, None], np.float32)

@@ -1,0 +1,30 @@
+// Strands: locks part and thin out where their cover falls below a strand's height.
+uniform sampler2D detail;
+
+in vec3 v_colour;
+in vec4 v_strand;
+#ifndef PER_VERTEX
+in vec3 v_through;
+in float v_surface;
+#endif
+
+out vec4 colour;
+
+void main() {
+#ifdef GRAIN_TEXELS
+    vec4 noise = texelFetch(detail, ivec2(v_strand.xy * GRAIN_TEXELS) & (int(GRAIN_TEXELS) - 1), 1);
+#else
+    vec4 noise = texture(detail, v_strand.xy);
+#endif
+    float height = 0.5 + 1.25 * (noise.w - 0.5) + 0.75 * (noise.x - 0.5);
+    if (height > v_strand.z) {
+        discard;
+    }
+    vec3 lit = v_colour * (0.45 + 1.1 * noise.y + 0.9 * (noise.w - 0.5));
+#ifndef PER_VERTEX
+    float sine = v_strand.w + 0.30 * (noise.z - 0.5);
+    lit += v_through * shine(sine, THROUGH) * (0.4 + 1.2 * noise.x);
+    lit += key_colour * (v_surface * shine(sine, SURFACE) * (0.2 + 1.6 * noise.y));
+#endif
+    colour = vec4(encode(lit), 1.0);
+}

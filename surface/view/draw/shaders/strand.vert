@@ -1,0 +1,42 @@
+// Hair: soft light per vertex; with quality "fast" the highlights, too.
+uniform mat4 view_projection;
+uniform vec3 camera;
+uniform mat3 head_rotation;
+
+const vec3 MIDDLE = vec3(0.0, 15.0, 0.0);  // of the hair, mm
+
+in vec3 position;
+in vec3 normal;
+in vec4 albedo_gloss;         // square root of the linear albedo, gloss
+in vec4 strands;              // texture coordinates across and along, cover, how open it lies
+in vec3 along;                // direction of the strands at rest
+
+out vec3 v_colour;
+out vec4 v_strand;            // texture coordinates, cover, sine of the angle half way
+#ifndef PER_VERTEX
+out vec3 v_through;           // colour of the highlight that went through the fibre
+out float v_surface;          // strength of the other
+#endif
+
+void main() {
+    gl_Position = view_projection * vec4(position, 1.0);
+    vec3 v = normalize(camera - position);
+    vec3 n = dot(normal, v) < 0.0 ? -normal : normal;
+    n = normalize(n + 1.1 * normalize(position - MIDDLE));  // locks are shaded as the whole that they make
+    vec3 t = head_rotation * along;
+    vec3 albedo = albedo_gloss.rgb * albedo_gloss.rgb;
+    float open = strands.w;
+    vec3 colour = albedo * strand_diffuse(n, t, v, open);
+    float sine = dot(t, normalize(key_direction + v));
+    float lit = clamp(1.6 * dot(n, key_direction) + 0.25, 0.0, 1.0) * open * open * albedo_gloss.a;
+    vec3 through = 0.85 * lit * key_colour * sqrt(albedo) * (0.05 + albedo);
+    float surface = (0.125 - 0.065 * clamp(6.0 * albedo.g, 0.0, 1.0)) * lit;  // stands out on dark hair
+#ifdef PER_VERTEX
+    colour += through * shine(sine, THROUGH) + surface * shine(sine, SURFACE) * key_colour;
+#else
+    v_through = through;
+    v_surface = surface;
+#endif
+    v_colour = colour;
+    v_strand = vec4(strands.xyz, sine);
+}

@@ -1,0 +1,48 @@
+"""A squint that opens a blinking eye is taken back as far as the eye blinks."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from surface.check.lids import eye_opening
+from surface.check.subject import Subject
+from surface.fit.features.squints import shut_with_squints
+from surface.head import Head
+from surface.head.model.data import Group, HeadData
+
+BOTH = {"eyeBlinkLeft": 1.0, "eyeSquintLeft": 1.0}
+
+
+def squinting(data: HeadData, share: float, *sides: str) -> HeadData:
+    """The head whose squints take back a share of its blinks."""
+    parts = []
+    for part in data.parts:
+        own = [g for g in part.groups if g.name in {f"eyeBlink{s}" for s in sides}]
+        more = [Group(g.name.replace("Blink", "Squint"), g.ids, np.float32(-share) * g.moves) for g in own]
+        parts.append(replace(part, groups=[*part.groups, *more]))
+    return replace(data, parts=parts)
+
+
+def opening(data: HeadData, pose: dict[str, float]) -> float:
+    head = Head(data)
+    head.pose(head.values(pose))
+    return eye_opening(Subject(Head(data)), 0, [np.array(p.vertices) for p in head.parts])
+
+
+def test_a_blink_stays_shut_with_a_squint_that_opened_it(head: Head) -> None:
+    bad = squinting(head.data, 0.7, "Left")
+    alone = opening(bad, {"eyeBlinkLeft": 1.0})
+    assert opening(bad, BOTH) > alone + 1.0
+    mended, (note,) = shut_with_squints(bad)
+    assert opening(mended, BOTH) == pytest.approx(alone, abs=0.05) and note.startswith("eyeSquintLeft left ")
+    only = {"eyeSquintLeft": 1.0}
+    assert opening(mended, only) == pytest.approx(opening(bad, only), abs=0.01)
+    assert shut_with_squints(mended) == (mended, [])
+
+
+def test_a_squint_that_leaves_the_eye_shut_and_a_head_without_squints_stay(head: Head) -> None:
+    good = squinting(head.data, -0.2, "Left", "Right")
+    for data in (good, head.data):
+        same, notes = shut_with_squints(data)
+        assert not notes and same.rules == data.rules

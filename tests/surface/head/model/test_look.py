@@ -1,0 +1,37 @@
+"""Skin by its melanin and blood, and wrinkles at rest."""
+
+import numpy as np
+import pytest
+from small_head import all_points, part, small_head
+
+from surface.head.model.look import OWN_MELANIN, TONES, skin_albedo, skin_tone, with_age
+
+
+def test_skin_darkens_with_melanin_in_every_channel():
+    tones = np.array([skin_tone(m) for m in np.linspace(0, 1, 21)])
+    assert (np.diff(tones, axis=0) < 0).all()
+    assert (tones[:, 0] > tones[:, 1]).all() and (tones[:, 1] > tones[:, 2]).all()
+    np.testing.assert_allclose(tones[[0, -1]], TONES[[0, -1]])
+
+
+def test_blood_reddens():
+    pale, ruddy = skin_tone(0.2, -0.5), skin_tone(0.2, 0.5)
+    assert ruddy[0] / ruddy[1] > 1.2 * pale[0] / pale[1]
+
+
+def test_paint_stays_as_it_is_for_the_heads_own_melanin_but_for_what_covers_it():
+    base = skin_tone(OWN_MELANIN)[None]
+    np.testing.assert_allclose(skin_albedo(base, OWN_MELANIN, 0.0, np.ones((1, 1))), base)
+    red = base * (1.0, 0.6, 0.7)
+    light, dark = (skin_albedo(red, m, 0.0, np.ones((1, 1))) / skin_tone(m) for m in (0.0, 1.0))
+    np.testing.assert_allclose(light, [[1.0, 0.6, 0.7]])
+    assert (dark[0, 1:] > light[0, 1:]).all()
+    np.testing.assert_allclose(skin_albedo(red, 0.5, 0.0, np.zeros((1, 1)))[0], skin_tone(0.5))
+
+
+@pytest.mark.parametrize(("group", "moves"), [("wrinkleEyeLeft", True), ("mouthPucker", False)])
+def test_age_sinks_wrinkles_at_rest_and_nothing_else(group, moves):
+    head = small_head(parts=[part("a", -40, groups=[all_points(group, (0, 0, -1))])], seams=[])
+    old = with_age(head, 0.5).parts[0].points - head.parts[0].points
+    assert (old[:, 2] < -0.1).all() if moves else not old.any()
+    np.testing.assert_array_equal(with_age(head, 0.0).parts[0].points, head.parts[0].points)

@@ -1,0 +1,142 @@
+"""Persons on the shipped head: what is worn sits on the skin, covers it, follows it and hides no hole."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from surface.base.errors import HeadFileError
+from surface.head import Head
+from surface.head.model.look import Look, Worn
+from surface.head.model.wardrobe import read_garment
+
+CONFIGS = Path(__file__).resolve().parents[3] / "configs"
+ICT, WARDROBE = CONFIGS / "heads" / "ict", CONFIGS / "wardrobe"
+GREY, BLUE = (0.2, 0.2, 0.2), (0.05, 0.1, 0.4)
+
+
+def worn(*names: str) -> Look:
+    return Look(melanin=0.5, worn=tuple(Worn(WARDROBE / f"{name}.npz", BLUE) for name in names))
+
+
+@pytest.fixture(scope="module")
+def plain() -> Head:
+    return Head.load(ICT)
+
+
+@pytest.fixture(scope="module")
+def dressed() -> Head:
+    return Head.load(ICT, {"broad": 0.7}, worn("hair-long", "beard-full", "clothes-shirt"))
+
+
+def test_worn_parts_have_their_colours_and_lie_near_the_head(dressed: Head) -> None:
+    names = [part.name for part in dressed.parts[-4:]]
+    assert names == ["hair", "tresses", "beard", "clothes"]
+    for part in dressed.parts[-4:]:
+        assert np.isfinite(part.vertices).all() and np.abs(part.vertices).max() < 400
+        assert part.attributes["albedo"].mean(axis=0).argmax() == 2
+        assert {"strands", "along", "gloss"} <= set(part.attributes)
+        assert len(part.decimated["fast"]) < 0.7 * len(part.triangles)
+
+
+def test_cloth_and_hair_lie_outside_of_the_skin_that_is_drawn(dressed: Head) -> None:
+    skins = [dressed.part(name) for name in ("face", "back")]
+    drawn = [np.unique(part.triangles) for part in skins]
+    points = np.vstack([part.vertices[ids] for part, ids in zip(skins, drawn, strict=True)])
+    normals = np.vstack([part.normals[ids] for part, ids in zip(skins, drawn, strict=True)])
+    tree = cKDTree(points)
+    for name in ("hair", "clothes"):
+        away, near = tree.query(dressed.part(name).vertices)
+        height = ((dressed.part(name).vertices - points[near]) * normals[near]).sum(axis=1)
+        assert height[away < 8.0].min() > -1.5, name
+
+
+def test_skin_below_is_hidden_and_takes_the_hairs_colour(plain: Head, dressed: Head) -> None:
+    for name in ("face", "back"):
+        assert len(dressed.part(name).triangles) < 0.93 * len(plain.part(name).triangles)
+    back = dressed.part("back")
+    crown = back.vertices[:, 1] > 125
+    albedo = back.attributes["albedo"]
+    assert (albedo[crown, 2] > albedo[crown, 0]).all()
+    face = dressed.part("face")
+    nose = face.vertices[:, 2] > 128
+    assert (face.attributes["albedo"][nose, 0] > face.attributes["albedo"][nose, 2]).all()
+
+
+def test_a_beard_goes_with_the_jaw_and_clothes_stay(dressed: Head) -> None:
+    before = {n: dressed.part(n).vertices.copy() for n in ("face", "beard", "clothes", "hair")}
+    dressed.pose(dressed.values({"jawOpen": 1.0}))
+    moved = {n: np.linalg.norm(dressed.part(n).vertices - rows, axis=1) for n, rows in before.items()}
+    dressed.pose(dressed.values({}))
+    chin = before["beard"][:, 1] < -65
+    away, near = cKDTree(before["face"]).query(before["beard"][chin])
+    assert np.abs(moved["beard"][chin] - moved["face"][near]).max() < 0.35 * moved["face"][near].max()
+    assert moved["beard"][chin].min() > 5 and not moved["clothes"].any() and not moved["hair"].any()
+    assert away.max() < 30
+
+
+def test_hair_sways_behind_a_turning_head_and_stops(dressed: Head) -> None:
+    turned, part = dressed.values({"headYaw": 0.4}), dressed.part("tresses")
+    dressed.pose(turned)
+    rest = part.vertices.copy()
+    dressed.sway.advance(np.zeros(3), 0.0)
+    dressed.sway.advance(np.array([0.1, 0.0, 0.0]), 0.02)
+    dressed.pose(turned)
+    swayed = np.linalg.norm(part.vertices - rest, axis=1)
+    dressed.sway.advance(np.zeros(3), 100.0)
+    dressed.pose(turned)
+    np.testing.assert_array_equal(part.vertices, rest)
+    dressed.pose(dressed.values({}))
+    assert 2.0 < swayed.max() < 15.0 and np.quantile(swayed, 0.05) < 0.5
+
+
+def test_no_hole_opens_between_hair_and_skin(plain: Head, dressed: Head, gl: None) -> None:
+    from surface.view import Camera, Offscreen
+
+    covered = []
+    for head in (plain, dressed):
+        with Offscreen(head, (160, 160), samples=1) as screen:
+            screen.renderer.set_background((0.0, 1.0, 0.0), (0.0, 1.0, 0.0))
+            views = [(0, 3), (40, 3), (90, 3), (180, 5), (30, 50)]
+            pictures = [screen.render(head.values({}), Camera.around(*view)).astype(int) for view in views]
+        covered.append([(p[..., 1] < 120) | (p[..., 0] > 60) | (p[..., 2] > 60) for p in pictures])
+    for bare, own in zip(*covered, strict=True):
+        inner = bare.copy()  # a broad head differs at its outline
+        for axis, by in ((0, 3), (0, -3), (1, 3), (1, -3)):
+            inner &= np.roll(bare, by, axis)
+        assert (inner & ~own).sum() == 0
+        assert own.sum() > 1.1 * bare.sum()
+
+
+def test_what_is_worn_must_be_there_and_fit(tmp_path: Path) -> None:
+    with pytest.raises(HeadFileError, match="missing"):
+        Head.load(ICT, None, Look(worn=(Worn(tmp_path / "hat.npz", GREY),)))
+
+
+@pytest.mark.parametrize("key", ["hair/follow", "hair/strands", "hair/fast"])
+def test_a_garment_whose_arrays_do_not_belong_together_is_refused_by_its_path(tmp_path: Path, key: str) -> None:
+    with np.load(WARDROBE / "hair-crop.npz") as file:
+        arrays = dict(file)
+    wrong = arrays[key] + 5000 if key == "hair/fast" else arrays[key][:5]
+    np.savez(tmp_path / "cut.npz", **arrays | {key: wrong})
+    with pytest.raises(HeadFileError, match=rf"cut\.npz: .*{key}"):
+        read_garment(Worn(tmp_path / "cut.npz", GREY))
+
+
+def test_points_of_a_garment_lie_on_parts_that_it_names(tmp_path: Path) -> None:
+    with np.load(WARDROBE / "hair-crop.npz") as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "far.npz", **arrays | {"hair/anchor": arrays["hair/anchor"] + 7.0})
+    with pytest.raises(HeadFileError, match=r"far\.npz: .*hair/anchor"):
+        read_garment(Worn(tmp_path / "far.npz", GREY))
+
+
+def test_a_garment_with_the_mesh_of_another_is_refused(tmp_path: Path) -> None:
+    with np.load(WARDROBE / "hair-crop.npz") as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "other.npz", **arrays | {"hair/mesh_made": arrays["hair/mesh_made"] + 1.0})
+    with pytest.raises(HeadFileError, match=r"other\.npz: is damaged: hair/strands"):
+        Head.load(ICT, None, Look(worn=(Worn(tmp_path / "other.npz", GREY),)))
