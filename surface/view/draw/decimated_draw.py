@@ -122,6 +122,8 @@ def draw_calls(
     calls = []
     for name, group in groupby(decimated.parts, lambda p: materials.of(p.part.material).program):
         parts = list(group)
+        if not any(len(p.triangles) for p in parts):  # clothes hide them
+            continue
         rows = [{key: data[p.kept] for key, data in static(p.part).items()} for p in parts]
         joined = {key: np.concatenate([each[key] for each in rows]) for key in rows[0]}
         buffers = PartBuffers(ctx, JoinedParts(decimated, parts), programs[name], joined)

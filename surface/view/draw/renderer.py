@@ -73,7 +73,8 @@ class Renderer:
         parts = sorted(head.parts, key=lambda part: materials.of(part.material).order)
         # Taken from the part at rest: later the face may have moved.
         self._static = {p.name: materials.of(p.material).static(p, self.theme, self.openings) for p in parts}
-        self._parts: list[PartBuffers] | list[DrawCall] = [self._buffers(part) for part in parts]
+        seen = [part for part in parts if len(part.triangles)]  # clothes may hide all of a part
+        self._parts: list[PartBuffers] | list[DrawCall] = [self._buffers(part) for part in seen]
         self._simplified = False
         self._camera: tuple[Camera, float] | None = None
         self._into_bust = False

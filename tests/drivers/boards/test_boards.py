@@ -33,6 +33,8 @@ TEXTS = {"template": "S{ch},{us}\n", "off": "D{ch}\n"}
 ASKED = TEXTS | {"query": "?{ch}\n", "answer": "{ch}={us}\n"}
 NOISY = ("noise:*:5:p=0.3", "flip:*:p=0.3", "drop:*:p=0.2", "short:*:1:p=0.3", "late:*:70ms:p=0.2", "slow-reader:50ms")
 QUICK = {"stagger_s": 0.0, "margin_s": 0.05}
+PATIENT = QUICK | {"margin_s": 0.6}
+"""Options over a real pseudo-terminal, whose far end may be late on a busy machine."""
 FAMILIES: dict[str, tuple[str, tuple[ServoSpec, ...], dict[str, Any]]] = {
     "maestro": ("maestro", SERVOS, {}),
     "micro": ("maestro", tuple(replace(s, id=i) for i, s in enumerate(SERVOS)), {"board": "micro"}),
@@ -96,8 +98,7 @@ class TestMaestroBus(BoardContract):
 
     @pytest.fixture
     def bus(self) -> Bus:
-        patient = QUICK | {"margin_s": 0.25}  # on a busy machine an answer takes its time
-        return open_bus("simulated", SERVOS, simulates="maestro", process=False, **patient)
+        return open_bus("simulated", SERVOS, simulates="maestro", process=False, **PATIENT)
 
 
 class TestMicroMaestroBus(BoardContract):
@@ -184,7 +185,7 @@ def test_3_every_way_out_switches_all_off(family: str, how: str) -> None:
 def test_3_signals_switch_all_off(number: int) -> None:
     with (
         SimulatedBus(SERVOS, family="maestro", options={"limits_us": (500, 2500)}) as board,
-        program("maestro", SERVOS, board.path, **QUICK) as child,
+        program("maestro", SERVOS, board.path, **PATIENT) as child,
     ):
         assert len(outputs(board)) == 3
         assert child.pid is not None
@@ -250,7 +251,7 @@ def test_13_14_nothing_is_believed_that_cannot_be(family: str, fault: str) -> No
 
 def test_10_a_port_in_use_is_told() -> None:
     with SimulatedBus(SERVOS, family="maestro") as board:
-        first, second = (open_bus("maestro", SERVOS, port=board.path, **QUICK) for _ in range(2))
+        first, second = (open_bus("maestro", SERVOS, port=board.path, **PATIENT) for _ in range(2))
         with first, pytest.raises(PortBusy, match="held by another program"):
             second.open()
 
@@ -319,7 +320,7 @@ def test_the_maestro_says_what_is_wrong_with_it(caplog: pytest.LogCaptureFixture
 def test_the_maestros_own_limits_are_told(caplog: pytest.LogCaptureFixture) -> None:
     servo = ServoSpec(0, "jaw", "rc-180", -1.2, 1.2, 8.0, 200.0, rest_rad=-1.0)
     with SimulatedBus([servo], family="maestro") as board, caplog.at_level(logging.WARNING):
-        with open_bus("maestro", [servo], port=board.path, **QUICK) as bus:
+        with open_bus("maestro", [servo], port=board.path, **PATIENT) as bus:
             bus.start()
             assert bus.read().position_rad[0] == pytest.approx((992 - 1500) * math.pi / 2000, abs=1e-3)
         assert "stays at 992 us" in caplog.text
@@ -327,7 +328,7 @@ def test_the_maestros_own_limits_are_told(caplog: pytest.LogCaptureFixture) -> N
 
 def test_the_wrong_board_is_told() -> None:
     with SimulatedBus(SERVOS[:2], family="maestro", options={"board": "micro"}) as board:
-        with open_bus("maestro", SERVOS[:2], port=board.path, **QUICK) as bus:
+        with open_bus("maestro", SERVOS[:2], port=board.path, **PATIENT) as bus:
             with pytest.raises(BusError, match="reports protocol") as caught:
                 bus.start()
             assert 'board = "micro"' in caught.value.hint
@@ -338,7 +339,7 @@ def test_targets_of_channels_in_a_row_go_in_one_command() -> None:
     servos = [ServoSpec(i, f"s{i}", "rc-90", -0.5, 0.5, 8.0, 200.0) for i in (0, 1, 2, 5, 6, 9)]
     with (
         SimulatedBus(servos, family="maestro", options={"limits_us": (500, 2500)}) as board,
-        open_bus("maestro", servos, port=board.path, **QUICK) as bus,
+        open_bus("maestro", servos, port=board.path, **PATIENT) as bus,
     ):
         bus.start()
         sent = bytearray()

@@ -58,7 +58,7 @@ def test_a_family_may_choose_its_driver_by_the_servos() -> None:
 
 
 def test_a_simulated_bus_is_the_driver_of_its_family_over_a_simulated_far_end() -> None:
-    with open_bus("simulated", [SERVO], simulates="maestro", process=False, stagger_s=0.0) as bus:
+    with open_bus("simulated", [SERVO], simulates="maestro", process=False, stagger_s=0.0, margin_s=0.6) as bus:
         assert isinstance(bus, driver_of("maestro", [SERVO]))
         bus.start()
         assert bus.read().torque.all()

@@ -182,7 +182,7 @@ def test_the_servos_stop_by_themselves_when_the_program_is_killed(wire: Simulate
 
 
 def test_the_first_error_is_told_and_the_one_of_closing_is_a_note(wire: SimulatedBus) -> None:
-    bus = open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.05, watchdog_ms=0)
+    bus = open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.5, watchdog_ms=0)
     with pytest.raises(ZeroDivisionError) as caught, bus:
         bus.start()
         wire.fault("mute:2")

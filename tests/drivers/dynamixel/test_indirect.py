@@ -20,7 +20,7 @@ from drivers.sim import SimulatedBus
 from drivers.tables.tables import ControlTable, Item, load_table
 from tests.drivers.contract import SERVOS, read_until, settle
 
-CALM = {"margin_s": 0.1, "watchdog_ms": 0}
+CALM = {"margin_s": 1.0, "watchdog_ms": 0}
 
 
 @pytest.fixture

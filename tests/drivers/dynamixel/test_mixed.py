@@ -14,7 +14,7 @@ from drivers.base.errors import NoReply, ServoFault, WrongModel
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import read_until, settle
 
-CALM = {"margin_s": 0.1, "watchdog_ms": 0}
+CALM = {"margin_s": 1.0, "watchdog_ms": 0}
 MODELS = ("xl330-m288", "ax-12a", "xl330-m288", "mx1-28")
 SERVOS = tuple(
     ServoSpec(number, f"s{number}", model, -0.5, 0.5, 8.0, 200.0)

@@ -25,7 +25,7 @@ def wire() -> Iterator[SimulatedBus]:
 
 @pytest.fixture
 def registers(wire: SimulatedBus) -> Iterator[Registers]:
-    port = Port(wire.path, margin_s=0.1)
+    port = Port(wire.path, margin_s=1.0)
     port.openPort()
     named = Registers(Packets(), port, SERVOS)
     named.tables = dict.fromkeys(IDS, load_table("xl330-m288"))
@@ -61,9 +61,11 @@ def test_lost_answers_are_asked_for_again(wire: SimulatedBus, registers: Registe
 
 
 def test_silence_and_damage_are_told_apart(wire: SimulatedBus, registers: Registers) -> None:
+    registers.port.margin_s = 0.1
     wire.fault("mute:1")
     with pytest.raises(NoReply, match=r'"jaw" \(id 1\) on .* at 1000000 baud did not answer reading Torque Enable'):
         registers.get(1, "torque")
+    registers.port.margin_s = 1.0
     wire.fault("crc:2")
     with pytest.raises(CorruptReply, match='"brow"'):
         registers.get(2, "torque")
@@ -74,6 +76,7 @@ def test_a_group_read_asks_the_missing_ones_again_and_names_all_that_fail(
 ) -> None:
     wire.fault("drop:2:count=1")
     assert registers.get_all(IDS, "torque") == dict.fromkeys(IDS, 0)
+    registers.port.margin_s = 0.1
     wire.fault("mute:1", "mute:7")
     with pytest.raises(NoReply, match="2 servos: ids 1, 7") as caught:
         registers.get_all(IDS, "torque")

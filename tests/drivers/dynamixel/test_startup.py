@@ -18,7 +18,7 @@ from drivers.sim.serving.virtual import VirtualBus
 from drivers.tables.tables import load_table
 from tests.drivers.contract import SERVOS, settle
 
-CALM = {"margin_s": 0.1, "watchdog_ms": 0}
+CALM = {"margin_s": 1.0, "watchdog_ms": 0}
 IDS = [servo.id for servo in SERVOS]
 
 

@@ -12,6 +12,7 @@ from surface.base.errors import HeadFileError
 from surface.head import Head
 from surface.head.model.look import Look, Worn
 from surface.head.model.wardrobe import read_garment
+from surface.view import Camera, Offscreen
 
 CONFIGS = Path(__file__).resolve().parents[3] / "configs"
 ICT, WARDROBE = CONFIGS / "heads" / "ict", CONFIGS / "wardrobe"
@@ -140,3 +141,18 @@ def test_a_garment_with_the_mesh_of_another_is_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "other.npz", **arrays | {"hair/mesh_made": arrays["hair/mesh_made"] + 1.0})
     with pytest.raises(HeadFileError, match=r"other\.npz: is damaged: hair/strands"):
         Head.load(ICT, None, Look(worn=(Worn(tmp_path / "other.npz", GREY),)))
+
+
+@pytest.mark.parametrize("simplified", [False, True])
+def test_what_is_worn_may_hide_all_of_a_part(tmp_path: Path, simplified: bool) -> None:
+    with np.load(WARDROBE / "hair-crop.npz") as file:
+        arrays = dict(file)
+    hood = {key: np.full_like(arrays[key], 255) for key in ("hidden/face", "hidden/back")}
+    np.savez(tmp_path / "hood.npz", **arrays | hood)
+    head = Head.load(ICT, None, Look(worn=(Worn(tmp_path / "hood.npz", GREY),)))
+    assert len(head.part("back").triangles) == 0
+    with Offscreen(head, (96, 96), quality="fast") as screen:
+        if simplified:
+            screen.renderer.hurry()
+        picture = screen.render(np.zeros(len(head.parameters)), Camera.front())
+    assert np.ptp(picture[..., :3].astype(int), axis=(0, 1)).max() > 40, "the hair is seen"
