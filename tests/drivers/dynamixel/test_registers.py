@@ -56,6 +56,7 @@ def test_a_refusal_names_servo_register_and_reason(registers: Registers) -> None
 
 
 def test_lost_answers_are_asked_for_again(wire: SimulatedBus, registers: Registers) -> None:
+    registers.port.margin_s = 0.3
     wire.fault("drop:1:every=3")
     assert [registers.get(1, "torque") for _ in range(6)] == [0] * 6
 
@@ -65,7 +66,7 @@ def test_silence_and_damage_are_told_apart(wire: SimulatedBus, registers: Regist
     wire.fault("mute:1")
     with pytest.raises(NoReply, match=r'"jaw" \(id 1\) on .* at 1000000 baud did not answer reading Torque Enable'):
         registers.get(1, "torque")
-    registers.port.margin_s = 1.0
+    registers.port.margin_s = 0.3
     wire.fault("crc:2")
     with pytest.raises(CorruptReply, match='"brow"'):
         registers.get(2, "torque")

@@ -7,11 +7,18 @@ import pytest
 from drivers.base.bus import ServoInfo
 from drivers.base.errors import CorruptReply, NoReply, ServoRefused
 from drivers.packets.packet import MAX_ID
+from drivers.servos import port
 from drivers.sim import SimulatedBus
 from drivers.tools import set_id as module
 from drivers.tools.set_id import set_id
 
 FAMILIES = [("xl330-m288", 2), ("xl320", 2), ("ax-12a", 1), ("sts3215", 1), ("scs0009", 1)]
+
+
+@pytest.fixture(autouse=True)
+def patience(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A simulated servo may answer late on a busy machine."""
+    monkeypatch.setattr(port, "reply_margin_s", lambda path: 0.15)
 
 
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
