@@ -33,6 +33,7 @@ STORED = ("points", "anchor", "degrees", "knots_u", "knots_v", "follow", "sway",
 BY_POINT = {"points": (3,), "anchor": (3,), "degrees": (2,), "follow": (), "sway": ()}  # shape of a row of each
 BY_VERTEX = {"mesh_uv": (2,), "strands": (4,), "tint": (), "shade": (), "mesh_side": ()}
 FIELDS = ("cover", "hidden", "shadow")
+MOST_NAMES, LONGEST_NAME = 64, 512  # names; bytes, four a character
 
 
 @dataclass(frozen=True)
@@ -65,19 +66,28 @@ def read_garment(worn: Worn) -> Garment:
 
     def make(file: Sidecar) -> Garment:
         z = file.arrays
-        names = [str(n).split(":") for n in z["parts"]]
+        names = [n.split(":") for n in _names(z, "parts")]
+        anchors = _names(z, "anchors")
         parts = tuple(WornPart(n, material, {k: z[f"{n}/{k}"] for k in (*STORED, *KEYS)}) for n, material in names)
         for part in parts:
             _check_rows(part)
-            if not np.isin(part.arrays["anchor"][:, 0], np.arange(len(z["anchors"]))).all():
+            if not np.isin(part.arrays["anchor"][:, 0], np.arange(len(anchors))).all():
                 raise ValueError(f"{part.name}/anchor names a part that is not in anchors")
         fields = {k: z[k].astype(np.float32) / np.float32(255) for k in z if k.split("/")[0] in FIELDS}
-        return Garment(worn, tuple(str(a) for a in z["anchors"]), parts, fields)
+        return Garment(worn, anchors, parts, fields)
 
     found = read_sidecar(worn.path, make, HINT)
     if found is None:
         raise HeadFileError(f"{worn.path}: missing", hint=HINT)
     return found
+
+
+def _names(arrays: Mapping[str, Array], key: str) -> tuple[str, ...]:
+    """Names in an array of texts. Raises ValueError: it is another array, or too long."""
+    names = arrays[key]
+    if names.ndim != 1 or names.dtype.kind != "U" or len(names) > MOST_NAMES or names.itemsize > LONGEST_NAME:
+        raise ValueError(f"{key} is no list of at most {MOST_NAMES} names")
+    return tuple(str(name) for name in names)
 
 
 def _check_rows(part: WornPart) -> None:

@@ -135,6 +135,15 @@ def test_points_of_a_garment_lie_on_parts_that_it_names(tmp_path: Path) -> None:
         read_garment(Worn(tmp_path / "far.npz", GREY))
 
 
+@pytest.mark.parametrize("names", [np.arange(12).reshape(4, 3), np.array(["a" * 200]), np.array(["a"] * 100)])
+def test_names_in_a_garment_are_bounded(tmp_path: Path, names: np.ndarray) -> None:
+    with np.load(WARDROBE / "hair-crop.npz") as file:
+        arrays = dict(file)
+    np.savez(tmp_path / "named.npz", **arrays | {"anchors": names})
+    with pytest.raises(HeadFileError, match=r"named\.npz: anchors is no list of at most"):
+        read_garment(Worn(tmp_path / "named.npz", GREY))
+
+
 def test_a_garment_with_the_mesh_of_another_is_refused(tmp_path: Path) -> None:
     with np.load(WARDROBE / "hair-crop.npz") as file:
         arrays = dict(file)
