@@ -43,6 +43,11 @@ class Presence:
         self._missed[index] = 0
         self._drive(self.driven | (np.arange(len(self.driven)) == index))
 
+    def leave_out(self, index: int) -> None:
+        """A servo has to be started again before it is driven."""
+        self.left_out[index] = True
+        self._drive(self.driven & (np.arange(len(self.driven)) != index))
+
     def note(self, state: BusState, turn: int) -> list[int]:
         """Take a read into account, of which ``turn`` are needed to ask every servo; returns who came back with it."""
         if self._complete and state.fresh.all():

@@ -27,6 +27,8 @@ E = TypeVar("E", bound=DriverError)
 
 JOIN_S = 1.0
 """Time between two attempts to start servos that were left out, one of them at a time."""
+FAR_RAD = 0.4
+"""How far from its last goal a servo may stand that comes back and is simply driven on."""
 
 
 class WireBus(Bus):
@@ -228,9 +230,25 @@ class WireBus(Bus):
     def _follow(self, state: BusState) -> None:
         """Drive only servos whose positions are known, each from where it is; see :mod:`drivers.core.presence`."""
         for index in self._presence.note(state, self._reads_a_turn):
-            self._begin_at(index, float(state.position_rad[index]))
+            self._come_back(index, float(state.position_rad[index]))
         if self._presence.left_out.any() and self._clock() >= self._join_s:
             self._let_join(np.flatnonzero(self._presence.left_out & ~state.silent).tolist())
+
+    def _come_back(self, index: int, angle_rad: float) -> None:
+        """Drive a servo that was away on from its position.
+
+        One that kept its torque stands near its last goal. One that reads far from there has lost its torque and its
+        settings, or two servos answer at once and what is read is wrong: it is started as if it were new, which reads
+        all of it again.
+        """
+        goal_rad = float(self._limits.target[index])
+        if abs(angle_rad - goal_rad) <= FAR_RAD:
+            self._begin_at(index, angle_rad)
+            return
+        self._presence.leave_out(index)
+        message = f"it came back at {angle_rad:.2f} rad, far from its last goal of {goal_rad:.2f} rad"
+        hint = "it is started again; look for a second servo of its id, and at its supply"
+        self._leave_out(index, self._error(BusError, message, hint, [index]))
 
     def _begin_at(self, index: int, angle_rad: float) -> None:
         """Let the goals of one servo begin at a position."""

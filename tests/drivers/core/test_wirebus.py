@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from drivers.base.bus import ServoSpec
+from drivers.base.bus import Bus, BusState, ServoSpec
 from drivers.base.errors import BusError, DriverError, NoReply, PortLost, PortMissing, ServoRefused
 from drivers.sim.serving.virtual import VirtualBus
 
@@ -222,3 +223,64 @@ def test_servos_that_may_be_on_after_a_start_that_failed_are_switched_off() -> N
         wire.clear()
         bus.stop()
         assert not any(servo.torque for servo in wire.chain.servos)
+
+
+def drive(wire: VirtualBus, bus: Bus, seconds: float) -> list[int]:
+    """Cycles with all servos wanted at 0.3 rad; returns the goals that servo 1 had."""
+    goals, end = [], wire.clock() + seconds
+    while wire.clock() < end:
+        bus.write([0.3, 0.3])
+        goals.append(wire.chain.servo(1).goal)
+        bus.read()
+        wire.clock.sleep(0.02)
+    return goals
+
+
+@pytest.mark.parametrize("model", ["xl330-m288", "sts3215", "ax-12a"])
+def test_a_servo_that_comes_back_far_from_its_goal_is_started_again_from_there(
+    model: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    servos = [ServoSpec(i, f"s{i}", model, -1.0, 1.0, 2.0, 50.0) for i in (1, 4)]
+    wire = VirtualBus(servos, "feetech" if model == "sts3215" else "dynamixel", driver={"margin_s": 0.02})
+    servo = wire.chain.servo(1)
+    rad = servo.table.rad_per_tick
+    with wire.bus() as bus, caplog.at_level(logging.WARNING):
+        bus.start()
+        drive(wire, bus, 0.5)
+        wire.fault("mute:1")
+        drive(wire, bus, 0.5)
+        servo.reboot(wire.clock())  # its supply was gone, and somebody has turned it
+        servo.place(servo.table.center - 0.9 / rad, wire.clock())
+        wire.clear()
+        goals = drive(wire, bus, 3.0)
+        assert "far from its last goal of 0.30 rad" in caplog.text
+        assert "is driven again" in caplog.text
+        on = [goal for goal in goals if goal < servo.table.center]
+        assert abs(on[0] * rad - servo.table.center * rad + 0.9) < 0.1, "it begins where it is"
+        assert np.abs(np.diff(on)).max() * rad < 0.2, "and goes on from there at its speed"
+        assert servo.torque and goals[-1] == pytest.approx(servo.table.center + 0.3 / rad, abs=2)
+
+
+def test_a_wrong_position_that_is_read_twice_becomes_no_goal(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = VirtualBus(CHAIN, "dynamixel", driver={"margin_s": 0.02})
+    with wire.bus() as bus:
+        bus.start()
+        drive(wire, bus, 0.5)
+        wire.fault("mute:1")
+        drive(wire, bus, 0.5)
+        wire.clear()
+        ask = bus._ask
+
+        def wrong() -> BusState:
+            state = ask()
+            position = state.position_rad.copy()
+            position[0] = np.where(state.fresh[0], -1.57, position[0])
+            return replace(state, position_rad=position)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(bus, "_ask", wrong)
+            goals = drive(wire, bus, 1.5)
+        goals += drive(wire, bus, 2.0)
+        center, rad = wire.chain.servo(1).table.center, wire.chain.servo(1).table.rad_per_tick
+        assert min(goals) > center + 0.2 / rad, "it was sent to a position that it never had"
+        assert bus.driven.all()
