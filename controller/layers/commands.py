@@ -74,6 +74,12 @@ class CommandSink(Protocol):
     def release(self, indices: Sequence[int], stamp_ns: int) -> None:
         """Give held parameters back to the layers below."""
 
+    def write_layer(self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
+        """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest."""
+
+    def release_layer(self, name: str) -> None:
+        """Let a layer fade out, whose source is lost."""
+
     def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
         """Show a named expression; without a duration until the next one."""
 
