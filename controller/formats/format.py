@@ -36,7 +36,6 @@ class Format:
     delimiter : what ends a message of a stream; empty where the format has datagrams only.
     most : bytes of the longest message.
     timeout_s : a source that is silent for so long is usually lost; infinity where messages are sent on changes only.
-    whole : whether each message holds the whole face, so that older ones need not be read where newer ones wait.
     note : one sentence on what the format cannot carry, for people.
     install : what ``pip install`` takes where a package is missing.
     """
@@ -53,7 +52,6 @@ class Format:
     delimiter: bytes = b""
     most: int = 65_536
     timeout_s: float = 0.5
-    whole: bool = False
     note: str = ""
     install: str = ""
 

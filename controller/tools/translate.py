@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
@@ -23,7 +24,7 @@ from controller.links.net.senders import Sender, open_sender
 from controller.takes.reader import load_take, suffixes
 from drivers.base.errors import PluginError
 
-_WAIT_S = 0.1
+_WAIT_S = 0.02
 _HINT = "write it as KIND:ADDRESS, for example livelink:127.0.0.1:11111; omote plugins lists the kinds"
 
 
@@ -33,6 +34,7 @@ class Options:
 
     mirror : left and right change places. connect : call the input's address (TCP). baud : of serial ports.
     open_to_network : listen where other machines reach. seconds : how long; None until the input ends.
+    stop : ends it when it is set.
     """
 
     mirror: bool = False
@@ -40,6 +42,7 @@ class Options:
     baud: int = 115_200
     open_to_network: bool = False
     seconds: float | None = None
+    stop: threading.Event = field(default_factory=threading.Event)
 
 
 @dataclass
@@ -170,7 +173,7 @@ def _pass_on(
                     counts.sent += 1
                 else:
                     counts.dropped += 1
-        if time.monotonic() >= end_s:
+        if time.monotonic() >= end_s or options.stop.is_set():
             return
 
 

@@ -152,6 +152,5 @@ FORMAT = Format(
     decoder=LiveLinkDecoder,
     encoder=LiveLinkEncoder,
     carries=_carries,
-    whole=True,
     most=2048 + 2 * _LONGEST_NAME,
 )

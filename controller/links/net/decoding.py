@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 from controller.base.parameters import Parameters
@@ -12,6 +11,9 @@ from controller.links.net.receivers import Received
 
 MOST_SENDERS = 16
 """Senders whose state is kept; the one that was silent longest is forgotten."""
+
+MOST_WAITING, MOST_WAITING_BYTES = 64, 65_536
+"""Messages of one sender that are read at once; more where they are small."""
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,7 @@ class Arrived:
 class Decoding:
     """Decodes what arrives at one receiver.
 
-    newest : read only the newest message of each sender, where the format's messages are whole faces.
+    newest : of what has waited, read only the newest messages of each sender; nothing is left out without.
     streams : pieces of streams arrive, not datagrams.
 
     Attributes
@@ -36,7 +38,7 @@ class Decoding:
 
     def __init__(self, form: Format, parameters: Parameters, *, streams: bool, newest: bool = False) -> None:
         self._form, self._parameters, self._streams = form, parameters, streams
-        self._newest = newest and form.whole
+        self._newest = newest
         self.refused = Refusals()
         self.messages = 0
         self._senders: dict[str, tuple[Decoder, Splitter]] = {}
@@ -46,10 +48,9 @@ class Decoding:
         arrived: list[Arrived] = []
         for sender, messages in self._by_sender(received).items():
             decoder, _ = self._senders[sender]
-            if self._newest:
-                arrived += self._newest_of(sender, decoder, messages)
-            else:
-                arrived += [Arrived(sender, frame) for each in messages for frame in decoder.feed(each)]
+            skipped = _too_old(messages) if self._newest else 0
+            frames = [frame for message in messages[skipped:] for frame in decoder.feed(message)]
+            arrived += [Arrived(sender, frame, 0 if n else skipped) for n, frame in enumerate(frames)]
         return arrived
 
     def _by_sender(self, received: Received) -> dict[str, list[bytes]]:
@@ -81,10 +82,12 @@ class Decoding:
         decoder.refused = self.refused
         self._senders[sender] = decoder, Splitter(self._form.delimiter or b"\n", self._form.most, self.refused)
 
-    @staticmethod
-    def _newest_of(sender: str, decoder: Decoder, messages: list[bytes]) -> Iterator[Arrived]:
-        for skipped, message in enumerate(reversed(messages)):
-            frames = decoder.feed(message)
-            if frames:
-                yield Arrived(sender, frames[-1], len(messages) - 1 - skipped)
-                return
+
+def _too_old(messages: list[bytes]) -> int:
+    """How many messages are left out, so that a flood costs bounded time: what is newest is always read."""
+    size = 0
+    for back, message in enumerate(reversed(messages)):
+        size += len(message)
+        if back >= MOST_WAITING and size > MOST_WAITING_BYTES:
+            return len(messages) - back
+    return 0

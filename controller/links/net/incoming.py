@@ -18,7 +18,9 @@ from controller.links.net.receivers import Receiver
 from controller.links.net.settings import NetSettings
 
 PASS_S = 0.004
-"""Shortest time from one look at what has arrived to the next: bounds what a flood of messages costs."""
+"""Shortest time from one look at what has arrived to the next."""
+REST = 3.0
+"""Longest share of work is 1 / (1 + this): so long, in times of its work, the link rests after a flood of messages."""
 _WAIT_S = 0.1
 _RENEW_S = 0.3
 """How often a face that holds is written again, so that its layer's own time-out does not release it."""
@@ -89,15 +91,16 @@ class Incoming:
         }
 
     def _run(self) -> None:
-        last_s = 0.0
+        next_s = 0.0
         while not self._stopping.is_set():
-            self._stopping.wait(max(0.0, last_s + PASS_S - time.monotonic()))
+            self._stopping.wait(max(0.0, next_s - time.monotonic()))
             received = self._receiver.receive(_WAIT_S)
-            last_s = now_s = time.monotonic()
+            now_s = time.monotonic()
             newest = self._newest(self._decoding.feed(received), now_s)
             if newest is not None:
                 self._show(newest, now_s)
             self._watch(now_s)
+            next_s = now_s + max(PASS_S, (1.0 + REST) * (time.monotonic() - now_s))
 
     def _newest(self, arrived: list[Arrived], now_s: float) -> Arrived | None:
         """The newest frame of the one source that counts; others are heard only when that one is silent."""

@@ -12,7 +12,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.vocabulary.presets import Presets
 
 VRM0 = "Neutral Joy Angry Sorrow Fun A I U E O Blink Blink_L Blink_R LookUp LookDown LookLeft LookRight"
-VRM1 = "happy angry sad relaxed surprised aa ih ou ee oh blink blinkLeft blinkRight neutral lookUp lookDown lookLeft lookRight"
+VRM1 = "happy angry sad relaxed surprised aa ih ou ee oh blink blinkLeft blinkRight neutral lookUp lookDown"
 """The names in the specifications of VRM 0.x (BlendShapePresetName) and 1.0 (expressions)."""
 
 
