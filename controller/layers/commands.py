@@ -139,6 +139,7 @@ class CommandState:
 
     Attributes
     ----------
+    link_status : says how links are, for STATUS.
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
     on_command : called after each command, in the thread that gave it.
     parts : what fails alone; a source of a layer that fails lets its layer fade out, and begins again.
@@ -178,6 +179,7 @@ class CommandState:
             self._part("gaze", self._looking, self._write_gaze, self._renew_gaze),
         )
         self.servo_monitor: ServoMonitor | None = None
+        self.link_status: Callable[[], Mapping[str, StatusValue]] = dict
         self.shows: Player | None = None
         self.on_command: Callable[[], None] = _nothing
         self.stop_latch = StopLatch()
@@ -367,6 +369,7 @@ class CommandState:
                 "layers": ",".join(self.mixer.active) or "none",
                 "failed": ",".join(self.parts.failed).replace(" ", "_") or "none",
                 **(self.servo_monitor.status() if self.servo_monitor is not None else {}),
+                **self.link_status(),
             }
 
     def _stop_looking(self, fade_s: float | None = None) -> None:

@@ -88,7 +88,8 @@ class LiveLinkDecoder:
         given = np.frombuffer(message, ">f4", count, at + 1)
         table, values, mask = self._table, self._neutral.copy(), self._nothing.copy()
         known = slice(None) if count >= COUNT else table.source < count
-        found = given[table.source[known]] / table.scale[known]
+        with np.errstate(invalid="ignore"):  # what is no number is left out below
+            found = given[table.source[known]] / table.scale[known]
         finite = np.isfinite(found)
         target = table.target[known]
         if not finite.all():
