@@ -32,10 +32,11 @@ mutate: setup ## mutation testing of a room, 50 changed lines: make mutate ROOM=
 	@$(PY) -m tests.mutate $(ROOM) --seed $(or $(SEED),1) $(if $(UNDER),--under $(UNDER))
 
 # COUNT files of each kind and lines; the same seed damages them in the same way.
-fuzz: setup ## read damaged files of every kind, and damaged lines: make fuzz COUNT=1000 SEED=1 MINUTES=60 JOBS=2
+fuzz: setup ## read damaged files of every kind, lines and messages: make fuzz COUNT=1000 SEED=1 MINUTES=60 JOBS=2
 	@$(PY) -m tests.fuzz.files --count $(or $(COUNT),1000) --seed $(or $(SEED),1) \
 		--minutes $(or $(MINUTES),60) $(if $(JOBS),--jobs $(JOBS))
 	@$(PY) -m tests.fuzz.lines
+	@$(PY) -m tests.fuzz.messages --count $(or $(MESSAGES),1000000) --seed $(or $(SEED),1)
 
 bench: setup ## measure the engine on this machine
 	@$(BIN)/omote bench

@@ -31,8 +31,11 @@ SINGLE = {
     "drivers.sim.wire.simulator": ("BoardOptions", "Setting", "Simulator"),
     "surface.export.exporter": ("API", "Exporter"),
     "controller.base.parameters": ("PARAMETERS", "Parameters"),
+    "controller.formats.format": ("API", "Format"),
+    "controller.formats.frame": ("Decoder", "Encoder", "Frame", "Refusals"),
     "controller.layers.commands": ("CommandSink",),
     "controller.links.kind": ("API", "LinkContext", "Link", "LinkKind"),
+    "controller.links.net.kinds": ("link_of",),
     "controller.takes.livelink": ("Take",),
     "controller.takes.reader": ("API", "TakeReader"),
 }

@@ -40,12 +40,12 @@ READERS = {
     "/dev/ttyUSB0": "{port}", "PORT": "{port}", "STAGE": "my-stage.toml", "TAKE": "a.tsv", "FILE": "a.tsv",
     "FOLDER": "small", "ROBOT": "head24", "NAME": "head24", "OLD": "1", "NEW": "12", "MESH": "me.glb",
     "...": "dynamixel", "configs/stages/serial.toml": "serial.toml", "heads/me": "small",
-    "myhead.toml": "my-robot.toml",
+    "myhead.toml": "my-robot.toml", "livelink:127.0.0.1:11111": "livelink:127.0.0.1:27311",
 }  # fmt: skip
 """What only a reader has, and what the test has in its place; the other names are files that the test writes."""
 MORE = {
     "run": ["--no-face", "--seconds", "0.3"], "play": ["--no-face", "--seconds", "0.3"],
-    "monitor": ["--seconds", "0.3"],
+    "monitor": ["--seconds", "0.3"], "translate": ["--seconds", "0.3"],
     "scan": ["--baud", "1000000"], "render": ["--size", "32x32"],
 }  # fmt: skip
 """Options that end a command soon; the last one counts where a line has the same."""

@@ -23,7 +23,7 @@ from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.parts import Part
 from controller.base.signals import termination_signals, unblock_interrupts
 from controller.body import messages
-from controller.body.link_part import LinkPart, thread_errors
+from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.body.messages import RunOptions
 from controller.body.panel_state import PanelState
 from controller.body.sources import Sources, Voice, show_part
@@ -189,6 +189,7 @@ class Body:
 
         choices = [link for link in stage.settings.links if not self.follows_servos or link.simulated is None]
         self.links = [LinkPart(choice, context, state.parts) for choice in choices]
+        state.link_status = lambda: link_status(self.links)
         faults: list[tuple[LinkPart, Exception]] = []
         for link in self.links:
             self._closers.callback(link.close)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any
 
@@ -14,6 +14,7 @@ from controller.links.links import LinkSettings, open_links
 from drivers.base.shutdown import Closers
 
 _CLOSE_S = 3.0
+_LONGEST_STATUS = 400
 
 
 class LinkPart:
@@ -106,6 +107,20 @@ class LinkPart:
             closers.close()
         except Exception as error:  # noqa: BLE001  the others are closed all the same
             self._part.note(f"it could not be closed in order: {describe(error)}")
+
+
+def link_status(links: Sequence[LinkPart]) -> dict[str, str]:
+    """Rate, jitter, loss, age and last error of each link that takes faces, as one word; nothing without any."""
+    words = []
+    for link in links:
+        report = link.report()
+        if "rate_hz" in report:
+            age = "never" if report["age_s"] is None else f"{report['age_s']}s"
+            figures = f"{report['rate_hz']}Hz,{report['jitter_ms']}ms,lost={report['lost']},age={age}"
+            words.append(
+                f"{link.name.removeprefix('link ')}:{figures},{report.get('fault') or report['error'] or 'good'}"
+            )
+    return {"links": "_".join(";".join(words).split())[:_LONGEST_STATUS]} if words else {}
 
 
 @contextmanager

@@ -21,7 +21,7 @@ def make_app() -> Typer:
     from typer import Typer
 
     # start-up: the same
-    from controller.cli import bench, bus, check, heads, landmarks, run, simulate, version
+    from controller.cli import bench, bus, check, heads, landmarks, run, simulate, translate, version
 
     app = Typer(
         name="omote",
@@ -34,6 +34,7 @@ def make_app() -> Typer:
     for command in (
         run.demo, run.run, run.play, heads.render, heads.fit, landmarks.landmarks, heads.export,
         bus.ports, bus.scan, bus.set_id, bus.monitor, bus.calibrate, check.check, check.plugins, bench.bench,
+        translate.translate,
     ):  # fmt: skip
         app.command()(command)
     app.add_typer(simulate.make_app(), name="simulate")

@@ -74,6 +74,12 @@ class CommandSink(Protocol):
     def release(self, indices: Sequence[int], stamp_ns: int) -> None:
         """Give held parameters back to the layers below."""
 
+    def write_layer(self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
+        """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest."""
+
+    def release_layer(self, name: str) -> None:
+        """Let a layer fade out, whose source is lost."""
+
     def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
         """Show a named expression; without a duration until the next one."""
 
@@ -133,6 +139,7 @@ class CommandState:
 
     Attributes
     ----------
+    link_status : says how links are, for STATUS.
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
     on_command : called after each command, in the thread that gave it.
     parts : what fails alone; a source of a layer that fails lets its layer fade out, and begins again.
@@ -172,6 +179,7 @@ class CommandState:
             self._part("gaze", self._looking, self._write_gaze, self._renew_gaze),
         )
         self.servo_monitor: ServoMonitor | None = None
+        self.link_status: Callable[[], Mapping[str, StatusValue]] = dict
         self.shows: Player | None = None
         self.on_command: Callable[[], None] = _nothing
         self.stop_latch = StopLatch()
@@ -361,6 +369,7 @@ class CommandState:
                 "layers": ",".join(self.mixer.active) or "none",
                 "failed": ",".join(self.parts.failed).replace(" ", "_") or "none",
                 **(self.servo_monitor.status() if self.servo_monitor is not None else {}),
+                **self.link_status(),
             }
 
     def _stop_looking(self, fade_s: float | None = None) -> None:

@@ -1,7 +1,8 @@
 """Defines what a kind of link is, and registers all kinds.
 
-A link is a folder of ``controller/links`` with a module ``kind`` that holds ``LINK``, or another package
-with an entry point in the group ``omote.links`` that names a :class:`LinkKind`; see docs/extending.md.
+A link is a folder of ``controller/links`` with a module ``kind`` that holds ``LINK``, or a format of
+``controller/formats``, or another package with an entry point in the group ``omote.links`` that names a
+:class:`LinkKind`; see docs/extending.md.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from controller.formats.format import FORMATS
 from controller.layers.commands import CommandSink
 from drivers.base.options import check_options
 from drivers.base.plugins import Registry, folders_with
@@ -63,12 +65,18 @@ class LinkKind:
     install: str = ""
 
 
+def _own() -> dict[str, str]:
+    """Links with a folder of their own, and one for each format."""
+    formats = {kind: f"controller.links.net.kinds:LINK_{kind}" for kind in FORMATS.builtin()}
+    return formats | folders_with("controller.links", "kind")
+
+
 LINKS: Registry[LinkKind] = Registry(
     LinkKind,
     "link kind",
     "omote.links",
     API,
-    lambda: folders_with("controller.links", "kind"),
+    _own,
     "LINK",
     check=lambda link: check_options(link.settings, {"kind"}),
 )

@@ -12,14 +12,14 @@ from pydantic import Field
 
 from controller.base.config import Settings, load
 from controller.base.errors import ConfigError, ParameterError, TakeError
-from controller.base.parameters import Parameters
+from controller.base.parameters import Parameters, did_you_mean
 from controller.base.paths import find_config
 from controller.layers.commands import CommandState
 from controller.layers.idle.settings import IdleSettings
 from controller.layers.mixer import LayerSettings
 from controller.layers.settings import load_layers
 from controller.links.line.script import load_script
-from controller.links.links import LinkTable
+from controller.links.links import LinkSettings, LinkTable
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
@@ -199,6 +199,24 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
     return found[0]
 
 
+def _layer_faults(links: Sequence[LinkSettings], layers: Sequence[LayerSettings]) -> list[str]:
+    """Links that write a layer which there is not, or one that another link writes: the two would take turns."""
+    faults, names = [], [layer.name for layer in layers]
+    writers: dict[str, int] = {}
+    for i, link in enumerate(links):
+        layer = getattr(link.own, "layer", None) if getattr(link.own, "incoming", None) is not None else None
+        if layer is None:
+            continue
+        if layer not in names:
+            faults.append(f"links[{i}].layer: unknown layer {layer!r}{did_you_mean(layer, names)}")
+        elif writers.setdefault(layer, i) != i:
+            faults.append(
+                f"links[{i}].layer: links[{writers[layer]}] writes {layer} already; give this one its own, as "
+                f'layer = "second" with [layers.second] and priority = 55'
+            )
+    return faults
+
+
 def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
     """All that a stage refers to; faults are added to ``faults``, and leave the stage unfit for use."""
     head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
@@ -214,6 +232,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
     layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
     life = _collect(faults, "life", lambda: IdleSettings.named(settings.life, parameters))
+    faults += _layer_faults(settings.links, layers or ())
     scripts = [("show", settings.show)] + [
         (f"links[{i}].script", link.simulated) for i, link in enumerate(settings.links)
     ]

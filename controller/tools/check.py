@@ -25,6 +25,7 @@ from controller.tools import file_kinds
 from controller.tools.robot_warnings import robot_warnings
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.facs import Facs
+from controller.vocabulary.presets import Presets
 from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
 from drivers.base.permission import ports_forbidden
@@ -175,6 +176,10 @@ def _describe_visemes(path: Path) -> Iterator[str]:
     yield f"visemes {path.name}: {len(found.names)}, {len(found.phonemes)} phonemes"
 
 
+def _describe_presets(path: Path) -> Iterator[str]:
+    yield f"presets {path.name}: {len(Presets.load(PARAMETERS, path).names)}"
+
+
 def _describe_moods(path: Path) -> Iterator[str]:
     yield f"moods {path.name}: {len(Affect.load(Vocabulary.load(PARAMETERS), path).names) - 1} anchors"
 
@@ -223,6 +228,7 @@ _READERS: dict[file_kinds.FileKind, Callable[[Path], Iterator[str]]] = {
     file_kinds.PARAMETERS: _describe_parameters,
     file_kinds.UNITS: _describe_units,
     file_kinds.VISEMES: _describe_visemes,
+    file_kinds.PRESETS: _describe_presets,
     file_kinds.MOODS: _describe_moods,
     file_kinds.LAYERS: _describe_layers,
     file_kinds.EXPRESSIONS: _describe_expressions,

@@ -44,13 +44,16 @@ LIFE = FileKind("life", frozenset(IdleSettings.known_keys()))
 PARAMETERS = FileKind("parameters", frozenset({"profile", "parameters", "aliases"}))
 UNITS = FileKind("action units", frozenset({"units", "emotions"}))
 VISEMES = FileKind("visemes", frozenset({"visemes", "rhubarb", "phonemes", "through"}))
+PRESETS = FileKind("presets", frozenset({"presets"}))
 MOODS = FileKind("moods", frozenset({"anchors"}))
 LAYERS = FileKind("layers", inside=frozenset(LayerTable.known_keys()))
 EXPRESSIONS = FileKind(
     "expressions",
     inside=frozenset({"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "of", "weights"}),
 )
-KINDS = (STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, LIFE, PARAMETERS, UNITS, VISEMES, MOODS, LAYERS, EXPRESSIONS)
+KINDS = (
+    STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, LIFE, PARAMETERS, UNITS, VISEMES, PRESETS, MOODS, LAYERS, EXPRESSIONS,
+)  # fmt: skip
 
 
 def kind_of(table: Mapping[str, Any]) -> FileKind | None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from controller.formats.format import FORMATS
 from controller.links.kind import LINKS
 from controller.takes.reader import TAKES
 from drivers.base.errors import PluginError
@@ -32,7 +33,13 @@ EXPORTERS: Registry[Exporter] = Registry(
     check=_check_exporter,
 )
 
-SORTS: dict[str, Registry[Any]] = {"bus": FAMILIES, "link": LINKS, "take": TAKES, "export": EXPORTERS}
+SORTS: dict[str, Registry[Any]] = {
+    "bus": FAMILIES,
+    "link": LINKS,
+    "format": FORMATS,
+    "take": TAKES,
+    "export": EXPORTERS,
+}
 """The registry of every sort of plug-in."""
 
 

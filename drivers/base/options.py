@@ -75,8 +75,8 @@ def check_options(options: type, reserved: Iterable[str] = ()) -> None:
         if entry.name in {*reserved} or entry.name.startswith(("_", "model_")):
             raise ValueError(f"{options.__name__}.{entry.name}: the name is taken")
         kinds = set(get_args(entry.type)) - {type(None)} if isinstance(entry.type, UnionType) else {entry.type}
-        if not kinds <= {bool, int, float, str, list[str]} or len(kinds) != 1:
-            allowed = "bool, int, float, str or list[str], or one of them or None"
+        if not kinds <= {bool, int, float, str, list[str], dict[str, float]} or len(kinds) != 1:
+            allowed = "bool, int, float, str, list[str] or dict[str, float], or one of them or None"
             raise ValueError(f"{options.__name__}.{entry.name}: its type must be {allowed}, not {entry.type}")
 
 

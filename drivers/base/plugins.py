@@ -55,8 +55,8 @@ class Registry(Generic[P]):
     what : name of one in messages, as ``"bus kind"``.
     group : entry points of other packages, as ``"omote.drivers"``.
     version : version of the interface; a plug-in made for another one is refused.
-    builtin : gives the built-in kinds and the module of each.
-    attribute : name of a definition in its module.
+    builtin : gives the built-in kinds and the module of each, or ``"module:name"`` of its definition.
+    attribute : name of a definition in its module, where the kind does not name another.
     reserved : kinds that no package may add.
     check : raises an error for a definition that this sort cannot use.
     """
@@ -100,7 +100,7 @@ class Registry(Generic[P]):
             name = f"{self.what} {kind!r} of the package {package}"
             hint = f"pip install --upgrade {package}, or ask its maker"
         try:
-            plugin: P = getattr(import_module(module), self.attribute) if module is not None else entry.load()
+            plugin: P = self._of_module(module) if module is not None else entry.load()
         except (Exception, SystemExit) as error:  # whatever a module of another package raises
             raise PluginError(f"{name} cannot be loaded: {_describe(error)}", hint=hint) from error
         self._check(plugin, kind, name, hint)
@@ -164,6 +164,11 @@ class Registry(Generic[P]):
         """Clear what was loaded and logged, as after another package was installed."""
         self._loaded.clear()
         self._logged.clear()
+
+    def _of_module(self, reference: str) -> P:
+        module, _, name = reference.partition(":")
+        found: P = getattr(import_module(module), name or self.attribute)
+        return found
 
     def _missing(self, mine: str, plugin: P, name: str) -> PluginError:
         """The error for a module that is not found: its package is not installed, or lacks the module."""

@@ -161,7 +161,7 @@ def _configs() -> list[Kind]:
         "stage": ["stages/demo.toml", "stages/everything.toml", "stages/play.toml", "stages/serial.toml"],
         "robot": ["robots/head24.toml", *(f"robots/{name}.toml" for name in ROBOTS)],
         "script": ["scripts/everything.toml", "scripts/tour.toml"],
-        **{name: [f"vocabularies/{name}.toml"] for name in ("arkit", "facs", "affect", "visemes", "layers")},
+        **{name: [f"vocabularies/{name}.toml"] for name in ("arkit", "facs", "affect", "visemes", "vrm", "layers")},
         "life": ["life/natural.toml"],
         "person": ["persons/maple.toml", "persons/oak.toml"],
     }

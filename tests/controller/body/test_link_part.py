@@ -12,7 +12,7 @@ import pytest
 from controller.base.errors import LinkError
 from controller.base.parts import Parts
 from controller.body import link_part
-from controller.body.link_part import LinkPart, thread_errors
+from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.links.kind import LinkContext
 from drivers.base.shutdown import Closers
 
@@ -163,3 +163,27 @@ def test_what_was_opened_before_an_error_is_closed(made: list[Any], monkeypatch:
     assert made[0].ended and not part.opened
     assert part.report() == {"port": "x", "accepted": 0, "refused": {}, "fault": ""}
     part.close()
+
+
+class Told:
+    """A link part with a report."""
+
+    def __init__(self, name: str, report: dict[str, object]) -> None:
+        self.name, self._report = name, report
+
+    def report(self) -> dict[str, object]:
+        return self._report
+
+
+def test_status_has_the_figures_of_links_that_take_faces_as_one_word() -> None:
+    figures = {"rate_hz": 60.0, "jitter_ms": 0.4, "lost": 2, "age_s": 0.012, "error": ""}
+    links = [
+        Told("link livelink on udp:127.0.0.1:11111", figures),
+        Told("link line on /dev/ttyUSB0", {"accepted": 5}),
+        Told("link vmc on udp:127.0.0.1:5", {**figures, "age_s": None, "error": "the far end hung up"}),
+    ]
+    assert link_status(cast(Any, links)) == {
+        "links": "livelink_on_udp:127.0.0.1:11111:60.0Hz,0.4ms,lost=2,age=0.012s,good;"
+        "vmc_on_udp:127.0.0.1:5:60.0Hz,0.4ms,lost=2,age=never,the_far_end_hung_up"
+    }
+    assert link_status(cast(Any, links[1:2])) == {}

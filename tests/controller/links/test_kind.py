@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from controller.base.parameters import PARAMETERS
+from controller.formats.format import FORMATS
 from controller.layers.commands import CommandState
 from controller.links.kind import API, LINKS, LinkContext, LinkKind
 from drivers.base.errors import PluginError
@@ -46,8 +47,8 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     LINKS.forget()
 
 
-def test_the_built_in_kind_is_found_by_its_folder() -> None:
-    assert LINKS.kinds() == ["line"]
+def test_built_in_kinds_are_folders_and_formats() -> None:
+    assert LINKS.kinds() == sorted(["line", *FORMATS.kinds()])
     line = LINKS.get("line")
     assert isinstance(line, LinkKind) and line.api == API and line.install == "pyserial"
     assert callable(LINKS.load(line, line.open))
@@ -56,7 +57,7 @@ def test_the_built_in_kind_is_found_by_its_folder() -> None:
 def test_a_kind_of_another_package_is_found(install: Callable[..., None]) -> None:
     install("udp")
     assert LINKS.get("udp").settings().port == 5
-    assert [kind.kind for kind in LINKS.all()] == ["line", "udp"]
+    assert [kind.kind for kind in LINKS.all()] == [*sorted(["line", *FORMATS.kinds()]), "udp"]
     assert LINKS.get("udp").install == ""
 
 

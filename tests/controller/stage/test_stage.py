@@ -155,3 +155,19 @@ def test_settings_of_a_stage_have_limits(
     for value in beyond:
         with pytest.raises(ConfigError, match="1 fault"):
             load_stage(stage_file(tmp_path, f'name = "mine"\n{line.format(value)}'), PARAMETERS)
+
+
+def test_two_links_do_not_write_one_layer_and_a_layer_must_be_there(tmp_path: Path) -> None:
+    link = '[[links]]\nkind = "{}"\nlisten = "127.0.0.1"\n'
+    text = 'name = "mine"\n' + link.format("livelink") + link.format("vmc")
+    with pytest.raises(ConfigError, match=r"links\[1\].layer: links\[0\] writes capture already"):
+        load_stage(stage_file(tmp_path, text), PARAMETERS)
+    with pytest.raises(ConfigError, match=r"links\[1\].layer: unknown layer 'secnd', did you mean 'second'"):
+        load_stage(stage_file(tmp_path, text + 'layer = "secnd"\n[layers.second]\npriority = 55\n'), PARAMETERS)
+    stage = load_stage(stage_file(tmp_path, text + 'layer = "second"\n[layers.second]\npriority = 55\n'), PARAMETERS)
+    assert [str(each) for each in stage.settings.links] == [
+        "livelink on udp:127.0.0.1:11111",
+        "vmc on udp:127.0.0.1:39539",
+    ]
+    sends = text.replace('kind = "vmc"\nlisten', 'kind = "vmc"\nsend')
+    assert load_stage(stage_file(tmp_path, sends), PARAMETERS)

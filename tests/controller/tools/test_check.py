@@ -159,6 +159,7 @@ SHIPPED = {
     "vocabularies/facs.toml": "action units facs.toml: 48 with sides, 8 emotions",
     "vocabularies/affect.toml": "moods affect.toml: 9 anchors",
     "vocabularies/visemes.toml": "visemes visemes.toml: 15, 41 phonemes",
+    "vocabularies/vrm.toml": "presets vrm.toml: 18",
     "vocabularies/layers.toml": "layers layers.toml: expression, idle, gaze, speech, capture, manual",
     "life/natural.toml": "life natural.toml: a blink every 4.5 s on average, 13 gestures",
 }

@@ -14,6 +14,7 @@ SHIPPED = {
     "stages/*": file_kinds.STAGE, "robots/*": file_kinds.ROBOT, "scripts/*": file_kinds.SCRIPT,
     "life/*": file_kinds.LIFE, "vocabularies/arkit*": file_kinds.PARAMETERS, "vocabularies/facs*": file_kinds.UNITS,
     "vocabularies/visemes*": file_kinds.VISEMES, "vocabularies/affect*": file_kinds.MOODS,
+    "vocabularies/vrm*": file_kinds.PRESETS,
     "vocabularies/layers*": file_kinds.LAYERS, "vocabularies/expressions*": file_kinds.EXPRESSIONS,
 }  # fmt: skip
 

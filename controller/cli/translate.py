@@ -1,0 +1,42 @@
+"""``omote translate``: faces from one program to another, in another format."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+
+def translate(
+    source: Annotated[
+        str, typer.Argument(metavar="IN", help="KIND:ADDRESS that faces are taken at, or the path of a take.")
+    ],
+    target: Annotated[str, typer.Argument(metavar="OUT", help="KIND:ADDRESS that faces are sent to.")],
+    seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
+    mirror: Annotated[bool, typer.Option("--mirror", help="Left and right change places.")] = False,
+    connect: Annotated[
+        bool, typer.Option("--connect", help="Call the address of IN instead of listening (TCP).")
+    ] = False,
+    baud: Annotated[int, typer.Option(help="Rate of serial ports.", min=300)] = 115_200,
+    open_to_network: Annotated[
+        bool, typer.Option("--open-to-network", help="Let IN listen where other machines reach.")
+    ] = False,
+) -> None:
+    """Take faces in one format and send them in another, without a stage, a face or servos.
+
+    An address is HOST:PORT, udp:HOST:PORT, tcp:HOST:PORT, a serial port, or - for standard input or output; without one
+    it is the usual port of the kind on this machine. `omote plugins` lists the kinds.
+
+    Example: omote translate livelink:127.0.0.1:11111 vmc:127.0.0.1:39539
+    """
+    # start-up: --help does without it
+    from controller.base.parameters import PARAMETERS
+    from controller.tools.translate import Options
+    from controller.tools.translate import translate as run
+
+    console = Console(stderr=True, highlight=False, soft_wrap=True)  # messages may go to standard output
+    options = Options(mirror, connect, baud, open_to_network, seconds)
+    counts = run(source, target, PARAMETERS, options, lambda text: console.print(escape(f"{text}; Ctrl-C ends")))
+    console.print(escape(str(counts)))

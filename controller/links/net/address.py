@@ -1,0 +1,80 @@
+"""Addresses of far ends, as a user writes them."""
+
+from __future__ import annotations
+
+import ipaddress
+import re
+from dataclasses import dataclass
+
+from controller.formats.format import Format
+
+_DEVICE = re.compile(r"/|serial:|COM\d|socket://", re.IGNORECASE)
+_SCHEME = re.compile(r"(udp|tcp):(?!//)(.*)", re.IGNORECASE | re.DOTALL)
+LOOPBACK = "127.0.0.1"
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where messages come from or go to.
+
+    transport : ``udp``, ``tcp``, ``serial`` or ``lines`` (standard input or output).
+    host, port : of UDP and TCP. device : path of a serial port.
+    """
+
+    transport: str
+    host: str = ""
+    port: int = 0
+    device: str = ""
+
+    def __str__(self) -> str:
+        if self.transport == "lines":
+            return "-"
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return self.device if self.transport == "serial" else f"{self.transport}:{host}:{self.port}"
+
+    @property
+    def is_local(self) -> bool:
+        """Whether only programs on this machine reach it."""
+        if self.transport not in ("udp", "tcp") or self.host == "localhost":
+            return True
+        try:
+            return ipaddress.ip_address(self.host).is_loopback
+        except ValueError:
+            return False
+
+
+def parse_address(text: str, form: Format) -> Address:
+    """``HOST:PORT``, ``udp:HOST:PORT``, ``tcp:HOST:PORT``, a serial port, or ``-`` for a standard stream.
+
+    form : whose transport and port count where the text names none.
+
+    Raises ValueError: the text is no address, or the format does not travel so.
+    """
+    text = text.strip()
+    if text == "-":
+        found = Address("lines")
+    elif _DEVICE.match(text):
+        found = Address("serial", device=text.removeprefix("serial:"))
+    else:
+        scheme = _SCHEME.fullmatch(text)
+        transport, rest = (scheme[1].lower(), scheme[2]) if scheme else (_network(form), text)
+        host, port = _host_and_port(rest, form.port, text)
+        found = Address(transport, host, port)
+    if found.transport not in form.transports:
+        raise ValueError(f"{form.kind} does not travel by {found.transport}; it does by {', '.join(form.transports)}")
+    return found
+
+
+def _network(form: Format) -> str:
+    """The transport of a host and port that names none."""
+    return next((each for each in form.transports if each in ("udp", "tcp")), "udp")
+
+
+def _host_and_port(rest: str, usual: int, text: str) -> tuple[str, int]:
+    host, colon, port = rest.rpartition(":")
+    if not colon:
+        host, port = rest, str(usual)
+    host = host.removeprefix("[").removesuffix("]") or LOOPBACK
+    if not (port.isascii() and port.isdigit()) or not 0 < int(port) < 65_536 or re.search(r"[\s/\\]", host):
+        raise ValueError(f'{text!r} is not HOST:PORT, as "{LOOPBACK}:{usual or 9400}"')
+    return host, int(port)

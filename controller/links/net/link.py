@@ -1,0 +1,77 @@
+"""Opens a link in one of the formats: what takes faces, what sends them, or both."""
+
+from __future__ import annotations
+
+import logging
+
+from controller.base.errors import LinkError
+from controller.base.parameters import did_you_mean
+from controller.links.kind import LinkContext
+from controller.links.net.incoming import Incoming
+from controller.links.net.neutral import state_file
+from controller.links.net.outgoing import Outgoing
+from controller.links.net.receivers import open_receiver
+from controller.links.net.senders import open_sender
+from controller.links.net.settings import NetSettings
+
+log = logging.getLogger(__name__)
+
+
+class NetLink:
+    """A link that is open."""
+
+    def __init__(self, address: str, incoming: Incoming | None, outgoing: Outgoing | None) -> None:
+        self._address, self._parts = address, [part for part in (incoming, outgoing) if part is not None]
+
+    def report(self) -> dict[str, object]:
+        """What arrived and what was sent."""
+        found: dict[str, object] = {"port": self._address}
+        for part in self._parts:
+            found |= part.report()
+        return found
+
+
+def open_net(settings: NetSettings, context: LinkContext) -> NetLink:
+    """Open both directions, as far as the settings name them.
+
+    Raises LinkError: an address cannot be used, there is no layer of the name, or what was learned cannot be read.
+    PortError: a serial port cannot be opened.
+    """
+    name = f"{settings.form.kind} {settings.address}"
+    incoming = _open_incoming(settings, context, name) if settings.incoming is not None else None
+    outgoing = _open_outgoing(settings, context, name) if settings.outgoing is not None else None
+    for part in (incoming, outgoing):
+        if part is not None:
+            part.start()
+    return NetLink(settings.address, incoming, outgoing)
+
+
+def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> Incoming:
+    layers = context.sink.layer_names()
+    if settings.layer not in layers:
+        raise LinkError(
+            f"{name}: unknown layer {settings.layer!r}{did_you_mean(settings.layer, layers)}",
+            hint=f"add it to the stage: [layers.{settings.layer}] and priority = 55; there are {', '.join(layers)}",
+        )
+    address = settings.incoming
+    assert address is not None
+    if not address.is_local and settings.connect is None:
+        log.warning("%s: every machine that reaches %s can move this face and its servos", name, address)
+    receiver = open_receiver(address, connect=settings.connect is not None, baud=settings.baud)
+    learns = settings.calibrate != "off" or settings.ranges
+    path = state_file(f"{settings.form.kind}-{settings.source or settings.layer}") if learns else None
+    try:
+        incoming = Incoming(settings, receiver, context.sink, name, path)
+    except BaseException:
+        receiver.close()
+        raise
+    context.closers.callback(incoming.stop)
+    return incoming
+
+
+def _open_outgoing(settings: NetSettings, context: LinkContext, name: str) -> Outgoing:
+    assert settings.outgoing is not None
+    sender = open_sender(settings.outgoing, settings.form.delimiter, settings.baud)
+    outgoing = Outgoing(settings, sender, context.sink, name)
+    context.closers.callback(outgoing.stop)
+    return outgoing

@@ -1,0 +1,64 @@
+"""Sends the present face to another program, at its own rate."""
+
+from __future__ import annotations
+
+import threading
+import time
+from typing import Protocol
+
+from controller.base.parameters import Floats, Parameters
+from controller.formats.frame import Frame
+from controller.links.net.senders import Sender
+from controller.links.net.settings import NetSettings
+
+
+class FaceSource(Protocol):
+    """Where the face comes from; see :class:`controller.layers.commands.CommandSink`."""
+
+    parameters: Parameters
+
+    def snapshot(self, out: Floats) -> None:
+        """Copy the present parameters to ``out`` : (P,)."""
+
+
+class Outgoing:
+    """Sends in its own thread until it is stopped."""
+
+    def __init__(self, settings: NetSettings, sender: Sender, source: FaceSource, name: str) -> None:
+        self._period_s, self._sender, self._source = 1.0 / settings.rate_hz, sender, source
+        self._encoder = settings.form.encoder(source.parameters)
+        self._mask = settings.form.carries(source.parameters)
+        self.sent = self.dropped = 0
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name=f"link {name}, out", daemon=True)
+
+    def start(self) -> None:
+        """Begin to send."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop sending and give back what was opened."""
+        self._stopping.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+        self._sender.close()
+
+    def report(self) -> dict[str, object]:
+        """Messages that were sent, and those that found no room or nobody."""
+        return {"sent": self.sent, "dropped": self.dropped, "send_error": self._sender.error}
+
+    def _run(self) -> None:
+        start_s = due_s = time.monotonic()
+        while not self._stopping.wait(max(0.0, due_s - time.monotonic())):
+            now_s = time.monotonic()
+            self._send(now_s - start_s)
+            due_s = max(due_s + self._period_s, now_s)  # late ones are skipped
+
+    def _send(self, time_s: float) -> None:
+        values = self._source.parameters.neutral()
+        self._source.snapshot(values)
+        for message in self._encoder.encode(Frame(values, self._mask, time_s)):
+            if self._sender.send(message):
+                self.sent += 1
+            else:
+                self.dropped += 1

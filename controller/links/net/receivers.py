@@ -1,0 +1,271 @@
+"""Receivers: what has arrived at a UDP port, a TCP port, a serial port or standard input."""
+
+from __future__ import annotations
+
+import os
+import selectors
+import socket
+import sys
+import time
+from typing import Protocol
+
+from controller.base.errors import LinkError
+from controller.links.net.address import Address
+from drivers.base.errors import PortError
+from drivers.port.serialport import SerialPort
+
+Received = list[tuple[str, bytes]]
+"""Who sent it, and the bytes: one datagram, or a piece of a stream; no bytes where a stream ended."""
+
+MOST_AT_ONCE = 4096
+"""Datagrams, or pieces of a stream, that are read before any is looked at."""
+MOST_CONNECTIONS = 8
+_BUFFER = 1 << 21
+_CHUNK = 65_536
+_RETRY_S = 0.5
+
+
+class Receiver(Protocol):
+    """Bytes from far ends.
+
+    error : what went wrong last, for people; empty while all is well.
+    """
+
+    error: str
+
+    def receive(self, timeout_s: float) -> Received:
+        """Wait for something at most so long, and return all that is there."""
+
+    def close(self) -> None:
+        """Give back what was opened."""
+
+
+def open_receiver(address: Address, *, connect: bool = False, baud: int = 115_200) -> Receiver:
+    """What an address gives.
+
+    connect : call the address instead of waiting for calls (TCP). baud : rate of a serial port.
+
+    Raises LinkError: the address is taken or not of this machine. PortError: the serial port cannot be opened.
+    """
+    if address.transport == "udp":
+        return UdpReceiver(address)
+    if address.transport == "tcp":
+        return TcpCaller(address) if connect else TcpListener(address)
+    return SerialReceiver(address.device, baud) if address.transport == "serial" else InputReceiver()
+
+
+class UdpReceiver:
+    """Datagrams; a sender is its host."""
+
+    def __init__(self, address: Address) -> None:
+        self.error = ""
+        self._socket = _bound(address, socket.SOCK_DGRAM)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._socket, selectors.EVENT_READ)
+
+    def receive(self, timeout_s: float) -> Received:
+        found: Received = []
+        if not self._selector.select(timeout_s):
+            return found
+        receive = self._socket.recvfrom
+        try:
+            while len(found) < MOST_AT_ONCE:
+                data, sender = receive(_CHUNK)
+                if data:
+                    found.append((sender[0], data))
+        except BlockingIOError:
+            pass
+        except OSError as error:  # an answer of the network to what another program sent
+            self.error = str(error.strerror)
+        return found
+
+    def send(self, data: bytes, host: str, port: int) -> None:
+        """Send a datagram from the same port. Raises OSError."""
+        self._socket.sendto(data, (host, port))
+
+    def close(self) -> None:
+        self._selector.close()
+        self._socket.close()
+
+
+class TcpListener:
+    """Streams of those who call; a sender is its host and port."""
+
+    def __init__(self, address: Address) -> None:
+        self.error = ""
+        self._socket = _bound(address, socket.SOCK_STREAM)
+        self._socket.listen(MOST_CONNECTIONS)
+        self._selector = selectors.DefaultSelector()
+        self._selector.register(self._socket, selectors.EVENT_READ)
+        self._calls: dict[socket.socket, str] = {}
+
+    def receive(self, timeout_s: float) -> Received:
+        found: Received = []
+        for key, _ in self._selector.select(timeout_s):
+            if key.fileobj is self._socket:
+                self._accept()
+            else:
+                found.append(self._read(key.fileobj))  # type: ignore[arg-type]
+        return found
+
+    def close(self) -> None:
+        self._selector.close()
+        for each in (*self._calls, self._socket):
+            each.close()
+
+    def _accept(self) -> None:
+        try:
+            call, sender = self._socket.accept()
+        except OSError as error:
+            self.error = str(error.strerror)
+            return
+        if len(self._calls) >= MOST_CONNECTIONS:
+            call.close()
+            self.error = f"more than {MOST_CONNECTIONS} connections"
+            return
+        call.setblocking(False)
+        self._calls[call] = f"{sender[0]}:{sender[1]}"
+        self._selector.register(call, selectors.EVENT_READ)
+
+    def _read(self, call: socket.socket) -> tuple[str, bytes]:
+        try:
+            data = call.recv(_CHUNK)
+        except BlockingIOError:
+            return self._calls[call], b""
+        except OSError:
+            data = b""
+        if data:
+            return self._calls[call], data
+        self._selector.unregister(call)
+        call.close()
+        return self._calls.pop(call), b""
+
+
+class TcpCaller:
+    """The stream of a program that is called, and called again where it hangs up."""
+
+    def __init__(self, address: Address) -> None:
+        self.error = "not connected yet"
+        self._address = address
+        self._socket: socket.socket | None = None
+        self._next_s = 0.0
+
+    def receive(self, timeout_s: float) -> Received:
+        if self._socket is None and not self._call(timeout_s):
+            return []
+        assert self._socket is not None
+        self._socket.settimeout(max(timeout_s, 1e-3))
+        try:
+            data = self._socket.recv(_CHUNK)
+        except TimeoutError:
+            return []
+        except OSError as error:
+            self._hang_up(error.strerror or type(error).__name__)
+            return [(str(self._address), b"")]
+        if not data:
+            self._hang_up("the far end hung up")
+        return [(str(self._address), data)]
+
+    def close(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+
+    def _call(self, timeout_s: float) -> bool:
+        wait_s = self._next_s - time.monotonic()
+        if wait_s > 0.0:
+            time.sleep(min(wait_s, timeout_s))
+            return False
+        self._next_s = time.monotonic() + _RETRY_S
+        try:
+            self._socket = socket.create_connection((self._address.host, self._address.port), _RETRY_S)
+        except OSError as error:
+            self.error = error.strerror or type(error).__name__
+            return False
+        self.error = ""
+        return True
+
+    def _hang_up(self, why: str) -> None:
+        if self._socket is not None:
+            self._socket.close()
+        self._socket, self.error = None, why
+
+
+class SerialReceiver:
+    """The stream of a serial port, which is opened again where it vanishes."""
+
+    def __init__(self, device: str, baud: int) -> None:
+        self.error = ""
+        self._port = SerialPort(device, baud)
+        self._port.open()
+        self._next_s = 0.0
+
+    def receive(self, timeout_s: float) -> Received:
+        try:
+            if not self._port.is_open and not self._reopen(timeout_s):
+                return []
+            data = self._port.read(time.monotonic() + timeout_s)
+        except PortError as error:
+            self._port.close()
+            self.error, self._next_s = str(error), time.monotonic() + _RETRY_S
+            return [(self._port.path, b"")]
+        return [(self._port.path, data)] if data else []
+
+    def close(self) -> None:
+        self._port.close()
+
+    def _reopen(self, timeout_s: float) -> bool:
+        wait_s = self._next_s - time.monotonic()
+        if wait_s > 0.0:
+            time.sleep(min(wait_s, timeout_s))
+            return False
+        self._port.open()
+        self.error = ""
+        return True
+
+
+class InputReceiver:
+    """Standard input, until it ends."""
+
+    def __init__(self) -> None:
+        self.error = ""
+        self.ended = False
+        self._file = os.dup(sys.stdin.fileno())
+        self._selector: selectors.BaseSelector | None = None
+        try:
+            self._selector = selectors.DefaultSelector()
+            self._selector.register(self._file, selectors.EVENT_READ)
+        except PermissionError:  # a file is always ready
+            self._selector = None
+
+    def receive(self, timeout_s: float) -> Received:
+        if self.ended:
+            time.sleep(timeout_s)
+            return []
+        if self._selector is not None and not self._selector.select(timeout_s):
+            return []
+        data = os.read(self._file, _CHUNK)
+        if not data:
+            self.ended, self.error = True, "standard input has ended"
+        return [("standard input", data)]
+
+    def close(self) -> None:
+        if self._selector is not None:
+            self._selector.close()
+        os.close(self._file)
+
+
+def _bound(address: Address, kind: socket.SocketKind) -> socket.socket:
+    """A socket at an address that does not block. Raises LinkError."""
+    family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+    made = socket.socket(family, kind)
+    try:
+        if kind == socket.SOCK_STREAM and os.name == "posix":
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind((address.host, address.port))
+    except OSError as error:
+        made.close()
+        hint = f"another program listens there: end it, or choose another port: ss -lunpt | grep {address.port}"
+        raise LinkError(f"{address}: cannot listen: {error.strerror or error}", hint=hint) from error
+    made.setblocking(False)
+    return made

@@ -1,0 +1,187 @@
+"""Senders: messages to a UDP port, a TCP port, a serial port or standard output; what finds no room is left out."""
+
+from __future__ import annotations
+
+import os
+import select
+import socket
+import sys
+import time
+from typing import Protocol
+
+from controller.links.net.address import Address
+from drivers.base.errors import PortError
+from drivers.port.serialport import SerialPort
+
+_RETRY_S = 0.5
+
+
+class Sender(Protocol):
+    """Messages to a far end.
+
+    error : what went wrong last, for people; empty while all is well.
+    """
+
+    error: str
+
+    def send(self, message: bytes) -> bool:
+        """Send one message; False where it was left out, as the far end is not there or has no room."""
+
+    def close(self) -> None:
+        """Give back what was opened."""
+
+
+def open_sender(address: Address, delimiter: bytes, baud: int = 115_200) -> Sender:
+    """What takes messages to an address; ``delimiter`` ends each on a stream.
+
+    Raises PortError: the serial port cannot be opened.
+    """
+    if address.transport == "udp":
+        return UdpSender(address)
+    if address.transport == "tcp":
+        return TcpSender(address, delimiter)
+    return SerialSender(address.device, delimiter, baud) if address.transport == "serial" else OutputSender(delimiter)
+
+
+class UdpSender:
+    """Datagrams."""
+
+    def __init__(self, address: Address) -> None:
+        self.error = ""
+        family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._to = address.host, address.port
+
+    def send(self, message: bytes) -> bool:
+        try:
+            self._socket.sendto(message, self._to)
+        except ConnectionRefusedError:
+            pass  # nobody listened to the one before; somebody may listen now
+        except OSError as error:
+            self.error = error.strerror or type(error).__name__
+            return False
+        self.error = ""
+        return True
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+class _Stream:
+    """What of a message found no room yet; a new message waits until there is nothing left of the one before."""
+
+    def __init__(self, delimiter: bytes) -> None:
+        self.error = ""
+        self._delimiter, self._rest = delimiter, b""
+
+    def send(self, message: bytes) -> bool:
+        if self._rest:
+            self._push()
+        if self._rest or not self._ready():
+            return False
+        self._rest = message + self._delimiter
+        self._push()
+        return True
+
+    def _push(self) -> None:
+        raise NotImplementedError
+
+    def _ready(self) -> bool:
+        return True
+
+
+class TcpSender(_Stream):
+    """A stream to a program that is called, and called again where it hangs up."""
+
+    def __init__(self, address: Address, delimiter: bytes) -> None:
+        super().__init__(delimiter)
+        self._address = address
+        self._socket: socket.socket | None = None
+        self._next_s = 0.0
+
+    def close(self) -> None:
+        if self._socket is not None:
+            self._socket.close()
+
+    def _ready(self) -> bool:
+        if self._socket is not None:
+            return True
+        if time.monotonic() < self._next_s:
+            return False
+        self._next_s = time.monotonic() + _RETRY_S
+        try:
+            self._socket = socket.create_connection((self._address.host, self._address.port), _RETRY_S)
+        except OSError as error:
+            self.error = error.strerror or type(error).__name__
+            return False
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._socket.setblocking(False)
+        self.error = ""
+        return True
+
+    def _push(self) -> None:
+        try:
+            if self._socket is not None:
+                self._rest = self._rest[self._socket.send(self._rest) :]
+        except BlockingIOError:
+            pass
+        except OSError as error:
+            self.error, self._rest = error.strerror or type(error).__name__, b""
+            self.close()
+            self._socket = None
+
+
+class SerialSender(_Stream):
+    """A stream to a serial port, which is opened again where it vanishes."""
+
+    def __init__(self, device: str, delimiter: bytes, baud: int) -> None:
+        super().__init__(delimiter)
+        self._port = SerialPort(device, baud)
+        self._port.open()
+        self._next_s = 0.0
+
+    def close(self) -> None:
+        self._port.close()
+
+    def _ready(self) -> bool:
+        if self._port.is_open:
+            return True
+        if time.monotonic() < self._next_s:
+            return False
+        try:
+            self._port.open()
+        except PortError as error:
+            self.error, self._next_s = str(error), time.monotonic() + _RETRY_S
+            return False
+        self.error = ""
+        return True
+
+    def _push(self) -> None:
+        try:
+            self._rest = self._rest[self._port.put(self._rest) :]
+        except PortError as error:
+            self.error, self._rest, self._next_s = str(error), b"", time.monotonic() + _RETRY_S
+            self._port.close()
+
+
+class OutputSender:
+    """Standard output; a reader that does not read loses messages."""
+
+    def __init__(self, delimiter: bytes) -> None:
+        self.error = ""
+        self._delimiter = delimiter
+        self._file = os.dup(sys.stdout.fileno())
+
+    def send(self, message: bytes) -> bool:
+        try:
+            if not select.select([], [self._file], [], 0.0)[1]:
+                return False
+            os.write(self._file, message + self._delimiter)
+        except OSError as error:
+            self.error = error.strerror or type(error).__name__
+            return False
+        return True
+
+    def close(self) -> None:
+        os.close(self._file)

@@ -1,0 +1,188 @@
+"""Translates faces from one format to another, without stage, face or servos."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from controller.base.errors import LinkError
+from controller.base.parameters import Parameters
+from controller.formats.format import FORMATS, Format
+from controller.formats.frame import Frame
+from controller.links.net.address import LOOPBACK, Address, parse_address
+from controller.links.net.decoding import Decoding
+from controller.links.net.meter import Meter
+from controller.links.net.receivers import InputReceiver, open_receiver
+from controller.links.net.senders import Sender, open_sender
+from controller.takes.reader import load_take, suffixes
+from drivers.base.errors import PluginError
+
+_WAIT_S = 0.02
+_HINT = "write it as KIND:ADDRESS, for example livelink:127.0.0.1:11111; omote plugins lists the kinds"
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to translate.
+
+    mirror : left and right change places. connect : call the input's address (TCP). baud : of serial ports.
+    open_to_network : listen where other machines reach. seconds : how long; None until the input ends.
+    stop : ends it when it is set.
+    """
+
+    mirror: bool = False
+    connect: bool = False
+    baud: int = 115_200
+    open_to_network: bool = False
+    seconds: float | None = None
+    stop: threading.Event = field(default_factory=threading.Event)
+
+
+@dataclass
+class Counts:
+    """What was translated.
+
+    frames : that came. sent, dropped : messages that went out, and those that found no room or nobody.
+    refused : what was left out of the input, by reason.
+    """
+
+    frames: int = 0
+    sent: int = 0
+    dropped: int = 0
+    refused: dict[str, int] = field(default_factory=dict)
+    meter: Meter = field(default_factory=Meter)
+
+    def __str__(self) -> str:
+        refused = ", ".join(f"{count} {reason}" for reason, count in self.refused.items()) or "nothing"
+        figures = self.meter.report(time.monotonic())
+        return (
+            f"{self.frames} frames came at {figures['rate_hz']}/s; {self.sent} messages went out, {self.dropped} found "
+            f"no room or nobody; refused: {refused}"
+        )
+
+
+class Input(Protocol):
+    """Frames until they end; ``counts.refused`` is kept up to date."""
+
+    def frames(self, counts: Counts) -> Iterator[Frame | None]:
+        """Frames as they come; None when for a while none came."""
+
+
+def translate(source: str, target: str, parameters: Parameters, options: Options = Options(),
+              ready: Callable[[str], None] = lambda text: None) -> Counts:  # fmt: skip
+    """Translate until the input ends, the time is up, or Ctrl-C.
+
+    source : ``kind:address``, or the path of a take. target : ``kind:address``. ready : told once both are open.
+
+    Raises LinkError, PortError, TakeError, PluginError: one of them is wrong or cannot be opened.
+    """
+    counts = Counts()
+    form, address = parse_end(target)
+    with ExitStack() as closers:
+        given = _open_input(source, parameters, options, closers)
+        sender = open_sender(address, form.delimiter, options.baud)
+        closers.callback(sender.close)
+        ready(f"translating {source} to {form.kind} at {address}")
+        with suppress(KeyboardInterrupt):
+            _pass_on(given, form, sender, parameters, options, counts)
+    return counts
+
+
+def parse_end(text: str) -> tuple[Format, Address]:
+    """The format and the address of one end.
+
+    Raises LinkError: the text is none. PluginError: there is no such format.
+    """
+    kind, _, rest = text.partition(":")
+    try:
+        form = FORMATS.get(kind)
+        return form, parse_address(rest or LOOPBACK, form)
+    except ValueError as error:
+        raise LinkError(f"{text}: {error}", hint=_HINT) from error
+    except PluginError as error:
+        raise LinkError(f"{text}: {error}", hint=_HINT) from error
+
+
+def _open_input(source: str, parameters: Parameters, options: Options, closers: ExitStack) -> Input:
+    if Path(source).suffix.lower() in suffixes() and source.partition(":")[0] not in FORMATS.kinds():
+        return TakeInput(Path(source), parameters)
+    form, address = parse_end(source)
+    if not (options.connect or address.is_local or options.open_to_network):
+        raise LinkError(
+            f"{source}: every machine that reaches this one could send faces there",
+            hint="add --open-to-network where that is meant",
+        )
+    if options.connect and address.transport != "tcp":
+        raise LinkError(f"{source}: only TCP is called", hint=f"write it as {form.kind}:tcp:HOST:PORT")
+    return LiveInput(form, address, parameters, options, closers)
+
+
+class LiveInput:
+    """Messages of another program."""
+
+    def __init__(
+        self, form: Format, address: Address, parameters: Parameters, options: Options, closers: ExitStack
+    ) -> None:
+        self._receiver = open_receiver(address, connect=options.connect, baud=options.baud)
+        closers.callback(self._receiver.close)
+        self._decoding = Decoding(form, parameters, streams=address.transport != "udp")
+
+    def frames(self, counts: Counts) -> Iterator[Frame | None]:
+        while True:
+            arrived = self._decoding.feed(self._receiver.receive(_WAIT_S))
+            counts.refused = dict(self._decoding.refused)
+            yield from (each.frame for each in arrived)
+            if isinstance(self._receiver, InputReceiver) and self._receiver.ended:
+                return
+            yield None
+
+
+class TakeInput:
+    """A take, at its own rate."""
+
+    def __init__(self, path: Path, parameters: Parameters) -> None:
+        self._take = load_take(path, parameters)
+
+    def frames(self, counts: Counts) -> Iterator[Frame | None]:
+        take, start_s = self._take, time.monotonic()
+        for time_s, values in zip(take.times_s, take.values, strict=True):
+            while (left_s := start_s + time_s - time.monotonic()) > 0.0:
+                time.sleep(min(left_s, _WAIT_S))
+                yield None
+            yield Frame(values, take.mask, float(time_s))
+
+
+def _pass_on(
+    given: Input, form: Format, sender: Sender, parameters: Parameters, options: Options, counts: Counts
+) -> None:
+    encoder, end_s = form.encoder(parameters), time.monotonic() + (options.seconds or float("inf"))
+    turn = _mirror(parameters) if options.mirror else lambda frame: frame
+    for frame in given.frames(counts):
+        if frame is not None:
+            counts.frames += 1
+            counts.meter.note(time.monotonic(), frame.sequence)
+            for message in encoder.encode(turn(frame)):
+                if sender.send(message):
+                    counts.sent += 1
+                else:
+                    counts.dropped += 1
+        if time.monotonic() >= end_s or options.stop.is_set():
+            return
+
+
+def _mirror(parameters: Parameters) -> Callable[[Frame], Frame]:
+    swap = parameters.mirror()
+    sign = np.array([-1.0 if name.endswith(("Yaw", "Roll")) else 1.0 for name in parameters.names])
+
+    def mirrored(frame: Frame) -> Frame:
+        values, mask = frame.values[swap] * sign, frame.mask[swap]
+        return Frame(values, mask, frame.time_s, frame.sequence, frame.face, frame.subject)
+
+    return mirrored

@@ -1,0 +1,97 @@
+"""The chain from a source's values to a layer's: eyes, neutral face, ranges, limits."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from controller.base.errors import LinkError
+from controller.base.parameters import PARAMETERS as P
+from controller.formats.format import FORMATS
+from controller.formats.frame import Frame
+from controller.links.net.conditioning import Conditioning
+from controller.links.net.kinds import link_of
+from controller.links.net.neutral import STILL_S, state_file
+
+EVERY = np.ones(len(P), dtype=bool)
+
+
+def chain(path: Path | None = None, **keys: Any) -> Conditioning:
+    return Conditioning(link_of(FORMATS.get("livelink")).settings(**keys), P, path)
+
+
+def values(**named: float) -> np.ndarray:
+    found = P.neutral()
+    for name, value in named.items():
+        found[P.index(name)] = value
+    return found
+
+
+def shown(chain: Conditioning, now_s: float = 0.0, **named: float) -> dict[str, float]:
+    found, _ = chain.apply(Frame(values(**named), EVERY), now_s)
+    return {name: round(float(found[i]), 4) for i, name in enumerate(P.names) if abs(found[i]) > 1e-4}
+
+
+def test_values_are_kept_in_range() -> None:
+    assert shown(chain(), jawOpen=1.7, cheekPuff=-0.3, headYaw=-2.0) == {"jawOpen": 1.0, "headYaw": -1.0}
+
+
+def test_eyes_that_are_told_in_two_ways_count_once() -> None:
+    both = {"eyeLookDownLeft": 0.5, "leftEyePitch": 0.4}
+    assert shown(chain(), **both) == {"eyeLookDownLeft": 0.5}
+    assert shown(chain(eyes="angles"), **both) == {"leftEyePitch": 0.4}
+    assert shown(chain(eyes="looks"), **both) == {"eyeLookDownLeft": 0.5}
+    assert shown(chain(eyes="both"), **both) == both
+    assert shown(chain(), leftEyePitch=0.4) == {"leftEyePitch": 0.4}
+
+
+def test_a_still_face_becomes_neutral_and_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "deep" / "phone.json"
+    learning = chain(path, calibrate="keep")
+    for n in range(30):  # moving: nothing is learned
+        shown(learning, n / 30, jawOpen=n % 2)
+    assert not learning.neutral_known
+    for n in range(80):
+        now_s = 1.0 + n / 30
+        shown(learning, now_s, jawOpen=0.2, headYaw=0.1)
+    assert learning.neutral_known and STILL_S < 80 / 30
+    assert shown(learning, 5.0, jawOpen=0.2, headYaw=0.1) == {}
+    assert shown(learning, 5.1, jawOpen=1.0, headYaw=0.3) == {"jawOpen": 1.0, "headYaw": 0.2}
+    again = chain(path, calibrate="keep")
+    assert again.neutral_known and shown(again, jawOpen=0.6, headYaw=0.1) == {"jawOpen": 0.5}
+    assert not chain(path, calibrate="again").neutral_known
+
+
+def test_a_damaged_file_is_told_with_what_to_do(tmp_path: Path) -> None:
+    path = tmp_path / "phone.json"
+    for text in ("", "{", "[]", '{"format": 2}', '{"format": 1, "neutral": {"jawOpen": []}, "ranges": {}}', "\udcff"):
+        path.write_text(text, encoding="utf-8", errors="surrogateescape")
+        with pytest.raises(LinkError, match="is no calibration of a link") as told:
+            chain(path, calibrate="keep")
+        assert told.value.hint == f"delete it: rm {path}"
+
+
+def test_ranges_are_widened_to_at_most_twice_as_much(tmp_path: Path) -> None:
+    path = tmp_path / "ranges.json"
+    learning = chain(path, ranges=True)
+    for n in range(400):
+        found = shown(learning, n / 30, jawOpen=0.6 * (n % 2), cheekPuff=0.3 * (n % 2), noseSneerLeft=0.1 * (n % 2))
+    assert found == {"jawOpen": 1.0, "cheekPuff": 0.6, "noseSneerLeft": 0.1}
+    learning.save()
+    assert json.loads(path.read_text())["ranges"]["jawOpen"] == 0.6
+    assert shown(chain(path, ranges=True), jawOpen=0.3) == {"jawOpen": 0.5}
+
+
+def test_the_file_of_a_link_lies_in_the_users_state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    assert state_file("livelink-../../My iPhone/é") == tmp_path / "omote/links/livelink-.._.._My_iPhone_.json"
+
+
+def test_smoothing_takes_noise_away() -> None:
+    smooth, rng = chain(smoothing=True, min_cutoff_hz=1.0, beta=0.1), np.random.default_rng(1)
+    found = [shown(smooth, n / 60, jawOpen=0.5 + rng.normal(0, 0.05))["jawOpen"] for n in range(300)]
+    assert np.std(found[60:]) < 0.02 and np.mean(found[60:]) == pytest.approx(0.5, abs=0.02)

@@ -1,0 +1,44 @@
+"""Rate, jitter and loss of sources that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller.links.net.meter import Meter
+
+
+@pytest.mark.parametrize("rate_hz", [30.0, 60.0, 200.0])
+def test_rate_jitter_and_age_are_those_of_the_source(rate_hz: float) -> None:
+    meter, rng = Meter(), np.random.default_rng(1)
+    for n in range(400):
+        meter.note(n / rate_hz + rng.uniform(-0.001, 0.001))
+    report = meter.report(400 / rate_hz + 0.1)
+    assert report["rate_hz"] == pytest.approx(rate_hz, rel=0.05)
+    assert 0.2 < report["jitter_ms"] < 1.5
+    assert report["age_s"] == pytest.approx(0.1 + 1 / rate_hz, abs=0.003)
+
+
+@pytest.mark.parametrize("step", [1, 2])
+def test_frames_are_lost_where_numbers_are_missing_whatever_the_usual_step(step: int) -> None:
+    meter = Meter()
+    numbers = [n * step for n in range(100) if n not in (50, 51, 70)]
+    for n, number in enumerate(numbers):
+        meter.note(n / 60, number)
+    assert meter.lost == 3
+
+
+def test_messages_that_were_not_read_are_not_lost() -> None:
+    meter = Meter()
+    meter.note(0.0, 1)
+    meter.note(0.01, 2)
+    meter.note(0.1, 12, skipped=9)
+    assert (meter.lost, meter.frames) == (0, 12)
+
+
+def test_a_silent_source_has_no_rate_and_midnight_loses_nothing() -> None:
+    meter = Meter()
+    assert meter.report(5.0) == {"rate_hz": 0.0, "jitter_ms": 0.0, "lost": 0, "age_s": None}
+    for n, number in enumerate([5_183_998, 5_183_999, 0, 1]):
+        meter.note(n / 60, number)
+    assert meter.lost == 0 and meter.report(60.0)["rate_hz"] == 0.0

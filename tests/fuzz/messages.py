@@ -1,0 +1,134 @@
+"""Damaged messages of every format: ``make fuzz``.
+
+Each message is read by a decoder that has read others before. Whatever a message holds, the decoder raises nothing,
+needs at most 50 ms of processor time, gives frames of finite numbers, and takes the next good message. The same seed
+damages the same messages in the same way.
+"""
+# ruff: noqa: T201 (a program that prints for people)
+
+from __future__ import annotations
+
+import argparse
+import random
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from controller.base.parameters import PARAMETERS as P
+from controller.formats.format import FORMATS, Format
+from controller.formats.frame import Frame
+
+LONGEST_S = 0.05
+_PROBE = 200
+
+
+@dataclass
+class Findings:
+    """What a run showed; ``faults`` : what must not be, each kind with its count and the first message."""
+
+    messages: int = 0
+    frames: int = 0
+    slowest_s: float = 0.0
+    faults: Counter[str] = field(default_factory=Counter)
+    first: dict[str, bytes] = field(default_factory=dict)
+
+    def fault(self, what: str, message: bytes) -> None:
+        """Note a fault."""
+        self.faults[what] += 1
+        self.first.setdefault(what, message)
+
+    def __str__(self) -> str:
+        faults = dict(self.faults) or "none"
+        return (
+            f"{self.messages} messages, {self.frames} frames, slowest {1e3 * self.slowest_s:.1f} ms; faults: {faults}"
+        )
+
+
+def attack(form: Format, count: int, seed: int) -> Findings:
+    """Feed damaged messages of one format to one decoder."""
+    found, decoder, encoder = Findings(), form.decoder(P), form.encoder(P)
+    draw = random.Random(f"{seed} {form.kind}")
+    for n, message in zip(range(count), damaged(form, draw), strict=False):
+        found.messages += 1
+        begin_s = time.thread_time()
+        try:
+            frames = decoder.feed(message)
+        except Exception as error:  # noqa: BLE001  what is looked for
+            found.fault(f"{form.kind}: {type(error).__name__}: {error}", message)
+            continue
+        found.slowest_s = max(found.slowest_s, time.thread_time() - begin_s)
+        found.frames += len(frames)
+        if not all(np.isfinite(frame.values[frame.mask]).all() for frame in frames):
+            found.fault(f"{form.kind}: values that are no numbers", message)
+        if n % _PROBE == 0 and not any(decoder.feed(good) for good in encoder.encode(_face(draw))):
+            found.fault(f"{form.kind}: the next good message is not taken", message)
+    return found
+
+
+def damaged(form: Format, draw: random.Random) -> Iterator[bytes]:
+    """Messages with bytes changed, left out, doubled, put together, and made of nothing but chance, without end."""
+    encoder = form.encoder(P)
+    good = [message for _ in range(20) for message in encoder.encode(_face(draw))]
+    while True:
+        message = bytearray(draw.choice(good))
+        for _ in range(draw.choice((1, 1, 2, 5, 40))):
+            _damage(message, draw.choice(good), draw)
+        yield bytes(message[: form.most])
+
+
+def _damage(message: bytearray, other: bytes, draw: random.Random) -> None:
+    at, size = draw.randrange(len(message) + 1), draw.choice((1, 1, 2, 4, 8, 60))
+    what = draw.randrange(8)
+    if what == 0:
+        message[at : at + size] = draw.randbytes(size)
+    elif what == 1:
+        del message[at : at + size]
+    elif what == 2:
+        message[at:at] = message[at : at + size] * draw.choice((1, 2, 50))
+    elif what == 3:
+        message[at:] = other[draw.randrange(len(other)) :]
+    elif what == 4:
+        message[at : at + 4] = draw.choice(_EDGES)
+    elif what == 5:
+        del message[at:]
+    elif what == 6:
+        message[:] = draw.randbytes(draw.randrange(600))
+    elif at < len(message):
+        message[at] ^= 1 << draw.randrange(8)
+
+
+_EDGES = (
+    b"\0\0\0\0", b"\xff\xff\xff\xff", b"\x7f\xff\xff\xff", b"\x80\0\0\0", b"\x7f\xc0\0\0", b"\x7f\x80\0\0",
+    b"#bundle\0",    b"1e999", b"-", b"nan", b"|", b"&", b"#", b",", b"{", b"[[[[[[[[", b'"', b"\\u0000",
+    b"=head#", b"999999999999999999",
+)  # fmt: skip
+
+
+def _face(draw: random.Random) -> Frame:
+    values = np.array([draw.uniform(low, high) for low, high in zip(P.low, P.high, strict=True)])
+    return Frame(values, np.ones(len(P), dtype=bool), draw.uniform(0.0, 1e5))
+
+
+def main() -> int:
+    """Run for all formats; 1 where something was found."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--count", type=int, default=1_000_000, help="messages of each format")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--kind", action="append", help="only this format")
+    given = parser.parse_args()
+    failed = False
+    for kind in given.kind or FORMATS.kinds():
+        found = attack(FORMATS.get(kind), given.count, given.seed)
+        failed |= bool(found.faults) or found.slowest_s > LONGEST_S
+        print(f"{kind}: {found}", flush=True)
+        for what, message in found.first.items():
+            print(f"  {what}: {message.hex()}")
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

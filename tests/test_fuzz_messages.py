@@ -1,0 +1,38 @@
+"""The fuzzer of messages: a short run of every format finds nothing, and it would find what it looks for."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from controller.base.parameters import Parameters
+from controller.formats.format import FORMATS
+from controller.formats.frame import Frame, Refusals
+from tests.controller.formats.faces import KINDS
+from tests.fuzz.messages import attack
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_short_run_finds_no_fault(kind: str) -> None:
+    found = attack(FORMATS.get(kind), 1500, seed=5)
+    assert not found.faults, found.first
+    assert found.messages == 1500 and found.frames > 10
+
+
+class Fragile:
+    """A decoder that raises for what it does not expect, and does not go on after it."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.refused, self._inner = Refusals(), FORMATS.get("livelink").decoder(parameters)
+
+    def feed(self, message: bytes) -> list[Frame]:
+        frames = self._inner.feed(message)
+        if not frames:
+            raise ValueError("what is this?")
+        return frames
+
+
+def test_what_raises_is_found() -> None:
+    found = attack(replace(FORMATS.get("livelink"), decoder=Fragile), 300, seed=1)
+    assert found.faults["livelink: ValueError: what is this?"] > 50 and "what is this" in str(found)
