@@ -33,6 +33,9 @@ def pytest_configure() -> None:
     for name in SETTINGS:
         os.environ.pop(name, None)
     os.environ["TERM"] = "xterm-256color"
+    # with this set, every process of a test would compile all modules of omote again, and this one all tests
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     # before numpy: its threads would spin where the tests beside this one have work
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if hasattr(os, "setpriority"):
