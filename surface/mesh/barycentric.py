@@ -13,8 +13,8 @@ from surface.base.jit import kernel
 def fill_shares(uv: Any, triangles: Any, point: Any, out: Any) -> Any:
     """Fill ``out (t, 3)`` with the barycentric coordinates of ``point (2,)`` in each of ``triangles (t, 3)``.
 
-    ``uv (m, 2)`` are their corners. Triangles without area get -inf: they hold nothing. Returns the triangle whose least
-    coordinate is greatest, the first of several.
+    ``uv (m, 2)`` are their corners. Triangles without area get -inf: they hold nothing. Returns the first triangle whose
+    least coordinate is greatest.
     """
     best, greatest, u, v = 0, -np.inf, point[0], point[1]
     for t in range(len(triangles)):
