@@ -13,7 +13,7 @@ from surface.base.jit import kernel
 def fill_shares(uv: Any, triangles: Any, point: Any, out: Any) -> Any:
     """Fill ``out (t, 3)`` with the barycentric coordinates of ``point (2,)`` in each of ``triangles (t, 3)``.
 
-    ``uv (m, 2)`` are their corners. Triangles without area get -inf: they hold nothing. Returns the first triangle whose
+    ``uv (m, 2)`` are their corners. Triangles without area hold nothing and get -inf. Returns the first triangle whose
     least coordinate is greatest.
     """
     best, greatest, u, v = 0, -np.inf, point[0], point[1]
