@@ -21,7 +21,7 @@ demo: setup ## set up, then drive the face and the simulated servo head
 	@$(BIN)/omote demo
 
 test: setup ## set up, then run the tests (no display, graphics processor or servo needed)
-	@$(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile
+	@$(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: setup ## check style and types
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy

@@ -26,6 +26,24 @@ SETTINGS = (
     "TTY_INTERACTIVE",
 )
 """By these a user tells programs how to write; a test that is about one of them sets it."""
+LONGEST = (
+    "tests/test_docs_shell.py",
+    "tests/surface/fit/transfer/test_transfer.py",
+    "tests/test_wheel.py",
+    "tests/surface/check/test_check_head.py",
+    "tests/surface/fit/surfaces/test_api.py",
+    "tests/surface/fit/eyes/test_drawn_lids.py",
+    "tests/test_rooms.py",
+    "tests/controller/tools/test_simulate.py",
+    "tests/test_fuzz_files.py",
+    "tests/surface/fit/surfaces/test_groupfile.py",
+    "tests/test_extending.py",
+    "tests/test_extras.py",
+    "tests/controller/robot/test_anchors.py",
+    "tests/surface/fit/test_round_trip.py",
+    "tests/test_process_kill.py",
+)
+"""Files that take longest, in this order: they begin first, so that no worker is left alone with one at the end."""
 
 
 def pytest_configure() -> None:
@@ -33,6 +51,9 @@ def pytest_configure() -> None:
     for name in SETTINGS:
         os.environ.pop(name, None)
     os.environ["TERM"] = "xterm-256color"
+    # with this set, every process of a test would compile all modules of omote again, and this one all tests
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     # before numpy: its threads would spin where the tests beside this one have work
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if hasattr(os, "setpriority"):
@@ -42,6 +63,12 @@ def pytest_configure() -> None:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the files that take longest first, for a run with several workers."""
+    rank = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: rank.get(item.nodeid.partition("::")[0], len(rank)))
 
 
 def keeping_priority(change: Callable[[int, int, int], None]) -> Callable[[int, int, int], None]:

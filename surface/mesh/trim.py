@@ -14,6 +14,7 @@ from surface.base import keys
 from surface.base.arrays import Floats, Ints
 
 from . import flips, loops
+from .barycentric import fill_shares
 from .domain import Domain, Slit
 
 ROUNDS = 4  # a triangle at a sharp corner is split so many times at most
@@ -172,11 +173,8 @@ def _ends(slit: Slit, uv: Floats) -> np.ndarray:
 
 def _weights_in(flat: Flat, point: Floats) -> Floats:
     """(t, 3): barycentric coordinates of a point in every triangle; -inf in those without area, which hold nothing."""
-    a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
-    area = _cross(b - a, c - a)
-    parts = np.stack([_cross(b - point, c - point), _cross(c - point, a - point), _cross(a - point, b - point)], 1)
-    shares = parts / np.where(area > 0, area, 1.0)[:, None]
-    shares[area <= 0] = -np.inf
+    shares = np.empty((len(flat.triangles), 3))
+    fill_shares(flat.uv, flat.triangles, point, shares)
     return shares
 
 
@@ -210,8 +208,8 @@ def _place(
 
     ``slides``: one of the rectangle's border, too, along it or where it is so close that the border bends by nothing.
     """
-    inside = _weights_in(flat, point)
-    triangle = int(np.argmax(inside.min(axis=1)))
+    inside = np.empty((len(flat.triangles), 3))
+    triangle = int(fill_shares(flat.uv, flat.triangles, point, inside))
     share = inside[triangle]
     if share.min() < -1e-9:
         return flat, line, fixed
@@ -266,7 +264,9 @@ def _with_point(flat: Flat, point: Floats, hit: Ints, added: Ints, owner: Ints) 
 
 def _across(triangles: Ints, b: int, c: int) -> int | None:
     """The triangle that holds the directed edge c-b, if any."""
-    found = np.flatnonzero(((triangles == c) & (np.roll(triangles, -1, axis=1) == b)).any(axis=1))
+    corners = np.ascontiguousarray(triangles).reshape(-1)
+    at = np.flatnonzero(corners == c)
+    found = at[corners[at - at % 3 + (at + 1) % 3] == b] // 3
     return int(found[0]) if len(found) else None
 
 

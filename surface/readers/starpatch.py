@@ -191,7 +191,7 @@ def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list
         ring = [*face[-1:], *face, *face[:1]]
         for (a, b), (_, c) in pairwise(pairwise(ring)):
             quads.append([b, number[min(b, c), max(b, c)], first + k, number[min(a, b), max(a, b)]])
-    between = np.array([places[[a, b]].mean(axis=0) for a, b in edges])
+    between = places[np.array(list(edges))].mean(axis=1)
     inside = np.array([places[face].mean(axis=0) if len(face) == 4 else np.full(2, np.nan) for face in faces])
     return quads, np.concatenate([corners, middles, centres]), np.concatenate([places, between, inside])
 
