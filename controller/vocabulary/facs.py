@@ -137,6 +137,10 @@ class Facs:
             levels[indices] = np.maximum(levels[indices], level * intensity)
         return levels
 
+    def columns_of(self, unit: str) -> list[int]:
+        """Positions of a unit's columns, one or one for each side, by its number, as "12"; none for an unknown one."""
+        return list(self._of_unit.get(self._aliases.get(unit, unit), []))
+
     def expand(self, formula: str, intensity: float = 1.0) -> Floats:
         """(P,) parameters of a formula, clipped to 1. Raises ParameterError."""
         return np.minimum(self.matrix @ self.levels(formula, intensity), 1.0)
