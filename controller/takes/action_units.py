@@ -60,7 +60,7 @@ def pyfeat_take(path: Path, parameters: Parameters) -> Take:
     cells = table.numbers([*units.values()], gaps=True)
     frames = _column(table, at, "frame", _PYFEAT) if "frame" in at else np.arange(float(len(table.rows)))
     times = frames / _rate(table, at, frames)
-    found: Flags = np.isfinite(cells).all(axis=1)
+    found = np.logical_and.reduce(np.isfinite(cells), axis=1)
     table, times = _one_face(table, times, _whole(table, at, "identity"), found)
     levels = {unit: np.clip(table.numbers([i])[:, 0], 0.0, 1.0) for unit, i in units.items()}
     values, mask = _expanded(levels, parameters)

@@ -30,10 +30,7 @@ _AENEAS = "aeneas writes it where os_task_file_format=json is in the configurati
 _TOKEN = re.compile(r'"((?:[^"]|"")*)"|(?<!\S)(<\w+>|[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?!\S)|(?<!\S)!.*')
 _SOUND_TIERS = re.compile(r"(?:.* - )?(?:phon(?:e|eme|emic|etic)?s?|sounds?|segments?|visemes?|ipa|mau|kan-mau)", re.I)
 _WORD_TIERS = re.compile(r"(?:.* - )?(?:words?|ort(?:-mau)?|text|sentences?|utterances?)", re.I)
-_SILENT = {
-    "",
-    *["sil", "sp", "spn", "nsn", "pau", "h#", "#", "_", "*", "noise", "<eps>", "<sil>", "<p:>", "<unk>", "{sl}"],
-}
+_SILENT = {"", "sil", "sp", "spn", "nsn", "pau", "h#", "#", "_", "*", "noise", "<eps>", "<sil>", "<p:>", "<unk>"}
 _MOST_BYTES = 16 << 20
 
 

@@ -106,8 +106,8 @@ class Visemes:
         plain = {name: self._named(name) for name in names}
         if all(found is not None for found in plain.values()):
             return [self.weights(name) for name in names]
-        symbols = {name: self._symbol(name) for name in names}
-        return [self.weights(name) if (found := symbols[name]) is None else found for name in names]
+        found = {name: self._mixed(name, plain[name]) for name in plain}
+        return [self.weights(name) if (weights := found[name]) is None else weights for name in names]
 
     def spell(self, text: str) -> Floats:
         """(k, n) weights of the sounds of a written text, guessed from its letters; (1, n) silence without any."""
@@ -126,11 +126,16 @@ class Visemes:
             return only
         return self.phonemes.get(name.upper().rstrip("012"))
 
+    def _mixed(self, name: str, plain: Floats | None) -> Floats | None:
+        """Weights of a sound among symbols of the IPA; names of ARPAbet beside them, as "DH", keep their meaning."""
+        arpabet = plain is not None and name.isascii() and (len(name) > 1 or name.isupper())
+        return plain if arpabet or (symbol := self._symbol(name)) is None else symbol
+
     def _symbol(self, name: str) -> Floats | None:
         """Weights of a symbol of the IPA, by the longest beginning that is listed."""
-        plain = _bare(name)
-        sizes = range(len(plain), 0, -1)
-        return next((self.ipa[plain[:size]] for size in sizes if plain[:size] in self.ipa), None)
+        bare = _bare(name)
+        starts = [text[:size] for text in (bare, bare.lower()) for size in range(len(bare), 0, -1)]
+        return next((self.ipa[start] for start in starts if start in self.ipa), None)
 
 
 def _bare(symbol: str) -> str:
