@@ -29,7 +29,7 @@ from controller.body.panel_state import PanelState
 from controller.body.sources import Sources, Voice, show_part
 from controller.layers.mixer import by_priority
 from controller.links.kind import LinkContext
-from controller.links.line.script import Script, load_named_script, load_script
+from controller.links.line.script import Script, load_named_script, load_script, script_names
 from controller.links.line.show import Shows
 from controller.robot.busloop import BusLoop
 from controller.robot.following import MeasuredFace
@@ -79,7 +79,7 @@ class Body:
                 [bus.following for bus in self.buses],
             )
         self.state.servo_monitor = self.measured_face
-        shows = self.state.shows = Shows(self._find_show, self.state)
+        shows = self.state.shows = Shows(self._find_show, self.state, self._show_names)
         if stage.settings.show is not None:
             script = load_script(stage.settings.show, parameters, stage.vocabulary, beside=stage.path)
             shows.play(self._as_part(script))
@@ -134,6 +134,9 @@ class Body:
         """The script that a robot asks for by name. Raises ConfigError: there is none, or it was switched off."""
         stage = self.stage
         return self._as_part(load_named_script(name, self.state.parameters, stage.vocabulary, beside=stage.path))
+
+    def _show_names(self) -> list[str]:
+        return script_names(beside=self.stage.path)
 
     def _as_part(self, script: Script) -> Script:
         """The script, as a part that fails alone. Raises ConfigError: it was switched off."""

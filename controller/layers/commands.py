@@ -10,6 +10,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
@@ -26,6 +27,7 @@ from controller.layers.layer_part import LayerPart
 from controller.layers.mixer import Layer, LayerSettings, Mixer
 from controller.layers.settings import default_layers
 from controller.motion.motion import MotionLimiter
+from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
 
 StatusValue = str | int | float
@@ -38,6 +40,9 @@ class Player(Protocol):
 
     def start(self, name: str) -> None:
         """Play a script from its beginning. Raises ConfigError."""
+
+    def names(self) -> Sequence[str]:
+        """The scripts that can be played, by name."""
 
     def control(self, what: str, to: str | float = 0.0) -> None:
         """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s). Raises ParameterError."""
@@ -100,6 +105,9 @@ class CommandSink(Protocol):
 
         ``manner`` : one of :data:`controller.layers.idle.settings.MANNERS`, or ``auto``.
         """
+
+    def viseme(self, names: Sequence[str], weights: Sequence[float], stamp_ns: int) -> None:
+        """Form the mouth of visemes, each at its weight 0..1, until the next ones; released after a second without."""
 
     def snapshot(self, out: Floats) -> None:
         """Copy the present parameters to ``out`` : (P,)."""
@@ -311,6 +319,18 @@ class CommandState:
             self._life.liveliness = min(max(amount, 0.0), 1.0)
             if manner is not None:
                 self._life.chosen = known
+
+    def viseme(self, names: Sequence[str], weights: Sequence[float], stamp_ns: int) -> None:
+        _check_finite("VISEME", *weights)
+        visemes = self._visemes
+        mixed = sum((weight * visemes.weights(name) for name, weight in zip(names, weights, strict=True)),
+                    np.zeros(len(visemes.names)))  # fmt: skip
+        values = np.clip(visemes.matrix @ mixed, 0.0, 1.0)
+        self.write_layer("speech", values, visemes.mask, stamp_ns, stamp_ns, through=visemes.through)
+
+    @cached_property
+    def _visemes(self) -> Visemes:
+        return Visemes.load(self.parameters)
 
     def capture(self, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
         """Give the live-capture layer ``values`` : (P,) where ``mask`` : (P,) bool; released after 1 s of silence."""

@@ -7,8 +7,6 @@ eyeLook columns say; and the labels JawLeft/JawRight and MouthLeft/MouthRight ar
 
 from __future__ import annotations
 
-import csv
-import io
 import math
 import re
 from dataclasses import dataclass
@@ -17,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from controller.base.errors import ParameterError, TakeError
-from controller.base.parameters import Flags, Floats, Parameters, fold
+from controller.base.parameters import Flags, Floats, Indices, Parameters, fold
 from controller.layers.commands import CommandState
-from surface.base import files
+from controller.takes.csvtable import header_of, read_csv
 
 _FRAMES_PER_S = 60.0
 _DAY_S = 86_400.0
@@ -134,45 +132,21 @@ class TakePlayer:
         self._state.write_layer(self.layer, values, self.take.mask, now_ns, now_ns, through=self.take.through)
 
 
+def is_livelink(start: bytes) -> bool:
+    """Whether a file begins as the takes of Live Link Face do."""
+    return "timecode" in header_of(start)
+
+
 def _read(path: Path) -> tuple[list[str], Floats, Floats]:
     """Column names (folded, without timecode and count), times from the first row (s) and cells (n, columns)."""
-    with files.reading(path, TakeError, hint=_HINT):
-        text = files.read_text(path)
-    try:
-        rows = list(csv.reader(io.StringIO(text, newline="")))
-    except csv.Error as error:
-        raise TakeError(f"{path}: not a CSV file: {error}", hint=_HINT) from error
-    if not rows:
-        raise TakeError(f"{path}: the file is empty", hint=_HINT)
-    header = [cell.strip() for cell in rows[0]]
-    folded = [fold(cell) for cell in header]
+    read = read_csv(path, _HINT)
+    folded = [fold(cell) for cell in read.header]
     if "timecode" not in folded:
         raise TakeError(f"{path}, line 1: no column Timecode", hint=_HINT)
-    lines = [(number, row) for number, row in enumerate(rows[1:], 2) if any(cell.strip() for cell in row)]
-    if not lines:
-        raise TakeError(f"{path}: a header but no rows", hint="record the take again, or export it again")
-    for number, row in lines:
-        if len(row) != len(header):
-            raise TakeError(
-                f"{path}, line {number}: {len(row)} cells where the header has {len(header)}",
-                hint="the file may be cut off; export the take again",
-            )
-    times = _times(path, [(number, row[folded.index("timecode")]) for number, row in lines])
+    codes = read.texts(folded.index("timecode"))
+    times = _times(path, [(line, code) for (line, _), code in zip(read.rows, codes, strict=True)])
     keep = [i for i, name in enumerate(folded) if name not in ("timecode", "blendshapecount", "framerate")]
-    table = np.array([[_number(path, number, header[i], row[i]) for i in keep] for number, row in lines])
-    return [folded[i] for i in keep], times, table
-
-
-def _number(path: Path, line: int, column: str, text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise TakeError(
-            f"{path}, line {line}, column {column}: {text!r} is not a finite number", hint="correct or remove that line"
-        )
-    return value
+    return [folded[i] for i in keep], times, read.numbers(keep)
 
 
 def _times(path: Path, lines: list[tuple[int, str]]) -> Floats:
@@ -215,10 +189,24 @@ def _by_parameter(columns: list[str], table: Floats, parameters: Parameters, swa
 def _leave_out(values: Floats, present: Flags, parameters: Parameters, use_eye_angles: bool) -> None:
     """Drop columns that carry nothing or say the same as others; changes both arrays."""
     head, eyes = parameters.indices(_HEAD), parameters.indices(_EYES)
-    looks = np.array([i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")])
+    looks = _looks(parameters)
     if not values[:, head].any():
         present[head] = False
     dropped = looks if use_eye_angles and values[:, eyes].any() else eyes
     if dropped is looks or values[:, looks].any():
-        values[:, dropped] = 0.0
-        present[dropped] = True  # held at zero, so that no lower layer adds its own gaze
+        _hold(values, present, dropped)
+
+
+def hold_looks(values: Floats, present: Flags, parameters: Parameters) -> None:
+    """Hold the eyeLook parameters of a take whose eyes are angles at zero; changes both arrays."""
+    _hold(values, present, _looks(parameters))
+
+
+def _looks(parameters: Parameters) -> Indices:
+    return np.array([i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")])
+
+
+def _hold(values: Floats, present: Flags, at: Indices) -> None:
+    """Hold parameters at zero, so that no lower layer adds its own gaze."""
+    values[:, at] = 0.0
+    present[at] = True

@@ -43,7 +43,7 @@ SCRIPT = FileKind("script", frozenset({"name", "description", "loop_s", "frames_
 LIFE = FileKind("life", frozenset(IdleSettings.known_keys()))
 PARAMETERS = FileKind("parameters", frozenset({"profile", "parameters", "aliases"}))
 UNITS = FileKind("action units", frozenset({"units", "emotions"}))
-VISEMES = FileKind("visemes", frozenset({"visemes", "rhubarb", "phonemes", "through"}))
+VISEMES = FileKind("visemes", frozenset({"visemes", "rhubarb", "phonemes", "ipa", "sapi", "letters", "through"}))
 PRESETS = FileKind("presets", frozenset({"presets"}))
 MOODS = FileKind("moods", frozenset({"anchors"}))
 LAYERS = FileKind("layers", inside=frozenset(LayerTable.known_keys()))

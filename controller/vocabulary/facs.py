@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
-from pydantic import Field, ValidationInfo, field_validator
+from pydantic import AfterValidator, Field, ValidationInfo, field_validator
 
-from controller.base.config import Settings, Share, load
+from controller.base.config import Number, Settings, load
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import config_dir
+from controller.base.plain_numbers import plain_number
 from controller.vocabulary.sides import sides, spread, unknown_names
 
 if TYPE_CHECKING:
@@ -24,15 +25,23 @@ LETTERS = "ABCDE"
 """Intensities of FACS, 0.2 to 1.0."""
 
 _PREFIX = r"(?:AU|AD)"
-_TERM = re.compile(rf"([LR]?){_PREFIX}?([LR]?)([0-9]{{1,2}})([LR]?)([A-E]?)", re.IGNORECASE)
+_TERM = re.compile(rf"([LR]?){_PREFIX}?([LR]?)([0-9]{{1,2}})([LR]?)([A-E]?)(?::(.*))?", re.IGNORECASE)
 _FORMULA = re.compile(rf"{_PREFIX}[LR]?[0-9]", re.IGNORECASE)
 _SPARSITY = 2e-3
 _LEAST_INTENSITY = 0.1
 _LEAST_LIKENESS = 0.35  # cosine to the nearest emotion below which a face shows none
 _TOLERANCE = 1e-5
+_TURNS = range(51, 65)
+"""Units that turn the head and the eyes, and say nothing of the emotion."""
 
 
-_Level = Annotated[Share, Field(gt=0)]
+def _not_zero(weight: float) -> float:
+    if not weight:
+        raise ValueError("must not be 0")
+    return weight
+
+
+_Level = Annotated[Number, Field(ge=-1, le=1), AfterValidator(_not_zero)]
 
 
 class _Unit(Settings):
@@ -89,6 +98,7 @@ class Facs:
         self.emotions = dict(emotions)
         self._aliases = aliases
         self._read = np.array([column.read for column in columns])
+        self._facial = np.array([int(column.unit) not in _TURNS for column in columns])
         self._of_unit: dict[str, list[int]] = {}
         for i, column in enumerate(columns):
             self._of_unit.setdefault(column.unit, []).append(i)
@@ -123,10 +133,10 @@ class Facs:
         return faults
 
     def levels(self, formula: str, intensity: float = 1.0) -> Floats:
-        """(n,) levels of a formula: units with optional side and letter, joined by ``+``; nothing for an empty one.
+        """(n,) levels of a formula: units with optional side and intensity, joined by ``+``; nothing for an empty one.
 
-        ``12`` is both sides at full intensity, ``L12B`` the face's own left side at 0.4. The side may also follow the
-        number, ``12LB``, and each unit may begin with ``AU`` or ``AD``.
+        ``12`` is both sides at full intensity, ``L12B`` the face's own left side at 0.4, ``12:0.35`` both at 0.35. The
+        side may also follow the number, ``12LB``, and each unit may begin with ``AU`` or ``AD``.
 
         Raises ParameterError: a term is not understood or no unit has its number.
         """
@@ -137,9 +147,13 @@ class Facs:
             levels[indices] = np.maximum(levels[indices], level * intensity)
         return levels
 
+    def columns_of(self, unit: str) -> list[int]:
+        """Positions of a unit's columns, one or one for each side, by its number, as "12"; none for an unknown one."""
+        return list(self._of_unit.get(self._aliases.get(unit, unit), []))
+
     def expand(self, formula: str, intensity: float = 1.0) -> Floats:
-        """(P,) parameters of a formula, clipped to 1. Raises ParameterError."""
-        return np.minimum(self.matrix @ self.levels(formula, intensity), 1.0)
+        """(P,) parameters of a formula, clipped to -1..1. Raises ParameterError."""
+        return np.clip(self.matrix @ self.levels(formula, intensity), -1.0, 1.0)
 
     def read(self, values: Floats) -> Floats:
         """(n,) levels 0..1 that show ``values`` : (P,) best, with few units."""
@@ -148,7 +162,7 @@ class Facs:
 
     def read_emotion(self, values: Floats) -> tuple[str, float]:
         """The emotion whose units ``values`` : (P,) show most, and its intensity 0..1; neutral when little shows."""
-        levels = self.read(values)
+        levels = self.read(values) * self._facial
         names, templates = self._templates
         sizes = np.linalg.norm(templates, axis=1)
         likeness = templates @ levels / sizes
@@ -176,8 +190,8 @@ class Facs:
     def _term(self, term: str) -> tuple[list[int], float]:
         match = _TERM.fullmatch(term)
         number, side, letter = ("", "", "") if match is None else _parts(match)
-        if not number or len(side) > 1:
-            raise ParameterError(f"{term!r} is not an action unit", hint='write it like "12", "12B" or "L12B"')
+        if match is None or not number or len(side) > 1 or (letter and match[6] is not None):
+            raise ParameterError(f"{term!r} is not an action unit", hint='write it like "12", "L12B" or "12:0.35"')
         unit = self._aliases.get(number, number)
         if unit not in self._of_unit:
             raise ParameterError(f"unknown action unit {number!r}{did_you_mean(number, self._of_unit)}",
@@ -187,6 +201,8 @@ class Facs:
             indices = [i for i in indices if self.names[i] == side + unit]
             if not indices:
                 raise ParameterError(f"action unit {unit} has no sides", hint=f"write it as {unit}")
+        if match[6] is not None:
+            return indices, _intensity(term, match[6])
         return indices, (LETTERS.index(letter) + 1) / 5 if letter else 1.0
 
 
@@ -197,8 +213,16 @@ def is_formula(text: str) -> bool:
 
 def _parts(match: re.Match[str]) -> tuple[str, str, str]:
     """Number, sides and letter of a term."""
-    first, second, number, third, letter = (group.upper() for group in match.groups())
+    first, second, number, third, letter = (match[i].upper() for i in range(1, 6))
     return number, first + second + third, letter
+
+
+def _intensity(term: str, text: str) -> float:
+    """The number behind a colon. Raises ParameterError."""
+    value = plain_number(text)
+    if value is None or not 0.0 <= value <= 1.0:
+        raise ParameterError(f"{term!r}: the intensity must be 0 to 1, not {text!r}", hint='write it like "12:0.35"')
+    return value
 
 
 def _columns(parameters: Parameters, name: str, unit: _Unit) -> list[_Column]:

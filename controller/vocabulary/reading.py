@@ -41,7 +41,7 @@ class Readings:
                     return [self._facs.read_emotion(values)]
                 case "VISEMES":
                     visemes, solver = self._visemes
-                    return _shown(visemes.names, solver.solve(values * visemes.mask))
+                    return _shown(visemes.names, solver.solve(values * visemes.mask)[: len(visemes.names)])
                 case "MOOD":
                     affect, solver = self._affect
                     levels = dict(zip(affect.names[1:], solver.solve(values).tolist(), strict=True))
@@ -54,8 +54,13 @@ class Readings:
 
     @cached_property
     def _visemes(self) -> tuple[Visemes, _Levels]:
+        """The visemes, and a solver for them and for each shape that an expression may lend to a speaking mouth.
+
+        Without the latter a smile would be read as the viseme that smiles most.
+        """
         visemes = Visemes.load(self._parameters)
-        return visemes, _Levels(visemes.matrix)
+        lent = np.flatnonzero(visemes.mask & (visemes.through > 0.0))
+        return visemes, _Levels(np.concatenate([visemes.matrix, np.eye(len(visemes.mask))[:, lent]], axis=1))
 
     @cached_property
     def _affect(self) -> tuple[Affect, _Levels]:

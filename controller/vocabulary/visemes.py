@@ -1,9 +1,10 @@
-"""Reads visemes, what the mouth does for a sound, and the tables from phonemes and Rhubarb's shapes to them."""
+"""Reads visemes, what the mouth does for a sound, and the tables from phonemes and other names of sounds to them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
@@ -15,6 +16,8 @@ from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import config_dir
 from controller.vocabulary.sides import spread, unknown_names
+
+_LONGEST_LETTERS = 3
 
 
 class _Viseme(Settings):
@@ -29,6 +32,9 @@ class _File(Settings):
     visemes: Annotated[dict[str, _Viseme], Field(min_length=1)]
     rhubarb: dict[str, dict[str, Number]] = {}
     phonemes: dict[str, str] = {}
+    ipa: dict[str, str] = {}
+    sapi: dict[Annotated[str, Field(pattern=r"^\d+$")], str] = {}
+    letters: dict[str, str] = {}
     through: dict[str, Share] = {}
 
 
@@ -39,7 +45,9 @@ class Visemes:
     names : of the n visemes. matrix : (P, n) float64, parameters of each at full weight.
     hold : (n,) how firmly each keeps its shape, 0..1. duration : (n,) relative lengths.
     through : (P,) how much of the face below shows through speech; 1 where no viseme moves a parameter.
-    rhubarb : mouth shape to weights (n,). phonemes : phoneme to weights (n,). aliases : other names of visemes.
+    rhubarb : mouth shape to weights (n,). phonemes : phoneme of ARPAbet to weights (n,). aliases : other names of
+    visemes. ipa : symbol of the IPA to weights (n,). sapi : viseme of SAPI, by its number, to weights (n,).
+    letters : letters of a written word to weights (n,).
     """
 
     names: tuple[str, ...]
@@ -50,6 +58,9 @@ class Visemes:
     rhubarb: dict[str, Floats]
     phonemes: dict[str, Floats]
     aliases: dict[str, str]
+    ipa: dict[str, Floats] = field(default_factory=dict)
+    sapi: dict[int, Floats] = field(default_factory=dict)
+    letters: dict[str, Floats] = field(default_factory=dict)
 
     @classmethod
     def load(cls, parameters: Parameters, path: Path | None = None) -> Visemes:
@@ -68,11 +79,7 @@ class Visemes:
 
         Raises ParameterError: neither is known.
         """
-        name = self.aliases.get(name, name)
-        if name in self.names:
-            only: Floats = np.eye(len(self.names))[self.names.index(name)]
-            return only
-        found = self.phonemes.get(name.upper().rstrip("012"))
+        found = self._named(name)
         if found is None:
             known = [*self.names, *self.phonemes]
             raise ParameterError(
@@ -80,6 +87,61 @@ class Visemes:
                 hint="configs/vocabularies/visemes.toml lists both",
             )
         return found
+
+    def viseme(self, name: str) -> str:
+        """The canonical name of a viseme, in any case. Raises ParameterError: it is none."""
+        known = {each.lower(): each for each in self.names} | {k.lower(): v for k, v in self.aliases.items()}
+        found = known.get(name.lower())
+        if found is None:
+            raise ParameterError(f"unknown viseme {name!r}{did_you_mean(name, self.names)}", hint=" ".join(self.names))
+        return found
+
+    def sounds(self, names: Sequence[str]) -> list[Floats]:
+        """Weights (n,) of each sound of an alignment: visemes, phonemes of ARPAbet, or symbols of the IPA.
+
+        All are symbols of the IPA where any of them can be nothing else: "y" is another sound there.
+
+        Raises ParameterError: a sound is unknown.
+        """
+        plain = {name: self._named(name) for name in names}
+        if all(found is not None for found in plain.values()):
+            return [self.weights(name) for name in names]
+        found = {name: self._mixed(name, plain[name]) for name in plain}
+        return [self.weights(name) if (weights := found[name]) is None else weights for name in names]
+
+    def spell(self, text: str) -> Floats:
+        """(k, n) weights of the sounds of a written text, guessed from its letters; (1, n) silence without any."""
+        rows, rest = [], text.lower()
+        while rest:
+            taken = next((rest[:size] for size in range(_LONGEST_LETTERS, 0, -1) if rest[:size] in self.letters), "")
+            if taken:
+                rows.append(self.letters[taken])
+            rest = rest[len(taken) or 1 :]
+        return np.stack(rows) if rows else self.weights(self.names[0])[None]
+
+    def _named(self, name: str) -> Floats | None:
+        name = self.aliases.get(name, name)
+        if name in self.names:
+            only: Floats = np.eye(len(self.names))[self.names.index(name)]
+            return only
+        return self.phonemes.get(name.upper().rstrip("012"))
+
+    def _mixed(self, name: str, plain: Floats | None) -> Floats | None:
+        """Weights of a sound among symbols of the IPA; names of ARPAbet beside them, as "DH", keep their meaning."""
+        arpabet = plain is not None and name.isascii() and (len(name) > 1 or name.isupper())
+        return plain if arpabet or (symbol := self._symbol(name)) is None else symbol
+
+    def _symbol(self, name: str) -> Floats | None:
+        """Weights of a symbol of the IPA, by the longest beginning that is listed."""
+        bare = _bare(name)
+        starts = [text[:size] for text in (bare, bare.lower()) for size in range(len(bare), 0, -1)]
+        return next((self.ipa[start] for start in starts if start in self.ipa), None)
+
+
+def _bare(symbol: str) -> str:
+    """A symbol of the IPA without marks of stress, length, tone and articulation."""
+    whole = unicodedata.normalize("NFD", symbol.strip())
+    return "".join(sign for sign in whole if unicodedata.category(sign) not in ("Mn", "Lm", "Sk", "Po") or sign == "_")
 
 
 def _faults(parameters: Parameters, file: _File) -> list[str]:
@@ -89,6 +151,8 @@ def _faults(parameters: Parameters, file: _File) -> list[str]:
         faults += unknown_names(parameters, f"visemes.{name}.weights", viseme.weights)
     used = {f"rhubarb.{shape}": name for shape, mix in file.rhubarb.items() for name in mix}
     used |= {f"phonemes.{phoneme}": name for phoneme, name in file.phonemes.items()}
+    used |= {f"sapi.{number}": name for number, name in file.sapi.items()}
+    used |= {f"{table}.{name}": name for table in ("ipa", "letters") for name in getattr(file, table)}
     return faults + [
         f"{where}: unknown viseme {name!r}{did_you_mean(name, file.visemes)}"
         for where, name in used.items()
@@ -114,7 +178,15 @@ def _build(parameters: Parameters, file: _File) -> Visemes:
         {shape: _weights(mix, given) for shape, mix in file.rhubarb.items()},
         {phoneme: _weights({name: 1.0}, given) for phoneme, name in file.phonemes.items()},
         {alias: name for name, viseme in given.items() for alias in viseme.aliases},
+        _listed(file.ipa, given),
+        {int(number): _weights({name: 1.0}, given) for number, name in file.sapi.items()},
+        _listed(file.letters, given),
     )
+
+
+def _listed(table: Mapping[str, str], names: Iterable[str]) -> dict[str, Floats]:
+    """Weights of every word of the lists of a table."""
+    return {word: _weights({name: 1.0}, names) for name, words in table.items() for word in words.split()}
 
 
 def _weights(mix: Mapping[str, float], names: Iterable[str]) -> Floats:

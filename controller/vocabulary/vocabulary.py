@@ -1,4 +1,4 @@
-"""Looks up expressions: by name, or by a formula of action units or of a mood."""
+"""Looks up expressions: by name, or by a formula of action units, of a mood or of a viseme."""
 
 from __future__ import annotations
 
@@ -16,12 +16,14 @@ from controller.base.plain_numbers import plain_number
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.expression import Expression, read_expressions
 from controller.vocabulary.facs import Facs, is_formula
+from controller.vocabulary.visemes import Visemes
 
+_VISEME = re.compile(r"VISEME:(.*)", re.IGNORECASE)
 _MOOD = re.compile(r"(VAD?):(.*)", re.IGNORECASE)
 
 
 class Vocabulary:
-    """Expressions by name, or by a formula: ``AU1+2+5B``, ``VA:0.6,-0.2`` or ``VAD:-0.5,0.6,0.3``.
+    """Expressions by name, or by a formula: ``AU1+2+5B``, ``VA:0.6,-0.2``, ``VAD:-0.5,0.6,0.3`` or ``VISEME:aa``.
 
     expressions : the named expressions, in file order; moods are blended from them.
     aliases : folded other names to canonical ones.
@@ -61,6 +63,10 @@ class Vocabulary:
             point = _point(kind, mood[2])
             shown = ",".join(f"{value:g}" for value in point)
             return Expression(f"{kind}:{shown}", self._affect.expand(*point), source="affect")
+        if viseme := _VISEME.fullmatch(name):
+            shown = self._visemes.viseme(viseme[1])
+            weights = self._visemes.matrix @ self._visemes.weights(shown)
+            return Expression(f"VISEME:{shown}", weights, kind="gesture", source="viseme", onset_s=0.08, offset_s=0.12)
         found = self._lookup.get(name) or self._lookup.get(fold(name))
         if found is None:
             raise ParameterError(
@@ -80,6 +86,10 @@ class Vocabulary:
     @cached_property
     def _facs(self) -> Facs:
         return Facs.load(self._parameters)
+
+    @cached_property
+    def _visemes(self) -> Visemes:
+        return Visemes.load(self._parameters)
 
     @cached_property
     def _affect(self) -> Affect:

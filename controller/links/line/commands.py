@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean
@@ -15,6 +16,7 @@ from controller.base.plain_numbers import plain_number
 from controller.layers.idle.settings import AUTO, MANNERS
 from controller.links.line.checksums import CHECKSUMS
 from controller.links.line.protocol import Code, LineError, Words, parse_words
+from controller.vocabulary.visemes import Visemes
 
 MAX_RATE_HZ = 200.0
 MIN_RATE_HZ = 0.1
@@ -26,7 +28,7 @@ MAX_DURATION_S = 3600.0
 MAX_FADE_S = 60.0
 READINGS = ("UNITS", "EMOTION", "VISEMES", "MOOD")
 """What a face can be read as: action units, the nearest emotion, mouth shapes, valence-arousal-dominance."""
-LISTS = ("COMMANDS", "EXPRESSIONS", "HOLDERS", "LAYERS", "PARAMETERS")
+LISTS = ("COMMANDS", "EXPRESSIONS", "HOLDERS", "LAYERS", "PARAMETERS", "SHOWS", "VISEMES")
 _SHOWN = 32
 
 
@@ -36,7 +38,7 @@ class Command:
 
     name : its first word, or two for ``GAZE AT`` and ``GAZE OFF``; FRAME becomes SET and VERSION becomes HELLO.
     indices : positions of the parameters it names. values : its numbers, of SET one for each of ``indices``.
-    words : other names in it: of an expression, a list, a reading, a script or a mark; of HELLO
+    words : other names in it: of an expression, visemes, a list, a reading, a script or a mark; of HELLO
         one of :data:`controller.links.line.checksums.CHECKSUMS`.
     question : what SUB streams: a command GET, MEASURED or READ.
     """
@@ -129,6 +131,20 @@ class Grammar:
         intensity = in_range("intensity", given[1], 0.0, 1.0) if len(given) > 1 else 1.0
         duration = [in_range("duration_s", text, MIN_DURATION_S, MAX_DURATION_S) for text in given[2:]]
         return Command("EXPR", values=(intensity, *duration), words=(name,))
+
+    def read_viseme(self, given: Sequence[str]) -> Command:
+        if len(given) % 2 and len(given) > 1:
+            raise LineError(Code.ARGUMENTS, f"a viseme without a weight; {_usage('VISEME')}")
+        try:
+            names = tuple(self._visemes.viseme(text) for text in given[::2])
+        except ParameterError as error:
+            raise LineError(Code.NAME, str(error)) from error
+        weights = [in_range("weight", text, 0.0, 1.0) for text in given[1::2]] or [1.0]
+        return Command("VISEME", values=tuple(weights), words=names)
+
+    @cached_property
+    def _visemes(self) -> Visemes:
+        return Visemes.load(self._parameters)
 
     def read_sub(self, given: Sequence[str]) -> Command:
         rate = in_range("rate_hz", given[0], MIN_RATE_HZ, MAX_RATE_HZ)
@@ -236,6 +252,13 @@ def _list(_: Grammar, given: Sequence[str]) -> Command:
     return Command("LIST", words=(what.upper(),))
 
 
+def _help(_: Grammar, given: Sequence[str]) -> Command:
+    (what,) = given or ("HELP",)
+    if what.upper() not in _RULES:
+        raise LineError(Code.NAME, f"unknown command {quoted(what)}{did_you_mean(what[:_SHOWN], COMMANDS)}")
+    return Command("HELP", words=(what.upper(),) if given else ())
+
+
 def _neutral(_: Grammar, given: Sequence[str]) -> Command:
     return Command("NEUTRAL", values=(in_range("seconds", given[0], 0.0, MAX_FADE_S) if given else 0.5,))
 
@@ -264,6 +287,7 @@ _RULES: dict[str, Rule] = {
               Grammar.read_frame),
     "RELEASE": (1, None, "RELEASE name ... or RELEASE ALL", _named("RELEASE")),
     "EXPR": (1, 3, "EXPR name [intensity [duration_s]]", Grammar.read_expr),
+    "VISEME": (1, 30, "VISEME name [weight [name weight ...]]", Grammar.read_viseme),
     "GAZE": (1, 4, "GAZE yaw_deg pitch_deg, GAZE AT x_mm y_mm z_mm, or GAZE OFF", _gaze),
     "NEUTRAL": (0, 1, "NEUTRAL [seconds]", _neutral),
     "LIFE": (1, 2, "LIFE amount [AUTO|ALONE|LISTEN|SPEAK]", _life),
@@ -277,10 +301,16 @@ _RULES: dict[str, Rule] = {
             "SUB rate_hz [ALL], SUB rate_hz name ..., SUB rate_hz READ ..., or SUB rate_hz MEASURED [name ...]",
             Grammar.read_sub),
     "UNSUB": (0, 0, "UNSUB", lambda _, given: Command("UNSUB")),
-    "LIST": (1, 1, "LIST COMMANDS, EXPRESSIONS, HOLDERS, LAYERS or PARAMETERS", _list),
+    "LIST": (1, 1, f"LIST {', '.join(LISTS[:-1])} or {LISTS[-1]}", _list),
+    "HELP": (0, 1, "HELP [command]", _help),
     "STOP": (0, None, "STOP", lambda _, given: Command("STOP")),
     "START": (0, 0, "START", Grammar.read_start),
 }  # fmt: skip
 
 COMMANDS = tuple(_RULES)
 """Every command word."""
+
+
+def help_of(name: str | None) -> str:
+    """How a command is written; without a name, the words of all commands."""
+    return _RULES[name][2] if name else f"[command]: {' '.join(COMMANDS)}"

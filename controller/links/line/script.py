@@ -19,8 +19,10 @@ from controller.base.plain_numbers import plain_number
 from controller.links.line.commands import Grammar, quoted
 from controller.links.line.protocol import LineError
 from controller.vocabulary.vocabulary import Vocabulary
+from surface.base.files import read_toml
 
 _SUFFIX = ".toml"
+_WORD = re.compile(r"[!-)+-~]{1,100}")
 _NAME = re.compile(r"(?![.])[^/\\\x00-\x1f\x7f]{1,100}")
 """Of a script that a robot may ask for: no folder, nothing hidden, nothing that a file system refuses."""
 
@@ -108,6 +110,21 @@ def load_named_script(
     known = sorted(path.stem for path in folders[-1].glob(f"*{_SUFFIX}"))
     message = f"no script {quoted(name)} in the folders of the stage and of configs/scripts{did_you_mean(name, known)}"
     raise ConfigError(message, hint=f"there are {', '.join(known)}")
+
+
+def script_names(beside: Path | None = None) -> list[str]:
+    """Names of the scripts that a robot may ask for with one word, in order; see :func:`load_named_script`."""
+    folders = [beside.parent, config_dir() / "scripts"] if beside is not None else [config_dir() / "scripts"]
+    paths = [path for folder in folders for path in folder.glob(f"*{_SUFFIX}")]
+    fit = {path.stem for path in paths if _WORD.fullmatch(path.stem) and _has_steps(path)}
+    return sorted(fit)
+
+
+def _has_steps(path: Path) -> bool:
+    try:
+        return path.resolve().parent == path.parent.resolve() and "steps" in read_toml(path)
+    except (OSError, ValueError):
+        return False
 
 
 def _load(path: Path, parameters: Parameters, vocabulary: Vocabulary | None) -> Script:

@@ -14,7 +14,7 @@ from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.base.plain_numbers import plain_number
 from controller.layers.commands import CommandSink, Player
 from controller.links.line.checksums import ChecksumRule
-from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Command, Grammar, Request
+from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Command, Grammar, Request, help_of
 from controller.links.line.protocol import (
     MAX_LINE,
     VERSION,
@@ -32,6 +32,7 @@ from controller.links.line.protocol import (
     parse_words,
 )
 from controller.vocabulary.reading import Readings
+from controller.vocabulary.visemes import Visemes
 
 log = logging.getLogger(__name__)
 
@@ -211,12 +212,10 @@ class LineSession:
                 sink.release(command.indices, now_ns)
             case "EXPR":
                 sink.expression(command.words[0], values[0], values[1] if values[1:] else None, now_ns)
-            case "GAZE":
-                sink.gaze(math.radians(values[0]), math.radians(values[1]), now_ns)
-            case "GAZE AT":
-                sink.gaze_at(values[0], values[1], values[2], now_ns)
-            case "GAZE OFF":
-                sink.gaze_off(now_ns)
+            case "VISEME":
+                sink.viseme(command.words, values, now_ns)
+            case "GAZE" | "GAZE AT" | "GAZE OFF":
+                self._gaze(command, now_ns)
             case "NEUTRAL":
                 sink.neutral(values[0], now_ns)
             case "LIFE":
@@ -226,6 +225,15 @@ class LineSession:
             case _:
                 return False
         return True
+
+    def _gaze(self, command: Command, now_ns: int) -> None:
+        match command.values:
+            case ():
+                self._sink.gaze_off(now_ns)
+            case (yaw, pitch):
+                self._sink.gaze(math.radians(yaw), math.radians(pitch), now_ns)
+            case (x, y, z):
+                self._sink.gaze_at(x, y, z, now_ns)
 
     def _start(self) -> None:
         """Let the servos move again, unless a STOP has arrived behind this line."""
@@ -247,6 +255,8 @@ class LineSession:
                 return "INFO " + self._info(command.indices[0])
             case "STATUS":
                 return "STATUS " + " ".join(f"{key}={_word(value)}" for key, value in self._status(now_ns).items())
+            case "HELP":
+                return f"HELP {help_of(words[0] if words else None)}"
             case "LIST":
                 return f"LIST {words[0]} " + " ".join(self._list(words[0]))
             case "HELLO":
@@ -292,6 +302,8 @@ class LineSession:
             "PARAMETERS": self._parameters.names,
             "EXPRESSIONS": self._sink.vocabulary.names,
             "LAYERS": self._sink.layer_names(),
+            "VISEMES": Visemes.load(self._parameters).names,
+            "SHOWS": tuple(self._sink.shows.names()) if self._sink.shows is not None else (),
             "COMMANDS": COMMANDS,
         }[what]
 
@@ -306,6 +318,9 @@ def _receipt(command: Command) -> str:
         return f"{name} {len(command.indices)}"
     if name == "EXPR":
         return " ".join([name, *command.words, number(command.values[0])])
+    if name == "VISEME":
+        pairs_of = zip(command.words, map(number, command.values), strict=True)
+        return " ".join([name, *(word for pair in pairs_of for word in pair)])
     if name == "LIFE":
         return " ".join([name, number(command.values[0]), *command.words])
     return " ".join([name.partition(" ")[0], *command.words])

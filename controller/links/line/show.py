@@ -5,7 +5,7 @@ from __future__ import annotations
 import bisect
 import math
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from controller.base.errors import ParameterError
 from controller.base.parameters import did_you_mean
@@ -100,10 +100,13 @@ class Shows:
     """The show that plays now; links change it from their threads, the control loop ticks it.
 
     find : the script of a name that a link may ask for; raises ConfigError. sink : the face.
+    names : gives the names that ``find`` knows.
     """
 
-    def __init__(self, find: Callable[[str], Script], sink: CommandSink) -> None:
-        self._find, self._sink = find, sink
+    def __init__(
+        self, find: Callable[[str], Script], sink: CommandSink, names: Callable[[], Sequence[str]] = tuple
+    ) -> None:
+        self._find, self._sink, self.names = find, sink, names
         self._show: Show | None = None
         self._lock = threading.RLock()  # a show may start another
 

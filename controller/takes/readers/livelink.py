@@ -8,4 +8,5 @@ TAKE = TakeReader(
     title="Live Link Face",
     suffixes=(".csv",),
     read="controller.takes.livelink:Take.load",
+    recognises="controller.takes.livelink:is_livelink",
 )

@@ -32,6 +32,19 @@ def test_emotions_to_units_to_parameters_and_back(readings: Readings, emotion: s
     assert readings.read("EMOTION", shown)[0][0] == emotion
 
 
+def test_a_smile_is_not_read_as_a_viseme(readings: Readings) -> None:
+    for intensity in (0.2, 0.6, 1.0):
+        assert readings.read("VISEMES", VOCABULARY["smile"].weights * intensity) == []
+
+
+@pytest.mark.parametrize("viseme", ["PP", "aa", "I", "O", "U", "SS"])
+def test_visemes_are_read_through_a_smile(readings: Readings, viseme: str) -> None:
+    visemes, smile = Visemes.load(P), VOCABULARY["smile"].weights
+    face = np.maximum(visemes.matrix @ visemes.weights(viseme), smile * visemes.through * visemes.mask)
+    found = dict(readings.read("VISEMES", face))
+    assert max(found, key=lambda name: found[name]) == viseme and found[viseme] > 0.6
+
+
 def test_units(readings: Readings) -> None:
     face = Facs.load(P).expand("12+26B+L2")
     found = dict(readings.read("UNITS", face))

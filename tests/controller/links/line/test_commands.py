@@ -41,6 +41,14 @@ def parse(line: str) -> Command:
         ("EXPR anger 0 3600", Command("EXPR", (), (0.0, 3600.0), ("anger",))),
         ("EXPR anger 1 0.05", Command("EXPR", (), (1.0, 0.05), ("anger",))),
         ("EXPR au1+2+5b 0.5", Command("EXPR", (), (0.5,), ("AU1+2+5B",))),
+        ("EXPR au12:0.35+au6:.5", Command("EXPR", (), (1.0,), ("AU12:0.35+AU6:.5",))),
+        ("EXPR viseme:AA 0.4", Command("EXPR", (), (0.4,), ("VISEME:aa",))),
+        ("VISEME aa", Command("VISEME", (), (1.0,), ("aa",))),
+        ("viseme pp 0.8", Command("VISEME", (), (0.8,), ("PP",))),
+        ("VISEME oh 0.5 I 0.25", Command("VISEME", (), (0.5, 0.25), ("O", "I"))),
+        ("HELP", Command("HELP")),
+        ("help set", Command("HELP", words=("SET",))),
+        ("LIST shows", Command("LIST", words=("SHOWS",))),
         ("EXPR va:0.5,-.25", Command("EXPR", (), (1.0,), ("VA:0.5,-0.25",))),
         ("GAZE -20 5.5", Command("GAZE", (), (-20.0, 5.5))),
         ("GAZE -95 70", Command("GAZE", (), (-95.0, 70.0))),
@@ -186,7 +194,7 @@ def test_a_script_may_stop_the_servos_and_not_start_them() -> None:
 
 
 @pytest.mark.parametrize(
-    "name", sorted({*COMMANDS} - {"HELLO", "VERSION", "PING", "NEUTRAL", "STATUS", "UNSUB", "STOP", "START"})
+    "name", sorted({*COMMANDS} - {"HELLO", "VERSION", "PING", "NEUTRAL", "STATUS", "UNSUB", "STOP", "START", "HELP"})
 )
 def test_commands_that_need_arguments_say_so(name: str) -> None:
     with pytest.raises(LineError, match=f"0 arguments; usage: {name}") as caught:

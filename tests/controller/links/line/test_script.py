@@ -11,7 +11,7 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
-from controller.links.line.script import Script, Wave, load_named_script, load_script
+from controller.links.line.script import Script, Wave, load_named_script, load_script, script_names
 from controller.vocabulary.vocabulary import Vocabulary
 
 VOCABULARY = Vocabulary.load(P)
@@ -163,3 +163,13 @@ def test_one_fault_is_named_with_its_place(tmp_path: Path, text: str, fault: str
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         object.__new__(Script).anything = 1
+
+
+def test_the_names_that_a_robot_may_play_are_those_of_scripts(tmp_path: Path) -> None:
+    for name, text in {"mine": 'steps = ["0 NEUTRAL"]', "stage": 'name = "s"', "broken": "steps = ["}.items():
+        (tmp_path / f"{name}.toml").write_text(text)
+    (tmp_path / "two words.toml").write_text('steps = ["0 NEUTRAL"]')
+    (tmp_path / "away.toml").symlink_to("/etc/hostname")
+    shipped = script_names()
+    assert "tour" in shipped and script_names(tmp_path / "stage.toml") == sorted([*shipped, "mine"])
+    assert all(load_named_script(name, P, beside=tmp_path / "stage.toml") for name in shipped)

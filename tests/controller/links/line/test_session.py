@@ -70,7 +70,8 @@ def test_every_command_is_acknowledged(talk: Talk) -> None:
         "GET ALL": "GET ALL 0", "STATUS": "STATUS expression=neutral", "SUB 20": "SUB 20 59", "UNSUB": "UNSUB",
         "LIST PARAMETERS": "LIST PARAMETERS eyeBlinkLeft", "LIST EXPRESSIONS": "LIST EXPRESSIONS neutral",
         "LIST LAYERS": "LIST LAYERS expression", "LIST HOLDERS": "LIST HOLDERS expression",
-        "LIST COMMANDS": "LIST COMMANDS HELLO",
+        "LIST COMMANDS": "LIST COMMANDS HELLO", "LIST VISEMES": "LIST VISEMES sil PP", "LIST SHOWS": "LIST SHOWS",
+        "HELP": "HELP [command]: HELLO", "HELP list": "HELP LIST COMMANDS",
     }  # fmt: skip
     for line, text in answers.items():
         reply = talk.say(line)
@@ -358,3 +359,24 @@ def test_faults_are_logged_once_a_kind_and_shown_in_part(
     for _ in range(100):
         talk.say("LIFE 1")
     assert caplog.text.count("it goes on with the next line") == 50
+
+
+def test_visemes_form_the_mouth_until_the_next_or_for_a_second(talk: Talk) -> None:
+    roll = P.index("mouthRollLower")
+    assert talk.say("VISEME aa 0.8") == Reply("OK", "VISEME aa 0.8")
+    assert talk.run(0.5)[JAW] == pytest.approx(0.44, abs=0.01) and talk.state.holder(JAW) == "speech"
+    talk.say("VISEME PP")
+    assert talk.run(0.5)[[JAW, roll]] == pytest.approx([0.0, 0.45], abs=0.01)
+    assert talk.run(1.5)[roll] == pytest.approx(0.0, abs=0.01) and talk.state.holder(roll) != "speech"
+
+
+def test_a_mix_of_visemes_is_the_sum_of_them_and_no_more_than_the_face_can(talk: Talk) -> None:
+    talk.say("VISEME aa 0.5 O 0.5")
+    assert talk.run(0.5)[JAW] == pytest.approx(0.5 * 0.55 + 0.5 * 0.4, abs=0.01)
+    talk.say("VISEME aa 1 O 1 U 1")
+    assert talk.run(0.8).max() == pytest.approx(1.0, abs=0.01)
+
+
+def test_the_shows_are_listed(talk: Talk) -> None:
+    talk.state.shows = Shows(lambda name: Script(((0.0, "PING"),)), talk.state, lambda: ("tour", "wave"))
+    assert talk.say("LIST SHOWS").text == "LIST SHOWS tour wave"

@@ -1,0 +1,162 @@
+"""Reads the action units of OpenFace 2 and of py-feat from CSV files.
+
+OpenFace (its wiki, "Output Format"): header names with a blank after each comma; ``AU01_r`` is an intensity 0..5,
+``AU01_c`` a presence 0 or 1, and AU28 has a presence only; rows with ``success`` 0 hold nothing. Head and gaze are
+angles in the camera's frame: x to the right of its picture, y down, z away from it.
+py-feat: ``AU01`` 0..1; a row for every face of every frame, cells of faces that were not found empty; times as frames.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from controller.base.errors import TakeError
+from controller.base.parameters import Flags, Floats, Parameters
+from controller.takes.csvtable import CsvTable, header_of, read_csv
+from controller.takes.livelink import Take, hold_looks
+from controller.vocabulary.facs import Facs
+
+_OPENFACE = "an OpenFace 2 file has the columns timestamp, success, AU01_r, AU01_c and so on: FeatureExtraction -aus"
+_PYFEAT = "a py-feat file has the columns frame, AU01, AU02 and so on: Detector().detect_video(...).to_csv(...)"
+_UNIT = re.compile(r"au0*(\d+)(_r|_c)?")
+_MOST_INTENSITY = 5.0
+_PRESENT = 0.6  # a presence without an intensity: letter C
+_LEAST_CONFIDENCE = 0.5
+_RATE_HZ = 30.0
+
+
+def is_openface(start: bytes) -> bool:
+    """Whether a file begins as OpenFace's do."""
+    names = header_of(start)
+    return "confidence" in names and any(re.fullmatch(r"au\d+_[rc]", name) for name in names)
+
+
+def is_pyfeat(start: bytes) -> bool:
+    """Whether a file begins as py-feat's do."""
+    names = header_of(start)
+    return "au01" in names and any(name in names for name in ("facescore", "facerectx", "frame", "input"))
+
+
+def openface_take(path: Path, parameters: Parameters) -> Take:
+    """A take from OpenFace's action units, head and gaze. Raises TakeError."""
+    table = read_csv(path, _OPENFACE)
+    at = {name.lower(): i for i, name in enumerate(table.header)}
+    times = _column(table, at, "timestamp", _OPENFACE)
+    table, times = _one_face(table, times, _whole(table, at, "face_id"), _found(table, at))
+    levels = _openface_levels(table, at)
+    values, mask = _expanded(levels, parameters)
+    _set_angles(table, at, values, mask, parameters)
+    return _take(path, times, values, mask, parameters)
+
+
+def pyfeat_take(path: Path, parameters: Parameters) -> Take:
+    """A take from py-feat's action units; 30 frames a second unless ``approx_time`` says more. Raises TakeError."""
+    table = read_csv(path, _PYFEAT)
+    at = {name.lower(): i for i, name in enumerate(table.header)}
+    units = {match[1]: i for name, i in at.items() if (match := _UNIT.fullmatch(name)) and not match[2]}
+    cells = table.numbers([*units.values()], gaps=True)
+    frames = _column(table, at, "frame", _PYFEAT) if "frame" in at else np.arange(float(len(table.rows)))
+    times = frames / _rate(table, at, frames)
+    found = np.logical_and.reduce(np.isfinite(cells), axis=1)
+    table, times = _one_face(table, times, _whole(table, at, "identity"), found)
+    levels = {unit: np.clip(table.numbers([i])[:, 0], 0.0, 1.0) for unit, i in units.items()}
+    values, mask = _expanded(levels, parameters)
+    return _take(path, times, values, mask, parameters)
+
+
+def _column(table: CsvTable, at: dict[str, int], name: str, hint: str) -> Floats:
+    if name not in at:
+        raise TakeError(f"{table.path}, line 1: no column {name}", hint=hint)
+    column: Floats = table.numbers([at[name]])[:, 0]
+    return column
+
+
+def _whole(table: CsvTable, at: dict[str, int], name: str) -> list[str]:
+    """Which face each row is of."""
+    return [text.strip() for text in table.texts(at[name])] if name in at else [""] * len(table.rows)
+
+
+def _found(table: CsvTable, at: dict[str, int]) -> Flags:
+    """(n,) whether a face was found in each row."""
+    found: Flags = np.ones(len(table.rows), dtype=bool)
+    for name, least in (("success", 0.5), ("confidence", _LEAST_CONFIDENCE)):
+        if name in at:
+            found = np.logical_and(found, np.nan_to_num(table.numbers([at[name]], gaps=True)[:, 0]) >= least)
+    return found
+
+
+def _one_face(table: CsvTable, times: Floats, faces: list[str], found: Flags) -> tuple[CsvTable, Floats]:
+    """The rows of the face that is seen most often, one for each time, in order of time."""
+    if not found.any():
+        raise TakeError(f"{table.path}: no face was found in any row", hint="track the video again")
+    seen = [face for face, there in zip(faces, found, strict=True) if there]
+    most = max(dict.fromkeys(seen), key=seen.count)
+    keep = [i for i in np.flatnonzero(found).tolist() if faces[i] == most]
+    chosen, order = np.unique(times[keep], return_index=True)
+    rows = [table.rows[keep[i]] for i in order]
+    return CsvTable(table.path, table.header, rows, table.decimal_comma), chosen - chosen[0]
+
+
+def _rate(table: CsvTable, at: dict[str, int], frames: Floats) -> float:
+    """Frames a second, from the column approx_time (``MM:SS``), where that spans two seconds or more."""
+    if "approx_time" not in at:
+        return _RATE_HZ
+    clock = [re.fullmatch(r"(?:(\d+):)?(\d+):(\d+)(?:\.\d+)?", text.strip()) for text in table.texts(at["approx_time"])]
+    if not all(clock):
+        return _RATE_HZ
+    seconds = np.array([3600 * int(m[1] or 0) + 60 * int(m[2]) + int(m[3]) for m in clock if m], dtype=np.float64)
+    ticks = np.flatnonzero(np.diff(seconds) > 0) + 1
+    if len(ticks) < 2 or frames[ticks[-1]] <= frames[ticks[0]]:
+        return _RATE_HZ
+    return float((frames[ticks[-1]] - frames[ticks[0]]) / (seconds[ticks[-1]] - seconds[ticks[0]]))
+
+
+def _openface_levels(table: CsvTable, at: dict[str, int]) -> dict[str, Floats]:
+    """Level 0..1 of each unit, (n,): its intensity, or its presence where there is no intensity."""
+    found: dict[str, Floats] = {}
+    for name, i in at.items():
+        match = _UNIT.fullmatch(name)
+        if match and match[2] == "_r":
+            found[match[1]] = np.clip(table.numbers([i])[:, 0] / _MOST_INTENSITY, 0.0, 1.0)
+        elif match and match[2] == "_c" and f"au{int(match[1]):02}_r" not in at:
+            found[match[1]] = np.where(table.numbers([i])[:, 0] > 0.5, _PRESENT, 0.0)
+    return found
+
+
+def _expanded(levels: dict[str, Floats], parameters: Parameters) -> tuple[Floats, Flags]:
+    """Parameters (n, P) of levels of units, and which of them any unit moves; units that omote lacks move nothing."""
+    facs = Facs.load(parameters)
+    count = len(next(iter(levels.values()), np.zeros(0)))
+    shown = np.zeros((count, len(facs.names)))
+    for unit, level in levels.items():
+        columns = facs.columns_of(unit)
+        shown[:, columns] = np.maximum(shown[:, columns], level[:, None])
+    moving = [i for unit in levels for i in facs.columns_of(unit)]
+    mask = (facs.matrix[:, moving] != 0.0).any(axis=1)
+    return np.minimum(shown @ facs.matrix.T, 1.0), mask
+
+
+def _set_angles(table: CsvTable, at: dict[str, int], values: Floats, mask: Flags, parameters: Parameters) -> None:
+    """Add head and eyes; signs follow from the camera's frame: a head that turns to its own left has a negative Ry."""
+    columns = [at.get(name) for name in ("pose_rx", "pose_ry", "pose_rz")]
+    if any(i is None for i in columns):
+        return
+    head = table.numbers([i for i in columns if i is not None]) * (1.0, -1.0, -1.0)
+    angles = dict(zip(("headPitch", "headYaw", "headRoll"), head.T, strict=True))
+    if (x := at.get("gaze_angle_x")) is not None and (y := at.get("gaze_angle_y")) is not None:
+        gaze = table.numbers([x, y]) - head[:, [1, 0]]
+        angles |= {f"{side}EyeYaw": gaze[:, 0] for side in ("left", "right")}
+        angles |= {f"{side}EyePitch": gaze[:, 1] for side in ("left", "right")}
+        hold_looks(values, mask, parameters)
+    for name, angle_rad in angles.items():
+        i = parameters.index(name)
+        values[:, i], mask[i] = angle_rad / parameters.full_scale_rad[i], True
+
+
+def _take(path: Path, times: Floats, values: Floats, mask: Flags, parameters: Parameters) -> Take:
+    if not mask.any():
+        raise TakeError(f"{path}: none of its action units is known", hint="configs/vocabularies/facs.toml lists them")
+    return Take(path.name, times, values, mask, parameters.low, parameters.high)

@@ -1,0 +1,97 @@
+"""Reads and writes plain tables of parameters: ``time,jawOpen,mouthSmileLeft,...``, the time in seconds.
+
+Columns may have any spelling of a parameter; a name without a side means both, ``headYaw_deg`` is in degrees. Columns
+that mean no parameter are left out, unless their name is nearly that of one.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from controller.base.errors import TakeError
+from controller.base.parameters import Flags, Floats, Parameters, did_you_mean
+from controller.takes.csvtable import CsvTable, read_csv
+from controller.takes.livelink import Take
+from controller.vocabulary.sides import sides
+
+_HINT = "a plain take begins with the line time,jawOpen,mouthSmileLeft,..., and the time is in seconds"
+_TIMES = {"time": 1.0, "t": 1.0, "seconds": 1.0, "timestamp": 1.0, "ms": 1e-3, "milliseconds": 1e-3}
+_TIMES |= {f"{name}_{unit}": scale for name in ("time", "t", "timestamp")
+           for unit, scale in (("s", 1.0), ("sec", 1.0), ("seconds", 1.0), ("ms", 1e-3))}  # fmt: skip
+_DEGREES = re.compile(r"(.+?)[ _.]?\(?deg(?:rees)?\)?", re.IGNORECASE)
+
+
+def plain_take(path: Path, parameters: Parameters) -> Take:
+    """A take from a table with a column of times and columns of parameters.
+
+    Raises TakeError: it cannot be read; no column of times, or of a parameter; a name that is nearly that of a
+    parameter; a parameter twice; a cell that is no number; times that do not rise.
+    """
+    table = read_csv(path, _HINT)
+    at, scale = _time_column(table)
+    times = scale * table.numbers([at])[:, 0]
+    for row, step in enumerate(np.diff(times), 1):
+        if step <= 0.0:
+            raise table.fault(table.rows[row][0], at, "the time is not later than that of the row before")
+    values, mask = np.zeros((len(times), len(parameters))), np.zeros(len(parameters), dtype=bool)
+    for column, positions, unit in _parameter_columns(table, at, parameters):
+        if mask[positions].any():
+            raise TakeError(f"{path}, line 1, column {table.header[column]}: is there twice", hint="remove one of them")
+        values[:, positions] = unit * table.numbers([column])
+        mask[positions] = True
+    if not mask.any():
+        raise TakeError(f"{path}, line 1: no column is a parameter", hint=_HINT)
+    return Take(path.name, times - times[0], values, mask, parameters.low, parameters.high)
+
+
+def write_plain(path: Path, times: Floats, values: Floats, mask: Flags, parameters: Parameters) -> None:
+    """Write times (n,) s and values (n, P) of the parameters in ``mask`` : (P,); six decimals.
+
+    Raises TakeError: the file cannot be written; what was there before stays.
+    """
+    new = path.with_name(path.name + ".new")
+    try:
+        new.write_text("".join(_lines(times, values, mask, parameters)), encoding="ascii")
+        new.replace(path)
+    except OSError as error:
+        raise TakeError(f"{path}: cannot be written: {error.strerror}", hint="choose a folder that can be written to"
+                        ) from error  # fmt: skip
+    finally:
+        if path.parent.is_dir():
+            new.unlink(missing_ok=True)
+
+
+def _lines(times: Floats, values: Floats, mask: Flags, parameters: Parameters) -> Iterator[str]:
+    columns = np.flatnonzero(mask)
+    yield ",".join(["time", *(parameters.names[i] for i in columns)]) + "\n"
+    for time, row in zip(times.tolist(), values[:, columns].tolist(), strict=True):
+        yield ",".join(f"{cell:.6f}".rstrip("0").rstrip(".") for cell in (time, *row)) + "\n"
+
+
+def _time_column(table: CsvTable) -> tuple[int, float]:
+    """Position of the column of times, and seconds of its unit."""
+    for i, name in enumerate(table.header):
+        scale = _TIMES.get(re.sub(r"[ _.()\[\]]+", "_", name.lower()).strip("_"))
+        if scale is not None:
+            return i, scale
+    raise TakeError(f"{table.path}, line 1: no column time", hint=_HINT)
+
+
+def _parameter_columns(table: CsvTable, but: int, parameters: Parameters) -> Iterator[tuple[int, list[int], float]]:
+    """Position of each column of a parameter, positions of the parameters it means, and the value of its unit."""
+    for column, name in enumerate(table.header):
+        positions, unit = sides(parameters, name), 1.0
+        if not positions and (degrees := _DEGREES.fullmatch(name)):
+            found = parameters.find(degrees[1])
+            if found is not None and math.isfinite(full := float(parameters.full_scale_rad[found])):
+                positions, unit = [found], math.radians(1.0) / full
+        if positions:
+            yield column, positions, unit
+        elif column != but and (meant := did_you_mean(name, parameters.names)):
+            why = f"{table.path}, line 1: unknown column {name!r}{meant}"
+            raise TakeError(why, hint="correct it, or remove the column")
