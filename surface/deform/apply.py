@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.jit import inlined, kernel
+from surface.base.jit import inlined, kernel, lean
 from surface.spline.lanes import (
     add,
     div,
@@ -251,15 +251,17 @@ def write_packed(
         e = end
 
 
-@kernel
-def compute_cells(table, cells, begin, end, sign, local, scratch):
-    """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored."""
+@lean
+def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
+    """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored.
+
+    ``local``, ``scratch``, ``starts`` : scratch space, of which every thread has its own.
+    """
     arrays = arrays_of(table)
     cell_start, tile_start, all_rows, room, at, ids_at, ids, value, slope = arrays[:9]
     points, origin, inv_w, dw, _, differences, vertices, normals = arrays[13:21]
     rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]
     packed_at, tile_entry, entry_row, packed, packed_slope, _, _, order_at, order = arrays[39:48]
-    starts = np.empty(local.shape[0], np.int32)
     for q in range(begin, end):
         c = cells[q]
         differences[c] = -1

@@ -26,13 +26,13 @@ NAMES = (
     "pull", "span", "drift", "extent",
     "rows_at", "picks_at", "factor_u", "factor_v", "factors", "picks",
     "packed_at", "tile_entry", "entry_row", "packed", "packed_slope", "places_at", "places", "order_at", "order",
-    "touched", "heavy",
+    "touched", "heavy", "starts",
 )  # fmt: skip
 """The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`,
-then of :class:`.factors.Factors` and :class:`.packing.Packed`; then which tiles an update touches and
-how much all weights at a vertex of a cell may add up to.
+then of :class:`.factors.Factors` and :class:`.packing.Packed`; then which tiles an update touches,
+how much all weights at a vertex of a cell may add up to, and scratch space for factorized sums.
 
-Kernels unpack that tuple once: each access of an element costs a reference count.
+Kernels unpack that tuple once.
 """
 
 
@@ -86,5 +86,5 @@ def arrays_of(table):
         _flat(table, 39, np.int64), _flat(table, 40, np.int64), _flat(table, 41, np.uint16),
         _flat(table, 42, np.float32), _flat(table, 43, np.float32), _flat(table, 44, np.int64),
         _flat(table, 45, np.uint16), _flat(table, 46, np.int64), _flat(table, 47, np.uint16),
-        _flat(table, 48, np.uint8), _flat(table, 49, np.float64),
+        _flat(table, 48, np.uint8), _flat(table, 49, np.float64), _flat(table, 50, np.int32),
     )  # fmt: skip

@@ -261,6 +261,7 @@ class Deformation(Generic[Table]):
         """Make room for the longest list and the sums of groups, and take the addresses of all arrays, which may have
         been replaced."""
         self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)) + 1, 3), dtype=np.float32)
+        self._arrays["starts"] = np.zeros(len(self._arrays["local"]), dtype=np.int32)
         self._arrays["scratch"] = np.zeros(self.storage.factors.sums, dtype=np.float32)
         self._addresses = address_table(vars(self.lists) | self._arrays | self.storage.arrays)
 
@@ -293,8 +294,11 @@ class Deformation(Generic[Table]):
         self._count = apply.join_ranges(cells, len(cells), self.lists.cell_start, GAP, self._ranges)
 
     def _compute(self, cells: np.ndarray) -> None:
-        local, scratch = self._arrays["local"], self._arrays["scratch"]
-        apply.compute_cells(self._addresses, cells, 0, len(cells), self._sign, local, scratch)
+        apply.compute_cells(self._addresses, cells, 0, len(cells), self._sign, *self._rooms())
+
+    def _rooms(self) -> list[np.ndarray]:
+        """Scratch space of the kernels."""
+        return [self._arrays[name] for name in ("local", "scratch", "starts")]
 
     def _compute_in_parts(self) -> None:
         """Threads take parts with equal shares of the weights, one after the other: a delayed thread does fewer."""
@@ -306,10 +310,10 @@ class Deformation(Generic[Table]):
         turns = count()  # next(turns) is one step: no two threads take the same part
 
         def work() -> None:
-            local, scratch = np.zeros_like(self._arrays["local"]), np.zeros_like(self._arrays["scratch"])
+            rooms = [np.zeros_like(room) for room in self._rooms()]
             while (part := next(turns)) < parts:
                 begin, end = cuts[part], cuts[part + 1]
-                apply.compute_cells(self._addresses, self._cells, begin, end, self._sign, local, scratch)
+                apply.compute_cells(self._addresses, self._cells, begin, end, self._sign, *rooms)
 
         waiting = [self._pool.submit(work) for _ in range(self._threads - 1)]
         work()

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.jit import inlined, kernel
+from surface.base.jit import inlined, kernel, lean
 from surface.spline.lanes import load
 
 from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
@@ -161,7 +161,7 @@ def has_left(points, delta, count, extent):
     return measure(points, extent, False)
 
 
-@kernel
+@lean
 def update_cells(table, count, limit, bias, sign):
     """Bring all cells that the first ``count`` moved points reach up to date; returns how many there are."""
     arrays = arrays_of(table)
@@ -171,8 +171,7 @@ def update_cells(table, count, limit, bias, sign):
     _, hits, affected, recomputed, moved_ids, delta, local, scratch, pull, span, drift, extent = arrays[21:33]
     rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]
     packed_at, tile_entry, entry_row, packed, packed_slope, places_at, places, order_at, order = arrays[39:48]
-    touched = arrays[48]
-    slopes, starts = dw.shape[0] > 0, np.empty(local.shape[0], np.int32)
+    touched, starts, slopes = arrays[48], arrays[50], dw.shape[0] > 0
     total = find_affected(moved_ids, delta, count, point_start, point_count, point_cell, hits, pull, affected)
     again = choose_recomputed(
         total, affected, hits, pull, differences, span, drift, rows, rows_at, slopes, limit, bias,
@@ -216,7 +215,7 @@ def update_cells(table, count, limit, bias, sign):
             every, touched, scratch,
         )  # fmt: skip
     if again > 0:
-        compute_cells(table, recomputed, np.int64(0), again, sign, local, scratch)
+        compute_cells(table, recomputed, np.int64(0), again, sign, local, scratch, starts)
     return total
 
 

@@ -18,6 +18,7 @@ LANES = 8
 VECTOR = ir.VectorType(ir.FloatType(), LANES)
 INDEX = ir.IntType(32)
 INDICES = ir.VectorType(INDEX, LANES)
+PAIRS = [k // 2 + k % 2 * LANES for k in range(2 * LANES)]  # x0 y0 x1 y1 ... of two vectors
 
 
 def _has_avx2() -> bool:
@@ -249,11 +250,14 @@ def store3_at(context, builder, kinds, args):
     order is uint16."""
     out = context.make_array(kinds[0])(context, builder, args[0]).data
     order = context.make_array(kinds[2])(context, builder, args[2]).data
+    pairs = builder.shuffle_vector(args[4], args[5], ir.Constant(ir.VectorType(INDEX, 2 * LANES), PAIRS))
+    double = ir.IntType(64)
+    pairs = builder.bitcast(pairs, ir.VectorType(double, LANES))  # x and y of a vertex are stored at once
     wide = ir.IntType(types.intp.bitwidth)
     for k in range(LANES):
         place = builder.zext(builder.load(builder.gep(order, [builder.add(args[3], wide(k))])), wide)
-        start = builder.add(args[1], builder.mul(place, wide(3)))
-        for c in range(3):
-            number = builder.extract_element(args[4 + c], ir.Constant(INDEX, k))
-            builder.store(number, builder.gep(out, [builder.add(start, wide(c))]))
+        start = builder.gep(out, [builder.add(args[1], builder.mul(place, wide(3)))])
+        pair = builder.extract_element(pairs, ir.Constant(INDEX, k))
+        builder.store(pair, builder.bitcast(start, double.as_pointer()), align=4)
+        builder.store(builder.extract_element(args[6], ir.Constant(INDEX, k)), builder.gep(start, [wide(2)]))
     return context.get_dummy_value()

@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
-from surface.base.jit import kernel
+from surface.base.jit import kernel, lean
 from surface.spline.lanes import fma, load, store3, zero
 
 # The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
@@ -14,7 +14,7 @@ from surface.spline.lanes import fma, load, store3, zero
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
 
 
-@kernel
+@lean
 def place_samples(
     start: Ints, ids: Ints, share: Floats32, local: Floats, around: bool, single: Floats32, room: Floats32, out: Floats
 ) -> None:  # fmt: skip
@@ -40,7 +40,7 @@ def place_samples(
             out[s, 3] = np.sqrt(a * a + b * b + c * c) if around else c
 
 
-@kernel
+@lean
 def angle(y: float, z: float) -> float:
     """The angle of (z, y) as np.arctan2(y, z), to 2e-8 rad, in a third of the time; Abramowitz and Stegun, 4.4.49."""
     a, b = abs(y), abs(z)
@@ -58,7 +58,7 @@ def angle(y: float, z: float) -> float:
     return -r if y < 0.0 else r
 
 
-@kernel
+@lean
 def trace_profiles(samples: Floats, rows: int, radius: float, out: Floats) -> None:
     """Profiles ``out (2, k, m, 3)`` of an opening's columns as (x, height, depth), from ``samples (s, 4)``, of which
     every column has ``rows``, m of them in its profile. Height is y, or, with a ``radius`` > 0, the arc above the
@@ -73,7 +73,7 @@ def trace_profiles(samples: Floats, rows: int, radius: float, out: Floats) -> No
                 out[side, k, j, 0], out[side, k, j, 1], out[side, k, j, 2] = sample[0], height, sample[3]
 
 
-@kernel
+@lean
 def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sign: float) -> float:
     """How far a profile's line reaches beyond ``height`` at ``depth``, towards ``sign``; -1e9 where it has none."""
     worst = -1e9
@@ -86,12 +86,14 @@ def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sig
     return worst
 
 
-@kernel
+@lean
 def deepest(heights: Floats, depths: Floats, others: Floats, at: Floats, sign: float, least: float) -> float:
     """How far two profiles, ``heights`` at ``depths`` and ``others`` at ``at``, overlap; -1e9 where that is no more
     than ``least`` at any depth."""
-    most = others.max() - heights.min() if sign > 0.0 else heights.max() - others.min()
-    if most <= least:
+    near, far = 1e9, -1e9
+    for j in range(len(heights)):
+        near, far = min(near, sign * heights[j]), max(far, sign * others[j])
+    if far - near <= least:
         return -1e9
     worst = -1e9
     for j in range(len(heights)):
@@ -169,7 +171,7 @@ def find_closing(samples: Floats, seal: float, least: Floats, wanted: Floats, fi
     return most
 
 
-@kernel
+@lean
 def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) -> None:
     """How high ``samples (s, 4)``, as :func:`place_samples` gives them, lie above an eyeball of radius ``size``:
     ``heights (s,)``.
@@ -186,7 +188,7 @@ def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) ->
         heights[s] = depth - size * ground
 
 
-@kernel
+@lean
 def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, gain: float, lifts: Floats) -> float:
     """How far samples at ``heights (s,)`` must be lifted or, below 0, laid down: ``lifts (s,)``.
 
@@ -232,7 +234,7 @@ def lift_points(ids: Ints, lifts: Floats, samples: Floats, table: Floats32, room
                 points[ids[k], c] += room[3 * (k - first) + c]
 
 
-@kernel
+@lean
 def move_up(i: int, move: float, eye: Floats, radius: float, outward: bool, points: Floats) -> None:
     """Move point i of ``points (n, 3)`` up by ``move``, mm; with a ``radius`` round the eyeball at ``eye (3,)``, or
     away from its centre if ``outward``."""
@@ -269,7 +271,7 @@ def move_points(
         move_up(ids[k], moves[k], eye, radius, outward, points)
 
 
-@kernel
+@lean
 def follow_samples(
     ids: Ints, beside: Ints, share: Floats, push: Floats, size: int, eye: Floats, radius: float, points: Floats
 ) -> None:  # fmt: skip

@@ -1,14 +1,16 @@
 """Compiled loops of posing: group displacements, jaw, lids, head rotation, seams and distances from polylines."""
 
+# mypy: disable-error-code="call-arg, var-annotated"
 from __future__ import annotations
 
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
-from surface.base.jit import kernel
+from surface.base.jit import inlined, lean
+from surface.spline.lanes import fma, load_x, load_y, load_z, splat, store3
 
 
-@kernel
+@lean
 def add_moves(
     amounts: Floats, group: Ints, first: Ints, start: Ints, moves: Floats32,
     points: Floats,
@@ -25,10 +27,11 @@ def add_moves(
             own[k] += amount * run[k]
 
 
-@kernel
+@lean
 def mix_rows(amounts: Floats, rows: Floats, rest: Floats, least: Floats, out: Floats) -> None:
     """Write ``rest (k,)`` plus ``amounts (g,) @ rows (g, k)``, nowhere less than ``least (k,)``, to ``out (k,)``."""
-    out[:] = rest
+    for k in range(out.shape[0]):
+        out[k] = rest[k]
     for g in range(amounts.shape[0]):
         if amounts[g] != 0.0:
             for k in range(out.shape[0]):
@@ -37,20 +40,39 @@ def mix_rows(amounts: Floats, rows: Floats, rest: Floats, least: Floats, out: Fl
         out[k] = max(out[k], least[k])
 
 
-@kernel
+@inlined
+def mapped(rows, at, linear, x0, y0, z0, out):  # type: ignore[no-untyped-def]
+    """Write ``linear @ p`` plus a shift (x0, y0, z0) of the eight vectors p from ``rows[at]`` on to ``out[at]``."""
+    x, y, z = load_x(rows, at), load_y(rows, at), load_z(rows, at)
+    store3(
+        out, at,
+        fma(x, linear[0, 0], fma(y, linear[0, 1], fma(z, linear[0, 2], splat(x0)))),
+        fma(x, linear[1, 0], fma(y, linear[1, 1], fma(z, linear[1, 2], splat(y0)))),
+        fma(x, linear[2, 0], fma(y, linear[2, 1], fma(z, linear[2, 2], splat(z0)))),
+    )  # fmt: skip
+
+
+@lean
 def move_rigid(
     rest: Floats32, rest_normals: Floats32, linear: Floats32, shift: Floats32, vertices: Floats32, normals: Floats32
 ) -> None:
     """Write ``linear (3, 3) @ p + shift (3,)`` of every row of ``rest (m, 3)``, and its normal's ``linear @ n``."""
-    for i in range(rest.shape[0]):
-        x, y, z = rest[i, 0], rest[i, 1], rest[i, 2]
-        p, q, r = rest_normals[i, 0], rest_normals[i, 1], rest_normals[i, 2]
+    none, whole = np.float32(0.0), rest.shape[0] // 8 * 8
+    flat, directions = rest.reshape(-1), rest_normals.reshape(-1)
+    out, out_directions = vertices.reshape(-1), normals.reshape(-1)
+    for i in range(0, whole, 8):
+        mapped(flat, 3 * i, linear, shift[0], shift[1], shift[2], out)
+        mapped(directions, 3 * i, linear, none, none, none, out_directions)
+    for i in range(whole, rest.shape[0]):
         for c in range(3):
-            vertices[i, c] = linear[c, 0] * x + linear[c, 1] * y + linear[c, 2] * z + shift[c]
-            normals[i, c] = linear[c, 0] * p + linear[c, 1] * q + linear[c, 2] * r
+            vertices[i, c] = shift[c]
+            normals[i, c] = none
+            for k in range(3):
+                vertices[i, c] += linear[c, k] * rest[i, k]
+                normals[i, c] += linear[c, k] * rest_normals[i, k]
 
 
-@kernel
+@lean
 def swing_jaw(
     rest: Floats, share: Floats, turn: Floats, shift: Floats, full_turn: Floats, full_shift: Floats,
     amount: float, undo: Floats, points: Floats,
@@ -72,7 +94,7 @@ def swing_jaw(
             points[i, r] += share[i] * (arc + undo[i] * (line - arc))
 
 
-@kernel
+@lean
 def keep_on_eyeball(ids: Ints, eye: Floats, hold: Floats, radius: Floats, points: Floats) -> None:
     """Set the distance of points ``ids (k,)`` from ``eye (k, 3)`` to ``radius (k,)``, by the share ``hold (k,)``.
 
@@ -91,7 +113,7 @@ def keep_on_eyeball(ids: Ints, eye: Floats, hold: Floats, radius: Floats, points
         points[i, 2] += scale * z
 
 
-@kernel
+@lean
 def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at: Floats) -> None:
     """For every point of ``uv (m, 2)``: its distance from the polyline ``line (k, 2)``, and how far along it the
     nearest place lies, in the line's points; written to ``distance (m,)`` and ``at (m,)``."""
@@ -111,7 +133,7 @@ def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at
         distance[i] = np.sqrt(best)
 
 
-@kernel
+@lean
 def stitch_border(
     vertices: Floats32, normals: Floats32, to_vertices: Floats32, to_normals: Floats32, ids: Ints,
     low: Ints, high: Ints, share: Floats32,
