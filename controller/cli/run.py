@@ -76,7 +76,7 @@ def run(
     monitor: Annotated[int | None, typer.Option(help="Monitor of the full screen, from 0.")] = None,
     quality: Annotated[str | None, typer.Option(help="full, fast, or auto: whichever holds --fps.")] = None,
     fps: Annotated[float | None, typer.Option(help="Frames per second wanted, which are not exceeded.")] = None,
-    theme: Annotated[str | None, typer.Option(help="skin or mask.")] = None,
+    theme: Annotated[str | None, typer.Option(help="skin, mask or robot.")] = None,
     camera: Annotated[str | None, typer.Option(help="front, three-quarter, profile and so on.")] = None,
     evaluator: Annotated[str | None, typer.Option(help="Where vertices are computed: auto, cpu or gpu.")] = None,
 ) -> None:

@@ -81,7 +81,7 @@ class Still:
 
     def load_head(self) -> Head:
         """The head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
-        dressed = self.look.theme != "mask"
+        dressed = self.look.dressed
         return load_head(self.head, self.identity, self.groups, self.persons, dressed=dressed)
 
 

@@ -40,7 +40,7 @@ class PictureSettings(Settings):
 
     quality: Literal["full", "fast", "auto"] = "full"
     camera: CameraName = "front"
-    theme: Literal["skin", "mask"] = "skin"
+    theme: Literal["skin", "mask", "robot"] = "skin"
     person: PersonName = ""
     background: HexColour | tuple[HexColour, HexColour] | None = None
     light: LightSettings = LightSettings()
@@ -76,6 +76,11 @@ class PictureSettings(Settings):
             return theme
         top, bottom = (self.background, self.background) if isinstance(self.background, str) else self.background
         return replace(theme, background_top=_colour(top), background_bottom=_colour(bottom))
+
+    @property
+    def dressed(self) -> bool:
+        """Whether a person wears hair and clothes: only skin does."""
+        return self.theme == "skin"
 
     @property
     def still_quality(self) -> str:

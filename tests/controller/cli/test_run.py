@@ -119,7 +119,7 @@ def test_a_take_is_played_to_its_end_and_pictures_are_written(stage: str, tmp_pa
         (["run", "--identity", "nobody=0.5"], "no identity 'nobody'"),
         (["run", "--identity", "broad=2"], "expected NAME=AMOUNT, 0 to 1"),
         (["run", "--mirror"], "nothing to mirror"),
-        (["run", "--theme", "clown"], "--theme clown: must be 'skin' or 'mask'"),
+        (["run", "--theme", "clown"], "--theme clown: must be 'skin', 'mask' or 'robot'"),
         (["run", "--voice", "none.wav", "--seconds", "30"], "none.wav: cannot be read"),
     ],
 )
