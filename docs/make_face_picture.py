@@ -34,6 +34,7 @@ def main() -> None:
     write_png(np.hstack(faces(head)), HERE / "face.png")
     write_webp(looks(head, "skin"), HERE / "pictures" / "picture-skin.webp")
     write_webp(looks(head, "mask"), HERE / "pictures" / "picture-mask.webp")
+    write_webp(looks(head, "robot"), HERE / "pictures" / "picture-robot.webp")
     write_webp(close(head), HERE / "pictures" / "picture-close.webp")
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses()]
     write_webp(persons(), HERE / "pictures" / "persons.webp")

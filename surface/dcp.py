@@ -18,7 +18,7 @@ from surface.base.progress import Progress, no_progress
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
 from surface.spline.controlpoints import ControlPoints
-from surface.spline.matrix import basis_matrices
+from surface.spline.matrix import Rows, basis_matrices, basis_rows
 from surface.spline.nurbs import nurbs_arrays
 from surface.spline.refine import Refinement, insert_knot, refine
 
@@ -117,6 +117,11 @@ class DCPSurface(ControlPoints):
         ``derivative`` is (0, 0), (1, 0) for S_u or (0, 1) for S_v. Rows where nothing covers are empty.
         """
         return basis_matrices(self, self._inside(uv), [derivative], side)[0]
+
+    def basis_rows(self, uv: ArrayLike) -> Rows:
+        """Rational weights for products with few columns, without scipy: ``basis_rows(uv) @ points`` is
+        ``evaluate(uv)``."""
+        return basis_rows(self, self._inside(uv))
 
     def tessellate(
         self,

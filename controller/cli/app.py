@@ -9,19 +9,28 @@ import os
 import signal
 import sys
 from contextlib import suppress
+from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from typer import Typer  # start-up: Ctrl-C ends it quietly while all this still loads
 
 
-def make_app() -> Typer:
-    """All commands."""
+COMMANDS = (
+    ("run", "demo"), ("run", "run"), ("run", "play"), ("heads", "render"), ("heads", "fit"), ("landmarks", "landmarks"),
+    ("heads", "export"), ("bus", "ports"), ("bus", "scan"), ("bus", "set_id"), ("bus", "monitor"), ("bus", "calibrate"),
+    ("check", "check"), ("check", "plugins"), ("bench", "bench"),
+    ("translate", "translate"), ("simulate", "simulate"),
+)  # fmt: skip
+"""Module in this folder and function of every command, in the order of ``omote --help``."""
+
+
+def make_app(only: str = "") -> Typer:
+    """All commands, or the one called ``only``, which loads faster; all if there is none of that name."""
     # start-up: main() ends Ctrl-C quietly from its first line on, while all this still loads
     from typer import Typer
 
-    # start-up: the same
-    from controller.cli import bench, bus, check, heads, landmarks, run, simulate, translate, version
+    from controller.cli import version  # start-up: the same
 
     app = Typer(
         name="omote",
@@ -31,13 +40,13 @@ def make_app() -> Typer:
         rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    for command in (
-        run.demo, run.run, run.play, heads.render, heads.fit, landmarks.landmarks, heads.export,
-        bus.ports, bus.scan, bus.set_id, bus.monitor, bus.calibrate, check.check, check.plugins, bench.bench,
-        translate.translate,
-    ):  # fmt: skip
-        app.command()(command)
-    app.add_typer(simulate.make_app(), name="simulate")
+    chosen = [command for command in COMMANDS if command[1].replace("_", "-") == only] or COMMANDS
+    for module, name in chosen:
+        loaded = import_module(f"controller.cli.{module}")
+        if name == "simulate":
+            app.add_typer(loaded.make_app(), name=name)
+        else:
+            app.command()(getattr(loaded, name))
     app.callback()(version.root)
     return app
 
@@ -86,7 +95,7 @@ def _run() -> int:
     if sys.argv[1:2] != ["fit"]:  # before numpy: threads are worth it for large equations, and spin between small ones
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
-        make_app()()
+        make_app(*sys.argv[1:2])()
         code = 0
     except SystemExit as end:
         code = int(end.code or 0)

@@ -58,8 +58,8 @@ def render(
         str | None,
         typer.Option(help="front, three-quarter, three-quarter-right, profile or profile-right.", show_default="front"),
     ] = None,
-    quality: Annotated[str | None, typer.Option(help="full or fast.", show_default="full")] = None,
-    theme: Annotated[str | None, typer.Option(help="skin or mask.", show_default="skin")] = None,
+    quality: Annotated[str | None, typer.Option(help="full or fast; auto is full.", show_default="full")] = None,
+    theme: Annotated[str | None, typer.Option(help="skin, mask or robot.", show_default="skin")] = None,
     background: Annotated[
         str | None, typer.Option(metavar="#RRGGBB[,#RRGGBB]", help="One colour, or a gradient from top to bottom.")
     ] = None,

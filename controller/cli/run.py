@@ -74,8 +74,9 @@ def run(
         bool, typer.Option("--kiosk", help="Full screen, no panel, no cursor; Esc or Ctrl-C ends.")
     ] = False,
     monitor: Annotated[int | None, typer.Option(help="Monitor of the full screen, from 0.")] = None,
-    quality: Annotated[str | None, typer.Option(help="full or fast.")] = None,
-    theme: Annotated[str | None, typer.Option(help="skin or mask.")] = None,
+    quality: Annotated[str | None, typer.Option(help="full, fast, or auto: whichever holds --fps.")] = None,
+    fps: Annotated[float | None, typer.Option(help="Frames per second wanted, which are not exceeded.")] = None,
+    theme: Annotated[str | None, typer.Option(help="skin, mask or robot.")] = None,
     camera: Annotated[str | None, typer.Option(help="front, three-quarter, profile and so on.")] = None,
     evaluator: Annotated[str | None, typer.Option(help="Where vertices are computed: auto, cpu or gpu.")] = None,
 ) -> None:
@@ -88,8 +89,8 @@ def run(
         return
     from controller.stage.persons import parse_person  # start-up: --help does without it
 
-    look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "theme": theme, "camera": camera,
-            "evaluator": evaluator, "person": parse_person(person)}  # fmt: skip
+    look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "fps": fps, "theme": theme,
+            "camera": camera, "evaluator": evaluator, "person": parse_person(person)}  # fmt: skip
     _run(stage, seconds, headless, no_face, pictures, report, mirror=mirror, voice=voice, voice_hz=voice_hz,
          record=record, identity=identity, look=look)  # fmt: skip
 

@@ -22,7 +22,8 @@ from controller.stage.stage import FaceSettings
 
 if TYPE_CHECKING:
     from surface.head import Head  # start-up: the body gets its orders first
-    from surface.view.pictures.offscreen import Offscreen  # start-up: the body gets its orders first
+    from surface.view.pictures.offscreen import AdaptiveOffscreen, Offscreen  # start-up: the same
+    from surface.view.scene.choice import QualityChoice  # start-up: the same
 
 Image = NDArray[np.uint8]
 
@@ -171,13 +172,10 @@ class HeadlessFace:
         recorder: Recorder | None = None,
     ) -> None:
         from surface.head.model.parameters import head_angles  # start-up: the body gets its orders first
-        from surface.view.pictures.offscreen import Offscreen
         from surface.view.scene.framing import framed
 
         self._angles = head_angles
-        self._screen: Offscreen = Offscreen(
-            head, settings.size, quality=settings.quality, theme=settings.make_theme(), evaluator=settings.evaluator
-        )
+        self._screen = _screen(head, settings)
         self._head, self._camera, self._settings = head, framed(settings.make_camera(), head), settings
         self._values, self._recorder = values, recorder
         self._log = FrameLog()
@@ -206,4 +204,20 @@ class HeadlessFace:
             **self._log.report(self._settings, self._screen.ctx.info["GL_RENDERER"]),
             "evaluator": evaluator.name,
             "evaluator_chosen": evaluator.reason,
+            **qualities(getattr(self._screen, "choice", None)),
         }
+
+
+def _screen(head: Head, settings: FaceSettings) -> Offscreen | AdaptiveOffscreen:
+    """What draws the picture in the quality that the settings name."""
+    from surface.view.pictures.offscreen import AdaptiveOffscreen, Offscreen  # start-up: the body gets its orders first
+
+    theme = settings.make_theme()
+    if settings.quality == "auto":
+        return AdaptiveOffscreen(head, settings.size, rate_hz=settings.fps, theme=theme, evaluator=settings.evaluator)
+    return Offscreen(head, settings.size, quality=settings.quality, theme=theme, evaluator=settings.evaluator)
+
+
+def qualities(choice: QualityChoice | None) -> dict[str, object]:
+    """How long each quality was drawn, and how often it changed, for a report; nothing where none was chosen."""
+    return {} if choice is None else {"quality_seconds": dict(choice.seconds), "quality_switches": choice.switches}

@@ -81,7 +81,7 @@ class Still:
 
     def load_head(self) -> Head:
         """The head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
-        dressed = self.look.theme != "mask"
+        dressed = self.look.dressed
         return load_head(self.head, self.identity, self.groups, self.persons, dressed=dressed)
 
 
@@ -143,7 +143,9 @@ def _add_expression(vocabulary: Vocabulary, values: NDArray[np.float64], word: s
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
     head, look = still.load_head(), still.look
-    with Offscreen(head, still.size, quality=look.quality, theme=look.make_theme(), evaluator=look.evaluator) as screen:
+    with Offscreen(
+        head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator
+    ) as screen:
         picture = screen.render(for_head(still.values, head.parameters), framed(look.make_camera(), head))
     write_png(picture, out)
 
@@ -177,7 +179,7 @@ def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | N
     head, look = still.load_head(), still.look
     entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]
     page = contact_sheet(
-        head, entries, views=[framed(look.make_camera(), head)], quality=look.quality, theme=look.make_theme(),
+        head, entries, views=[framed(look.make_camera(), head)], quality=look.still_quality, theme=look.make_theme(),
         progress=progress,
     )  # fmt: skip
     write_png(page, out)

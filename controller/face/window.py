@@ -17,13 +17,14 @@ from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS, REGIONS, Floats
 from controller.body.messages import Hold, Neutral, PanelRequest, Show, StartServos, StopServos
 from controller.body.panel_state import PanelState
-from controller.face.face import FrameLog, HeadValues
+from controller.face.face import FrameLog, HeadValues, qualities
 from controller.face.point_editing import PointEditor, Screen
 from controller.stage.stage import FaceSettings
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.head.model.parameters import head_angles
 from surface.view.scene.camera import Camera
+from surface.view.scene.choice import QualityChoice
 from surface.view.scene.framing import framed, framing_of
 from surface.view.scene.viewpoint import Viewpoint
 from surface.view.window import run_window
@@ -56,6 +57,7 @@ class WindowFace:
         self._mouse = None if copy is None or settings.kiosk else MouseEditing(head, copy, lambda: values.full, send)
         self._panel = Panel(lambda: values.full, send, panel_state)
         self._log = FrameLog()
+        self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
@@ -84,7 +86,7 @@ class WindowFace:
             gui=None if self._settings.kiosk else gui,
             keep_going=keep_going,
             camera=viewpoint,
-            quality=self._settings.quality,
+            quality=self._choice or self._settings.still_quality,
             theme=self._settings.make_theme(),
             evaluator=self._settings.evaluator,
             kiosk=self._settings.kiosk,
@@ -93,7 +95,7 @@ class WindowFace:
 
     def report(self) -> dict[str, object]:
         """Frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""
-        return self._log.report(self._settings, "window")
+        return {**self._log.report(self._settings, "window"), **qualities(self._choice)}
 
 
 class Panel:

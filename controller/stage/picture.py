@@ -38,9 +38,9 @@ class PictureSettings(Settings):
     """Look of the picture. ``background`` is one colour, or the upper and the lower one of a gradient; ``person`` a
     name, or several with the share of each."""
 
-    quality: Literal["full", "fast"] = "full"
+    quality: Literal["full", "fast", "auto"] = "full"
     camera: CameraName = "front"
-    theme: Literal["skin", "mask"] = "skin"
+    theme: Literal["skin", "mask", "robot"] = "skin"
     person: PersonName = ""
     background: HexColour | tuple[HexColour, HexColour] | None = None
     light: LightSettings = LightSettings()
@@ -76,6 +76,16 @@ class PictureSettings(Settings):
             return theme
         top, bottom = (self.background, self.background) if isinstance(self.background, str) else self.background
         return replace(theme, background_top=_colour(top), background_bottom=_colour(bottom))
+
+    @property
+    def dressed(self) -> bool:
+        """Whether a person wears hair and clothes: only skin does."""
+        return self.theme == "skin"
+
+    @property
+    def still_quality(self) -> str:
+        """The quality of one picture, which has time: "auto" is "full"."""
+        return "full" if self.quality == "auto" else self.quality
 
     def make_camera(self) -> Camera:
         """The camera of that name."""

@@ -133,7 +133,7 @@ class Stage:
 
     def load_head(self) -> Head:
         """The stage's head with its persons, identity and groups; see :func:`load_head`."""
-        dressed = self.settings.face.theme != "mask"
+        dressed = self.settings.face.dressed
         return load_head(self.head, self.settings.identity, self.groups, self.persons, dressed=dressed)
 
     def state(self, parameters: Parameters, seed: int | None = None, period_s: float | None = None) -> CommandState:

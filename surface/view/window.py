@@ -14,9 +14,11 @@ import numpy as np
 
 from surface.base.errors import ViewError
 from surface.base.extras import importing
+from surface.view.draw.alternating import Alternating
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target
 from surface.view.scene.camera import Camera
+from surface.view.scene.choice import LEVELS, QualityChoice
 from surface.view.scene.framing import framing_of
 from surface.view.scene.parts import ViewHead
 from surface.view.scene.sampling import AdaptiveSampling, is_software
@@ -53,7 +55,7 @@ def run_window(
     seconds: float | None = None,
     keep_going: Callable[[], bool] | None = None,
     camera: Camera | Viewpoint | None = None,
-    quality: str = "full",
+    quality: str | QualityChoice = "full",
     theme: str | Theme = "skin",
     evaluator: str = "auto",
     kiosk: bool = False,
@@ -68,7 +70,8 @@ def run_window(
     camera : the camera at first; a viewpoint can be changed by the caller later.
     seconds : close automatically after this long.
     keep_going : called once per frame, also while the window is minimised; the window closes when it returns False.
-    quality, theme, evaluator : see :class:`surface.view.draw.renderer.Renderer`.
+    quality, theme, evaluator : see :class:`surface.view.draw.renderer.Renderer`; a choice takes the quality that holds
+        its rate.
     kiosk : cover a whole monitor, hide the cursor, ignore mouse and keys but for Esc, which closes the window.
     monitor : which one, from 0.
 
@@ -80,7 +83,7 @@ def run_window(
     with importing("the window", "imgui_bundle"):
         from imgui_bundle import hello_imgui, imgui  # optional: the extra view
     viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera, framing_of(head))
-    make = partial(Renderer, head=head, quality=quality, theme=theme, evaluator=evaluator)
+    make = partial(Renderer, head=head, theme=theme, evaluator=evaluator)
     window = _Window(imgui, source, viewpoint, make, quality)
     window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk
     params = window.params = _parameters(hello_imgui, window, size, title)
@@ -112,6 +115,44 @@ def _no_window(error: Exception) -> ViewError:
     return ViewError(f"no window on display {display!r}: {str(error).splitlines()[0]}", hint=HEADLESS_HINT)
 
 
+class _Drawing:
+    """The head in one quality, on a context whose size changes.
+
+    size : (width, height), pixels, of the next frame.
+    """
+
+    target: Target
+
+    def __init__(self, renderer: Renderer) -> None:
+        self.renderer, self.size = renderer, (1, 1)
+        self._sampling = AdaptiveSampling(renderer.quality, software=is_software(renderer.ctx))
+        self._sampling.start_live()
+        if self._sampling.simplified:
+            renderer.hurry()
+        self._settings: tuple[object, ...] = ()
+
+    def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
+        """Pose the head with ``values`` (P,) and draw it."""
+        self.renderer.pose(values)
+        started, settings = time.perf_counter(), (*self.size, *self._sampling.settings)
+        if self._settings != settings:
+            old = self.target if self._settings else None
+            self.target = Target(self.renderer.ctx, self.size, *self._sampling.settings)
+            self._settings = settings
+            if old is not None:
+                old.release()
+        self.renderer.update()
+        self.target.paint(self.renderer, camera or Camera.front())
+        self.target.complete()
+        self._sampling.add_frame(time.perf_counter() - started)
+
+    def release(self) -> None:
+        """Release the graphics memory."""
+        if self._settings:
+            self.target.release()
+        self.renderer.release()
+
+
 class _Window:
     """The runner's callbacks; keeps the first exception, since none may leave a callback."""
 
@@ -122,8 +163,8 @@ class _Window:
         imgui: Any,
         source: Callable[[], np.ndarray],
         viewpoint: Viewpoint,
-        make_renderer: Callable[[moderngl.Context], Renderer],
-        quality: str,
+        make_renderer: Callable[..., Renderer],
+        quality: str | QualityChoice,
     ) -> None:
         self._imgui, self._source, self._viewpoint = imgui, source, viewpoint
         self._make_renderer, self._quality = make_renderer, quality
@@ -133,9 +174,9 @@ class _Window:
         self.keep_going: Callable[[], bool] | None = None
         self.frames, self.first, self.last, self._began = 0, 0.0, 0.0, 0.0
         self.failure: BaseException | None = None
-        self._renderer: Renderer | None = None
-        self._target: Target | None = None
-        self._target_settings: tuple[object, ...] = ()
+        self._ctx: moderngl.Context | None = None
+        self._drawings: dict[str, _Drawing] = {}
+        self._alternating: Alternating | None = None
 
     def as_callback(self, action: Callable[[], None]) -> Callable[[], None]:
         """`action` as a callback: an exception is kept and closes the window."""
@@ -165,42 +206,42 @@ class _Window:
             why = f"the window has no OpenGL 3.1: {error}"
             raise ViewError(why, hint="set LIBGL_ALWAYS_SOFTWARE=1 to draw in software") from error
         ctx.clear_errors()
-        self._sampling = AdaptiveSampling(self._quality, software=is_software(ctx))
-        self._sampling.start_live()
-        self._renderer = self._make_renderer(ctx)
-        if self._sampling.simplified:
-            self._renderer.hurry()
+        choice = self._quality if isinstance(self._quality, QualityChoice) else None
+        names = LEVELS if choice is not None else (str(self._quality),)
+        self._drawings = {name: _Drawing(self._make_renderer(ctx, quality=name)) for name in names}
+        self._alternating = Alternating(self._drawings, choice) if choice is not None else None
+        self._ctx = ctx
 
     def background(self) -> None:
         """One frame of the head, under the panels."""
-        if self._renderer is None:
+        if self._ctx is None:
             return
-        ctx, size = self._renderer.ctx, self._pixels()
+        ctx, size = self._ctx, self._pixels()
         # The runner's own drawing changes OpenGL's state without moderngl: begin from what is bound.
         screen = ctx.detect_framebuffer()
         if min(size) < 1:
             return
-        self._renderer.pose(self._source())
-        started = time.perf_counter()
-        settings = (*size, *self._sampling.settings)
-        target = self._target
-        if target is None or self._target_settings != settings:
-            self._target, self._target_settings = Target(ctx, size, *self._sampling.settings), settings
-            if target is not None:
-                target.release()
-            target = self._target
-        self._renderer.update()
-        target.paint(self._renderer, self._viewpoint.camera)
-        target.complete()
-        target.picture.scissor = (0, 0, *size)
+        picture = self._picture(size)
+        picture.scissor = (0, 0, *size)
         screen.viewport = screen.scissor = (0, 0, *size)
-        ctx.copy_framebuffer(screen, target.picture)
+        ctx.copy_framebuffer(screen, picture)
         screen.use()
         ctx.enable_only(ctx.NOTHING)
         self.last = time.perf_counter()
-        self._sampling.add_frame(self.last - started)
         self.first = self.first if self.frames else self.last
         self.frames += 1
+
+    def _picture(self, size: tuple[int, int]) -> moderngl.Framebuffer:
+        """The next picture of `size`."""
+        for each in self._drawings.values():
+            each.size = size
+        values, camera = self._source(), self._viewpoint.camera
+        if self._alternating is not None:
+            self._alternating.draw(values, camera)
+            return self._alternating.picture()
+        (drawing,) = self._drawings.values()
+        drawing.draw(values, camera)
+        return drawing.target.picture
 
     def panels(self) -> None:
         """Mouse, keys and the caller's panels."""
@@ -242,10 +283,10 @@ class _Window:
 
     def stop(self) -> None:
         """Release the graphics memory, while the context still exists."""
-        for thing in (self._target, self._renderer):
+        for thing in (self._alternating, *self._drawings.values()):
             if thing is not None:
                 thing.release()
-        self._target = self._renderer = None
+        self._ctx, self._alternating, self._drawings = None, None, {}
 
     def _pixels(self) -> tuple[int, int]:
         """Size of the window's framebuffer, pixels."""

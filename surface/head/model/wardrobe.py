@@ -130,15 +130,18 @@ def _seated(worn: WornPart, garment: Garment, head: HeadData, where: str) -> Par
     of = {p.name: p for p in head.parts}
     for k, name in enumerate(garment.anchors):
         rows, skin = np.flatnonzero(anchor[:, 0] == k), of[name]
-        basis = make_surface(skin).basis_matrix(anchor[rows, 1:])
+        basis = make_surface(skin).basis_rows(anchor[rows, 1:])
         points[rows] += basis @ skin.points
         moving = follow[rows] > 0.0
         if moving.any():
             jaw[rows] = follow[rows] * (basis @ skin.jaw)
+            reached = np.zeros(len(skin.points), bool)
+            reached[basis.column] = True
             for group in skin.groups:
-                dense = np.zeros((len(skin.points), 3))
-                np.add.at(dense, group.ids, group.moves)
-                moves.setdefault(group.name, np.zeros((n, 3)))[rows] += follow[rows, None] * (basis @ dense)
+                if reached[group.ids].any():
+                    dense = np.zeros((len(skin.points), 3))
+                    np.add.at(dense, group.ids, group.moves)
+                    moves.setdefault(group.name, np.zeros((n, 3)))[rows] += follow[rows, None] * (basis @ dense)
     if not np.isfinite(points).all():
         raise HeadFileError(f"{where}: {garment.worn.path.stem} does not lie on this head", hint=HINT)
     moves |= dict(zip(SWAYS, sway_moves(points, np.asarray(a["sway"], float), head.neck.pivot), strict=True))

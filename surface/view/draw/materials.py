@@ -30,6 +30,8 @@ _OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
 _LOWER_LASHES = 0.42
 #: Radius of an iris, in eyeball radii, and of its pupil, in radii of the iris.
 _IRIS, _PUPIL = 0.49, 0.185 / 0.49
+#: How a bar of lamps fades, as brows do in hair.frag.
+_BAR = (2.2, -2.6, 0.08, 0.0)
 #: Materials of parts that the skin surrounds in every pose.
 INSIDE = ("eye", "teeth", "gums", "mouth")
 #: Programs of what is worn.
@@ -65,7 +67,14 @@ def programs(
     return {name: worn_program(ctx, name, quality) for name in WORN if name in worn} | {
         "skin": skin_program(ctx, quality, theme, freckled=freckled),
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
-        "inner": build(ctx, ("light.glsl", "inner.vert"), flat),
+        "inner": build(
+            ctx,
+            *(
+                (("display.vert",), ("light.glsl", "display.frag"))
+                if theme.lit
+                else (("light.glsl", "inner.vert"), flat)
+            ),
+        ),
         "hair": build(ctx, ("light.glsl", "hair.vert"), ("hair.frag",)),
         "background": build(ctx, ("background.vert",), ("background.frag",)),
     }
@@ -77,16 +86,21 @@ def skin_program(
     """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software; `freckled`
     draws freckles where the parts' attribute of that name has them, with quality "full"."""
     defines: dict[str, int | str] = {"INSIDE": _INSIDE}
+    scale: dict[str, int | str] = {"DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
+    if theme.lit:
+        defines |= {"PANELS": 1} | scale
     if quality != "full":
-        return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), ("flat.frag",), defines=defines)
+        fragment = ("light.glsl", "panels.glsl", "panels_fast.frag") if theme.lit else ("flat.frag",)
+        return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), fragment, defines=defines)
     if theme.seams:
-        defines |= {"SEAMS": 1, "DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
+        defines |= {"SEAMS": 1} | scale
     if freckled and theme.use_painted:
         defines["FRECKLES"] = 1
     if simplified:
         defines["GRAIN_TEXELS"] = f"{_DETAIL_SIZE // 2}.0"
     shared = ("light.glsl", "skin.glsl")
-    return build(ctx, (*shared, "skin.vert"), (*shared, "skin.frag"), defines=defines)
+    panels = ("panels.glsl",) if theme.lit else ()
+    return build(ctx, (*shared, "skin.vert"), (*shared, *panels, "skin.frag"), defines=defines)
 
 
 def worn_program(ctx: moderngl.Context, name: str, quality: str, *, simplified: bool = False) -> moderngl.Program:
@@ -128,11 +142,16 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     packed = np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), np.clip(occlusion, 0.0, 1.0)])
     thin = attribute(part, "thin", (0.0,))[:, :1]
     freckled = {"freckles": part.attributes["freckles"]} if "freckles" in part.attributes else {}
-    return freckled | {
-        "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
-        "around": np.rint(attribute(part, "visible", _OPEN_SKY)[:, :4] * 255.0).astype(np.uint8),
-        "surface_uv_gloss": np.hstack([detail_uv(part), gloss, thin]).astype(np.float32),
-    }
+    lamp = {"lamp": openings.lip_line(part).astype(np.float32)[:, None]} if theme.lit else {}
+    return (
+        freckled
+        | lamp
+        | {
+            "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
+            "around": np.rint(attribute(part, "visible", _OPEN_SKY)[:, :4] * 255.0).astype(np.uint8),
+            "surface_uv_gloss": np.hstack([detail_uv(part), gloss, thin]).astype(np.float32),
+        }
+    )
 
 
 def detail_uv(part: ViewPart) -> np.ndarray:
@@ -155,7 +174,12 @@ def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[
         "through": theme.through,
         "gloss_scale": theme.gloss,
         "detail_strength": 0.16 * theme.detail,
+        **_lamps(theme),
     }
+
+
+def _lamps(theme: Theme) -> dict[str, Any]:
+    return {"lamps": theme.lamps} if theme.lit else {}
 
 
 def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[str, Any]:
@@ -179,7 +203,7 @@ def _inner(albedo: tuple[float, float, float], wrap: float, wetness: float, **op
     return Material(
         "inner",
         lambda part, theme, openings: {"occlusion": attribute(part, "occlusion", (1.0,))[:, :1]},
-        lambda part, theme, openings: fixed | openings.mouth(),
+        lambda part, theme, openings: fixed | _lamps(theme) | openings.mouth(),
         **options,
     )
 
@@ -189,11 +213,19 @@ def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0
     return Material(
         "hair",
         lambda part, theme, openings: {"along": np.hstack([strip_uv(part), strip_strength(part, theme)])},
-        lambda part, theme, openings: {"albedo": _painted(part, theme, colour), "fade": fade, "edges": edges},
+        lambda part, theme, openings: _hair_uniforms(part, theme, colour, fade, edges),
         two_sided=True,
         blended=True,
         order=2,
     )
+
+
+def _hair_uniforms(
+    part: ViewPart, theme: Theme, colour: str, fade: tuple[float, float, float, float], edges: float
+) -> Mapping[str, Any]:
+    if theme.lit and colour == "brow":  # a bar of lamps
+        return {"albedo": theme.brow, "lamps": theme.lamps, "fade": _BAR, "edges": 0.0}
+    return {"albedo": _painted(part, theme, colour), "lamps": (0.0, 0.0, 0.0), "fade": fade, "edges": edges}
 
 
 def _painted(part: ViewPart, theme: Theme, colour: str) -> tuple[float, ...]:
@@ -211,7 +243,9 @@ def strip_uv(part: ViewPart) -> np.ndarray:
 
 def strip_strength(part: ViewPart, theme: Theme) -> np.ndarray:
     """Opacity of each hair, (m, 1): lashes of the lower lid are fainter."""
-    strength = theme.hair * attribute(part, "strength", (1.0,))[:, :1]
+    share = 1.0 if theme.lit and part.material == "brow" else theme.hair
+    strength = share * (attribute(part, "strength", (1.0,))[:, :1] if theme.use_painted else np.ones((len(part.uv), 1)))
+    strength = strength.astype(np.float32)
     if part.material == "lash":
         strip = np.floor(np.asarray(part.uv)[:, 0] / 2.0)
         height = {s: float(part.vertices[strip == s, 1].mean()) for s in np.unique(strip)}

@@ -29,6 +29,8 @@ class Target:
     size : (width, height), pixels.
     samples : per pixel; capped at what the driver offers.
     scale : the head is drawn at this share of the size, up to 1, and enlarged; 1 where `samples` > 1.
+
+    picture : the framebuffer that holds the picture; texture : its pixels.
     """
 
     def __init__(self, ctx: moderngl.Context, size: tuple[int, int], samples: int = 4, scale: float = 1.0) -> None:
@@ -37,7 +39,8 @@ class Target:
         single = self.samples == 1
         self.scale = scale if single else 1.0
         inner = max(1, round(size[0] * self.scale)), max(1, round(size[1] * self.scale))
-        self.picture = ctx.framebuffer([ctx.texture(size, 4)])
+        self.texture = ctx.texture(size, 4)
+        self.picture = ctx.framebuffer([self.texture])
         self._raw: moderngl.Texture | None = None
         self._smooth: Rectangles | None = None
         if single:
@@ -97,9 +100,7 @@ class Target:
     def read(self) -> np.ndarray:
         """The picture, (height, width, 3) uint8, top row first."""
         self.complete()
-        width, height = self.size
-        raw = self.picture.read(components=3, alignment=1)
-        return np.flipud(np.frombuffer(raw, np.uint8).reshape(height, width, 3)).copy()
+        return read_pixels(self.picture)
 
     def release(self) -> None:
         """Release the buffers."""
@@ -111,6 +112,13 @@ class Target:
                 if attachment is not None:
                     attachment.release()
             frame.release()
+
+
+def read_pixels(picture: moderngl.Framebuffer) -> np.ndarray:
+    """The pixels of a framebuffer, (height, width, 3) uint8, top row first."""
+    width, height = picture.size
+    raw = picture.read(components=3, alignment=1)
+    return np.flipud(np.frombuffer(raw, np.uint8).reshape(height, width, 3)).copy()
 
 
 def enlarged(boxes: np.ndarray, inner: tuple[int, int], size: tuple[int, int]) -> np.ndarray:

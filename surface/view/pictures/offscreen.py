@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from surface.base.errors import ViewError
 from surface.base.extras import importing
+from surface.view.draw.alternating import Alternating
 from surface.view.draw.renderer import Renderer
-from surface.view.draw.target import Target
+from surface.view.draw.target import Target, read_pixels
 from surface.view.scene.camera import Camera
+from surface.view.scene.choice import QualityChoice
 from surface.view.scene.framing import framed
 from surface.view.scene.parts import ViewHead
 from surface.view.scene.sampling import AdaptiveSampling, is_software
@@ -51,6 +54,7 @@ class Offscreen:
         the picture is live, and "full" too falls back to 1 where 4 take too long; "fast" on a software renderer is then
         drawn at a share of its size (:data:`surface.view.scene.sampling.SCALE`) and enlarged.
     quality, theme, evaluator : see :class:`surface.view.draw.renderer.Renderer`.
+    ctx : the context to draw in, which stays its owner's; None opens one.
 
     Raises ViewError: no OpenGL, or a size that no driver draws.
     """
@@ -63,12 +67,15 @@ class Offscreen:
         quality: str = "full",
         theme: str | Theme = "skin",
         evaluator: str = "auto",
+        *,
+        ctx: moderngl.Context | None = None,
     ) -> None:
-        self.head, self._closed = head, False
-        self.ctx = open_context()
+        self.head, self._closed, self._owner = head, False, ctx is None
+        self.ctx = ctx or open_context()
         limit = min(self.ctx.info["GL_MAX_VIEWPORT_DIMS"])
         if not all(1 <= length <= limit for length in size):
-            self.ctx.release()
+            if self._owner:
+                self.ctx.release()
             raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
         self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme, evaluator=evaluator)
         self._front = framed(Camera.front(), head)
@@ -144,9 +151,64 @@ class Offscreen:
         self._make_current()
         self.renderer.release()
         self.target.release()
-        self.ctx.release()
+        if self._owner:
+            self.ctx.release()
 
     def __enter__(self) -> Offscreen:
+        return self
+
+    def __exit__(self, *error: Any) -> None:
+        self.close()
+
+
+class AdaptiveOffscreen:
+    """A head drawn live without a display in whichever quality holds ``rate_hz``, frames/s; a context manager.
+
+    choice : which quality is drawn, and how long each was. now_s : the time, s; replaced in tests.
+    Other arguments and errors as for :class:`Offscreen`.
+    """
+
+    def __init__(
+        self,
+        head: ViewHead,
+        size: tuple[int, int] = (1280, 720),
+        *,
+        rate_hz: float,
+        theme: str | Theme = "skin",
+        evaluator: str = "auto",
+        now_s: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        full = Offscreen(head, size, quality="full", theme=theme, evaluator=evaluator)
+        fast = Offscreen(head, size, quality="fast", theme=theme, evaluator=evaluator, ctx=full.ctx)
+        self._full, self._fast, self.ctx, self.choice = full, fast, full.ctx, QualityChoice(rate_hz)
+        self._alternating = Alternating({"full": full, "fast": fast}, self.choice, now_s=now_s)
+
+    @property
+    def renderer(self) -> Renderer:
+        """The renderer whose picture is seen."""
+        return self._alternating.shown.renderer
+
+    def go_live(self) -> None:
+        """Prepare for moving pictures, which the first :meth:`draw` would do otherwise."""
+        self._full.go_live()
+        self._fast.go_live()
+
+    def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
+        """As :meth:`Offscreen.draw`."""
+        self._alternating.draw(values, camera)
+
+    def read(self) -> np.ndarray:
+        """The picture last drawn, (height, width, 3) uint8, top row first."""
+        self._full._make_current()
+        return read_pixels(self._alternating.picture())
+
+    def close(self) -> None:
+        """Release everything; safe to call twice."""
+        self._alternating.release()
+        self._fast.close()
+        self._full.close()
+
+    def __enter__(self) -> AdaptiveOffscreen:
         return self
 
     def __exit__(self, *error: Any) -> None:

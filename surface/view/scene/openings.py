@@ -74,6 +74,9 @@ class EyeFrame:
     painted: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
+_LINE_MM = 1.1  # half the width of the line where the lips meet
+
+
 class Openings:
     """Lids, lips and eyeballs of a head.
 
@@ -144,6 +147,19 @@ class Openings:
             return {"eye_rotation": rotation, "lid_upper": none, "lid_lower": none, "lids": 0.0}
         upper, lower = self._read(self._skin, frame.lids.upper), self._read(self._skin, frame.lids.lower)
         return {"eye_rotation": rotation, "lid_upper": upper, "lid_lower": lower, "lids": 1.0}
+
+    def lip_line(self, part: ViewPart) -> np.ndarray:
+        """How near a part's vertices at rest are to the line where the lips meet, (m,): 1 on it, 0 some mm away."""
+        vertices = np.asarray(part.vertices, float)
+        if self._lips is None or self._skin is None or part.name != self._skin.name:
+            return np.zeros(len(vertices))
+        edges = [vertices[ids] for ids in (self._lips.upper, self._lips.lower)]
+        x = vertices[:, 0]
+        middle = np.mean([np.interp(x, edge[:, 0], edge[:, 1]) for edge in edges], axis=0)
+        ends = np.clip((edges[0][-1, 0] - np.abs(x)) / _LINE_MM, 0.0, 1.0)
+        front = np.clip((vertices[:, 2] - edges[0][:, 2].min()) / _LINE_MM, 0.0, 1.0)
+        near: np.ndarray = np.exp2(-(((vertices[:, 1] - middle) / _LINE_MM) ** 2)) * ends * front
+        return near
 
     def mouth(self) -> dict[str, object]:
         """Uniforms of the opening between the lips: centre and vector area, mm and mm^2."""

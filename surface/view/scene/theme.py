@@ -39,6 +39,8 @@ class Theme:
     hair : opacity of lashes and brows, 0..1.
     lips : how much darker a mask's lips are, 0..1.
     seams : whether the shell shows the gaps between its plates.
+    lamps : light of a robot's lips, brows and display in the mouth; (0, 0, 0) for a face without lamps, whose shell has
+        one colour.
     lights_follow : 0 keeps the lights with the world, 1 turns them with the camera.
     """
 
@@ -63,7 +65,13 @@ class Theme:
     hair: float = 1.0
     lips: float = 0.0
     seams: bool = False
+    lamps: Colour = (0.0, 0.0, 0.0)
     lights_follow: float = 0.5
+
+    @property
+    def lit(self) -> bool:
+        """Whether the face has lamps."""
+        return any(self.lamps)
 
 
 THEMES: dict[str, Theme] = {
@@ -90,6 +98,27 @@ THEMES: dict[str, Theme] = {
         seams=True,
         background_top=(0.08, 0.10, 0.13),
         background_bottom=(0.20, 0.23, 0.27),
+    ),
+    "robot": Theme(
+        albedo=(0.66, 0.67, 0.68),
+        use_painted=False,
+        wrap=(0.06, 0.06, 0.06),
+        gloss=2.2,
+        detail=0.0,
+        iris=(0.16, 0.80, 0.62),
+        sclera=(0.004, 0.005, 0.006),
+        brow=(0.16, 0.80, 0.62),
+        key=Light(-38.0, 36.0, (1.00, 0.98, 0.95)),
+        fill=Light(52.0, 4.0, (0.10, 0.13, 0.16)),
+        rim=Light(150.0, 24.0, (0.70, 1.00, 0.95)),
+        sky=(0.16, 0.17, 0.19),
+        ground=(0.06, 0.065, 0.075),
+        through=(0.0, 0.0, 0.0),
+        glow=4.0,
+        hair=0.0,
+        lamps=(0.42, 2.1, 1.65),
+        background_top=(0.055, 0.065, 0.075),
+        background_bottom=(0.15, 0.17, 0.185),
     ),
 }
 

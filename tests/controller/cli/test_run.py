@@ -119,7 +119,7 @@ def test_a_take_is_played_to_its_end_and_pictures_are_written(stage: str, tmp_pa
         (["run", "--identity", "nobody=0.5"], "no identity 'nobody'"),
         (["run", "--identity", "broad=2"], "expected NAME=AMOUNT, 0 to 1"),
         (["run", "--mirror"], "nothing to mirror"),
-        (["run", "--theme", "clown"], "--theme clown: must be 'skin' or 'mask'"),
+        (["run", "--theme", "clown"], "--theme clown: must be 'skin', 'mask' or 'robot'"),
         (["run", "--voice", "none.wav", "--seconds", "30"], "none.wav: cannot be read"),
     ],
 )
@@ -212,7 +212,7 @@ def noted(*words: str) -> Session:
     return Session.last
 
 
-LOOK = dict.fromkeys(("kiosk", "monitor", "quality", "theme", "camera", "evaluator", "person"))
+LOOK = dict.fromkeys(("kiosk", "monitor", "quality", "fps", "theme", "camera", "evaluator", "person"))
 
 
 def test_a_run_without_options_opens_a_window_where_there_is_a_display(display: dict[str, bool]) -> None:
@@ -230,9 +230,9 @@ def test_every_option_of_a_run_arrives(display: dict[str, bool], tmp_path: Path)
     assert noted("run", "mine", "--no-face", "--headless").how == ("no face", None)
     session = noted("run", "mine", "--voice", "v.wav", "--voice-rate", "1000", "--record", "a.rec")
     assert session.given["options"] == RunOptions(voice=Voice("v.wav", 1000), record=Path("a.rec"))
-    words = ["--kiosk", "--monitor", "0", "--quality", "fast", "--theme", "mask", "--camera", "front"]
+    words = ["--kiosk", "--monitor", "0", "--quality", "fast", "--theme", "mask", "--camera", "front", "--fps", "240"]
     session = noted("run", "mine", *words, "--evaluator", "cpu", "--identity", "broad=0.5", "--person", "maple")
-    assert session.given["look"] == {"kiosk": True, "monitor": 0, "quality": "fast", "theme": "mask",
+    assert session.given["look"] == {"kiosk": True, "monitor": 0, "quality": "fast", "fps": 240.0, "theme": "mask",
                                      "camera": "front", "evaluator": "cpu", "person": "maple"}  # fmt: skip
     assert session.given["identity"] == {"broad": 0.5}
 

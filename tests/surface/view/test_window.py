@@ -262,7 +262,7 @@ class Opened:
         monkeypatch.setattr("moderngl.create_context", self.create)
         self.hands = Hands()
         self.hands.io.display_framebuffer_scale = SimpleNamespace(x=1.0, y=1.0)
-        make = partial(Renderer, head=BallHead(), quality=quality)
+        make = partial(Renderer, head=BallHead())
         self.window = _Window(self.hands, self.source, Viewpoint(), make, quality)
         self.window.params = SimpleNamespace(app_shall_exit=False)
         self.frame = self.ctx.framebuffer([self.ctx.renderbuffer((400, 300), 4)])
@@ -299,8 +299,9 @@ def test_the_head_is_drawn_into_what_is_bound(gl: None, monkeypatch: pytest.Monk
     assert np.abs(picture[60:, :320] - wanted).max() <= 1
     assert (picture[:60] == [255, 0, 255]).all() and (picture[:, 320:] == [255, 0, 255]).all()
     assert window.frames == 1 and window.first == window.last > 0.0
-    before, first = window._target, window.first
-    assert (opened.draw() == picture).all() and window._target is before
+    (drawing,) = window._drawings.values()
+    before, first = drawing.target, window.first
+    assert (opened.draw() == picture).all() and drawing.target is before
     assert window.frames == opened.posed == 2 and window.first == first < window.last
     window.stop()
     opened.ctx.release()
@@ -315,17 +316,18 @@ def test_a_window_that_changes_its_size_gets_another_target_and_releases_the_old
     opened.window.start()
     opened.draw()
     small = opened.draw(160.0, 120.0)
-    assert released == [(320, 240)] and opened.window._target.size == (160, 120)
+    drawing = opened.window._drawings["fast"]
+    assert released == [(320, 240)] and drawing.target.size == (160, 120)
     assert small[180:, :160].std() > 20 and (small[:180] == [255, 0, 255]).all()
     assert (opened.draw(0.0, 120.0) == [255, 0, 255]).all(), "a minimised window draws nothing"
     assert (opened.window.frames, opened.posed) == (2, 2)
-    renderer = opened.window._renderer
+    renderer = drawing.renderer
     ended: list[int] = []
     monkeypatch.setattr(renderer, "release", lambda: ended.append(1))
     opened.window.stop()
     opened.window.stop()
     assert released == [(320, 240), (160, 120)] and ended == [1]
-    assert opened.window._target is opened.window._renderer is None
+    assert not opened.window._drawings
     opened.ctx.release()
 
 
@@ -360,8 +362,7 @@ def test_only_in_software_a_window_hurries(
     monkeypatch.setattr("surface.view.window.is_software", lambda ctx: software)
     opened = Opened(monkeypatch, "full")
     opened.window.start()
-    assert opened.window._renderer is not None
-    assert opened.window._renderer._simplified == simplified
+    assert opened.window._drawings["full"].renderer._simplified == simplified
     opened.window.stop()
     opened.ctx.release()
 

@@ -1,6 +1,7 @@
 // Lashes and brows: strips whose u runs along them and v from root to tip.
 uniform mat4 view_projection;
 uniform vec3 albedo;
+uniform vec3 lamps;  // light of its own
 
 const float BEFORE_MM = 1.5;
 
@@ -19,7 +20,7 @@ void main() {
     vec4 nearer = gl_Position - BEFORE_MM * (view_projection * vec4(away, 0.0));
     gl_Position.z = nearer.z / nearer.w * gl_Position.w;
     vec3 light = ambient(normal) + key_colour * (0.25 + 0.35 * clamp(dot(normal, key_direction), 0.0, 1.0));
-    v_colour = encode(albedo * light);
+    v_colour = encode(albedo * light + lamps);
     v_along = along.xy;
     v_strength = along.z;
 }

@@ -19,6 +19,10 @@ float freckle() {
 }
 #endif
 
+#ifdef PANELS
+in float v_lamp;
+#endif
+
 #ifdef SEAMS
 // The shell of a mask is made of plates: gaps along curves in longitude and latitude of the skull.
 float gap(float away, float half_width) {
@@ -54,6 +58,9 @@ void main() {
 #endif
 #ifdef SEAMS
     lit *= 1.0 - 0.88 * min(seams(v_uv / DETAIL_PER_RADIAN), 1.0);
+#endif
+#ifdef PANELS
+    lit = robot(lit, v_uv / DETAIL_PER_RADIAN, v_lamp);
 #endif
     vec3 shown = encode(lit);
     colour = vec4(gl_FrontFacing ? shown : INSIDE * shown, 1.0);

@@ -16,6 +16,10 @@ out vec2 v_uv;
 in float freckles;          // how many grow here, 0..1
 out float v_freckles;
 #endif
+#ifdef PANELS
+in float lamp;              // how much of the lamps' light it sends out
+out float v_lamp;
+#endif
 
 void main() {
     gl_Position = view_projection * vec4(position, 1.0);
@@ -29,5 +33,8 @@ void main() {
     v_uv = surface_uv_gloss.xy;
 #ifdef FRECKLES
     v_freckles = freckles;
+#endif
+#ifdef PANELS
+    v_lamp = lamp;
 #endif
 }

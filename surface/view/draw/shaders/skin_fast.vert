@@ -7,8 +7,15 @@ in vec3 normal;
 in vec4 albedo_occlusion;
 in vec4 around;               // which way the surroundings lie, as baked
 in vec4 surface_uv_gloss;
+#ifdef PANELS
+in float lamp;                // how much of the lamps' light it sends out
 
+out vec3 v_light;
+out vec2 v_uv;
+out float v_lamp;
+#else
 out vec3 v_colour;
+#endif
 
 void main() {
     gl_Position = view_projection * vec4(position, 1.0);
@@ -21,5 +28,11 @@ void main() {
     float shine = highlight(normal, v) * albedo_occlusion.a * sun * (WIDE * wide + NARROW * narrow * surface_uv_gloss.z);
     vec3 lit = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w);
     lit += shine * key_colour;
+#ifdef PANELS
+    v_light = lit;
+    v_uv = surface_uv_gloss.xy;
+    v_lamp = lamp;
+#else
     v_colour = encode(lit);
+#endif
 }

@@ -117,6 +117,7 @@ def test_lashes_of_the_lower_lid_are_fainter() -> None:
     part.material = "brow"
     assert (of("brow").static(part, THEMES["skin"], openings())["along"][:, 2] == 1.0).all()
     assert (of("brow").static(part, THEMES["mask"], openings())["along"][:, 2] == 0.0).all()
+    assert (of("brow").static(part, THEMES["robot"], openings())["along"][:, 2] == 1.0).all(), "bars of lamps"
 
 
 def test_uniforms_name_what_the_shaders_read(gl: None) -> None:
@@ -225,7 +226,8 @@ def test_a_shader_of_skin_knows_seams_of_masks_and_the_texels_of_unfiltered_grai
         skin_program(None, quality, THEMES[theme], simplified=simplified)  # type: ignore[arg-type]
     seams = {"SEAMS": 1, "DETAIL_PER_RADIAN": "2.86479"} if theme == "mask" else {}  # 18 tiles around
     grain = {"GRAIN_TEXELS": "64.0"} if simplified else {}
-    assert given == [{"INSIDE": "0.25"} | seams | grain, {"INSIDE": "0.25"}]
+    panels = {"PANELS": 1, "DETAIL_PER_RADIAN": "2.86479"} if theme == "robot" else {}
+    assert given == [{"INSIDE": "0.25"} | seams | panels | grain, {"INSIDE": "0.25"} | panels]
 
 
 def test_lashes_of_many_strips_are_upper_or_lower_by_their_height() -> None:

@@ -20,14 +20,14 @@ def test_themes_are_found_by_name_or_taken_as_they_are() -> None:
 def test_an_unknown_name_lists_the_themes() -> None:
     with pytest.raises(ViewError, match="there is no theme 'clown'") as caught:
         find_theme("clown")
-    assert caught.value.hint == "themes: mask, skin"
+    assert caught.value.hint == "themes: mask, robot, skin"
 
 
 @pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
 def test_values_are_within_their_ranges(theme: Theme) -> None:
     for field in fields(theme):
         value = getattr(theme, field.name)
-        if isinstance(value, tuple):
+        if isinstance(value, tuple) and field.name != "lamps":
             assert len(value) == 3 and all(0.0 <= x <= 1.0 for x in value), field.name
         if isinstance(value, Light):
             assert -180.0 <= value.yaw_deg <= 180.0 and -90.0 <= value.pitch_deg <= 90.0
@@ -67,6 +67,7 @@ def test_lights_come_from_where_the_pictures_of_reference_have_them() -> None:
     assert placed == {
         "skin": [(-34.0, 32.0), (48.0, 6.0), (152.0, 28.0)],
         "mask": [(-38.0, 34.0), (52.0, 4.0), (150.0, 24.0)],
+        "robot": [(-38.0, 36.0), (52.0, 4.0), (150.0, 24.0)],
     }
     for theme in THEMES.values():
         for light, least, most in ((theme.key, 0.9, 1.2), (theme.fill, 0.1, 0.22), (theme.rim, 0.7, 1.15)):
@@ -76,8 +77,16 @@ def test_lights_come_from_where_the_pictures_of_reference_have_them() -> None:
 
 @pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
 def test_hair_is_dark_and_the_sky_is_blue(theme: Theme) -> None:
-    assert max(*theme.brow, *theme.lash) < 0.1 and max(*theme.sky, *theme.ground, *theme.background_top) < 0.3
+    assert (theme.lit or max(theme.brow) < 0.1) and max(theme.lash) < 0.1
+    assert max(*theme.sky, *theme.ground, *theme.background_top) < 0.3
     assert theme.sky == tuple(sorted(theme.sky)) and max(theme.background_bottom) < 0.5
     assert theme.background_top == tuple(sorted(theme.background_top))
     if not theme.use_painted:
-        assert theme.albedo == tuple(sorted(theme.albedo)) and theme.iris == tuple(sorted(theme.iris))
+        assert theme.albedo == tuple(sorted(theme.albedo)) and theme.iris[0] < min(theme.iris[1:])
+
+
+def test_only_a_robot_has_lamps() -> None:
+    assert {name for name, theme in THEMES.items() if theme.lit} == {"robot"}
+    robot = THEMES["robot"]
+    assert robot.glow > THEMES["mask"].glow and max(robot.lamps) > 1.0, "brighter than what is lit"
+    assert not robot.use_painted and robot.hair == 0.0 and robot.through == (0, 0, 0)
