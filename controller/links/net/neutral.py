@@ -6,7 +6,6 @@ A file in the user's state folder holds both, as JSON with parameters by name.
 from __future__ import annotations
 
 import json
-import os
 import re
 from pathlib import Path
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from controller.base.errors import LinkError
 from controller.base.parameters import Flags, Floats, Parameters
+from controller.links.access import state_folder
 
 STILL_S = 2.0
 """How long a face must be still to be taken as neutral."""
@@ -23,15 +23,9 @@ _LEAST_RANGE = 0.5  # smaller ones are not widened further
 _FORMAT = 1
 
 
-def state_folder() -> Path:
-    """The user's folder for what programs keep between runs (XDG Base Directory Specification), omote's part of it."""
-    base = os.environ.get("XDG_STATE_HOME") or Path.home() / ".local" / "state"
-    return Path(base) / "omote" / "links"
-
-
 def state_file(name: str) -> Path:
     """The file of a link's name, of which any character may be foreign to file names."""
-    return state_folder() / f"{re.sub(r'[^A-Za-z0-9.-]+', '_', name)[:100]}.json"
+    return state_folder() / "links" / f"{re.sub(r'[^A-Za-z0-9.-]+', '_', name)[:100]}.json"
 
 
 class Neutral:

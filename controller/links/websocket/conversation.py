@@ -1,0 +1,237 @@
+"""One client of the WebSocket API: messages in, answers out, the state at a rate on request; no I/O here."""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from pydantic import ValidationError
+
+from controller.base.errors import OMOTE_ERRORS, ParameterError
+from controller.base.parameters import Indices, Parameters
+from controller.layers.commands import CommandSink
+from controller.links.line.session import package_version
+from controller.links.websocket import messages as m
+
+log = logging.getLogger(__name__)
+
+_SHOWN = 3
+"""Faults of a message that its answer names."""
+
+
+class Conversation:
+    """What one client asked for.
+
+    Parameters
+    ----------
+    sink : where accepted commands go. who : the client, for people: a stop is reported under this name.
+    start_ns : time zero of the states (monotonic clock, ns).
+
+    Attributes
+    ----------
+    accepted : requests carried out. refused : requests that were not, by code.
+    """
+
+    def __init__(self, sink: CommandSink, who: str, start_ns: int) -> None:
+        self._sink, self._who, self._start_ns = sink, who, start_ns
+        self._values, self._shown = sink.parameters.neutral(), sink.parameters.neutral()
+        self._subscription: m.Subscribe | None = None
+        self._chosen: Indices | None = None
+        self._due_ns = 0
+        self.accepted = 0
+        self.refused: Counter[str] = Counter()
+
+    def handle(self, text: str | bytes, now_ns: int) -> m.Reply | None:
+        """Carry out one message that arrived at ``now_ns``; returns its answer, None where there is none."""
+        try:
+            request = m.REQUESTS.validate_json(text)
+        except ValidationError as error:
+            return self._refuse(None, "message", _faults(error))
+        try:
+            reply = self._answer(request, now_ns)
+        except ParameterError as error:
+            return self._refuse(request.id, "name", str(error), error.hint)
+        except OMOTE_ERRORS as error:
+            return self._refuse(request.id, "busy", str(error), getattr(error, "hint", ""))
+        except Exception as error:
+            log.error("%s: %s: %s", self._who, type(error).__name__, error, exc_info=_debug(error))
+            return self._refuse(request.id, "fault", f"an error in omote, see its log: {type(error).__name__}")
+        self.accepted += 1
+        if reply is not None:
+            return reply.model_copy(update={"id": request.id})
+        return m.Done(id=request.id) if request.id is not None else None
+
+    def refuse_rate(self) -> m.Refused:
+        """The answer to messages that come too fast."""
+        return self._refuse(
+            None, "rate", "messages come too fast and some were dropped", "send at most a few hundred a second"
+        )
+
+    def due_ns(self) -> int | None:
+        """When the next state is due; None without a subscription."""
+        return None if self._subscription is None else self._due_ns
+
+    def state_due(self, now_ns: int) -> m.State | None:
+        """The newest state, where one is due. Those that were missed are left out."""
+        wanted = self._subscription
+        if wanted is None or now_ns < self._due_ns:
+            return None
+        period = round(1e9 / wanted.rate_hz)
+        self._due_ns += period * (1 + (now_ns - self._due_ns) // period)
+        return self._state(self._chosen, now_ns, status=False)
+
+    def _refuse(self, request_id: Any, code: Any, message: str, hint: str = "") -> m.Refused:
+        self.refused[code] += 1
+        return m.Refused(id=request_id, code=code, message=message, hint=hint)
+
+    def _answer(self, request: m.AnyRequest, now_ns: int) -> m.Reply | None:
+        match request:
+            case m.Hello():
+                return self._welcome(request)
+            case m.Get():
+                return self._state(self._positions(request.parameters), now_ns, status=True)
+            case m.List():
+                return m.Names(what=request.what, names=self._names(request.what))
+            case m.Subscribe():
+                self._chosen = self._positions(request.parameters)
+                self._subscription, self._due_ns = request, now_ns
+            case m.Unsubscribe():
+                self._subscription = None
+            case m.Ping():
+                return m.Done()
+            case m.Stop():
+                self._sink.stop_latch.stop(self._who, now_ns)
+            case m.Start():
+                self._sink.stop_latch.start()
+            case _:
+                self._act(request, now_ns)
+        return None
+
+    def _act(self, request: m.AnyRequest, now_ns: int) -> None:
+        """Pass a command that changes the face to the sink."""
+        sink = self._sink
+        match request:
+            case m.Set(parameters=given):
+                sink.set_parameters(*_in_range(sink.parameters, given), now_ns)
+            case m.Release(parameters=names):
+                chosen = range(len(sink.parameters)) if names is None else sink.parameters.indices(names).tolist()
+                sink.release(list(chosen), now_ns)
+            case m.Expression():
+                sink.expression(request.name, request.intensity, request.duration_s, now_ns)
+            case m.Emotion():
+                sink.expression(_mood(request), request.intensity, None, now_ns)
+            case m.Neutral():
+                sink.neutral(request.seconds, now_ns)
+            case m.Life():
+                sink.live(request.amount, now_ns, *([request.manner] if request.manner else []))
+            case m.Show():
+                _play(sink, request)
+            case m.Gaze() | m.GazeAt() | m.GazeOff():
+                self._look(request, now_ns)
+
+    def _look(self, request: m.Gaze | m.GazeAt | m.GazeOff, now_ns: int) -> None:
+        match request:
+            case m.Gaze():
+                self._sink.gaze(math.radians(request.yaw_deg), math.radians(request.pitch_deg), now_ns)
+            case m.GazeAt(point_mm=point):
+                if math.hypot(*point) < 1.0:
+                    raise ParameterError("the point must be at least 1 mm from the middle between the eyes")
+                self._sink.gaze_at(*point, now_ns)
+            case m.GazeOff():
+                self._sink.gaze_off(now_ns)
+
+    def _welcome(self, request: m.Hello) -> m.Welcome:
+        if request.version != m.VERSION:
+            raise ParameterError(
+                f"version {request.version} of the messages is not spoken here", hint=f"use version {m.VERSION}"
+            )
+        p = self._sink.parameters
+        return m.Welcome(
+            omote=package_version(),
+            parameters={name: _parameter(p, i) for i, name in enumerate(p.names)},
+            expressions=list(self._sink.vocabulary.names),
+            layers=list(self._sink.layer_names()),
+        )
+
+    def _state(self, chosen: Indices | None, now_ns: int, *, status: bool) -> m.State:
+        sink = self._sink
+        sink.snapshot(self._values)
+        stopped = sink.stop_latch.stopped
+        return m.State(
+            time_s=(now_ns - self._start_ns) * 1e-9,
+            parameters=self._named(self._values, chosen),
+            measured=self._named(self._shown, chosen) if sink.measured(self._shown) else None,
+            stopped_by=stopped.who if stopped is not None else None,
+            status=sink.status() if status else {},
+        )
+
+    def _named(self, values: Any, chosen: Indices | None) -> dict[str, float]:
+        names = self._sink.parameters.names
+        which: Sequence[int] = range(len(names)) if chosen is None else chosen.tolist()
+        return {names[i]: round(float(values[i]), 4) for i in which}
+
+    def _positions(self, names: Sequence[str] | None) -> Indices | None:
+        return None if names is None else self._sink.parameters.indices(names)
+
+    def _names(self, what: str) -> list[str]:
+        sink = self._sink
+        kinds: dict[str, Callable[[], Sequence[str]]] = {
+            "parameters": lambda: sink.parameters.names,
+            "expressions": lambda: sink.vocabulary.names,
+            "layers": sink.layer_names,
+            "shows": lambda: sink.shows.names() if sink.shows is not None else [],
+        }
+        return list(kinds[what]())
+
+
+def _in_range(parameters: Parameters, given: dict[str, float]) -> tuple[list[int], list[float]]:
+    """Positions and values. Raises ParameterError: an unknown name, two of one parameter, or a value out of range."""
+    indices = parameters.indices(given).tolist()
+    if len(set(indices)) < len(indices):
+        raise ParameterError("a parameter is named twice, in two spellings")
+    for i, (name, value) in zip(indices, given.items(), strict=True):
+        low, high = float(parameters.low[i]), float(parameters.high[i])
+        if not low <= value <= high:
+            raise ParameterError(f"{name} must be {low:g} to {high:g}, not {value:g}")
+    return indices, list(given.values())
+
+
+def _parameter(p: Parameters, i: int) -> m.Parameter:
+    full = math.degrees(p.full_scale_rad[i])
+    angle = None if math.isnan(full) else round(full, 3)
+    return m.Parameter(low=float(p.low[i]), high=float(p.high[i]), region=p.regions[i], full_scale_deg=angle)
+
+
+def _mood(request: m.Emotion) -> str:
+    """The formula of an emotion, as :class:`controller.vocabulary.vocabulary.Vocabulary` reads it."""
+    point = [request.valence, request.arousal, *([] if request.dominance is None else [request.dominance])]
+    return f"{'VA' if len(point) == 2 else 'VAD'}:{','.join(f'{value:.4f}' for value in point)}"
+
+
+def _play(sink: CommandSink, request: m.Show) -> None:
+    """Raises ParameterError or ConfigError: no shows here, none of this name, no such mark, or nothing to do."""
+    if sink.shows is None:
+        raise ParameterError("no shows can be played here", hint="omote run plays them")
+    if (request.name is None) == (request.action is None):
+        raise ParameterError("a show needs a name to begin it, or an action", hint='{"type": "show", "name": "tour"}')
+    if (request.to is not None) != (request.action == "seek"):
+        raise ParameterError("to is for the action seek, which needs it", hint='{"action": "seek", "to": 2.5}')
+    if request.name is not None:
+        sink.shows.start(request.name)
+    elif request.action is not None:
+        sink.shows.control(request.action.upper(), 0.0 if request.to is None else request.to)
+
+
+def _faults(error: ValidationError) -> str:
+    """What is wrong with a message, in one line."""
+    found = error.errors(include_url=False, include_input=False, include_context=False)
+    shown = [": ".join(filter(None, [".".join(map(str, each["loc"]))[:80], each["msg"]])) for each in found[:_SHOWN]]
+    return "; ".join(shown)[:400] + (f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else "")
+
+
+def _debug(error: Exception) -> Exception | None:
+    return error if os.environ.get("OMOTE_DEBUG") else None

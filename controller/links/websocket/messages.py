@@ -1,0 +1,255 @@
+"""The messages of the WebSocket API: pydantic models, from which its JSON schema is made.
+
+A message is a JSON object whose ``type`` says what it is. Angles are in degrees and lengths in millimetres; the axes
+are those of the line protocol (yaw positive to the face's own left, pitch positive up). A message with an ``id`` is
+answered; one without is answered only where it is a question or wrong.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
+
+VERSION = 1
+"""Version of the messages: grows where one changes its meaning or goes; new ones may come without."""
+MAX_RATE_HZ, MIN_RATE_HZ = 200.0, 0.1
+LONGEST = 65_536
+"""Bytes of a message."""
+
+Name = Annotated[str, Field(min_length=1, max_length=128)]
+Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
+Signed = Annotated[float, Field(ge=-1.0, le=1.0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
+Id = Annotated[int, Field(ge=-(2**53), le=2**53)] | Annotated[str, Field(max_length=64)]
+
+
+class Request(BaseModel):
+    """What every request may have. ``id`` : comes back with its answer."""
+
+    model_config = ConfigDict(extra="forbid", strict=False, frozen=True)
+    id: Id | None = None
+
+
+class Hello(Request):
+    """Ask who is there; ``version`` : refused where the server does not speak it. ``name`` : of the client."""
+
+    type: Literal["hello"]
+    version: int = VERSION
+    name: Annotated[str, Field(max_length=64)] = ""
+
+
+class Set(Request):
+    """Hold parameters at values, until they are released."""
+
+    type: Literal["set"]
+    parameters: Annotated[dict[Name, Finite], Field(min_length=1, max_length=1000)]
+
+
+class Release(Request):
+    """Give held parameters back; all without ``parameters``."""
+
+    type: Literal["release"]
+    parameters: Annotated[list[Name], Field(max_length=1000)] | None = None
+
+
+class Expression(Request):
+    """Show a named expression, or a formula such as ``AU1+2+5B``; without a duration until the next one."""
+
+    type: Literal["expression"]
+    name: Name
+    intensity: Share = 1.0
+    duration_s: Annotated[float, Field(ge=0.05, le=3600.0)] | None = None
+
+
+class Emotion(Request):
+    """Show a mood: a point of valence and arousal, perhaps dominance."""
+
+    type: Literal["emotion"]
+    valence: Signed
+    arousal: Signed
+    dominance: Signed | None = None
+    intensity: Share = 1.0
+
+
+class Gaze(Request):
+    """Look in a direction."""
+
+    type: Literal["gaze"]
+    yaw_deg: Annotated[float, Field(ge=-95.0, le=95.0)]
+    pitch_deg: Annotated[float, Field(ge=-70.0, le=70.0)]
+
+
+class GazeAt(Request):
+    """Look at a point (x, y, z), mm from the middle between the eyes."""
+
+    type: Literal["gaze_at"]
+    point_mm: tuple[Finite, Finite, Finite]
+
+
+class GazeOff(Request):
+    """Stop looking at anything."""
+
+    type: Literal["gaze_off"]
+
+
+class Neutral(Request):
+    """Release everything that was commanded and return to neutral."""
+
+    type: Literal["neutral"]
+    seconds: Annotated[float, Field(ge=0.0, le=60.0)] = 0.5
+
+
+class Life(Request):
+    """Set the amount of idle motion and the manner."""
+
+    type: Literal["life"]
+    amount: Share
+    manner: Literal["auto", "alone", "listen", "speak"] | None = None
+
+
+class Show(Request):
+    """Play a script by name; or pause, stop or go on with the one that was begun, or seek a mark or a time (s)."""
+
+    type: Literal["show"]
+    name: Name | None = None
+    action: Literal["play", "pause", "stop", "seek"] | None = None
+    to: Annotated[float, Field(ge=0.0, le=86_400.0)] | Name | None = None
+
+
+class Stop(Request):
+    """Switch the servos of all robots off, until ``start``."""
+
+    type: Literal["stop"]
+
+
+class Start(Request):
+    """Let the servos move again."""
+
+    type: Literal["start"]
+
+
+class Get(Request):
+    """Ask for the state, once."""
+
+    type: Literal["get"]
+    parameters: Annotated[list[Name], Field(max_length=1000)] | None = None
+
+
+class List(Request):
+    """Ask for names."""
+
+    type: Literal["list"]
+    what: Literal["parameters", "expressions", "layers", "shows"]
+
+
+class Subscribe(Request):
+    """Get the state at a rate; a client that reads too slowly gets fewer, never older ones."""
+
+    type: Literal["subscribe"]
+    rate_hz: Annotated[float, Field(ge=MIN_RATE_HZ, le=MAX_RATE_HZ)] = 30.0
+    parameters: Annotated[list[Name], Field(max_length=1000)] | None = None
+
+
+class Unsubscribe(Request):
+    """End the subscription."""
+
+    type: Literal["unsubscribe"]
+
+
+class Ping(Request):
+    """Ask whether the server is there."""
+
+    type: Literal["ping"]
+
+
+AnyRequest = Annotated[
+    Hello | Set | Release | Expression | Emotion | Gaze | GazeAt | GazeOff | Neutral | Life | Show | Stop | Start
+    | Get | List | Subscribe | Unsubscribe | Ping,
+    Field(discriminator="type"),
+]  # fmt: skip
+REQUESTS: TypeAdapter[AnyRequest] = TypeAdapter(AnyRequest)
+
+
+class Reply(BaseModel):
+    """What every answer may have. ``id`` : of the request, where it had one."""
+
+    model_config = ConfigDict(frozen=True)
+    id: Id | None = None
+
+
+class Welcome(Reply):
+    """The answer to ``hello``."""
+
+    type: Literal["hello"] = "hello"
+    version: int = VERSION
+    omote: str
+    parameters: dict[str, Parameter]
+    expressions: list[str]
+    layers: list[str]
+    max_rate_hz: float = MAX_RATE_HZ
+    max_bytes: int = LONGEST
+
+
+class Parameter(BaseModel):
+    """One parameter: its range, its region of the face, and the angle of the value 1 where it is an angle."""
+
+    low: float
+    high: float
+    region: str
+    full_scale_deg: float | None = None
+
+
+class State(Reply):
+    """The face. ``time_s`` : since the server began. ``measured`` : what the servos show; null where none reports it.
+
+    ``status`` : short words and numbers, those of ``STATUS`` of the line protocol.
+    """
+
+    type: Literal["state"] = "state"
+    time_s: float
+    parameters: dict[str, float]
+    measured: dict[str, float] | None = None
+    stopped_by: str | None = None
+    status: dict[str, str | int | float] = {}
+
+
+class Names(Reply):
+    """The answer to ``list``."""
+
+    type: Literal["names"] = "names"
+    what: str
+    names: list[str]
+
+
+class Done(Reply):
+    """A request with an ``id`` was carried out."""
+
+    type: Literal["ok"] = "ok"
+
+
+class Refused(Reply):
+    """A request was not carried out, and why; ``hint`` : what to do next."""
+
+    type: Literal["error"] = "error"
+    code: Literal["message", "value", "name", "busy", "rate", "fault"]
+    message: str
+    hint: str = ""
+
+
+AnyReply = Annotated[Welcome | State | Names | Done | Refused, Field(discriminator="type")]
+REPLIES: TypeAdapter[AnyReply] = TypeAdapter(AnyReply)
+
+
+def schema() -> dict[str, Any]:
+    """The JSON schema of all requests and replies, with the version of the messages."""
+    requests = REQUESTS.json_schema(ref_template="#/$defs/{model}")
+    replies = REPLIES.json_schema(ref_template="#/$defs/{model}", mode="serialization")
+    defs = requests.pop("$defs") | replies.pop("$defs")
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "omote WebSocket API",
+        "version": VERSION,
+        "properties": {"request": requests, "reply": replies},
+        "$defs": defs,
+    }

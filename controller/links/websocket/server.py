@@ -1,0 +1,251 @@
+"""Serves WebSocket clients in a thread of its own.
+
+Every client has a task that takes its messages and one that sends to it. A client that does not read loses answers,
+which are counted, and gets fewer states; it holds up neither the face nor another client.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+import time
+from collections import Counter
+from contextlib import suppress
+from http import HTTPStatus
+from typing import Any
+
+from websockets.asyncio.server import Server, ServerConnection, serve
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+
+from controller.base.errors import LinkError
+from controller.layers.commands import CommandSink
+from controller.links.access import given_token, is_own_page, make_token, same_token
+from controller.links.kind import LinkContext
+from controller.links.websocket.conversation import Conversation
+from controller.links.websocket.kind import WebSocketSettings
+from controller.links.websocket.messages import LONGEST, Reply
+
+log = logging.getLogger(__name__)
+
+_WAITING = 256
+"""Answers that may wait for a client."""
+_RATE_HZ, _BURST = 1000.0, 2000.0
+"""Messages of a client that are taken, in the long run and at once."""
+_START_S, _STOP_S, _CLOSE_S = 10.0, 3.0, 1.0
+
+
+def open_websocket(settings: WebSocketSettings, context: LinkContext) -> WebSocketLink:
+    """Listen for clients.
+
+    Raises LinkError: the address cannot be used, or the token cannot be kept.
+    """
+    token = _token(settings) if settings.needs_token else None
+    link = WebSocketLink(settings, context.sink, token)
+    context.closers.callback(link.stop)
+    link.start()
+    return link
+
+
+def _token(settings: WebSocketSettings) -> str:
+    """What clients must know; says where it is kept, and shows one that was made just now."""
+    if settings.token is not None:
+        return settings.token
+    token, path, new = make_token()
+    log.warning("websocket %s: other machines may move this face and its servos with the token in %s%s",
+                settings.address, path, f", which is shown only now: {token}" if new else "")  # fmt: skip
+    return token
+
+
+class WebSocketLink:
+    """A link that is open; clients come and go."""
+
+    def __init__(self, settings: WebSocketSettings, sink: CommandSink, token: str | None) -> None:
+        self._settings, self._sink, self._token = settings, sink, token
+        self._start_ns = time.monotonic_ns()
+        self._clients: set[_Client] = set()
+        self._served = 0
+        self._turned_away: Counter[str] = Counter()
+        self._accepted = 0
+        self._refused: Counter[str] = Counter()
+        self._unanswered = 0
+        self._loop = asyncio.new_event_loop()
+        self._ready = threading.Event()
+        self._error: Exception | None = None
+        self._stopping: asyncio.Event | None = None
+        self._port = 0
+        self._thread = threading.Thread(target=self._run, name=f"websocket {settings.address}", daemon=True)
+
+    @property
+    def port(self) -> int:
+        """Where it listens; of port 0 in the settings, the one that was free."""
+        return self._port
+
+    def start(self) -> None:
+        """Listen. Raises LinkError: the address cannot be used."""
+        self._thread.start()
+        if not self._ready.wait(_START_S):
+            raise LinkError(f"websocket {self._settings.address}: did not start within {_START_S:g} s")
+        if self._error is not None:
+            reason = getattr(self._error, "strerror", None) or self._error
+            raise LinkError(
+                f"websocket {self._settings.address}: cannot listen: {reason}",
+                hint=f"is another program there? look: ss -ltnp 'sport = :{self._settings.where[1]}'",
+            ) from self._error
+
+    def stop(self) -> None:
+        """Send all clients away and stop listening; may be called again."""
+        if self._thread.is_alive() and self._stopping is not None:
+            self._loop.call_soon_threadsafe(self._stopping.set)
+            self._thread.join(_STOP_S)
+
+    def report(self) -> dict[str, object]:
+        """Clients now and in all, requests taken, refused (by code) and not answered, and clients turned away."""
+        return {
+            "port": self._settings.address,
+            "connected": bool(self._clients),
+            "clients": len(self._clients),
+            "served": self._served,
+            "accepted": self._accepted + sum(client.conversation.accepted for client in list(self._clients)),
+            "refused": dict(sum((client.conversation.refused for client in list(self._clients)), self._refused.copy())),
+            "unanswered": self._unanswered + sum(client.unanswered for client in list(self._clients)),
+            "turned_away": dict(self._turned_away),
+        }
+
+    def _run(self) -> None:
+        asyncio.set_event_loop(self._loop)
+        try:
+            self._loop.run_until_complete(self._serve())
+        except Exception as error:
+            if self._ready.is_set():
+                raise  # to the part of this link, which opens it again
+            self._error = error
+        finally:
+            self._ready.set()
+            self._loop.close()
+
+    async def _serve(self) -> None:
+        self._stopping = asyncio.Event()
+        host, port = self._settings.where
+        quiet = logging.getLogger(f"{__name__}.library")
+        quiet.setLevel(logging.CRITICAL)
+        async with serve(
+            self._talk, host, port, process_request=self._admit, max_size=LONGEST, max_queue=64, compression=None,
+            logger=quiet, close_timeout=_CLOSE_S, server_header=None,
+        ) as server:  # fmt: skip
+            self._port = _port_of(server)
+            self._ready.set()
+            await self._stopping.wait()
+
+    def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
+        """None for who may connect; an answer that says why not for all others."""
+        why = self._refusal(request)
+        if why is None:
+            return None
+        status, code, text = why
+        self._turned_away[code] += 1
+        return connection.respond(status, text + "\n")
+
+    def _refusal(self, request: Request) -> tuple[HTTPStatus, str, str] | None:
+        if len(self._clients) >= self._settings.clients:
+            return HTTPStatus.SERVICE_UNAVAILABLE, "full", f"all {self._settings.clients} places are taken"
+        if self._token is not None:
+            given = given_token(request.path, request.headers.get("Authorization"))
+            if not same_token(given, self._token):
+                text = "a token is needed: ws://HOST:PORT/?token=TOKEN, or the header Authorization: Bearer TOKEN"
+                return HTTPStatus.UNAUTHORIZED, "token", text
+            return None
+        origin = request.headers.get("Origin")
+        if origin is not None and not is_own_page(origin, self._settings.origins):
+            text = f"a page of {origin} may not connect; add it to origins of the link in the stage"
+            return HTTPStatus.FORBIDDEN, "origin", text
+        return None
+
+    async def _talk(self, connection: ServerConnection) -> None:
+        client = _Client(connection, self._sink, self._start_ns)
+        self._clients.add(client)
+        self._served += 1
+        try:
+            await client.talk()
+        finally:
+            self._clients.discard(client)
+            self._accepted += client.conversation.accepted
+            self._refused += client.conversation.refused
+            self._unanswered += client.unanswered
+
+
+class _Client:
+    """One connected client. ``unanswered`` : answers that it did not read in time."""
+
+    def __init__(self, connection: ServerConnection, sink: CommandSink, start_ns: int) -> None:
+        host, port = connection.remote_address[:2]
+        self.conversation = Conversation(sink, f"websocket {host}:{port}", start_ns)
+        self.unanswered = 0
+        self._connection = connection
+        self._waiting: asyncio.Queue[Reply | None] = asyncio.Queue(_WAITING)
+        self._budget, self._counted_s, self._warned_s = _BURST, time.monotonic(), 0.0
+
+    async def talk(self) -> None:
+        """Until the client goes."""
+        sending = asyncio.create_task(self._send())
+        try:
+            async for text in self._connection:
+                self._take(text)
+        except ConnectionClosed:
+            pass
+        finally:
+            sending.cancel()
+            with suppress(asyncio.CancelledError, ConnectionClosed):
+                await sending
+
+    def _take(self, text: str | bytes) -> None:
+        if not self._may_come() and not _may_stop(text):
+            if time.monotonic() > self._warned_s + 1.0:
+                self._warned_s = time.monotonic()
+                self._put(self.conversation.refuse_rate())
+            return
+        self._put(self.conversation.handle(text, time.monotonic_ns()))
+
+    def _may_come(self) -> bool:
+        """Whether a message is within the rate (a token bucket)."""
+        now_s = time.monotonic()
+        self._budget = min(self._budget + (now_s - self._counted_s) * _RATE_HZ, _BURST) - 1.0
+        self._counted_s = now_s
+        if self._budget < 0.0:
+            self._budget = 0.0
+            return False
+        return True
+
+    def _put(self, reply: Reply | None) -> None:
+        """Let an answer wait to be sent; None wakes the sender, which may have a new subscription."""
+        try:
+            self._waiting.put_nowait(reply)
+        except asyncio.QueueFull:
+            self.unanswered += reply is not None
+
+    async def _send(self) -> None:
+        while True:
+            reply = await self._next()
+            for each in (reply, self.conversation.state_due(time.monotonic_ns())):
+                if each is not None:
+                    await self._connection.send(each.model_dump_json(exclude_none=False))
+
+    async def _next(self) -> Reply | None:
+        """The next answer, or None when a state is due."""
+        due_ns = self.conversation.due_ns()
+        wait_s = None if due_ns is None else max(0.0, (due_ns - time.monotonic_ns()) * 1e-9)
+        try:
+            return await asyncio.wait_for(self._waiting.get(), wait_s)
+        except TimeoutError:
+            return None
+
+
+def _may_stop(text: str | bytes) -> bool:
+    """Whether a message may be a STOP, which is taken however many came before it."""
+    return len(text) < 200 and ("stop" in text if isinstance(text, str) else b"stop" in text)
+
+
+def _port_of(server: Server) -> int:
+    sockets: Any = server.sockets
+    return int(next(iter(sockets)).getsockname()[1])
