@@ -194,8 +194,9 @@ class Head:
         self.bus.write(target)
         after, _ = self._registers(self.clock())
         self._check_goals(before, after, places, span_s)
+        active = self._active()
         state = self.bus.read()
-        self._compare(state, now)
+        self._compare(state, now, active | self._active())  # some end while the bus is read
         well = self._well_s <= now
         self.result.healthy += int(well.sum())
         self.result.driven += int((well & self.bus.driven).sum())
@@ -214,9 +215,12 @@ class Head:
             self.result.jumps += 1
             self._tell(f"servo {IDS[at]}: a goal {after[at] - before[at]:+.2f} rad from the last")
 
-    def _compare(self, state: BusState, began: float) -> None:
-        """Fresh positions against where the shafts were between two moments."""
-        active = {fault.kind for fault in self.wire.line.faults.active}
+    def _active(self) -> set[str]:
+        """Kinds of the faults at present."""
+        return {fault.kind for fault in self.wire.line.faults.active}
+
+    def _compare(self, state: BusState, began: float, active: set[str]) -> None:
+        """Fresh positions against where the shafts were between two moments, under some kinds of faults."""
         for at in np.flatnonzero(state.fresh):
             servo = self.wire.chain.servo(IDS[at])
             places = [

@@ -15,6 +15,7 @@ has all messages. Both classes raise :class:`FaceError` where the face refuses a
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from typing import Any, TypeVar
@@ -207,8 +208,6 @@ class AsyncFace(_Requests):
         await self._open.close()
 
     async def _ask(self, kind: str, **fields: Any) -> Message:
-        import asyncio
-
         number, text = self._dialogue.request(kind, fields)
         try:
             await self._open.send(text)

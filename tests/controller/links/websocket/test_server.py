@@ -75,7 +75,7 @@ def test_a_handshake_and_a_frame_written_by_hand(far: tuple[CommandState, Any, s
 
 
 def test_two_clients_see_each_others_changes(far: tuple[CommandState, Any, str]) -> None:
-    state, _, url = far
+    _, _, url = far
     with connect(url) as one, connect(url) as other:
         ask(one, "stop")
         assert ask(other, "get")["stopped_by"].startswith("websocket 127.0.0.1:")
@@ -97,7 +97,7 @@ def test_a_flood_that_reads_nothing_delays_no_stop_of_its_own_or_another(far: tu
     state, link, url = far
     flood = json.dumps({"type": "hello", "id": 1})  # whose answer is long
     with connect(url, max_queue=1) as rude, connect(url) as good:
-        for _ in range(900):
+        for _ in range(700):
             rude.send(flood)
         assert ask(good, "ping")["type"] == "ok"
         rude.send('{"type": "stop"}')
@@ -106,7 +106,7 @@ def test_a_flood_that_reads_nothing_delays_no_stop_of_its_own_or_another(far: tu
 
 
 def test_messages_beyond_the_rate_are_dropped_and_the_client_hears_of_it(far: tuple[CommandState, Any, str]) -> None:
-    _, link, url = far
+    _, _, url = far
     with connect(url) as client:
         for _ in range(6000):
             client.send('{"type": "neutral"}')
@@ -180,9 +180,12 @@ def test_more_clients_than_places_are_turned_away_until_one_goes() -> None:
 
 
 def test_an_address_that_is_taken_is_an_error_with_the_next_step() -> None:
-    with served() as (_, link, _), pytest.raises(LinkError, match="cannot listen") as caught:
-        with served(listen=f"127.0.0.1:{link.port}"):
-            pass
+    with (
+        served() as (_, link, _),
+        pytest.raises(LinkError, match="cannot listen") as caught,
+        served(listen=f"127.0.0.1:{link.port}"),
+    ):
+        pass
     assert "ss -ltnp" in caught.value.hint
 
 
@@ -198,12 +201,10 @@ def test_closing_the_link_sends_clients_away_and_frees_the_address() -> None:
 
 
 def test_a_subscriber_that_reads_slowly_gets_fresh_states(far: tuple[CommandState, Any, str]) -> None:
-    state, _, url = far
+    _, _, url = far
     with connect(url, max_queue=1) as slow:
         ask(slow, "subscribe", rate_hz=200)
         time.sleep(0.5)
         ask(slow, "set", parameters={"jawOpen": 0.75})
-        ages = []
-        for _ in range(400):
-            ages.append(json.loads(slow.recv(WAIT_S)).get("time_s", 0.0))
+        ages = [json.loads(slow.recv(WAIT_S)).get("time_s", 0.0) for _ in range(400)]
         assert ages == sorted(ages)
