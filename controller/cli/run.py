@@ -247,7 +247,7 @@ def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
     if voice := report.get("voice"):
         found.append(("voice", f"{voice['heard_s']:.1f} s heard"))
     return found + [
-        (f"link {link['port']}", f"{link['accepted']} lines accepted, {sum(link['refused'].values())} refused")
+        (f"link {link['port']}", f"{link['accepted']} accepted, {sum(link['refused'].values())} refused")
         for link in report.get("links", [])
     ]
 

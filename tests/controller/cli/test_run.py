@@ -45,7 +45,7 @@ def test_every_part_of_a_run_has_its_rows() -> None:
     assert found["frames per second"] == "30.0"
     assert found["milliseconds a frame"] == "p50 1.00  p95 2.00  p99 3.25  max 4.00"
     assert found["start to first frame"] == "2.50 s"
-    assert found["link /dev/x"] == "7 lines accepted, 1 refused"
+    assert found["link /dev/x"] == "7 accepted, 1 refused"
     assert found["bus head: 24 servos"] == "50.0 Hz of 50 wanted, 2 skipped"
     assert found["bus head: command to wire (ms)"] == "nothing measured"
     assert found["bus head: errors"] == "2 no_reply"
@@ -161,7 +161,7 @@ def test_rows_come_in_the_order_of_a_run_and_name_the_picture() -> None:
     found = dict(rows)
     assert found["picture"] == "1280 x 720, full, llvmpipe"
     assert found["bus b: errors"] == "2 no_reply, 3 crc" and found["bus b: targets held at a limit"] == "3"
-    assert found["link /dev/x"] == "7 lines accepted, 3 refused"
+    assert found["link /dev/x"] == "7 accepted, 3 refused"
     assert report_rows({"stage": "s"}) == []
     away = {"rms_deg": 1.0, "worst": [{"channel": "a", "rms_deg": 2.0}, {"channel": "b", "rms_deg": 1.0}]}
     rows = report_rows({"stage": "s", "buses": [{**bus, "face_difference": away}]})
