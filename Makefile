@@ -37,6 +37,7 @@ fuzz: setup ## read damaged files of every kind, lines and messages: make fuzz C
 		--minutes $(or $(MINUTES),60) $(if $(JOBS),--jobs $(JOBS))
 	@$(PY) -m tests.fuzz.lines
 	@$(PY) -m tests.fuzz.messages --count $(or $(MESSAGES),1000000) --seed $(or $(SEED),1)
+	@$(PY) -m tests.fuzz.requests --count $(or $(MESSAGES),1000000) --seed $(or $(SEED),1)
 
 bench: setup ## measure the engine on this machine
 	@$(BIN)/omote bench

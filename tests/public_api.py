@@ -31,6 +31,7 @@ SINGLE = {
     "drivers.sim.wire.simulator": ("BoardOptions", "Setting", "Simulator"),
     "surface.export.exporter": ("API", "Exporter"),
     "controller.base.parameters": ("PARAMETERS", "Parameters"),
+    "controller.client": ("AsyncFace", "Face", "FaceError"),
     "controller.formats.format": ("API", "Format"),
     "controller.formats.frame": ("Decoder", "Encoder", "Frame", "Refusals"),
     "controller.layers.commands": ("CommandSink",),

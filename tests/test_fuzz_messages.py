@@ -10,6 +10,7 @@ from controller.base.parameters import Parameters
 from controller.formats.format import FORMATS
 from controller.formats.frame import Frame, Refusals
 from tests.controller.formats.faces import KINDS
+from tests.fuzz import requests
 from tests.fuzz.messages import attack
 
 
@@ -36,3 +37,15 @@ class Fragile:
 def test_what_raises_is_found() -> None:
     found = attack(replace(FORMATS.get("livelink"), decoder=Fragile), 300, seed=1)
     assert found.faults["livelink: ValueError: what is this?"] > 50 and "what is this" in str(found)
+
+
+def test_a_short_run_of_websocket_requests_finds_no_fault() -> None:
+    found = requests.attack(1500, seed=5)
+    assert not found.faults, found.first
+    assert found.messages == 1500 and found.frames > 100
+
+
+def test_what_raises_in_a_conversation_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(requests.Conversation, "_refuse", lambda *_: 1 / 0)
+    found = requests.attack(300, seed=1)
+    assert found.faults["ZeroDivisionError: division by zero"] > 50

@@ -76,11 +76,12 @@ def damaged(form: Format, draw: random.Random) -> Iterator[bytes]:
     while True:
         message = bytearray(draw.choice(good))
         for _ in range(draw.choice((1, 1, 2, 5, 40))):
-            _damage(message, draw.choice(good), draw)
+            damage(message, draw.choice(good), draw)
         yield bytes(message[: form.most])
 
 
-def _damage(message: bytearray, other: bytes, draw: random.Random) -> None:
+def damage(message: bytearray, other: bytes, draw: random.Random) -> None:
+    """Change some bytes of a message; ``other`` : what it may be put together with."""
     at, size = draw.randrange(len(message) + 1), draw.choice((1, 1, 2, 4, 8, 60))
     what = draw.randrange(8)
     if what == 0:
