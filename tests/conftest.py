@@ -13,6 +13,10 @@ from types import ModuleType
 
 import pytest
 
+# Before numpy, which the conftest of a folder imports that is named on the command line: its threads
+# would spin where the tests beside this one have work.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 SETTINGS = (
@@ -54,8 +58,6 @@ def pytest_configure() -> None:
     # with this set, every process of a test would compile all modules of omote again, and this one all tests
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
     sys.dont_write_bytecode = False
-    # before numpy: its threads would spin where the tests beside this one have work
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if hasattr(os, "setpriority"):
         os.setpriority = keeping_priority(os.setpriority)
     # a shell starts what runs in the background with Ctrl-C ignored, and nohup ignores the terminal's end
