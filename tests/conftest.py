@@ -55,9 +55,6 @@ def pytest_configure() -> None:
     for name in SETTINGS:
         os.environ.pop(name, None)
     os.environ["TERM"] = "xterm-256color"
-    # with this set, every process of a test would compile all modules of omote again, and this one all tests
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    sys.dont_write_bytecode = False
     if hasattr(os, "setpriority"):
         os.setpriority = keeping_priority(os.setpriority)
     # a shell starts what runs in the background with Ctrl-C ignored, and nohup ignores the terminal's end
