@@ -20,8 +20,9 @@ help: ## print this list
 demo: setup ## set up, then drive the face and the simulated servo head
 	@$(BIN)/omote demo
 
+# Without bytecode, where a user has switched it off, every process of a test would compile all modules again.
 test: setup ## set up, then run the tests (no display, graphics processor or servo needed)
-	@$(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: setup ## check style and types
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy

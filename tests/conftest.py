@@ -13,6 +13,10 @@ from types import ModuleType
 
 import pytest
 
+# Before numpy, which the conftest of a folder imports that is named on the command line: its threads
+# would spin where the tests beside this one have work.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 ROOT = Path(__file__).resolve().parent.parent
 SHARED = ROOT.parent / "shared"
 SETTINGS = (
@@ -51,11 +55,6 @@ def pytest_configure() -> None:
     for name in SETTINGS:
         os.environ.pop(name, None)
     os.environ["TERM"] = "xterm-256color"
-    # with this set, every process of a test would compile all modules of omote again, and this one all tests
-    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-    sys.dont_write_bytecode = False
-    # before numpy: its threads would spin where the tests beside this one have work
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     if hasattr(os, "setpriority"):
         os.setpriority = keeping_priority(os.setpriority)
     # a shell starts what runs in the background with Ctrl-C ignored, and nohup ignores the terminal's end
@@ -63,6 +62,12 @@ def pytest_configure() -> None:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Workers of ``-n auto``: one more than there are processors, since many tests wait for processes and clocks."""
+    return 1 + len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1 + (os.cpu_count() or 1)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -211,7 +211,8 @@ def test_no_module_takes_a_name_of_the_standard_library() -> None:
 
 
 ALONE = """
-import importlib, os, sys
+import gc, importlib, os, sys
+gc.disable()  # going over all objects would copy their memory into every child
 for package in sys.argv[1].split():
     try:
         importlib.import_module(package)  # once for all: here only the rooms' own imports are looked at

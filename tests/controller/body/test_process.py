@@ -45,7 +45,7 @@ def servos() -> Iterator[SimulatedBus]:
 def stage(tmp_path: Path, root: Path, servos: SimulatedBus) -> Stage:
     """The shipped head on the simulated bus's port, no links; late answers of a busy machine are waited for."""
     robot = (root / "configs/robots/head24.toml").read_text()
-    robot = robot.replace('kind = "simulated"', f'kind = "dynamixel"\nport = "{servos.path}"\nmargin_s = 0.5')
+    robot = robot.replace('kind = "simulated"', f'kind = "dynamixel"\nport = "{servos.path}"\nmargin_s = 2.0')
     (tmp_path / "robot.toml").write_text(robot)
     (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["robot.toml"]\n')
     return load_stage(str(tmp_path / "stage.toml"), PARAMETERS)
@@ -144,7 +144,11 @@ def test_main_killed_is_noticed_and_the_servos_stopped(stage: Stage, servos: Sim
         main.communicate()
 
 
-def test_a_servo_that_does_not_answer_is_named_and_nothing_moves(stage: Stage, servos: SimulatedBus) -> None:
+@pytest.mark.usefixtures("stage")
+def test_a_servo_that_does_not_answer_is_named_and_nothing_moves(tmp_path: Path, servos: SimulatedBus) -> None:
+    robot = tmp_path / "robot.toml"
+    robot.write_text(robot.read_text().replace("margin_s = 2.0", "margin_s = 0.5"))  # it is asked several times
+    stage = load_stage(str(tmp_path / "stage.toml"), PARAMETERS)
     servos.fault("mute:7")
     with pytest.raises(ControllerError, match="7") as caught, BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()

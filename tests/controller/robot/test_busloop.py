@@ -73,7 +73,7 @@ def ticked(loop: BusLoop, count: int) -> None:
 
 
 def make(servos: SimulatedBus, face: Face, options: dict[str, Any] | None = None, **more: Any) -> BusLoop:
-    table = {"name": "b", "kind": "dynamixel", "port": servos.path, "rate_hz": 50, "margin_s": 0.3} | (options or {})
+    table = {"name": "b", "kind": "dynamixel", "port": servos.path, "rate_hz": 50, "margin_s": 2.0} | (options or {})
     return BusLoop(read_bus(table), CHANNELS, P, face, **more)
 
 
@@ -148,7 +148,7 @@ def test_servos_are_led_to_the_neutral_face_before_they_go_limp(servos: Simulate
 def test_nothing_is_sent_while_a_pose_is_not_known(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
     """A servo that came up and then keeps silent: where it is is not known, so no goal is safe."""
     servos.servo(1).place(2048 + 20 * TICKS)
-    loop = make(servos, Face())
+    loop = make(servos, Face(), {"margin_s": 0.3})  # it is asked again and again
     real = loop.bus.start
 
     def start() -> None:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from relief import cube_tsm, named, relief
+from relief import named, relief
 
 from surface.base.errors import FitError
-from surface.fit.surfaces import SurfaceOptions, fit_surfaces, head_of
+from surface.fit.surfaces import SurfaceOptions, head_of
 from surface.head import Head, HeadData
 
 SMILE = '[[groups]]\nname = "mouthSmileLeft"\n'
@@ -88,22 +88,6 @@ def test_groups_move_the_head(tmp_path: Path) -> None:
     before = head.parts[0].vertices.copy()
     head.pose(head.values({"mouthSmileLeft": 1.0}))
     assert 2 < (head.parts[0].vertices - before)[:, 1].max() < 5
-
-
-def test_charts_of_a_t_spline_with_star_points_move_as_one(tmp_path: Path) -> None:
-    (tmp_path / "cube.tsm").write_text(cube_tsm(3))
-    (tmp_path / "g.toml").write_text(SMILE + "at = [50, 60, 50]\nradius = 70\nmove = [9, 9, 0]\n")
-    options = SurfaceOptions(unit="mm", up="y", forward="z", groups=(tmp_path / "g.toml",))
-    report = fit_surfaces(tmp_path / "cube.tsm", tmp_path / "h", name="h", options=options)
-    assert 0 < report.parts[0].deviation_mm < 0.5
-    assert "exact but near star points, there within" in report.lines()[0]
-    part = Head.load(tmp_path / "h").data.parts[0]
-    shift = np.zeros_like(part.points)
-    shift[part.groups[0].ids] = part.groups[0].moves
-    _, first, same = np.unique(np.round(part.points, 6), axis=0, return_index=True, return_inverse=True)
-    regular = np.bincount(same.ravel())[same.ravel()] > 1
-    np.testing.assert_allclose(shift[regular], shift[first[same.ravel()]][regular], atol=1e-5)
-    assert np.abs(shift).max() > 3
 
 
 @pytest.mark.parametrize(

@@ -53,9 +53,13 @@ def made(scan_file):
     out = scan_file.parent / "head"
     heard: list[float] = []
     folder = scan_file.parent / "report"
-    report = transfer_head(
-        scan_file, ICT, out, name="other", progress=lambda _, done: heard.append(done), report_dir=folder
-    )
+    with pytest.MonkeyPatch.context() as patch:
+        for name, count in (("FEATURES", 300), ("FACE", 150), ("REST", 110)):  # the map is smooth: it needs no more
+            patch.setattr(f"surface.fit.transfer.register.{name}", count)
+        report = transfer_head(
+            scan_file, ICT, out, name="other", options=LoadOptions(up="z"), report_dir=folder,
+            progress=lambda _, done: heard.append(done),
+        )  # fmt: skip
     return Head.load(out), report, heard
 
 
