@@ -69,12 +69,14 @@ def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:
     """The head with corrective shapes: groups for pairs of shapes that do not add up, worth the product of the two.
 
     wanted : tables with ``shapes``, two of them; ``subtract``, shares of displacements of shapes that are taken back
-        where both are whole; ``gain``, by which each is multiplied before that, and then goes to 1 at most.
+        where both are whole; ``gain``, by which each is multiplied before that, and then goes to 1 at most; ``unless``,
+        a shape that is taken from each of the two first.
     """
     for table in wanted:
         first, second = table["shapes"]
         gain = float(table.get("gain", 1.0))
-        rule = Rule(f"{first}*{second}", ({first: gain}, {second: gain}))
+        less = {table["unless"]: -gain} if "unless" in table else {}
+        rule = Rule(f"{first}*{second}", ({first: gain} | less, {second: gain} | less))
         parts = [_corrected(p, rule.group, table["subtract"]) for p in head.parts]
         head = replace(head, parts=parts, rules=[*head.rules, rule])
     return head

@@ -196,15 +196,14 @@ def test_corrections_take_back_only_what_is_named_and_more_than_a_thousandth():
 
 def test_a_gain_reaches_the_whole_of_a_corrective_earlier(data):
     pair = {"shapes": ["jawOpen", "jawOpen"], "subtract": {"mouthSmileLeft": -1.0}}
-    head = add_correctives(data, [pair | {"gain": 2.0}])
+    head = add_correctives(data, [pair | {"gain": 2.0, "unless": "mouthClose"}])
     rule = head.rules[-1]
-    shapes = np.zeros(len(SHAPES))
     found = []
-    for value in (0.0, 0.25, 0.5, 1.0):
+    for value, shut in ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.25), (1.0, 1.0)):
         shapes = np.zeros(len(SHAPES))
-        shapes[SHAPES.index("jawOpen")] = value
+        shapes[SHAPES.index("jawOpen")], shapes[SHAPES.index("mouthClose")] = value, shut
         found.append(float(Drivers([rule]).amounts(shapes)[-1]))
-    assert found == [0.0, 0.25, 1.0, 1.0]
+    assert found == [0.0, 0.25, 1.0, 1.0, 0.25, 0.0]
 
 
 def test_an_open_mouth_shows_the_lower_teeth_and_a_low_tongue(root):
