@@ -20,6 +20,7 @@ DROOP = "tongueDroop"
 DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
 LOW = "tongueLow"
 LOW_RULE = Rule(LOW, ({"jawOpen": 1.0},))
+LOW_NARROWER, LOW_BACK = 0.2, 0.7  # of the width, and back by this share of how much it sinks
 TILTS = ("jawForward", "jawLeft", "jawRight")
 
 
@@ -93,13 +94,14 @@ def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
 
 
 def lowered_tongue(points: Floats, path: Floats, by_mm: float) -> Group:
-    """:data:`LOW`: the tongue of an open mouth lies on its floor, behind the lower teeth, its front lower by ``by_mm``.
+    """:data:`LOW`: the tongue of an open mouth lies on its floor, within the lower teeth, its front lower by ``by_mm``,
+    narrower and further back.
 
     points, path : as for :func:`tongue_groups`.
     """
     share = smoothstep(points[:, 2], path[1, 0], path[-2, 0])
     moves = np.zeros((len(points), 3), np.float32)
-    moves[:, 1] = np.round(-by_mm * share, 4)
+    moves[:] = np.round(share[:, None] * (points * [-LOW_NARROWER, 0, 0] - [0.0, by_mm, LOW_BACK * by_mm]), 4)
     ids = np.flatnonzero(moves[:, 1]).astype(np.int32)
     return Group(LOW, ids, moves[ids])
 
