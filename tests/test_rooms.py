@@ -33,9 +33,8 @@ FOREIGN = {
 COMPILED = {"drivers.core.kernels": {"numba"}}
 """Loaded by whoever drives a bus and by nobody else, so that looking for ports stays quick."""
 MOST_MODULES = 20
-REGISTRIES = {"drivers.base.plugins", "surface.export", "controller.cli.app"}
-"""Where modules are found by their folder, of the surface, which knows no drivers, and of all others; and where only
-the module of the command that runs is loaded."""
+REGISTRIES = {"drivers.base.plugins", "surface.export"}
+"""Where modules are found by their folder: of the surface, which knows no drivers, and of all others."""
 
 
 def modules() -> dict[str, Path]:

@@ -8,25 +8,49 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
-from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from typer import Typer  # start-up: Ctrl-C ends it quietly while all this still loads
 
 
+def _runs() -> tuple[Callable[..., None], ...]:
+    from controller.cli import run  # start-up: each of these only where it is needed
+
+    return run.demo, run.run, run.play
+
+
+def _pictures() -> tuple[Callable[..., None], ...]:
+    from controller.cli import heads, landmarks  # start-up: the same
+
+    return heads.render, heads.fit, landmarks.landmarks, heads.export
+
+
+def _buses() -> tuple[Callable[..., None], ...]:
+    from controller.cli import bus  # start-up: the same
+
+    return bus.ports, bus.scan, bus.set_id, bus.monitor, bus.calibrate
+
+
+def _others() -> tuple[Callable[..., None], ...]:
+    from controller.cli import bench, check, translate  # start-up: the same
+
+    return check.check, check.plugins, bench.bench, translate.translate
+
+
 COMMANDS = (
-    ("run", "demo"), ("run", "run"), ("run", "play"), ("heads", "render"), ("heads", "fit"), ("landmarks", "landmarks"),
-    ("heads", "export"), ("bus", "ports"), ("bus", "scan"), ("bus", "set_id"), ("bus", "monitor"), ("bus", "calibrate"),
-    ("check", "check"), ("check", "plugins"), ("bench", "bench"),
-    ("translate", "translate"), ("simulate", "simulate"),
-)  # fmt: skip
-"""Module in this folder and function of every command, in the order of ``omote --help``."""
+    (("demo", "run", "play"), _runs),
+    (("render", "fit", "landmarks", "export"), _pictures),
+    (("ports", "scan", "set-id", "monitor", "calibrate"), _buses),
+    (("check", "plugins", "bench", "translate"), _others),
+)
+"""Names of commands and what loads them, in the order of ``omote --help``; ``simulate`` has commands of its own."""
 
 
 def make_app(only: str = "") -> Typer:
-    """All commands, or the one called ``only``, which loads faster; all if there is none of that name."""
+    """All commands, or only those that are loaded with the one called ``only``, which is faster."""
     # start-up: main() ends Ctrl-C quietly from its first line on, while all this still loads
     from typer import Typer
 
@@ -40,13 +64,14 @@ def make_app(only: str = "") -> Typer:
         rich_markup_mode="rich",
         context_settings={"help_option_names": ["-h", "--help"]},
     )
-    chosen = [command for command in COMMANDS if command[1].replace("_", "-") == only] or COMMANDS
-    for module, name in chosen:
-        loaded = import_module(f"controller.cli.{module}")
-        if name == "simulate":
-            app.add_typer(loaded.make_app(), name=name)
-        else:
-            app.command()(getattr(loaded, name))
+    chosen = [load for names, load in COMMANDS if only in names]
+    for load in chosen or [load for _, load in COMMANDS]:
+        for command in load():
+            app.command()(command)
+    if not chosen:
+        from controller.cli import simulate  # start-up: the same
+
+        app.add_typer(simulate.make_app(), name="simulate")
     app.callback()(version.root)
     return app
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -37,7 +38,7 @@ class Rows:
     def __matmul__(self, points: ArrayLike) -> Floats:
         """(m, ...) float64 sums for values (n, ...) of the control points."""
         values = np.asarray(points, np.float64)[self.column]
-        terms = values.reshape(len(values), -1).T * self.share
+        terms = values.reshape(len(values), math.prod(values.shape[1:])).T * self.share
         sums: Floats = np.stack([np.bincount(self.row, term, self.count) for term in terms], axis=1)
         return sums.reshape(self.count, *values.shape[1:])
 

@@ -66,7 +66,7 @@ def quickened() -> Iterator[None]:
     shipped, load = find_config("heads", DEFAULT_HEAD), file.load_data
     head = load(shipped)
     with (
-        patch.object(app, "make_app", lambda: command),
+        patch.object(app, "make_app", lambda *_: command),
         patch.object(file, "load_data", lambda path: head if path == shipped else load(path)),
         patch.object(rhino, "_is_readable", _tried_in_fork),
     ):

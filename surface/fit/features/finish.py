@@ -11,7 +11,7 @@ import numpy as np
 from surface.base import files
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.fit.features.rigging import DROOP, DROOP_RULE
+from surface.fit.features.rigging import DROOP, DROOP_RULE, LOW_RULE, lowered_tongue
 from surface.fit.features.wrinkles import add_wrinkles
 from surface.fit.points.recipe import Recipe
 from surface.fit.points.strokes import arc_length
@@ -42,7 +42,8 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     names = tuple(p.name for p in head.parts)
     contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names, cling=bool(recipe.parts))
     parts = [wrinkled if p is face else p for p in head.parts]
-    head = add_correctives(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe.correctives)
+    head = lower_tongue(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe)
+    head = add_correctives(head, recipe.correctives)
     rest = read_pose(np.zeros(59))
     for _ in range(SETTLINGS):
         points = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
@@ -50,15 +51,32 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     return head
 
 
+def lower_tongue(head: HeadData, recipe: Recipe) -> HeadData:
+    """The head whose tongue sinks as the jaw opens, where the recipe says how far."""
+    if not recipe.tongue_low or not any(part.material == "tongue" for part in head.parts):
+        return head
+    path = np.array(recipe.tongue)
+    parts = [
+        replace(part, groups=[*part.groups, lowered_tongue(part.points, path, recipe.tongue_low)])
+        if part.material == "tongue"
+        else part
+        for part in head.parts
+    ]
+    return replace(head, parts=parts, rules=[*head.rules, LOW_RULE])
+
+
 def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:
     """The head with corrective shapes: groups for pairs of shapes that do not add up, worth the product of the two.
 
     wanted : tables with ``shapes``, two of them; ``subtract``, shares of displacements of shapes that are taken back
-        where both are whole.
+        where both are whole; ``gain``, by which each is multiplied before that, and then goes to 1 at most; ``unless``,
+        a shape that is taken from each of the two first.
     """
     for table in wanted:
         first, second = table["shapes"]
-        rule = Rule(f"{first}*{second}", ({first: 1.0}, {second: 1.0}))
+        gain = float(table.get("gain", 1.0))
+        less = {table["unless"]: -gain} if "unless" in table else {}
+        rule = Rule(f"{first}*{second}", ({first: gain} | less, {second: gain} | less))
         parts = [_corrected(p, rule.group, table["subtract"]) for p in head.parts]
         head = replace(head, parts=parts, rules=[*head.rules, rule])
     return head

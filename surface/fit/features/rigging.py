@@ -18,6 +18,9 @@ LEAST_MM = 0.004  # displacements smaller than this are dropped
 LEAST_GROUP_MM = 0.25  # a part gets no group for a shape that moves nothing in it further than this
 DROOP = "tongueDroop"
 DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
+LOW = "tongueLow"
+LOW_RULE = Rule(LOW, ({"jawOpen": 1.0},))
+LOW_NARROWER, LOW_BACK = 0.2, 0.7  # of the width, and back by this share of how much it sinks
 TILTS = ("jawForward", "jawLeft", "jawRight")
 
 
@@ -88,6 +91,19 @@ def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
     moves = straight - (points @ turn.T + shift), hung - straight
     named = zip(("tongueOut", DROOP), moves, strict=True)
     return [Group(name, ids, np.round(held * move, 4).astype(np.float32)) for name, move in named]
+
+
+def lowered_tongue(points: Floats, path: Floats, by_mm: float) -> Group:
+    """:data:`LOW`: the tongue of an open mouth lies on its floor, within the lower teeth, its front lower by ``by_mm``,
+    narrower and further back.
+
+    points, path : as for :func:`tongue_groups`.
+    """
+    share = smoothstep(points[:, 2], path[1, 0], path[-2, 0])
+    moves = np.zeros((len(points), 3), np.float32)
+    moves[:] = np.round(share[:, None] * (points * [-LOW_NARROWER, 0, 0] - [0.0, by_mm, LOW_BACK * by_mm]), 4)
+    ids = np.flatnonzero(moves[:, 1]).astype(np.int32)
+    return Group(LOW, ids, moves[ids])
 
 
 def _along_path(points: Floats, first: float, last: float, path: Callable[..., Floats]) -> Floats:

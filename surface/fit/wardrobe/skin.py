@@ -22,11 +22,12 @@ def unit(rows: Floats) -> Floats:
 class Skin:
     """Samples of the skin at rest.
 
-    points, normals : (s, 3). part : (s,) number in :data:`ANCHORS`. uv : (s, 2).
+    data : the head. points, normals : (s, 3). part : (s,) number in :data:`ANCHORS`. uv : (s, 2).
     bare : samples without the ears, which hair lies over or behind.
     """
 
     def __init__(self, head: Head) -> None:
+        self.data = head.data
         self.surfaces = [head.part(name).surface for name in ANCHORS]
         self.uv, self.part, self.points, self.normals = self._samples(head)
         x, y, z = np.abs(self.points[:, 0]), self.points[:, 1], self.points[:, 2]

@@ -17,6 +17,7 @@ from surface.fit.wardrobe.patches import Patches, arrays
 from surface.fit.wardrobe.skin import ANCHORS, Skin
 from surface.fit.wardrobe.styles import step
 from surface.head.model.sidecar import write_sidecar
+from surface.head.model.wardrobe import outline
 
 SIZE = 192  # pixels of a picture along u and v
 FADE_MM = (-5.0, 4.0)  # inside the hairline: where the skin begins to have hair's colour, and where it has it
@@ -27,7 +28,7 @@ def write_garment(
     path: Path, skin: Skin, parts: Mapping[str, tuple[str, list[Patches]]], fields: Mapping[str, Floats]
 ) -> Path:
     """Write parts, each a material and its patches, and pictures (h, w), 0..1, by "KIND/PART"."""
-    every: dict[str, Array] = {"anchors": np.array(ANCHORS)}
+    every: dict[str, Array] = {"anchors": np.array(ANCHORS), "fit": np.array([outline(skin.data, ANCHORS)], np.int64)}
     every["parts"] = np.array([f"{name}:{material}" for name, (material, _) in parts.items()])
     for name, (_, patches) in parts.items():
         every |= {f"{name}/{key}": array for key, array in arrays(patches, skin).items()}

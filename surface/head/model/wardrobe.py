@@ -10,12 +10,14 @@ Arrays of a file, by part as ``PART/key``, with n control points and m vertices:
 ``sway`` (n,) share of the motion that lags behind the head's; ``strands`` (m, 4) texture coordinates across and along,
 cover and occlusion; ``tint`` (m,) share of the tips' colour; ``shade`` (m,) brightness; ``fast`` (t, 3) fewer
 triangles. ``cover/PART``, ``hidden/PART`` and ``shadow/PART`` (h, w) are pictures over (u, v) of a part of the head,
-0 to 255: skin that has the garment's colour, that is covered, and that lies in its shade.
+0 to 255: skin that has the garment's colour, that is covered, and that lies in its shade. ``fit`` (1,) is the
+:func:`outline` of the head it was made for; files without it are put on any head that has the parts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import zlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +31,7 @@ from surface.head.model.sidecar import DAMAGED, Sidecar, read_sidecar, reason
 from surface.head.model.sway import SWAYS, sway_moves
 
 HINT = "names are those of configs/wardrobe"
+OTHER_HEAD = "leave out hair, beard and clothes"
 STORED = ("points", "anchor", "degrees", "knots_u", "knots_v", "follow", "sway", "strands", "tint", "shade", "fast")
 BY_POINT = {"points": (3,), "anchor": (3,), "degrees": (2,), "follow": (), "sway": ()}  # shape of a row of each
 BY_VERTEX = {"mesh_uv": (2,), "strands": (4,), "tint": (), "shade": (), "mesh_side": ()}
@@ -50,12 +53,23 @@ class Garment:
     """Contents of a file.
 
     anchors : the head's parts that its points are offsets from. fields : pictures by "KIND/PART", 0..1.
+    fit : :func:`outline` of the head it was made for; None where the file does not say.
     """
 
     worn: Worn
     anchors: tuple[str, ...]
     parts: tuple[WornPart, ...]
     fields: Mapping[str, Floats32]
+    fit: int | None = None
+
+
+def outline(head: HeadData, anchors: Sequence[str]) -> int:
+    """CRC-32 over how parts lie in (u, v): their trim loops and slits. Identities and refinement leave it as it is."""
+    out = 0
+    for part in (p for name in anchors for p in head.parts if p.name == name):
+        for line in (*part.loops, part.slits):
+            out = zlib.crc32(np.rint(1e4 * np.asarray(line, np.float64)).astype(np.int64).tobytes(), out)
+    return out
 
 
 def read_garment(worn: Worn) -> Garment:
@@ -74,7 +88,8 @@ def read_garment(worn: Worn) -> Garment:
             if not np.isin(part.arrays["anchor"][:, 0], np.arange(len(anchors))).all():
                 raise ValueError(f"{part.name}/anchor names a part that is not in anchors")
         fields = {k: z[k].astype(np.float32) / np.float32(255) for k in z if k.split("/")[0] in FIELDS}
-        return Garment(worn, anchors, parts, fields)
+        fit = int(z["fit"][0]) if "fit" in z else None
+        return Garment(worn, anchors, parts, fields, fit)
 
     found = read_sidecar(worn.path, make, HINT)
     if found is None:
@@ -113,7 +128,9 @@ def with_garments(head: HeadData, garments: tuple[Garment, ...], where: str) -> 
         missing = [name for name in garment.anchors if name not in {p.name for p in head.parts}]
         if missing:
             why = f"fits a head with the parts {', '.join(garment.anchors)}, which this one has not"
-            raise HeadFileError(f"{where}: {garment.worn.path.stem} {why}", hint="leave out hair, beard and clothes")
+            raise HeadFileError(f"{where}: {garment.worn.path.stem} {why}", hint=OTHER_HEAD)
+        if garment.fit is not None and garment.fit != outline(head, garment.anchors):
+            raise HeadFileError(f"{where}: {garment.worn.path.stem} was made for another head", hint=OTHER_HEAD)
         try:
             parts += [_seated(worn, garment, head, where) for worn in garment.parts]
         except DAMAGED as error:

@@ -243,7 +243,7 @@ def test_a_reader_that_is_gone_ends_a_command_quietly() -> None:
 def test_interrupts_that_were_ignored_count_again_and_others_handlers_stay(
     omote: Omote, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "make_app", lambda: lambda: None)
+    monkeypatch.setattr(module, "make_app", lambda *_: lambda: None)
     before = signal.getsignal(signal.SIGINT)
     try:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -264,7 +264,7 @@ def test_ctrl_c_while_a_class_is_made_is_no_fault_of_omote(monkeypatch: pytest.M
     def app() -> None:
         raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()
 
-    monkeypatch.setattr(module, "make_app", lambda: app)
+    monkeypatch.setattr(module, "make_app", lambda *_: app)
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 130
@@ -277,7 +277,7 @@ def test_what_the_system_has_run_out_of_is_no_fault_of_omote(
         raise OSError(24, "Too many open files")
 
     monkeypatch.delenv("OMOTE_DEBUG", raising=False)
-    monkeypatch.setattr(module, "make_app", lambda: app)
+    monkeypatch.setattr(module, "make_app", lambda *_: app)
     with pytest.raises(SystemExit) as ended:
         main()
     said = capsys.readouterr().err

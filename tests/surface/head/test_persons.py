@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ from scipy.spatial import cKDTree
 
 from surface.base.errors import HeadFileError
 from surface.head import Head
+from surface.head.model.file import load_data
 from surface.head.model.look import Look, Worn
-from surface.head.model.wardrobe import read_garment
+from surface.head.model.wardrobe import outline, read_garment, with_garments
 from surface.view import Camera, Offscreen
 
 CONFIGS = Path(__file__).resolve().parents[3] / "configs"
@@ -115,6 +117,19 @@ def test_no_hole_opens_between_hair_and_skin(plain: Head, dressed: Head, gl: Non
 def test_what_is_worn_must_be_there_and_fit(tmp_path: Path) -> None:
     with pytest.raises(HeadFileError, match="missing"):
         Head.load(ICT, None, Look(worn=(Worn(tmp_path / "hat.npz", GREY),)))
+
+
+def test_a_garment_knows_the_head_it_was_made_for() -> None:
+    garment = read_garment(Worn(WARDROBE / "hair-crop.npz", GREY))
+    head = load_data(ICT)
+    assert garment.fit == outline(head, garment.anchors)
+    face = head.parts[0]
+    moved = replace(face, points=face.points + 1.0)
+    assert outline(replace(head, parts=[moved, *head.parts[1:]]), garment.anchors) == garment.fit, "any identity"
+    other = replace(head, parts=[replace(face, loops=[loop * 0.99 for loop in face.loops]), *head.parts[1:]])
+    with pytest.raises(HeadFileError, match="hair-crop was made for another head"):
+        with_garments(other, (garment,), "there")
+    assert len(with_garments(other, (replace(garment, fit=None),), "there").parts) == len(head.parts) + 1
 
 
 @pytest.mark.parametrize("key", ["hair/follow", "hair/strands", "hair/fast"])

@@ -82,3 +82,4 @@ def test_rows_for_products_are_the_matrix_without_scipy() -> None:
     for values in (surface.points, np.arange(25.0), np.ones((25, 2, 3))):
         wanted = (sparse @ values.reshape(25, -1)).reshape(40, *values.shape[1:])
         assert np.allclose(rows @ values, wanted, rtol=0, atol=1e-13)
+    assert (matrix.basis_rows(surface, np.zeros((0, 2))) @ surface.points).shape == (0, 3)

@@ -51,6 +51,14 @@ vec3 iris(vec2 p, float t) {
     return tint * (1.0 - 0.8 * smoothstep(0.72, 1.0, t)) * smoothstep(-0.06, 0.12, t);
 }
 
+// Two upright windows where the key light is, in sines of angles from its middle: 1 in a pane, soft at its frame.
+float windows(vec3 mirrored) {
+    vec3 side = normalize(cross(vec3(0.0, 1.0, 0.0), key_direction) + vec3(1e-4, 0.0, 0.0));
+    vec2 at = abs(vec2(dot(mirrored, side), dot(mirrored, cross(key_direction, side))));
+    float pane = 1.0 - smoothstep(0.085, 0.125, abs(at.x - 0.135));
+    return pane * (1.0 - smoothstep(0.21, 0.27, at.y));
+}
+
 void main() {
     vec3 d = normalize(v_local);
     vec3 v = normalize(v_view);
@@ -83,9 +91,9 @@ void main() {
     vec3 lit = albedo * light * shade * caustic;
 
     vec3 mirrored = reflect(-v, cornea);
-    // Lamps mirror as soft boxes: flat inside, soft at the rim.
+    // The key light mirrors as two windows side by side, the fill as a soft lamp.
     float towards_key = dot(mirrored, key_direction);
-    float key = 1.1 * smoothstep(0.955, 0.980, towards_key) + 0.05 * lobe(towards_key, 30.0);
+    float key = 1.1 * windows(mirrored) * step(0.0, towards_key) + 0.05 * lobe(towards_key, 30.0);
     float fill = smoothstep(0.965, 0.990, dot(mirrored, fill_direction)) * 0.5;
     float fresnel = 1.0 - clamp(dot(cornea, v), 0.0, 1.0);
     fresnel = 0.03 + 0.5 * fresnel * fresnel * fresnel;

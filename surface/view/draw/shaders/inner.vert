@@ -1,5 +1,6 @@
 // Teeth, gums, tongue and the mouth's lining: lit by what comes in between the lips, per vertex.
 #define WALLS vec3(0.50, 0.18, 0.16)
+#define NEIGHBOURS vec3(0.84, 0.82, 0.80)
 #define DEEP_MM vec2(12.0, 40.0)  // behind the lips: where the mouth's inside begins to be deep, and where it is
 #define ROUND_WALLS vec3(1.0, 0.86, 0.78)
 
@@ -42,10 +43,13 @@ void main() {
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, deep);
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
         + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
+    float teeth = smoothstep(0.5, 0.7, albedo.g);
     // A tongue past the lips is in the open.
-    float reach = mix(clamp(daylight(n) * mix(occlusion, 1.0, 0.5 * deep), 0.0, 1.0), 1.0, smoothstep(-8.0, 3.0, past));
+    float open = mix(occlusion, 1.0, max(0.5 * deep, 0.5 * teeth));
+    float reach = mix(clamp(daylight(n) * open, 0.0, 1.0), 1.0, smoothstep(-8.0, 3.0, past));
     // Light bounces between here and the red walls of the mouth: the less comes straight in, the more that counts.
-    vec3 bounce = 0.5 * (albedo + WALLS);
+    // Teeth pass it on to each other, whiter than those walls do.
+    vec3 bounce = mix(0.5 * (albedo + WALLS), NEIGHBOURS, 0.9 * teeth);
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach;

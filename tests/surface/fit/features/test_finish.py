@@ -22,6 +22,7 @@ from surface.head.model.data import PartData
 from surface.head.model.file import load_data
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import SHAPES
+from surface.head.model.rules import Drivers
 
 
 def test_a_head_without_openings_stays_as_it_is():
@@ -191,3 +192,25 @@ def test_corrections_take_back_only_what_is_named_and_more_than_a_thousandth():
     group = add_correctives(head, table).parts[0].groups[-1]
     assert group.name == "mouthLeft*jawOpen" and group.ids.tolist() == [*range(5), *range(7, 25)]
     np.testing.assert_allclose(group.moves[[0, -1]], [[-0.5, 0, 0], [-0.00105, 0, 0]], atol=1e-8)
+
+
+def test_a_gain_reaches_the_whole_of_a_corrective_earlier(data):
+    pair = {"shapes": ["jawOpen", "jawOpen"], "subtract": {"mouthSmileLeft": -1.0}}
+    head = add_correctives(data, [pair | {"gain": 2.0, "unless": "mouthClose"}])
+    rule = head.rules[-1]
+    found = []
+    for value, shut in ((0.0, 0.0), (0.25, 0.0), (0.5, 0.0), (1.0, 0.0), (0.5, 0.25), (1.0, 1.0)):
+        shapes = np.zeros(len(SHAPES))
+        shapes[SHAPES.index("jawOpen")], shapes[SHAPES.index("mouthClose")] = value, shut
+        found.append(float(Drivers([rule]).amounts(shapes)[-1]))
+    assert found == [0.0, 0.25, 1.0, 1.0, 0.25, 0.0]
+
+
+def test_an_open_mouth_shows_the_lower_teeth(root):
+    head = Head.load(root / "configs" / "heads" / "ict")
+    for value in (0.65, 1.0):
+        head.pose(head.values({"jawOpen": value}))
+        face, teeth = (head.part(name).vertices for name in ("face", "teeth_lower"))
+        middle = face[(np.abs(face[:, 0]) < 2.0) & (face[:, 2] > 90.0) & (face[:, 1] < -42.0)]
+        edge = teeth[(np.abs(teeth[:, 0]) < 4.0) & (teeth[:, 2] > 80.0), 1].max()
+        assert edge > middle[:, 1].max() + 0.5, value

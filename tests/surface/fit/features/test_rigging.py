@@ -9,6 +9,7 @@ from surface.fit.features.rigging import (
     find_jaw,
     jaw_share,
     lid_share,
+    lowered_tongue,
     make_groups,
     tongue_groups,
 )
@@ -184,3 +185,12 @@ def test_displacements_are_rounded_to_a_tenth_of_a_micrometre():
     for group in (*made, *tongue_groups(section, PATH, JAW)):
         steps = 1e4 * group.moves.astype(float)
         assert np.abs(steps - np.rint(steps)).max() < 0.06 and (np.rint(steps) % 10).any()
+
+
+def test_the_front_of_a_lowered_tongue_sinks_and_its_root_stays():
+    points = np.column_stack([np.full(5, 10.0), np.full(5, -40.0), [20.0, 50.0, 70.0, 90.0, 98.0]])
+    path = np.zeros((5, 7))
+    path[:, 0] = [30.0, 50.0, 70.0, 90.0, 98.0]
+    group = lowered_tongue(points, path, 6.0)
+    assert group.name == "tongueLow" and group.ids.tolist() == [2, 3, 4]
+    assert group.moves == pytest.approx(np.outer([0.5, 1.0, 1.0], [-2.0, -6.0, -4.2]))
