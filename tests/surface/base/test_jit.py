@@ -9,7 +9,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from numba.core.errors import NumbaRuntimeError
 from numba.core.registry import CPUDispatcher
 
 from surface.base import jit
@@ -120,3 +122,18 @@ def test_kernels_run_on_a_full_disk(monkeypatch: pytest.MonkeyPatch, caplog: pyt
 
     assert double(2.0) == 4.0
     assert "No space left on device" in caplog.text
+
+
+def test_a_lean_kernel_cannot_allocate_and_may_call_one_that_does() -> None:
+    def allocate(array):  # type: ignore[no-untyped-def]
+        return np.zeros(3).sum() + array[0]
+
+    allocating = jit.kernel(allocate)
+
+    def call(array):  # type: ignore[no-untyped-def]
+        return allocating(array[1:]) + array[0]
+
+    lean = jit.lean(call)
+    assert lean(np.array([1.0, 2.0])) == 3.0
+    with pytest.raises(NumbaRuntimeError, match="NRT required"):
+        jit.lean(allocate)(np.ones(1))
