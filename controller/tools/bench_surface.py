@@ -64,11 +64,14 @@ def bench_surface(seconds: float, log: Log, vertices: int = VERTICES, name: str 
 
 
 def bench_large(seconds: float, log: Log, progress: Progress, vertices: int = VERTICES) -> Tables:
-    """Building trees and lists for that many control points; two threads against one; ten times ``vertices``."""
+    """Building trees and lists for that many control points; the sheet with cold caches; two threads against one; ten
+    times ``vertices``."""
     large = 10 * vertices
     level = max(0, round(np.log2(np.sqrt(large) / 8)))  # under 8 x 8 roots
     built = build_table(vertices, level, progress)
-    return [(f"about {large:,} vertices", built + large_table(large, seconds, log))]
+    cool = cold.cold_rows(f"sheet of {large:,}", [sheet(large)], seconds, "<= 0.8", report=log)
+    return [(f"about {large:,} vertices, caches cold", cool),
+            (f"about {large:,} vertices", built + large_table(large, seconds, log))]  # fmt: skip
 
 
 def bench_growth(seconds: float, log: Log, out: Path, vertices: int = VERTICES) -> Tables:

@@ -48,7 +48,7 @@ IMPORT = re.compile(r"^from[ ]+(\.*)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n#]*)", 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile at the first call for each set of argument types, cache on disk, release the GIL."""
-    return _compiled(function)
+    return _compiled(function, _nrt=True)  # else it takes what a lean caller has, and cannot allocate
 
 
 def lean(function: Callable[..., Any]) -> Any:

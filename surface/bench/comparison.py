@@ -172,7 +172,7 @@ def draw(variants: list[Variant], path: str | Path, *, height: int = 900) -> Non
         _draw_mesh(pen, variant.mesh, place)
         text = f"{variant.name}\n{len(variant.mesh.vertices)} vertices"
         if variant.saving:
-            text += f", {100 * variant.saving:.1f} % saved"
+            text += f", {100 * abs(variant.saving):.1f} % {'saved' if variant.saving > 0 else 'more'}"
         pen.multiline_text((offset[0], 0.01 * height), text, fill="black", font_size=0.045 * height)
     picture.resize((picture.width // 2, height), Image.Resampling.LANCZOS).save(path)
 

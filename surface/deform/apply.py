@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.jit import inlined, kernel, lean
+from surface.base.jit import inlined, lean
 from surface.spline.lanes import (
     add,
     div,
@@ -35,6 +35,7 @@ from .binding import arrays_of
 from .groupsums import HEAD, STEP, join_all, join_values, sum_groups, wide
 from .packedsums import AHEAD, sum_all_packed, sum_packed, write_lanes
 
+AHEAD_OUT = 384  # coordinates of vertices that are fetched before they are written: 16 tiles
 MOST_SQUARE = np.float32(1e36)  # of a vector's length
 
 
@@ -222,6 +223,9 @@ def write_joined(
     """Positions of a cell with factors, whose groups have been summed."""
     full = last - (last - first) % 8
     for vertex in range(first, full, 8):
+        prefetch(vertices, 3 * vertex + AHEAD_OUT)  # a line is read before a part of it is written
+        prefetch(vertices, 3 * vertex + AHEAD_OUT + 16)
+        prefetch(inv_w, 8 * tile + AHEAD_OUT // 3)
         x, y, z = join_values(groups, wide_u, pick_at, factors, picks, starts, scratch)
         x, y, z = positions_of(tile, x, y, z, inv_w)
         store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
@@ -312,7 +316,7 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
                 tile += 1
 
 
-@kernel
+@lean
 def join_ranges(cells, total, cell_start, gap, out):
     """Vertex ranges of rising cells, joined where fewer than ``gap`` vertices lie between; returns their number."""
     count = 0

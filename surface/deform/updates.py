@@ -84,7 +84,7 @@ def find_affected(ids, delta, count, point_start, point_count, point_cell, hits,
     return total
 
 
-@kernel
+@lean
 def choose_recomputed(
     total, affected, hits, pull, differences, span, drift, rows, rows_at, slopes, limit, bias, most_drift, recomputed
 ):  # fmt: skip
@@ -122,7 +122,16 @@ def largest(local, rows):
     return most
 
 
-@kernel
+@lean
+def reach_along(points, k):
+    """The least and the greatest of coordinate k of ``points (n, 3)``."""
+    low, high = points[0, k], points[0, k]
+    for i in range(points.shape[0]):
+        low, high = min(low, points[i, k]), max(high, points[i, k])
+    return low, high
+
+
+@lean
 def measure(points, extent, afresh):
     """Fill ``extent`` for ``points (n, 3)``; returns whether origins are to be chosen again, as they are if ``afresh``.
 
@@ -130,22 +139,22 @@ def measure(points, extent, afresh):
     longest side since origins were chosen, the greatest coordinate that is allowed, and the box's middle when origins
     were chosen (3).
     """
-    middle, away = np.empty(3), 0.0
-    extent[:2] = 0.0
+    extent[0], extent[1], away = 0.0, 0.0, 0.0
     for k in range(3):
-        low, high = points[0, k], points[0, k]
-        for i in range(points.shape[0]):
-            low, high = min(low, points[i, k]), max(high, points[i, k])
-        extent[0], middle[k] = max(extent[0], high - low), 0.5 * low + 0.5 * high
-        away = max(away, abs(middle[k] - extent[4 + k]))
+        low, high = reach_along(points, k)
+        extent[0] = max(extent[0], high - low)
+        away = max(away, abs(0.5 * low + 0.5 * high - extent[4 + k]))
     extent[2] = max(extent[2], extent[0])
     if not (afresh or 2.0 * extent[0] < extent[2] or away > extent[0]):
         return False
-    extent[2], extent[4:] = extent[0], middle
+    extent[2] = extent[0]
+    for k in range(3):
+        low, high = reach_along(points, k)
+        extent[4 + k] = 0.5 * low + 0.5 * high
     return True
 
 
-@kernel
+@lean
 def has_left(points, delta, count, extent):
     """Whether the surface has become so small, or moved so far, that the origins do not fit it any more.
 
@@ -219,7 +228,7 @@ def update_cells(table, count, limit, bias, sign):
     return total
 
 
-@kernel
+@lean
 def first_invalid(ids, rows, relative, points, farthest):
     """The first row with an id out of range (as ``-1 - row``), or one that leads to a number that is not finite or
     beyond ``farthest`` (``row``); or VALID."""
@@ -235,7 +244,7 @@ def first_invalid(ids, rows, relative, points, farthest):
     return VALID
 
 
-@kernel
+@lean
 def store_positions(ids, rows, relative, points, moved_ids, delta):
     """Store new positions; ``moved_ids`` and ``delta`` get the points that really moved; returns their number."""
     count = 0
@@ -258,7 +267,7 @@ def store_positions(ids, rows, relative, points, moved_ids, delta):
     return count
 
 
-@kernel
+@lean
 def move_points(table, ids, rows, relative, most, limit, bias, gap, sign):
     """Move points and bring the mesh up to date: the whole of an update in one call.
 

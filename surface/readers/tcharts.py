@@ -14,17 +14,43 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Bools, Floats
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain
 from surface.spline.matrix import basis_rows
 
 from .common import NamedSurface, Ties
 from .starpatch import SPANS, Sampled, fit_patch, limit_samples
-from .tlayout import STEP, Complex, Copy, Layout, Rect, overlap
+from .tlayout import STEP, Complex, Copy, Layout, Rect
 from .tsmfile import TsmFile
 
 GAP = 2.0  # between the reaches of two charts, in mean sides of faces: no cell of a mesh shall reach over it
+
+
+class Boxes:
+    """A growing list of rectangles."""
+
+    def __init__(self) -> None:
+        self._all, self._used = np.zeros((64, 4)), 0
+
+    def append(self, rect: Rect) -> None:
+        """Add one."""
+        if self._used == len(self._all):
+            self._all = np.concatenate([self._all, np.zeros_like(self._all)])
+        self._all[self._used] = rect
+        self._used += 1
+
+    @property
+    def rows(self) -> Floats:
+        """(k, 4) all of them."""
+        return self._all[: self._used]
+
+
+def overlaps(rects: Floats, rect: Floats, near: float) -> Bools:
+    """Which of ``rects (k, 4)`` share more than a border with ``rect (4,)``: as :func:`.tlayout.overlap`."""
+    u0, u1, v0, v1 = rects.T
+    shared: Bools = (u0 < rect[1] - near) & (rect[0] < u1 - near) & (v0 < rect[3] - near) & (rect[2] < v1 - near)
+    return shared
 
 
 @dataclass
@@ -39,19 +65,29 @@ class Chart:
     rects: dict[int, Rect] = field(default_factory=dict)
     copies: dict[tuple[int, ...], Copy] = field(default_factory=dict)
     keys: dict[int, set[tuple[int, ...]]] = field(default_factory=dict)
+    _boxes: Boxes = field(default_factory=lambda: Boxes())  # of the faces
+    _reached: Boxes = field(default_factory=lambda: Boxes())  # where copies act
+    _numbers: dict[tuple[int, ...], int] = field(default_factory=dict)  # of copies in these
 
     def fits(self, rect: Rect, copies: dict[tuple[int, ...], Copy], near: float) -> bool:
         """Whether a face can join: it lies beside the others, and all still see only their own grips."""
-        if any(overlap(rect, other, near) for other in self.rects.values()):
+        rects, reached, new = self._boxes.rows, self._reached.rows, [key for key in copies if key not in self.copies]
+        if overlaps(rects, np.array(rect), near).any():
             return False
-        if any(copy.reaches(rect, near) for key, copy in self.copies.items() if key not in copies):
+        seen = overlaps(reached, np.array(rect), near)
+        seen[[self._numbers[key] for key in copies if key in self._numbers]] = False
+        if seen.any():
             return False
-        new = [copy for key, copy in copies.items() if key not in self.copies]
-        return not any(copy.reaches(other, near) for copy in new for other in self.rects.values())
+        return not any(overlaps(rects, np.array(copies[key].rect), near).any() for key in new)
 
     def add(self, face: int, place: tuple[float, float, int], rect: Rect, copies: dict[tuple[int, ...], Copy]) -> None:
         """Let a face join."""
         self.places[face], self.rects[face], self.keys[face] = place, rect, set(copies)
+        self._boxes.append(rect)
+        for key, copy in copies.items():
+            if key not in self.copies:
+                self._numbers[key] = len(self._numbers)
+                self._reached.append(copy.rect)
         self.copies |= copies
 
 

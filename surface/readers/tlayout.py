@@ -7,9 +7,11 @@ ends).
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections import deque
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 
@@ -40,10 +42,10 @@ class Copy:
             u, v = tuple(-x for x in reversed(v)), u
         return Copy(self.grip, tuple(x + du for x in u), tuple(x + dv for x in v))
 
-    def reaches(self, rect: Rect, near: float) -> bool:
-        """Whether it acts inside a rectangle."""
-        u, v = self.knots_u, self.knots_v
-        return u[0] < rect[1] - near and u[-1] > rect[0] + near and v[0] < rect[3] - near and v[-1] > rect[2] + near
+    @property
+    def rect(self) -> Rect:
+        """Where it acts."""
+        return self.knots_u[0], self.knots_u[-1], self.knots_v[0], self.knots_v[-1]
 
     def key(self, near: float) -> tuple[int, ...]:
         """Equal for copies that differ by rounding only."""
@@ -166,6 +168,7 @@ class Layout:
     def __init__(self, mesh: Complex, face: int, rings: int = RINGS) -> None:
         self.mesh = mesh
         self.places: dict[int, tuple[float, float, int]] = {}
+        self._rays: dict[tuple[int, float], Ray] = {}  # by axis, and by the coordinate that they have in common
         self.rects: dict[int, Rect] = {}
         queue = deque([(face, mesh.loops[face][0], (0.0, 0.0), 0, 0)])
         while queue:
@@ -216,22 +219,19 @@ class Layout:
     def _knots(self, axis: int, at: tuple[float, float], inward: int) -> Knots | None:
         """The five knots of a grip along u (0) or v (1); None where it would lie outside."""
         near, x, y = self.mesh.near, at[axis], at[1 - axis]
-        lines = self._lines[axis]
-        met = lines[(lines[:, 1] <= y + near) & (lines[:, 2] >= y - near)]
-        low = met[(met[:, 3] == 1) & (met[:, 0] <= x + near), 0].max(initial=-np.inf)
-        high = met[(met[:, 3] == 2) & (met[:, 0] >= x - near), 0].min(initial=np.inf)
-        inner = _merged(met[(met[:, 0] > low + near) & (met[:, 0] < high - near), 0], near)
-        inner = _extended(inner, x, low, high)
-        row = [low] * 4 * bool(np.isfinite(low)) + inner + [high] * 4 * bool(np.isfinite(high))
+        if (axis, y) not in self._rays:
+            lines = self._lines[axis]
+            self._rays[axis, y] = Ray(lines[(lines[:, 1] <= y + near) & (lines[:, 2] >= y - near)], near)
+        row, low, high = self._rays[axis, y].row(x)
         if abs(x - low) <= near:
             centre = 2 + inward
         elif abs(x - high) <= near:
             centre = len(row) - 3 + inward
         else:
-            centre = int(np.argmin(np.abs(np.array(row) - x))) + inward
+            centre = nearest(row, x) + inward
         if not 2 <= centre <= len(row) - 3:
             return None
-        return tuple(float(t) for t in row[centre - 2 : centre + 3])
+        return tuple(row[centre - 2 : centre + 3])
 
     def _reaching(self, axis: int, at: tuple[float, float], inward: int, rect: Rect) -> Knots | None:
         """As :meth:`_knots`; None also where the grip would not act inside a rectangle."""
@@ -264,19 +264,59 @@ class Layout:
         return list(out.values())
 
 
+class Ray:
+    """A straight line through a layout: the edges that it crosses, in order.
+
+    met : (k, 4) rows of :attr:`Layout._lines`.
+    """
+
+    def __init__(self, met: Floats, near: float) -> None:
+        self._near = near
+        self._all, self._ends, self._starts = (
+            np.sort(met[of, 0]).tolist() for of in (slice(None), met[:, 3] == 2, met[:, 3] == 1)
+        )
+        self._rows: dict[tuple[float, float], list[float]] = {}
+
+    def row(self, x: float) -> tuple[list[float], float, float]:
+        """Knots between the two places of the outline about x, with four at each, and these places; infinity where the
+        layout ends without one."""
+        k = bisect_right(self._starts, x + self._near)
+        low = self._starts[k - 1] if k else -np.inf
+        k = bisect_left(self._ends, x - self._near)
+        high = self._ends[k] if k < len(self._ends) else np.inf
+        if (low, high) not in self._rows:
+            first, last = bisect_right(self._all, low + self._near), bisect_left(self._all, high - self._near)
+            inner = _merged(self._all[first:last], self._near)
+            row = _extended(inner, x, low, high)
+            found = [low] * 4 * bool(np.isfinite(low)) + row + [high] * 4 * bool(np.isfinite(high))
+            if not inner:
+                return found, low, high  # these depend on x
+            self._rows[low, high] = found
+        return self._rows[low, high], low, high
+
+
+def nearest(row: list[float], x: float) -> int:
+    """Place of the number in a rising row that is nearest to x, the first of several."""
+    k = bisect_left(row, x)
+    if k == len(row) or (k > 0 and x - row[k - 1] <= row[k] - x):
+        return bisect_left(row, row[k - 1])
+    return k
+
+
 def overlap(a: Rect, b: Rect, near: float) -> bool:
     """Whether two rectangles share more than a border."""
     return a[0] < b[1] - near and b[0] < a[1] - near and a[2] < b[3] - near and b[2] < a[3] - near
 
 
-def _merged(values: Floats, near: float) -> list[float]:
-    """Distinct values in order."""
-    row = np.sort(values)
-    return [float(x) for x in row[np.concatenate([[True], np.diff(row) > near])[: len(row)]]]
+def _merged(row: list[float], near: float) -> list[float]:
+    """Distinct values of a rising row."""
+    return row[:1] + [b for a, b in pairwise(row) if b - a > near]
 
 
 def _extended(inner: list[float], x: float, low: float, high: float) -> list[float]:
     """Knots with three more where the layout ends without an outline: equal intervals beyond what is known."""
+    if np.isfinite(low) and np.isfinite(high):
+        return inner
     row = inner or [x]
     ends = [e for e in (low, high) if np.isfinite(e)]
     steps = np.diff(np.unique([*row, *ends]))

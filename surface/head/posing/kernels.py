@@ -6,8 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
-from surface.base.jit import inlined, lean
-from surface.spline.lanes import fma, load_x, load_y, load_z, splat, store3
+from surface.base.jit import inlined, kernel, lean
+from surface.spline.lanes import add, div, fma, load_x, load_y, load_z, mul, root, splat, store3
+
+ONE, TINY = np.float32(1.0), np.float32(1e-30)
 
 
 @lean
@@ -41,35 +43,59 @@ def mix_rows(amounts: Floats, rows: Floats, rest: Floats, least: Floats, out: Fl
 
 
 @inlined
-def mapped(rows, at, linear, x0, y0, z0, out):  # type: ignore[no-untyped-def]
-    """Write ``linear @ p`` plus a shift (x0, y0, z0) of the eight vectors p from ``rows[at]`` on to ``out[at]``."""
+def mapped(rows, at, linear, x0, y0, z0):  # type: ignore[no-untyped-def]
+    """``linear @ p`` plus a shift (x0, y0, z0) of the eight vectors p from ``rows[at]`` on."""
     x, y, z = load_x(rows, at), load_y(rows, at), load_z(rows, at)
-    store3(
-        out, at,
+    return (
         fma(x, linear[0, 0], fma(y, linear[0, 1], fma(z, linear[0, 2], splat(x0)))),
         fma(x, linear[1, 0], fma(y, linear[1, 1], fma(z, linear[1, 2], splat(y0)))),
         fma(x, linear[2, 0], fma(y, linear[2, 1], fma(z, linear[2, 2], splat(z0)))),
-    )  # fmt: skip
+    )
 
 
 @lean
+def move_tile(
+    rest: Floats32, rest_normals: Floats32, linear: Floats32, shift: Floats32, turn: Floats32, at: int,
+    vertices: Floats32, normals: Floats32, to: int,
+) -> None:  # fmt: skip
+    """Eight vertices of :func:`move_rigid` from ``at`` on, to ``to``; all arrays but the matrices are flat, and
+    ``turn (3, 3)`` is for normals."""
+    none = np.float32(0.0)
+    x, y, z = mapped(rest, at, linear, shift[0], shift[1], shift[2])
+    store3(vertices, to, x, y, z)
+    x, y, z = mapped(rest_normals, at, turn, none, none, none)
+    square = add(mul(x, x), add(mul(y, y), mul(z, z)))
+    scale = div(splat(ONE), root(add(square, splat(TINY))))
+    store3(normals, to, mul(x, scale), mul(y, scale), mul(z, scale))
+
+
+@kernel
 def move_rigid(
     rest: Floats32, rest_normals: Floats32, linear: Floats32, shift: Floats32, vertices: Floats32, normals: Floats32
 ) -> None:
-    """Write ``linear (3, 3) @ p + shift (3,)`` of every row of ``rest (m, 3)``, and its normal's ``linear @ n``."""
-    none, whole = np.float32(0.0), rest.shape[0] // 8 * 8
+    """Write ``linear (3, 3) @ p + shift (3,)`` of every row of ``rest (m, 3)``, and the unit normal there.
+
+    Normals go by the matrix of cofactors, which the cross product of two mapped tangents is: ``linear`` need not be a
+    rotation.
+    """
+    turn = np.empty((3, 3), np.float32)
+    for r in range(3):
+        i, j = (r + 1) % 3, (r + 2) % 3
+        for c in range(3):
+            k, m = (c + 1) % 3, (c + 2) % 3
+            turn[r, c] = linear[i, k] * linear[j, m] - linear[i, m] * linear[j, k]
     flat, directions = rest.reshape(-1), rest_normals.reshape(-1)
     out, out_directions = vertices.reshape(-1), normals.reshape(-1)
-    for i in range(0, whole, 8):
-        mapped(flat, 3 * i, linear, shift[0], shift[1], shift[2], out)
-        mapped(directions, 3 * i, linear, none, none, none, out_directions)
-    for i in range(whole, rest.shape[0]):
-        for c in range(3):
-            vertices[i, c] = shift[c]
-            normals[i, c] = none
-            for k in range(3):
-                vertices[i, c] += linear[c, k] * rest[i, k]
-                normals[i, c] += linear[c, k] * rest_normals[i, k]
+    whole = 24 * (len(rest) // 8)
+    for at in range(0, whole, 24):
+        move_tile(flat, directions, linear, shift, turn, at, out, out_directions, at)
+    left = 3 * len(rest) - whole
+    if left > 0:  # fewer than eight are left: they are moved in a tile of their own
+        own = np.zeros((4, 24), np.float32)
+        own[0, :left], own[1, :left] = flat[whole:], directions[whole:]
+        move_tile(own[0], own[1], linear, shift, turn, 0, own[2], own[3], 0)
+        for k in range(left):
+            out[whole + k], out_directions[whole + k] = own[2, k], own[3, k]
 
 
 @lean

@@ -100,9 +100,12 @@ def test_the_large_tables_are_ten_times_larger(monkeypatch: pytest.MonkeyPatch, 
     asked: list[tuple[Any, ...]] = []
     monkeypatch.setattr(bench_surface, "build_table", lambda points, deep, _: asked.append((points, deep)) or ["tree"])
     monkeypatch.setattr(bench_surface, "large_table", lambda count, seconds, _: asked.append((count, seconds)) or ["x"])
-    ((title, rows),) = bench_large(0.5, lambda text: None, lambda *_: None, vertices)
-    assert asked == [(vertices, level), (10 * vertices, 0.5)] and rows == ["tree", "x"]
-    assert title == f"about {10 * vertices:,} vertices"
+    monkeypatch.setattr(bench_surface, "sheet", lambda count: f"sheet of {count}")
+    monkeypatch.setattr(bench_surface.cold, "cold_rows", lambda *given, report: asked.append(given) or ["cool"])
+    (cool, built) = bench_large(0.5, lambda text: None, lambda *_: None, vertices)
+    name, title = f"sheet of {10 * vertices:,}", f"about {10 * vertices:,} vertices"
+    assert asked == [(vertices, level), (name, [f"sheet of {10 * vertices}"], 0.5, "<= 0.8"), (10 * vertices, 0.5)]
+    assert cool == (f"{title}, caches cold", ["cool"]) and built == (title, ["tree", "x"])
 
 
 def test_growth_scales_its_sizes_down_to_a_least(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -31,9 +31,10 @@ def decimated(head: Head) -> DecimatedHead:
 
 
 def assert_alike(decimated: DecimatedHead) -> None:
+    """Within one unit in the last place of a number of 128 to 256 mm: two ways to sum round differently."""
     for part in decimated.parts:
         own = slice(part.first, part.last)
-        assert decimated.vertices[own] == pytest.approx(part.part.vertices[part.kept], abs=1e-5)
+        assert decimated.vertices[own] == pytest.approx(part.part.vertices[part.kept], abs=1.6e-5)
         assert decimated.normals[own] == pytest.approx(part.part.normals[part.kept], abs=1e-5)
 
 

@@ -41,13 +41,15 @@ def test_rows_are_mixed_and_kept_above_the_least(rng: np.random.Generator) -> No
     assert out[3] == out[5] == 5.0
 
 
-def test_a_rigid_motion_shifts_points_and_only_turns_normals(rng: np.random.Generator) -> None:
-    rest, normals = (rng.normal(size=(7, 3)).astype(np.float32) for _ in range(2))
-    linear, shift = rng.normal(size=(3, 3)).astype(np.float32), np.array([1.0, -2.0, 3.0], np.float32)
+def test_an_affine_motion_keeps_normals_square_to_the_surface(rng: np.random.Generator) -> None:
+    """Normals go by the inverse's transpose; 19 rows are two tiles and a part of one."""
+    rest, normals = (rng.normal(size=(19, 3)).astype(np.float32) for _ in range(2))
+    linear, shift = (np.eye(3) + 0.3 * rng.normal(size=(3, 3))).astype(np.float32), np.float32([1.0, -2.0, 3.0])
     out, out_normals = np.zeros_like(rest), np.zeros_like(rest)
     move_rigid(rest, normals, linear, shift, out, out_normals)
     np.testing.assert_allclose(out, rest @ linear.T + shift, atol=1e-5)
-    np.testing.assert_allclose(out_normals, normals @ linear.T, atol=1e-5)
+    want = np.sign(np.linalg.det(linear)) * normals @ np.linalg.inv(linear)
+    np.testing.assert_allclose(out_normals, want / np.linalg.norm(want, axis=1)[:, None], atol=1e-5)
 
 
 def test_points_swing_by_their_share_and_take_the_straight_way_where_undone(rng: np.random.Generator) -> None:
