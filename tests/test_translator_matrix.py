@@ -20,7 +20,12 @@ FRAMES = 6
 
 
 def kind_of_socket(form: Format) -> socket.SocketKind:
-    return socket.SOCK_DGRAM if "udp" in form.transports else socket.SOCK_STREAM
+    return socket.SOCK_DGRAM if transport(form) == "udp" else socket.SOCK_STREAM
+
+
+def transport(form: Format) -> str:
+    """How it travels over a network if nobody chooses."""
+    return next(each for each in form.transports if each in ("udp", "tcp"))
 
 
 class Translator:
