@@ -18,6 +18,7 @@ _TIME = "time"
 _REPEAT = 120
 _MOST_COLUMNS = 1024
 _LONGEST_CELL = 32
+_LARGEST = 1e15
 
 
 class CsvDecoder:
@@ -88,7 +89,7 @@ def _number(text: str) -> float | None:
         value = float(text) if len(text) <= _LONGEST_CELL else math.nan
     except ValueError:
         return None
-    return value if math.isfinite(value) else None
+    return value if abs(value) < _LARGEST else None
 
 
 def _carries(parameters: Parameters) -> Flags:
