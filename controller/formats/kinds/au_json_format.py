@@ -94,11 +94,13 @@ _facs = cache(Facs.load)
 @lru_cache(maxsize=256)
 def _columns(facs: Facs, name: str) -> Indices | None:
     """Columns of a unit's name, such as ``AU12`` or ``AUL12``; None for what is no unit, or more than one."""
+    if len(name) > _LONGEST_NAME or "+" in name:
+        return None
     try:
-        found: Indices | list[int] = np.flatnonzero(facs.levels(name)) if len(name) <= _LONGEST_NAME and "+" not in name else []
+        found: Indices = np.flatnonzero(facs.levels(name))
     except ParameterError:
         return None
-    return np.asarray(found) if len(found) else None
+    return found if len(found) else None
 
 
 def about(parameters: Parameters) -> Flags:
