@@ -69,7 +69,10 @@ class Incoming:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop listening, keep what was learned, and give back what was opened. Raises LinkError: it cannot be kept."""
+        """Stop listening, keep what was learned, and give back what was opened.
+
+        Raises ControllerError: what was learned cannot be kept.
+        """
         self._stopping.set()
         if self._thread.ident is not None and self._thread is not threading.current_thread():
             self._thread.join()

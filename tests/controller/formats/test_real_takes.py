@@ -13,15 +13,12 @@ from controller.formats.frame import Frame
 from controller.takes.livelink import Take
 from tests.controller.formats.faces import KINDS, there_and_back, tolerance
 
-TAKE = Path(__file__).resolve().parents[4] / "shared" / "data" / "livelink" / "alex_rom_3.csv"
 EVERY = 20
 
 
 @pytest.fixture(scope="module")
-def take() -> Take:
-    if not TAKE.exists():
-        pytest.skip("the recorded take lies outside the repository")
-    return Take.load(TAKE, P)
+def take(shared: Path) -> Take:
+    return Take.load(shared / "data" / "livelink" / "alex_rom_3.csv", P)
 
 
 @pytest.mark.parametrize("kind", KINDS)
