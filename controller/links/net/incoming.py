@@ -20,7 +20,7 @@ from controller.links.net.settings import NetSettings
 PASS_S = 0.004
 """Shortest time from one look at what has arrived to the next."""
 REST = 3.0
-"""How long a link rests after it has read, in multiples of that time: a flood costs a quarter of a core at most."""
+"""How long a link rests after it has read, in multiples of that time: a flood costs about a quarter of a core."""
 _WAIT_S = 0.1
 _RENEW_S = 0.3
 """How often a face that holds is written again, so that its layer's own time-out does not release it."""
