@@ -10,7 +10,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from controller.base.parameters import PARAMETERS
+from controller.base.parameters import PARAMETERS, Flags
 from controller.formats.format import FORMATS, Format
 
 PAGE = Path(__file__).resolve().parent / "links.md"
@@ -24,9 +24,9 @@ def own() -> list[Format]:
 
 def formats_table() -> str:
     """The formats: what they are, how they travel, what they carry."""
-    rows = ["| kind | what it is | travels by | port | parameters | rounded to | |", "|---|---|---|---|---|---|---|"]
+    rows = ["| kind | what it is | travels by | port | parameters | rounded to | |", "|---" * 7 + "|"]
     for form in own():
-        count = int(form.carries(PARAMETERS).sum())
+        count = amount(form.carries(PARAMETERS), form.about(PARAMETERS))
         port, exact = str(form.port or ""), f"{2 * form.quantum:g}" if form.quantum else "not"
         travels = ", ".join(form.transports)
         rows.append(f"| `{form.kind}` | {form.title} | {travels} | {port} | {count} | {exact} | {form.note} |")
@@ -43,9 +43,16 @@ def matrix_table() -> str:
 
 def pair(one: Format, other: Format) -> str:
     """One cell."""
-    count = int((one.carries(PARAMETERS) & other.carries(PARAMETERS)).sum())
-    rounded = 2 * max(one.quantum, other.quantum)
-    return f"{count}, ±{rounded / 2:g}" if rounded else str(count)
+    exact = one.carries(PARAMETERS) & other.carries(PARAMETERS)
+    known = [form.carries(PARAMETERS) | form.about(PARAMETERS) for form in (one, other)]
+    count, rounded = amount(exact, known[0] & known[1] & ~exact), max(one.quantum, other.quantum)
+    return f"{count}, ±{rounded:g}" if rounded and exact.any() else count
+
+
+def amount(exact: Flags, about: Flags) -> str:
+    """How many parameters go through, and how many more in effect only."""
+    more = f"~{about.sum()}" if about.any() else ""
+    return " + ".join([*([str(exact.sum())] if exact.any() else []), *([more] if more else [])]) or "0"
 
 
 def with_tables(text: str) -> str:

@@ -113,7 +113,7 @@ def test_the_examples_are_short(page: str) -> None:
         folder = name.partition("/")[0]
         lines[folder] = lines.get(folder, 0) + sum(bool(line.strip()) for line in text.splitlines())
     folders = {folder for folder in lines if folder != "pyproject.toml"}
-    assert folders == {"omote_puppet8", "omote_jsonudp", "omote_track", "omote_xyz"}
+    assert folders == {"omote_puppet8", "omote_jsonudp", "omote_pairs", "omote_track", "omote_xyz"}
     assert all(count < MOST_LINES for count in lines.values()), lines
 
 
@@ -131,7 +131,7 @@ def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, ro
 
 def test_every_list_has_them(omote: Omote) -> None:
     plugins, simulators, simulator = omote("plugins", "simulate --help", "simulate puppet8 --help")
-    for word in ("puppet8", "Puppet8 boards", "jsonudp", "track", "xyz", "omote-example 0.1.0"):
+    for word in ("puppet8", "Puppet8 boards", "jsonudp", "pairs", "track", "xyz", "omote-example 0.1.0"):
         assert word in plugins.stdout
     assert "puppet8" in simulators.stdout
     assert "57600" in simulator.stdout and "Example: omote simulate puppet8" in simulator.stdout
@@ -196,3 +196,19 @@ def test_a_take_and_an_exported_head_go_through_them(omote: Omote, tmp_path: Pat
     assert head.returncode == 0
     assert len((tmp_path / "head.xyz").read_text().splitlines()) > 30_000
     assert ".xyz" in stl.stderr
+
+
+def test_a_format_has_a_link_and_is_translated(omote: Omote, tmp_path: Path) -> None:
+    (tmp_path / "a.track").write_text("jawOpen headYaw\n0 0 0\n0.05 1 0.2\n")
+    link = '[[links]]\nkind = "pairs"\nlisten = "{}"\nmirror = true\n'
+    (tmp_path / "good.toml").write_text('name = "good"\n' + link.format("127.0.0.1"))
+    (tmp_path / "open.toml").write_text('name = "open"\n' + link.format("0.0.0.0"))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as receiver:
+        receiver.bind(("127.0.0.1", 0))
+        receiver.settimeout(10)
+        address = f"pairs:127.0.0.1:{receiver.getsockname()[1]}"
+        good, far, translated = omote("check good.toml", "check open.toml", f"translate a.track {address}")
+        assert receiver.recv(1000) == b"jawOpen=0;headYaw=0" and receiver.recv(1000) == b"jawOpen=1;headYaw=0.2"
+    assert "pairs on udp:127.0.0.1:9403" in good.stdout
+    assert far.returncode == 1 and "open_to_network = true allows it" in far.stderr
+    assert translated.returncode == 0 and "2 messages went out" in translated.stderr

@@ -18,7 +18,7 @@ from tests.fuzz.messages import attack
 def test_a_short_run_finds_no_fault(kind: str) -> None:
     found = attack(FORMATS.get(kind), 1500, seed=5)
     assert not found.faults, found.first
-    assert found.messages == 1500 and found.frames > 10
+    assert found.messages == 1500 and found.frames >= 3
 
 
 class Fragile:

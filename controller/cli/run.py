@@ -237,6 +237,17 @@ def _face(face: dict[str, Any]) -> list[tuple[str, str]]:
     return found
 
 
+def _link(link: dict[str, Any]) -> str:
+    """Lines of a link, or faces that it took and sent."""
+    refused = f"{sum(link['refused'].values())} refused"
+    if "rate_hz" not in link and "sent" not in link:
+        return f"{link['accepted']} lines accepted, {refused}"
+    taken = [f"{link['accepted']} faces taken, {link['lost']} lost, {refused}"] if "rate_hz" in link else []
+    sent = [f"{link['sent']} messages sent, {link['dropped']} dropped"] if "sent" in link else []
+    errors = [str(link[key]) for key in ("error", "send_error") if link.get(key)]
+    return "; ".join([*taken, *sent, *errors])
+
+
 def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
     found = []
     if control := report.get("control"):
@@ -246,10 +257,7 @@ def _control(report: dict[str, Any]) -> list[tuple[str, str]]:
         found.append(("take", f"{take['played_s']:.1f} of {take['duration_s']:.1f} s played, {rate}"))
     if voice := report.get("voice"):
         found.append(("voice", f"{voice['heard_s']:.1f} s heard"))
-    return found + [
-        (f"link {link['port']}", f"{link['accepted']} accepted, {sum(link['refused'].values())} refused")
-        for link in report.get("links", [])
-    ]
+    return found + [(f"link {link['port']}", _link(link)) for link in report.get("links", [])]
 
 
 def _buses(buses: list[dict[str, Any]]) -> list[tuple[str, str]]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from controller.base.parameters import Flags, Parameters
 from controller.formats.frame import Decoder, Encoder
 from drivers.base.plugins import Registry, modules_in
@@ -22,6 +24,11 @@ TRANSPORTS = ("udp", "tcp", "serial", "lines")
 _SUFFIX = "_format"
 
 
+def nothing(parameters: Parameters) -> Flags:
+    """No parameter."""
+    return np.zeros(len(parameters), dtype=bool)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Format:
     """One sort of messages.
@@ -32,6 +39,7 @@ class Format:
     port : UDP or TCP port that its programs use; 0 where there is none.
     decoder, encoder : make a decoder or encoder for some parameters; one serves one source or receiver.
     carries : says which parameters its messages can hold, (P,) bool.
+    about : says which others they hold only in effect, as one number for a smile and a frown.
     quantum : how far a value may be rounded, in units of a parameter, besides the 1e-4 that every format keeps.
     delimiter : what ends a message of a stream; empty where the format has datagrams only.
     most : bytes of the longest message.
@@ -47,6 +55,7 @@ class Format:
     decoder: Callable[[Parameters], Decoder]
     encoder: Callable[[Parameters], Encoder]
     carries: Callable[[Parameters], Flags]
+    about: Callable[[Parameters], Flags] = nothing
     port: int = 0
     quantum: float = 0.0
     delimiter: bytes = b""

@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -25,6 +25,7 @@ from controller.takes.reader import load_take, suffixes
 from drivers.base.errors import PluginError
 
 _WAIT_S = 0.02
+_LARGEST = 100.0  # times a whole movement
 _HINT = "write it as KIND:ADDRESS, for example livelink:127.0.0.1:11111; omote plugins lists the kinds"
 
 
@@ -163,7 +164,7 @@ def _pass_on(
     given: Input, form: Format, sender: Sender, parameters: Parameters, options: Options, counts: Counts
 ) -> None:
     encoder, end_s = form.encoder(parameters), time.monotonic() + (options.seconds or float("inf"))
-    turn = _mirror(parameters) if options.mirror else lambda frame: frame
+    turn = _prepared(parameters, options.mirror)
     for frame in given.frames(counts):
         if frame is not None:
             counts.frames += 1
@@ -177,12 +178,13 @@ def _pass_on(
             return
 
 
-def _mirror(parameters: Parameters) -> Callable[[Frame], Frame]:
-    swap = parameters.mirror()
-    sign = np.array([-1.0 if name.endswith(("Yaw", "Roll")) else 1.0 for name in parameters.names])
+def _prepared(parameters: Parameters, mirror: bool) -> Callable[[Frame], Frame]:
+    """What happens to each frame: no format has room for any number, and sides may change places."""
+    order = parameters.mirror() if mirror else np.arange(len(parameters))
+    turned = [-1.0 if mirror and name.endswith(("Yaw", "Roll")) else 1.0 for name in parameters.names]
 
-    def mirrored(frame: Frame) -> Frame:
-        values, mask = frame.values[swap] * sign, frame.mask[swap]
-        return Frame(values, mask, frame.time_s, frame.sequence, frame.face, frame.subject)
+    def prepare(frame: Frame) -> Frame:
+        values = np.clip(frame.values[order] * turned, -_LARGEST, _LARGEST)
+        return replace(frame, values=values, mask=frame.mask[order])
 
-    return mirrored
+    return prepare

@@ -16,6 +16,7 @@ import numpy as np
 
 from controller.base.parameters import PARAMETERS
 from controller.layers.commands import CommandState
+from controller.links.net.neutral import Neutral, Ranges, load_state, save_state
 from controller.takes.recording import recorded
 from surface.fit.identities import read_modes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
@@ -218,7 +219,20 @@ def _takes(folder: Path) -> list[Kind]:
         Kind("wav", "voice.wav", [wav(8000 * np.sin(np.arange(3000) / 9.0))]),
         Kind("recording", "run.rec", [_recording(folder / "run.rec")]),
         Kind("group", "group.json", [_group()]),
+        Kind("link", "phone.json", [_learned(folder / "phone.json")], reports(_read_learned)),  # a link reads it
     ]
+
+
+def _learned(path: Path) -> bytes:
+    """What a link learned of a person."""
+    neutral, ranges = Neutral(PARAMETERS), Ranges(PARAMETERS)
+    neutral.values[3], neutral.known, ranges.top[5] = 0.2, True, 0.7
+    save_state(path, PARAMETERS, neutral, ranges)
+    return path.read_bytes()
+
+
+def _read_learned(path: Path) -> None:
+    load_state(path, PARAMETERS, Neutral(PARAMETERS), Ranges(PARAMETERS))
 
 
 def _recording(path: Path) -> bytes:

@@ -12,11 +12,11 @@ from unittest.mock import patch
 
 from typer.main import get_command
 
+from controller.base.errors import OMOTE_ERRORS
 from controller.base.paths import find_config
 from controller.cli import app
 from controller.tools.check import DEFAULT_HEAD
 from surface import check as checker
-from surface.base.errors import SurfaceError
 from surface.check import check_head as look
 from surface.head.model import file
 from surface.readers import rhino
@@ -49,7 +49,7 @@ def reports(read: Callable[[Path], object]) -> Callable[[Path], int]:
     def run(path: Path) -> int:
         try:
             read(path)
-        except SurfaceError as error:
+        except OMOTE_ERRORS as error:
             app.report_error(error)
             return 1
         return 0

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
 
+from controller.base.errors import ControllerError
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.formats.frame import Frame
 from controller.links.net.neutral import Neutral, Ranges, load_state, save_state
 from controller.links.net.one_euro import OneEuro
 from controller.links.net.settings import NetSettings
+
+log = logging.getLogger(__name__)
 
 _LOOKED = 0.02
 """Amount from which on eyes count as moved."""
@@ -60,7 +64,7 @@ class Conditioning:
             self._filter.reset()
 
     def save(self) -> None:
-        """Keep what was learned. Raises LinkError: the file cannot be written."""
+        """Keep what was learned. Raises ControllerError: the file cannot be written."""
         if self._path is not None and (self._neutral.known or self._settings.ranges):
             save_state(self._path, self._parameters, self._neutral, self._ranges)
 
@@ -71,7 +75,10 @@ class Conditioning:
 
     def _calibrated(self, values: Floats, now_s: float) -> Floats:
         if not self._neutral.known and self._neutral.learn(values, now_s):
-            self.save()
+            try:
+                self.save()
+            except ControllerError as error:  # the face goes on; it is learned again at the next start
+                log.warning("what a link learned is not kept: %s", error)
         return self._neutral.apply(values) if self._neutral.known else values
 
     def _one_gaze(self, values: Floats, mask: Flags) -> Floats:

@@ -20,7 +20,7 @@ from controller.links.net.settings import NetSettings
 PASS_S = 0.004
 """Shortest time from one look at what has arrived to the next."""
 REST = 3.0
-"""Longest share of work is 1 / (1 + this): so long, in times of its work, the link rests after a flood of messages."""
+"""How long a link rests after it has read, in multiples of that time: a flood costs about a quarter of a core."""
 _WAIT_S = 0.1
 _RENEW_S = 0.3
 """How often a face that holds is written again, so that its layer's own time-out does not release it."""
@@ -69,7 +69,10 @@ class Incoming:
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop listening, keep what was learned, and give back what was opened. Raises LinkError: it cannot be kept."""
+        """Stop listening, keep what was learned, and give back what was opened.
+
+        Raises ControllerError: what was learned cannot be kept.
+        """
         self._stopping.set()
         if self._thread.ident is not None and self._thread is not threading.current_thread():
             self._thread.join()

@@ -12,8 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from controller.base.errors import LinkError
+from controller.base.files import format_fault, replacing
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.links.access import state_folder
+from surface.base import files
 
 STILL_S = 2.0
 """How long a face must be still to be taken as neutral."""
@@ -21,6 +23,7 @@ _STILL = 0.03  # most that a parameter varies meanwhile
 _LEARN_S = 10.0  # until what was seen of the ranges counts wholly
 _LEAST_RANGE = 0.5  # smaller ones are not widened further
 _FORMAT = 1
+_MOST_BYTES = 100_000
 
 
 def state_file(name: str) -> Path:
@@ -90,44 +93,40 @@ def load_state(path: Path, parameters: Parameters, neutral: Neutral, ranges: Ran
 
     Raises LinkError: the file is damaged, or of a newer omote.
     """
-    try:
-        table = json.loads(path.read_text(encoding="utf-8"))
-        if table["format"] != _FORMAT:
-            raise ValueError(f"is of version {table['format']}")
+    if not path.exists():
+        return
+    with files.reading(path, LinkError, hint=f"delete it: rm {path}"):
+        table = files.read_json(path, _MOST_BYTES)
+        if not isinstance(table, dict) or not all(isinstance(table.get(key), dict) for key in ("neutral", "ranges")):
+            raise ValueError("is no calibration of a link")
+        if fault := format_fault(table.get("format"), _FORMAT):
+            raise ValueError(fault)
         given, found = _read(table["neutral"], parameters)
         tops, _ = _read(table["ranges"], parameters)
-        neutral.values, neutral.known = given, bool(found.any())
-        ranges.top, ranges.seen_s = np.abs(tops), _LEARN_S if tops.any() else 0.0
-    except FileNotFoundError:
-        return
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-        raise LinkError(f"{path}: is no calibration of a link: {error}", hint=f"delete it: rm {path}") from error
+    neutral.values, neutral.known = given, bool(found.any())
+    ranges.top, ranges.seen_s = np.abs(tops), _LEARN_S if tops.any() else 0.0
 
 
 def save_state(path: Path, parameters: Parameters, neutral: Neutral, ranges: Ranges) -> None:
-    """Keep what was learned. Raises LinkError: the file cannot be written."""
+    """Keep what was learned. Raises ControllerError: the file cannot be written."""
     table = {
         "format": _FORMAT,
         "neutral": _written(neutral.values, parameters) if neutral.known else {},
         "ranges": _written(ranges.top, parameters),
     }
-    beside = path.with_suffix(".new")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+    with replacing(path) as beside:
         beside.write_text(json.dumps(table, indent=1), encoding="utf-8")
-        beside.replace(path)
-    except OSError as error:
-        raise LinkError(
-            f"{path}: cannot be written: {error.strerror}", hint=f"look at: ls -ld {path.parent}"
-        ) from error
 
 
-def _read(table: dict[str, float], parameters: Parameters) -> tuple[Floats, Flags]:
+def _read(table: dict[str, object], parameters: Parameters) -> tuple[Floats, Flags]:
+    """Values by position, and which there are. Raises ValueError: one is no number."""
     values, mask = parameters.neutral(), np.zeros(len(parameters), dtype=bool)
     for name, value in table.items():
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not -2.0 <= value <= 2.0:
+            raise ValueError(f"{name}: must be a number from -2 to 2")
         at = parameters.find(name)
-        if at is not None and -2.0 <= float(value) <= 2.0:
-            values[at], mask[at] = float(value), True
+        if at is not None:
+            values[at], mask[at] = value, True
     return values, mask
 
 

@@ -94,4 +94,4 @@ class NetSettings:
     def address(self) -> str:
         """Its ends, for people."""
         ends = [str(self.incoming)] if self.incoming is not None else []
-        return " and ".join([*ends, *([f"to {self.outgoing}"] if self.outgoing is not None else [])])
+        return " and ".join([*ends, *([f"{self.outgoing} (out)"] if self.outgoing is not None else [])])

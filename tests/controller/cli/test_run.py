@@ -14,7 +14,7 @@ from controller.body.messages import RunOptions
 from controller.body.sources import Voice
 from controller.cli.app import make_app
 from controller.cli.console import console
-from controller.cli.run import report_rows
+from controller.cli.run import _link, report_rows
 
 SPREAD = {"mean": 1.0, "p50": 1.0, "p95": 2.0, "p99": 3.25, "max": 4.0}
 FACE = {
@@ -276,3 +276,19 @@ def test_the_demo_runs_for_a_while_and_leaves_pictures_where_there_is_no_display
 )
 def test_options_have_limits(display: dict[str, bool], words: tuple[str, ...]) -> None:
     assert omote(*words).exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("more", "shown"),
+    [
+        ({"rate_hz": 60.0, "lost": 2, "error": ""}, "7 faces taken, 2 lost, 1 refused"),
+        ({"sent": 300, "dropped": 1, "send_error": "gone"}, "300 messages sent, 1 dropped; gone"),
+        (
+            {"rate_hz": 60.0, "lost": 0, "error": "", "sent": 5, "dropped": 0, "send_error": ""},
+            "7 faces taken, 0 lost, 1 refused; 5 messages sent, 0 dropped",
+        ),
+    ],
+)
+def test_links_that_take_and_send_faces_are_reported_as_such(more: dict[str, object], shown: str) -> None:
+    link = {"port": "udp:127.0.0.1:5", "accepted": 7, "refused": {"too short": 1}, **more}
+    assert _link(link) == shown

@@ -15,7 +15,6 @@ from controller.formats.kinds.vmc_format import VmcDecoder, VmcEncoder
 from controller.formats.osc import bundle, message
 from tests.controller.formats.faces import face
 
-VECTORS = Path(__file__).resolve().parents[5] / "shared/data/protocol-vectors/vmc_osc.json"
 VALUE, APPLY = "/VMC/Ext/Blend/Val", message("/VMC/Ext/Blend/Apply")
 
 
@@ -53,11 +52,10 @@ def test_the_bytes_of_the_specification_are_read() -> None:
     assert got(frame, "mouthSmileLeft") > 0.2
 
 
-def test_bytes_of_other_implementers_are_read() -> None:
-    if not VECTORS.exists():
-        pytest.skip("the vectors lie outside the repository")
+def test_bytes_of_other_implementers_are_read(shared: Path) -> None:
     decoder = VmcDecoder(P)
-    for vector in json.loads(VECTORS.read_text(encoding="utf-8")):
+    vectors = shared / "data" / "protocol-vectors" / "vmc_osc.json"
+    for vector in json.loads(vectors.read_text(encoding="utf-8")):
         frames = decoder.feed(bytes.fromhex(vector["hex"]))
         if "Apply" in vector["meaning"]:
             assert got(frames[0], "jawOpen") > 0.1  # A 0.5

@@ -66,13 +66,31 @@ def test_a_still_face_becomes_neutral_and_is_kept(tmp_path: Path) -> None:
     assert not chain(path, calibrate="again").neutral_known
 
 
-def test_a_damaged_file_is_told_with_what_to_do(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        (b"", "JSON"), (b"{", "JSON"), (b"[]", "is no calibration of a link"), (b"\xff", "UTF-8"),
+        (b'{"format": 2, "neutral": {}, "ranges": {}}', "written by a newer omote"),
+        (b'{"neutral": {}, "ranges": {}}', "format: must be a whole number"),
+        (b'{"format": 1, "neutral": {"jawOpen": []}, "ranges": {}}', "jawOpen: must be a number from -2 to 2"),
+        (b'{"format": 1, "neutral": 5, "ranges": {}}', "is no calibration of a link"),
+    ],
+)  # fmt: skip
+def test_a_damaged_file_is_told_with_what_to_do(tmp_path: Path, text: bytes, why: str) -> None:
     path = tmp_path / "phone.json"
-    for text in ("", "{", "[]", '{"format": 2}', '{"format": 1, "neutral": {"jawOpen": []}, "ranges": {}}', "\udcff"):
-        path.write_text(text, encoding="utf-8", errors="surrogateescape")
-        with pytest.raises(LinkError, match="is no calibration of a link") as told:
-            chain(path, calibrate="keep")
-        assert told.value.hint == f"delete it: rm {path}"
+    path.write_bytes(text)
+    with pytest.raises(LinkError, match=why) as told:
+        chain(path, calibrate="keep")
+    assert str(path) in str(told.value) and told.value.hint == f"delete it: rm {path}"
+
+
+def test_a_folder_that_cannot_be_written_ends_nothing(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "file").write_text("")
+    learning = chain(tmp_path / "file" / "phone.json", calibrate="again")
+    for n in range(80):
+        shown(learning, n / 30, jawOpen=0.2)
+    assert learning.neutral_known and shown(learning, 5.0, jawOpen=0.2) == {}
+    assert "what a link learned is not kept" in caplog.text
 
 
 def test_ranges_are_widened_to_at_most_twice_as_much(tmp_path: Path) -> None:

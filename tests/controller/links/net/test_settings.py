@@ -39,7 +39,7 @@ def test_what_is_wrong_is_told(keys: dict[str, object], told: str) -> None:
         ({"listen": "127.0.0.1"}, "vmc on udp:127.0.0.1:39539"),
         ({"listen": "localhost:5"}, "vmc on udp:localhost:5"),
         ({"listen": "[::1]:5"}, "vmc on udp:[::1]:5"),
-        ({"listen": "127.0.0.2:5", "send": "10.0.0.1:6"}, "vmc on udp:127.0.0.2:5 and to udp:10.0.0.1:6"),
+        ({"listen": "127.0.0.2:5", "send": "10.0.0.1:6"}, "vmc on udp:127.0.0.2:5 and udp:10.0.0.1:6 (out)"),
         ({"listen": "0.0.0.0:5", "open_to_network": True}, "vmc on udp:0.0.0.0:5"),
     ],
 )

@@ -1,0 +1,109 @@
+"""Numbers between commas, as tables and plotting programs have them: a line of names, then a line for each frame.
+
+The names are parameters and, if there is one, ``time`` (s). An empty cell gives nothing. The encoder repeats the names
+every two seconds, so that a receiver that begins late understands the rest.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.base.parameters import Flags, Parameters
+from controller.formats.format import API, Format
+from controller.formats.frame import Frame, Refusals
+
+_TIME = "time"
+_REPEAT = 120
+_MOST_COLUMNS = 1024
+_LONGEST_CELL = 32
+_LARGEST = 1e15
+
+
+class CsvDecoder:
+    """Reads lines; a line of which no cell is a number is a new line of names."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.refused = Refusals()
+        self._parameters = parameters
+        self._columns: list[int | None] = []
+        self._time: int | None = None
+
+    def feed(self, message: bytes) -> list[Frame]:
+        """One frame for a line of numbers."""
+        cells = [cell.strip() for cell in message.decode("utf-8", "replace").strip().split(",", _MOST_COLUMNS)]
+        numbers = [_number(cell) for cell in cells]
+        if not any(number is not None for number in numbers):
+            self._name(cells)
+            return []
+        if not self._columns or len(cells) != len(self._columns):
+            self.refused.add(
+                "numbers before their names" if not self._columns else "a line with another number of cells"
+            )
+            return []
+        return self._frame(cells, numbers)
+
+    def _name(self, cells: list[str]) -> None:
+        columns = [self._parameters.find(cell) for cell in cells]
+        folded = [cell.lower() for cell in cells]
+        unknown = any(at is None and name != _TIME for at, name in zip(columns, folded, strict=True))
+        if not any(at is not None for at in columns) or (
+            unknown and self._columns
+        ):  # damaged, of a stream that goes on
+            self.refused.add("neither names nor numbers")
+            return
+        self._columns, self._time = columns, folded.index(_TIME) if _TIME in folded else None
+
+    def _frame(self, cells: list[str], numbers: list[float | None]) -> list[Frame]:
+        values, mask = self._parameters.neutral(), np.zeros(len(self._parameters), dtype=bool)
+        for at, number, cell in zip(self._columns, numbers, cells, strict=True):
+            if at is not None and number is not None:
+                values[at], mask[at] = number, True
+            elif at is not None and cell:
+                self.refused.add("cells that are no numbers")
+        time_s = None if self._time is None else numbers[self._time]
+        return [Frame(values, mask, time_s, None, bool(mask.any()))]
+
+
+class CsvEncoder:
+    """Writes a line of names, and a line of numbers for each frame."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._header = ",".join([_TIME, *parameters.names]).encode()
+        self._sent = 0
+
+    def encode(self, frame: Frame) -> list[bytes]:
+        """A line, with the line of names before it where that is due; empty cells for what is not given."""
+        time_s = self._sent / 60.0 if frame.time_s is None else frame.time_s
+        given = zip(frame.values.tolist(), frame.mask.tolist(), strict=True)
+        cells = [f"{value:.6g}" if held and frame.face else "" for value, held in given]
+        names = [self._header] if self._sent % _REPEAT == 0 else []
+        self._sent += 1
+        return [*names, ",".join([f"{time_s:.6f}", *cells]).encode()]
+
+
+def _number(text: str) -> float | None:
+    """A finite number; None for any other text."""
+    try:
+        value = float(text) if len(text) <= _LONGEST_CELL else math.nan
+    except ValueError:
+        return None
+    return value if abs(value) < _LARGEST else None
+
+
+def _carries(parameters: Parameters) -> Flags:
+    return np.ones(len(parameters), dtype=bool)
+
+
+FORMAT = Format(
+    api=API,
+    kind="csv",
+    title="numbers between commas",
+    transports=("tcp", "udp", "serial", "lines"),
+    port=9402,
+    decoder=CsvDecoder,
+    encoder=CsvEncoder,
+    carries=_carries,
+    delimiter=b"\n",
+)

@@ -1,0 +1,21 @@
+"""Facemotion3d: the text of iFacialMocap with ``&`` between name and value and ARKit's own names."""
+
+from __future__ import annotations
+
+from functools import partial
+
+from controller.formats.format import API, Format
+from controller.formats.kinds.ifacialmocap_format import IFacialMocapDecoder, IFacialMocapEncoder, carries
+
+FORMAT = Format(
+    api=API,
+    kind="facemotion3d",
+    title="Facemotion3d",
+    transports=("udp",),
+    port=49993,
+    decoder=IFacialMocapDecoder,
+    encoder=partial(IFacialMocapEncoder, between="&", suffixed=False),
+    carries=carries,
+    quantum=0.005,
+    note="angles are not rounded",
+)

@@ -1,0 +1,125 @@
+"""JSON: an object for each message, with parameters by name.
+
+``{"type": "set", "parameters": {"jawOpen": 0.5}}`` and plain ``{"jawOpen": 0.5}`` are the same; ``null`` releases a
+parameter, and what is not named stays as it was. Blend shapes as MediaPipe's face landmarker gives them are read, too:
+``[{"categoryName": "jawOpen", "score": 0.5}, ...]``.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from typing import Any, TypeGuard
+
+import numpy as np
+
+from controller.base.parameters import Flags, Parameters
+from controller.formats.format import API, Format
+from controller.formats.frame import Frame, Held, Refusals
+
+_KINDS = ("set", "state")
+_SKIPPED = {"_neutral", "time", "type", "face", "subject"}
+_LISTS = ("blendshapes", "categories")
+
+
+class JsonDecoder:
+    """Reads objects; what is wrong in one is counted, and the rest of it is taken."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self.refused = Refusals()
+        self._parameters, self._held = parameters, Held(parameters)
+
+    def feed(self, message: bytes) -> list[Frame]:
+        """One frame for each object that gives or releases something."""
+        try:
+            found = json.loads(message)
+        except (ValueError, RecursionError):
+            self.refused.add("not JSON")
+            return []
+        table = {"blendshapes": found} if isinstance(found, list) else found
+        if not isinstance(table, dict) or table.get("type", "set") not in _KINDS:
+            self.refused.add("no object that sets parameters")
+            return []
+        if table.get("face") is False:
+            return [Frame(self._parameters.neutral(), np.zeros(len(self._parameters), dtype=bool), face=False)]
+        if not [name for name, value in self._given(table) if self._take(name, value)]:
+            return []
+        subject, time_s = table.get("subject"), table.get("time")
+        return [
+            self._held.frame(
+                time_s=float(time_s) if _is_number(time_s) else None,
+                subject=subject[:200] if isinstance(subject, str) else "",
+            )
+        ]
+
+    def _given(self, table: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+        """Names and values, wherever in the object they stand."""
+        listed = next((table[key] for key in _LISTS if isinstance(table.get(key), list)), None)
+        if listed is not None:
+            for each in listed:
+                if isinstance(each, dict):
+                    yield str(each.get("categoryName", each.get("category_name"))), each.get("score")
+            return
+        inner = table.get("parameters", table)
+        yield from inner.items() if isinstance(inner, dict) else ()
+
+    def _take(self, name: str, value: Any) -> bool:
+        """Take one value; whether that changed anything."""
+        if name in _SKIPPED:
+            return False
+        at = self._parameters.find(name)
+        if at is None:
+            self.refused.add("unknown names")
+        elif value is None:
+            self._held.mask[at] = False
+            return True
+        elif _is_number(value):
+            self._held.update({at: float(value)})
+            return True
+        else:
+            self.refused.add("values that are no numbers")
+        return False
+
+
+class JsonEncoder:
+    """Writes one object for each frame, without blanks."""
+
+    def __init__(self, parameters: Parameters) -> None:
+        self._names = parameters.names
+
+    def encode(self, frame: Frame) -> list[bytes]:
+        """One message; values have six digits after the point."""
+        table: dict[str, Any] = {"type": "set"}
+        if frame.time_s is not None:
+            table["time"] = round(frame.time_s, 6)
+        if not frame.face:
+            table["face"] = False
+        given = zip(self._names, frame.values.tolist(), frame.mask.tolist(), strict=True)
+        table["parameters"] = {name: round(value, 6) for name, value, held in given if held}
+        return [json.dumps(table, separators=(",", ":")).encode()]
+
+
+def _is_number(value: Any) -> TypeGuard[float]:
+    """Whether a value is a finite number that fits into 64 bits of a float."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    return abs(value) < 1e15 and math.isfinite(value)
+
+
+def _carries(parameters: Parameters) -> Flags:
+    return np.ones(len(parameters), dtype=bool)
+
+
+FORMAT = Format(
+    api=API,
+    kind="json",
+    title="JSON, an object a message",
+    transports=("udp", "tcp", "serial", "lines"),
+    port=9400,
+    decoder=JsonDecoder,
+    encoder=JsonEncoder,
+    carries=_carries,
+    delimiter=b"\n",
+    timeout_s=math.inf,
+)

@@ -1,0 +1,75 @@
+"""Which of several sources counts, and what a link costs where nothing can be shown."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from controller.base.parameters import PARAMETERS as P
+from controller.formats.format import FORMATS
+from controller.layers.commands import CommandState
+from controller.links.net.incoming import Incoming
+from controller.links.net.kinds import link_of
+from controller.links.net.receivers import Received
+from tests.controller.formats.faces import face
+from tests.controller.links.net.sockets import wait_for
+
+
+class Fed:
+    """A receiver that is given what it receives."""
+
+    error = ""
+
+    def __init__(self) -> None:
+        self.waiting: Received = []
+        self.closed = False
+
+    def receive(self, timeout_s: float) -> Received:
+        if not self.waiting:
+            time.sleep(0.005)
+        found, self.waiting = self.waiting, []
+        return found
+
+    def close(self) -> None:
+        self.closed = True
+
+
+def opened(**keys: object) -> tuple[Fed, CommandState, Incoming]:
+    fed, state = Fed(), CommandState(P)
+    settings = link_of(FORMATS.get("livelink")).settings(listen="127.0.0.1", **keys)
+    incoming = Incoming(settings, fed, state, "livelink here")
+    incoming.start()
+    return fed, state, incoming
+
+
+def test_a_second_source_is_heard_when_the_first_is_silent() -> None:
+    fed, state, incoming = opened(timeout_s=0.3)
+    encoder = FORMATS.get("livelink").encoder(P)
+    first, second = (encoder.encode(face(seed, 1.0 + seed))[0] for seed in (1, 2))
+    try:
+        fed.waiting = [("10.0.0.1", first)]
+        wait_for(lambda: incoming.report()["accepted"] == 1)
+        fed.waiting = [("10.0.0.2", second)]
+        wait_for(lambda: incoming.report()["refused"] == {"a second source while the first one sends": 1})
+        time.sleep(0.35)
+        fed.waiting = [("10.0.0.2", second)]
+        wait_for(lambda: incoming.report()["accepted"] == 2)
+        assert incoming.report()["sender"] == "10.0.0.2 omote"
+        assert np.isfinite(state.mixer["capture"].values).all()
+    finally:
+        incoming.stop()
+    assert fed.closed
+
+
+def test_of_several_sources_at_once_the_first_counts() -> None:
+    fed, _, incoming = opened(timeout_s=5.0)
+    message = FORMATS.get("livelink").encoder(P).encode(face(1, 1.0))[0]
+    try:
+        for _ in range(20):
+            fed.waiting = [("10.0.0.1", message), ("10.0.0.2", message)]
+            wait_for(lambda: not fed.waiting)
+        wait_for(lambda: incoming.report()["accepted"] == 20)
+        assert incoming.report()["refused"] == {"a second source while the first one sends": 20}
+    finally:
+        incoming.stop()
