@@ -32,7 +32,7 @@ def make_app() -> Typer:
         context_settings={"help_option_names": ["-h", "--help"]},
     )
     for command in (
-        run.demo, run.run, run.play, heads.render, heads.fit, landmarks.landmarks, heads.export,
+        run.demo, run.run, run.play, run.convert, heads.render, heads.fit, landmarks.landmarks, heads.export,
         bus.ports, bus.scan, bus.set_id, bus.monitor, bus.calibrate, check.check, check.plugins, bench.bench,
     ):  # fmt: skip
         app.command()(command)

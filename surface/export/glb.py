@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from surface.base import files
 from surface.base.arrays import Array, Floats32
 from surface.base.errors import ExportError
+from surface.export.animation import Animation
 from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
+from surface.export.glb_motion import add_motion
 from surface.export.shapes import ExportPart, export_parts
 from surface.head import Head
 from surface.head.model.parameters import ANGLES
@@ -46,6 +48,16 @@ def write_glb_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list
     return [path]
 
 
+def write_animated_glb(head: Head, animation: Animation, path: Path, pose: Mapping[str, float]) -> list[Path]:
+    """As :func:`write_glb`, with an animation: weights of shapes over time, and a joint that turns the head."""
+    _refuse_angles(pose)
+    parts = export_parts(head)
+    document = Document(head, parts, pose)
+    add_motion(document, head, parts, animation)
+    _replace(path, document.bytes())
+    return [path]
+
+
 def _refuse_angles(pose: Mapping[str, float]) -> None:
     angles = [n for n, v in pose.items() if n in ANGLES and v]
     if angles:
@@ -69,6 +81,7 @@ EXPORTER = Exporter(
     title="all parts, materials, and one morph target a shape",
     suffixes=(".glb",),
     write=write_glb,
+    animate=write_animated_glb,
     write_in_file=write_glb_in_file,
 )
 
@@ -94,7 +107,10 @@ def png_bytes(picture: NDArray[np.uint8]) -> bytes:
 
 
 class Document:
-    """A head as a glTF document and its binary chunk, in metres."""
+    """A head as a glTF document and its binary chunk, in metres.
+
+    content : the document, to which more may be added before :meth:`bytes`.
+    """
 
     def __init__(self, head: Head, parts: list[ExportPart], pose: Mapping[str, float],
                  extras: Mapping[str, str] = MappingProxyType({})) -> None:  # fmt: skip
@@ -110,7 +126,7 @@ class Document:
             nodes.append({"name": part.name, "mesh": k})
             if part.pivot.any():
                 nodes[-1]["translation"] = (METRES * part.pivot).tolist()
-        self._document = {
+        self.content: dict[str, Any] = {
             "asset": _asset(head, extras), "scene": 0, "scenes": [{"name": head.name, "nodes": [0]}], "nodes": nodes,
             "meshes": meshes, "materials": list(self._materials.values()), "accessors": self._accessors,
             "bufferViews": self._views,
@@ -123,12 +139,12 @@ class Document:
                 "wrapT": CLAMP_TO_EDGE,
             }
             textures = [{"source": 0, "sampler": 0}]
-            self._document |= {"images": self._images, "textures": textures, "samplers": [sampler]}
+            self.content |= {"images": self._images, "textures": textures, "samplers": [sampler]}
 
     def bytes(self) -> bytes:
         """The whole .glb."""
         self._pad()
-        document = self._document | {"buffers": [{"byteLength": len(self._data)}]}
+        document = self.content | {"buffers": [{"byteLength": len(self._data)}]}
         text = json.dumps(document, separators=(",", ":"), ensure_ascii=True).encode()
         text += b" " * (-len(text) % 4)
         chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
@@ -145,7 +161,7 @@ class Document:
         if part.colours is not None:
             attributes["COLOR_0"] = self._floats(part.colours)
         index = part.triangles.astype(np.uint32).ravel()
-        indices = self._accessor(index, UINT, "SCALAR", bufferView=self._view(index, ELEMENT_BUFFER))
+        indices = self.accessor(index, UINT, "SCALAR", bufferView=self.view(index, ELEMENT_BUFFER))
         primitive: dict[str, Any] = {
             "attributes": attributes, "indices": indices, "material": self._material(part), "mode": 4,
         }  # fmt: skip
@@ -186,7 +202,7 @@ class Document:
             v = 1.0 - (np.arange(256) + 0.5) / 256
             column = np.stack([np.interp(v, at, colours[:, k]) for k in range(3)], axis=1)
             picture = np.repeat(np.rint(255 * column).astype(np.uint8)[:, None], 4, axis=1)
-            view = self._view(np.frombuffer(png_bytes(picture), np.uint8))
+            view = self.view(np.frombuffer(png_bytes(picture), np.uint8))
             self._images.append({"name": "eye", "mimeType": "image/png", "bufferView": view})
 
     def _target(self, rows: Floats32, *, bounds: bool = False) -> int:
@@ -194,17 +210,17 @@ class Document:
         ids = np.flatnonzero(rows.any(axis=1))
         if not 0 < len(ids) < SPARSE * len(rows):
             return self._floats(rows, bounds=bounds)
-        indices = {"bufferView": self._view(ids.astype(np.uint32)), "componentType": UINT}
-        sparse = {"count": len(ids), "indices": indices, "values": {"bufferView": self._view(rows[ids])}}
-        return self._accessor(rows, FLOAT, "VEC3", bounds=bounds, sparse=sparse)
+        indices = {"bufferView": self.view(ids.astype(np.uint32)), "componentType": UINT}
+        sparse = {"count": len(ids), "indices": indices, "values": {"bufferView": self.view(rows[ids])}}
+        return self.accessor(rows, FLOAT, "VEC3", bounds=bounds, sparse=sparse)
 
     def _floats(self, rows: Array, *, bounds: bool = False) -> int:
         rows = np.ascontiguousarray(rows, np.float32)
-        return self._accessor(
-            rows, FLOAT, f"VEC{rows.shape[1]}", bounds=bounds, bufferView=self._view(rows, ARRAY_BUFFER)
+        return self.accessor(
+            rows, FLOAT, f"VEC{rows.shape[1]}", bounds=bounds, bufferView=self.view(rows, ARRAY_BUFFER)
         )
 
-    def _accessor(self, rows: Array, component: int, kind: str, *, bounds: bool = False, **source: Any) -> int:
+    def accessor(self, rows: Array, component: int, kind: str, *, bounds: bool = False, **source: Any) -> int:
         """Add an accessor whose elements are in ``source``; returns its index."""
         entry = {"componentType": component, "count": len(rows), "type": kind, **source}
         if bounds:
@@ -212,7 +228,7 @@ class Document:
         self._accessors.append(entry)
         return len(self._accessors) - 1
 
-    def _view(self, array: Array, target: int | None = None) -> int:
+    def view(self, array: Array, target: int | None = None) -> int:
         """Add a buffer view with the array's bytes; returns its index."""
         self._pad()
         view = {"buffer": 0, "byteOffset": len(self._data), "byteLength": array.nbytes}
