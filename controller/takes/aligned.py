@@ -205,7 +205,7 @@ def _speaks(interval: Interval) -> bool:
 
 def _cues_of_sounds(tier: Sequence[Interval], visemes: Visemes) -> tuple[list[Cue], float]:
     """A cue for each sound, and silence between sounds that do not follow each other. Raises ParameterError."""
-    weights = iter(visemes.sounds([each.text for each in tier if _speaks(each)]))
+    weights = iter(visemes.sounds([each.text for each in tier if _speaks(each)], guess=True))
     rest, cues, end_s = visemes.weights(visemes.names[0]), list[Cue](), 0.0
     for each in sorted(tier, key=lambda each: each.start_s):
         if each.start_s > end_s + 1e-3:

@@ -125,7 +125,8 @@ class _Mouth:
     def __init__(self, parameters: Parameters) -> None:
         self.visemes = Visemes.load(parameters)
         self._model = lip_model()
-        at = [self.visemes.names.index(name) for name in self._model.visemes]
+        known = self.visemes.names
+        at = [known.index(name) if name in known else 0 for name in self._model.visemes]
         self._columns = self.visemes.matrix[:, at].T
         self._firmness = self.visemes.hold[at] * np.where(np.array(self._model.visemes) == "PP", _CLOSING, 1.0)
         self.rest = np.eye(len(self._columns))[0]

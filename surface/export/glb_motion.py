@@ -4,19 +4,17 @@ morph targets, and a skin with two joints, so that the neck bends where the head
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats
 from surface.export.animation import Animation
+from surface.export.glb_document import Document
 from surface.export.shapes import ExportPart
 from surface.head import Head
 from surface.head.model.parameters import SHAPES
-
-if TYPE_CHECKING:
-    from surface.export.glb import Document  # which imports this module
 
 _FLOAT, _BYTE, _ARRAY = 5126, 5121, 34962
 _METRES = 0.001
