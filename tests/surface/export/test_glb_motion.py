@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 import trimesh
 from small_head import small_head
-from test_glb import Decoded
 
 from surface.base.errors import ExportError
 from surface.export import Animation, export_head
 from surface.head import Head
 from surface.head.model.parameters import NAMES, SHAPES
+from tests.surface.export.test_glb import Decoded
 
 TIMES = np.array([0.0, 0.1, 0.25, 0.5])
 
@@ -66,9 +66,8 @@ class Played(Decoded):
             mesh = self.document["meshes"][node["mesh"]]
             (primitive,) = mesh["primitives"]
             points = self.accessor(primitive["attributes"]["POSITION"]).astype(float)
-            for target, weight in zip(
-                primitive.get("targets", []), weights[k][1][frame] if k in weights else [], strict=False
-            ):
+            shares = weights[k][1][frame] if k in weights else []
+            for target, weight in zip(primitive.get("targets", []), shares, strict=False):
                 points = points + weight * self.accessor(target["POSITION"])
             homogeneous = np.column_stack([points, np.ones(len(points))])
             if "skin" in node:
