@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from controller.base.errors import ParameterError, TakeError
-from controller.base.parameters import Parameters
+from controller.base.parameters import Floats, Parameters
 from controller.takes.livelink import Take
 from controller.takes.speech import Cue, speech_take
 from controller.vocabulary.visemes import Visemes
@@ -57,6 +57,23 @@ def textgrid_take(path: Path, parameters: Parameters) -> Take:
         raise TakeError(f"{path}: not a TextGrid: {error}", hint=_TEXTGRID) from error
     cues, end_s = _cues_of_tiers(path, tiers, visemes)
     return speech_take(path.name, cues, end_s, parameters, visemes)
+
+
+def sounds_of(path: Path, visemes: Visemes) -> list[tuple[float, float, str, Floats]]:
+    """Start and end (s), label and weights (n,) of every sound in a TextGrid's tier of sounds, without silence.
+
+    Raises TakeError: there is no such tier, or a sound is unknown.
+    """
+    try:
+        tiers = dict(_tiers(path))
+        sounds = _longest({name: tier for name, tier in tiers.items() if _SOUND_TIERS.fullmatch(name.strip())})
+        spoken = [each for each in sounds or [] if _speaks(each)]
+        if not spoken:
+            raise ValueError("no tier of sounds")
+        weights = visemes.sounds([each.text for each in spoken], guess=True)
+    except (ValueError, ParameterError) as error:
+        raise TakeError(f"{path}: {error}", hint=_TEXTGRID) from error
+    return [(each.start_s, each.end_s, each.text, row) for each, row in zip(spoken, weights, strict=True)]
 
 
 def aeneas_take(path: Path, parameters: Parameters) -> Take:

@@ -10,7 +10,9 @@ import pytest
 
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
+from controller.takes.aligned import sounds_of
 from controller.takes.reader import load_take
+from controller.vocabulary.visemes import Visemes
 
 JAW, ROLL, PUCKER = P.index("jawOpen"), P.index("mouthRollLower"), P.index("mouthPucker")
 LONG = '''File type = "ooTextFile"
@@ -105,6 +107,15 @@ def test_every_form_and_encoding_of_textgrid_is_the_same(tmp_path: Path, text: s
     values = read(tmp_path / "a.TextGrid", text, encoding)
     assert values[27, ROLL] > 0.3 > 0.1 > values[27, JAW] and values[50, JAW] > 0.5 and values[95, JAW] < 0.05
     np.testing.assert_array_equal(values, read(tmp_path / "b.TextGrid", SHORT))
+
+
+def test_the_sounds_of_a_tier_with_their_times(tmp_path: Path) -> None:
+    (tmp_path / "a.TextGrid").write_text(LONG)
+    found = sounds_of(tmp_path / "a.TextGrid", Visemes.load(P))
+    assert [(start, end, text) for start, end, text, _ in found] == [(0.2, 0.35, "M"), (0.35, 0.7, "AA1")]
+    (tmp_path / "b.TextGrid").write_text(tier((0.0, 1.0, "mama"), name="words"))
+    with pytest.raises(TakeError, match="no tier of sounds"):
+        sounds_of(tmp_path / "b.TextGrid", Visemes.load(P))
 
 
 def test_big_endian_utf_16(tmp_path: Path) -> None:
