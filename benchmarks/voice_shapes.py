@@ -1,3 +1,4 @@
+# ruff: noqa: T201
 """How often a mouth that follows a voice shows the class of the sound that is spoken.
 
     python benchmarks/voice_shapes.py FOLDER
@@ -20,7 +21,8 @@ from controller.takes.voice import wav_take
 from controller.vocabulary.visemes import Visemes
 
 CLASSES = {
-    "closed": "PP sil", "open": "aa E kk", "round": "O U RR", "spread": "I", "fricative": "FF TH SS CH", "narrow": "nn DD",
+    "closed": "PP sil", "open": "aa E kk", "round": "O U RR", "spread": "I", "fricative": "FF TH SS CH",
+    "narrow": "nn DD",
 }  # fmt: skip
 """Visemes that look alike. A sound of the last class, or kk, RR or silence, is not counted; showing one is an error."""
 COUNTED = {"PP", "FF", "TH", "SS", "CH", "aa", "E", "I", "O", "U"}

@@ -144,7 +144,10 @@ def _tiers(path: Path) -> Iterator[tuple[str, list[Interval]]]:
 
 def _decoded(data: bytes) -> str:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16")
+        try:
+            return data.decode("utf-16")
+        except UnicodeDecodeError as error:
+            raise ValueError(f"its UTF-16 is damaged at byte {error.start}") from error
     return files.decode(data)
 
 

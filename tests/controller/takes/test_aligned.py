@@ -118,6 +118,12 @@ def test_the_sounds_of_a_tier_with_their_times(tmp_path: Path) -> None:
         sounds_of(tmp_path / "b.TextGrid", Visemes.load(P))
 
 
+def test_damaged_utf_16_is_one_message(tmp_path: Path) -> None:
+    (tmp_path / "a.TextGrid").write_bytes(b"\xff\xfe" + LONG.encode("utf-16-le")[:99])
+    with pytest.raises(TakeError, match="its UTF-16 is damaged at byte"):
+        load_take(tmp_path / "a.TextGrid", P)
+
+
 def test_big_endian_utf_16(tmp_path: Path) -> None:
     assert read(tmp_path / "a.TextGrid", "\ufeff" + LONG, "utf-16-be")[50, JAW] > 0.5
 
