@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def _runs() -> tuple[Callable[..., None], ...]:
     from controller.cli import run  # start-up: each of these only where it is needed
 
-    return run.demo, run.run, run.play
+    return run.demo, run.run, run.play, run.convert
 
 
 def _pictures() -> tuple[Callable[..., None], ...]:
@@ -41,7 +41,7 @@ def _others() -> tuple[Callable[..., None], ...]:
 
 
 COMMANDS = (
-    (("demo", "run", "play"), _runs),
+    (("demo", "run", "play", "convert"), _runs),
     (("render", "fit", "landmarks", "export"), _pictures),
     (("ports", "scan", "set-id", "monitor", "calibrate"), _buses),
     (("check", "plugins", "bench", "translate"), _others),

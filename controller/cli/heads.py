@@ -17,6 +17,7 @@ from surface.base.extras import require
 
 if TYPE_CHECKING:
     from controller.tools.surface_fit import SurfaceFit  # start-up: --help does without it
+    from surface.export.animation import Animation  # start-up: --help does without it
     from surface.fit.points.report import FitReport  # start-up: --help does without it
     from surface.fit.source.load import LoadOptions  # start-up: --help does without it
 
@@ -308,10 +309,19 @@ def export(
     frame: Annotated[
         str, typer.Option(help="head: millimetres or metres, y up, z forward; file: as in the mesh it was fitted to.")
     ] = "head",
+    take: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Take, recording or show that the .glb plays as an animation.")
+    ] = None,
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(
+            "--rate", min=1, max=1000, help="Frames a second of --take.", show_default="the take's own, or 60"
+        ),
+    ] = None,
 ) -> None:
     """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.
 
-    Example: omote export head.glb
+    Example: omote export head.glb; with an animation: omote export head.glb --take alex_rom_3.csv
     """
     # start-up: --help does without any of these
     from controller.base.parameters import PARAMETERS
@@ -329,6 +339,24 @@ def export(
         added = added_exporters()
         kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
         with EXPORTERS.blaming(kind):
-            written = export_head(loaded, out, pose, added, frame)
+            written = export_head(loaded, out, pose, added, frame, _animation(take, rate_hz))
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
+
+
+def _animation(take: Path | None, rate_hz: float | None) -> Animation | None:
+    """What a take shows, as an animation; None without one."""
+    # start-up: --help does without any of these
+    from controller.base.parameters import PARAMETERS
+    from controller.face.face import head_indices
+    from controller.tools.motion_file import load_motion
+    from surface.export.animation import Animation
+    from surface.head.model.parameters import NAMES
+
+    if take is None and rate_hz is not None:
+        raise ConfigError("--rate: there is no --take", hint="--take alex_rom_3.csv --rate 30")
+    if take is None:
+        return None
+    motion = load_motion(take, PARAMETERS, rate_hz)
+    order = head_indices(PARAMETERS, NAMES)
+    return Animation(take.stem, motion.times_s, motion.with_rest()[:, order])

@@ -98,7 +98,7 @@ def run(
 def play(
     take: Annotated[
         Path,
-        typer.Argument(help="Take (.csv), speech (.wav, .tsv, Rhubarb .json), recording (.rec), or - for a voice."),
+        typer.Argument(help="Take or speech of any kind (see omote plugins), recording (.rec), or - for a voice."),
     ],
     stage: StageName = "play",
     seconds: Seconds = None,
@@ -122,6 +122,28 @@ def play(
              record=record)  # fmt: skip
     else:
         _run(stage, seconds, headless, no_face, pictures, report, take=take, record=record)
+
+
+def convert(
+    take: Annotated[Path, typer.Argument(help="Take of any kind, voice, recording (.rec) or show (.toml).")],
+    out: Annotated[Path, typer.Argument(metavar="OUT.csv", help="Table to write: time and parameters.")],
+    rate_hz: Annotated[
+        float | None,
+        typer.Option("--rate", min=1, max=1000, help="Rows a second.", show_default="the take's own, or 60"),
+    ] = None,
+) -> None:
+    """Write what a take shows as a plain table: time,jawOpen,... in seconds and values, for other programs.
+
+    Example: omote convert alex_rom_3.csv alex.csv --rate 30
+    """
+    # start-up: --help does without either
+    from controller.base.parameters import PARAMETERS
+    from controller.tools.motion_file import convert as write
+
+    with console.status("converting"):
+        motion = write(take, out, PARAMETERS, rate_hz)
+    rows = f"{len(motion.times_s)} rows of {int(motion.mask.sum())} parameters, {motion.times_s[-1]:.1f} s"
+    console.print(f"{rows}\nwrote {out}", soft_wrap=True)
 
 
 def _run(

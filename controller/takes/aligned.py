@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from controller.base.errors import ParameterError, TakeError
-from controller.base.parameters import Parameters
+from controller.base.parameters import Floats, Parameters
 from controller.takes.livelink import Take
 from controller.takes.speech import Cue, speech_take
 from controller.vocabulary.visemes import Visemes
@@ -57,6 +57,23 @@ def textgrid_take(path: Path, parameters: Parameters) -> Take:
         raise TakeError(f"{path}: not a TextGrid: {error}", hint=_TEXTGRID) from error
     cues, end_s = _cues_of_tiers(path, tiers, visemes)
     return speech_take(path.name, cues, end_s, parameters, visemes)
+
+
+def sounds_of(path: Path, visemes: Visemes) -> list[tuple[float, float, str, Floats]]:
+    """Start and end (s), label and weights (n,) of every sound in a TextGrid's tier of sounds, without silence.
+
+    Raises TakeError: there is no such tier, or a sound is unknown.
+    """
+    try:
+        tiers = dict(_tiers(path))
+        sounds = _longest({name: tier for name, tier in tiers.items() if _SOUND_TIERS.fullmatch(name.strip())})
+        spoken = [each for each in sounds or [] if _speaks(each)]
+        if not spoken:
+            raise ValueError("no tier of sounds")
+        weights = visemes.sounds([each.text for each in spoken], guess=True)
+    except (ValueError, ParameterError) as error:
+        raise TakeError(f"{path}: {error}", hint=_TEXTGRID) from error
+    return [(each.start_s, each.end_s, each.text, row) for each, row in zip(spoken, weights, strict=True)]
 
 
 def aeneas_take(path: Path, parameters: Parameters) -> Take:
@@ -127,7 +144,10 @@ def _tiers(path: Path) -> Iterator[tuple[str, list[Interval]]]:
 
 def _decoded(data: bytes) -> str:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16")
+        try:
+            return data.decode("utf-16")
+        except UnicodeDecodeError as error:
+            raise ValueError(f"its UTF-16 is damaged at byte {error.start}") from error
     return files.decode(data)
 
 
@@ -205,7 +225,7 @@ def _speaks(interval: Interval) -> bool:
 
 def _cues_of_sounds(tier: Sequence[Interval], visemes: Visemes) -> tuple[list[Cue], float]:
     """A cue for each sound, and silence between sounds that do not follow each other. Raises ParameterError."""
-    weights = iter(visemes.sounds([each.text for each in tier if _speaks(each)]))
+    weights = iter(visemes.sounds([each.text for each in tier if _speaks(each)], guess=True))
     rest, cues, end_s = visemes.weights(visemes.names[0]), list[Cue](), 0.0
     for each in sorted(tier, key=lambda each: each.start_s):
         if each.start_s > end_s + 1e-3:

@@ -56,7 +56,7 @@ def viseme_take(path: Path, parameters: Parameters) -> Take:
             continue  # events of blend shapes come after those of visemes, without a viseme of their own
         if not _is_number(offset) or not 0 <= offset < math.inf:
             raise _fault(path, where, "its offset must be a number of ticks of 100 ns")
-        if number not in visemes.sapi:
+        if isinstance(number, bool) or not isinstance(number, int) or number not in visemes.sapi:
             raise _fault(path, where, f"viseme {number!r}: must be 0 to {max(visemes.sapi, default=0)}")
         cues.append(Cue(offset / _TICKS_PER_S, visemes.sapi[number]))
     end_s = cues[-1].start_s + _LAST_S if cues else 0.0

@@ -87,23 +87,27 @@ def _dominance(t: Floats, start: Floats, end: Floats, room: Floats | float) -> F
 
 
 def cue_take(path: Path, parameters: Parameters) -> Take:
-    """A take from Rhubarb's TSV or JSON, or from a TSV of phonemes or visemes (time, tab, name). Raises TakeError."""
+    """A take from Rhubarb's TSV or JSON, or from a TSV of sounds (time, tab, name). Raises TakeError.
+
+    Sounds are visemes, phonemes of ARPAbet or symbols of the IPA. Rhubarb's letters mean its shapes only where every
+    name in the file is one: B and F are phonemes, too.
+    """
     with files.reading(path, TakeError, hint="save it as UTF-8"):
         text = files.read_text(path, _MOST_BYTES)
     visemes = Visemes.load(parameters)
     rows, end_s = _json_rows(path, text) if path.suffix.lower() == ".json" else _tsv_rows(path, text)
     shapes = all(name in visemes.rhubarb for _, _, name in rows)
-    cues = [Cue(start_s, _weights(path, line, name, visemes, shapes)) for line, start_s, name in rows]
+    sounds = [visemes.rhubarb[name] for _, _, name in rows] if shapes else _sounds(path, rows, visemes)
+    cues = [Cue(start_s, weights) for (_, start_s, _), weights in zip(rows, sounds, strict=True)]
     return speech_take(path.name, cues, end_s, parameters, visemes)
 
 
-def _weights(path: Path, line: str, name: str, visemes: Visemes, shapes: bool) -> Floats:
-    """Rhubarb's letters mean its shapes only where every name in the file is one: B and F are phonemes, too."""
-    if shapes:
-        return visemes.rhubarb[name]
+def _sounds(path: Path, rows: Sequence[tuple[str, float, str]], visemes: Visemes) -> list[Floats]:
+    """Weights of the sounds of rows. Raises TakeError, with the place of the first that is unknown."""
     try:
-        return visemes.weights(name)
+        return visemes.sounds([name for _, _, name in rows])
     except ParameterError as error:
+        line = next(line for line, _, name in rows if not visemes.knows(name))
         raise TakeError(f"{path}, {line}: {error}", hint=error.hint) from error
 
 

@@ -37,8 +37,9 @@ from surface.base import files
 __all__ = ["HOP_S", "VoiceEnvelope", "VoiceListener", "voice_take", "wav_take"]
 
 _RATE_HZ = round(1 / HOP_S)
-_TAU_S = 0.02
-_LEAD = 3  # frames by which the lips of a file lead its sound, which makes up for the time that they take to move
+_TAU_S = 0.01
+_SHARPNESS = 2.0  # power of the shares: mouths between all visemes look like none
+_CLOSING = 2.0  # lips that do not meet are noticed more than lips that meet too often
 _MEMORY_S = 4.0
 _LONGEST_S = 3600.0
 _QUIET_DB = -53.0  # what is never louder counts as silence whatever came before
@@ -71,11 +72,11 @@ def voice_take(
     mouth = _Mouth(parameters)
     loudness = loudness_db(levels)
     loud = max(float(np.percentile(loudness, _LOUD_PERCENTILE)), _QUIET_DB)
-    shares = np.concatenate([*_judged(levels, loud, mouth), np.repeat(mouth.rest[None], _LEAD, axis=0)])
-    followed, share = np.empty_like(shares), mouth.rest
+    shares = np.concatenate([mouth.rest[None], *_judged(levels, loud, mouth)])  # a frame's middle is a hop later
+    share = mouth.rest
     for i, goal in enumerate(shares):
-        followed[i] = share = _follow(share, goal)
-    values = mouth.pose(followed[_LEAD:], loudness - loud)
+        shares[i] = share = _follow(share, goal)
+    values = mouth.pose(shares[:-1], loudness - loud)
     times: Floats = np.arange(len(values)) / _RATE_HZ
     return Take(
         Path(name).name, times, values, mouth.visemes.mask, parameters.low, parameters.high, mouth.visemes.through
@@ -125,16 +126,16 @@ class _Mouth:
         self.visemes = Visemes.load(parameters)
         self._model = lip_model()
         known = self.visemes.names
-        self._columns = np.stack(
-            [self.visemes.matrix[:, known.index(name)] if name in known else parameters.neutral()
-             for name in self._model.visemes]
-        )  # fmt: skip
+        at = [known.index(name) if name in known else 0 for name in self._model.visemes]
+        self._columns = self.visemes.matrix[:, at].T
+        self._firmness = self.visemes.hold[at] * np.where(np.array(self._model.visemes) == "PP", _CLOSING, 1.0)
         self.rest = np.eye(len(self._columns))[0]
         self._jaw = parameters.index("jawOpen")
 
     def shares(self, levels: Floats, loud: Floats | float, near: Floats) -> Floats:
         """(k, n) shares in levels (k + BEFORE + AHEAD, BANDS); silence where ``near``, the loudest around, is low."""
-        judged = self._model.judge(features(levels, loud))
+        judged = self._model.judge(features(levels, loud)) ** _SHARPNESS * self._firmness
+        judged /= np.maximum(judged.sum(axis=1, keepdims=True), 1e-9)
         heard = (near > _QUIET_DB) & (near > loud - _HUSHED_DB)
         return np.where(heard[:, None], judged, self.rest)
 
@@ -149,7 +150,7 @@ class _Mouth:
 class VoiceEnvelope:
     """Turns sound of ``rate_hz`` samples per second into a mouth, a hop of 10 ms at a time.
 
-    The mouth is about 70 ms behind the sound: 40 ms of it to hear what follows a closure.
+    The mouth is about 60 ms behind the sound: 40 ms of it to hear what follows a closure.
 
     mask : (P,) bool, the parameters it moves.
     """

@@ -96,18 +96,23 @@ class Visemes:
             raise ParameterError(f"unknown viseme {name!r}{did_you_mean(name, self.names)}", hint=" ".join(self.names))
         return found
 
-    def sounds(self, names: Sequence[str]) -> list[Floats]:
+    def sounds(self, names: Sequence[str], *, guess: bool = False) -> list[Floats]:
         """Weights (n,) of each sound of an alignment: visemes, phonemes of ARPAbet, or symbols of the IPA.
 
         All are symbols of the IPA where any of them can be nothing else: "y" is another sound there.
+        guess : what is unknown is read as a symbol in small letters, as "PT".
 
         Raises ParameterError: a sound is unknown.
         """
         plain = {name: self._named(name) for name in names}
         if all(found is not None for found in plain.values()):
             return [self.weights(name) for name in names]
-        found = {name: self._mixed(name, plain[name]) for name in plain}
+        found = {name: self._mixed(name, plain[name], guess) for name in plain}
         return [self.weights(name) if (weights := found[name]) is None else weights for name in names]
+
+    def knows(self, name: str) -> bool:
+        """Whether :meth:`sounds` knows a sound."""
+        return self._named(name) is not None or self._symbol(name) is not None
 
     def spell(self, text: str) -> Floats:
         """(k, n) weights of the sounds of a written text, guessed from its letters; (1, n) silence without any."""
@@ -126,16 +131,21 @@ class Visemes:
             return only
         return self.phonemes.get(name.upper().rstrip("012"))
 
-    def _mixed(self, name: str, plain: Floats | None) -> Floats | None:
+    def _mixed(self, name: str, plain: Floats | None, guess: bool) -> Floats | None:
         """Weights of a sound among symbols of the IPA; names of ARPAbet beside them, as "DH", keep their meaning."""
         arpabet = plain is not None and name.isascii() and (len(name) > 1 or name.isupper())
-        return plain if arpabet or (symbol := self._symbol(name)) is None else symbol
+        if arpabet:
+            return plain
+        symbol = self._symbol(name)
+        if symbol is None and guess:
+            symbol = self._symbol(name.lower())
+        return plain if symbol is None else symbol
 
     def _symbol(self, name: str) -> Floats | None:
         """Weights of a symbol of the IPA, by the longest beginning that is listed."""
         bare = _bare(name)
-        starts = [text[:size] for text in (bare, bare.lower()) for size in range(len(bare), 0, -1)]
-        return next((self.ipa[start] for start in starts if start in self.ipa), None)
+        sizes = range(len(bare), 0, -1)
+        return next((self.ipa[bare[:size]] for size in sizes if bare[:size] in self.ipa), None)
 
 
 def _bare(symbol: str) -> str:

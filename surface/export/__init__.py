@@ -15,11 +15,12 @@ from pathlib import Path
 from typing import Any
 
 from surface.base.errors import ExportError
+from surface.export.animation import Animation
 from surface.export.exporter import API, Exporter, Write
 from surface.export.frames import FRAMES
 from surface.head import Head
 
-__all__ = ["API", "SUFFIXES", "Exporter", "export_head", "exporters"]
+__all__ = ["API", "SUFFIXES", "Animation", "Exporter", "export_head", "exporters"]
 
 SUFFIXES: tuple[str, ...]  # of the exporters of this folder
 
@@ -65,7 +66,7 @@ def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
 
 def export_head(
     head: Head, path: str | Path, pose: Mapping[str, float] | None = None, extra: Iterable[Exporter] = (),
-    frame: str = "head",
+    frame: str = "head", animation: Animation | None = None,
 ) -> list[Path]:  # fmt: skip
     """Write a head to a file for other programs; the suffix chooses the exporter (see :func:`exporters`).
 
@@ -74,11 +75,12 @@ def export_head(
     extra : exporters from other packages.
     frame : "head" for head space (mm or m, y up, z forward), "file" for axes, origin and unit of the file that the head
         was fitted to.
+    animation : motion that the file shall hold; its shapes move over time, and its head turns.
 
     Returns the paths written.
 
-    Raises ExportError: another suffix or frame, a frame of a file that nothing is known of, a pose that a file of this
-    kind cannot hold, or a place that cannot be written to; nothing is left half-written.
+    Raises ExportError: another suffix or frame, a frame of a file that nothing is known of, a pose or an animation that
+    a file of this kind cannot hold, or a place that cannot be written to; nothing is left half-written.
     """
     path, known = Path(path), exporters(extra)
     if frame not in FRAMES:
@@ -86,7 +88,7 @@ def export_head(
     for one in known:
         if path.suffix.lower() in one.suffixes:
             try:
-                return _writer(one, frame)(head, path, pose or {})
+                return _writer(one, frame, animation)(head, path, pose or {})
             except OSError as e:
                 hint = "choose a folder that can be written to"
                 raise ExportError(f"{path}: cannot be written ({e})", hint=hint) from e
@@ -97,8 +99,14 @@ def export_head(
     )
 
 
-def _writer(exporter: Exporter, frame: str) -> Write:
-    """What writes in a frame."""
+def _writer(exporter: Exporter, frame: str, animation: Animation | None) -> Write:
+    """What writes in a frame, or an animation."""
+    if animation is not None:
+        if exporter.animate is None or frame != "head":
+            why = f"{exporter.kind!r} holds no animation" if exporter.animate is None else "--frame file: no animation"
+            raise ExportError(why, hint="export a .glb, in head space")
+        animate, shown = exporter.animate, animation
+        return lambda head, path, pose: animate(head, shown, path, pose)
     if frame == "head":
         return exporter.write
     if exporter.write_in_file is None:

@@ -6,11 +6,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from surface.export.animation import Animation
 from surface.head import Head
 
 API = 1
 """Version of the interface of exporters: this module and :class:`surface.head.Head`."""
 Write = Callable[[Head, Path, Mapping[str, float]], list[Path]]
+Animate = Callable[[Head, Animation, Path, Mapping[str, float]], list[Path]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,6 +25,7 @@ class Exporter:
     kind : a short name, as "glb"; the module's own for the exporters of this folder
     title : short description of the file's content
     suffixes : of such files, in lower case, as (".glb",)
+    animate : as ``write``, with an animation before the path; None for a format that has none
     install : argument of ``pip install`` for a missing package
     write : is called with the head, the path and a pose (values by parameter, empty at rest) and returns the paths
         written. It leaves no incomplete files, and raises ExportError, or OSError if a path cannot be written to
@@ -35,3 +38,4 @@ class Exporter:
     write: Write
     install: str = ""
     write_in_file: Write | None = None
+    animate: Animate | None = None

@@ -12,7 +12,7 @@ import numpy as np
 from surface.base.arrays import Floats32
 from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
-from surface.export.glb import materials
+from surface.export.glb_document import materials
 from surface.export.shapes import ExportPart, export_parts
 from surface.head import Head
 

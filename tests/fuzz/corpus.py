@@ -217,6 +217,7 @@ def _takes(folder: Path) -> list[Kind]:
         Kind("tsv", "speech.tsv", [b"0.00\tX\n0.10\tD\n0.40\tB\n0.90\tX\n", b"0.0\taa\n0.5\tPP\n1.0\tsil\n"]),
         Kind("rhubarb", "speech.json", [json.dumps({"metadata": {"duration": 0.9}, "mouthCues": cues}).encode()]),
         Kind("wav", "voice.wav", [wav(8000 * np.sin(np.arange(3000) / 9.0))]),
+        *_alignments(),
         Kind("recording", "run.rec", [_recording(folder / "run.rec")]),
         Kind("group", "group.json", [_group()]),
         Kind("link", "phone.json", [_learned(folder / "phone.json")], reports(_read_learned)),  # a link reads it
@@ -233,6 +234,27 @@ def _learned(path: Path) -> bytes:
 
 def _read_learned(path: Path) -> None:
     load_state(path, PARAMETERS, Neutral(PARAMETERS), Ranges(PARAMETERS))
+
+
+def _alignments() -> list[Kind]:
+    """Takes that share their suffixes with others, and alignments of speech."""
+    tier = b'"IntervalTier"\n"phones"\n0\n1\n2\n0\n0.4\n"AA1"\n0.4\n1\n"sp"\n'
+    grid = b'File type = "ooTextFile"\nObject class = "TextGrid"\n\n0\n1\n<exists>\n1\n' + tier
+    fragment = {"begin": "0.0", "end": "1.0", "id": "f1", "language": "eng", "lines": ["Mama"], "children": []}
+    shapes = {"FrameIndex": 0, "BlendShapes": [[0.25] * 55] * 3}
+    visemes = [{"audio_offset": 500000 * k, "viseme_id": k} for k in range(6)]
+    openface = b"frame, timestamp, confidence, success, pose_Rx, pose_Ry, pose_Rz, AU01_r, AU28_c\n"
+    openface += b"".join(b"%d, 0.%d, 0.9, 1, 0.1, 0, 0, 2.5, 1\n" % (k, k) for k in range(1, 9))
+    pyfeat = b"input,frame,FaceScore,AU01,AU12,approx_time\n"
+    pyfeat += b"".join(b"a.mp4,%d,0.9,0.1,0.5,00:0%d\n" % (k * 30, k) for k in range(5))
+    return [
+        Kind("openface", "of.csv", [openface]), Kind("pyfeat", "feat.csv", [pyfeat]),
+        Kind("plain", "plain.csv", [b"time,jawOpen,headYaw_deg\n0,0.1,5\n0.1,0.5,-5\n", b"t;JawOpen\n0;0,5\n1;1\n"]),
+        Kind("textgrid", "a.TextGrid", [grid, grid.decode().encode("utf-16")]),
+        Kind("aeneas", "aeneas.json", [json.dumps({"fragments": [fragment]}).encode()]),
+        Kind("azure-visemes", "visemes.json", [json.dumps(visemes).encode()]),
+        Kind("azure-shapes", "shapes.json", [json.dumps(shapes).encode()]),
+    ]  # fmt: skip
 
 
 def _recording(path: Path) -> bytes:

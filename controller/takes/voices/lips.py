@@ -3,7 +3,7 @@
 A frame of 25 ms is reduced to the energies of 24 bands that are equally wide in mel, relative to the voice's own
 loudness. The shape of the lips follows from these bands, where formants and friction stand, and from those shortly
 before and after, where closures and bursts stand, by a small network (one hidden layer). Its weights are in
-``lips.npz``; ``benchmarks/voice_shapes.py`` says from which speech they were learnt and how well they do.
+``lips.npz``, learnt from speech of flite and espeak-ng; ``benchmarks/voice_shapes.py`` measures how well they do.
 """
 
 from __future__ import annotations

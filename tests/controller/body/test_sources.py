@@ -25,13 +25,14 @@ from controller.links.line.script import Script
 from controller.links.line.session import LineSession
 from controller.links.line.show import Shows
 from controller.stage.stage import load_stage
+from tests.controller.takes.voices.synthesis import MEN, vowel
 
 RATE = 8000
 JAW = P.index("jawOpen")
 
 
 def sound(seconds: float) -> bytes:
-    wave_ = 0.5 * np.sin(2 * np.pi * 200 * np.arange(int(RATE * seconds)) / RATE)
+    wave_ = vowel(MEN["ɑ"], 120.0, seconds, RATE)
     return (wave_ * 32767).astype("<i2").tobytes()
 
 

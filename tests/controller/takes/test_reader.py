@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import FrozenInstanceError
@@ -19,7 +20,8 @@ MODULE = """
 import numpy as np
 from controller.takes.livelink import Take
 from controller.takes.reader import TakeReader
-PLUGIN = TakeReader(api={api}, kind="{kind}", title="trial", suffixes={suffixes}, read="plugin_{kind}:{read}")
+PLUGIN = TakeReader(api={api}, kind="{kind}", title="trial", suffixes={suffixes}, read="plugin_{kind}:{read}",
+                    recognises="{recognises}")
 
 def rest(path, parameters):
     n = len(parameters)
@@ -27,6 +29,9 @@ def rest(path, parameters):
 
 def nothing(path, parameters):
     return 3
+
+def mine(start):
+    return start.startswith(b"mine")
 
 def broken(path, parameters):
     return 1 / 0
@@ -38,12 +43,14 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     """Adds a reader of another package."""
     monkeypatch.syspath_prepend(tmp_path)
 
-    def add(kind: str, *taken: str, read: str = "rest", api: int = API) -> None:
+    def add(kind: str, *taken: str, read: str = "rest", api: int = API, recognises: str = "") -> None:
         info = tmp_path / f"{kind}_package-1.dist-info"
         info.mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {kind}-package\nVersion: 1\n")
         (info / "entry_points.txt").write_text(f"[omote.takes]\n{kind} = plugin_{kind}:PLUGIN\n")
-        (tmp_path / f"plugin_{kind}.py").write_text(MODULE.format(kind=kind, suffixes=taken, read=read, api=api))
+        (tmp_path / f"plugin_{kind}.py").write_text(
+            MODULE.format(kind=kind, suffixes=taken, read=read, api=api, recognises=recognises)
+        )
 
     yield add
     for name in [name for name in sys.modules if name.startswith("plugin_")]:
@@ -52,21 +59,45 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 
 
 def test_the_built_in_readers() -> None:
-    assert {(reader.kind, reader.suffixes, reader.layer) for reader in TAKES.all()} == {
-        ("livelink", (".csv",), "capture"),
-        ("sounds", (".tsv", ".json"), "speech"),
-        ("wav", (".wav",), "speech"),
-    }
-    assert sorted(suffixes()) == [".csv", ".json", ".tsv", ".wav"]
+    assert {(reader.kind, reader.layer) for reader in TAKES.all()} == {
+        ("livelink", "capture"), ("openface", "capture"), ("pyfeat", "capture"), ("plain", "capture"),
+        ("sounds", "speech"), ("aeneas", "speech"), ("azure_visemes", "speech"), ("azure_shapes", "capture"),
+        ("textgrid", "speech"), ("wav", "speech"), ("compressed", "speech"),
+    }  # fmt: skip
+    assert {".csv", ".json", ".tsv", ".wav", ".textgrid", ".mp3"} <= set(suffixes())
+    assert len(set(suffixes())) == len(suffixes())
     assert all(isinstance(reader, TakeReader) and reader.api == API for reader in TAKES.all())
 
 
-@pytest.mark.parametrize(("name", "kind"), [("a.csv", "livelink"), ("A.CSV", "livelink"), ("b.x.json", "sounds")])
-def test_a_reader_is_found_by_the_ending_in_any_case(name: str, kind: str) -> None:
-    assert reader_of(Path(name)).kind == kind
+def test_one_built_in_reader_of_each_suffix_takes_what_no_other_recognises() -> None:
+    for suffix in suffixes():
+        assert sum(suffix in reader.suffixes and not reader.recognises for reader in TAKES.all()) == 1, suffix
 
 
-@pytest.mark.parametrize(("name", "ending"), [("a.mp3", ".mp3"), ("take", "nothing")])
+@pytest.mark.parametrize(
+    ("name", "text", "kind"),
+    [
+        ("a.csv", "Timecode,BlendShapeCount,JawOpen", "livelink"),
+        ("A.CSV", "timecode, BlendshapeCount", "livelink"),
+        ("a.csv", "frame, face_id, timestamp, confidence, success, AU01_r", "openface"),
+        ("a.csv", "input,frame,FaceScore,AU01", "pyfeat"),
+        ("a.csv", "time,jawOpen", "plain"),
+        ("a.csv", "", "plain"),
+        ("b.x.json", '{"mouthCues": []}', "sounds"),
+        ("b.json", '{"fragments": []}', "aeneas"),
+        ("b.json", '[{"audio_offset": 0, "viseme_id": 0}]', "azure_visemes"),
+        ("b.json", '[{"privAudioOffset": 0, "privVisemeId": 0}]', "azure_visemes"),
+        ("b.json", '{"FrameIndex": 0, "BlendShapes": []}', "azure_shapes"),
+        ("b.json", json.dumps({"viseme_id": 0, "animation": json.dumps({"BlendShapes": []})}), "azure_shapes"),
+        ("c.TextGrid", "", "textgrid"),
+    ],
+)
+def test_a_reader_is_found_by_the_ending_and_the_first_bytes(tmp_path: Path, name: str, text: str, kind: str) -> None:
+    (tmp_path / name).write_text(text)
+    assert reader_of(tmp_path / name).kind == kind
+
+
+@pytest.mark.parametrize(("name", "ending"), [("a.mp4", ".mp4"), ("take", "nothing")])
 def test_a_file_that_nobody_reads_names_what_there_is(name: str, ending: str) -> None:
     with pytest.raises(TakeError, match=f"{name}: no take: its name ends in {ending}") as caught:
         reader_of(Path(name))
@@ -89,6 +120,20 @@ def test_wrong_suffixes_are_refused(install: Callable[..., None], suffix: str, w
     install("track", suffix)
     with pytest.raises(PluginError, match=why):
         TAKES.get("track")
+
+
+def test_a_reader_of_another_package_shares_a_suffix_with_what_it_recognises(
+    install: Callable[..., None], tmp_path: Path
+) -> None:
+    install("track", ".csv", ".track", recognises="plugin_track:mine")
+    install("other", ".track", recognises="plugin_other:mine")
+    for name, text, kind in (("a.csv", "mine", "track"), ("b.csv", "time,jawOpen", "plain")):
+        (tmp_path / name).write_text(text)
+        assert reader_of(tmp_path / name).kind == kind
+    (tmp_path / "a.track").write_text("nobody's")
+    with pytest.raises(TakeError, match="that omote knows") as caught:
+        reader_of(tmp_path / "a.track")
+    assert "trial" in caught.value.hint
 
 
 def test_a_reader_for_another_version_is_refused(install: Callable[..., None]) -> None:

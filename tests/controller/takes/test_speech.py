@@ -17,6 +17,7 @@ from controller.takes.livelink import TakePlayer
 from controller.takes.reader import load_take
 from controller.takes.speech import Cue, cue_take, speech_take
 from controller.vocabulary.visemes import Visemes
+from tests.controller.takes.voices.synthesis import MEN, noise, vowel
 
 VISEMES = Visemes.load(P)
 JAW, PRESS, SMILE = P.index("jawOpen"), P.index("mouthPressLeft"), P.index("mouthSmileLeft")
@@ -85,7 +86,7 @@ def test_phonemes_a_line(tmp_path: Path) -> None:
         ("a.json", f'{{"mouthCues": [{{"start": 0, "end": {10**400}, "value": "A"}}]}}', "mouthCues[0].end must be a"),
         ("a.json", '{"mouthCues": [{"start": 0, "end": 1, "value": ["A"]}]}', "mouthCues[0].value must be a name"),
         ("a.wav", "RIFF", "not WAV of PCM"),
-        ("a.mp3", "", "its name ends in .mp3"),
+        ("a.mp4", "", "its name ends in .mp4"),
     ],
 )
 def test_broken_files_say_why(tmp_path: Path, name: str, text: str, message: str) -> None:
@@ -115,8 +116,8 @@ def write_wav(path: Path, sound: np.ndarray, rate: int, width: int = 2, channels
 
 @pytest.mark.parametrize(("width", "channels", "rate"), [(2, 1, 16000), (1, 1, 8000), (4, 2, 44100)])
 def test_a_voice_opens_the_jaw_and_silence_closes_it(tmp_path: Path, width: int, channels: int, rate: int) -> None:
-    t = np.arange(2 * rate) / rate
-    voice = 0.6 * np.sin(2 * np.pi * 220 * t) * ((t > 0.5) & (t < 1.2))
+    voice = np.zeros(2 * rate)
+    voice[rate // 2 : rate // 2 + int(0.7 * rate)] = vowel(MEN["ɑ"], 120.0, 0.7, rate)
     take = load_take(write_wav(tmp_path / "a.wav", voice, rate, width, channels), P)
     jaw = take.values[:, JAW]
     assert take.frames == 200 and take.duration_s == pytest.approx(1.99)
@@ -124,14 +125,24 @@ def test_a_voice_opens_the_jaw_and_silence_closes_it(tmp_path: Path, width: int,
 
 
 def test_hissing_stretches_the_lips_more_than_it_opens_the_jaw(tmp_path: Path) -> None:
-    rate, random = 16000, np.random.default_rng(1)
-    t = np.arange(2 * rate) / rate
-    voice = 0.5 * np.sin(2 * np.pi * 200 * t) * (t < 0.8)
-    hiss = np.diff(random.normal(size=2 * rate + 1)) * 0.1 * ((t > 1.2) & (t < 1.6))
-    values = load_take(write_wav(tmp_path / "a.wav", np.clip(voice + hiss, -1, 1), rate), P).values
+    voice, silence = vowel(MEN["ɑ"], 120.0, 0.8), np.zeros(3200)
+    sound = np.concatenate([voice, silence, noise(4500, 7800, 0.4, 0.06), silence])
+    values = load_take(write_wav(tmp_path / "a.wav", sound, 16000), P).values
     stretch = P.index("mouthStretchLeft")
-    assert values[135:155, stretch].min() > 0.1 > values[135:155, JAW].max()
+    assert values[105:135, stretch].min() > 0.1 > values[105:135, JAW].max()
     assert values[20:70, JAW].min() > 0.3
+
+
+def test_symbols_of_the_ipa_are_sounds_too(tmp_path: Path) -> None:
+    sounds = {"ipa": "m ˈaɪ ʃ yː _", "arpabet": "M AY1 SH UW0 SIL"}
+    for name, words in sounds.items():
+        text = "".join(f"{0.2 * i:.1f} {word}\n" for i, word in enumerate(words.split()))
+        (tmp_path / f"{name}.tsv").write_text(text, encoding="utf-8")
+    ipa, arpabet = (load_take(tmp_path / f"{name}.tsv", P) for name in ("ipa", "arpabet"))
+    np.testing.assert_allclose(ipa.values, arpabet.values)
+    (tmp_path / "bad.tsv").write_text("0 ʃ\n0.1 ✂\n", encoding="utf-8")
+    with pytest.raises(TakeError, match="line 2: unknown viseme or phoneme"):
+        load_take(tmp_path / "bad.tsv", P)
 
 
 def test_talking_keeps_the_smile_and_the_brows(tmp_path: Path) -> None:

@@ -156,9 +156,9 @@ def test_what_a_stage_has_and_has_not(tmp_path: Path) -> None:
 
 SHIPPED = {
     "vocabularies/arkit.toml": "parameters arkit.toml: 59",
-    "vocabularies/facs.toml": "action units facs.toml: 48 with sides, 8 emotions",
+    "vocabularies/facs.toml": "action units facs.toml: 61 with sides, 8 emotions",
     "vocabularies/affect.toml": "moods affect.toml: 9 anchors",
-    "vocabularies/visemes.toml": "visemes visemes.toml: 15, 41 phonemes",
+    "vocabularies/visemes.toml": "visemes visemes.toml: 15, 61 phonemes",
     "vocabularies/vrm.toml": "presets vrm.toml: 18",
     "vocabularies/layers.toml": "layers layers.toml: expression, idle, gaze, speech, capture, manual",
     "life/natural.toml": "life natural.toml: a blink every 4.5 s on average, 13 gestures",

@@ -68,11 +68,14 @@ def test_a_take_that_is_none_is_told(install: Install, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".csv", "track", ".TRACK"])
-def test_a_reader_takes_no_suffix_of_ours_and_none_that_is_no_suffix(install: Install, suffix: str) -> None:
+def test_a_reader_takes_no_suffix_of_ours_and_none_that_is_no_suffix(
+    install: Install, suffix: str, tmp_path: Path
+) -> None:
     install("takes", "aaa", TAKE.format(kind="aaa", suffix=suffix))
     with pytest.raises(PluginError, match="aaa-package cannot be used"):
         TAKES.get("aaa")
-    assert reader_of(Path("face.csv")).kind == "livelink"
+    (tmp_path / "face.csv").write_text("Timecode,BlendShapeCount,JawOpen")
+    assert reader_of(tmp_path / "face.csv").kind == "livelink"
 
 
 def test_an_exporter_takes_no_suffix_of_ours(install: Install) -> None:

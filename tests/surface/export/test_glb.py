@@ -11,7 +11,7 @@ from shapes import hills
 from small_head import all_points, part, small_head
 
 from surface.export import export_head
-from surface.export.glb import materials, png_bytes
+from surface.export.glb_document import materials, png_bytes
 from surface.export.shapes import export_parts
 from surface.head import Head
 from surface.head.model.data import Group

@@ -1,0 +1,115 @@
+"""What a take, a show or a recording shows over time, as values of parameters; for other programs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from controller.base.config import read_toml
+from controller.base.errors import TakeError
+from controller.base.parameters import Flags, Floats, Parameters
+from controller.layers.commands import CommandState
+from controller.links.line.script import load_script
+from controller.links.line.show import Show
+from controller.takes.plain import write_plain
+from controller.takes.reader import load_take
+from controller.takes.recording import SUFFIX, replay
+
+SHOW_HZ = 60.0
+"""Rows per second of shows and recordings."""
+_LONGEST_S = 3600.0
+_AFTER_S = 2.0  # for which a show that ends is followed to its last expression
+_SCRIPT = ".toml"
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Values over time.
+
+    name : for people. times_s : (n,) float64 from 0, rising. values : (n, P) float64 in range. mask : (P,) bool, the
+    parameters that it moves.
+    """
+
+    name: str
+    times_s: Floats
+    values: Floats
+    mask: Flags
+
+    def with_rest(self) -> Floats:
+        """(n, P + 1) the values, and a column of zeros for names that are no parameters."""
+        return np.append(self.values, np.zeros((len(self.values), 1)), axis=1)
+
+
+def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None) -> Motion:
+    """What a file shows: a take of any kind, a recording (.rec), or a script (.toml) as a show.
+
+    rate_hz : rows per second; without it those of a take are its own, those of shows and recordings 60.
+
+    Raises TakeError, ConfigError or ControllerError: the file cannot be read or is wrong.
+    """
+    if path.suffix.lower() == _SCRIPT:
+        return _of_ticks(path.name, *_show(path, parameters), rate_hz or SHOW_HZ)
+    if path.suffix == SUFFIX:
+        ticks = [(now_ns * 1e-9, values.copy()) for now_ns, values in replay(path, parameters)]
+        if not ticks:
+            raise TakeError(f"{path}: nothing is recorded in it", hint="record it again")
+        times, rows = np.array([at for at, _ in ticks]), np.array([row for _, row in ticks])
+        return _of_ticks(path.name, times - times[0], rows, rate_hz or SHOW_HZ)
+    take = load_take(path, parameters)
+    times = take.times_s if rate_hz is None else _grid(take.duration_s, rate_hz)
+    values = np.array([take.sample(float(t), parameters.neutral()) for t in times])
+    return Motion(take.name, *_rising(times, values), take.mask)
+
+
+def _show(path: Path, parameters: Parameters) -> tuple[Floats, Floats]:
+    """Every tick of a show from its beginning to its end, or once through where it begins again."""
+    read_toml(path)
+    state = CommandState(parameters)
+    script = load_script(str(path), parameters)
+    show = Show(script, state)
+    show.playing = True
+    last_s = script.steps[-1][0] if script.steps else 0.0
+    length_s = min(script.loop_s or last_s + _AFTER_S, _LONGEST_S)
+    ticks, out, rows = round(length_s * 100), parameters.neutral(), []
+    for k in range(ticks + 1):
+        now_ns = 10_000_000 * (k + 1)
+        show.tick(now_ns)
+        state.tick(now_ns, 0.01, out)
+        rows.append(out.copy())
+    return np.arange(ticks + 1) / 100.0, np.array(rows)
+
+
+def _of_ticks(name: str, times: Floats, rows: Floats, rate_hz: float) -> Motion:
+    """Rows at a rate, straight between ticks."""
+    at = _grid(float(times[-1]), rate_hz)
+    values = np.stack([np.interp(at, times, column) for column in rows.T], axis=1)
+    return Motion(name, at, values, np.logical_or.reduce(values != 0.0, axis=0))
+
+
+def _grid(length_s: float, rate_hz: float) -> Floats:
+    times: Floats = np.arange(int(length_s * rate_hz + 1e-6) + 1) / rate_hz
+    return times
+
+
+def _rising(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Times and values without rows at the time of the row before."""
+    later = np.append(True, np.diff(times) > 0.0)
+    return times[later], values[later]
+
+
+def convert(path: Path, out: Path, parameters: Parameters, rate_hz: float | None = None) -> Motion:
+    """Write what a file shows as a plain table (.csv); returns it.
+
+    Raises as :func:`load_motion`; TakeError: another suffix, or a place that cannot be written to.
+    """
+    if out.suffix.lower() != ".csv":
+        raise TakeError(
+            f"{out}: tables of parameters are .csv files", hint=f"omote convert {path.name} {path.stem}.csv"
+        )
+    if out.exists() and out.samefile(path):
+        raise TakeError(f"{out}: is the file that is read", hint="choose another name")
+    motion = load_motion(path, parameters, rate_hz)
+    write_plain(out, motion.times_s, motion.values, motion.mask, parameters)
+    return motion

@@ -1,0 +1,213 @@
+"""TextGrid of Praat and MFA, and the JSON of aeneas."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import TakeError
+from controller.base.parameters import PARAMETERS as P
+from controller.takes.aligned import sounds_of
+from controller.takes.reader import load_take
+from controller.vocabulary.visemes import Visemes
+
+JAW, ROLL, PUCKER = P.index("jawOpen"), P.index("mouthRollLower"), P.index("mouthPucker")
+LONG = '''File type = "ooTextFile"
+Object class = "TextGrid"
+
+xmin = 0
+xmax = 1
+tiers? <exists>
+size = 2
+item []:
+    item [1]:
+        class = "IntervalTier"
+        name = "words"
+        xmin = 0
+        xmax = 1
+        intervals: size = 1
+        intervals [1]:
+            xmin = 0
+            xmax = 1
+            text = "say ""mama"""
+    item [2]:
+        class = "IntervalTier"
+        name = "phones"
+        xmin = 0
+        xmax = 1
+        intervals: size = 4
+        intervals [1]:
+            xmin = 0
+            xmax = 0.2
+            text = ""
+        intervals [2]:
+            xmin = 0.2
+            xmax = 0.35
+            text = "M"
+        intervals [3]:
+            xmin = 0.35
+            xmax = 0.7
+            text = "AA1"
+        intervals [4]:
+            xmin = 0.7
+            xmax = 1
+            text = "sp"
+'''
+SHORT = '''File type = "ooTextFile"
+Object class = "TextGrid"
+
+0
+1
+<exists>
+2
+"IntervalTier"
+"words"
+0
+1
+1
+0
+1
+"say ""mama"""
+"IntervalTier"
+"phones"
+0
+1
+4
+0
+0.2
+""
+0.2
+0.35
+"M"
+0.35
+0.7
+"AA1"
+0.7
+1
+"sp"
+'''
+
+
+def tier(*intervals: tuple[float, float, str], name: str = "phones", kind: str = "IntervalTier") -> str:
+    rows = "".join(f'{a} {b} "{text}"\n' for a, b, text in intervals)
+    return f'"ooTextFile"\n"TextGrid"\n0\n9\n<exists>\n1\n"{kind}"\n"{name}"\n0\n9\n{len(intervals)}\n{rows}'
+
+
+def read(path: Path, text: str, encoding: str = "utf-8") -> np.ndarray:
+    path.write_bytes(text.encode(encoding))
+    return load_take(path, P).values
+
+
+@pytest.mark.parametrize("text", [LONG, SHORT, LONG.replace("\n", "\r\n")], ids=["long", "short", "crlf"])
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16"])
+def test_every_form_and_encoding_of_textgrid_is_the_same(tmp_path: Path, text: str, encoding: str) -> None:
+    values = read(tmp_path / "a.TextGrid", text, encoding)
+    assert values[27, ROLL] > 0.3 > 0.1 > values[27, JAW] and values[50, JAW] > 0.5 and values[95, JAW] < 0.05
+    np.testing.assert_array_equal(values, read(tmp_path / "b.TextGrid", SHORT))
+
+
+def test_the_sounds_of_a_tier_with_their_times(tmp_path: Path) -> None:
+    (tmp_path / "a.TextGrid").write_text(LONG)
+    found = sounds_of(tmp_path / "a.TextGrid", Visemes.load(P))
+    assert [(start, end, text) for start, end, text, _ in found] == [(0.2, 0.35, "M"), (0.35, 0.7, "AA1")]
+    (tmp_path / "b.TextGrid").write_text(tier((0.0, 1.0, "mama"), name="words"))
+    with pytest.raises(TakeError, match="no tier of sounds"):
+        sounds_of(tmp_path / "b.TextGrid", Visemes.load(P))
+
+
+def test_damaged_utf_16_is_one_message(tmp_path: Path) -> None:
+    (tmp_path / "a.TextGrid").write_bytes(b"\xff\xfe" + LONG.encode("utf-16-le")[:99])
+    with pytest.raises(TakeError, match="its UTF-16 is damaged at byte"):
+        load_take(tmp_path / "a.TextGrid", P)
+
+
+def test_big_endian_utf_16(tmp_path: Path) -> None:
+    assert read(tmp_path / "a.TextGrid", "\ufeff" + LONG, "utf-16-be")[50, JAW] > 0.5
+
+
+def test_symbols_of_the_ipa_and_labels_of_silence(tmp_path: Path) -> None:
+    text = tier((0.0, 0.2, "spn"), (0.2, 0.5, "uː"), (0.5, 0.6, ""), (0.8, 1.1, "ɑ"), name="Speaker 1 - phones")
+    values = read(tmp_path / "a.TextGrid", text)
+    assert values[35, PUCKER] > 0.6 and values[70, JAW] < 0.1 and values[95, JAW] > 0.4
+
+
+def test_a_tier_of_words_alone_is_spelt(tmp_path: Path) -> None:
+    values = read(tmp_path / "a.TextGrid", tier((0.0, 0.3, ""), (0.3, 0.9, "mama"), name="words"))
+    jaw = values[:, JAW]
+    assert jaw[:25].max() < 0.1 and jaw[35] < 0.2 < 0.35 < jaw[50] and jaw[65] < 0.25 < 0.4 < jaw[82]
+
+
+def test_a_tier_of_any_name_that_holds_sounds_is_one_of_sounds(tmp_path: Path) -> None:
+    values = read(tmp_path / "a.TextGrid", tier((0.0, 0.3, "P"), (0.3, 0.9, "OW1"), name="Mary"))
+    assert values[60, PUCKER] > 0.6 and values[10, ROLL] > 0.3
+
+
+def test_points_last_until_the_next(tmp_path: Path) -> None:
+    points = '"ooTextFile"\n"TextGrid"\n0\n1\n<exists>\n1\n"TextTier"\n"phones"\n0\n1\n2\n0.2 "aa"\n0.6 "PP"\n'
+    values = read(tmp_path / "a.TextGrid", points)
+    assert values[40, JAW] > 0.4 and values[80, JAW] < 0.05 < values[80, ROLL]
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("", "it ends too early"),
+        ("hello", "it ends too early"),
+        (LONG[: LONG.index('"AA1"')], "it ends too early"),
+        (LONG.replace("TextGrid", "Sound"), "begins without"),
+        (LONG.replace("<exists>", "<absent>"), "it has no tiers"),
+        (LONG.replace("size = 2", "size = 2.5"), "2.5 is no count"),
+        (LONG.replace("size = 2", "size = 3"), "it ends too early"),
+        (LONG.replace('"IntervalTier"', '"PitchTier"'), "tier 1 is a 'PitchTier'"),
+        (LONG.replace("xmax = 0.35", "xmax = 0.1"), "its times are 0.2 to 0.1 s"),
+        (LONG.replace("xmax = 0.35", 'xmax = "x"'), "stands where a number should"),
+        (LONG.replace('"M"', "5"), "'5' stands where a text should"),
+        (LONG.replace('"M"', '"✂"'), "unknown viseme or phoneme '✂'"),
+        (tier((0.0, 1.0, ""), (1.0, 2.0, "sil")), "no tier has any text"),
+        (tier((0.0, 1e300, "AA")), "3600 s are read"),
+        ("ooBinaryFile\x08TextGrid", "it is a binary file"),
+    ],
+)
+def test_what_is_wrong_with_a_textgrid_is_named(tmp_path: Path, text: str, why: str) -> None:
+    with pytest.raises(TakeError, match=why) as caught:
+        read(tmp_path / "a.TextGrid", text)
+    assert caught.value.hint and "a.TextGrid" in str(caught.value)
+
+
+def fragments(*found: tuple[str, str, str]) -> str:
+    return json.dumps({"fragments": [
+        {"begin": a, "end": b, "id": f"f{i}", "language": "eng", "lines": [text], "children": []}
+        for i, (a, b, text) in enumerate(found)
+    ]})  # fmt: skip
+
+
+def test_fragments_of_aeneas_are_spelt_over_their_time(tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(fragments(("0.000", "0.400", ""), ("0.400", "1.400", "Papa"), ("1.400", "2.000", "who")))
+    values = load_take(path, P).values
+    assert values[:30, JAW].max() < 0.1 and values[70:90, JAW].max() > 0.4 and values[150:190, PUCKER].max() > 0.6
+    assert 2.0 < len(values) / 100 < 2.2
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ('{"fragments": 5}', "no list fragments"),
+        ('{"fragments": [5]}', r"fragments\[0\] must be an object"),
+        ('{"fragments": [{"begin": "x", "end": "1", "lines": []}]}', r"fragments\[0\].begin must be a time"),
+        ('{"fragments": [{"begin": "0", "lines": []}]}', r"fragments\[0\].end must be a time"),
+        ('{"fragments": [{"begin": "2", "end": "1", "lines": []}]}', "its times are 2 to 1 s"),
+        ('{"fragments": [{"begin": "nan", "end": "1", "lines": []}]}', "its times are nan"),
+        ('{"fragments": [{"begin": "0", "end": "1", "lines": [1]}]}', "lines must be a list of texts"),
+        ('{"fragments": []}', "at least one sound"),
+        ('{"fragments": [', "not valid JSON"),
+    ],
+)
+def test_what_is_wrong_with_aeneas_is_named(tmp_path: Path, text: str, why: str) -> None:
+    (tmp_path / "a.json").write_text(text)
+    with pytest.raises(TakeError, match=why) as caught:
+        load_take(tmp_path / "a.json", P)
+    assert caught.value.hint

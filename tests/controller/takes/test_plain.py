@@ -1,0 +1,72 @@
+"""Plain tables of parameters, read and written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import TakeError
+from controller.base.parameters import PARAMETERS as P
+from controller.takes.plain import write_plain
+from controller.takes.reader import load_take, reader_of
+
+
+def read(path: Path, text: str) -> dict[str, list[float]]:
+    path.write_text(text, encoding="utf-8")
+    take = load_take(path, P)
+    found = {P.names[i]: [round(float(v), 5) for v in take.values[:, i]] for i in np.flatnonzero(take.mask)}
+    return {"time": [round(float(t), 5) for t in take.times_s], **found}
+
+
+def test_spellings_sides_degrees_and_units_of_time(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    assert read(path, "time,jawOpen,eyeBlink_L\n1,0.5,0\n1.5,1.1,1\n") == {
+        "time": [0.0, 0.5], "jawOpen": [0.5, 1.1], "eyeBlinkLeft": [0.0, 1.0]
+    }  # fmt: skip
+    assert read(path, "Time (ms);MouthSmile;headYaw_deg\n0;0,5;-30\n40;1;60\n") == {
+        "time": [0.0, 0.04], "headYaw": [-0.5, 1.0], "mouthSmileLeft": [0.5, 1.0], "mouthSmileRight": [0.5, 1.0]
+    }  # fmt: skip
+    assert read(path, "\ufefft\tJawOpen\tnotes\n0\t1\tx\n")["jawOpen"] == [1.0]
+    assert reader_of(path).kind == "plain" and reader_of(path).layer == "capture"
+
+
+def test_what_is_written_is_read_back(tmp_path: Path) -> None:
+    random, path = np.random.default_rng(0), tmp_path / "a.csv"
+    times = np.sort(random.uniform(0, 9, 40)).round(5)
+    times -= times[0]
+    values = random.uniform(P.low, P.high, (40, len(P))).round(6)
+    mask = random.random(len(P)) < 0.5
+    write_plain(path, times, values, mask, P)
+    take = load_take(path, P)
+    np.testing.assert_allclose(take.times_s, times, atol=1e-6)
+    np.testing.assert_array_equal(take.mask, mask)
+    np.testing.assert_allclose(take.values[:, mask], values[:, mask], atol=1e-6)
+    assert not (tmp_path / "a.csv.new").exists()
+    with pytest.raises(TakeError, match="cannot be written"):
+        write_plain(tmp_path / "none" / "a.csv", times, values, mask, P)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("time,jawOpn\n0,1\n", "unknown column 'jawOpn', did you mean 'jawOpen'"),
+        ("time,x,y\n0,1,2\n", "no column is a parameter"),
+        ("jawOpen\n1\n", "no column time"),
+        ("time,jawOpen,JawOpen\n0,1,1\n", "column JawOpen: is there twice"),
+        ("time,jawOpen\n0,1\n0,1\n", "line 3, column time: the time is not later"),
+        ("time,jawOpen\n1,1\n0,1\n", "line 3, column time: the time is not later"),
+        ("time,jawOpen\n0,\n", "column jawOpen: '' is not a finite number"),
+        ("time,jawOpen\n0,inf\n", "is not a finite number"),
+        ("time,jawOpen\n", "a header but no rows"),
+        ("", "the file is empty"),
+        ("time,jawOpen\n0,1,2\n", "3 cells where the header has 2"),
+        ('time,"jawOpen\n0,1\n', "a header but no rows"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path: Path, text: str, why: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(TakeError, match=why) as caught:
+        load_take(tmp_path / "a.csv", P)
+    assert caught.value.hint

@@ -1,0 +1,74 @@
+"""What takes, shows and recordings show, written as plain tables and read again."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from controller.base.errors import ConfigError, TakeError
+from controller.base.parameters import PARAMETERS as P
+from controller.layers.commands import CommandState
+from controller.takes.reader import load_take
+from controller.takes.recording import recorded
+from controller.tools.motion_file import convert, load_motion
+
+JAW = P.index("jawOpen")
+TAKE = "Timecode,BlendShapeCount,JawOpen,EyeBlinkLeft,HeadYaw\n" + "".join(
+    f"00:00:0{k // 60}:{k % 60:02}.000,61,{k / 100:.3f},1.2,{-0.01 * k}\n" for k in range(0, 90, 2)
+)
+
+
+def test_a_take_comes_back_from_its_table_within_a_millionth(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(TAKE)
+    convert(tmp_path / "a.csv", tmp_path / "out.csv", P)
+    first, again = load_take(tmp_path / "a.csv", P), load_take(tmp_path / "out.csv", P)
+    np.testing.assert_allclose(again.times_s, first.times_s, atol=1e-6)
+    np.testing.assert_array_equal(again.mask, first.mask)
+    inside = np.clip(first.values, P.low, P.high)
+    np.testing.assert_allclose(again.values[:, first.mask], inside[:, first.mask], atol=1e-6)
+
+
+def test_rows_at_another_rate_lie_on_the_take(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(TAKE)
+    motion = load_motion(tmp_path / "a.csv", P, 100.0)
+    take, out = load_take(tmp_path / "a.csv", P), P.neutral()
+    np.testing.assert_allclose(np.diff(motion.times_s), 0.01)
+    assert motion.times_s[-1] <= take.duration_s < motion.times_s[-1] + 0.01
+    for time, row in zip(motion.times_s, motion.values, strict=True):
+        np.testing.assert_allclose(row, take.sample(float(time), out))
+
+
+def test_a_show_moves_as_on_the_face(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text('steps = ["0 SET jawOpen 0.8", "0.5 SET jawOpen 0.2", "1 NEUTRAL 0.2"]')
+    motion = load_motion(tmp_path / "s.toml", P)
+    assert motion.values[[28, 55], JAW] == pytest.approx([0.8, 0.2], abs=0.02)
+    assert motion.values[-1, JAW] == pytest.approx(0.0, abs=0.01) and np.flatnonzero(motion.mask).tolist() == [JAW]
+    assert motion.times_s[-1] == pytest.approx(3.0, abs=0.02)
+
+
+def test_a_recording_is_what_its_ticks_were(tmp_path: Path) -> None:
+    out, rows = P.neutral(), []
+    with recorded(CommandState(P), tmp_path / "r.rec") as state:
+        state.set_parameters([JAW], [0.6], 1)
+        for k in range(1, 101):
+            state.tick(k * 10_000_000, 0.01, out)
+            rows.append(out[JAW])
+    motion = load_motion(tmp_path / "r.rec", P, 50.0)
+    np.testing.assert_allclose(motion.values[:, JAW], np.array(rows)[::2], atol=1e-9)
+
+
+def test_what_cannot_be_converted_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(TAKE)
+    with pytest.raises(TakeError, match=r"tables of parameters are \.csv files"):
+        convert(tmp_path / "a.csv", tmp_path / "a.json", P)
+    with pytest.raises(TakeError, match="is the file that is read"):
+        convert(tmp_path / "a.csv", tmp_path / "a.csv", P)
+    with pytest.raises(TakeError, match="cannot be written"):
+        convert(tmp_path / "a.csv", tmp_path / "none" / "b.csv", P)
+    with pytest.raises(ConfigError):
+        load_motion(tmp_path / "none.toml", P)
+    (tmp_path / "s.toml").write_text("steps = [")
+    with pytest.raises(ConfigError):
+        load_motion(tmp_path / "s.toml", P)
