@@ -16,6 +16,7 @@ import sys
 import tomllib
 import wave
 from collections.abc import Callable, Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -98,7 +99,9 @@ def words_of(line: str, port: str = "PORT") -> list[str]:
     """The words of a line of omote with what the test has in the place of what a reader has."""
     words = [READERS.get(word, word).replace("{port}", port) for word in shlex.split(OMOTE[line])]
     if words[1] == "export":
-        words = [word.replace("a.tsv", "head.glb") for word in words]
+        words = [
+            word if before == "--take" else word.replace("a.tsv", "head.glb") for before, word in pairwise(["", *words])
+        ]
     if "--frame" in words:  # this needs a fitted head
         words = ["ict" if word == "small" else word for word in words]
     elif (words[1] == "export" or "--sheet" in words) and not {"--head", "--person"} & set(words):
@@ -227,6 +230,7 @@ RULES: tuple[tuple[str, Callable[[str], object]], ...] = (
     ("omote needs", is_printed),
     ("omote ", parse),
     ("make ", has_target),
+    ("python -m http.server", lambda line: None),  # of Python itself; it serves until it is interrupted
     ("pip install", has_packages),
     ("python ", has_program),
     ("sudo apt-get install", lambda line: None),  # changes the system of whoever reads it

@@ -260,10 +260,10 @@ def _face(face: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _link(link: dict[str, Any]) -> str:
-    """Lines of a link, or faces that it took and sent."""
+    """Requests of a link, or faces that it took and sent."""
     refused = f"{sum(link['refused'].values())} refused"
     if "rate_hz" not in link and "sent" not in link:
-        return f"{link['accepted']} lines accepted, {refused}"
+        return f"{link['accepted']} accepted, {refused}"
     taken = [f"{link['accepted']} faces taken, {link['lost']} lost, {refused}"] if "rate_hz" in link else []
     sent = [f"{link['sent']} messages sent, {link['dropped']} dropped"] if "sent" in link else []
     errors = [str(link[key]) for key in ("error", "send_error") if link.get(key)]

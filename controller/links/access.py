@@ -11,6 +11,7 @@ from pathlib import Path
 from urllib.parse import parse_qs, urlsplit
 
 from controller.base.errors import LinkError
+from surface.base import files
 
 _BYTES = 18
 _LONGEST = 256
@@ -29,8 +30,7 @@ def make_token() -> tuple[str, Path, bool]:
     """
     path = state_folder() / "token"
     try:
-        with path.open(encoding="ascii") as stream:
-            kept = stream.read(_LONGEST).strip()
+        kept = files.read_text(path, _LONGEST).strip()
         if kept:
             return kept, path, False
     except FileNotFoundError:

@@ -245,7 +245,7 @@ def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeyp
     monkeypatch.setattr("controller.tools.plugins.added_exporters", lambda: [other])
     monkeypatch.setattr(
         "surface.export.export_head",
-        lambda head, out, pose, added, frame: (
+        lambda head, out, pose, added, frame, animation: (
             calls.append((head.name, out, pose, added, frame)) or [out, tmp_path / "more"]
         ),
     )

@@ -43,7 +43,7 @@ def test_every_camera_can_be_named(name: str) -> None:
 @pytest.mark.parametrize(
     ("wanted", "message"),
     [
-        ({"theme": "clown"}, "--theme clown: must be 'skin' or 'mask'"),
+        ({"theme": "clown"}, "--theme clown: must be 'skin', 'mask' or 'robot'"),
         ({"camera": "above"}, "--camera above: must be 'front'"),
         ({"background": "red"}, "--background red: must be #rrggbb"),
         ({"background": ("#000000", "x")}, "--background #000000,x: must be"),
