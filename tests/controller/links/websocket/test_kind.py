@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import sys
+
 import pytest
 from pydantic import ValidationError
 
+from controller.links.kind import LINKS
 from controller.links.links import read_link
+from drivers.base.errors import PluginError
 
 
 def test_the_address_and_when_a_token_is_needed() -> None:
@@ -31,3 +35,13 @@ def test_the_address_and_when_a_token_is_needed() -> None:
 def test_what_is_wrong_is_refused(keys: dict[str, object], part: str) -> None:
     with pytest.raises(ValidationError, match=part):
         read_link({"kind": "websocket", **keys})
+
+
+def test_without_its_package_the_extra_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in [name for name in sys.modules if name.startswith(("websockets", "controller.links.websocket.server"))]:
+        monkeypatch.delitem(sys.modules, name)
+    monkeypatch.setitem(sys.modules, "websockets", None)
+    kind = LINKS.get("websocket")
+    with pytest.raises(PluginError, match="websockets") as caught:
+        LINKS.load(kind, kind.open)
+    assert caught.value.hint == 'pip install "omote[web]"'
