@@ -17,8 +17,9 @@ from __future__ import annotations
 
 import asyncio
 import json
+from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from websockets.asyncio.client import ClientConnection as AsyncConnection
 from websockets.asyncio.client import connect as connect_async
@@ -28,7 +29,6 @@ from websockets.sync.client import ClientConnection, connect
 URL = "ws://127.0.0.1:8765"
 WAIT_S = 5.0
 Message = dict[str, Any]
-Self = TypeVar("Self")
 
 
 class FaceError(Exception):
@@ -39,14 +39,15 @@ class FaceError(Exception):
         self.hint = hint
 
 
-class _Requests:
+class _Requests(ABC):
     """The messages of every request; one class sends them at once, the other with asyncio.
 
     A method of :class:`AsyncFace` gives an awaitable where that of :class:`Face` gives its result.
     """
 
+    @abstractmethod
     def _ask(self, kind: str, **fields: Any) -> Any:
-        raise NotImplementedError
+        """Send a request, and wait for its answer; fields that are None are left out."""
 
     def set(self, parameters: Mapping[str, float] | None = None, /, **more: float) -> Any:
         """Hold parameters at values, until they are released."""
@@ -177,7 +178,7 @@ class Face(_Requests):
         """End the connection; the face keeps what was commanded."""
         self._connection.close()
 
-    def __enter__(self: Self) -> Self:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -194,7 +195,7 @@ class AsyncFace(_Requests):
         self._url, self._token, self._wait_s, self._dialogue = url, token, wait_s, _Dialogue()
         self._connection: AsyncConnection | None = None
 
-    async def __aenter__(self) -> AsyncFace:
+    async def __aenter__(self) -> Self:
         headers = {"Authorization": f"Bearer {self._token}"} if self._token else None
         try:
             self._connection = await connect_async(

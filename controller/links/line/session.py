@@ -7,11 +7,11 @@ import math
 import os
 from collections import Counter
 from collections.abc import Iterator
-from functools import cache, cached_property
-from importlib import metadata
+from functools import cached_property
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.base.plain_numbers import plain_number
+from controller.base.version import package_version
 from controller.layers.commands import CommandSink, Player
 from controller.links.line.checksums import ChecksumRule
 from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Command, Grammar, Request, help_of
@@ -339,12 +339,3 @@ def _play(shows: Player | None, what: str, to: str = "0") -> None:
 
 def _word(value: str | int | float) -> str:
     return number(value) if isinstance(value, float) else str(value)
-
-
-@cache
-def package_version() -> str:
-    """Version of the installed omote; ``0`` when it runs from a folder that is not installed."""
-    try:
-        return metadata.version("omote")
-    except metadata.PackageNotFoundError:
-        return "0"

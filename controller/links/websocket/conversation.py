@@ -13,8 +13,8 @@ from pydantic import ValidationError
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.base.parameters import Indices, Parameters
+from controller.base.version import package_version
 from controller.layers.commands import CommandSink
-from controller.links.line.session import package_version
 from controller.links.websocket import messages as m
 
 log = logging.getLogger(__name__)

@@ -20,6 +20,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.http11 import Request, Response
 
 from controller.base.errors import LinkError
+from controller.base.version import package_version
 from controller.layers.commands import CommandSink
 from controller.links.access import given_token, is_own_page, make_token, same_token
 from controller.links.kind import LinkContext
@@ -63,6 +64,7 @@ class WebSocketLink:
 
     def __init__(self, settings: WebSocketSettings, sink: CommandSink, token: str | None) -> None:
         self._settings, self._sink, self._token = settings, sink, token
+        package_version()  # kept from now on: when a client asks, there may be no file descriptor left to read it
         self._start_ns = time.monotonic_ns()
         self._clients: set[_Client] = set()
         self._served = 0
@@ -229,7 +231,7 @@ class _Client:
             reply = await self._next()
             for each in (reply, self.conversation.state_due(time.monotonic_ns())):
                 if each is not None:
-                    await self._connection.send(each.model_dump_json(exclude_none=False))
+                    await self._connection.send(each.model_dump_json())
 
     async def _next(self) -> Reply | None:
         """The next answer, or None when a state is due."""

@@ -12,10 +12,11 @@ from hypothesis import strategies as st
 
 from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS as P
+from controller.base.version import package_version
 from controller.layers.commands import CommandState
 from controller.links.line.protocol import MAX_LINE, MAX_REPLY, Reply, checksum, format_words, parse_reply
 from controller.links.line.script import Script
-from controller.links.line.session import LineSession, package_version
+from controller.links.line.session import LineSession
 from controller.links.line.show import Shows
 from controller.vocabulary.vocabulary import Vocabulary
 

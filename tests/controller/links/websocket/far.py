@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from typing import Any
@@ -29,8 +30,6 @@ def served(state: CommandState | None = None, **keys: Any) -> Iterator[tuple[Com
 
 def tick(state: CommandState, seconds: float = 1.0, now_ns: int = 0) -> None:
     """Let the face move on."""
-    import time
-
     now_ns = now_ns or time.monotonic_ns()
     out = state.parameters.neutral()
     for step in range(round(seconds / 0.01)):
