@@ -136,14 +136,15 @@ class Grammar:
         if len(given) % 2 and len(given) > 1:
             raise LineError(Code.ARGUMENTS, f"a viseme without a weight; {_usage('VISEME')}")
         try:
-            names = tuple(self._visemes.viseme(text) for text in given[::2])
+            names = tuple(self.visemes.viseme(text) for text in given[::2])
         except ParameterError as error:
             raise LineError(Code.NAME, str(error)) from error
         weights = [in_range("weight", text, 0.0, 1.0) for text in given[1::2]] or [1.0]
         return Command("VISEME", values=tuple(weights), words=names)
 
     @cached_property
-    def _visemes(self) -> Visemes:
+    def visemes(self) -> Visemes:
+        """Those that VISEME may name, read at the first use."""
         return Visemes.load(self._parameters)
 
     def read_sub(self, given: Sequence[str]) -> Command:

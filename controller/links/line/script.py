@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
 
@@ -121,6 +122,16 @@ def script_names(beside: Path | None = None) -> list[str]:
 
 
 def _has_steps(path: Path) -> bool:
+    try:
+        at = path.stat()
+    except OSError:
+        return False
+    return _had_steps(path, (at.st_ino, at.st_mtime_ns, at.st_size))
+
+
+@lru_cache(maxsize=512)  # a host may ask for the names at any rate, beside commands that must not wait
+def _had_steps(path: Path, _state: tuple[int, int, int]) -> bool:
+    """Whether a file in a given state is a script."""
     try:
         return path.resolve().parent == path.parent.resolve() and "steps" in read_toml(path)
     except (OSError, ValueError):

@@ -32,7 +32,6 @@ from controller.links.line.protocol import (
     parse_words,
 )
 from controller.vocabulary.reading import Readings
-from controller.vocabulary.visemes import Visemes
 
 log = logging.getLogger(__name__)
 
@@ -302,7 +301,7 @@ class LineSession:
             "PARAMETERS": self._parameters.names,
             "EXPRESSIONS": self._sink.vocabulary.names,
             "LAYERS": self._sink.layer_names(),
-            "VISEMES": Visemes.load(self._parameters).names,
+            "VISEMES": self._grammar.visemes.names,
             "SHOWS": tuple(self._sink.shows.names()) if self._sink.shows is not None else (),
             "COMMANDS": COMMANDS,
         }[what]

@@ -11,8 +11,10 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
+from controller.links.line import script
 from controller.links.line.script import Script, Wave, load_named_script, load_script, script_names
 from controller.vocabulary.vocabulary import Vocabulary
+from surface.base.files import read_toml
 
 VOCABULARY = Vocabulary.load(P)
 
@@ -173,3 +175,20 @@ def test_the_names_that_a_robot_may_play_are_those_of_scripts(tmp_path: Path) ->
     shipped = script_names()
     assert "tour" in shipped and script_names(tmp_path / "stage.toml") == sorted([*shipped, "mine"])
     assert all(load_named_script(name, P, beside=tmp_path / "stage.toml") for name in shipped)
+
+
+def test_names_follow_files_that_change_and_read_no_others_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[str] = []
+    monkeypatch.setattr(script, "read_toml", lambda path: read.append(path.name) or read_toml(path))
+    beside, mine = tmp_path / "stage.toml", tmp_path / "mine.toml"
+    mine.write_text('steps = ["0 NEUTRAL"]')
+    (tmp_path / "other.toml").write_text('steps = ["0 NEUTRAL"]')
+    assert {"mine", "other"} <= set(script_names(beside)) and {"mine.toml", "other.toml"} <= set(read)
+    read.clear()
+    assert "mine" in script_names(beside) and not read
+    mine.write_text('name = "no script any more"')
+    assert "mine" not in script_names(beside) and read == ["mine.toml"]
+    mine.unlink()
+    assert "mine" not in script_names(beside)
