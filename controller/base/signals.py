@@ -18,23 +18,27 @@ def termination_signals() -> tuple[signal.Signals, ...]:
 
 
 @contextmanager
-def interrupts_blocked() -> Iterator[None]:
-    """Block SIGINT, also in a process started meanwhile, until that calls :func:`unblock_interrupts`."""
+def signals_blocked() -> Iterator[None]:
+    """Block SIGINT and :data:`TERMINATION_SIGNALS`, also in a process started meanwhile, until that calls
+    :func:`unblock_signals`.
+
+    A program that was ended halfway through starting a process would leave one that cannot read what it shall do.
+    """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
     resource_tracker.ensure_running()  # else it starts with the first process, and unblocks SIGINT then
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *TERMINATION_SIGNALS})
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def unblock_interrupts() -> None:
-    """Unblock SIGINT in a process that was started inside :func:`interrupts_blocked`."""
+def unblock_signals() -> None:
+    """Unblock what :func:`signals_blocked` blocks, in a process that was started inside it."""
     if hasattr(signal, "pthread_sigmask"):
-        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, *TERMINATION_SIGNALS})
 
 
 @contextmanager

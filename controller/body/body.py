@@ -21,7 +21,7 @@ from controller.base.linked_clocks import HurriedClock
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.parts import Part
-from controller.base.signals import termination_signals, unblock_interrupts
+from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.body.messages import RunOptions
@@ -282,7 +282,6 @@ def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
     """
     stop = threading.Event()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
-    unblock_interrupts()
     for ending in termination_signals():
         signal.signal(ending, lambda *_: stop.set())
     try:

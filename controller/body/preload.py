@@ -16,7 +16,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from typing import TYPE_CHECKING
 
-from controller.base.signals import interrupts_blocked
+from controller.base.signals import signals_blocked, unblock_signals
 from drivers.base.permission import check_ports_allowed
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ class PreloadedBody:
         self.pipe, theirs = context.Pipe()
         voice, self.voice = context.Pipe(duplex=False)
         self.process: SpawnProcess = context.Process(target=_wait, args=(theirs, voice), name="omote body")
-        with interrupts_blocked(), _without_main_module():
+        with signals_blocked(), _without_main_module():
             self.process.start()
         theirs.close()
         voice.close()
@@ -91,6 +91,7 @@ def _without_main_module() -> Iterator[None]:
 def _wait(pipe: Connection, voice: Connection) -> None:
     """Load the body's code, wait for orders, then run the body."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
+    unblock_signals()
     with garbage_collection_off():
         from controller.body.body import body_main  # start-up: in the child, while main reads its orders
     try:

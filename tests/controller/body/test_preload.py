@@ -79,7 +79,27 @@ if __name__ == "__main__":
 """
     said = subprocess.check_output([sys.executable, "-c", program], text=True, timeout=120)
     held = next(int(line.split()[1], 16) for line in said.splitlines() if line.startswith("SigBlk"))
-    assert held >> signal.SIGINT - 1 & 1
+    assert all(held >> number - 1 & 1 for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="starts processes as Linux does")
+def test_a_program_that_is_ended_while_it_starts_the_process_leaves_none_that_complains() -> None:
+    program = """
+import os, signal
+from multiprocessing import util
+from controller.body.preload import PreloadedBody
+start = util.spawnv_passfds
+def start_and_end(*given):
+    pid = start(*given)
+    if given[1][-1] == "--multiprocessing-fork":
+        os.kill(os.getpid(), signal.SIGHUP)  # the process is there, and has not been told what to do
+    return pid
+util.spawnv_passfds = start_and_end
+if __name__ == "__main__":
+    PreloadedBody()
+"""
+    main = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=120)
+    assert main.returncode == -signal.SIGHUP and not main.stderr
 
 
 def test_the_command_line_comes_without_numpy() -> None:
