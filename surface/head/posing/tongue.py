@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.base.jit import kernel
+from surface.base.jit import kernel, lean
 from surface.dcp import DCPSurface
 from surface.head.model.data import HeadData, PartData
 from surface.head.model.meshes import domain_of, make_surface
@@ -33,42 +33,85 @@ PASSES = 3
 LEAST_SAMPLES, LEAST_MM = 50, 5.0  # of a part that is a tongue, and its length
 
 
-@kernel
-def find_rise(under: Floats, below: Floats, reach: float, clear: float, soft: float, rise: Floats) -> float:
+@lean
+def find_rise(
+    under: Floats, below: Floats, reach: float, clear: float, soft: float, again: bool, rise: Floats
+) -> float:  # fmt: skip
     """How far stations ``under (s, 3)`` are too low, ``rise (s,)``, over points ``below (k, 3)``, by rising z, within
-    ``reach``, of which each counts less the further away it is, seen from above. Returns the farthest."""
+    ``reach``, of which each counts less the further away it is, seen from above. Returns the farthest.
+
+    ``again`` : stations have only been lifted since the last call, so those that were not too low are left out.
+    """
     most = 0.0
     for s in range(len(under)):
-        rise[s] = 0.0
-        first = np.searchsorted(below[:, 2], under[s, 2] - reach)
-        for k in range(first, len(below)):
-            if below[k, 2] >= under[s, 2] + reach:
-                break
-            need = below[k, 1] + clear - under[s, 1]
-            if need <= -soft:
-                continue
-            square = ((under[s, 0] - below[k, 0]) ** 2 + (under[s, 2] - below[k, 2]) ** 2) / reach**2
-            if square < 1.0:
-                near = min(need + soft, 2.0 * soft)
-                need = need if need > soft else near * near / (4.0 * soft)
-                rise[s] = max(rise[s], need * (1.0 - square) ** 2)
+        if again and rise[s] == 0.0:
+            continue
+        rise[s] = rise_of(under[s, 0], under[s, 1] - clear, under[s, 2], below, reach, soft)
         most = max(most, rise[s])
     return most
 
 
-@kernel
-def lift_sections(rise: Floats, fade: Floats, part: Floats, share: float, points: Floats) -> None:
+@lean
+def rise_of(x: float, y: float, z: float, below: Floats, reach: float, soft: float) -> float:
+    """How far one station at (x, y, z) is too low: :func:`find_rise`."""
+    most, scale = 0.0, 1.0 / (reach * reach)
+    for k in range(np.searchsorted(below[:, 2], z - reach), len(below)):
+        if below[k, 2] >= z + reach:
+            break
+        need = below[k, 1] - y
+        if need + soft <= most:  # a point lifts by no more than that
+            continue
+        square = ((x - below[k, 0]) ** 2 + (z - below[k, 2]) ** 2) * scale
+        if square < 1.0:
+            near = min(need + soft, 2.0 * soft)
+            need = need if need > soft else near * near / (4.0 * soft)
+            most = max(most, need * (1.0 - square) ** 2)
+    return most
+
+
+@lean
+def lift_sections(rise: Floats, fade: Floats, part: Floats, share: float, lift: Floats, points: Floats) -> None:
     """Move points (n, 3) up by ``share`` times their ``part (n,)`` of the greatest ``rise (s k,)`` of k stations of
-    each of s cross-sections, times ``fade (s, n)``."""
-    sections, across = len(fade), len(rise) // len(fade)
-    lift = np.zeros(len(points))
-    for s in range(sections):
-        most = rise[s * across : (s + 1) * across].max()
+    each of s cross-sections, times ``fade (s, n)``; ``lift (n,)`` is scratch space."""
+    across = len(rise) // len(fade)
+    for i in range(len(points)):
+        lift[i] = 0.0
+    for s in range(len(fade)):
+        most = 0.0
+        for k in range(s * across, (s + 1) * across):
+            most = max(most, rise[k])
         if most > 0.0:
             for i in range(len(points)):
                 lift[i] = max(lift[i], most * fade[s, i])
     for i in range(len(points)):
         points[i, 1] += share * part[i] * lift[i]
+
+
+@lean
+def place_stations(start: Ints, ids: Ints, weights: Floats, sign: float, points: Floats, out: Floats) -> None:
+    """Stations ``out (s, 3)``: sums of ``weights`` times ``points (n, 3)``, as :func:`.contact.weights_at` gives them,
+    with y times ``sign``."""
+    for s in range(len(out)):
+        x, y, z = 0.0, 0.0, 0.0
+        for k in range(start[s], start[s + 1]):
+            i, w = ids[k], weights[k]
+            x, y, z = x + w * points[i, 0], y + w * points[i, 1], z + w * points[i, 2]
+        out[s, 0], out[s, 1], out[s, 2] = x, sign * y, z
+
+
+@kernel
+def press(
+    start: Ints, ids: Ints, weights: Floats, against: Floats, fade: Floats, part: Floats, sign: float, share: float,
+    points: Floats,
+) -> None:  # fmt: skip
+    """Move points (n, 3) away from what lies ``against (k, 3)``, by rising z and with y times ``sign``, the side of the
+    stations that the first three place; ``fade``, ``part`` and ``share`` as in :func:`lift_sections`."""
+    stations, rise, lift = np.zeros((len(start) - 1, 3)), np.zeros(len(start) - 1), np.zeros(len(points))
+    for again in range(PASSES):
+        place_stations(start, ids, weights, sign, points, stations)
+        if find_rise(stations, against, REACH_MM, CLEAR_MM, SOFT_MM, again > 0, rise) < SOFT_MM / 4.0:
+            break
+        lift_sections(rise, fade, part, sign * share, lift, points)
 
 
 def tongue_rest(part: PartData, head: HeadData) -> TongueRest | None:
@@ -91,7 +134,7 @@ class TongueRest:
         z = part.points[:, 2]
         length = min(LENGTH_MM, 0.8 * float(np.ptp(at[:, 2])))
         along = at[:, 2].max() - np.linspace(1.0, length, STATIONS)
-        self._sides = [_dense_weights(surface, _stations(places, at, along, sign)) for sign in (-1.0, 1.0)]
+        self._sides = [weights_at(surface, _stations(places, at, along, sign)) for sign in (-1.0, 1.0)]
         away = np.abs(z[None] - along[:, None])
         away[0, z > along[0]] = 0.0  # the tip goes as its first station
         self._fade = 1.0 - smoothstep(away / BEND_MM)
@@ -99,7 +142,8 @@ class TongueRest:
         self._whole = np.ones(len(z))
         low, high = _thickness(at, z)
         self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
-        self._lower, self._upper = (_edges(head, follows, sign) for follows, sign in (("jaw", 1.0), ("skull", -1.0)))
+        self._lower, upper = (_edges(head, follows, sign) for follows, sign in (("jaw", 1.0), ("skull", -1.0)))
+        self._upper = _by_depth(upper, -1.0)
 
     def share(self, pose: Pose) -> float:
         """How much of the correction a pose takes, 0..1: none while the tongue is in the mouth."""
@@ -116,18 +160,14 @@ class TongueRest:
         aside = float(lip[:, 0].mean() - self._sideways @ points[:, 0] / self._sideways.sum())
         points[:, 0] += share * SIDEWAYS * aside * self._sideways
         below = np.concatenate([lip, self._lower @ linear.T + shift])
-        self._press(0, below, self._whole, share, points)
-        self._press(1, self._upper, self._thick, share, points)
+        press(*self._sides[0], _by_depth(below, 1.0), self._fade, self._whole, 1.0, share, points)
+        press(*self._sides[1], self._upper, self._fade, self._thick, -1.0, share, points)
 
-    def _press(self, side: int, against: Floats, part: Floats, share: float, points: Floats) -> None:
-        """Move points away from what lies ``against`` the under (0) or the upper (1) side, by their ``part`` of it."""
-        sign, (ids, shares) = 1.0 - 2.0 * side, self._sides[side]
-        way, rise = np.array([1.0, sign, 1.0]), np.zeros(len(shares))
-        mirrored = against[np.argsort(against[:, 2], kind="stable")] * way
-        for _ in range(PASSES):
-            if find_rise(shares @ points[ids] * way, mirrored, REACH_MM, CLEAR_MM, SOFT_MM, rise) < SOFT_MM / 4.0:
-                break
-            lift_sections(rise, self._fade, part, sign * share, points)
+
+def _by_depth(at: Floats, sign: float) -> Floats:
+    """Points (k, 3) by rising z, with y times ``sign``."""
+    rising: Floats = at[np.argsort(at[:, 2])] * (1.0, sign, 1.0)
+    return rising
 
 
 def _grid(part: PartData) -> Floats:
@@ -172,15 +212,6 @@ def _thickness(at: Floats, z: Floats) -> tuple[Floats, Floats]:
     knots = np.linspace(at[:, 2].min(), max(at[:, 2].max() - SLICE_MM, at[:, 2].min()), 30)
     slices = [at[_slice(at, k), 1] for k in knots]
     return np.interp(z, knots, [s.min() for s in slices]), np.interp(z, knots, [s.max() for s in slices])
-
-
-def _dense_weights(surface: DCPSurface, places: Floats) -> tuple[Ints, Floats]:
-    """Control points (k,) that reach places (s, 2), and their weights (s, k)."""
-    start, ids, share = weights_at(surface, places)
-    used, local = np.unique(ids, return_inverse=True)
-    table = np.zeros((len(places), len(used)))
-    np.add.at(table, (np.repeat(np.arange(len(places)), np.diff(start)), local), share)
-    return used, table
 
 
 def _edges(head: HeadData, follows: str, sign: float) -> Floats:

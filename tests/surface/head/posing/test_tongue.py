@@ -50,7 +50,7 @@ def test_the_tongue_comes_out_without_a_jump(head: Head) -> None:
 
 def test_a_station_rises_over_what_is_below_it_and_less_over_what_is_beside() -> None:
     under, rise = np.array([[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [20.0, 0.0, 0.0]]), np.zeros(3)
-    most = find_rise(under, np.array([[0.0, 2.0, 0.0]]), 5.0, 0.5, 0.4, rise)
+    most = find_rise(under, np.array([[0.0, 2.0, 0.0]]), 5.0, 0.5, 0.4, False, rise)
     np.testing.assert_allclose(rise, [2.5, 2.5 * (1.0 - 0.64) ** 2, 0.0])
     assert most == 2.5
 
@@ -59,7 +59,7 @@ def test_only_what_is_near_lifts_a_station() -> None:
     rng = np.random.default_rng(2)
     under, below = rng.uniform(-10, 10, (40, 3)), rng.uniform(-10, 10, (300, 3))
     below, rise = below[np.argsort(below[:, 2])], np.zeros(40)
-    find_rise(under, below, 3.0, 0.5, 0.4, rise)
+    find_rise(under, below, 3.0, 0.5, 0.4, False, rise)
     need = below[:, 1] + 0.5 - under[:, None, 1]
     near = np.clip(need + 0.4, 0.0, 0.8)
     need = np.where(need > 0.4, need, near * near / 1.6)
