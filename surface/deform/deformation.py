@@ -138,6 +138,26 @@ class Deformation(Generic[Table]):
         """Put all points at ``xyz (n, 3)``: :meth:`set_positions` without a list of ids."""
         self._place(self._all, _rows(xyz, "xyz"), False)
 
+    def own_arrays(self) -> dict[str, np.ndarray]:
+        """What differs between deformations of one mesh that share weights and knots, by the names of
+        :data:`.binding.NAMES`."""
+        return {
+            name: self._arrays[name] for name in ("points", "origin", "vertices", "normals", "differences", "extent")
+        }
+
+    def addressed(self) -> dict[str, np.ndarray]:
+        """All arrays that kernels take, by the names of :data:`.binding.NAMES`."""
+        return vars(self.lists) | self._arrays | self.storage.arrays
+
+    def work(self) -> tuple[np.ndarray, np.float32, list[np.ndarray]]:
+        """What kernels take besides: all cells, the sign of normals, scratch space of a thread."""
+        return self._cells, self._sign, [np.zeros_like(room) for room in self._rooms()]
+
+    @property
+    def weights_of_cells(self) -> Ints:
+        """(c,) how many weights each cell has, however they are kept."""
+        return self._work
+
     def set_weights(self, ids: ArrayLike, weights: ArrayLike) -> None:
         """Give points ``ids (k,)`` the weights ``(k,)``, positive.
 
@@ -249,7 +269,7 @@ class Deformation(Generic[Table]):
         """
         self._arrays["origin"][:] = self._points[self.lists.ids[self.lists.ids_at]]
         self.refresh()
-        self._arrays["origin"][:] = _middles(self.vertices, self.mesh.cell_start)
+        self._arrays["origin"][:] = middles(self.vertices, self.mesh.cell_start)
         self.refresh()
 
     def _is_elsewhere(self, vertices: np.ndarray) -> bool:
@@ -263,7 +283,7 @@ class Deformation(Generic[Table]):
         self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)) + 1, 3), dtype=np.float32)
         self._arrays["starts"] = np.zeros(len(self._arrays["local"]), dtype=np.int32)
         self._arrays["scratch"] = np.zeros(self.storage.factors.sums, dtype=np.float32)
-        self._addresses = address_table(vars(self.lists) | self._arrays | self.storage.arrays)
+        self._addresses = address_table(self.addressed())
 
     def _sum_weights(self, cells: Ints) -> None:
         denominators(self._addresses, cells)
@@ -337,7 +357,7 @@ def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[
     m, cells, n = len(mesh.vertices), len(mesh.cell_start) - 1, len(points)
     single, cell = partial(np.zeros, dtype=np.float32), partial(np.zeros, cells)
     return {
-        "origin": _with_room(_middles(mesh.vertices, mesh.cell_start)), "points": _with_room(points),
+        "origin": _with_room(middles(mesh.vertices, mesh.cell_start)), "points": _with_room(points),
         "inv_w": single(8 * tiles),
         "dw": single(16 * tiles * normals), "numerators": single((72 if normals else 24) * tiles),
         "differences": np.full(cells, NOT_STORED), "touched": np.zeros(tiles, np.uint8),
@@ -348,7 +368,7 @@ def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[
     }  # fmt: skip
 
 
-def _middles(vertices: np.ndarray, cell_start: Ints) -> Floats:
+def middles(vertices: np.ndarray, cell_start: Ints) -> Floats:
     """(c, 3) the middle of each cell's vertices (m, 3)."""
     if not len(vertices):
         return np.zeros((len(cell_start) - 1, 3))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,13 @@ from surface.head.posing.turning import turn_head
 from surface.mesh.mesh import Mesh, border_edges
 
 
+class Posed(Protocol):
+    """Vertices and normals (m, 3) float32 before the head turns, as a deformation has them."""
+
+    vertices: Any
+    normals: Any
+
+
 class Turn:
     """The head's rotation of one pose: matrix (3, 3), rotation vector (3,), pivot (3,)."""
 
@@ -29,9 +36,9 @@ class Turn:
         self.none, self.key = not self.vector.any(), (matrix + 0.0).tobytes()  # 0 is -0
 
     def rotate(
-        self, source: Deformation[Any], share: Floats32, rows: tuple[int, int], vertices: Floats32, normals: Floats32
+        self, source: Posed, share: Floats32, rows: tuple[int, int], vertices: Floats32, normals: Floats32
     ) -> None:
-        """Write rows [start, stop) of a deformation, turned by each one's share, to ``vertices`` and ``normals``."""
+        """Write rows [start, stop) of what is posed, turned by each one's share, to ``vertices`` and ``normals``."""
         start, stop = rows
         if self.none:
             vertices[start:stop] = source.vertices[start:stop]
@@ -112,6 +119,11 @@ class HeadPart:
         """Report every vertex as changed: a seam has written into the part."""
         self.changed = [(0, len(self.vertices))]
 
+    def show(self, vertices: Floats32, normals: Floats32) -> None:
+        """Take vertices and normals (m, 3) that were posed elsewhere, until the next :meth:`pose`."""
+        self.vertices[:], self.normals[:] = vertices, normals
+        self.touch()
+
 
 class SkinPart(HeadPart):
     """A part whose control points move one by one; vertices follow by Eq. (2)."""
@@ -126,11 +138,19 @@ class SkinPart(HeadPart):
         self._straight = True  # does the deformation write to the part's own arrays?
         self.deformation.write_to(self.vertices, self.normals)
         self._share[:] = head.neck.share(self.vertices.astype(np.float64))
+        self._shown = False  # are the vertices from elsewhere?
+
+    def show(self, vertices: Floats32, normals: Floats32) -> None:
+        super().show(vertices, normals)
+        self._shown = True
 
     def pose(self, pose: Pose, turn: Turn) -> None:
         points, ranges = self.rig.apply(pose), []
-        turned, self._turn = turn.key != self._turn.key, turn
+        turned, self._turn = self._shown or turn.key != self._turn.key, turn
         self._direct(turn.none)
+        if self._shown:
+            self._shown = False
+            self.deformation.refresh()
         if self._version != self.rig.version:
             self._version = self.rig.version
             self.deformation.set_points(points)
@@ -178,6 +198,10 @@ class RigidPart(HeadPart):
         self._motion = np.eye(3), np.zeros(3)
         self._last_key: tuple[object, ...] = ()
 
+    def show(self, vertices: Floats32, normals: Floats32) -> None:
+        super().show(vertices, normals)
+        self._last_key = ()
+
     def pose(self, pose: Pose, turn: Turn) -> None:
         key = (*motion_key(self.follows, self._head, pose), turn.key)
         self._turn, self.changed = turn, []
@@ -185,7 +209,12 @@ class RigidPart(HeadPart):
             return
         self._last_key, self.changed = key, [(0, len(self._rest))]
         self._motion = rigid_motion(self.follows, self._head, pose)
-        move_rigid(self._rest, self._rest_normals, *turn.after(*self._motion), self.vertices, self.normals)
+        self.move(*self._motion, turn, self.vertices, self.normals)
+
+    def move(self, linear: Floats, shift: Floats, turn: Turn, vertices: Floats32, normals: Floats32) -> None:
+        """Write the part, moved by ``linear (3, 3)`` and ``shift (3,)`` and turned with the head, to ``vertices`` and
+        ``normals`` (m, 3)."""
+        move_rigid(self._rest, self._rest_normals, *turn.after(linear, shift), vertices, normals)
 
     @property
     def control_points(self) -> Floats:

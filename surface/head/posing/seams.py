@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.head.model.data import Seam
 from surface.head.posing.kernels import nearest_on_line, stitch_border
 from surface.head.posing.part import HeadPart
@@ -67,10 +67,12 @@ class SeamStitch:
         """Put the second part's border onto the first one's, if either has changed."""
         one, two = self.first, self.second
         if len(self.ids) and (one.changed or two.changed):
-            stitch_border(
-                one.vertices, one.normals, two.vertices, two.normals, self.ids, self.low, self.high, self.share
-            )
+            self.join(one.vertices, one.normals, two.vertices, two.normals)
             two.touch()
+
+    def join(self, vertices: Floats32, normals: Floats32, second_vertices: Floats32, second_normals: Floats32) -> None:
+        """Put the border among the second part's vertices (m, 3) onto that among the first one's (k, 3)."""
+        stitch_border(vertices, normals, second_vertices, second_normals, self.ids, self.low, self.high, self.share)
 
 
 def _along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:

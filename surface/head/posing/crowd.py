@@ -1,0 +1,133 @@
+"""A crowd: many heads of one surface, each with parameters of its own, posed in one batch.
+
+They share weights, lists, triangles and colours; each has only its control points, vertices and normals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from surface.base.arrays import Floats, Floats32
+from surface.deform.batch import DeformationBatch
+from surface.head.posing.head import Head
+from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
+
+
+@dataclass
+class CrowdPart:
+    """One part of all heads.
+
+    part : of the head that all are like. vertices, normals : (h, m, 3) float32.
+    batch : its deformations; None for a part that does not deform.
+    """
+
+    part: HeadPart
+    vertices: Floats32
+    normals: Floats32
+    batch: DeformationBatch | None
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all heads' arrays."""
+        return self.vertices.nbytes + self.normals.nbytes + (self.batch.nbytes if self.batch is not None else 0)
+
+
+class Crowd:
+    """``count`` heads like one, at rest at first; hair that sways does so as the one head's.
+
+    head : whose parts they share; nobody else poses it meanwhile, except by :meth:`show`.
+
+    Attributes
+    ----------
+    parts : in the order of the head's parts.
+    values : (h, P) float64, parameters of the last :meth:`pose`, read-only.
+
+    ValueError for fewer than one head.
+    """
+
+    def __init__(self, head: Head, count: int) -> None:
+        if count < 1:
+            raise ValueError(f"count: must be at least 1, not {count}")
+        self.head = head
+        neutral = np.zeros(len(head.parameters))
+        head.pose(neutral)
+        self.parts = tuple(_make_part(part, count) for part in head.parts)
+        at = {id(part): i for i, part in enumerate(head.parts)}
+        self._stitches = [(stitch, at[id(stitch.first)], at[id(stitch.second)]) for stitch in head.zippers]
+        self._values = np.tile(neutral, (count, 1))
+        self.values = self._values.view()
+        self.values.flags.writeable = False
+
+    def __len__(self) -> int:
+        """Number of heads."""
+        return len(self._values)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes of all heads, without what they share."""
+        return sum(part.nbytes for part in self.parts)
+
+    def pose(self, values: Floats) -> list[int]:
+        """Move every head to its parameter values (h, P); they are clipped. Returns which heads moved.
+
+        Raises ValueError: wrong shape or a value that is not a number; the heads keep their poses.
+        """
+        given = np.asarray(values, np.float64)
+        if given.shape != self._values.shape:
+            raise ValueError(f"values has shape {given.shape}, expected {self._values.shape}")
+        for row in given:
+            self.head.read_pose(row)  # raises for what is not a number, before anything moves
+        moved = np.flatnonzero((given != self._values).any(axis=1)).tolist()
+        finishing = [self._place(k, given[k]) for k in moved]
+        for part in self.parts:
+            if part.batch is not None:
+                part.batch.compute()
+        for finish in finishing:
+            finish()
+        self._values[moved] = given[moved]
+        return moved
+
+    def show(self, k: int) -> None:
+        """Let the head that all are like have the vertices and normals of head k, until it is posed again."""
+        for crowd in self.parts:
+            crowd.part.show(crowd.vertices[k], crowd.normals[k])
+
+    def _place(self, k: int, values: Floats) -> Callable[[], None]:
+        """Place the control points of head k; returns what turns and sews it when vertices are computed."""
+        rows, turn = self.head.place_points(values)
+        for crowd, points in zip(self.parts, rows, strict=True):
+            if crowd.batch is not None:
+                crowd.batch.place(k, points)
+            elif isinstance(crowd.part, RigidPart):
+                crowd.part.move(points[:3].T, points[3], turn, crowd.vertices[k], crowd.normals[k])
+        return lambda: self._finish(k, turn)
+
+    def _finish(self, k: int, turn: Turn) -> None:
+        """Turn the deforming parts of head k with the head, and close its seams."""
+        for crowd in self.parts:
+            if crowd.batch is not None:
+                source = _Member(crowd.batch.vertices[k], crowd.batch.normals[k])
+                rows = 0, len(source.vertices)
+                turn.rotate(source, crowd.part.share, rows, crowd.vertices[k], crowd.normals[k])
+        for stitch, first, second in self._stitches:
+            if len(stitch.ids):
+                one, two = self.parts[first], self.parts[second]
+                stitch.join(one.vertices[k], one.normals[k], two.vertices[k], two.normals[k])
+
+
+@dataclass
+class _Member:
+    """One part of one head before it turns."""
+
+    vertices: Floats32
+    normals: Floats32
+
+
+def _make_part(part: HeadPart, count: int) -> CrowdPart:
+    """A part of ``count`` heads, as it is now."""
+    vertices, normals = (np.tile(array, (count, 1, 1)) for array in (part.vertices, part.normals))
+    batch = DeformationBatch(part.deformation, count) if isinstance(part, SkinPart) else None
+    return CrowdPart(part, vertices, normals, batch)

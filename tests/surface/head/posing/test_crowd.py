@@ -1,0 +1,99 @@
+"""surface.head.posing.crowd: each head of a crowd is as one head alone."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from surface.head import Head
+from surface.head.posing.crowd import Crowd
+
+ROOT = Path(__file__).parents[4]
+
+
+@pytest.fixture(scope="module")
+def alone() -> Head:
+    return Head.load(ROOT / "configs" / "heads" / "ict")
+
+
+@pytest.fixture(scope="module")
+def crowd() -> Crowd:
+    return Crowd(Head.load(ROOT / "configs" / "heads" / "ict"), 3)
+
+
+def draw(seed: int, count: int, heads: int = 3) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-0.5, 1.0, (heads, count)) * (rng.random((heads, count)) < 0.4)
+
+
+def check(crowd: Crowd, alone: Head) -> None:
+    for k in range(len(crowd)):
+        alone.pose(crowd.values[k])
+        for own, part in zip(crowd.parts, alone.parts, strict=True):
+            np.testing.assert_allclose(own.vertices[k], part.vertices, atol=2e-4, err_msg=part.name)
+            assert np.mean(np.sum(own.normals[k] * part.normals, axis=1)) > 1.0 - 1e-5, part.name
+
+
+def test_each_head_is_as_one_alone(crowd: Crowd, alone: Head) -> None:
+    count = len(alone.parameters)
+    for seed in range(2):
+        assert crowd.pose(draw(seed, count)) == [0, 1, 2]
+        check(crowd, alone)
+    still = np.zeros((3, count))  # heads that are not turned are written in another way
+    still[1, alone.parameters.index("jawOpen")] = 0.7
+    crowd.pose(still)
+    check(crowd, alone)
+
+
+def test_only_heads_that_moved_are_posed(crowd: Crowd, alone: Head) -> None:
+    values = draw(3, len(alone.parameters))
+    crowd.pose(values)
+    before = [part.vertices.copy() for part in crowd.parts]
+    values[1, alone.parameters.index("jawOpen")] = 0.9
+    assert crowd.pose(values) == [1] and crowd.pose(values) == []
+    for own, was in zip(crowd.parts, before, strict=True):
+        np.testing.assert_array_equal(own.vertices[[0, 2]], was[[0, 2]])
+    check(crowd, alone)
+
+
+def test_the_one_head_shows_any_of_them_and_is_itself_again(crowd: Crowd, alone: Head) -> None:
+    values = draw(4, len(alone.parameters))
+    crowd.pose(values)
+    for k in (2, 0):
+        crowd.show(k)
+        for own, part in zip(crowd.parts, crowd.head.parts, strict=True):
+            np.testing.assert_array_equal(part.vertices, own.vertices[k])
+            assert part.changed == [(0, len(part.vertices))]
+    for wanted in (values[1], np.zeros(len(alone.parameters))):
+        crowd.head.pose(wanted)
+        alone.pose(wanted)
+        for shown, part in zip(crowd.head.parts, alone.parts, strict=True):
+            np.testing.assert_allclose(shown.vertices, part.vertices, atol=2e-4, err_msg=part.name)
+    assert crowd.pose(values) == []  # what the one head did has moved none of them
+
+
+def test_wrong_values_move_nothing(crowd: Crowd, alone: Head) -> None:
+    values = draw(5, len(alone.parameters))
+    crowd.pose(values)
+    before = [part.vertices.copy() for part in crowd.parts]
+    wrong = draw(6, len(alone.parameters))
+    wrong[2, alone.parameters.index("jawOpen")] = np.nan
+    with pytest.raises(ValueError, match="jawOpen is not a number"):
+        crowd.pose(wrong)
+    with pytest.raises(ValueError, match="expected"):
+        crowd.pose(wrong[:2])
+    for own, was in zip(crowd.parts, before, strict=True):
+        np.testing.assert_array_equal(own.vertices, was)
+    np.testing.assert_array_equal(crowd.values, values)
+
+
+def test_a_further_head_costs_no_more_than_three_times_its_vertices(crowd: Crowd) -> None:
+    arrays = sum(part.vertices[0].nbytes + part.normals[0].nbytes for part in crowd.parts)
+    assert crowd.nbytes / len(crowd) <= 3.0 * arrays
+
+
+def test_no_heads_are_no_crowd(crowd: Crowd) -> None:
+    with pytest.raises(ValueError, match="at least 1"):
+        Crowd(crowd.head, 0)
