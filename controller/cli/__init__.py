@@ -3,6 +3,16 @@
 In: words. Out: calls of controller.tools. Imports any room left of it.
 """
 
-from controller.cli.app import main
+import sys
 
 __all__ = ["main"]
+
+
+def main() -> None:
+    """Entry point of the ``omote`` command: Ctrl-C ends it quietly from here on, also while its modules load."""
+    try:
+        from controller.cli import app  # start-up: it loads modules of Python that an interrupt could hit
+
+        app.main()
+    except KeyboardInterrupt:
+        sys.exit(130)

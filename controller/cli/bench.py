@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     from surface.bench.bench import Measure
 
 PICTURES = (".png", ".svg", ".jpg", ".webp")
+MOST_HEADS = 10_000
 _KEPT = {None: "", True: "kept", False: "missed"}
 
 
@@ -32,6 +34,7 @@ class Subject(StrEnum):
     surface = "surface"
     quadtree = "quadtree"
     drift = "drift"
+    crowd = "crowd"
     bus = "bus"
 
 
@@ -41,7 +44,8 @@ _NEEDS = {Subject.surface: ("scipy",)}
 
 def bench(
     what: Annotated[
-        Subject, typer.Argument(help="A head, the engine at its limit, quad trees, drift, or a servo bus.")
+        Subject,
+        typer.Argument(help="A head, the engine at its limit, quad trees, drift, a crowd, or a servo bus."),
     ] = Subject.head,
     head: Annotated[
         str, typer.Option(help="Head: a name from configs/heads or a folder.", autocompletion=names_of("heads"))
@@ -60,6 +64,7 @@ def bench(
     ] = 100_000,
     level: Annotated[int, typer.Option(help="Levels of the uniform mesh (quadtree only).", min=0, max=9)] = 7,
     updates: Annotated[int, typer.Option(help="Number of updates (drift only).", min=1)] = 1_000_000,
+    heads: Annotated[int, typer.Option(help="Number of heads (crowd only).", min=1, max=MOST_HEADS)] = 64,
     face: Annotated[bool, typer.Option("--face", help="Also while the face is drawn (bus only).")] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON (bus only).")] = False,
 ) -> None:
@@ -87,24 +92,36 @@ def bench(
         def advance(stage: str, part: float) -> None:
             progress.update(task, description=f"building: {stage}", total=1.0, completed=part)
 
-        match what:
-            case Subject.head:
-                tables = benches.bench_head(head, seconds, log)
-            case Subject.drift:
-                tables = benches.bench_drift(head, updates, log)
-            case Subject.quadtree:
-                tables = benches.bench_savings(head, log, level) if large else []
-                tables += benches.bench_quadtree(head, log, level, file)
-            case _:
-                tables = benches.bench_surface(seconds, log, vertices, head)
-                tables += benches.bench_large(seconds, log, advance, vertices) if large else []
-                tables += benches.bench_growth(seconds, log, file, vertices) if file is not None else []
+        simple = {
+            Subject.head: lambda: benches.bench_head(head, seconds, log),
+            Subject.crowd: lambda: benches.bench_crowd(head, heads, seconds, log),
+            Subject.drift: lambda: benches.bench_drift(head, updates, log),
+        }
+        if what in simple:
+            tables = simple[what]()
+        elif what is Subject.quadtree:
+            tables = benches.bench_savings(head, log, level) if large else []
+            tables += benches.bench_quadtree(head, log, level, file)
+        else:
+            tables = _bench_surface(head, seconds, vertices, large, file, log, advance)
     for title, measures in tables:
         table = Table("measure", "ms", "ratio", "to", "reach", "", title=title, title_justify="left")
         for row in measures:
             took = f"{row.milliseconds:.3f}" if row.milliseconds else ""
             table.add_row(row.name, took, _ratio(row), row.against, row.reach, _KEPT[row.kept])
         show_table(table)
+
+
+def _bench_surface(
+    head: str, seconds: float, vertices: int, large: bool, growth: Path | None, log: Callable[[str], None],
+    advance: Callable[[str, float], None],
+) -> list[tuple[str, list[Measure]]]:  # fmt: skip
+    """The engine at its limit; also far more vertices if ``large``, and growth with size if that file is given."""
+    from controller.tools import bench_surface as benches  # start-up: --help does without it
+
+    tables = benches.bench_surface(seconds, log, vertices, head)
+    tables += benches.bench_large(seconds, log, advance, vertices) if large else []
+    return tables + (benches.bench_growth(seconds, log, growth, vertices) if growth is not None else [])
 
 
 def _ratio(row: Measure) -> str:

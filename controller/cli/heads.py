@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -47,6 +48,7 @@ Setting = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated.", autocompletion=setting_names),
 ]
+MOST_DRAWN = 1024
 HEAD = "Head: a name from configs/heads or a folder."
 
 
@@ -87,13 +89,19 @@ def render(
     sheet: Annotated[
         bool, typer.Option("--sheet", help="Draw every parameter at its limit and every named expression.")
     ] = False,
+    crowd: Annotated[
+        int | None,
+        typer.Option(
+            metavar="HEADS", min=1, max=MOST_DRAWN, help="Draw so many heads on one sheet, each with a face of its own."
+        ),
+    ] = None,
 ) -> None:
     """Draw one picture of the face, without a display.
 
     Example: omote render --set jawOpen=0.8 --size 800x800 -o out.png
     """
     require("a picture", "moderngl", "PIL")
-    from controller.face.still import Still, draw_sheet, draw_still  # start-up: --help does without it
+    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still  # start-up: --help does without it
     from controller.stage.persons import parse_person  # start-up: --help does without it
     from controller.stage.picture import parse_background  # start-up: --help does without it
 
@@ -105,9 +113,12 @@ def render(
         settings or [], expression or [], size, look, head, identity,
         stage=stage, vocabularies=vocabulary or (), groups=group or (),
     )  # fmt: skip
-    if sheet:
+    if sheet and crowd:
+        raise ConfigError("--sheet and --crowd are two pictures", hint="leave out one of them")
+    if sheet or crowd:
+        draw = partial(draw_crowd, still, crowd) if crowd else partial(draw_sheet, still)
         with console.status("drawing") as status:
-            draw_sheet(still, out, lambda done, total: status.update(f"drawing {done} of {total}"))
+            draw(out, lambda done, total: status.update(f"drawing {done} of {total}"))
     else:
         draw_still(still, out)
     console.print(f"wrote {out}", soft_wrap=True)

@@ -26,9 +26,9 @@ from controller.stage.stage import (
     parse_identity,
 )
 from controller.vocabulary.vocabulary import Vocabulary
-from surface.head import Head
+from surface.head import Crowd, Head
 from surface.view.pictures.offscreen import Offscreen
-from surface.view.pictures.sheet import contact_sheet, write_png
+from surface.view.pictures.sheet import contact_sheet, crowd_sheet, write_png
 from surface.view.scene.framing import framed
 
 
@@ -181,5 +181,36 @@ def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | N
     page = contact_sheet(
         head, entries, views=[framed(look.make_camera(), head)], quality=look.still_quality, theme=look.make_theme(),
         progress=progress,
+    )  # fmt: skip
+    write_png(page, out)
+
+
+def crowd_poses(still: Still, count: int) -> list[tuple[str, NDArray[np.float64]]]:
+    """Label and full parameter vector of ``count`` heads: each shows what ``still`` shows and the next of its named
+    expressions, and looks somewhere else, the same in every picture."""
+    rng, names = np.random.default_rng(count), still.vocabulary.names
+    looks = [PARAMETERS.index(name) for name in ("headYaw", "headPitch", "headRoll")]
+    poses = []
+    for k in range(count):
+        name = names[k % len(names)]
+        values = still.values + _vector(still.vocabulary.expand(name, 1.0 if k < len(names) else 0.6))
+        values[looks] += rng.uniform(-0.3, 0.3, len(looks))
+        poses.append((name, np.clip(values, PARAMETERS.low, PARAMETERS.high)))
+    return poses
+
+
+def draw_crowd(still: Still, count: int, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
+    """Draw ``count`` heads that are posed in one batch on one sheet (PNG); calls ``progress(done, total)``.
+
+    Raises ParameterError: a still whose vertices are to be computed by the graphics processor.
+    """
+    if still.look.evaluator == "gpu":
+        raise ParameterError("a crowd is posed by the processor", hint="leave out --evaluator gpu")
+    head, look, poses = still.load_head(), still.look, crowd_poses(still, count)
+    crowd = Crowd(head, count)
+    crowd.pose(np.stack([for_head(values, head.parameters) for _, values in poses]))
+    page = crowd_sheet(
+        crowd, [label for label, _ in poses], camera=framed(look.make_camera(), head), quality=look.still_quality,
+        theme=look.make_theme(), columns=math.isqrt(count - 1) + 1, progress=progress,
     )  # fmt: skip
     write_png(page, out)

@@ -14,11 +14,11 @@ from controller.base.parameters import Floats
 from controller.base.paths import find_config
 from surface.base.progress import Progress
 from surface.bench import cold, growth
-from surface.bench.bench import Measure, build_table, large_table, least, measure, sheet, speed_table
+from surface.bench.bench import Measure, build_table, large_table, least, least_of, measure, sheet, speed_table
 from surface.bench.comparison import Variant, compare, draw
 from surface.bench.drift import drift
 from surface.bench.savings import MEASURES, nine_surfaces, savings
-from surface.head import Head
+from surface.head import Crowd, Head
 from surface.head.model.meshes import domain_of
 
 Log = Callable[[str], None]
@@ -165,6 +165,26 @@ def pose_rows(head: Head, seconds: float, log: Log) -> list[Measure]:
         rows.append(Measure(f"pose, only {parameter} changed", took, took / whole, "every parameter"))
     still = least(poser(head, np.zeros((1, count))), seconds)
     return [*rows, Measure("pose, nothing changed", still, still / whole, "every parameter")]
+
+
+def bench_crowd(name: str, count: int, seconds: float, log: Log) -> Tables:
+    """Posing a crowd of ``count`` heads with everything changed, beside one head alone, in turn; and its memory."""
+    log("loading")
+    folder = find_config("heads", name)
+    alone, crowd = Head.load(folder), Crowd(Head.load(folder), count)
+    poses = np.random.default_rng(1).uniform(0, 0.5, (_POSES, count, len(alone.parameters)))
+    each = cycle(poses)
+    log(f"{count} heads")
+    one, all_of_them = least_of([poser(alone, poses[:, 0]), lambda: crowd.pose(next(each))], seconds)
+    arrays = sum(part.vertices.nbytes + part.normals.nbytes for part in alone.parts)
+    rows = [
+        Measure("one head alone, every parameter changed", one),
+        Measure(
+            "a head of the crowd, every parameter changed", all_of_them / count, all_of_them / count / one, "one alone"
+        ),
+        Measure("memory of a further head", 0.0, crowd.nbytes / count / arrays, "its vertices and normals", "<= 3"),
+    ]
+    return [(f"{count} heads like {alone.name}, {arrays / 1e6:.1f} MB of vertices and normals each", rows)]
 
 
 def poser(head: Head, poses: Floats) -> Callable[[], object]:

@@ -6,12 +6,14 @@ In: a head's folder and values of parameters. Out: vertices and normals of its p
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.file import load_data, save_data
 from surface.head.model.parameters import NAMES
+from surface.head.posing.crowd import Crowd
 from surface.head.posing.head import Head
 from surface.head.posing.part import HeadPart
 
 __all__ = [
     "NAMES",
     "Contact",
+    "Crowd",
     "Group",
     "Head",
     "HeadData",

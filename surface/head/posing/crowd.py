@@ -78,8 +78,8 @@ class Crowd:
         given = np.asarray(values, np.float64)
         if given.shape != self._values.shape:
             raise ValueError(f"values has shape {given.shape}, expected {self._values.shape}")
-        for row in given:
-            self.head.read_pose(row)  # raises for what is not a number, before anything moves
+        for row in given[np.isnan(given).any(axis=1)]:
+            self.head.read_pose(row)  # raises, before anything moves
         moved = np.flatnonzero((given != self._values).any(axis=1)).tolist()
         finishing = [self._place(k, given[k]) for k in moved]
         for part in self.parts:

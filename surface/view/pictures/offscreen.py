@@ -103,6 +103,14 @@ class Offscreen:
         self._frame(values, camera)
         return self.read()
 
+    def render_present(self, camera: Camera | None = None) -> np.ndarray:
+        """As :meth:`render`, but of the head as it is, which somebody else has posed. The renderer's evaluator must be
+        "cpu", and it must not draw fewer triangles."""
+        self._make_current()
+        self.renderer.update()
+        self.target.paint(self.renderer, camera or self._front)
+        return self.read()
+
     def _make_current(self) -> None:
         """Make the context current; another may have been since."""
         self.ctx.__enter__()  # type: ignore[no-untyped-call]  # moderngl has no types here

@@ -19,6 +19,8 @@ from surface.view.scene.theme import Theme
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+    from surface.head.posing.crowd import Crowd  # compiled: who has one has loaded it
+
 _PAPER = (24, 26, 29)
 _INK = (232, 233, 235)
 _GAP = 4
@@ -55,6 +57,32 @@ def contact_sheet(
             if progress is not None:
                 progress(index + 1, len(entries))
     return compose(pictures, [label for label, _ in entries], columns=columns)
+
+
+def crowd_sheet(
+    crowd: Crowd,
+    labels: Sequence[str],
+    *,
+    camera: Camera | None = None,
+    tile: tuple[int, int] = (160, 176),
+    columns: int | None = None,
+    quality: str = "full",
+    theme: str | Theme = "skin",
+    progress: Callable[[int, int], None] | None = None,
+) -> Image:
+    """Draw every head of a crowd as it is posed and put the pictures on one page; the rest as :func:`contact_sheet`.
+
+    labels : one for each head. camera : zoomed in, since tiles are small; the front if None.
+    """
+    camera = zoom_to_head(camera or framed(Camera.front(), crowd.head))
+    pictures = []
+    with Offscreen(crowd.head, tile, quality=quality, theme=theme, evaluator="cpu") as screen:
+        for k in range(len(crowd)):
+            crowd.show(k)
+            pictures.append(screen.render_present(camera))
+            if progress is not None:
+                progress(k + 1, len(crowd))
+    return compose(pictures, labels, columns=columns)
 
 
 def zoom_to_head(camera: Camera) -> Camera:

@@ -125,17 +125,25 @@ def test_a_process_of_its_own_ends_with_that_code_and_says_it_on_stderr() -> Non
     assert result.stderr.startswith("error: ")
 
 
-@pytest.mark.parametrize("background", [(), ("sh", "-c", 'trap "" INT; exec "$@"', "sh")], ids=["", "background"])
-@pytest.mark.parametrize("module", ["controller.base.errors", "rich.console", "controller.cli.run"])
+BACKGROUND = ("sh", "-c", 'trap "" INT; exec "$@"', "sh")
+
+
+@pytest.mark.parametrize(
+    ("module", "background"),
+    [("controller.cli.app", ())]  # later ones also where a shell has had the signal ignored
+    + [(module, way) for module in ("controller.base.errors", "rich.console", "controller.cli.run")
+       for way in ((), BACKGROUND)],
+    ids=str,
+)  # fmt: skip
 def test_an_interrupt_while_the_command_line_loads_says_nothing(module: str, background: tuple[str, ...]) -> None:
     program = """
-import signal, sys
-from controller.cli.app import main
+import _signal, sys
+from controller.cli import main
 
 class Finder:
     def find_spec(self, name, path=None, target=None):
         if name == sys.argv[1]:
-            signal.raise_signal(signal.SIGINT)
+            _signal.raise_signal(_signal.SIGINT)
 
 sys.meta_path.insert(0, Finder())
 main()

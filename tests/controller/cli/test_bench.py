@@ -108,7 +108,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple[Any, ...]]:
 
         return note
 
-    for name in ("head", "surface", "large", "growth", "drift", "quadtree"):
+    for name in ("head", "surface", "large", "growth", "drift", "quadtree", "crowd"):
         monkeypatch.setattr(surface_module, f"bench_{name}", noting(f"bench_{name}"))
     return found
 
@@ -128,8 +128,10 @@ def test_every_subject_is_given_its_own_options(calls: list[tuple[Any, ...]], tm
     said("surface")
     said("drift")
     said("quadtree")
+    said("crowd", "--heads", "8")
     assert calls == [
-        ("bench_surface", 0.3, 100_000, "ict"), ("bench_drift", "ict", 1_000_000), ("bench_quadtree", "ict", 7, None)
+        ("bench_surface", 0.3, 100_000, "ict"), ("bench_drift", "ict", 1_000_000), ("bench_quadtree", "ict", 7, None),
+        ("bench_crowd", "ict", 8, 0.3),
     ]  # fmt: skip
     calls.clear()
     svg, png = tmp_path / "a.svg", tmp_path / "b.PNG"

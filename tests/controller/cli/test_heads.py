@@ -239,6 +239,18 @@ def test_render_draws_a_picture_unless_a_sheet_is_asked_for(tmp_path, monkeypatc
     assert plain.look.background != other.look.background
 
 
+def test_render_draws_a_crowd_or_a_sheet(tmp_path, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(
+        "controller.face.still.draw_crowd", lambda still, count, out, progress: drawn.append((count, out))
+    )
+    out = tmp_path / "a.png"
+    assert CliRunner().invoke(make_app(), ["render", "-o", str(out), "--crowd", "64"]).exit_code == 0
+    assert drawn == [(64, out)]
+    both = CliRunner().invoke(make_app(), ["render", "-o", str(out), "--crowd", "2", "--sheet"])
+    assert both.exit_code != 0 and len(drawn) == 1
+
+
 def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeypatch, sheet):
     calls = []
     other = SimpleNamespace(kind="odd", suffixes=(".odd",))

@@ -7,10 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS
-from controller.face.still import Still, for_head, parse_group, parse_setting, parse_size, sheet_poses
+from controller.face.still import (
+    Still,
+    crowd_poses,
+    draw_crowd,
+    for_head,
+    parse_group,
+    parse_setting,
+    parse_size,
+    sheet_poses,
+)
 
 
 def test_a_setting_names_a_parameter_in_any_spelling() -> None:
@@ -140,3 +150,30 @@ def test_the_sheet_names_two_sides_of_angles_only() -> None:
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         object.__new__(Still).anything = 1
+
+
+def test_heads_of_a_crowd_differ_and_keep_what_all_of_them_show() -> None:
+    still = Still.parse(["cheekPuff=0.5"], [])
+    poses = crowd_poses(still, 60)
+    assert len({values.tobytes() for _, values in poses}) == 60
+    assert [label for label, _ in poses[: len(still.vocabulary.names)]] == list(still.vocabulary.names)
+    puff = PARAMETERS.index("cheekPuff")
+    for _, values in poses:
+        assert values[puff] >= 0.5 and (values >= PARAMETERS.low).all() and (values <= PARAMETERS.high).all()
+    assert all((a == b).all() for (_, a), (_, b) in zip(poses, crowd_poses(still, 60), strict=True))
+
+
+def test_a_crowd_is_drawn_on_one_sheet(tmp_path: Path) -> None:
+    seen: list[tuple[int, int]] = []
+    draw_crowd(Still.parse([], []), 3, tmp_path / "a.png", lambda *at: seen.append(at))
+    page = np.asarray(Image.open(tmp_path / "a.png")).astype(int)
+    assert seen == [(1, 3), (2, 3), (3, 3)]
+    height, width = page.shape[0] // 2, page.shape[1] // 2
+    tiles = [page[:height, :width], page[:height, width : 2 * width], page[height : 2 * height, :width]]
+    assert all(np.abs(one - other).mean() > 3.0 for one, other in zip(tiles, tiles[1:] + tiles[:1], strict=True))
+
+
+def test_a_crowd_is_not_posed_by_the_graphics_processor(tmp_path: Path) -> None:
+    still = Still.parse([], [], look={"evaluator": "gpu"})
+    with pytest.raises(ParameterError, match="posed by the processor"):
+        draw_crowd(still, 2, tmp_path / "a.png")

@@ -11,6 +11,7 @@ import pytest
 from controller.base.paths import find_config
 from controller.tools import bench_surface
 from controller.tools.bench_surface import (
+    bench_crowd,
     bench_drift,
     bench_growth,
     bench_head,
@@ -124,6 +125,13 @@ def test_growth_scales_its_sizes_down_to_a_least(monkeypatch: pytest.MonkeyPatch
     assert titles[1] == "growth, from 5,000 to 500,000 vertices and from 50 to 50,000 control points"
     assert title == "growth, from 256 to 10,000 vertices and from 25 to 1,000 control points"
     assert (tmp_path / "a.svg").read_text() == "drawn"
+
+
+def test_a_crowd_is_measured_beside_one_head(small: str) -> None:
+    ((title, (alone, each, memory)),) = bench_crowd(small, 3, 0.0, lambda text: None)
+    assert title.startswith("3 heads like ") and alone.milliseconds > 0.0
+    assert each.ratio == pytest.approx(each.milliseconds / alone.milliseconds)
+    assert memory.ratio is not None and memory.ratio > 1.0 and memory.reach == "<= 3"
 
 
 def test_drift_is_told_in_millionths(monkeypatch: pytest.MonkeyPatch, small: str) -> None:
