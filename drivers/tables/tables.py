@@ -180,6 +180,11 @@ class ControlTable(Mapping[str, Item]):
         """Angle of one position step."""
         return self.turn_rad / self.ticks_per_turn
 
+    @property
+    def first_step(self) -> int:
+        """The position step at which the turn begins: 0, or half a turn below 0 (P-series)."""
+        return self.center - self.ticks_per_turn // 2
+
     @cached_property
     def by_address(self) -> dict[int, Item]:
         """The items by their first address."""
