@@ -2,9 +2,9 @@
 
     python docs/make_servo_tables.py FOLDER [--versions FILE] [-o drivers/tables/manual.toml]
 
-FOLDER holds the manual's pages under ``docs/en/dxl``. Each version is the page's last commit there, or comes from FILE,
-with lines ``path commit``, where the pages were saved one by one. Check the difference to the old file by eye: the manual
-has changed values of a model from version to version.
+FOLDER holds the manual's pages under ``docs/en/dxl``. Each version is the page's last commit there, or comes from
+FILE, with lines ``path commit``, where the pages were saved one by one. Check the difference to the old file by eye:
+the manual has changed values of a model from version to version.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from drivers.tables.tables import known_models
 
 HEADER = """\
 # Control tables as ROBOTIS' e-Manual prints them. Written by docs/make_servo_tables.py; do not edit: what omote takes
-# otherwise than its page says is in tables.toml and legacy.toml, with the reason. How to read it: drivers/tables/manual.py
+# otherwise than its page says is in tables.toml, with the reason. How to read it: drivers/tables/manual.py
 """
 FAMILIES = (
     ("ax-", "docs/en/dxl/ax/{}.md"),

@@ -1,9 +1,9 @@
 """Control tables of Dynamixel and Feetech servos: the registers of each model with addresses, units and limits.
 
-Addresses and sizes of Protocol 2.0 models come from the table files that ship with dynamixel-sdk, initial values, ranges
-and units of each Dynamixel from its page of the manual (`manual.toml`); `tables.toml` adds what both lack (access, signs,
-limits by other registers) and corrects mistakes; `legacy.toml` holds the models with Protocol 1.0 framing, `motors.toml`
-their motors. Each table is built when it is first used.
+Addresses and sizes of Protocol 2.0 models come from the table files that ship with dynamixel-sdk, initial values,
+ranges and units of each Dynamixel from its page of the manual (`manual.toml`); `tables.toml` adds what both lack
+(access, signs, limits by other registers) and corrects mistakes; `legacy.toml` holds the models with Protocol 1.0
+framing, `motors.toml` what the makers say of their motors. Each table is built when it is first used.
 """
 
 from __future__ import annotations
