@@ -36,10 +36,11 @@ class Scale:
         )
         self.sign, self.zero_rad, self.center, self.rad_per_tick = self.axes
         ends = [self._steps(np.array([getattr(servo, end) for servo in servos])) for end in ("min_rad", "max_rad")]
-        top = np.array([table.ticks_per_turn - 1 for table in tables])
-        low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), 0, top)
+        first = np.array([table.first_step for table in tables])
+        top = first + np.array([table.ticks_per_turn - 1 for table in tables])
+        low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), first, top)
         high = np.clip(np.floor(np.maximum(*ends) + _EDGE), low, top)
-        self._bounds = np.array([low, high, np.zeros_like(top), top], np.int32)
+        self._bounds = np.array([low, high, first, top], np.int32)
         self.low, self.high, self.lowest, self.highest = self._bounds
 
     def _steps(self, angle_rad: Floats) -> Floats:

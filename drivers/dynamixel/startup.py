@@ -13,7 +13,7 @@ from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.registers import Registers
 from drivers.packets.packet import StatusPacket
 from drivers.servos import startup
-from drivers.tables.tables import ControlTable
+from drivers.tables.tables import ControlTable, Item
 
 WATCHDOG_STEP_S = 0.02
 INPUT_VOLTAGE = 0x01
@@ -81,7 +81,11 @@ class Startup(startup.Startup[StatusPacket]):
         return super().bring_up(servos)
 
     def _clear_faults(self, ids: Sequence[int]) -> list[int]:
-        """Reboot servos with a latched error where that is allowed; input voltage alone may be ignored."""
+        """Reboot servos with a latched error where that is allowed.
+
+        Input voltage alone is ignored where it does not switch the motor off; else the servo is rebooted in any case:
+        its motor is off already, and the supply was found good.
+        """
         registers = self.registers
         latched = registers.get_all(ids, "hardware")
         bad = {
@@ -91,8 +95,9 @@ class Startup(startup.Startup[StatusPacket]):
         }
         if not bad:
             return []
-        if not self.policy.reboot_faulted:
-            raise self.fault("latched", bad)
+        worse = {servo: bits for servo, bits in bad.items() if bits != INPUT_VOLTAGE}
+        if worse and not self.policy.reboot_faulted:
+            raise self.fault("latched", worse)
         for servo in bad:
             registers.packets.reboot(registers.port, servo)
         registers.port.sleep(BOOT_S / 4)
@@ -144,7 +149,7 @@ class Startup(startup.Startup[StatusPacket]):
                 item = self.registers.item(servo.id, name)
                 if item is not None:  # 0 would mean no limit
                     steps = math.ceil(getattr(servo, limit) / item.scale)
-                    values[servo.id] = min(max(steps, 1), 1023 if item.size == 2 else 32767)
+                    values[servo.id] = min(max(steps, 1), _most(self.registers.tables[servo.id], item))
             self.registers.set_all(values, name)
         watched = self.registers.having(ids, "watchdog")
         self.registers.put_all(dict.fromkeys(watched, 0), "watchdog")
@@ -154,3 +159,10 @@ class Startup(startup.Startup[StatusPacket]):
         """Switch the watchdogs of servos off; a failure is ignored."""
         with suppress(NoReply, CorruptReply, ServoRefused):
             self.registers.set_all(dict.fromkeys(self.registers.having(ids, "watchdog"), 0), "watchdog")
+
+
+def _most(table: ControlTable, item: Item) -> int:
+    """The largest value of a profile register; P-series bound it by the register that holds the limit."""
+    if item.upper is not None:
+        return table[item.upper].initial
+    return 1023 if item.size == 2 else 32767

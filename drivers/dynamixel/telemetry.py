@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np
@@ -24,6 +25,8 @@ log = logging.getLogger(__name__)
 
 JOINT_FAILURES = 2
 """Fast reads in a row that no servo answers before plain ones are used."""
+FAST_AGAIN_S, FAST_AGAIN_MOST_S = 5.0, 320.0
+"""Time until fast reads are tried again, twice as long after each try in vain, and its longest."""
 
 
 class Telemetry(telemetry.Telemetry):
@@ -58,6 +61,7 @@ class Telemetry(telemetry.Telemetry):
         self._feedbacks = [ReadRequest(group, group.layout.feedback, group.ids) for group in self._groups]
         self._fast = self._may_be_fast and all(table.fast_read for table in tables.values())
         self._joint_failures = 0
+        self._fast_again_s, self._fast_pause_s = math.inf, FAST_AGAIN_S
         self._compiled: CompiledRead | None = None
         self.tripped.clear()
         self.unmapped.clear()
@@ -79,6 +83,8 @@ class Telemetry(telemetry.Telemetry):
     # ------------------------------------------------------------------ reading
 
     def _read_feedback(self, clock: Callable[[], float], running: bool, scale: Scale) -> BusState | None:
+        if clock() >= self._fast_again_s:
+            self._try_fast_again()
         compiled = None if self._port.suspects else self._compiled_read(scale)
         self._ask(self._feedbacks, clock, running, self._fast, compiled)
         return None if compiled is None else compiled.state
@@ -111,16 +117,26 @@ class Telemetry(telemetry.Telemetry):
         if asked:
             read = compiled.read if compiled else group_read(_runs(asked), fast)
             got = self._packets.read_prepared(self._port, read, compiled)
-        self._note_joint(got, fast)
+        if fast:
+            self._note_joint(got, clock())
         if compiled is None or compiled.state is None:
             self._accept(requests, got, clock(), running)
 
-    def _note_joint(self, got: Got, fast: bool) -> None:
-        """Use plain reads when servos answer them, but no fast ones."""
-        self._joint_failures = self._joint_failures + 1 if fast and got.joint_lost and got.replies else 0
+    def _note_joint(self, got: Got, now: float) -> None:
+        """Use plain reads for a while when servos answer them, but no fast ones."""
+        if not got.joint_lost:
+            self._joint_failures, self._fast_pause_s = 0, FAST_AGAIN_S
+            return
+        self._joint_failures = self._joint_failures + 1 if got.replies else 0
         if self._joint_failures >= JOINT_FAILURES:
-            self._fast = False
-            log.warning("no servo answers fast reads; using plain ones")
+            self._fast, self._fast_again_s = False, now + self._fast_pause_s
+            self._log("no servo answers fast reads; using plain ones, and fast ones again in %g s", self._fast_pause_s)
+            self._fast_pause_s = min(2.0 * self._fast_pause_s, FAST_AGAIN_MOST_S)
+
+    def _try_fast_again(self) -> None:
+        """Read fast once more; without an answer, plainly again at once."""
+        self._fast, self._fast_again_s = True, math.inf
+        self._joint_failures = JOINT_FAILURES - 1
 
     # ------------------------------------------------------------------ replies
 

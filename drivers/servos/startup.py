@@ -269,11 +269,12 @@ class Startup(ABC, Generic[R]):
         goals, far = {}, {}
         firsts = self._first_steps([servo for servo in ids if servo not in held])
         for servo, value in self.registers.get_all(ids, "position").items():
-            turn = self.registers.tables[servo].ticks_per_turn
-            first, slack = (0, self._slack(turn)) if servo in held else (firsts.get(servo, 0), 0)
+            table = self.registers.tables[servo]
+            turn, begin = table.ticks_per_turn, table.first_step
+            first, slack = (begin, self._slack(turn)) if servo in held else (begin + firsts.get(servo, 0), 0)
             if not first - slack <= value < first + turn + slack:
                 far[servo] = self._out_of_turn(servo, value, turn)
-            low, high = self.started.limits.get(servo, (0, turn - 1))
+            low, high = self.started.limits.get(servo, (begin, begin + turn - 1))
             goals[servo] = min(max(value, low), high)
         if far:
             raise merge_errors(far)

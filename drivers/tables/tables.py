@@ -1,13 +1,15 @@
 """Control tables of Dynamixel and Feetech servos: the registers of each model with addresses, units and limits.
 
-Addresses and sizes of Protocol 2.0 models come from the table files that ship with dynamixel-sdk; `tables.toml` adds
-what they lack (initial values, access, ranges, signs, units) and corrects their mistakes; `legacy.toml` holds the
-models with Protocol 1.0 framing. Each table is built when it is first used.
+Addresses and sizes of Protocol 2.0 models come from the table files that ship with dynamixel-sdk, initial values,
+ranges and units of each Dynamixel from its page of the manual (`manual.toml`); `tables.toml` adds what both lack
+(access, signs, limits by other registers) and corrects mistakes; `legacy.toml` holds the models with Protocol 1.0
+framing, `motors.toml` what the makers say of their motors. Each table is built when it is first used.
 """
 
 from __future__ import annotations
 
 import importlib.util
+import math
 import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -16,6 +18,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from drivers.base.errors import DriverError
+from drivers.tables import manual
 
 MAGNITUDE_BIT = 1024
 """XL-320: bit 10 of speed and load is the direction, the rest the magnitude."""
@@ -91,6 +94,27 @@ def from_magnitude(raw: int, sign_bit: int) -> int:
     return -magnitude if raw >> sign_bit & 1 else magnitude
 
 
+@dataclass(frozen=True, slots=True)
+class Motor:
+    """What the maker says of a servo's motor.
+
+    supply_v : supply at which the others were measured, volts. lowest_v, highest_v : range of supply.
+    no_load_rpm : no-load speed, rev/min. stall_nm, stall_a : torque and current at stall (P-series: continuous).
+    """
+
+    supply_v: float
+    lowest_v: float
+    highest_v: float
+    no_load_rpm: float
+    stall_nm: float
+    stall_a: float
+
+    @property
+    def no_load_rad_s(self) -> float:
+        """No-load speed, rad/s."""
+        return self.no_load_rpm * math.pi / 30.0
+
+
 class ControlTable(Mapping[str, Item]):
     """The items of one model and firmware, by name.
 
@@ -100,12 +124,13 @@ class ControlTable(Mapping[str, Item]):
         one by one.
     lock : what closes the EEPROM to writes: ``"torque"``, or ``"Lock"`` for the register of that name.
     top_speed : no-load speed in steps of its speed register; 0 = the initial Velocity Limit.
+    motor : what its maker says of its motor, or None.
     items : by name, in order of address.
     eeprom_end : first RAM address; everything below keeps its value without power and is locked under torque.
     size : bytes of the whole table.
     ticks_per_turn, turn_rad, center : position steps over `turn_rad` radians, and the step of the zero angle.
     baud : bits per second by value of Baud Rate.
-    voltage : usual supply, in the register's 0.1 V.
+    voltage : usual supply, in 0.1 V.
     hardware_error : bit by cause (``voltage``, ``temperature``, ``overload`` ...) of Hardware Error Status and
         Shutdown; the XL-320 orders them differently from every other model.
     indirect : (first Indirect Address, first Indirect Data, slots) of each indirect area.
@@ -124,9 +149,10 @@ class ControlTable(Mapping[str, Item]):
         self.protocol: int = spec.get("protocol", 2)
         self.group_read: str = spec.get("group_read", "")
         self.lock: str = spec.get("lock", "torque")
-        self.top_speed: int = spec.get("top_speed", 0)
+        self.motor = Motor(*spec["motor"]) if "motor" in spec else None
+        self.top_speed: int = spec.get("top_speed", 0) or self._no_load_steps()
         self.baud = _bit_rates(spec)
-        self.voltage: int = spec["voltage"]
+        self.voltage: int = round(10.0 * self.motor.supply_v) if self.motor else spec["voltage"]
         self.indirect: tuple[tuple[int, int, int], ...] = tuple(tuple(area) for area in spec.get("indirect", ()))
         self.hardware_error: dict[str, int] = spec["hardware_error"]
         self.fast_read = 0 < spec.get("fast_read_firmware", 0) <= firmware
@@ -145,10 +171,19 @@ class ControlTable(Mapping[str, Item]):
     def __len__(self) -> int:
         return len(self.items_by_name)
 
+    def _no_load_steps(self) -> int:
+        item = self.get("Present Velocity") or self.get("Present Speed")
+        return round(self.motor.no_load_rad_s / item.scale) if self.motor and item else 0
+
     @property
     def rad_per_tick(self) -> float:
         """Angle of one position step."""
         return self.turn_rad / self.ticks_per_turn
+
+    @property
+    def first_step(self) -> int:
+        """The position step at which the turn begins: 0, or half a turn below 0 (P-series)."""
+        return self.center - self.ticks_per_turn // 2
 
     @cached_property
     def by_address(self) -> dict[int, Item]:
@@ -283,12 +318,28 @@ def _specification(model: str) -> dict[str, Any]:
     spec: dict[str, Any] = {}
     items: dict[str, dict[str, Any]] = {}
     base = data["family"].get(data["family"][family].get("extends"), {})
-    for layer in (base, data["family"][family], data["series"].get(series, {}), data["model"].get(model, {})):
+    above = (base, data["family"][family], data["series"].get(series, {}), data["model"].get(model, {}))
+    for layer in above:
         spec.update(layer)
+    page = {"items": manual.entries(model, spec["turn_rad"] / spec["ticks_per_turn"])}
+    for layer in (*above, page, *(data["instead"][reason] for reason in instead(model))):
         for name, changes in layer.get("items", {}).items():
             items[name] = {**items.get(name, {}), **changes}
     spec["items"] = items
+    if model in _motors():
+        spec["motor"] = _motors()[model]
     return spec
+
+
+def instead(model: str) -> list[str]:
+    """Keys of the sections ``[instead]`` of ``tables.toml`` that hold for a model, in their order."""
+    return [key for key, section in _data()["instead"].items() if model.startswith(tuple(section["models"]))]
+
+
+@lru_cache(maxsize=1)
+def _motors() -> dict[str, list[float]]:
+    """Model -> the arguments of `Motor`."""
+    return tomllib.loads(Path(__file__).with_name("motors.toml").read_text(encoding="utf-8"))
 
 
 def _layout(text: str, spec: dict[str, Any]) -> dict[str, tuple[int, int]]:

@@ -64,7 +64,8 @@ class XDrive(Drive):
         self.ticks_s2 = acceleration.scale / table.rad_per_tick
         limit = table.get("Current Limit")
         self.has_current = limit is not None
-        self.full_current = limit.initial if limit else 1000  # else Present Load, 0.1 %
+        self.full_current = _current_at_stall(table) if limit else 1000  # else Present Load, 0.1 %
+        self.full_pwm = table["PWM Limit"].initial
         self._layout, self.first_sensed, self.last_sensed = _sensed_block(table)
         self._profile_at = acceleration.address
         self.motion_at = table["Present Velocity"].address - 2
@@ -76,7 +77,8 @@ class XDrive(Drive):
         self.mode = registers.get("Operating Mode")
         self.goals = _GOALS[self.mode]
         reverse = registers.get("Drive Mode") & REVERSE
-        self.side, self.mirror = (-1, registers.table.ticks_per_turn - 1.0) if reverse else (1, 0.0)
+        center = registers.table.center  # X-series reverse 0 to 4095, P-series about 0
+        self.side, self.mirror = (-1, max(2.0 * center - 1.0, 0.0)) if reverse else (1, 0.0)
         offset = registers.get("Homing Offset")
         ignored = self.mode == POSITION and abs(offset) > MAX_POSITION_OFFSET
         self.offset = 0 if ignored else offset
@@ -174,7 +176,7 @@ class XDrive(Drive):
             int((now_s - self.born_s) * 1000.0) & 0x7FFF,
             int(powered and speed != 0.0),
             (arrived and not running) | running << 1 | (not arrived) << 3 | profile,
-            side * round(885.0 * push),
+            side * round(self.full_pwm * push),
             side * round(load * self.full_current),
             side * round(speed / ticks_s),
             round(self.mirror + side * motion.position) + self.offset,
@@ -183,6 +185,13 @@ class XDrive(Drive):
             round(10.0 * plant.voltage(load)),
             min(max(round(plant.temperature_c), 0), 255),
         )
+
+
+def _current_at_stall(table: ControlTable) -> int:
+    """What Present Current shows at stall, in its steps; Current Limit where the maker gives no current at stall."""
+    if table.motor is None:
+        return table["Current Limit"].initial
+    return round(table.motor.stall_a / table["Present Current"].scale)
 
 
 def _sensed_block(table: ControlTable) -> tuple[struct.Struct, int, int]:

@@ -16,12 +16,20 @@ class Skin:
     rest : position of the skin at rest, ticks; None = where the servo starts.
     inertia : share per tick/s².
     friction : share while it turns.
+
+    The defaults are for servos of 4096 steps a turn, see `for_turn`.
     """
 
     spring: float = 4e-5
     rest: float | None = None
     inertia: float = 1.2e-6
     friction: float = 0.02
+
+    @classmethod
+    def for_turn(cls, ticks: int) -> Skin:
+        """The usual skin on a servo of so many steps a turn: the same share at the same angle."""
+        fine = 4096 / ticks
+        return cls(spring=cls().spring * fine, inertia=cls().inertia * fine)
 
 
 class Plant:

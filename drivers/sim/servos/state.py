@@ -91,7 +91,7 @@ class ServoState:
         self.force_baud(baud, self.baud)
         start = float(table.center if position is None else position)
         top_speed = (table.top_speed or table["Velocity Limit"].initial) * speed_unit(table)
-        self.plant = Plant(now_s, start, top_speed, table.voltage / 10, skin or Skin())
+        self.plant = Plant(now_s, start, top_speed, table.voltage / 10, skin or Skin.for_turn(table.ticks_per_turn))
         kind: type[Drive] = WordDrive
         if "Goal Velocity" in table:
             kind = XDrive if "Profile Velocity" in table else FeetechDrive
@@ -299,7 +299,7 @@ class ServoState:
     def _wrap_position(self, now_s: float) -> None:
         """Bring the shaft's position back into one turn."""
         self._sensed_at = -1.0
-        turn = self.table.ticks_per_turn
-        position = self.plant.motion(now_s).position
+        turn, first = self.table.ticks_per_turn, self.table.first_step
+        position = self.plant.motion(now_s).position - first
         if not 0 <= position < turn:
-            self.plant.place(now_s, position % turn)
+            self.plant.place(now_s, first + position % turn)

@@ -222,6 +222,18 @@ def test_a_voltage_error_that_leaves_torque_alone_is_no_reason_to_reboot(wire: V
         assert torques(wire) == [True] * 3
 
 
+def test_a_voltage_error_alone_is_cleared_where_the_supply_is_good_again(wire: VirtualBus) -> None:
+    """XL330 servos switch their motor off for it (Shutdown 53), so that a reboot drops nothing."""
+    wire.servo(2).latch(0x01)
+    assert wire.servo(2).register("Shutdown") & 0x01
+    with bus_on(wire) as bus:
+        bus.start()
+        assert torques(wire) == [True] * 3
+        assert wire.servo(2).register("Hardware Error Status") == 0
+    wire.servo(2).latch(0x21)
+    refuses(wire, ServoFault, r'"brow" \(id 2\) 0x21')
+
+
 # ---------------------------------------------------------------------------- 17: positions out of turn
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import Bus
+from drivers.dynamixel import telemetry
 from drivers.servos.telemetry import PROBE_S
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import SERVOS, pause, read_until, settle
@@ -244,6 +245,26 @@ def test_servos_that_ignore_fast_reads_are_read_plainly(wire: VirtualBus) -> Non
     finally:
         for servo in wire.chain.servos:
             servo.table.fast_read = True
+
+
+def test_fast_reads_come_back_after_a_fault_has_passed(wire: VirtualBus, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(telemetry, "FAST_AGAIN_S", 0.2)
+    table = wire.chain.servos[0].table
+    with wire.bus(fast=True, **CALM) as bus:
+        bus.start()
+        try:
+            for servo in wire.chain.servos:
+                servo.table.fast_read = False
+            read_until(bus, lambda s: not bus._telemetry._fast)
+            assert bus.read().fresh.all(), "plain reads answer"
+        finally:
+            for servo in wire.chain.servos:
+                servo.table.fast_read = True
+        assert table.fast_read
+        read_until(bus, lambda s: bus._telemetry._fast)
+        for _ in range(5):
+            assert bus.read().fresh.all()
+        assert bus._telemetry._fast
 
 
 def test_mixed_models_share_a_wire() -> None:

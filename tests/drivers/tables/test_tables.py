@@ -182,7 +182,7 @@ def test_numbers_and_names():
     assert load_table("xw430-t200").number == 1280
 
 
-@pytest.mark.parametrize("model", ["xl330-m999", 4711, "ph42-020-s300"])
+@pytest.mark.parametrize("model", ["xl330-m999", 4711, "ym070-210-r051"])
 def test_unknown_models_name_what_there_is(model):
     with pytest.raises(DriverError, match=str(model)) as error:
         load_table(model)

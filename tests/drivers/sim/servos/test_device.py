@@ -121,21 +121,21 @@ def test_current_mode_finds_the_balance_with_the_skin():
     device = servo(skin=Skin(spring=1e-3, inertia=0.0, friction=0.0))
     write(device, "Operating Mode", 0)
     write(device, "Torque Enable", 1)
-    write(device, "Goal Current", 175)  # a tenth of the stall torque
+    write(device, "Goal Current", 147)  # a tenth of the 1.47 A at stall (e-Manual, XL330-M288)
     assert read(device, "Present Position", 5.0) == 2048 + 100
-    assert read(device, "Present Current", 5.0) == 175
+    assert read(device, "Present Current", 5.0) == 147
 
 
 def test_current_limit_holds_the_shaft_back():
     device = servo(skin=Skin(spring=1e-3, inertia=0.0, friction=0.0))
-    write(device, "Current Limit", 350)
+    write(device, "Current Limit", 294)
     write(device, "Torque Enable", 1)
     write(device, "Goal Position", 4000)
     assert read(device, "Present Position", 5.0) == 2048 + 200
     other = servo(skin=Skin(spring=1e-3, inertia=0.0, friction=0.0))
     write(other, "Operating Mode", 5)
     write(other, "Torque Enable", 1)
-    write(other, "Goal Current", 175)
+    write(other, "Goal Current", 147)
     write(other, "Goal Position", 4000)
     assert read(other, "Present Position", 5.0) == 2048 + 100
 
@@ -144,8 +144,8 @@ def test_load_comes_from_spring_and_friction():
     device = servo(skin=Skin(spring=1e-4, inertia=0.0, friction=0.05))
     write(device, "Torque Enable", 1)
     write(device, "Goal Position", 3048)
-    assert read(device, "Present Current", 0.1) > 0.05 * 1750
-    assert read(device, "Present Current", 9.0) == 175
+    assert read(device, "Present Current", 0.1) > 0.05 * 1470
+    assert read(device, "Present Current", 9.0) == 147
     write(device, "Torque Enable", 0, 9.0)
     assert read(device, "Present Current", 9.0) == 0
 
@@ -333,13 +333,13 @@ def test_the_ramps_of_a_time_based_profile_take_profile_acceleration_in_millisec
     assert device.plant.motion(0.5).velocity == pytest.approx(cruise)
 
 
-@pytest.mark.parametrize(("goal_current", "sign"), [(175, 1), (-175, -1)])
+@pytest.mark.parametrize(("goal_current", "sign"), [(147, 1), (-147, -1)])
 def test_without_a_spring_current_turns_the_shaft_for_ever(goal_current: int, sign: int):
     device = servo()
     write(device, "Operating Mode", 0)
     write(device, "Torque Enable", 1)
     write(device, "Goal Current", goal_current)
-    assert device.plant.motion(5.0).velocity == pytest.approx(sign * 0.1 * device.plant.top_speed)
+    assert device.plant.motion(5.0).velocity == pytest.approx(sign * 0.1 * device.drive.top_speed)
 
 
 def test_velocity_is_bounded_by_its_limit_and_reversed_by_the_drive_mode():

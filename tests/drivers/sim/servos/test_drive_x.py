@@ -100,7 +100,7 @@ def test_the_goals_of_each_mode(mode: int, goals: tuple[str, ...]):
 
 
 def test_a_current_reaches_as_far_as_the_spring_lets_it():
-    one = drive(Current_Limit=875)
+    one = drive(Current_Limit=735)
     assert one.reach == pytest.approx(0.5 / 4e-5)
     one.registers.put("Goal Position", 1_000_000)
     one.plan(0.0)
@@ -139,7 +139,7 @@ def test_sensed_registers_one_by_one():
     assert get("Realtime Tick") == 2000
     assert (get("Moving"), get("Present Velocity"), get("Velocity Trajectory")) == (1, 100, 100)
     assert get("Present Position") == get("Position Trajectory") == round(4095 - motion.position)
-    assert get("Present Current") == -round(1750 * load)
+    assert get("Present Current") == -round(1470 * load)
     assert get("Present PWM") == -round(885 * (0.8 * motion.velocity / one.plant.top_speed + 0.2 * load))
     assert (get("Present Input Voltage"), get("Present Temperature")) == (50, 42)
     assert get("Moving Status") == 1, "a velocity that is reached is no profile any more"

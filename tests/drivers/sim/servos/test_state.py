@@ -101,7 +101,7 @@ def test_a_jammed_shaft_draws_full_current_and_overloads():
     device.plant.jam(0.0, True)
     write(device, "Goal Position", 3000)
     assert read(device, "Present Position", 0.5) == 2048
-    assert read(device, "Present Current", 0.5) == 1750
+    assert read(device, "Present Current", 0.5) == 1470
     assert read(device, "Moving Status", 0.5) & 8
     device.update(0.9)
     assert device.torque
