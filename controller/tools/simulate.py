@@ -6,7 +6,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -127,11 +127,15 @@ def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> N
     """Serve simulated servos for a bus of a robot file (:func:`robot_bus`), set up as its driver expects them."""
     chosen, channels = robot_bus(name, bus)
     simulator = simulator_of(chosen.family)  # before the driver, which may not be there
-    options = {key: value for key, value in chosen.options().items() if key not in SIMULATION}
-    driver = open_bus(chosen.family, servo_specs(channels), **{"port": "", **options})
+    _serve(far_end(chosen, channels), chosen.baud, how, console, simulator)
+
+
+def far_end(bus: BusSettings, channels: Sequence[ChannelSettings]) -> Line:
+    """Simulated servos or board of a robot's bus, set up as its driver expects them. Raises DriverError."""
+    options = {key: value for key, value in bus.options().items() if key not in SIMULATION}
+    driver = open_bus(bus.family, servo_specs(channels), **{"port": "", **options})
     servos = [(channel.id, channel.model) for channel in channels]
-    line = make_line(chosen.family, servos, time.monotonic(), baud=chosen.baud, options=driver.far_end())
-    _serve(line, chosen.baud, how, console, simulator)
+    return make_line(bus.family, servos, time.monotonic(), baud=bus.baud, options=driver.far_end())
 
 
 def serve_host(script: str, link: Path | None, console: Console) -> None:

@@ -156,13 +156,15 @@ class PortServer:
             self.port.open(fault.alias or self._link)
 
 
-def make_server(settings: Mapping[str, Any]) -> PortServer:
+def make_server(settings: Mapping[str, Any], line: Line | None = None) -> PortServer:
     """The server of a simulated far end, from the settings of a :class:`~drivers.sim.serving.simulated.SimulatedBus`.
+
+    line : the far end, where it is made already.
 
     Raises DriverError: unknown family or model, unreadable fault, or the port cannot be made.
     """
     now_s, baud = time.monotonic(), settings["baud"]
-    line = make_line(
+    line = line or make_line(
         settings["family"], settings["servos"], now_s, baud=baud, seed=settings["seed"], options=settings["options"]
     )
     wire, latency_s, handle = settings["wire"], settings["latency_s"], Commands(line).handle
