@@ -131,7 +131,7 @@ def test_a_goal_after_torque_is_a_jump(bus: ServoBus) -> None:
     text = said(bus.no_jump)
     found = re.search(
         r"servo 2 \(xl330-m288\) went ([\d.]+) degrees in ([\d.]+) s, at up to (\d+) degrees/s, from (\d+) to (\d+) at "
-        r"0.5\d\d s; its last goal was Goal Position = 3072 at 0.50\d s, and its torque had come on at 0.50\d s: move in",
+        r"0.5\d\d s; its last goal was Goal Position = 3072 at 0.50\d s, and its torque had come on at 0.50\d s: move",
         text,
     )
     assert found, text
