@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
@@ -54,6 +55,12 @@ def paths(pieces: Sequence[Piece], end_s: float) -> Iterator[tuple[Piece, list[S
     ends = [after.start_s for _, after in pairwise(pieces)] + [end_s]
     for piece, piece_end_s in zip(pieces, ends, strict=True):
         yield piece, path(piece, piece_end_s)
+
+
+def place_at(pieces: Sequence[Piece], time_s: float) -> float:
+    """Where the shaft was at a time, ticks of the bare shaft."""
+    piece = pieces[max(bisect_right(pieces, time_s, key=lambda each: each.start_s) - 1, 0)]
+    return piece.trajectory.at(time_s).position if piece.jammed_at is None else piece.jammed_at
 
 
 def dashes(pieces: Sequence[Piece], end_s: float, speed: float) -> list[Dash]:

@@ -6,10 +6,10 @@ Times in messages are seconds since the record began, positions are Present Posi
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from drivers.sim.servos.device import SimulatedServo
-from drivers.testing.motions import Dash, dashes, paths
+from drivers.testing.motions import Dash, dashes, paths, place_at
 from drivers.testing.records import ServoRecord, Write
 
 Limits = tuple[float, float] | Mapping[int, tuple[float, float]] | None
@@ -31,22 +31,34 @@ def fail(title: str, faults: list[str]) -> None:
 
 
 def beyond_limits(record: ServoRecord, limits: Limits, end_s: float) -> list[str]:
-    """Goals that were beyond limits, also those that the servo refused, and shafts that moved beyond them."""
+    """Goals that were beyond limits, also those that the servo refused, and shafts that moved beyond them.
+
+    Where a shaft was outside before, its goals may lead it back.
+    """
     faults = []
     for k, servo in enumerate(record.servos):
         low, high = _limits_of(servo, limits)
-        for write in record.writes:
-            if write.id == servo.id and write.register == GOAL and not low <= (write.value or 0) <= high:
-                note = f", which it refused ({write.refused})" if write.refused else ""
-                faults.append(f"{name(servo)} was told {_said(write)}{note}; its limits are {low:g} to {high:g}")
+        own = [write for write in record.writes if write.id == servo.id]
+        faults += _goals_out(record, k, own, low, high)
         if limits is None:
             faults += [
                 f"{name(servo)} refused {_said(write)}: {write.refused}"
-                for write in record.writes
-                if write.id == servo.id and write.refused.startswith("data") and write.register != GOAL
+                for write in own
+                if write.refused.startswith("data") and write.register != GOAL
             ]
-        faults += list(_ways_out(record, k, low, high, end_s))
+        faults += _ways_out(record, k, low, high, end_s)
     return faults
+
+
+def _goals_out(record: ServoRecord, k: int, writes: Sequence[Write], low: float, high: float) -> Iterator[str]:
+    servo = record.servos[k]
+    for write in writes:
+        if write.register != GOAL or write.value is None or low <= write.value <= high:
+            continue
+        here = servo.drive.to_register(place_at(record.pieces[k], record.start_s + write.time_s))
+        if write.refused or not min(low, here) - 1 <= write.value <= max(high, here) + 1:
+            note = f", which it refused ({write.refused})" if write.refused else ""
+            yield f"{name(servo)} was told {_said(write)}{note}; its limits are {low:g} to {high:g}"
 
 
 def _limits_of(servo: SimulatedServo, limits: Limits) -> tuple[float, float]:

@@ -342,3 +342,13 @@ def test_time_of_a_port_cannot_be_stepped() -> None:
 def test_it_can_be_imported_beside_tests() -> None:
     """pytest collects classes whose name begins with Test."""
     assert not Bench.__name__.startswith("Test")
+
+
+def test_goals_may_lead_back_from_outside_but_not_further_out(bus: ServoBus) -> None:
+    bus.servo(1).place(3500)
+    write(bus, 1, TORQUE, 1)
+    write(bus, 1, GOAL, 3400)
+    bus.step(1.0)
+    bus.never_beyond_limits((0, 3000))
+    write(bus, 1, GOAL, 3450)
+    assert "was told Goal Position = 3450" in said(lambda: bus.never_beyond_limits((0, 3000)))
