@@ -8,7 +8,12 @@ from importlib.metadata import entry_points
 
 import pytest
 
+import drivers.testing  # noqa: F401
+
 pytest_plugins = ["pytester"]
+
+ALONE = ("-p", "no:xdist", "-p", "no:hypothesispytest", "-p", "no:cacheprovider")
+"""Plug-ins that these tests do without; hypothesis takes seconds."""
 
 
 def test_it_is_installed() -> None:
@@ -47,7 +52,7 @@ def test_servo_bus_finds_the_jump_and_closes_the_port(pytester: pytest.Pytester)
         def test_a_wrong_model(servo_bus):
             servo_bus("xl331")
     """)
-    result = pytester.runpytest_inprocess("-p", "no:cacheprovider", "-p", "no:xdist")
+    result = pytester.runpytest_inprocess(*ALONE)
     result.assert_outcomes(passed=2, failed=1)
     result.stdout.fnmatch_lines(["*DriverError*xl331*", "*xl330-m288*"])
 
@@ -73,4 +78,4 @@ def test_servo_board_robot_head_and_robot_host(pytester: pytest.Pytester) -> Non
             with serial.Serial(host.port, 115_200, timeout=10) as port:
                 assert b"HELLO" in port.read_until()
     """)
-    pytester.runpytest_inprocess("-p", "no:cacheprovider", "-p", "no:xdist").assert_outcomes(passed=3)
+    pytester.runpytest_inprocess(*ALONE).assert_outcomes(passed=3)
