@@ -27,7 +27,8 @@ _TCGETS2 = 0x802C542A
 _TERMIOS2 = struct.Struct("4IB19B2I")
 
 Link = str | os.PathLike[str] | None
-"""A path that shall point at a pseudo-terminal, ``socket://HOST:PORT``, ``memory://NAME``, or None."""
+"""A path that shall point at a pseudo-terminal, ``socket://HOST:PORT``, ``rfc2217://HOST:PORT``, ``memory://NAME``,
+or None."""
 
 
 class ServedPort(ABC):
@@ -84,6 +85,10 @@ def make_port(link: Link) -> ServedPort:
         return TcpPort(text)
     if text.startswith("memory://"):
         return MemoryPort(text)
+    if text.startswith("rfc2217://"):
+        from drivers.sim.serving.rfc2217port import Rfc2217Port  # start-up: few use it
+
+        return Rfc2217Port(text)
     return PtyPort(link)
 
 
@@ -249,8 +254,12 @@ class _SocketPort(ServedPort):
 class TcpPort(_SocketPort):
     """Listens at ``socket://HOST:PORT``; port 0 takes a free one, and ``path`` then names it.
 
+    scheme : of the URL.
+
     Raises PortError: the address cannot be listened at; PortBusy where another program does.
     """
+
+    scheme = "socket"
 
     def _listen(self) -> socket.socket:
         try:
@@ -259,7 +268,7 @@ class TcpPort(_SocketPort):
         except (OSError, ValueError) as error:
             kind = PortBusy if isinstance(error, OSError) and "in use" in str(error) else PortError
             raise kind(f"cannot listen at {self.path}: {error}", hint="for example --tcp 127.0.0.1:4000") from error
-        self.path = f"socket://{host}:{listener.getsockname()[1]}"
+        self.path = f"{self.scheme}://{host}:{listener.getsockname()[1]}"
         return listener
 
     def _accept(self) -> socket.socket:
