@@ -33,9 +33,9 @@ def file_head(wire: Wire) -> bytes:
     return _block(_SECTION, section) + _block(_INTERFACE, struct.pack("<HHI", _USER0, 0, 0) + options)
 
 
-def packet(piece: Piece, begun_s: float) -> bytes:
-    """The block of a piece of traffic. begun_s : time of the beginning, seconds since 1970."""
-    stamp = round((begun_s + piece.time_s) * 1e9)
+def packet(piece: Piece, begun_ns: int) -> bytes:
+    """The block of a piece of traffic. begun_ns : time of the beginning, nanoseconds since 1970."""
+    stamp = begun_ns + round(piece.time_s * 1e9)
     size = len(piece.data)
     body = struct.pack("<IIIII", 0, stamp >> 32, stamp & 0xFFFFFFFF, size, size) + _padded(piece.data)
     flags = struct.pack("<I", _DIRECTION[piece.sent])

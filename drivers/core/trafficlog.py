@@ -34,17 +34,19 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Wire:
-    """What is on a wire: the family, its bit rate, and models by id where they are known."""
+    """What is on a wire: the family, its bit rate, models by id where they are known, and the model of all others."""
 
     family: str = "dynamixel"
     baud: int = 1_000_000
     servos: dict[int, str] = field(default_factory=dict)
+    model: str = ""
 
     def head(self) -> str:
         """The first lines of a log."""
         servos = " ".join(f"{number}:{model}" for number, model in sorted(self.servos.items()))
-        lines = [f"omote traffic = {FORMAT}", f"family = {self.family}", f"baud = {self.baud}"]
-        return "".join(f"# {line}\n" for line in [*lines, *([f"servos = {servos}"] if servos else [])])
+        keys = {"omote traffic": FORMAT, "family": self.family, "baud": self.baud}
+        keys |= {"servos": servos, "model": self.model}
+        return "".join(f"# {key} = {value}\n" for key, value in keys.items() if value)
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def read_log(text: str) -> TrafficRecord:
     if "omote traffic" not in head:
         raise DriverError("it is no record of traffic: its first line is not '# omote traffic = 1'", hint=_HINT)
     wire = read_head(head)
-    pieces = []
+    pieces: list[Piece] = []
     for number, line in enumerate(lines, 1):
         if line.strip() and not line.startswith("#"):
             pieces.append(_read_piece(number, line, pieces[-1].time_s if pieces else 0.0))
@@ -98,7 +100,8 @@ def read_head(head: dict[str, str]) -> Wire:
     servos = [_SERVO.fullmatch(word) for word in words]
     if None in servos or len(words) > 2048:
         raise DriverError("servos must be like 1:xl330-m288 2:xl330-m288", hint=_HINT)
-    return Wire(head.get("family", "dynamixel"), int(baud), {int(each[1]): each[2] for each in servos if each})
+    models = {int(each[1]): each[2] for each in servos if each}
+    return Wire(head.get("family", "dynamixel"), int(baud), models, head.get("model", "")[:60])
 
 
 def read_keys(text: str) -> dict[str, str]:

@@ -35,7 +35,7 @@ def beyond_limits(record: ServoRecord, limits: Limits, end_s: float) -> list[str
 
     Where a shaft was outside before, its goals may lead it back.
     """
-    faults = []
+    faults: list[str] = []
     for k, servo in enumerate(record.servos):
         low, high = _limits_of(servo, limits)
         own = [write for write in record.writes if write.id == servo.id]

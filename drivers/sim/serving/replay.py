@@ -22,11 +22,11 @@ STATUS_AT = 7
 
 
 def frame_reader(wire: Wire) -> FrameReader[Any] | None:
-    """What cuts requests on a wire into packets; None where no servos are known on it."""
-    protocols = {load_table(model).protocol for model in wire.servos.values()}
-    if not protocols:
+    """What cuts requests on a wire into packets; None where none is known, or both are there."""
+    protocols = {load_table(model).protocol for model in [*wire.servos.values(), wire.model] if model}
+    if len(protocols) != 1:
         return None
-    return InstructionReader() if 2 in protocols else Reader1()
+    return InstructionReader() if protocols == {2} else Reader1()
 
 
 class _Frames(BufferingReader):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import select
 import socket
@@ -17,6 +18,8 @@ from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Line, ReplyQueue
 from drivers.sim.wire.simulator import make_line
 from drivers.sim.wire.timing import WireTiming
+
+log = logging.getLogger(__name__)
 
 EARLY_S = 80e-6
 """How long before bytes are due the server wakes: the system wakes it about this much late."""
@@ -150,7 +153,13 @@ class PortServer:
                     self.tap(False, data)
             self._replied_s = now_s
         self._queue.advance(now_s)
-        self._timeline.advance(now_s, Commands(self.line).handle)
+        self._timeline.advance(now_s, self._carry_out)
+
+    def _carry_out(self, command: str) -> None:
+        """A command of the timeline; one that cannot be carried out is logged."""
+        answer = Commands(self.line).handle(command)
+        if answer.startswith("error"):
+            log.warning("timeline: %s: %s", command, answer.removeprefix("error "))
 
     def _unplug(self, fault: Fault, begins: bool) -> None:
         """Close the port and drop all pending bytes, or open it again, perhaps under another name."""

@@ -13,7 +13,7 @@ class Timeline:
     """
 
     def __init__(self, steps: Sequence[tuple[float, str]], loop_s: float = 0.0) -> None:
-        self._steps, self._loop_s = tuple(steps), loop_s
+        self.steps, self.loop_s = tuple(steps), loop_s
         self._next, self._start_s = 0, math.nan
 
     def start(self, now_s: float) -> None:
@@ -23,15 +23,15 @@ class Timeline:
     @property
     def due_s(self) -> float:
         """When the next command is due; infinity: there is none, or the timeline has not been started."""
-        if self._next >= len(self._steps) or math.isnan(self._start_s):
+        if self._next >= len(self.steps) or math.isnan(self._start_s):
             return math.inf
-        return self._start_s + self._steps[self._next][0]
+        return self._start_s + self.steps[self._next][0]
 
     def advance(self, now_s: float, carry_out: Callable[[str], object]) -> None:
         """Carry out what is due."""
         while self.due_s <= now_s:
-            line = self._steps[self._next][1]
+            line = self.steps[self._next][1]
             self._next += 1
-            if self._next == len(self._steps) and self._loop_s:
-                self._next, self._start_s = 0, self._start_s + self._loop_s
+            if self._next == len(self.steps) and self.loop_s:
+                self._next, self._start_s = 0, self._start_s + self.loop_s
             carry_out(line)
