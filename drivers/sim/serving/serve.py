@@ -86,6 +86,7 @@ class PortServer:
     def run(self, control: Control) -> None:
         """Serve until `control` reaches its end (or gives any byte, without `on_line`)."""
         self._timeline.start(time.monotonic())
+        self._do_due()  # what is due at once comes before the first byte
         try:
             while True:
                 watched = [control, *(self._socket.descriptors if self._socket else ()), *self.port.descriptors]
