@@ -78,20 +78,6 @@ class ServedPort(ABC):
         return None
 
 
-def make_port(link: Link) -> ServedPort:
-    """The port that a link asks for. Raises PortError: it cannot be made."""
-    text = "" if link is None else os.fspath(link)
-    if text.startswith("socket://"):
-        return TcpPort(text)
-    if text.startswith("memory://"):
-        return MemoryPort(text)
-    if text.startswith("rfc2217://"):
-        from drivers.sim.serving.rfc2217port import Rfc2217Port  # start-up: few use it
-
-        return Rfc2217Port(text)
-    return PtyPort(link)
-
-
 class PtyPort(ServedPort):
     """A pseudo-terminal and, if wanted, a symbolic link to it at a path of the user's choice, which is its `path` then.
 

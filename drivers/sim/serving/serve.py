@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from drivers.sim.serving.control import Commands, ControlSocket, Lines
-from drivers.sim.serving.ports import Link, make_port
+from drivers.sim.serving.make_port import make_port
+from drivers.sim.serving.ports import Link
 from drivers.sim.serving.timeline import Timeline
 from drivers.sim.servos.simulators import ids_and_models
 from drivers.sim.wire.faults import Fault
