@@ -14,7 +14,7 @@ from typing import Any
 from drivers.core.registry import FAMILIES
 
 WHOLE = ("surface", "surface.head", "surface.view", "surface.fit", "surface.readers", "surface.export", "drivers",
-         "drivers.sim")  # fmt: skip
+         "drivers.sim", "drivers.testing")  # fmt: skip
 """Packages of which everything in ``__all__`` is public."""
 
 SINGLE = {
@@ -38,6 +38,8 @@ SINGLE = {
     "controller.links.kind": ("API", "LinkContext", "Link", "LinkKind"),
     "controller.links.net.kinds": ("link_of",),
     "controller.takes.livelink": ("Take",),
+    "controller.testing.head": ("RobotHead",),
+    "controller.testing.host": ("ScriptedHost",),
     "controller.takes.reader": ("API", "TakeReader"),
 }
 """Names of other modules that plug-ins and programs use."""

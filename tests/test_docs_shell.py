@@ -128,6 +128,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (here / "dimple.json").write_text('{"format": 1, "name": "dimple", "part": "face", "ids": [1], '
                                       '"moves_mm": [[0, 0, 1]]}')  # fmt: skip
     (here / "voice.raw").write_bytes((here / "voice.wav").read_bytes()[44:])
+    (here / "bad-minute.toml").write_bytes((ROOT / "examples" / "bad-minute.toml").read_bytes())
+    (here / "bus.log").write_text("# omote traffic = 1\n# servos = 1:xl330-m288\n0 > ff ff fd 00 01 03 00 01 19 4e\n")
     (here / "out").mkdir()
     save_data(here / "small", small_head())
     return here

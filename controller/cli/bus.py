@@ -99,7 +99,7 @@ def set_id(
 
 
 def monitor(
-    port: Port,
+    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them. None with --replay.")] = "",
     baud: Annotated[int, typer.Option(help="Baud rate of the bus; omote scan finds it.")] = 1_000_000,
     protocol: Protocol = None,
     listen: Annotated[
@@ -110,6 +110,10 @@ def monitor(
     ] = "",
     rate: Annotated[float, typer.Option(min=0.1, max=200, help="How often the servos are read, per second.")] = 10.0,
     seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
+    record: Annotated[
+        Path | None, typer.Option("--record", help="Write the traffic to this file: .pcapng, else a text log.")
+    ] = None,
+    replay: Annotated[Path | None, typer.Option("--replay", help="Decode a recorded file instead of a port.")] = None,
 ) -> None:
     """Show the servos of a bus and the decoded packets that pass, live; nothing is switched on or moved.
 
@@ -120,8 +124,13 @@ def monitor(
     # start-up: --help does without any of these
     from controller.base.signals import stop_flag
     from controller.body.process import deadline
-    from controller.tools.monitor import listen_to_bus, poll_servos
+    from controller.tools.monitor import listen_to_bus, poll_servos, replay_traffic
 
+    if bool(port) == (replay is not None):
+        raise ConfigError("give either a port or --replay FILE", hint="omote ports lists the ports")
+    if replay is not None:
+        replay_traffic(replay, protocol, console, model)
+        return
     in_time = deadline(seconds)
     with stop_flag() as flag:
 
@@ -129,9 +138,9 @@ def monitor(
             return not flag.is_set() and in_time()
 
         if listen:
-            listen_to_bus(port, baud, protocol, console, keep_going, model)
+            listen_to_bus(port, baud, protocol, console, keep_going, model, record)
         else:
-            poll_servos(port, baud, protocol, console, keep_going, rate)
+            poll_servos(port, baud, protocol, console, keep_going, rate, record)
 
 
 def calibrate(

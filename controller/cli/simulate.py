@@ -69,12 +69,21 @@ def make_app() -> typer.Typer:
     simulators = typer.Typer(cls=_Simulators, no_args_is_help=True, help="Simulate hardware on a pseudo-terminal.")
     simulators.command("robot")(simulate_robot)
     simulators.command("host")(simulate_host)
+    simulators.command("record")(simulate_record)
     return simulators
 
 
 Link = Annotated[Path | None, typer.Option("--link", help="Make this path a link to the pseudo-terminal.")]
 Tcp = Annotated[
     str | None, typer.Option("--tcp", metavar="HOST:PORT", help="Listen here; clients open socket://HOST:PORT.")
+]
+Rfc2217 = Annotated[
+    str | None,
+    typer.Option("--rfc2217", metavar="HOST:PORT", help="Listen here; clients open rfc2217://HOST:PORT."),
+]
+Script = Annotated[Path | None, typer.Option("--script", help="File with a timeline of faults.")]
+Record = Annotated[
+    Path | None, typer.Option("--record", help="Write the traffic to this file: .pcapng, else a text log.")
 ]
 Wire = Annotated[bool, typer.Option("--wire", help="Bytes take the time they take at the baud rate.")]
 Latency = Annotated[
@@ -93,21 +102,25 @@ Control = Annotated[
 def _serving(
     link: Link = None,
     tcp: Tcp = None,
+    rfc2217: Rfc2217 = None,
     wire: Wire = False,
     latency: Latency = 0.0,
     fault: Faults = None,
     control: Control = None,
     watch: Look = False,
+    script: Script = None,
+    record: Record = None,
 ) -> Serving:
-    """Where and how to serve: a link to a pseudo-terminal, or a TCP address."""
+    """Where and how to serve: a link to a pseudo-terminal, or an address."""
     from controller.tools.simulate import Serving  # start-up: --help does without it
 
-    if link is not None and tcp is not None:
-        raise ConfigError("--link and --tcp do not go together", hint="run it twice for two ports")
+    places = {"--link": link, "--tcp": tcp, "--rfc2217": rfc2217}
+    if len(given := [name for name, place in places.items() if place is not None]) > 1:
+        raise ConfigError(f"{' and '.join(given)} do not go together", hint="run it twice for two ports")
     if latency and not wire:
         raise ConfigError("--latency is part of the time on the wire", hint="add --wire")
-    where = link if tcp is None else f"socket://{tcp}"
-    return Serving(where, wire, latency / 1000.0, tuple(fault or ()), control, watch)
+    where = f"socket://{tcp}" if tcp else f"rfc2217://{rfc2217}" if rfc2217 else link
+    return Serving(where, wire, latency / 1000.0, tuple(fault or ()), control, watch, script, record)
 
 
 def _add_serving(command: Callable[..., None], own: list[inspect.Parameter] | None = None) -> Callable[..., None]:
@@ -173,6 +186,20 @@ def simulate_robot(
     from controller.tools.simulate import serve_robot  # start-up: --help does without it
 
     serve_robot(robot, bus, how, console)
+
+
+@_add_serving
+def simulate_record(
+    how: Serving,
+    file: Annotated[Path, typer.Argument(help="Record of traffic, from --record of this command or of omote monitor.")],
+) -> None:
+    """Serve a recorded bus: each request gets the answers of the record; prints `ready PATH`, and counts at the end.
+
+    Example: omote simulate record desk.log --link /tmp/head
+    """
+    from controller.tools.simulate import serve_record  # start-up: --help does without it
+
+    serve_record(file, how, console)
 
 
 def simulate_host(

@@ -22,7 +22,9 @@ from controller.stage.stage import check_identity, load_stage
 from controller.takes.reader import load_take, suffixes
 from controller.takes.recording import SUFFIX, replay
 from controller.tools import file_kinds
+from controller.tools.fault_script import load_fault_script
 from controller.tools.robot_warnings import robot_warnings
+from controller.tools.traffic_files import describe_traffic
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.facs import Facs
 from controller.vocabulary.presets import Presets
@@ -35,6 +37,7 @@ from surface.readers import is_plain, read_surface, summary
 
 DEFAULT_HEAD = "ict"
 SURFACE_SUFFIXES = (".3dm", ".xml", ".tsm")
+TRAFFIC = (".pcapng", ".log")
 
 
 def check_anything(name: str) -> list[str]:
@@ -77,6 +80,8 @@ def _describe(path: Path) -> Iterator[str]:
         times = [now_ns for now_ns, _ in replay(path, PARAMETERS)]
         seconds = (times[-1] - times[0]) * 1e-9 if times else 0.0
         yield f"recording {path.name}: {len(times)} ticks, {seconds:.1f} s, all came out again bit by bit"
+    elif suffix in TRAFFIC:
+        yield describe_traffic(path)
     elif suffix in suffixes():
         take = load_take(path, PARAMETERS)
         yield f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz"
@@ -138,6 +143,12 @@ def _describe_calibration(path: Path) -> Iterator[str]:
 def _describe_script(path: Path) -> Iterator[str]:
     script = load_script(str(path), PARAMETERS)
     yield f"script {script.name}: {len(script.steps)} steps, {len(script.marks)} marks"
+
+
+def _describe_faults(path: Path) -> Iterator[str]:
+    timeline = load_fault_script(path)
+    loop = f", again every {timeline.loop_s:g} s" if timeline.loop_s else ""
+    yield f"timeline of faults {path.name}: {len(timeline.steps)} entries{loop}"
 
 
 def _describe_expressions(path: Path) -> Iterator[str]:
@@ -224,6 +235,7 @@ _READERS: dict[file_kinds.FileKind, Callable[[Path], Iterator[str]]] = {
     file_kinds.CALIBRATION: _describe_calibration,
     file_kinds.PERSON: _describe_person,
     file_kinds.SCRIPT: _describe_script,
+    file_kinds.FAULTS: _describe_faults,
     file_kinds.LIFE: _describe_life,
     file_kinds.PARAMETERS: _describe_parameters,
     file_kinds.UNITS: _describe_units,

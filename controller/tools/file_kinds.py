@@ -16,6 +16,7 @@ from controller.robot.calibration import CalibrationFile
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import PersonSettings
 from controller.stage.stage import StageSettings
+from controller.tools.fault_script import FaultScript
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,7 @@ ROBOT = FileKind("robot", frozenset(RobotSettings.known_keys()))
 STAGE = FileKind("stage", frozenset(StageSettings.known_keys()))
 PERSON = FileKind("person", frozenset(PersonSettings.known_keys()))
 SCRIPT = FileKind("script", frozenset({"name", "description", "loop_s", "frames_hz", "marks", "steps"}))
+FAULTS = FileKind("timeline of faults", frozenset(FaultScript.known_keys()))
 LIFE = FileKind("life", frozenset(IdleSettings.known_keys()))
 PARAMETERS = FileKind("parameters", frozenset({"profile", "parameters", "aliases"}))
 UNITS = FileKind("action units", frozenset({"units", "emotions"}))
@@ -52,7 +54,8 @@ EXPRESSIONS = FileKind(
     inside=frozenset({"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "of", "weights"}),
 )
 KINDS = (
-    STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, LIFE, PARAMETERS, UNITS, VISEMES, PRESETS, MOODS, LAYERS, EXPRESSIONS,
+    STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, FAULTS, LIFE, PARAMETERS, UNITS, VISEMES, PRESETS, MOODS, LAYERS,
+    EXPRESSIONS,
 )  # fmt: skip
 
 

@@ -6,7 +6,8 @@ import math
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, suppress
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +18,12 @@ from rich.text import Text
 
 from controller.tools.scan import scan_port
 from controller.tools.tables import fitted
+from controller.tools.traffic_files import TrafficWriter, all_of, decoder_of, read_traffic
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
+from drivers.core.trafficlog import Wire
 from drivers.port.serialport import SerialPort, tapped
 from drivers.tables.tables import ControlTable, load_table
 
@@ -40,33 +43,66 @@ def make_decoder(protocol: int, tables: Mapping[int, ControlTable], model: str =
     return Decoder1(tables, default) if protocol == 1 else Decoder2(tables, default)
 
 
+def replay_traffic(path: Path, protocol: int | None, console: Console, model: str = "") -> None:
+    """Print a record of traffic, decoded. ``protocol``, ``model`` : what it does not say itself.
+
+    Raises ConfigError: it cannot be read. DriverError: no such model.
+    """
+    record = read_traffic(path)
+    decoder = decoder_of(record, protocol, model)
+    for piece in record.pieces:
+        for line in decoder.feed(piece.sent, piece.data):
+            console.print(Text(f"{piece.time_s:9.3f}  {line}"), soft_wrap=True)
+
+
 def listen_to_bus(
-    port: str, baud: int, protocol: int | None, console: Console, keep_going: Callable[[], bool], model: str = ""
+    port: str,
+    baud: int,
+    protocol: int | None,
+    console: Console,
+    keep_going: Callable[[], bool],
+    model: str = "",
+    record: Path | None = None,
 ) -> None:
     """Show the traffic of a bus without sending a byte: an adapter that only receives is enough.
 
     ``protocol`` : None is that of ``model``, or 2 without one.
     ``model`` : of servos whose model is not seen in the traffic, for the names of registers; may be empty.
-    Raises PortError, or DriverError when there is no such model.
+    ``record`` : file for the traffic, or None.
+    Raises PortError, DriverError when there is no such model, or ConfigError when the file cannot be written.
     """
     decoder = make_decoder(protocol or (load_table(model).protocol if model else 2), {}, model)
     view = BusView(f"listening on {port} at {baud} baud", lambda: _heard_rows(decoder), decoder, console)
     link = SerialPort(port, baud)
     link.open()
-    link.tap = lambda sent, data: view.tap(None, data)
-    try:
+    wire = Wire("dynamixel", baud, model=model)
+    with ExitStack() as stack:
+        stack.callback(link.close)
+        writer = stack.enter_context(TrafficWriter(record, wire)) if record else None
+
+        def heard(sent: bool, data: bytes) -> None:
+            view.tap(None, data)
+            if writer is not None:
+                writer.tap(None, data)
+
+        link.tap = heard
         view.run(keep_going, lambda: link.read(time.monotonic() + WAIT_S))
-    finally:
-        link.close()
 
 
 def poll_servos(
-    port: str, baud: int, protocol: int | None, console: Console, keep_going: Callable[[], bool], rate_hz: float
+    port: str,
+    baud: int,
+    protocol: int | None,
+    console: Console,
+    keep_going: Callable[[], bool],
+    rate_hz: float,
+    record: Path | None = None,
 ) -> None:
     """Find the servos on a port, then read their states at a rate and show them with all traffic.
 
     ``protocol`` : None tries both and takes the first in which servos answer, 2 before 1.
-    Raises PortError, or NoReply when no servo answers.
+    ``record`` : file for the traffic, or None.
+    Raises PortError, NoReply when no servo answers, or ConfigError when the file cannot be written.
     """
     protocol, found = _find_servos(port, baud, (2, 1) if protocol is None else (protocol,))
     tables: dict[int, ControlTable] = {}
@@ -81,9 +117,11 @@ def poll_servos(
     view = BusView(f"{port} at {baud} baud", lambda: (), decoder, console)
     kind = "feetech" if known[0].model.startswith(FEETECH) else "dynamixel"
     specs = [ServoSpec(info.id, f"servo {info.id}", info.model, -math.pi, math.pi, 1.0, 1.0) for info in known]
-    with tapped(view.tap):
-        bus = open_bus(kind, specs, port=port, baud=baud)
-    with bus:
+    wire = Wire(kind, baud, {info.id: tables[info.id].model for info in known})
+    with ExitStack() as stack:
+        writer = stack.enter_context(TrafficWriter(record, wire)) if record else None
+        with tapped(all_of(view.tap, *([writer.tap] if writer else []))):
+            bus = stack.enter_context(open_bus(kind, specs, port=port, baud=baud))
         reader = _Reader(bus, 1.0 / rate_hz)
         view.rows = reader.rows
         view.run(keep_going, reader.step)

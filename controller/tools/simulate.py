@@ -6,7 +6,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -25,21 +25,29 @@ from controller.robot.buses import SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
+from controller.tools.fault_script import load_fault_script
 from controller.tools.monitor import BusView
+from controller.tools.traffic_files import Tap, TrafficWriter, all_of, decoder_of, read_traffic
 from drivers import open_bus
+from drivers.core.traffic import Decoder
+from drivers.core.trafficlog import Wire
+from drivers.sim.serving.replay import Replay
 from drivers.sim.serving.serve import PortServer, serve
+from drivers.sim.servos.chain import Chain
 from drivers.sim.wire.line import Line
-from drivers.sim.wire.simulator import Setting, Simulator, make_line, simulator_of
+from drivers.sim.wire.simulator import Setting, make_line, simulator_of
 
 
 @dataclass(frozen=True)
 class Serving:
     """Options of a server.
 
-    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT`` to listen at instead.
+    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT`` to
+        listen at instead.
     wire : bytes take the time they take at the baud rate. latency_s : latency timer of a USB adapter, added to it.
     faults : faults to inject, see docs/simulated-buses.md. control : path of a socket that takes faults while it runs.
     watch : show the servos and the traffic while it runs.
+    script : timeline of faults. record : file for the traffic.
     """
 
     link: Path | str | None = None
@@ -48,6 +56,8 @@ class Serving:
     faults: tuple[str, ...] = ()
     control: Path | None = None
     watch: bool = False
+    script: Path | None = None
+    record: Path | None = None
 
 
 def serve_alone(kind: str, options: Any, how: Serving, console: Console) -> None:
@@ -57,35 +67,58 @@ def serve_alone(kind: str, options: Any, how: Serving, console: Console) -> None
     """
     simulator = simulator_of(kind)
     setting = Setting(now_s=time.monotonic(), baud=options.baud, names=PARAMETERS.names)
-    _serve(simulator.alone(options, setting), options.baud, how, console, simulator)
+    line = simulator.alone(options, setting)
+    _serve(line, wire_of(line, kind, options.baud), how, console, simulator.decoder(line))
 
 
-def _serve(line: Line, baud: int, how: Serving, console: Console, simulator: Simulator) -> None:
-    def start_view(server: PortServer) -> None:
+def wire_of(line: Line, family: str, baud: int) -> Wire:
+    """What a record says of a simulated wire."""
+    return Wire(family, baud, {servo.id: servo.table.model for servo in line.servos} if isinstance(line, Chain) else {})
+
+
+def serve_record(path: Path, how: Serving, console: Console) -> None:
+    """Serve a recorded bus; prints ``ready PATH``, and its counts when it is interrupted.
+
+    Raises ConfigError or DriverError: the record cannot be read, or nothing in it could be answered.
+    """
+    record = read_traffic(path)
+    line = Replay(record)
+    _serve(line, record.wire, how, console, decoder_of(record))
+    console.print(f"{line.requests} requests, {line.unknown} of them not in the record", soft_wrap=True)
+
+
+def _serve(line: Line, wire: Wire, how: Serving, console: Console, decoder: Decoder) -> None:
+    def look(server: PortServer) -> None:
+        taps: list[Tap] = [stack.enter_context(TrafficWriter(how.record, wire)).tap] if how.record else []
+        server.tap = all_of(*taps, *([start_view(server)] if how.watch else []))
+
+    def start_view(server: PortServer) -> Tap:
         def rows() -> list[dict[str, Any]]:
             with server.line.lock:
                 return server.line.describe(time.monotonic())
 
-        view = BusView(f"simulated bus on {server.port.path}", rows, simulator.decoder(line), console)
-        server.tap = view.tap
+        view = BusView(f"simulated bus on {server.port.path}", rows, decoder, console)
         over = threading.Event()
         thread = threading.Thread(target=view.run, args=(lambda: not over.is_set(),))
         stack.callback(thread.join)
         stack.callback(over.set)
         thread.start()
+        return view.tap
 
+    timeline = load_fault_script(how.script) if how.script else None
     line.faults.add(how.faults, time.monotonic())
     with ExitStack() as stack, _stop_socket() as stop:
         serve(
             line,
             how.link,
             lambda path: console.print(f"ready {path}", soft_wrap=True),
-            baud=baud,
+            baud=wire.baud,
             wire=how.wire,
             latency_s=how.latency_s,
             commands=how.control,
+            timeline=timeline,
             stop=stop,
-            on_server=start_view if how.watch else lambda server: None,
+            on_server=look,
         )
 
 
@@ -127,11 +160,16 @@ def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> N
     """Serve simulated servos for a bus of a robot file (:func:`robot_bus`), set up as its driver expects them."""
     chosen, channels = robot_bus(name, bus)
     simulator = simulator_of(chosen.family)  # before the driver, which may not be there
-    options = {key: value for key, value in chosen.options().items() if key not in SIMULATION}
-    driver = open_bus(chosen.family, servo_specs(channels), **{"port": "", **options})
+    line = far_end(chosen, channels)
+    _serve(line, wire_of(line, chosen.family, chosen.baud), how, console, simulator.decoder(line))
+
+
+def far_end(bus: BusSettings, channels: Sequence[ChannelSettings]) -> Line:
+    """Simulated servos or board of a robot's bus, set up as its driver expects them. Raises DriverError."""
+    options = {key: value for key, value in bus.options().items() if key not in SIMULATION}
+    driver = open_bus(bus.family, servo_specs(channels), **{"port": "", **options})
     servos = [(channel.id, channel.model) for channel in channels]
-    line = make_line(chosen.family, servos, time.monotonic(), baud=chosen.baud, options=driver.far_end())
-    _serve(line, chosen.baud, how, console, simulator)
+    return make_line(bus.family, servos, time.monotonic(), baud=bus.baud, options=driver.far_end())
 
 
 def serve_host(script: str, link: Path | None, console: Console) -> None:

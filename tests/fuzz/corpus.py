@@ -18,6 +18,8 @@ from controller.base.parameters import PARAMETERS
 from controller.layers.commands import CommandState
 from controller.links.net.neutral import Neutral, Ranges, load_state, save_state
 from controller.takes.recording import recorded
+from drivers.core.pcapng import file_head, packet
+from drivers.core.trafficlog import read_log
 from surface.fit.identities import read_modes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh
@@ -71,6 +73,17 @@ max_deg = 24.25
 min_deg = -40
 neutral_deg = 1.5
 max_deg = 41
+"""
+FAULTS = b"""name = "bad minute"
+loop_s = 60
+timeline = ["0.5 fault mute:7 late:3:45ms", "4 clear mute", "5 place 3 1500"]
+"""
+TRAFFIC = b"""# omote traffic = 1
+# family = dynamixel
+# baud = 1000000
+# servos = 1:xl330-m288
+0.000000 > ff ff fd 00 01 03 00 01 19 4e
+0.000512 < ff ff fd 00 01 07 00 55 00 b0 04 34 b2 d4
 """
 WIDE_STAGE = b"""name = "wide"
 head = "ict"
@@ -169,8 +182,15 @@ def _configs() -> list[Kind]:
     found = [Kind(name, f"{name}.toml", [(CONFIGS / f).read_bytes() for f in files]) for name, files in named.items()]
     return [
         *found, Kind("stage-wide", "stage.toml", [WIDE_STAGE]), Kind("expressions", "own.toml", [EXPRESSIONS]),
-        Kind("calibration", CALIBRATED, [CALIBRATION]),
+        Kind("calibration", CALIBRATED, [CALIBRATION]), Kind("faults", "faults.toml", [FAULTS]),
+        Kind("traffic", "bus.log", [TRAFFIC]), Kind("pcapng", "bus.pcapng", [_pcapng()]),
     ]  # fmt: skip
+
+
+def _pcapng() -> bytes:
+    """The same traffic in the form of network analysers."""
+    record = read_log(TRAFFIC.decode())
+    return file_head(record.wire) + b"".join(packet(piece, 1_700_000_000 * 10**9) for piece in record.pieces)
 
 
 def wav(samples: np.ndarray, rate: int = 16000) -> bytes:

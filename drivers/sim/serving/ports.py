@@ -27,7 +27,8 @@ _TCGETS2 = 0x802C542A
 _TERMIOS2 = struct.Struct("4IB19B2I")
 
 Link = str | os.PathLike[str] | None
-"""A path that shall point at a pseudo-terminal, ``socket://HOST:PORT``, ``memory://NAME``, or None."""
+"""A path that shall point at a pseudo-terminal, ``socket://HOST:PORT``, ``rfc2217://HOST:PORT``, ``memory://NAME``,
+or None."""
 
 
 class ServedPort(ABC):
@@ -75,16 +76,6 @@ class ServedPort(ABC):
     def baud(self) -> int | None:
         """Bit rate the client has set, or None where none was set or it cannot be known."""
         return None
-
-
-def make_port(link: Link) -> ServedPort:
-    """The port that a link asks for. Raises PortError: it cannot be made."""
-    text = "" if link is None else os.fspath(link)
-    if text.startswith("socket://"):
-        return TcpPort(text)
-    if text.startswith("memory://"):
-        return MemoryPort(text)
-    return PtyPort(link)
 
 
 class PtyPort(ServedPort):
@@ -249,8 +240,12 @@ class _SocketPort(ServedPort):
 class TcpPort(_SocketPort):
     """Listens at ``socket://HOST:PORT``; port 0 takes a free one, and ``path`` then names it.
 
+    scheme : of the URL.
+
     Raises PortError: the address cannot be listened at; PortBusy where another program does.
     """
+
+    scheme = "socket"
 
     def _listen(self) -> socket.socket:
         try:
@@ -259,7 +254,7 @@ class TcpPort(_SocketPort):
         except (OSError, ValueError) as error:
             kind = PortBusy if isinstance(error, OSError) and "in use" in str(error) else PortError
             raise kind(f"cannot listen at {self.path}: {error}", hint="for example --tcp 127.0.0.1:4000") from error
-        self.path = f"socket://{host}:{listener.getsockname()[1]}"
+        self.path = f"{self.scheme}://{host}:{listener.getsockname()[1]}"
         return listener
 
     def _accept(self) -> socket.socket:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import select
 import socket
@@ -10,12 +11,16 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from drivers.sim.serving.control import Commands, ControlSocket, Lines
-from drivers.sim.serving.ports import Link, make_port
+from drivers.sim.serving.make_port import make_port
+from drivers.sim.serving.ports import Link
+from drivers.sim.serving.timeline import Timeline
 from drivers.sim.servos.simulators import ids_and_models
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import Line, ReplyQueue
 from drivers.sim.wire.simulator import make_line
 from drivers.sim.wire.timing import WireTiming
+
+log = logging.getLogger(__name__)
 
 EARLY_S = 80e-6
 """How long before bytes are due the server wakes: the system wakes it about this much late."""
@@ -41,6 +46,7 @@ class PortServer:
     baud : bit rate while no client has set one.
     wire : bytes take their time at the bit rate, with return delay and the USB latency timer `latency_s`.
     commands : path of a socket that takes commands (``drivers.sim.serving.control``), or None.
+    timeline : commands by time, counted from when `run` begins, or None.
     on_line : called with each command line that arrives at the `control` of `run`; None: any byte there ends the
         loop, as its end always does.
 
@@ -59,9 +65,10 @@ class PortServer:
         wire: bool = False,
         latency_s: float = 0.0,
         commands: str | os.PathLike[str] | None = None,
+        timeline: Timeline | None = None,
         on_line: Callable[[str], object] | None = None,
     ) -> None:
-        self.line = line
+        self.line, self._timeline = line, timeline or Timeline(())
         self.tap: Callable[[bool, bytes], None] | None = None
         self._socket = ControlSocket(commands, Commands(line).handle) if commands else None
         try:
@@ -79,6 +86,8 @@ class PortServer:
 
     def run(self, control: Control) -> None:
         """Serve until `control` reaches its end (or gives any byte, without `on_line`)."""
+        self._timeline.start(time.monotonic())
+        self._do_due()  # what is due at once comes before the first byte
         try:
             while True:
                 watched = [control, *(self._socket.descriptors if self._socket else ()), *self.port.descriptors]
@@ -113,7 +122,7 @@ class PortServer:
 
     def _timeout(self) -> float | None:
         """Seconds until something is due; None = nothing is."""
-        now_s, due_s = time.monotonic(), self._queue.due_s
+        now_s, due_s = time.monotonic(), min(self._queue.due_s, self._timeline.due_s)
         if self._queue.replies:
             due_s = min(due_s, self._queue.replies[0][0] - EARLY_S)
         if self._prompt and now_s - self._replied_s < POLL_S:
@@ -146,6 +155,13 @@ class PortServer:
                     self.tap(False, data)
             self._replied_s = now_s
         self._queue.advance(now_s)
+        self._timeline.advance(now_s, self._carry_out)
+
+    def _carry_out(self, command: str) -> None:
+        """A command of the timeline; one that cannot be carried out is logged."""
+        answer = Commands(self.line).handle(command)
+        if answer.startswith("error"):
+            log.warning("timeline: %s: %s", command, answer.removeprefix("error "))
 
     def _unplug(self, fault: Fault, begins: bool) -> None:
         """Close the port and drop all pending bytes, or open it again, perhaps under another name."""
@@ -156,13 +172,15 @@ class PortServer:
             self.port.open(fault.alias or self._link)
 
 
-def make_server(settings: Mapping[str, Any]) -> PortServer:
+def make_server(settings: Mapping[str, Any], line: Line | None = None) -> PortServer:
     """The server of a simulated far end, from the settings of a :class:`~drivers.sim.serving.simulated.SimulatedBus`.
+
+    line : the far end, where it is made already.
 
     Raises DriverError: unknown family or model, unreadable fault, or the port cannot be made.
     """
     now_s, baud = time.monotonic(), settings["baud"]
-    line = make_line(
+    line = line or make_line(
         settings["family"], settings["servos"], now_s, baud=baud, seed=settings["seed"], options=settings["options"]
     )
     wire, latency_s, handle = settings["wire"], settings["latency_s"], Commands(line).handle
@@ -220,6 +238,7 @@ def serve(
     wire: bool = False,
     latency_s: float = 0.0,
     commands: str | os.PathLike[str] | None = None,
+    timeline: Timeline | None = None,
     stop: Control | None = None,
     on_server: Callable[[PortServer], None] = lambda server: None,
 ) -> None:
@@ -227,7 +246,7 @@ def serve(
 
     Raises DriverError: the terminal, link or socket cannot be made.
     """
-    server = PortServer(line, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands)
+    server = PortServer(line, link, baud=baud, wire=wire, latency_s=latency_s, commands=commands, timeline=timeline)
     reading, writing = os.pipe()
     try:
         on_server(server)

@@ -91,6 +91,11 @@ class SimulatedBus:
     process : serve from a child process (which ends with this one, however this one ends) instead of a thread.
     seed : of random faults.
     family, options : see :func:`drivers.sim.wire.simulator.make_line`.
+    line : a far end that is made already, instead of servos; thread mode only.
+
+    Attributes
+    ----------
+    tap : thread mode only: called with (sent by the client, bytes) for everything that passes.
 
     Raises DriverError: on entering: unknown model, unreadable fault, no terminal, or the child does not start.
     """
@@ -109,8 +114,9 @@ class SimulatedBus:
         seed: int = 0,
         family: str = "dynamixel",
         options: Mapping[str, Any] = {},
+        line: Line | None = None,
     ) -> None:
-        self.baud = baud
+        self.baud, self._made = baud, line
         self._settings = {
             "servos": ids_and_models(servos, model),
             "link": None if link is None else os.fspath(link),
@@ -149,6 +155,16 @@ class SimulatedBus:
             raise TypeError("a board has no servos to look at; see line")
         return self.line
 
+    @property
+    def tap(self) -> Callable[[bool, bytes], None] | None:
+        return self._server.tap if self._server else None
+
+    @tap.setter
+    def tap(self, tap: Callable[[bool, bytes], None] | None) -> None:
+        if self._server is None:
+            raise RuntimeError("the traffic can be seen only while the bus runs in a thread of this process")
+        self._server.tap = tap
+
     def servo(self, device_id: int) -> ServoView:
         """One servo (thread mode only); KeyError where none has the id."""
         return ServoView(self.chain, device_id)
@@ -162,6 +178,14 @@ class SimulatedBus:
     def clear(self, kind: str | None = None) -> None:
         """End the faults of a kind; None: all."""
         self._send(f"clear {kind or ''}")
+
+    def sync(self) -> None:
+        """Return when what clients wrote before has been carried out (thread mode only).
+
+        The server carries out commands before the bytes that are there by then: the second command comes after them.
+        """
+        self._send("faults")
+        self._send("faults")
 
     def __enter__(self) -> Self:
         if self._process:
@@ -185,7 +209,7 @@ class SimulatedBus:
         self._thread = self._server = self._stop = None
 
     def _start_thread(self) -> None:
-        server = make_server(self._settings)
+        server = make_server(self._settings, self._made)
         handle = server.on_line
 
         def carry_out(line: str) -> None:

@@ -78,6 +78,20 @@ class VirtualLink:
         """Give it back."""
         self._open = False
 
+    @property
+    def due_s(self) -> float:
+        """When the far end does something next, an answer or a fault; infinity: never by itself."""
+        return self._queue.due_s
+
+    def advance(self) -> None:
+        """Let the far end do what is due."""
+        self._queue.advance(self.clock())
+
+    def set_baud(self, baud: int) -> None:
+        """The host changes its bit rate."""
+        self.baud = baud
+        self._line.set_line_baud(baud)
+
     def write(self, data: bytes) -> None:
         """Send; the far end acts when the last byte of a packet has arrived."""
         self._queue.advance(self.clock())

@@ -55,6 +55,7 @@ class SimulatedServo(ServoState):
         """Error byte of a write; nothing is changed unless all of it is allowed."""
         changes = self.registers.parse(address, data)
         if isinstance(changes, ErrorNumber):
+            self.on_refusal(address, data, changes, now_s)
             return self.alert | changes
         self._apply(changes, now_s)
         return self.alert
@@ -63,6 +64,7 @@ class SimulatedServo(ServoState):
         """Error byte; keeps an allowed write for `action`."""
         changes = self.registers.parse(address, data)
         if isinstance(changes, ErrorNumber):
+            self.on_refusal(address, data, changes, self.last_instruction.at_s)
             return self.alert | changes
         self._pending = changes
         self.registers.put("Registered Instruction", 1)
@@ -124,6 +126,7 @@ class SimulatedServo(ServoState):
         return effects
 
     def _apply(self, changes: list[Change], now_s: float) -> None:
+        self.on_write(changes, now_s)
         for item, value in changes:
             self._store(item, value, now_s)
         self._sensed_at = -1.0

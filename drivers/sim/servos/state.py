@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drivers.packets.packet import ALERT
+from drivers.packets.packet import ALERT, ErrorNumber
 from drivers.sim.servos.drive import Drive, speed_unit
 from drivers.sim.servos.drive_word import FeetechDrive, WordDrive
 from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM, XDrive
@@ -59,6 +59,8 @@ class ServoState:
     next_health_s : when heat, supply and load are checked again.
     last_instruction : when the last instruction went over the wire; a bus gives all its servos the same object.
     on_change : called when id, secondary id or baud rate changed.
+    on_write : called with (changes, time) before the items of an allowed write change.
+    on_refusal : called with (address, data, why, time) for a write that is refused.
     """
 
     def __init__(
@@ -77,6 +79,8 @@ class ServoState:
         self.registers.reset(0, table.size)
         self.eeprom_writes: Counter[str] = Counter()
         self.on_change: Callable[[], None] = lambda: None
+        self.on_write: Callable[[list[Change], float], None] = lambda changes, now_s: None
+        self.on_refusal: Callable[[int, bytes, ErrorNumber, float], None] = lambda *_: None
         self.deaf_until = now_s
         self.watchdog_ignored = self.forced_alert = self.shut_down = False
         self.eeprom_busy_s = 0.0

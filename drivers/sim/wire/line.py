@@ -78,6 +78,16 @@ class FixedReader(BufferingReader):
         return []
 
 
+class Watcher(Protocol):
+    """Watches the devices of a line; called with its lock held."""
+
+    def before(self, now_s: float) -> None:
+        """A packet will be carried out."""
+
+    def after(self, now_s: float) -> None:
+        """It was carried out."""
+
+
 class Line(ABC):
     """A simulated bus without a port, whatever is on it.
 
@@ -94,6 +104,7 @@ class Line(ABC):
     burst_s : replies reach the host in bursts so far apart, seconds; 0: at once.
     on_unplug : called with (fault, begins) when the port disappears or returns.
     packets : packets handled.
+    watcher : told before and after each packet is carried out, or None.
     lock : held while a packet is handled; hold it to read the devices from another thread.
     """
 
@@ -103,6 +114,7 @@ class Line(ABC):
         self.burst_s = 0.0
         self.on_unplug: Callable[[Fault, bool], None] = lambda fault, begins: None
         self.packets = 0
+        self.watcher: Watcher | None = None
         self.lock = threading.RLock()
         self.reader = self.make_reader()
         self.faults = FaultSet(self.fault_changed, seed, kinds)
@@ -136,7 +148,12 @@ class Line(ABC):
         with self.lock:
             self.catch_up(now_s)
             self.packets += 1
-            return self.carry_out(packet, now_s)
+            if self.watcher is None:
+                return self.carry_out(packet, now_s)
+            self.watcher.before(now_s)
+            replies = self.carry_out(packet, now_s)
+            self.watcher.after(now_s)
+            return replies
 
     def catch_up(self, now_s: float) -> None:
         """Update what changed since the last packet: faults begin and end."""

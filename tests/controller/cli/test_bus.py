@@ -170,10 +170,10 @@ def test_set_id_is_given_the_usual_rate_and_protocol(monkeypatch: pytest.MonkeyP
 def test_a_monitor_asks_ten_times_a_second_unless_it_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     calls: list[Any] = []
 
-    def polled(port: str, baud: int, protocol: int, _: Any, going: Any, rate: float) -> None:
+    def polled(port: str, baud: int, protocol: int, _: Any, going: Any, rate: float, record: Any) -> None:
         calls.append((port, baud, protocol, rate, going()))
 
-    def heard(port: str, baud: int, protocol: int, _: Any, going: Any, model: str) -> None:
+    def heard(port: str, baud: int, protocol: int, _: Any, going: Any, model: str, record: Any) -> None:
         calls.append((port, baud, protocol, model, going()))
 
     monkeypatch.setattr(monitor_module, "poll_servos", polled)
@@ -189,6 +189,15 @@ def test_a_monitor_asks_ten_times_a_second_unless_it_is_told(monkeypatch: pytest
     ]  # fmt: skip
     for words in (("--rate", "0.09"), ("--rate", "200.1"), ("--seconds", "0.09"), ("--protocol", "3")):
         assert omote("monitor", "p", *words).exit_code == 2
+
+
+def test_a_monitor_takes_a_port_or_a_record(tmp_path: Path) -> None:
+    record = tmp_path / "bus.log"
+    record.write_text("# omote traffic = 1\n# servos = 1:xl330-m288\n0.5 > ff ff fd 00 01 03 00 01 19 4e\n")
+    assert said("monitor", "--replay", str(record)) == "0.500 -> 1 ping"
+    for words in ((), ("p", "--replay", str(record))):
+        error = omote("monitor", *words).exception
+        assert isinstance(error, ConfigError) and "either a port or --replay" in str(error)
 
 
 def test_a_calibration_is_given_its_channels_and_place(

@@ -59,6 +59,8 @@ def test_without_options_a_family_has_its_usual_ones(served: dict[str, Any]) -> 
     assert served["how"] == Serving() and served["options"].baud == FAMILIES.get("dynamixel").baud
     assert omote("ssc32", "--tcp", "127.0.0.1:0").exit_code == 0
     assert served["how"] == Serving("socket://127.0.0.1:0")
+    assert omote("ssc32", "--rfc2217", ":0", "--script", "s.toml", "--record", "r.log").exit_code == 0
+    assert served["how"] == Serving("rfc2217://:0", script=Path("s.toml"), record=Path("r.log"))
     assert served["options"].baud == FAMILIES.get("ssc32").baud != FAMILIES.get("dynamixel").baud
 
 
@@ -73,6 +75,7 @@ def test_a_robot_and_a_host_are_served_by_name(served: dict[str, Any], tmp_path:
     ("words", "message", "hint"),
     [
         (["--link", "x", "--tcp", ":1"], "--link and --tcp do not go together", "run it twice"),
+        (["--rfc2217", ":2", "--tcp", ":1"], "--tcp and --rfc2217 do not go together", "run it twice"),
         (["--latency", "16"], "--latency is part of the time on the wire", "add --wire"),
     ],
 )

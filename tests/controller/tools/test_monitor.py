@@ -9,6 +9,7 @@ import struct
 import sys
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -17,7 +18,7 @@ import pytest
 from rich.console import Console
 
 from controller.tools import monitor as module
-from controller.tools.monitor import KEPT, BusView, listen_to_bus, make_decoder, poll_servos, table_of
+from controller.tools.monitor import KEPT, BusView, listen_to_bus, make_decoder, poll_servos, replay_traffic, table_of
 from drivers.base.bus import BusState
 from drivers.base.errors import DriverError, NoReply, PortLost, PortMissing
 from drivers.core.traffic import Decoder1, Decoder2
@@ -289,3 +290,20 @@ def test_decoders_are_of_their_protocol_and_know_a_usual_model() -> None:
         make_decoder(2, {}, "nothing")
     view = watch()
     assert view._log.maxlen == 16 and KEPT == 4096
+
+
+@pytest.mark.parametrize(("model", "listen"), [("xl330-m288", False), ("sts3215", False), ("xl330-m288", True)])
+def test_traffic_is_recorded_and_decoded_again(tmp_path: Path, model: str, listen: bool) -> None:
+    live, again, path = io.StringIO(), io.StringIO(), tmp_path / "bus.log"
+    with SimulatedBus([1, 4], model=model) as bus:
+        console = Console(file=live, width=200)
+        if listen:
+            with os.fdopen(os.open(bus.path, os.O_RDWR | os.O_NOCTTY), "wb", buffering=0) as other:
+                other.write(encode_instruction(4, 1))
+                listen_to_bus(bus.path, 1_000_000, None, console, times(3), model, path)
+        else:
+            poll_servos(bus.path, 1_000_000, None, console, times(8), 100.0, path)
+    replay_traffic(path, None, Console(file=again, width=200))
+    shown, found = ([" ".join(line.split()[1:]) for line in out.getvalue().splitlines()] for out in (live, again))
+    assert found == shown
+    assert listen or any("Present Position" in line for line in found)

@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 
 from controller.base.errors import ConfigError
 from controller.tools.simulate import Serving, robot_bus
+from controller.tools.traffic_files import read_traffic
 
 
 @contextmanager
@@ -149,3 +150,18 @@ def test_what_cannot_be_simulated_is_told(words: tuple[str, ...], why: str) -> N
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         object.__new__(Serving).anything = 1
+
+
+def test_faults_come_by_time_and_traffic_is_recorded_and_served_again(tmp_path: Path) -> None:
+    faults, record, link = tmp_path / "faults.toml", tmp_path / "bus.log", tmp_path / "bus"
+    faults.write_text('timeline = ["0 place 1 1000", "0 fault alert:1"]')
+    ping = bytes.fromhex("FFFFFD00010300 01194E")
+    words = ("dynamixel", "--ids", "1", "--link", str(link), "--script", str(faults), "--record", str(record))
+    with served(*words), serial.Serial(str(link), 1_000_000, timeout=10) as port:
+        port.write(ping)
+        answer = port.read(14)
+        assert answer[8] == 0x80, "the alert of the timeline"
+    assert read_traffic(record).wire.servos == {1: "xl330-m288"}
+    with served("record", str(record), "--link", str(link)), serial.Serial(str(link), 1_000_000, timeout=10) as port:
+        port.write(ping)
+        assert port.read(14) == answer

@@ -18,8 +18,8 @@ import pytest
 from drivers import open_bus
 from drivers.base.bus import Bus
 from drivers.base.errors import NoReply, PortBusy, PortLost, PortMissing, ServoFault
-from drivers.sim import SimulatedBus
 from drivers.sim.serving.virtual import VirtualBus
+from drivers.testing import ServoBus
 from tests.drivers.contract import SERVOS, BusContract, read_until, settle
 from tests.drivers.programs import RAISE, program
 
@@ -27,23 +27,28 @@ CALM = {"margin_s": 0.5, "watchdog_ms": 0}
 IDS = [servo.id for servo in SERVOS]
 
 
-@pytest.fixture
-def wire(tmp_path: Path) -> Iterator[SimulatedBus]:
-    with SimulatedBus(SERVOS, link=tmp_path / "by-id") as simulated:
-        yield simulated
+LIMITS = {1: (1657, 2309), 2: (1722, 2374), 7: (1983, 2765)}
+"""Ticks of SERVOS' limits: 2048 + (zero_rad -+ angle) x 4096 / 2 pi, widened to whole ones."""
 
 
 @pytest.fixture
-def bus(wire: SimulatedBus) -> Iterator[Bus]:
-    with open_bus("dynamixel", SERVOS, port=wire.path, **CALM) as running:
+def wire(tmp_path: Path, servo_bus: Callable[..., ServoBus]) -> Iterator[ServoBus]:
+    simulated = servo_bus("xl330-m288", IDS, link=tmp_path / "by-id")
+    yield simulated
+    simulated.never_beyond_limits(LIMITS)
+
+
+@pytest.fixture
+def bus(wire: ServoBus) -> Iterator[Bus]:
+    with open_bus("dynamixel", SERVOS, port=wire.port, **CALM) as running:
         running.start()
         yield running
 
 
 class TestDynamixelBus(BusContract):
     @pytest.fixture
-    def bus(self, wire: SimulatedBus) -> Bus:
-        return open_bus("dynamixel", SERVOS, port=wire.path, **CALM)
+    def bus(self, wire: ServoBus) -> Bus:
+        return open_bus("dynamixel", SERVOS, port=wire.port, **CALM)
 
 
 class TestDynamixelBusFastReads(BusContract):
@@ -69,15 +74,15 @@ class TestDynamixelBusWithWatchdogs(BusContract):
         return VirtualBus(SERVOS).bus(margin_s=0.05, watchdog_ms=200)
 
 
-def torques(wire: SimulatedBus) -> list[bool]:
+def torques(wire: ServoBus) -> list[bool]:
     return [wire.servo(i).torque for i in IDS]
 
 
-def goals(wire: SimulatedBus) -> list[int]:
+def goals(wire: ServoBus) -> list[int]:
     return [wire.servo(i).goal for i in IDS]
 
 
-def positions(wire: SimulatedBus) -> list[int]:
+def positions(wire: ServoBus) -> list[int]:
     return [wire.servo(i).position_ticks for i in IDS]
 
 
@@ -91,7 +96,7 @@ def wait_until(done: Callable[[], bool], timeout_s: float = 10.0) -> None:
 # ---------------------------------------------------------------------------- 2: unplugged and back
 
 
-def test_unplugging_is_told_once_and_the_bus_comes_back_where_the_servos_are(wire: SimulatedBus, bus: Bus) -> None:
+def test_unplugging_is_told_once_and_the_bus_comes_back_where_the_servos_are(wire: ServoBus, bus: Bus) -> None:
     settle(bus, [0.2, 0.2, 0.2])
     wait_until(lambda: positions(wire) == goals(wire))  # settled is near: the last steps are still to come
     before = goals(wire)
@@ -111,14 +116,14 @@ def test_unplugging_is_told_once_and_the_bus_comes_back_where_the_servos_are(wir
 
     assert goals(wire) == before, "none of the goals after the loss went out"
     wire.clear("unplug")
-    wait_until(lambda: Path(wire.path).exists())
+    wait_until(lambda: Path(wire.port).exists())
     bus.reconnect()
     assert torques(wire) == [True] * 3
     assert goals(wire) == positions(wire) == before
     settle(bus, [0.0, 0.0, 0.0])
 
 
-def test_stop_while_unplugged_names_everybody(wire: SimulatedBus, bus: Bus) -> None:
+def test_stop_while_unplugged_names_everybody(wire: ServoBus, bus: Bus) -> None:
     wire.fault("unplug")
     with pytest.raises(PortLost):
         bus.read()
@@ -130,18 +135,18 @@ def test_stop_while_unplugged_names_everybody(wire: SimulatedBus, bus: Bus) -> N
     wire.clear("unplug")
 
 
-def test_stop_uses_an_adapter_that_is_back(wire: SimulatedBus, bus: Bus) -> None:
+def test_stop_uses_an_adapter_that_is_back(wire: ServoBus, bus: Bus) -> None:
     wire.fault("unplug")
     with pytest.raises(PortLost):
         bus.read()
     wire.clear("unplug")
-    wait_until(lambda: Path(wire.path).exists())
+    wait_until(lambda: Path(wire.port).exists())
     bus.stop()
     assert torques(wire) == [False] * 3
 
 
-def test_unplugging_in_the_middle_of_switching_off_is_told(wire: SimulatedBus) -> None:
-    bus = open_bus("dynamixel", SERVOS, port=wire.path, **CALM)
+def test_unplugging_in_the_middle_of_switching_off_is_told(wire: ServoBus) -> None:
+    bus = open_bus("dynamixel", SERVOS, port=wire.port, **CALM)
     bus.open()
     bus.start()
     wire.fault("unplug")
@@ -155,8 +160,8 @@ def test_unplugging_in_the_middle_of_switching_off_is_told(wire: SimulatedBus) -
 
 
 @pytest.mark.parametrize("how", [RAISE, "SIGINT", "SIGTERM", "SIGHUP"])
-def test_every_way_out_switches_all_servos_off(wire: SimulatedBus, how: str) -> None:
-    with program("dynamixel", SERVOS, wire.path, how, **CALM) as child:
+def test_every_way_out_switches_all_servos_off(wire: ServoBus, how: str) -> None:
+    with program("dynamixel", SERVOS, wire.port, how, **CALM) as child:
         if how != RAISE:
             assert child.pid is not None
             os.kill(child.pid, getattr(signal, how))
@@ -165,15 +170,15 @@ def test_every_way_out_switches_all_servos_off(wire: SimulatedBus, how: str) -> 
         assert torques(wire) == [False] * 3
 
 
-def test_the_servos_stop_by_themselves_when_the_program_is_killed(wire: SimulatedBus) -> None:
-    with program("dynamixel", SERVOS, wire.path, margin_s=0.5, watchdog_ms=400) as child:
+def test_the_servos_stop_by_themselves_when_the_program_is_killed(wire: ServoBus) -> None:
+    with program("dynamixel", SERVOS, wire.port, margin_s=0.5, watchdog_ms=400) as child:
         child.kill()
         child.join(20)
         wait_until(lambda: all(wire.servo(i).register("Bus Watchdog") == 255 for i in IDS))
         rest = [wire.servo(i).position_ticks for i in IDS]
         time.sleep(0.2)
         assert [wire.servo(i).position_ticks for i in IDS] == rest
-    with open_bus("dynamixel", SERVOS, port=wire.path, **CALM) as bus:
+    with open_bus("dynamixel", SERVOS, port=wire.port, **CALM) as bus:
         bus.start()
         settle(bus, [0.1, 0.1, 0.1])
 
@@ -181,8 +186,8 @@ def test_the_servos_stop_by_themselves_when_the_program_is_killed(wire: Simulate
 # ---------------------------------------------------------------------------- 4: errors on the way out
 
 
-def test_the_first_error_is_told_and_the_one_of_closing_is_a_note(wire: SimulatedBus) -> None:
-    bus = open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.5, watchdog_ms=0)
+def test_the_first_error_is_told_and_the_one_of_closing_is_a_note(wire: ServoBus) -> None:
+    bus = open_bus("dynamixel", SERVOS, port=wire.port, margin_s=0.5, watchdog_ms=0)
     with pytest.raises(ZeroDivisionError) as caught, bus:
         bus.start()
         wire.fault("mute:2")
@@ -194,14 +199,14 @@ def test_the_first_error_is_told_and_the_one_of_closing_is_a_note(wire: Simulate
 # ---------------------------------------------------------------------------- 10: somebody else has the port
 
 
-def test_a_second_program_is_told_that_the_port_is_held(wire: SimulatedBus, bus: Bus) -> None:
+def test_a_second_program_is_told_that_the_port_is_held(wire: ServoBus, bus: Bus) -> None:
     with pytest.raises(PortBusy):
-        open_bus("dynamixel", SERVOS, port=wire.path).open()
+        open_bus("dynamixel", SERVOS, port=wire.port).open()
     settle(bus, [0.1, 0.1, 0.1])
 
 
 def test_an_interrupt_in_a_transaction_leaves_the_bus_usable(
-    wire: SimulatedBus, bus: Bus, monkeypatch: pytest.MonkeyPatch
+    wire: ServoBus, bus: Bus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
@@ -226,9 +231,9 @@ class Clock:
         return time.monotonic() + self.ahead_s
 
 
-def test_a_tripped_watchdog_is_cleared_without_a_jump(wire: SimulatedBus) -> None:
+def test_a_tripped_watchdog_is_cleared_without_a_jump(wire: ServoBus) -> None:
     clock = Clock()
-    with open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.5, watchdog_ms=2000, clock=clock) as bus:
+    with open_bus("dynamixel", SERVOS, port=wire.port, margin_s=0.5, watchdog_ms=2000, clock=clock) as bus:
         bus.start()
         settle(bus, [0.0, 0.0, 0.0])
         for i in IDS:
@@ -245,17 +250,17 @@ def test_a_tripped_watchdog_is_cleared_without_a_jump(wire: SimulatedBus) -> Non
         settle(bus, [0.2, 0.2, 0.2])
 
 
-def test_a_watchdog_that_trips_unseen_is_found_in_turn(wire: SimulatedBus) -> None:
-    with open_bus("dynamixel", SERVOS, port=wire.path, margin_s=0.5, watchdog_ms=2000) as bus:
+def test_a_watchdog_that_trips_unseen_is_found_in_turn(wire: ServoBus) -> None:
+    with open_bus("dynamixel", SERVOS, port=wire.port, margin_s=0.5, watchdog_ms=2000) as bus:
         bus.start()
         wire.servo(2).put("Bus Watchdog", 255)
         settle(bus, [0.2, 0.2, 0.2])
         assert bus.report().errors_by_servo == {2: {"watchdog": 1}}
 
 
-def test_a_stalled_host_sends_no_burst(wire: SimulatedBus) -> None:
+def test_a_stalled_host_sends_no_burst(wire: ServoBus) -> None:
     clock = Clock()
-    with open_bus("dynamixel", SERVOS, port=wire.path, clock=clock, **CALM) as bus:
+    with open_bus("dynamixel", SERVOS, port=wire.port, clock=clock, **CALM) as bus:
         bus.start()
         settle(bus, [-0.3, -0.3, -0.3])
         clock.ahead_s += 0.5
@@ -272,7 +277,7 @@ def test_a_stalled_host_sends_no_burst(wire: SimulatedBus) -> None:
 # ---------------------------------------------------------------------------- servos that let go
 
 
-def test_a_servo_that_let_go_comes_back_only_when_asked(wire: SimulatedBus, bus: Bus) -> None:
+def test_a_servo_that_let_go_comes_back_only_when_asked(wire: ServoBus, bus: Bus) -> None:
     settle(bus, [0.2, 0.2, 0.2])
     wire.servo(2).latch(0x20)
     read_until(bus, lambda state: not state.torque[1])
@@ -290,7 +295,7 @@ def test_a_servo_that_let_go_comes_back_only_when_asked(wire: SimulatedBus, bus:
     settle(bus, [0.1, 0.1, 0.1])
 
 
-def test_a_servo_that_is_gone_cannot_be_recovered(wire: SimulatedBus, bus: Bus) -> None:
+def test_a_servo_that_is_gone_cannot_be_recovered(wire: ServoBus, bus: Bus) -> None:
     wire.fault("mute:2")
     bus._port.margin_s = 0.05
     with pytest.raises(NoReply, match="id 2"):

@@ -18,7 +18,8 @@ from drivers.base.errors import DriverError, PortBusy, PortError, PortLost, Port
 from drivers.port.serialport import SerialPort, reply_margin_s
 from drivers.sim import SimulatedBus
 from drivers.sim.serving import ports
-from drivers.sim.serving.ports import MemoryPort, PtyPort, TcpPort, make_port
+from drivers.sim.serving.make_port import make_port
+from drivers.sim.serving.ports import MemoryPort, PtyPort, TcpPort
 from tests.drivers.contract import SERVOS, BusContract
 
 PING = bytes.fromhex("FFFFFD0001030001194E")

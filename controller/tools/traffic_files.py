@@ -1,0 +1,114 @@
+"""Writes and reads records of the traffic on a bus: text logs, and pcapng by the suffix of the file."""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from controller.base.errors import ConfigError
+from drivers.base.errors import DriverError
+from drivers.core import pcapng
+from drivers.core.traffic import Decoder, Decoder1, Decoder2
+from drivers.core.trafficlog import MOST_PIECES, Piece, TrafficRecord, Wire, format_piece, read_log
+from drivers.sim.serving.replay import Replay
+from drivers.sim.wire.simulator import simulator_of
+from drivers.tables.tables import load_table
+from surface.base import files
+
+SUFFIX = ".pcapng"
+log = logging.getLogger(__name__)
+
+
+class TrafficWriter:
+    """Writes what passes to a file, piece by piece; a context manager. ``tap`` may be called from any thread.
+
+    path : file, replaced; a pcapng file where its name ends so, else a text log. wire : what is on the wire.
+
+    What goes beyond the size that omote reads again is left out, with a warning.
+
+    Raises ConfigError: the file cannot be written.
+    """
+
+    def __init__(self, path: Path, wire: Wire) -> None:
+        self._path, self._network = path, path.suffix.lower() == SUFFIX
+        self._begun_s, self._begun_ns = time.monotonic(), time.time_ns()
+        self._room, self._pieces = files.DATA_LIMIT if self._network else files.TEXT_LIMIT, MOST_PIECES
+        try:
+            self._file = path.open("wb")
+        except OSError as error:
+            raise ConfigError(f"{path}: cannot be written: {error.strerror}", hint=f"mkdir -p {path.parent}") from error
+        self._write(pcapng.file_head(wire) if self._network else wire.head().encode())
+
+    def tap(self, sent: bool | None, data: bytes) -> None:
+        """Keep bytes that passed; ``sent`` None where the direction is not known."""
+        piece = Piece(time.monotonic() - self._begun_s, sent, bytes(data))
+        self._write(pcapng.packet(piece, self._begun_ns) if self._network else format_piece(piece).encode())
+
+    def _write(self, data: bytes) -> None:
+        if self._file.closed or self._room < 0:
+            return
+        self._room -= len(data)
+        self._pieces -= 1
+        if self._room < 0 or self._pieces < 0:
+            log.warning("%s is full: what passes from now on is not recorded", self._path)
+            self._room = -1
+            return
+        self._file.write(data)
+        self._file.flush()  # whoever records wants it most when the program ends unexpectedly
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._file.close()
+
+
+def read_traffic(path: Path) -> TrafficRecord:
+    """A record, whichever of the two it is. Raises ConfigError: it cannot be read, or is no such record."""
+    with files.reading(path, ConfigError, hint="record it again"):
+        data = files.read_file(path)
+        network = data.startswith(pcapng.MAGIC)
+        if not network and len(data) > files.TEXT_LIMIT:
+            raise ValueError(f"is larger than {files.TEXT_LIMIT >> 20} MB")
+        text = "" if network else files.decode(data)
+    try:
+        return pcapng.read_pcapng(data) if network else read_log(text)
+    except DriverError as error:
+        raise ConfigError(f"{path}: {error}", hint=error.hint) from error
+
+
+def decoder_of(record: TrafficRecord, protocol: int | None = None, model: str = "") -> Decoder:
+    """A decoder for a record. protocol, model : what it does not say itself, or None and empty. Raises DriverError."""
+    wire = record.wire
+    tables = {number: load_table(name) for number, name in wire.servos.items()}
+    default = load_table(model or wire.model) if model or wire.model else None
+    known = {table.protocol for table in tables.values()} | ({default.protocol} if default else set())
+    if protocol or known or wire.family in ("dynamixel", "feetech"):
+        number = protocol or (1 if 1 in known else 2)
+        return Decoder1(tables, default) if number == 1 else Decoder2(tables, default)
+    return simulator_of(wire.family).decoder(Replay(record))
+
+
+def describe_traffic(path: Path) -> str:
+    """What a record holds, in a line; raises ConfigError."""
+    record = read_traffic(path)
+    seconds = record.pieces[-1].time_s if record.pieces else 0.0
+    size = sum(len(piece.data) for piece in record.pieces)
+    return f"traffic {path.name}: {len(record.pieces)} pieces, {size} bytes, {seconds:.1f} s, {record.wire.family}"
+
+
+Tap = Callable[[bool, bytes], None]
+
+
+def all_of(*taps: Tap) -> Tap:
+    """One tap that calls all."""
+
+    def call(sent: bool, data: bytes) -> None:
+        for tap in taps:
+            tap(sent, data)
+
+    return call
