@@ -262,7 +262,7 @@ def _face(face: dict[str, Any]) -> list[tuple[str, str]]:
 def _link(link: dict[str, Any]) -> str:
     """Requests of a link, or faces that it took and sent."""
     refused = f"{sum(link['refused'].values())} refused"
-    if "rate_hz" not in link and "sent" not in link:
+    if "unanswered" in link or not {"rate_hz", "sent"} & {*link}:
         return f"{link['accepted']} accepted, {refused}"
     taken = [f"{link['accepted']} faces taken, {link['lost']} lost, {refused}"] if "rate_hz" in link else []
     sent = [f"{link['sent']} messages sent, {link['dropped']} dropped"] if "sent" in link else []

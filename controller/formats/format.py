@@ -44,6 +44,8 @@ class Format:
     delimiter : what ends a message of a stream; empty where the format has datagrams only.
     most : bytes of the longest message.
     timeout_s : a source that is silent for so long is usually lost; infinity where messages are sent on changes only.
+    takes_token : whether a TCP stream that other machines may open must begin with a token: not where programs that
+        know nothing of tokens send it.
     note : one sentence on what the format cannot carry, for people.
     install : what ``pip install`` takes where a package is missing.
     """
@@ -61,6 +63,7 @@ class Format:
     delimiter: bytes = b""
     most: int = 65_536
     timeout_s: float = 0.5
+    takes_token: bool = False
     note: str = ""
     install: str = ""
 

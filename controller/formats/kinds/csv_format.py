@@ -106,4 +106,5 @@ FORMAT = Format(
     encoder=CsvEncoder,
     carries=_carries,
     delimiter=b"\n",
+    takes_token=True,
 )

@@ -122,4 +122,5 @@ FORMAT = Format(
     carries=_carries,
     delimiter=b"\n",
     timeout_s=math.inf,
+    takes_token=True,
 )
