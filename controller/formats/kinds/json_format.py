@@ -2,7 +2,8 @@
 
 ``{"type": "set", "parameters": {"jawOpen": 0.5}}`` and plain ``{"jawOpen": 0.5}`` are the same; ``null`` releases a
 parameter, and what is not named stays as it was. Blend shapes as MediaPipe's face landmarker gives them are read, too:
-``[{"categoryName": "jawOpen", "score": 0.5}, ...]``.
+``[{"categoryName": "jawOpen", "score": 0.5}, ...]``. The encoder adds ``"measured"``, what the servos show, where it is
+given.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from controller.base.parameters import Flags, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.formats.format import API, Format
 from controller.formats.frame import Frame, Held, Refusals
 
@@ -95,9 +96,14 @@ class JsonEncoder:
             table["time"] = round(frame.time_s, 6)
         if not frame.face:
             table["face"] = False
-        given = zip(self._names, frame.values.tolist(), frame.mask.tolist(), strict=True)
-        table["parameters"] = {name: round(value, 6) for name, value, held in given if held}
+        table["parameters"] = self._named(frame.values, frame.mask)
+        if frame.measured is not None:
+            table["measured"] = self._named(frame.measured, frame.mask)
         return [json.dumps(table, separators=(",", ":")).encode()]
+
+    def _named(self, values: Floats, mask: Flags) -> dict[str, float]:
+        given = zip(self._names, values.tolist(), mask.tolist(), strict=True)
+        return {name: round(value, 6) for name, value, held in given if held}
 
 
 def _is_number(value: Any) -> TypeGuard[float]:
@@ -123,4 +129,5 @@ FORMAT = Format(
     delimiter=b"\n",
     timeout_s=math.inf,
     takes_token=True,
+    measured=True,
 )

@@ -15,6 +15,8 @@ LOST = ("fade", "hold", "neutral", "stop")
 """What a link does when its source falls silent: give its layer back, keep the last face, show neutral, stop servos."""
 EYES = ("auto", "looks", "angles", "both")
 """Which of two ways to say where the eyes look counts: the eyeLook names, the eye angles, what moves, or both added."""
+SENDS = ("face", "servos", "both")
+"""What a link sends: the face that is shown, what the measured servos show of it, or the face with that beside it."""
 CALIBRATE = ("off", "keep", "again")
 """Whether a neutral face is learned: never, once and kept in a file, or at each start."""
 
@@ -32,6 +34,7 @@ class NetSettings:
     baud: int = option("Rate of a serial port.", 115_200, at_least=300, at_most=12_000_000)
     send: str | None = option("HOST:PORT, or serial port, to which the present face is sent.")
     rate_hz: float = option("How often the present face is sent.", 60.0, at_least=0.1, at_most=500.0)
+    sends: str = option("What is sent: the face, what the servos show, or both.", "face", choices=SENDS)
     layer: str = option("The layer that shows what is taken.", "capture")
     source: str | None = option("Take only what comes from this host, or shows this subject.")
     timeout_s: float | None = option("A source that is silent for so long is lost.", above=0.0, at_most=3600.0)
@@ -59,6 +62,8 @@ class NetSettings:
             raise ValueError("connect: only TCP is called; write it as tcp:HOST:PORT")
         if self.send is not None:
             parse_address(self.send, self.form)
+        if self.sends == "both" and not self.form.measured:
+            raise ValueError(f'sends: {self.form.kind} has no room for both; "servos" sends what the servos show')
         self._check_reach()
         unknown = [name for name in self.gains if name not in REGIONS]
         if unknown:
