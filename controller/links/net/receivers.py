@@ -81,6 +81,10 @@ def open_receiver(
         return UdpReceiver(address)
     if address.transport == "tcp":
         return TcpCaller(address) if connect else TcpListener(address, gate)
+    if address.transport == "midi":
+        from controller.links.net.midi import MidiReceiver  # few links need it
+
+        return MidiReceiver(address.device)
     return SerialReceiver(address.device, baud) if address.transport == "serial" else InputReceiver()
 
 

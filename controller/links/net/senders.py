@@ -41,6 +41,10 @@ def open_sender(address: Address, delimiter: bytes, baud: int = 115_200, token: 
         return UdpSender(address)
     if address.transport == "tcp":
         return TcpSender(address, delimiter, token)
+    if address.transport == "midi":
+        from controller.links.net.midi import MidiSender  # few links need it
+
+        return MidiSender(address.device)
     return SerialSender(address.device, delimiter, baud) if address.transport == "serial" else OutputSender(delimiter)
 
 

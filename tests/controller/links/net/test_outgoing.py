@@ -68,7 +68,7 @@ def decoded(kind: str, messages: list[bytes]) -> Frame:
     return next(frame for message in messages for frame in decoder.feed(message))
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if kind != "icub"])  # which has emotions only
 def test_every_format_sends_the_face_as_far_as_it_can(kind: str) -> None:
     frame = decoded(kind, sent(kind, Head(), 2))
     assert frame.values[JAW] == pytest.approx(0.5, abs=0.11)  # au-json has steps of a fifth
