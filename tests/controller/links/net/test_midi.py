@@ -41,7 +41,7 @@ def test_messages_go_both_ways(wire: Any) -> None:
 
 
 def test_a_port_that_is_not_there_is_told_with_those_that_are(wire: Any) -> None:
-    with pytest.raises(LinkError, match="midi:nanoKONTROL: no such MIDI port|nanoKONTROX") as caught:
+    with pytest.raises(LinkError, match="midi:nanoKONTROX: no such MIDI port") as caught:
         open_receiver(parse_address("midi:nanoKONTROX", FORM))
     assert "Midi Through, nanoKONTROL2 MIDI 1" in caught.value.hint
 
