@@ -126,13 +126,13 @@ def play(
 
 def convert(
     take: Annotated[Path, typer.Argument(help="Take of any kind, voice, recording (.rec) or show (.toml).")],
-    out: Annotated[Path, typer.Argument(metavar="OUT.csv", help="Table to write: time and parameters.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Table to write, .csv, or .mcap: time and parameters.")],
     rate_hz: Annotated[
         float | None,
         typer.Option("--rate", min=1, max=1000, help="Rows a second.", show_default="the take's own, or 60"),
     ] = None,
 ) -> None:
-    """Write what a take shows as a plain table: time,jawOpen,... in seconds and values, for other programs.
+    """Write what a take shows for other programs: a table, time,jawOpen,... in seconds and values, or MCAP.
 
     Example: omote convert alex_rom_3.csv alex.csv --rate 30
     """

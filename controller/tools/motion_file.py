@@ -13,6 +13,7 @@ from controller.base.parameters import Flags, Floats, Parameters
 from controller.layers.commands import CommandState
 from controller.links.line.script import load_script
 from controller.links.line.show import Show
+from controller.takes.mcap_files import write_mcap
 from controller.takes.plain import write_plain
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
@@ -22,6 +23,7 @@ SHOW_HZ = 60.0
 _LONGEST_S = 3600.0
 _AFTER_S = 2.0  # for which a show that ends is followed to its last expression
 _SCRIPT = ".toml"
+_WRITERS = {".csv": write_plain, ".mcap": write_mcap}
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,16 +102,18 @@ def _rising(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def convert(path: Path, out: Path, parameters: Parameters, rate_hz: float | None = None) -> Motion:
-    """Write what a file shows as a plain table (.csv); returns it.
+    """Write what a file shows as a plain table (.csv) or as MCAP (.mcap); returns it.
 
-    Raises as :func:`load_motion`; TakeError: another suffix, or a place that cannot be written to.
+    Raises as :func:`load_motion`; TakeError: another suffix, or a place that cannot be written to. MissingPackage: mcap
+    is not installed.
     """
-    if out.suffix.lower() != ".csv":
+    write = _WRITERS.get(out.suffix.lower())
+    if write is None:
         raise TakeError(
-            f"{out}: tables of parameters are .csv files", hint=f"omote convert {path.name} {path.stem}.csv"
+            f"{out}: tables of parameters are .csv files, or .mcap", hint=f"omote convert {path.name} {path.stem}.csv"
         )
     if out.exists() and out.samefile(path):
         raise TakeError(f"{out}: is the file that is read", hint="choose another name")
     motion = load_motion(path, parameters, rate_hz)
-    write_plain(out, motion.times_s, motion.values, motion.mask, parameters)
+    write(out, motion.times_s, motion.values, motion.mask, parameters)
     return motion

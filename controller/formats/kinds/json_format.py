@@ -21,7 +21,7 @@ from controller.formats.frame import Frame, Held, Refusals
 
 _KINDS = ("set", "state")
 _SKIPPED = {"_neutral", "time", "type", "face", "subject"}
-_LISTS = ("blendshapes", "categories")
+_LISTS = ("blendshapes", "categories", "faceBlendshapes", "face_blendshapes")
 
 
 class JsonDecoder:
@@ -58,7 +58,10 @@ class JsonDecoder:
         """Names and values, wherever in the object they stand."""
         listed = next((table[key] for key in _LISTS if isinstance(table.get(key), list)), None)
         if listed is not None:
-            for each in listed:
+            inside = (
+                listed[0].get("categories") if listed and isinstance(listed[0], dict) else None
+            )  # of the first face
+            for each in inside if isinstance(inside, list) else listed:
                 if isinstance(each, dict):
                     yield str(each.get("categoryName", each.get("category_name"))), each.get("score")
             return
