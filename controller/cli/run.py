@@ -131,6 +131,9 @@ def convert(
         float | None,
         typer.Option("--rate", min=1, max=1000, help="Rows a second.", show_default="the take's own, or 60"),
     ] = None,
+    voice_model: Annotated[
+        Path | None, typer.Option("--voice-model", help="Network in ONNX that makes the face of a voice (WAV).")
+    ] = None,
 ) -> None:
     """Write what a take shows for other programs: a table, time,jawOpen,... in seconds and values, or MCAP.
 
@@ -141,7 +144,7 @@ def convert(
     from controller.tools.motion_file import convert as write
 
     with console.status("converting"):
-        motion = write(take, out, PARAMETERS, rate_hz)
+        motion = write(take, out, PARAMETERS, rate_hz, voice_model)
     rows = f"{len(motion.times_s)} rows of {int(motion.mask.sum())} parameters, {motion.times_s[-1]:.1f} s"
     console.print(f"{rows}\nwrote {out}", soft_wrap=True)
 

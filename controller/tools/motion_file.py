@@ -17,6 +17,7 @@ from controller.takes.mcap_files import write_mcap
 from controller.takes.plain import write_plain
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
+from controller.takes.voices.network import network_take
 
 SHOW_HZ = 60.0
 """Rows per second of shows and recordings."""
@@ -44,10 +45,11 @@ class Motion:
         return np.append(self.values, np.zeros((len(self.values), 1)), axis=1)
 
 
-def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None) -> Motion:
+def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None, model: Path | None = None) -> Motion:
     """What a file shows: a take of any kind, a recording (.rec), or a script (.toml) as a show.
 
     rate_hz : rows per second; without it those of a take are its own, those of shows and recordings 60.
+    model : network in ONNX that makes the face of a voice (WAV); see :mod:`controller.takes.voices.network`.
 
     Raises TakeError, ConfigError or ControllerError: the file cannot be read or is wrong.
     """
@@ -59,7 +61,7 @@ def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None
             raise TakeError(f"{path}: nothing is recorded in it", hint="record it again")
         times, rows = np.array([at for at, _ in ticks]), np.array([row for _, row in ticks])
         return _of_ticks(path.name, times - times[0], rows, rate_hz or SHOW_HZ)
-    take = load_take(path, parameters)
+    take = load_take(path, parameters) if model is None else network_take(path, model, parameters)
     times = take.times_s if rate_hz is None else _grid(take.duration_s, rate_hz)
     values = np.array([take.sample(float(t), parameters.neutral()) for t in times])
     return Motion(take.name, *_rising(times, values), take.mask)
@@ -101,7 +103,9 @@ def _rising(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     return times[later], values[later]
 
 
-def convert(path: Path, out: Path, parameters: Parameters, rate_hz: float | None = None) -> Motion:
+def convert(
+    path: Path, out: Path, parameters: Parameters, rate_hz: float | None = None, model: Path | None = None
+) -> Motion:
     """Write what a file shows as a plain table (.csv) or as MCAP (.mcap); returns it.
 
     Raises as :func:`load_motion`; TakeError: another suffix, or a place that cannot be written to. MissingPackage: mcap
@@ -114,6 +118,6 @@ def convert(path: Path, out: Path, parameters: Parameters, rate_hz: float | None
         )
     if out.exists() and out.samefile(path):
         raise TakeError(f"{out}: is the file that is read", hint="choose another name")
-    motion = load_motion(path, parameters, rate_hz)
+    motion = load_motion(path, parameters, rate_hz, model)
     write(out, motion.times_s, motion.values, motion.mask, parameters)
     return motion
