@@ -18,7 +18,7 @@ def stage_file(tmp_path: Path, text: str) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("name", ["demo", "everything", "play", "serial"])
+@pytest.mark.parametrize("name", ["demo", "everything", "gamepad", "play", "serial", "voice-and-phone", "websocket"])
 def test_shipped_stages_are_whole(name: str) -> None:
     stage = load_stage(name, PARAMETERS)
     assert stage.settings.name == name
