@@ -62,5 +62,5 @@ def test_every_key_is_explained_with_its_default() -> None:
 
 @pytest.mark.parametrize("block", re.findall(r"```toml\n(.*?)```", TEXT, re.S))
 def test_every_example_can_be_read(block: str) -> None:
-    for table in tomllib.loads(block)["links"]:
+    for table in tomllib.loads(block).get("links", []):
         assert str(read_link(table))

@@ -38,7 +38,7 @@ def config_dir() -> Path:
 def find_config(kind: str, name: str, *, beside: Path | None = None) -> Path:
     """The file or folder that ``name`` means.
 
-    kind : ``"heads"``, ``"robots"``, ``"stages"``, ``"vocabularies"`` or ``"scripts"``.
+    kind : ``"heads"``, ``"robots"``, ``"stages"``, ``"vocabularies"``, ``"controls"`` or ``"scripts"``.
     name : a path (also relative to the folder of ``beside``), or a name from ``configs/<kind>``.
     beside : the file that contains ``name``.
 

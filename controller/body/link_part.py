@@ -110,7 +110,7 @@ class LinkPart:
 
 
 def link_status(links: Sequence[LinkPart]) -> dict[str, str]:
-    """Rate, jitter, loss, age and last error of each link that takes faces, as one word; nothing without any."""
+    """Rate, jitter, loss, age and last error of each link that takes anything, as one word; nothing without any."""
     words = []
     for link in links:
         report = link.report()

@@ -35,16 +35,16 @@ def _buses() -> tuple[Callable[..., None], ...]:
 
 
 def _others() -> tuple[Callable[..., None], ...]:
-    from controller.cli import bench, check, translate  # start-up: the same
+    from controller.cli import bench, check, translate, webcam  # start-up: the same
 
-    return check.check, check.plugins, bench.bench, translate.translate
+    return check.check, check.plugins, bench.bench, translate.translate, webcam.webcam
 
 
 COMMANDS = (
     (("demo", "run", "play", "convert"), _runs),
     (("render", "fit", "landmarks", "export"), _pictures),
     (("ports", "scan", "set-id", "monitor", "calibrate"), _buses),
-    (("check", "plugins", "bench", "translate"), _others),
+    (("check", "plugins", "bench", "translate", "webcam"), _others),
 )
 """Names of commands and what loads them, in the order of ``omote --help``; ``simulate`` has commands of its own."""
 

@@ -126,13 +126,16 @@ def play(
 
 def convert(
     take: Annotated[Path, typer.Argument(help="Take of any kind, voice, recording (.rec) or show (.toml).")],
-    out: Annotated[Path, typer.Argument(metavar="OUT.csv", help="Table to write: time and parameters.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="Table to write, .csv, or .mcap: time and parameters.")],
     rate_hz: Annotated[
         float | None,
         typer.Option("--rate", min=1, max=1000, help="Rows a second.", show_default="the take's own, or 60"),
     ] = None,
+    voice_model: Annotated[
+        Path | None, typer.Option("--voice-model", help="Network in ONNX that makes the face of a voice (WAV).")
+    ] = None,
 ) -> None:
-    """Write what a take shows as a plain table: time,jawOpen,... in seconds and values, for other programs.
+    """Write what a take shows for other programs: a table, time,jawOpen,... in seconds and values, or MCAP.
 
     Example: omote convert alex_rom_3.csv alex.csv --rate 30
     """
@@ -141,7 +144,7 @@ def convert(
     from controller.tools.motion_file import convert as write
 
     with console.status("converting"):
-        motion = write(take, out, PARAMETERS, rate_hz)
+        motion = write(take, out, PARAMETERS, rate_hz, voice_model)
     rows = f"{len(motion.times_s)} rows of {int(motion.mask.sum())} parameters, {motion.times_s[-1]:.1f} s"
     console.print(f"{rows}\nwrote {out}", soft_wrap=True)
 
@@ -262,7 +265,7 @@ def _face(face: dict[str, Any]) -> list[tuple[str, str]]:
 def _link(link: dict[str, Any]) -> str:
     """Requests of a link, or faces that it took and sent."""
     refused = f"{sum(link['refused'].values())} refused"
-    if "rate_hz" not in link and "sent" not in link:
+    if "unanswered" in link or not {"rate_hz", "sent"} & {*link}:
         return f"{link['accepted']} accepted, {refused}"
     taken = [f"{link['accepted']} faces taken, {link['lost']} lost, {refused}"] if "rate_hz" in link else []
     sent = [f"{link['sent']} messages sent, {link['dropped']} dropped"] if "sent" in link else []

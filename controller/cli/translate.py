@@ -23,6 +23,10 @@ def translate(
     open_to_network: Annotated[
         bool, typer.Option("--open-to-network", help="Let IN listen where other machines reach.")
     ] = False,
+    token: Annotated[
+        str | None,
+        typer.Option("--token", envvar="OMOTE_TOKEN", help="What TCP streams begin with, those of IN and that of OUT."),
+    ] = None,
 ) -> None:
     """Take faces in one format and send them in another, without a stage, a face or servos.
 
@@ -37,6 +41,6 @@ def translate(
     from controller.tools.translate import translate as run
 
     console = Console(stderr=True, highlight=False, soft_wrap=True)  # messages may go to standard output
-    options = Options(mirror, connect, baud, open_to_network, seconds)
+    options = Options(mirror, connect, baud, open_to_network, token, seconds)
     counts = run(source, target, PARAMETERS, options, lambda text: console.print(escape(f"{text}; Ctrl-C ends")))
     console.print(escape(str(counts)))

@@ -6,7 +6,7 @@ Ctrl and the mouse drag a point by moving parameters; with Shift it moves contro
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +17,12 @@ from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS, REGIONS, Floats
 from controller.body.messages import Hold, Neutral, PanelRequest, Show, StartServos, StopServos
 from controller.body.panel_state import PanelState
+from controller.face.controls import Controls
+from controller.face.devices import Devices
 from controller.face.face import FrameLog, HeadValues, qualities
 from controller.face.point_editing import PointEditor, Screen
 from controller.stage.stage import FaceSettings
+from controller.vocabulary.controls import ControlsFile
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.head.model.parameters import head_angles
@@ -42,6 +45,7 @@ class WindowFace:
     head : the head to draw. settings : size, quality and camera. values : returns the head's newest values.
     send : sends the panel's requests to the body. panel_state : see :class:`Panel`.
     copy : loads the head again, for dragging points with the mouse; without, none can be dragged.
+    controls : what gamepad and keys do.
     """
 
     def __init__(
@@ -52,8 +56,10 @@ class WindowFace:
         send: Callable[[PanelRequest], None],
         panel_state: PanelState | None = None,
         copy: Callable[[], Head] | None = None,
+        controls: Collection[ControlsFile] = (),
     ) -> None:
         self._head, self._settings, self._values = head, settings, values
+        self._devices = Devices(Controls(controls, PARAMETERS), send) if controls else None
         self._mouse = None if copy is None or settings.kiosk else MouseEditing(head, copy, lambda: values.full, send)
         self._panel = Panel(lambda: values.full, send, panel_state)
         self._log = FrameLog()
@@ -74,7 +80,10 @@ class WindowFace:
             return values
 
         def gui() -> None:
-            self._panel()
+            if not self._settings.kiosk:
+                self._panel()
+            if self._devices is not None:
+                self._devices()
             if self._mouse is not None:
                 self._mouse(viewpoint.camera)
 
@@ -83,7 +92,7 @@ class WindowFace:
             source,
             size=self._settings.size,
             title=_TITLE,
-            gui=None if self._settings.kiosk else gui,
+            gui=None if self._settings.kiosk and self._devices is None else gui,
             keep_going=keep_going,
             camera=viewpoint,
             quality=self._choice or self._settings.still_quality,

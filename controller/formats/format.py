@@ -18,8 +18,8 @@ from drivers.base.plugins import Registry, modules_in
 API = 1
 """Version of what a format must keep: this module and :mod:`controller.formats.frame`."""
 
-TRANSPORTS = ("udp", "tcp", "serial", "lines")
-"""How messages travel: datagrams, TCP streams, serial ports, and lines of text on standard input and output."""
+TRANSPORTS = ("udp", "tcp", "serial", "lines", "midi")
+"""How messages travel: datagrams, TCP streams, serial ports, lines of text on standard input and output, MIDI ports."""
 
 _SUFFIX = "_format"
 
@@ -42,8 +42,12 @@ class Format:
     about : says which others they hold only in effect, as one number for a smile and a frown.
     quantum : how far a value may be rounded, in units of a parameter, besides the 1e-4 that every format keeps.
     delimiter : what ends a message of a stream; empty where the format has datagrams only.
+    pieces : whether its decoder takes a stream in any pieces, so that it needs no delimiter.
     most : bytes of the longest message.
     timeout_s : a source that is silent for so long is usually lost; infinity where messages are sent on changes only.
+    takes_token : whether a TCP stream that other machines may open must begin with a token: not where programs that
+        know nothing of tokens send it.
+    measured : whether its messages have room for what the servos show, beside the face.
     note : one sentence on what the format cannot carry, for people.
     install : what ``pip install`` takes where a package is missing.
     """
@@ -59,8 +63,11 @@ class Format:
     port: int = 0
     quantum: float = 0.0
     delimiter: bytes = b""
+    pieces: bool = False
     most: int = 65_536
     timeout_s: float = 0.5
+    takes_token: bool = False
+    measured: bool = False
     note: str = ""
     install: str = ""
 
@@ -76,7 +83,7 @@ def _check(found: Format) -> None:
     unknown = [each for each in found.transports if each not in TRANSPORTS]
     if unknown or not found.transports:
         raise ValueError(f"transports must be of {', '.join(TRANSPORTS)}, not {', '.join(unknown) or 'none'}")
-    if not found.delimiter and set(found.transports) != {"udp"}:
+    if not (found.delimiter or found.pieces) and set(found.transports) != {"udp"}:
         raise ValueError("a stream needs a delimiter that ends each message")
 
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import hmac
 import ipaddress
+import logging
 import os
+import re
 import secrets
 from collections.abc import Collection
 from pathlib import Path
@@ -13,8 +15,84 @@ from urllib.parse import parse_qs, urlsplit
 from controller.base.errors import LinkError
 from surface.base import files
 
+log = logging.getLogger(__name__)
+
+SHORTEST_TOKEN = 12
+"""Characters of a token of one's own."""
 _BYTES = 18
 _LONGEST = 256
+_TOKEN = re.compile(r"[!-)+-~]+")
+_WEB = re.compile(rb"^(?:host:\s|[^\s:]+ \S+ HTTP/\d)", re.IGNORECASE | re.MULTILINE)
+
+
+def host_and_port(listen: str, usual: int) -> tuple[str, int]:
+    """Host and port of an address to listen at; ``usual`` : the port of the example.
+
+    Raises ValueError: it is no address.
+    """
+    host, colon, port = listen.rpartition(":")
+    host = host.removeprefix("[").removesuffix("]")
+    if not colon or not host or not port.isascii() or not port.isdigit() or int(port) > 65_535:
+        raise ValueError(f'listen: {listen!r} is no address; write it as "127.0.0.1:{usual}"')
+    return host, int(port)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only programs on this machine reach an address."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
+
+
+def check_reach(host: str, token: str | None, *, open_to_network: bool) -> None:
+    """Raises ValueError: others reach an address without leave, or a token is none."""
+    if not is_loopback(host) and not open_to_network:
+        raise ValueError(
+            f"listen: at {host} every machine that reaches this one could try to connect; "
+            "open_to_network = true allows it, with a token"
+        )
+    if token is not None and len(token) < SHORTEST_TOKEN:
+        raise ValueError(f"token: needs at least {SHORTEST_TOKEN} characters")
+
+
+def check_word(token: str) -> None:
+    """Raises ValueError: a token of one's own is easily guessed, or no single word of ASCII, as ``AUTH`` needs it."""
+    if len(token) < SHORTEST_TOKEN:
+        raise ValueError(f"token: needs at least {SHORTEST_TOKEN} characters")
+    if not _TOKEN.fullmatch(token):
+        raise ValueError("token: must be printable ASCII without blanks and *")
+
+
+def token_for(name: str, host: str, token: str | None) -> str | None:
+    """What clients of a link must know: the stage's ``token``, or beyond this machine the one that omote keeps.
+
+    Says where that is, and shows one that was made just now. None where they need none. Raises LinkError: it cannot be
+    kept.
+    """
+    if token is not None or is_loopback(host):
+        return token
+    kept, path, new = make_token()
+    log.warning("%s: other machines may move this face and its servos with the token in %s%s",
+                name, path, f", which is shown only now: {kept}" if new else "")  # fmt: skip
+    return kept
+
+
+class WebRequests:
+    """Notices HTTP requests in the stream of one client.
+
+    A web page can make a browser send text of its choice to any port of this machine. A request line and the field
+    ``Host``, neither of which a page can leave out, come before that text.
+    """
+
+    def __init__(self) -> None:
+        self._line = b""
+
+    def begins(self, data: bytes) -> bool:
+        """Whether a request begins in the next piece of the stream."""
+        seen = self._line + data
+        self._line = seen[seen.rfind(b"\n") + 1 :][:_LONGEST]
+        return _WEB.search(seen) is not None
 
 
 def state_folder() -> Path:

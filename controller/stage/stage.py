@@ -25,6 +25,7 @@ from controller.robot.settings import RobotSettings
 from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
 from controller.stage.picture import PictureSettings, with_options
 from controller.takes.reader import load_take
+from controller.vocabulary.controls import ControlsFile, load_controls
 from controller.vocabulary.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ class FaceSettings(PictureSettings):
 
     size: tuple[Pixels, Pixels] = (1280, 720)
     fps: Annotated[float, Field(ge=1, le=1000)] = 60.0
+    controls: Annotated[list[str], Field(max_length=8)] = []
 
 
 IDENTITY_HINT = "--identity broad=0.6,young=0.4"
@@ -107,7 +109,7 @@ class Stage:
 
     path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
     layers : the layers. life : settings of idle motion. groups : group files added to the head, each with its amount.
-    persons : whom the face shows, each with its share.
+    persons : whom the face shows, each with its share. controls : what gamepad and keys do in the window.
     """
 
     path: Path
@@ -120,6 +122,7 @@ class Stage:
     life: IdleSettings
     groups: tuple[tuple[Path, float], ...] = ()
     persons: tuple[tuple[Person, float], ...] = ()
+    controls: tuple[ControlsFile, ...] = ()
 
     def file(self, name: str) -> Path:
         """A file that the stage names: relative to the stage's folder, or a path."""
@@ -239,9 +242,13 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     for key, script in scripts:
         if script is not None:
             _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
+    controls = tuple(
+        _collect(faults, f"face.controls[{i}]", lambda file=file: load_controls(file, parameters, vocabulary))
+        for i, file in enumerate(_files(faults, "controls", settings.face.controls, path) if vocabulary else ())
+    )
     amounts = tuple(zip(groups, settings.groups.values(), strict=False))
     shown = tuple(persons or ())
-    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, amounts, shown)
+    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, amounts, shown, controls)
     if settings.take is not None:
         _collect(faults, "take", lambda: load_take(stage.file(str(settings.take)), parameters))
     return stage

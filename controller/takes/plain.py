@@ -1,7 +1,7 @@
 """Reads and writes plain tables of parameters: ``time,jawOpen,mouthSmileLeft,...``, the time in seconds.
 
 Columns may have any spelling of a parameter; a name without a side means both, ``headYaw_deg`` is in degrees. Columns
-that mean no parameter are left out, unless their name is nearly that of one.
+that mean no parameter are left out, unless their name is nearly that of one; so are those of what servos showed.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 
 from controller.base.errors import TakeError
 from controller.base.parameters import Flags, Floats, Parameters, did_you_mean
+from controller.formats.kinds.csv_format import MEASURED
 from controller.takes.csvtable import CsvTable, read_csv
 from controller.takes.livelink import Take
 from controller.vocabulary.sides import sides
@@ -85,6 +86,8 @@ def _time_column(table: CsvTable) -> tuple[int, float]:
 def _parameter_columns(table: CsvTable, but: int, parameters: Parameters) -> Iterator[tuple[int, list[int], float]]:
     """Position of each column of a parameter, positions of the parameters it means, and the value of its unit."""
     for column, name in enumerate(table.header):
+        if name.startswith(MEASURED):
+            continue
         positions, unit = sides(parameters, name), 1.0
         if not positions and (degrees := _DEGREES.fullmatch(name)):
             found = parameters.find(degrees[1])

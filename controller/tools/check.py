@@ -26,6 +26,7 @@ from controller.tools.fault_script import load_fault_script
 from controller.tools.robot_warnings import robot_warnings
 from controller.tools.traffic_files import describe_traffic
 from controller.vocabulary.affect import Affect
+from controller.vocabulary.controls import load_controls
 from controller.vocabulary.facs import Facs
 from controller.vocabulary.presets import Presets
 from controller.vocabulary.visemes import Visemes
@@ -52,14 +53,15 @@ def check_anything(name: str) -> list[str]:
 def _find(name: str) -> Path:
     if os.path.exists(name):
         return Path(name)
-    for kind in ("stages", "robots", "heads", "scripts", "vocabularies", "life", "persons"):
+    for kind in ("stages", "robots", "heads", "scripts", "vocabularies", "life", "persons", "controls"):
         try:
             return find_config(kind, name)
         except ConfigError:
             continue
     hint = "omote check demo"
     raise ConfigError(
-        f"{name}: no such file, and no stage, robot, head, script, vocabulary, life or person of it", hint=hint
+        f"{name}: no such file, and no stage, robot, head, script, vocabulary, life, person or controls of it",
+        hint=hint,
     )
 
 
@@ -191,6 +193,12 @@ def _describe_presets(path: Path) -> Iterator[str]:
     yield f"presets {path.name}: {len(Presets.load(PARAMETERS, path).names)}"
 
 
+def _describe_controls(path: Path) -> Iterator[str]:
+    found = load_controls(path, PARAMETERS)
+    counts = (f"{len(getattr(found, what))} {what}" for what in ("controllers", "axes", "buttons", "keys"))
+    yield f"controls {path.name}: {', '.join(text for text in counts if not text.startswith('0 ')) or 'nothing'}"
+
+
 def _describe_moods(path: Path) -> Iterator[str]:
     yield f"moods {path.name}: {len(Affect.load(Vocabulary.load(PARAMETERS), path).names) - 1} anchors"
 
@@ -241,6 +249,7 @@ _READERS: dict[file_kinds.FileKind, Callable[[Path], Iterator[str]]] = {
     file_kinds.UNITS: _describe_units,
     file_kinds.VISEMES: _describe_visemes,
     file_kinds.PRESETS: _describe_presets,
+    file_kinds.CONTROLS: _describe_controls,
     file_kinds.MOODS: _describe_moods,
     file_kinds.LAYERS: _describe_layers,
     file_kinds.EXPRESSIONS: _describe_expressions,

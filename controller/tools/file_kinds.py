@@ -17,6 +17,7 @@ from controller.robot.settings import RobotSettings
 from controller.stage.persons import PersonSettings
 from controller.stage.stage import StageSettings
 from controller.tools.fault_script import FaultScript
+from controller.vocabulary.controls import ControlsFile
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,7 @@ PARAMETERS = FileKind("parameters", frozenset({"profile", "parameters", "aliases
 UNITS = FileKind("action units", frozenset({"units", "emotions"}))
 VISEMES = FileKind("visemes", frozenset({"visemes", "rhubarb", "phonemes", "ipa", "sapi", "letters", "through"}))
 PRESETS = FileKind("presets", frozenset({"presets"}))
+CONTROLS = FileKind("controls", frozenset(ControlsFile.known_keys()))
 MOODS = FileKind("moods", frozenset({"anchors"}))
 LAYERS = FileKind("layers", inside=frozenset(LayerTable.known_keys()))
 EXPRESSIONS = FileKind(
@@ -54,8 +56,8 @@ EXPRESSIONS = FileKind(
     inside=frozenset({"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "of", "weights"}),
 )
 KINDS = (
-    STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, FAULTS, LIFE, PARAMETERS, UNITS, VISEMES, PRESETS, MOODS, LAYERS,
-    EXPRESSIONS,
+    STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, FAULTS, LIFE, PARAMETERS, UNITS, VISEMES, PRESETS, CONTROLS, MOODS,
+    LAYERS, EXPRESSIONS,
 )  # fmt: skip
 
 

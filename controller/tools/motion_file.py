@@ -13,15 +13,18 @@ from controller.base.parameters import Flags, Floats, Parameters
 from controller.layers.commands import CommandState
 from controller.links.line.script import load_script
 from controller.links.line.show import Show
+from controller.takes.mcap_files import write_mcap
 from controller.takes.plain import write_plain
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
+from controller.takes.voices.network import network_take
 
 SHOW_HZ = 60.0
 """Rows per second of shows and recordings."""
 _LONGEST_S = 3600.0
 _AFTER_S = 2.0  # for which a show that ends is followed to its last expression
 _SCRIPT = ".toml"
+_WRITERS = {".csv": write_plain, ".mcap": write_mcap}
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,10 +45,11 @@ class Motion:
         return np.append(self.values, np.zeros((len(self.values), 1)), axis=1)
 
 
-def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None) -> Motion:
+def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None, model: Path | None = None) -> Motion:
     """What a file shows: a take of any kind, a recording (.rec), or a script (.toml) as a show.
 
     rate_hz : rows per second; without it those of a take are its own, those of shows and recordings 60.
+    model : network in ONNX that makes the face of a voice (WAV); see :mod:`controller.takes.voices.network`.
 
     Raises TakeError, ConfigError or ControllerError: the file cannot be read or is wrong.
     """
@@ -57,7 +61,7 @@ def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None
             raise TakeError(f"{path}: nothing is recorded in it", hint="record it again")
         times, rows = np.array([at for at, _ in ticks]), np.array([row for _, row in ticks])
         return _of_ticks(path.name, times - times[0], rows, rate_hz or SHOW_HZ)
-    take = load_take(path, parameters)
+    take = load_take(path, parameters) if model is None else network_take(path, model, parameters)
     times = take.times_s if rate_hz is None else _grid(take.duration_s, rate_hz)
     values = np.array([take.sample(float(t), parameters.neutral()) for t in times])
     return Motion(take.name, *_rising(times, values), take.mask)
@@ -99,17 +103,21 @@ def _rising(times: Floats, values: Floats) -> tuple[Floats, Floats]:
     return times[later], values[later]
 
 
-def convert(path: Path, out: Path, parameters: Parameters, rate_hz: float | None = None) -> Motion:
-    """Write what a file shows as a plain table (.csv); returns it.
+def convert(
+    path: Path, out: Path, parameters: Parameters, rate_hz: float | None = None, model: Path | None = None
+) -> Motion:
+    """Write what a file shows as a plain table (.csv) or as MCAP (.mcap); returns it.
 
-    Raises as :func:`load_motion`; TakeError: another suffix, or a place that cannot be written to.
+    Raises as :func:`load_motion`; TakeError: another suffix, or a place that cannot be written to. MissingPackage: mcap
+    is not installed.
     """
-    if out.suffix.lower() != ".csv":
+    write = _WRITERS.get(out.suffix.lower())
+    if write is None:
         raise TakeError(
-            f"{out}: tables of parameters are .csv files", hint=f"omote convert {path.name} {path.stem}.csv"
+            f"{out}: tables of parameters are .csv files, or .mcap", hint=f"omote convert {path.name} {path.stem}.csv"
         )
     if out.exists() and out.samefile(path):
         raise TakeError(f"{out}: is the file that is read", hint="choose another name")
-    motion = load_motion(path, parameters, rate_hz)
-    write_plain(out, motion.times_s, motion.values, motion.mask, parameters)
+    motion = load_motion(path, parameters, rate_hz, model)
+    write(out, motion.times_s, motion.values, motion.mask, parameters)
     return motion

@@ -100,7 +100,10 @@ class StageRun:
             values, head = self._load_head(body)
             from controller.face.window import WindowFace  # start-up: the body gets its orders first
 
-            face = WindowFace(head, self.stage.settings.face, values, body.send, body.panel_state, self.stage.load_head)
+            face = WindowFace(
+                head, self.stage.settings.face, values, body.send, body.panel_state, self.stage.load_head,
+                self.stage.controls,
+            )  # fmt: skip
             failed = self._show(face, self._begin(body, flag, seconds))
             return self._end(body, None if failed else face.report(), failed)
 

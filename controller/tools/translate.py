@@ -19,7 +19,7 @@ from controller.formats.frame import Frame
 from controller.links.net.address import LOOPBACK, Address, parse_address
 from controller.links.net.decoding import Decoding
 from controller.links.net.meter import Meter
-from controller.links.net.receivers import InputReceiver, open_receiver
+from controller.links.net.receivers import Gate, InputReceiver, open_receiver
 from controller.links.net.senders import Sender, open_sender
 from controller.takes.reader import load_take, suffixes
 from drivers.base.errors import PluginError
@@ -34,7 +34,8 @@ class Options:
     """How to translate.
 
     mirror : left and right change places. connect : call the input's address (TCP). baud : of serial ports.
-    open_to_network : listen where other machines reach. seconds : how long; None until the input ends.
+    open_to_network : listen where other machines reach. token : what TCP streams begin with, in and out.
+    seconds : how long; None until the input ends.
     stop : ends it when it is set.
     """
 
@@ -42,6 +43,7 @@ class Options:
     connect: bool = False
     baud: int = 115_200
     open_to_network: bool = False
+    token: str | None = None
     seconds: float | None = None
     stop: threading.Event = field(default_factory=threading.Event)
 
@@ -88,7 +90,7 @@ def translate(source: str, target: str, parameters: Parameters, options: Options
     form, address = parse_end(target)
     with ExitStack() as closers:
         given = _open_input(source, parameters, options, closers)
-        sender = open_sender(address, form.delimiter, options.baud)
+        sender = open_sender(address, form.delimiter, options.baud, options.token)
         closers.callback(sender.close)
         ready(f"translating {source} to {form.kind} at {address}")
         with suppress(KeyboardInterrupt):
@@ -120,6 +122,8 @@ def _open_input(source: str, parameters: Parameters, options: Options, closers: 
             f"{source}: every machine that reaches this one could send faces there",
             hint="add --open-to-network where that is meant",
         )
+    if not address.is_local and form.takes_token and address.transport == "tcp" and options.token is None:
+        raise LinkError(f"{source}: other machines need a token there", hint="choose one and add --token TOKEN")
     if options.connect and address.transport != "tcp":
         raise LinkError(f"{source}: only TCP is called", hint=f"write it as {form.kind}:tcp:HOST:PORT")
     return LiveInput(form, address, parameters, options, closers)
@@ -131,7 +135,8 @@ class LiveInput:
     def __init__(
         self, form: Format, address: Address, parameters: Parameters, options: Options, closers: ExitStack
     ) -> None:
-        self._receiver = open_receiver(address, connect=options.connect, baud=options.baud)
+        gate = None if options.token is None else Gate(options.token, form.delimiter)
+        self._receiver = open_receiver(address, connect=options.connect, baud=options.baud, gate=gate)
         closers.callback(self._receiver.close)
         self._decoding = Decoding(form, parameters, streams=address.transport != "udp")
 

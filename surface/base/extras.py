@@ -16,6 +16,11 @@ EXTRAS = {
     "trimesh": ("trimesh", "fit"),
     "igl": ("libigl", "fit"),
     "rhino3dm": ("rhino3dm", "cad"),
+    "mediapipe": ("mediapipe", "webcam"),
+    "cv2": ("opencv-python-headless", "webcam"),
+    "mcap": ("mcap", "mcap"),
+    "onnxruntime": ("onnxruntime", "onnx"),
+    "pylsl": ("pylsl", "lsl"),
 }
 """Name of a package and the extra of pyproject.toml that brings it, by the name under which it is imported."""
 

@@ -28,6 +28,7 @@ class Lines:
             "LIFE": lambda: [self._pick("0", "1", "0.5", "2"), *self._draw.choice(([], ["LISTEN"], ["auto"], ["x"]))],
             "SHOW": self._show, "READ": self._reading,
             "VISEME": lambda: self._draw.choice((["aa"], ["PP", "0.5"], ["oh", "1", "I", "0.2"], ["aa", "2"], ["x"])),
+            "AUTH": lambda: self._draw.choice((["x"], ["a-token-of-some-length"], [])),
             "HELP": lambda: self._draw.choice(([], ["SET"], ["x"])),
             "LIST": lambda: [self._pick(*LISTS)], "SUB": self._stream, "PING": lambda: ["x" * self._draw.randrange(40)],
             "HELLO": lambda: self._draw.choice(([], [], ["checksum=latched"], ["checksum=required"], ["checksum=x"])),

@@ -50,7 +50,7 @@ class AuJsonDecoder:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 <= value <= 1e6:
             self.refused.add("intensities that are none")
             return False
-        columns = _columns(self._facs, name)
+        columns = unit_columns(self._facs, name)
         if columns is None:
             self.refused.add("unknown units")
             return False
@@ -92,7 +92,7 @@ _facs = cache(Facs.load)
 
 
 @lru_cache(maxsize=256)
-def _columns(facs: Facs, name: str) -> Indices | None:
+def unit_columns(facs: Facs, name: str) -> Indices | None:
     """Columns of a unit's name, such as ``AU12`` or ``AUL12``; None for what is no unit, or more than one."""
     if len(name) > _LONGEST_NAME or "+" in name:
         return None

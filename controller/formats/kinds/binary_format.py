@@ -129,4 +129,5 @@ FORMAT = Format(
     carries=_carries,
     delimiter=b"\0",
     most=1024,
+    takes_token=True,
 )

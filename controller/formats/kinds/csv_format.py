@@ -1,7 +1,8 @@
 """Numbers between commas, as tables and plotting programs have them: a line of names, then a line for each frame.
 
 The names are parameters and, if there is one, ``time`` (s). An empty cell gives nothing. The encoder repeats the names
-every two seconds, so that a receiver that begins late understands the rest.
+every two seconds, so that a receiver that begins late understands the rest. Where it is given what the servos show, it
+writes that in columns ``servos:jawOpen`` and so on, which the decoder leaves out.
 """
 
 from __future__ import annotations
@@ -10,11 +11,13 @@ import math
 
 import numpy as np
 
-from controller.base.parameters import Flags, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.formats.format import API, Format
 from controller.formats.frame import Frame, Refusals
 
 _TIME = "time"
+MEASURED = "servos:"
+"""What the name of a column begins with that says what the servos show."""
 _REPEAT = 120
 _MOST_COLUMNS = 1024
 _LONGEST_CELL = 32
@@ -47,7 +50,9 @@ class CsvDecoder:
     def _name(self, cells: list[str]) -> None:
         columns = [self._parameters.find(cell) for cell in cells]
         folded = [cell.lower() for cell in cells]
-        unknown = any(at is None and name != _TIME for at, name in zip(columns, folded, strict=True))
+        known = (at is not None or name == _TIME or name.startswith(MEASURED)
+                 for at, name in zip(columns, folded, strict=True))  # fmt: skip
+        unknown = not all(known)
         if not any(at is not None for at in columns) or (
             unknown and self._columns
         ):  # damaged, of a stream that goes on
@@ -70,17 +75,32 @@ class CsvEncoder:
     """Writes a line of names, and a line of numbers for each frame."""
 
     def __init__(self, parameters: Parameters) -> None:
-        self._header = ",".join([_TIME, *parameters.names]).encode()
+        self._names = parameters.names
         self._sent = 0
+        self._measured = False
 
     def encode(self, frame: Frame) -> list[bytes]:
         """A line, with the line of names before it where that is due; empty cells for what is not given."""
+        begins = frame.measured is not None and not self._measured
+        self._measured |= begins
         time_s = self._sent / 60.0 if frame.time_s is None else frame.time_s
-        given = zip(frame.values.tolist(), frame.mask.tolist(), strict=True)
-        cells = [f"{value:.6g}" if held and frame.face else "" for value, held in given]
-        names = [self._header] if self._sent % _REPEAT == 0 else []
+        mask = frame.mask if frame.face else np.zeros_like(frame.mask)
+        cells = _cells(frame.values, mask)
+        if self._measured:
+            cells += _cells(frame.values if frame.measured is None else frame.measured,
+                            np.zeros_like(mask) if frame.measured is None else frame.mask)  # fmt: skip
+        names = [self._header()] if begins or self._sent % _REPEAT == 0 else []
         self._sent += 1
         return [*names, ",".join([f"{time_s:.6f}", *cells]).encode()]
+
+    def _header(self) -> bytes:
+        measured = [MEASURED + name for name in self._names] if self._measured else []
+        return ",".join([_TIME, *self._names, *measured]).encode()
+
+
+def _cells(values: Floats, mask: Flags) -> list[str]:
+    """Numbers, and nothing where none is given."""
+    return [f"{value:.6g}" if held else "" for value, held in zip(values.tolist(), mask.tolist(), strict=True)]
 
 
 def _number(text: str) -> float | None:
@@ -106,4 +126,6 @@ FORMAT = Format(
     encoder=CsvEncoder,
     carries=_carries,
     delimiter=b"\n",
+    takes_token=True,
+    measured=True,
 )

@@ -2,7 +2,8 @@
 
 ``{"type": "set", "parameters": {"jawOpen": 0.5}}`` and plain ``{"jawOpen": 0.5}`` are the same; ``null`` releases a
 parameter, and what is not named stays as it was. Blend shapes as MediaPipe's face landmarker gives them are read, too:
-``[{"categoryName": "jawOpen", "score": 0.5}, ...]``.
+``[{"categoryName": "jawOpen", "score": 0.5}, ...]``. The encoder adds ``"measured"``, what the servos show, where it is
+given.
 """
 
 from __future__ import annotations
@@ -14,13 +15,13 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from controller.base.parameters import Flags, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.formats.format import API, Format
 from controller.formats.frame import Frame, Held, Refusals
 
 _KINDS = ("set", "state")
 _SKIPPED = {"_neutral", "time", "type", "face", "subject"}
-_LISTS = ("blendshapes", "categories")
+_LISTS = ("blendshapes", "categories", "faceBlendshapes", "face_blendshapes")
 
 
 class JsonDecoder:
@@ -57,7 +58,10 @@ class JsonDecoder:
         """Names and values, wherever in the object they stand."""
         listed = next((table[key] for key in _LISTS if isinstance(table.get(key), list)), None)
         if listed is not None:
-            for each in listed:
+            inside = (
+                listed[0].get("categories") if listed and isinstance(listed[0], dict) else None
+            )  # of the first face
+            for each in inside if isinstance(inside, list) else listed:
                 if isinstance(each, dict):
                     yield str(each.get("categoryName", each.get("category_name"))), each.get("score")
             return
@@ -95,9 +99,14 @@ class JsonEncoder:
             table["time"] = round(frame.time_s, 6)
         if not frame.face:
             table["face"] = False
-        given = zip(self._names, frame.values.tolist(), frame.mask.tolist(), strict=True)
-        table["parameters"] = {name: round(value, 6) for name, value, held in given if held}
+        table["parameters"] = self._named(frame.values, frame.mask)
+        if frame.measured is not None:
+            table["measured"] = self._named(frame.measured, frame.mask)
         return [json.dumps(table, separators=(",", ":")).encode()]
+
+    def _named(self, values: Floats, mask: Flags) -> dict[str, float]:
+        given = zip(self._names, values.tolist(), mask.tolist(), strict=True)
+        return {name: round(value, 6) for name, value, held in given if held}
 
 
 def _is_number(value: Any) -> TypeGuard[float]:
@@ -122,4 +131,6 @@ FORMAT = Format(
     carries=_carries,
     delimiter=b"\n",
     timeout_s=math.inf,
+    takes_token=True,
+    measured=True,
 )

@@ -304,6 +304,7 @@ _RULES: dict[str, Rule] = {
     "UNSUB": (0, 0, "UNSUB", lambda _, given: Command("UNSUB")),
     "LIST": (1, 1, f"LIST {', '.join(LISTS[:-1])} or {LISTS[-1]}", _list),
     "HELP": (0, 1, "HELP [command]", _help),
+    "AUTH": (1, 1, "AUTH token", lambda _, given: Command("AUTH", words=tuple(given))),
     "STOP": (0, None, "STOP", lambda _, given: Command("STOP")),
     "START": (0, 0, "START", Grammar.read_start),
 }  # fmt: skip

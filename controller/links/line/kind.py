@@ -1,29 +1,41 @@
-"""Defines the kind of link that speaks the omote line protocol on a serial port."""
+"""Defines the kind of link that speaks the omote line protocol, on a serial port or over TCP."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from controller.links.access import check_reach, check_word, host_and_port
 from controller.links.kind import LinkKind
 from controller.links.line.checksums import CHECKSUMS
-from drivers.base.options import REQUIRED, option
+from drivers.base.options import option
 
 SIMULATED = "simulated"
+PORT = 9404
 
 
 @dataclass(frozen=True, kw_only=True)
 class LineSettings:
     """Its options in a stage."""
 
-    port: str = option("Device path; simulated starts a simulated robot host.", REQUIRED)
+    port: str | None = option("Device path; simulated starts a simulated robot host.")
     baud: int = option("Rate of the port.", 115_200, at_least=300, at_most=12_000_000)
     checksum: str = option(
         "When lines must have one: never, once a line had a valid one, or always.", "latched", choices=CHECKSUMS
     )
     script: str | None = option("What a simulated host plays: a name in configs/scripts, or a path.")
+    listen: str | None = option("HOST:PORT at which clients connect by TCP, instead of a serial port.")
+    token: str | None = option("What clients must know, instead of the token that omote makes.", longest=128)
+    open_to_network: bool = option("Allow others than programs on this machine to connect, with a token.", False)
+    clients: int = option("How many clients may be connected by TCP.", 8, at_least=1, at_most=64)
 
     def check(self) -> None:
-        """Raises ValueError for a script without a simulated host."""
+        """Raises ValueError: no port, or two; a script without a simulated host; an address that others reach."""
+        if (self.port is None) == (self.listen is None):
+            raise ValueError(f'give port, as "/dev/ttyUSB0", or listen, as "127.0.0.1:{PORT}"')
+        if self.listen is not None:
+            check_reach(self.where[0], self.token, open_to_network=self.open_to_network)
+            if self.token is not None:
+                check_word(self.token)
         if self.script is not None and self.port != SIMULATED:
             raise ValueError('script needs port = "simulated"')
 
@@ -33,15 +45,20 @@ class LineSettings:
         return (self.script or "tour") if self.port == SIMULATED else None
 
     @property
+    def where(self) -> tuple[str, int]:
+        """Host and port of a link over TCP. Raises ValueError: it is no address."""
+        return host_and_port(self.listen or "", PORT)
+
+    @property
     def address(self) -> str:
         """Where the link listens."""
-        return self.port
+        return self.listen or self.port or ""
 
 
 LINK = LinkKind(
     api=1,
     kind="line",
-    title="the omote line protocol on a serial port",
+    title="the omote line protocol on a serial port or over TCP",
     settings=LineSettings,
     open="controller.links.line.opening:open_line",
     install="pyserial",

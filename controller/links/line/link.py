@@ -11,8 +11,8 @@ import threading
 import time
 
 from controller.layers.commands import CommandSink
-from controller.links.line.outbox import Outbox
 from controller.links.line.session import LineSession
+from controller.links.line.talk import Talk
 from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
 
@@ -45,9 +45,8 @@ class LineLink:
         self.reconnects = 0
         self._serial = SerialPort(port, baud)
         self._session = LineSession(sink, time.monotonic_ns(), name=f"line {port}", checksum=checksum)
-        self._out = Outbox()
+        self._talk = Talk(self._session)
         self._retry_s = retry_s
-        self._counts = {"bytes_in": 0, "bytes_out": 0, "streamed": 0, "dropped": 0}
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"link {port}", daemon=True)
 
@@ -67,17 +66,21 @@ class LineLink:
         self.connected = False
 
     def report(self) -> dict[str, object]:
-        """Counts: lines taken, refused (by code) and not answered, bytes, streamed and dropped lines, reconnects."""
+        """Counts: lines taken, refused (by code) and not answered, bytes, streamed and dropped lines, reconnects; rate
+        and jitter of what arrives.
+        """
         return {
             "port": self.port,
             "connected": self.connected,
             "accepted": self._session.accepted,
             "refused": {str(code): count for code, count in sorted(self._session.refused.items())},
             "unanswered": self._session.unanswered,
-            **self._counts,
+            **self._talk.counts,
             "reconnects": self.reconnects,
             "faults": self._session.faults,
             "last_fault": self._session.last_fault,
+            **self._talk.meter.report(time.monotonic()),
+            "error": "" if self.connected else "the port is not there",
         }
 
     def __enter__(self) -> LineLink:
@@ -99,51 +102,21 @@ class LineLink:
 
     def _serve(self) -> None:
         while not self._stopping.is_set():
-            data = self._read()
-            now_ns = time.monotonic_ns()
-            for answer in self._session.answers(data, now_ns) if data else ():
-                self._reply(answer)
-            self._flush()
-            self._stream(now_ns)
-            self._flush()
+            self._talk.serve(self._read(), self._serial.put)
 
     def _read(self) -> bytes:
         """All that has arrived, so that a STOP is found however much came before it."""
-        data = self._serial.read(self._wake_s())
+        data = self._serial.read(time.monotonic() + self._talk.wait_s(_POLL_S))
         more = data
         while more and len(data) < _READ_LIMIT:
             more = self._serial.read(0.0)
             data += more
-        self._counts["bytes_in"] += len(data)
         return data
-
-    def _wake_s(self) -> float:
-        """When to stop reading from the port next, on the monotonic clock."""
-        now_s = time.monotonic()
-        due_ns = self._session.due_ns()
-        return now_s + _POLL_S if due_ns is None else min(now_s + _POLL_S, due_ns * 1e-9)
-
-    def _reply(self, line: bytes) -> None:
-        if self._out.add(line, answer=True):
-            return
-        self._flush()
-        if not self._out.add(line, answer=True):
-            self._counts["dropped"] += 1
-            self._session.unanswered += 1
-
-    def _stream(self, now_ns: int) -> None:
-        line = self._session.stream(now_ns)
-        if line:
-            self._counts["streamed" if self._out.add(line, answer=False) else "dropped"] += 1
-
-    def _flush(self) -> None:
-        self._counts["bytes_out"] += self._out.flush(self._serial.put)
 
     def _reconnect(self) -> None:
         """Wait for the port to come back; the face keeps its last commands."""
         self.connected = False
-        self._session.drop()
-        self._session.unanswered += self._out.clear()
+        self._talk.lose()
         while not self._stopping.wait(self._retry_s):
             try:
                 self._serial.open()

@@ -11,9 +11,11 @@ from pathlib import Path
 
 from controller.base.errors import LinkError
 from controller.base.paths import find_config
+from controller.links.access import token_for
 from controller.links.kind import LinkContext
 from controller.links.line.kind import LineSettings
 from controller.links.line.link import LineLink
+from controller.links.line.server import LineServer
 from drivers.base.children import command as module_command
 from drivers.base.children import environment
 
@@ -22,12 +24,15 @@ _START_LIMIT_S = 20.0
 _END_LIMIT_S = 3.0
 
 
-def open_line(settings: LineSettings, context: LinkContext) -> LineLink:
-    """Open the port and listen.
+def open_line(settings: LineSettings, context: LinkContext) -> LineLink | LineServer:
+    """Open the port, or the address, and listen.
 
-    Raises LinkError: the simulated host does not start. PortError: the port cannot be opened.
+    Raises LinkError: the simulated host does not start, or the address cannot be used. PortError: the port cannot be
+    opened.
     """
-    port = settings.port
+    if settings.listen is not None:
+        return _open_server(settings, context)
+    port = settings.port or ""
     if settings.simulated is not None:
         script = find_config("scripts", settings.simulated, beside=context.beside)
         host = HostProcess(str(script), context.vocabularies)
@@ -36,6 +41,13 @@ def open_line(settings: LineSettings, context: LinkContext) -> LineLink:
     link = LineLink(port, settings.baud, context.sink, checksum=settings.checksum).start()
     context.closers.callback(link.stop)
     return link
+
+
+def _open_server(settings: LineSettings, context: LinkContext) -> LineServer:
+    token = token_for(f"line {settings.address}", settings.where[0], settings.token)
+    server = LineServer(settings, context.sink, token)
+    context.closers.callback(server.stop)
+    return server.start()
 
 
 class HostProcess:

@@ -45,6 +45,7 @@ class Code(IntEnum):
     RANGE = 24
     BUSY = 30
     FAULT = 31
+    TOKEN = 32
 
 
 class LineError(LinkError):

@@ -6,13 +6,14 @@ import logging
 import math
 import os
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cached_property
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.base.plain_numbers import plain_number
 from controller.base.version import package_version
 from controller.layers.commands import CommandSink, Player
+from controller.links.access import same_token
 from controller.links.line.checksums import ChecksumRule
 from controller.links.line.commands import COMMANDS, MAX_RATE_HZ, Command, Grammar, Request, help_of
 from controller.links.line.protocol import (
@@ -51,11 +52,13 @@ class LineSession:
     name : who sends the lines, for people: a STOP is reported under this name.
     checksum : when lines must have one, of :data:`controller.links.line.checksums.CHECKSUMS`.
     scripted : the lines come from a script; see :class:`controller.links.line.commands.Grammar`.
+    token : what ``AUTH`` must give before anything else is taken; None for nothing.
 
     Attributes
     ----------
     accepted : lines taken. refused : lines refused, by error code. unanswered : lines whose answer could not be sent.
     faults : how many errors of omote itself there were; last_fault : the last of them.
+    locked : whether the token was not given yet. wrong_tokens : how many others were.
     """
 
     def __init__(
@@ -66,6 +69,7 @@ class LineSession:
         name: str = "line",
         checksum: str = "optional",
         scripted: bool = False,
+        token: str | None = None,
     ) -> None:
         self._sink = sink
         self._name = name
@@ -85,6 +89,8 @@ class LineSession:
         self.last_fault = ""
         self._logged: set[str] = set()
         self._stops_waiting = 0
+        self._token = token
+        self.locked, self.wrong_tokens = token is not None, 0
 
     def feed(self, data: bytes, now_ns: int) -> bytes:
         """Act on bytes that arrived at ``now_ns``; returns the replies, one line for each line that has anything."""
@@ -93,7 +99,7 @@ class LineSession:
     def answers(self, data: bytes, now_ns: int) -> Iterator[bytes]:
         """As :meth:`feed`, but gives each reply when its line has been acted on. A STOP acts before all other lines."""
         lines = self._decoder.feed(data)
-        self._stops_waiting = sum(map(is_stop, lines))
+        self._stops_waiting = 0 if self.locked else sum(map(is_stop, lines))
         if self._stops_waiting:
             self._sink.stop_latch.stop(self._name, now_ns)
         for line in lines:
@@ -143,6 +149,8 @@ class LineSession:
             words = self._words(line)
             if words is None:
                 return b""
+            if self.locked:
+                self._check_token(words)
             text = self._do(self._grammar.request(words), now_ns)
         except Exception as error:  # noqa: BLE001  one line must not cost another its answer
             refusal = self._refusal(error)
@@ -166,6 +174,15 @@ class LineSession:
             self._checksums.check(words)
         return words
 
+    def _check_token(self, words: Words) -> None:
+        """Raises LineError for anything but the token."""
+        command, *rest = words.words
+        if command.upper() == "AUTH" and len(rest) == 1 and same_token(rest[0], self._token or ""):
+            self.locked = False
+            return
+        self.wrong_tokens += command.upper() == "AUTH"
+        raise LineError(Code.TOKEN, "a token is needed first: AUTH token")
+
     def _refusal(self, error: Exception) -> LineError:
         if isinstance(error, LineError):
             return error
@@ -181,10 +198,12 @@ class LineSession:
             case "SUB" | "UNSUB":
                 self._stream, self._due_ns = (request if command.question else None), now_ns
             case "STOP":
-                self._stops_waiting -= 1
+                self._stops_waiting = max(0, self._stops_waiting - 1)
                 self._sink.stop_latch.stop(self._name, now_ns)
             case "START":
                 self._start()
+            case "AUTH":
+                return "AUTH"
             case "HELLO":
                 for mode in command.words:
                     self._checksums.change(mode, checked=request.checked)
@@ -294,17 +313,17 @@ class LineSession:
             return {"stopped": "no"}
         return {"stopped": "_".join(stopped.who.split()), "stopped_s": max(0.0, (now_ns - stopped.at_ns) * 1e-9)}
 
-    def _list(self, what: str) -> tuple[str, ...]:
-        if what == "HOLDERS":
-            return tuple(self._sink.holder(i) or "none" for i in range(len(self._parameters)))
-        return {
-            "PARAMETERS": self._parameters.names,
-            "EXPRESSIONS": self._sink.vocabulary.names,
-            "LAYERS": self._sink.layer_names(),
-            "VISEMES": self._grammar.visemes.names,
-            "SHOWS": tuple(self._sink.shows.names()) if self._sink.shows is not None else (),
-            "COMMANDS": COMMANDS,
-        }[what]
+    def _list(self, what: str) -> Sequence[str]:
+        lists: dict[str, Callable[[], Sequence[str]]] = {
+            "PARAMETERS": lambda: self._parameters.names,
+            "EXPRESSIONS": lambda: self._sink.vocabulary.names,
+            "LAYERS": self._sink.layer_names,
+            "VISEMES": lambda: self._grammar.visemes.names,
+            "SHOWS": lambda: self._sink.shows.names() if self._sink.shows is not None else (),
+            "HOLDERS": lambda: [self._sink.holder(i) or "none" for i in range(len(self._parameters))],
+            "COMMANDS": lambda: COMMANDS,
+        }
+        return lists[what]()
 
 
 def _receipt(command: Command) -> str:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from controller.formats.format import Format
 
 _DEVICE = re.compile(r"/|serial:|COM\d|socket://", re.IGNORECASE)
+_MIDI = re.compile(r"midi:(.+)", re.IGNORECASE)
 _SCHEME = re.compile(r"(udp|tcp):(?!//)(.*)", re.IGNORECASE | re.DOTALL)
 LOOPBACK = "127.0.0.1"
 
@@ -17,8 +18,8 @@ LOOPBACK = "127.0.0.1"
 class Address:
     """Where messages come from or go to.
 
-    transport : ``udp``, ``tcp``, ``serial`` or ``lines`` (standard input or output).
-    host, port : of UDP and TCP. device : path of a serial port.
+    transport : ``udp``, ``tcp``, ``serial``, ``midi`` or ``lines`` (standard input or output).
+    host, port : of UDP and TCP. device : path of a serial port, or name of a MIDI port.
     """
 
     transport: str
@@ -29,6 +30,8 @@ class Address:
     def __str__(self) -> str:
         if self.transport == "lines":
             return "-"
+        if self.transport == "midi":
+            return f"midi:{self.device}"
         host = f"[{self.host}]" if ":" in self.host else self.host
         return self.device if self.transport == "serial" else f"{self.transport}:{host}:{self.port}"
 
@@ -44,7 +47,7 @@ class Address:
 
 
 def parse_address(text: str, form: Format) -> Address:
-    """``HOST:PORT``, ``udp:HOST:PORT``, ``tcp:HOST:PORT``, a serial port, or ``-`` for a standard stream.
+    """``HOST:PORT``, ``udp:HOST:PORT``, ``tcp:HOST:PORT``, ``midi:NAME``, a serial port, or ``-``, a standard stream.
 
     form : whose transport and port count where the text names none.
 
@@ -53,6 +56,8 @@ def parse_address(text: str, form: Format) -> Address:
     text = text.strip()
     if text == "-":
         found = Address("lines")
+    elif (midi := _MIDI.fullmatch(text)) is not None:
+        found = Address("midi", device=midi[1])
     elif _DEVICE.match(text):
         found = Address("serial", device=text.removeprefix("serial:"))
     else:

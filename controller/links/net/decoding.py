@@ -37,7 +37,7 @@ class Decoding:
     """
 
     def __init__(self, form: Format, parameters: Parameters, *, streams: bool, newest: bool = False) -> None:
-        self._form, self._parameters, self._streams = form, parameters, streams
+        self._form, self._parameters, self._streams = form, parameters, streams and not form.pieces
         self._newest = newest
         self.refused = Refusals()
         self.messages = 0

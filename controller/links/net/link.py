@@ -6,11 +6,12 @@ import logging
 
 from controller.base.errors import LinkError
 from controller.base.parameters import did_you_mean
+from controller.links.access import token_for
 from controller.links.kind import LinkContext
 from controller.links.net.incoming import Incoming
 from controller.links.net.neutral import state_file
 from controller.links.net.outgoing import Outgoing
-from controller.links.net.receivers import open_receiver
+from controller.links.net.receivers import Gate, open_receiver
 from controller.links.net.senders import open_sender
 from controller.links.net.settings import NetSettings
 
@@ -55,9 +56,11 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
         )
     address = settings.incoming
     assert address is not None
-    if not address.is_local and settings.connect is None:
+    token = token_for(name, address.host, settings.token) if settings.needs_token else None
+    if not address.is_local and settings.connect is None and token is None:
         log.warning("%s: every machine that reaches %s can move this face and its servos", name, address)
-    receiver = open_receiver(address, connect=settings.connect is not None, baud=settings.baud)
+    gate = None if token is None else Gate(token, settings.form.delimiter)
+    receiver = open_receiver(address, connect=settings.connect is not None, baud=settings.baud, gate=gate)
     learns = settings.calibrate != "off" or settings.ranges
     path = state_file(f"{settings.form.kind}-{settings.source or settings.layer}") if learns else None
     try:
@@ -71,7 +74,7 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
 
 def _open_outgoing(settings: NetSettings, context: LinkContext, name: str) -> Outgoing:
     assert settings.outgoing is not None
-    sender = open_sender(settings.outgoing, settings.form.delimiter, settings.baud)
+    sender = open_sender(settings.outgoing, settings.form.delimiter, settings.baud, settings.token)
     outgoing = Outgoing(settings, sender, context.sink, name)
     context.closers.callback(outgoing.stop)
     return outgoing

@@ -20,6 +20,9 @@ class FaceSource(Protocol):
     def snapshot(self, out: Floats) -> None:
         """Copy the present parameters to ``out`` : (P,)."""
 
+    def measured(self, out: Floats) -> bool:
+        """Copy what the servos show to ``out`` : (P,); False when none reports its position."""
+
 
 class Outgoing:
     """Sends in its own thread until it is stopped."""
@@ -27,7 +30,8 @@ class Outgoing:
     def __init__(self, settings: NetSettings, sender: Sender, source: FaceSource, name: str) -> None:
         self._period_s, self._sender, self._source = 1.0 / settings.rate_hz, sender, source
         self._encoder = settings.form.encoder(source.parameters)
-        self._mask = settings.form.carries(source.parameters)
+        form, parameters = settings.form, source.parameters
+        self._mask, self._sends = form.carries(parameters) | form.about(parameters), settings.sends
         self.sent = self.dropped = 0
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"link {name}, out", daemon=True)
@@ -55,10 +59,18 @@ class Outgoing:
             due_s = max(due_s + self._period_s, now_s)  # late ones are skipped
 
     def _send(self, time_s: float) -> None:
-        values = self._source.parameters.neutral()
-        self._source.snapshot(values)
-        for message in self._encoder.encode(Frame(values, self._mask, time_s)):
+        frame = self._frame(time_s)
+        for message in self._encoder.encode(frame) if frame is not None else ():
             if self._sender.send(message):
                 self.sent += 1
             else:
                 self.dropped += 1
+
+    def _frame(self, time_s: float) -> Frame | None:
+        """What is to be sent now; None while only the servos are to be sent and none reports its position."""
+        face, servos = self._source.parameters.neutral(), self._source.parameters.neutral()
+        self._source.snapshot(face)
+        known = self._sends != "face" and self._source.measured(servos)
+        if self._sends == "servos":
+            return Frame(servos, self._mask, time_s) if known else None
+        return Frame(face, self._mask, time_s, measured=servos if known else None)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import hmac
 import os
 import selectors
 import socket
 import sys
 import time
+from dataclasses import dataclass
 from typing import Protocol
 
 from controller.base.errors import LinkError
+from controller.links.access import WebRequests
 from controller.links.net.address import Address
 from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
@@ -40,17 +43,48 @@ class Receiver(Protocol):
         """Give back what was opened."""
 
 
-def open_receiver(address: Address, *, connect: bool = False, baud: int = 115_200) -> Receiver:
+@dataclass(frozen=True)
+class Gate:
+    """What a stream must begin with: ``AUTH token`` and the delimiter of its messages."""
+
+    token: str
+    delimiter: bytes
+
+    @property
+    def first(self) -> bytes:
+        """The first message of a stream, with its end."""
+        return auth_message(self.token) + self.delimiter
+
+    def lets_in(self, start: bytes) -> bool | None:
+        """Whether a stream that begins so may go on; None where that cannot be said yet."""
+        if len(start) < len(self.first):
+            return None if self.delimiter not in start else False
+        return hmac.compare_digest(start[: len(self.first)], self.first)
+
+
+def auth_message(token: str) -> bytes:
+    """What says a token at the beginning of a stream."""
+    return f"AUTH {token}".encode()
+
+
+def open_receiver(
+    address: Address, *, connect: bool = False, baud: int = 115_200, gate: Gate | None = None
+) -> Receiver:
     """What an address gives.
 
-    connect : call the address instead of waiting for calls (TCP). baud : rate of a serial port.
+    connect : call the address instead of waiting for calls (TCP). baud : rate of a serial port. gate : what streams of
+    callers must begin with; None for nothing.
 
     Raises LinkError: the address is taken or not of this machine. PortError: the serial port cannot be opened.
     """
     if address.transport == "udp":
         return UdpReceiver(address)
     if address.transport == "tcp":
-        return TcpCaller(address) if connect else TcpListener(address)
+        return TcpCaller(address) if connect else TcpListener(address, gate)
+    if address.transport == "midi":
+        from controller.links.net.midi import MidiReceiver  # few links need it
+
+        return MidiReceiver(address.device)
     return SerialReceiver(address.device, baud) if address.transport == "serial" else InputReceiver()
 
 
@@ -59,7 +93,7 @@ class UdpReceiver:
 
     def __init__(self, address: Address) -> None:
         self.error = ""
-        self._socket = _bound(address, socket.SOCK_DGRAM)
+        self._socket = bound(address, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._socket, selectors.EVENT_READ)
@@ -89,24 +123,49 @@ class UdpReceiver:
         self._socket.close()
 
 
-class TcpListener:
-    """Streams of those who call; a sender is its host and port."""
+class _Call:
+    """One caller of a listener; ``start`` : how its stream begins, until that is known to be right."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, sender: str, gate: Gate | None) -> None:
+        self.sender, self._gate = sender, gate
+        self._web, self._start = WebRequests(), b""
+
+    def take(self, data: bytes) -> bytes:
+        """What of a piece of its stream counts. Raises ValueError: it must hang up; says why."""
+        if self._web.begins(data):
+            raise ValueError("a web browser, which was turned away")
+        if self._gate is None:
+            return data
+        self._start += data
+        match self._gate.lets_in(self._start):
+            case None:
+                return b""
+            case False:
+                raise ValueError("a caller without the token, who was turned away")
+        data, self._start = self._start[len(self._gate.first) :], b""
+        self._gate = None
+        return data
+
+
+class TcpListener:
+    """Streams of those who call; a sender is its host and port. ``gate`` : what they must begin with."""
+
+    def __init__(self, address: Address, gate: Gate | None = None) -> None:
         self.error = ""
-        self._socket = _bound(address, socket.SOCK_STREAM)
+        self._gate = gate
+        self._socket = bound(address, socket.SOCK_STREAM)
         self._socket.listen(MOST_CONNECTIONS)
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._socket, selectors.EVENT_READ)
-        self._calls: dict[socket.socket, str] = {}
+        self._calls: dict[socket.socket, _Call] = {}
 
     def receive(self, timeout_s: float) -> Received:
         found: Received = []
         for key, _ in self._selector.select(timeout_s):
-            if key.fileobj is self._socket:
+            if key.data is None:
                 self._accept()
             else:
-                found.append(self._read(key.fileobj))  # type: ignore[arg-type]
+                found += self._read(key.fileobj, key.data)  # type: ignore[arg-type]
         return found
 
     def close(self) -> None:
@@ -125,21 +184,26 @@ class TcpListener:
             self.error = f"more than {MOST_CONNECTIONS} connections"
             return
         call.setblocking(False)
-        self._calls[call] = f"{sender[0]}:{sender[1]}"
-        self._selector.register(call, selectors.EVENT_READ)
+        self._calls[call] = _Call(f"{sender[0]}:{sender[1]}", self._gate)
+        self._selector.register(call, selectors.EVENT_READ, self._calls[call])
 
-    def _read(self, call: socket.socket) -> tuple[str, bytes]:
+    def _read(self, call: socket.socket, caller: _Call) -> Received:
+        """A piece of a stream; no bytes where it ended, nothing where none of it counts yet."""
         try:
             data = call.recv(_CHUNK)
+            if data:
+                counted = caller.take(data)
+                return [(caller.sender, counted)] if counted else []
         except BlockingIOError:
-            return self._calls[call], b""
+            return []
+        except ValueError as error:
+            self.error = str(error)
         except OSError:
-            data = b""
-        if data:
-            return self._calls[call], data
+            pass  # it ended, however it did
         self._selector.unregister(call)
         call.close()
-        return self._calls.pop(call), b""
+        del self._calls[call]
+        return [(caller.sender, b"")]
 
 
 class TcpCaller:
@@ -255,7 +319,7 @@ class InputReceiver:
         os.close(self._file)
 
 
-def _bound(address: Address, kind: socket.SocketKind) -> socket.socket:
+def bound(address: Address, kind: socket.SocketKind) -> socket.socket:
     """A socket at an address that does not block. Raises LinkError."""
     family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
     made = socket.socket(family, kind)

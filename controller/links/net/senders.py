@@ -10,6 +10,7 @@ import time
 from typing import Protocol
 
 from controller.links.net.address import Address
+from controller.links.net.receivers import auth_message
 from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
 
@@ -31,15 +32,19 @@ class Sender(Protocol):
         """Give back what was opened."""
 
 
-def open_sender(address: Address, delimiter: bytes, baud: int = 115_200) -> Sender:
-    """What takes messages to an address; ``delimiter`` ends each on a stream.
+def open_sender(address: Address, delimiter: bytes, baud: int = 115_200, token: str | None = None) -> Sender:
+    """What takes messages to an address; ``delimiter`` ends each on a stream, ``token`` begins one over TCP.
 
     Raises PortError: the serial port cannot be opened.
     """
     if address.transport == "udp":
         return UdpSender(address)
     if address.transport == "tcp":
-        return TcpSender(address, delimiter)
+        return TcpSender(address, delimiter, token)
+    if address.transport == "midi":
+        from controller.links.net.midi import MidiSender  # few links need it
+
+        return MidiSender(address.device)
     return SerialSender(address.device, delimiter, baud) if address.transport == "serial" else OutputSender(delimiter)
 
 
@@ -94,9 +99,10 @@ class _Stream:
 class TcpSender(_Stream):
     """A stream to a program that is called, and called again where it hangs up."""
 
-    def __init__(self, address: Address, delimiter: bytes) -> None:
+    def __init__(self, address: Address, delimiter: bytes, token: str | None = None) -> None:
         super().__init__(delimiter)
         self._address = address
+        self._first = b"" if token is None else auth_message(token) + delimiter
         self._socket: socket.socket | None = None
         self._next_s = 0.0
 
@@ -118,7 +124,9 @@ class TcpSender(_Stream):
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.setblocking(False)
         self.error = ""
-        return True
+        self._rest = self._first
+        self._push()
+        return self._socket is not None and not self._rest
 
     def _push(self) -> None:
         try:

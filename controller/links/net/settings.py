@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from controller.base.parameters import REGIONS, did_you_mean
 from controller.formats.format import Format
+from controller.links.access import check_word
 from controller.links.net.address import Address, parse_address
 from drivers.base.options import Option, option
 
@@ -14,6 +15,8 @@ LOST = ("fade", "hold", "neutral", "stop")
 """What a link does when its source falls silent: give its layer back, keep the last face, show neutral, stop servos."""
 EYES = ("auto", "looks", "angles", "both")
 """Which of two ways to say where the eyes look counts: the eyeLook names, the eye angles, what moves, or both added."""
+SENDS = ("face", "servos", "both")
+"""What a link sends: the face that is shown, what the measured servos show of it, or the face with that beside it."""
 CALIBRATE = ("off", "keep", "again")
 """Whether a neutral face is learned: never, once and kept in a file, or at each start."""
 
@@ -31,6 +34,7 @@ class NetSettings:
     baud: int = option("Rate of a serial port.", 115_200, at_least=300, at_most=12_000_000)
     send: str | None = option("HOST:PORT, or serial port, to which the present face is sent.")
     rate_hz: float = option("How often the present face is sent.", 60.0, at_least=0.1, at_most=500.0)
+    sends: str = option("What is sent: the face, what the servos show, or both.", "face", choices=SENDS)
     layer: str = option("The layer that shows what is taken.", "capture")
     source: str | None = option("Take only what comes from this host, or shows this subject.")
     timeout_s: float | None = option("A source that is silent for so long is lost.", above=0.0, at_most=3600.0)
@@ -46,6 +50,7 @@ class NetSettings:
     calibrate: str = option("Whether a neutral face is learned.", "off", choices=CALIBRATE)
     ranges: bool = option("Whether the range of each parameter is learned.", False)
     open_to_network: bool = option("Allow others than programs on this machine to send faces.", False)
+    token: str | None = option("What TCP streams begin with, those that come and those that are sent.", longest=128)
 
     def check(self) -> None:
         """Raises ValueError: no address, one that is wrong, or one that others reach without leave."""
@@ -57,6 +62,8 @@ class NetSettings:
             raise ValueError("connect: only TCP is called; write it as tcp:HOST:PORT")
         if self.send is not None:
             parse_address(self.send, self.form)
+        if self.sends == "both" and not self.form.measured:
+            raise ValueError(f'sends: {self.form.kind} has no room for both; "servos" sends what the servos show')
         self._check_reach()
         unknown = [name for name in self.gains if name not in REGIONS]
         if unknown:
@@ -66,11 +73,23 @@ class NetSettings:
 
     def _check_reach(self) -> None:
         here = self.incoming
+        if self.token is not None:
+            if not any(end is not None and end.transport == "tcp" for end in (here, self.outgoing)):
+                raise ValueError("token: only TCP streams have one; UDP and serial ports have no place for it")
+            check_word(self.token)
         if here is not None and self.connect is None and not here.is_local and not self.open_to_network:
             raise ValueError(
                 f"listen: at {here.host} every machine that reaches this one could move the face; "
                 "open_to_network = true allows it"
             )
+
+    @property
+    def needs_token(self) -> bool:
+        """Whether streams that come must begin with a token."""
+        here = self.incoming
+        if here is None or here.transport != "tcp" or self.connect is not None:
+            return False
+        return self.token is not None or (self.form.takes_token and not here.is_local)
 
     @property
     def silence_s(self) -> float:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import ipaddress
 from dataclasses import dataclass, field
 
+from controller.links.access import check_reach, host_and_port, is_loopback
 from controller.links.kind import LinkKind
 from drivers.base.options import Option, option
 
@@ -26,44 +26,22 @@ class WebSocketSettings:
 
     def check(self) -> None:
         """Raises ValueError: no address, or one that others reach without leave, or a token that is easily guessed."""
-        host, _ = self.where
-        if not _is_loopback(host) and not self.open_to_network:
-            raise ValueError(
-                f"listen: at {host} every machine that reaches this one could try to connect; "
-                "open_to_network = true allows it, with a token"
-            )
-        if self.token is not None and len(self.token) < SHORTEST_TOKEN:
-            raise ValueError(f"token: needs at least {SHORTEST_TOKEN} characters")
+        check_reach(self.where[0], self.token, open_to_network=self.open_to_network)
 
     @property
     def where(self) -> tuple[str, int]:
         """Host and port. Raises ValueError: it is no address."""
-        host, colon, port = self.listen.rpartition(":")
-        host = host.removeprefix("[").removesuffix("]")
-        if not colon or not host or not port.isascii() or not port.isdigit() or int(port) > 65_535:
-            raise ValueError(f'listen: {self.listen!r} is no address; write it as "127.0.0.1:{PORT}"')
-        return host, int(port)
+        return host_and_port(self.listen, PORT)
 
     @property
     def needs_token(self) -> bool:
         """Whether clients have to know a token."""
-        return self.token is not None or not _is_loopback(self.where[0])
+        return self.token is not None or not is_loopback(self.where[0])
 
     @property
     def address(self) -> str:
         """Where the link listens."""
         return self.listen
-
-
-SHORTEST_TOKEN = 12
-"""Characters of a token of one's own."""
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 LINK = LinkKind(

@@ -22,8 +22,9 @@ from websockets.http11 import Request, Response
 from controller.base.errors import LinkError
 from controller.base.version import package_version
 from controller.layers.commands import CommandSink
-from controller.links.access import given_token, is_own_page, make_token, same_token
+from controller.links.access import given_token, is_own_page, same_token, token_for
 from controller.links.kind import LinkContext
+from controller.links.net.meter import Meter
 from controller.links.websocket.conversation import Conversation
 from controller.links.websocket.kind import WebSocketSettings
 from controller.links.websocket.messages import LONGEST, Reply
@@ -42,21 +43,11 @@ def open_websocket(settings: WebSocketSettings, context: LinkContext) -> WebSock
 
     Raises LinkError: the address cannot be used, or the token cannot be kept.
     """
-    token = _token(settings) if settings.needs_token else None
+    token = token_for(f"websocket {settings.address}", settings.where[0], settings.token)
     link = WebSocketLink(settings, context.sink, token)
     context.closers.callback(link.stop)
     link.start()
     return link
-
-
-def _token(settings: WebSocketSettings) -> str:
-    """What clients must know; says where it is kept, and shows one that was made just now."""
-    if settings.token is not None:
-        return settings.token
-    token, path, new = make_token()
-    log.warning("websocket %s: other machines may move this face and its servos with the token in %s%s",
-                settings.address, path, f", which is shown only now: {token}" if new else "")  # fmt: skip
-    return token
 
 
 class WebSocketLink:
@@ -72,6 +63,7 @@ class WebSocketLink:
         self._accepted = 0
         self._refused: Counter[str] = Counter()
         self._unanswered = 0
+        self._meter = Meter()
         self._loop = asyncio.new_event_loop()
         self._ready = threading.Event()
         self._error: Exception | None = None
@@ -113,6 +105,8 @@ class WebSocketLink:
             "refused": dict(sum((client.conversation.refused for client in list(self._clients)), self._refused.copy())),
             "unanswered": self._unanswered + sum(client.unanswered for client in list(self._clients)),
             "turned_away": dict(self._turned_away),
+            **self._meter.report(time.monotonic()),
+            "error": "" if self._clients else "no client",
         }
 
     def _run(self) -> None:
@@ -165,7 +159,7 @@ class WebSocketLink:
         return None
 
     async def _talk(self, connection: ServerConnection) -> None:
-        client = _Client(connection, self._sink, self._start_ns)
+        client = _Client(connection, self._sink, self._start_ns, self._meter)
         self._clients.add(client)
         self._served += 1
         try:
@@ -178,13 +172,13 @@ class WebSocketLink:
 
 
 class _Client:
-    """One connected client. ``unanswered`` : answers that it did not read in time."""
+    """One connected client. ``unanswered`` : answers that it did not read in time. ``meter`` : of all clients."""
 
-    def __init__(self, connection: ServerConnection, sink: CommandSink, start_ns: int) -> None:
+    def __init__(self, connection: ServerConnection, sink: CommandSink, start_ns: int, meter: Meter) -> None:
         host, port = connection.remote_address[:2]
         self.conversation = Conversation(sink, f"websocket {host}:{port}", start_ns)
         self.unanswered = 0
-        self._connection = connection
+        self._connection, self._meter = connection, meter
         self._waiting: asyncio.Queue[Reply | None] = asyncio.Queue(_WAITING)
         self._budget, self._counted_s, self._warned_s = _BURST, time.monotonic(), 0.0
 
@@ -207,6 +201,7 @@ class _Client:
                 self._warned_s = time.monotonic()
                 self._put(self.conversation.refuse_rate())
             return
+        self._meter.note(time.monotonic())
         self._put(self.conversation.handle(text, time.monotonic_ns()))
 
     def _may_come(self) -> bool:

@@ -179,7 +179,7 @@ def test_status_has_the_figures_of_links_that_take_faces_as_one_word() -> None:
     figures = {"rate_hz": 60.0, "jitter_ms": 0.4, "lost": 2, "age_s": 0.012, "error": ""}
     links = [
         Told("link livelink on udp:127.0.0.1:11111", figures),
-        Told("link line on /dev/ttyUSB0", {"accepted": 5}),
+        Told("link foreign on far", {"accepted": 5}),
         Told("link vmc on udp:127.0.0.1:5", {**figures, "age_s": None, "error": "the far end hung up"}),
     ]
     assert link_status(cast(Any, links)) == {

@@ -18,7 +18,7 @@ def stage_file(tmp_path: Path, text: str) -> str:
     return str(path)
 
 
-@pytest.mark.parametrize("name", ["demo", "everything", "play", "serial"])
+@pytest.mark.parametrize("name", ["demo", "everything", "gamepad", "play", "serial", "voice-and-phone", "websocket"])
 def test_shipped_stages_are_whole(name: str) -> None:
     stage = load_stage(name, PARAMETERS)
     assert stage.settings.name == name
@@ -49,7 +49,7 @@ def test_faults_of_stage_and_references_come_together(tmp_path: Path) -> None:
     [
         ("[face]\nsize = [0, 720]", "face.size[0]: "),
         ("[face]\nqualty = 'full'", "face.qualty: unknown key, did you mean 'quality'?"),
-        ("[[links]]\nbaud = 9600", "links[0].port: missing"),
+        ("[[links]]\nbaud = 9600", "links[0]: give port, as"),
         ("[[links]]\nport = '/dev/x'\nscript = 'tour'", 'links[0]: script needs port = "simulated"'),
         ("control_hz = 0", "control_hz: "),
     ],

@@ -62,7 +62,7 @@ def test_the_built_in_readers() -> None:
     assert {(reader.kind, reader.layer) for reader in TAKES.all()} == {
         ("livelink", "capture"), ("openface", "capture"), ("pyfeat", "capture"), ("plain", "capture"),
         ("sounds", "speech"), ("aeneas", "speech"), ("azure_visemes", "speech"), ("azure_shapes", "capture"),
-        ("textgrid", "speech"), ("wav", "speech"), ("compressed", "speech"),
+        ("textgrid", "speech"), ("wav", "speech"), ("compressed", "speech"), ("mcap", "capture"),
     }  # fmt: skip
     assert {".csv", ".json", ".tsv", ".wav", ".textgrid", ".mp3"} <= set(suffixes())
     assert len(set(suffixes())) == len(suffixes())

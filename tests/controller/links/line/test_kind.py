@@ -30,6 +30,30 @@ def test_a_script_needs_a_simulated_host() -> None:
         read_link({"port": "/dev/ttyUSB0", "script": "tour"})
 
 
+def test_an_address_instead_of_a_port() -> None:
+    settings = read_link({"listen": "[::1]:9404", "clients": 2}).own
+    assert (settings.where, settings.address, settings.simulated) == (("::1", 9404), "[::1]:9404", None)
+    assert str(read_link({"listen": "127.0.0.1:9404"})) == "line on 127.0.0.1:9404"
+
+
+@pytest.mark.parametrize(
+    ("keys", "part"),
+    [
+        ({}, "give port"),
+        ({"port": "/dev/ttyUSB0", "listen": "127.0.0.1:9404"}, "give port"),
+        ({"listen": "9404"}, "is no address"),
+        ({"listen": "0.0.0.0:9404"}, "open_to_network = true allows it, with a token"),
+        ({"listen": "127.0.0.1:9404", "token": "short"}, "at least 12 characters"),
+        ({"listen": "127.0.0.1:9404", "token": "two words of a token"}, "printable ASCII without blanks"),
+        ({"listen": "127.0.0.1:9404", "script": "tour"}, 'script needs port = "simulated"'),
+        ({"listen": "127.0.0.1:9404", "clients": 65}, "clients"),
+    ],
+)
+def test_what_is_wrong_with_an_address_is_refused(keys: dict[str, object], part: str) -> None:
+    with pytest.raises(ValueError, match=part):
+        read_link(keys)
+
+
 @pytest.mark.parametrize(("baud", "good"), [(299, False), (300, True), (12_000_000, True), (12_000_001, False)])
 def test_limits_of_the_baud_rate(baud: int, good: bool) -> None:
     table = {"port": "/dev/ttyUSB0", "baud": baud}

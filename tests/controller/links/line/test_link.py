@@ -169,6 +169,7 @@ def test_every_count_begins_at_nothing_and_bytes_are_counted_both_ways(port: Hos
     assert link.report() == {
         "port": port.path, "connected": False, "accepted": 0, "refused": {}, "bytes_in": 0, "bytes_out": 0,
         "unanswered": 0, "streamed": 0, "dropped": 0, "reconnects": 0, "faults": 0, "last_fault": "",
+        "rate_hz": 0.0, "jitter_ms": 0.0, "lost": 0, "age_s": None, "error": "the port is not there",
     }  # fmt: skip
     with link:
         peer = Peer(port)
@@ -176,6 +177,7 @@ def test_every_count_begins_at_nothing_and_bytes_are_counted_both_ways(port: Hos
         assert peer.next().text == "PONG abc"
         eventually(lambda: link.report()["bytes_out"])
         assert (link.report()["bytes_in"], link.report()["bytes_out"]) == (9, len(b"OK PONG abc\n"))
+        assert link.report()["age_s"] is not None and link.report()["error"] == ""
 
 
 def test_a_missing_port_is_one_clear_error(tmp_path: Path, state: CommandState) -> None:

@@ -6,6 +6,7 @@ import socket
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -175,6 +176,32 @@ def test_an_address_that_is_taken_is_told_with_what_to_do(far: Open) -> None:
         choices = [read_link({"kind": "vmc", "listen": f"127.0.0.1:{there.port}"})]
         open_links(choices, LinkContext(CommandState(P), closers))
     assert str(there.port) in told.value.hint
+
+
+def test_two_omotes_share_a_token_over_tcp() -> None:
+    token, address = "a-token-of-two", f"tcp:127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    one, two = CommandState(P), CommandState(P)
+    one.set_parameters([JAW], [0.5], 1)
+    for n in range(200):
+        one.tick(n * 10_000_000, 0.01, P.neutral())
+    with ExitStack() as closers:
+        open_links([read_link({"kind": "json", "listen": address, "token": token})], LinkContext(two, closers))
+        open_links([read_link({"kind": "json", "send": address, "token": token})], LinkContext(one, closers))
+        wait_for(lambda: two.mixer["capture"].values[JAW] == pytest.approx(0.5, abs=1e-3))
+
+
+def test_beyond_this_machine_a_stream_of_ours_needs_a_token(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    port = free_port(socket.SOCK_STREAM)
+    keys = {"kind": "csv", "listen": f"tcp:0.0.0.0:{port}", "open_to_network": True}
+    with ExitStack() as closers:
+        (link,) = open_links([read_link(keys)], LinkContext(CommandState(P), closers))
+        assert "shown only now" in caplog.text and (tmp_path / "omote" / "token").exists()
+        with socket.create_connection(("127.0.0.1", port)) as call:
+            call.sendall(b"time,jawOpen\n0,0.5\n")
+            wait_for(lambda: "without the token" in link.report()["error"])
 
 
 def test_an_unknown_layer_is_told_with_those_there_are() -> None:

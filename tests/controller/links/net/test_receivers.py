@@ -15,7 +15,7 @@ from controller.base.errors import LinkError
 from controller.formats.format import FORMATS
 from controller.links.line.hostport import HostPort
 from controller.links.net.address import parse_address
-from controller.links.net.receivers import MOST_CONNECTIONS, InputReceiver, Receiver, open_receiver
+from controller.links.net.receivers import MOST_CONNECTIONS, Gate, InputReceiver, Receiver, open_receiver
 from drivers.base.errors import PortMissing
 from tests.controller.links.net.sockets import free_port
 
@@ -67,6 +67,42 @@ def test_calls_come_as_streams_and_end_as_such(opened: Open) -> None:
     while not found:
         found = receiver.receive(1.0)
     assert found[0][1] == b""
+
+
+def test_a_web_page_is_turned_away(opened: Open) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    receiver = opened(f"tcp:127.0.0.1:{port}")
+    with socket.create_connection(("127.0.0.1", port)) as call:
+        call.sendall(b'POST / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n{"jawOpen": 1}\n')
+        found, end_s = list[tuple[str, bytes]](), time.monotonic() + 10
+        while not found:
+            assert time.monotonic() < end_s
+            found = receiver.receive(0.1)
+    assert [data for _, data in found] == [b""] and "browser" in receiver.error
+
+
+@pytest.mark.parametrize("size", [1, 5, 100])
+def test_a_stream_begins_with_a_token_where_one_is_wanted(opened: Open, size: int) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    receiver, stream = opened(f"tcp:127.0.0.1:{port}", gate=Gate("abcdef", b"\n")), b"AUTH abcdef\nhello"
+    with socket.create_connection(("127.0.0.1", port)) as call:
+        call.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        for at in range(0, len(stream), size):
+            call.sendall(stream[at : at + size])
+        assert taken(receiver, 5) == b"hello" and receiver.error == ""
+
+
+@pytest.mark.parametrize("start", [b"AUTH abcdeg\nhello", b"AUTH abc\n", b"hello, hello, hello", b"\n"])
+def test_a_stream_without_the_token_is_turned_away(opened: Open, start: bytes) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    receiver = opened(f"tcp:127.0.0.1:{port}", gate=Gate("abcdef", b"\n"))
+    with socket.create_connection(("127.0.0.1", port)) as call:
+        call.sendall(start)
+        found, end_s = list[tuple[str, bytes]](), time.monotonic() + 10
+        while not found:
+            assert time.monotonic() < end_s
+            found = receiver.receive(0.1)
+    assert [data for _, data in found] == [b""] and "without the token" in receiver.error
 
 
 def test_calls_are_limited(opened: Open) -> None:

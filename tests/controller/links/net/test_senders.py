@@ -91,3 +91,15 @@ def test_standard_output_takes_lines(monkeypatch: pytest.MonkeyPatch) -> None:
             while out.send(b"x" * 1000):  # a reader that does not read holds nothing up
                 pass
     os.close(reading)
+
+
+def test_a_token_begins_each_stream() -> None:
+    with closing(socket.create_server(("127.0.0.1", 0))) as server:
+        address = parse_address(f"tcp:127.0.0.1:{server.getsockname()[1]}", FORM)
+        with closing(open_sender(address, b"\n", token="secret")) as out:
+            assert out.send(b"hello")
+            server.settimeout(10)
+            call, _ = server.accept()
+            call.settimeout(10)
+            with closing(call), call.makefile("rb") as lines:
+                assert (lines.readline(), lines.readline()) == (b"AUTH secret\n", b"hello\n")

@@ -25,6 +25,7 @@ from controller.links.links import read_link
         ({"listen": "127.0.0.1:5", "gains": {"brow": 0.5}}, "no region called 'brow', did you mean 'brows'"),
         ({"listen": "127.0.0.1:5", "gains": {"brows": 5.0}}, "must be 0 to 4"),
         ({"listen": "127.0.0.1:5", "lost": "panic"}, "'fade', 'hold', 'neutral' or 'stop'"),
+        ({"listen": "127.0.0.1:5", "token": "a-token-of-mine"}, "only TCP streams have one"),
         ({"listen": "127.0.0.1:5", "smothing": True}, "Extra inputs"),
     ],
 )
@@ -45,3 +46,24 @@ def test_what_is_wrong_is_told(keys: dict[str, object], told: str) -> None:
 )
 def test_what_is_right_is_shown_as_people_write_it(keys: dict[str, object], shown: str) -> None:
     assert str(read_link({"kind": "vmc", **keys})) == shown
+
+
+@pytest.mark.parametrize(
+    ("keys", "needed"),
+    [
+        ({"kind": "json", "listen": "tcp:127.0.0.1:5"}, False),
+        ({"kind": "json", "listen": "tcp:127.0.0.1:5", "token": "a-token-of-mine"}, True),
+        ({"kind": "json", "listen": "tcp:0.0.0.0:5", "open_to_network": True}, True),
+        ({"kind": "json", "listen": "udp:0.0.0.0:5", "open_to_network": True}, False),
+        ({"kind": "ifacialmocap", "listen": "tcp:0.0.0.0:5", "open_to_network": True}, False),
+        ({"kind": "json", "connect": "tcp:10.0.0.1:5"}, False),
+        ({"kind": "json", "send": "tcp:10.0.0.1:5", "token": "a-token-of-mine"}, False),
+    ],
+)
+def test_which_streams_need_a_token(keys: dict[str, object], needed: bool) -> None:
+    assert read_link(keys).own.needs_token == needed
+
+
+def test_a_token_must_be_hard_to_guess() -> None:
+    with pytest.raises(ValidationError, match="at least 12"):
+        read_link({"kind": "json", "listen": "tcp:127.0.0.1:5", "token": "short"})

@@ -1,0 +1,146 @@
+"""Sends the face that a webcam sees: MediaPipe's face landmarker, by a model given as a file (the extra webcam).
+
+MediaPipe gives ARKit's shapes by name (without ``tongueOut``) and a 4 x 4 matrix of the head, in metres or centimetres,
+whose axes are x to the image's right, y up and z towards the camera. Source: the documentation of its face landmarker.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller.base.errors import LinkError
+from controller.base.parameters import Floats, Parameters
+from controller.formats.frame import Frame
+from controller.links.net.senders import open_sender
+from controller.tools.translate import parse_end
+from surface.base import files
+from surface.base.extras import importing
+
+_LARGEST_MODEL = 256 << 20
+_MODEL_HINT = "give the path of face_landmarker.task, which MediaPipe's documentation names; omote downloads nothing"
+
+
+@dataclass
+class Seen:
+    """What was done. frames : pictures that the camera gave. faces : those with a face. sent : messages."""
+
+    frames: int = 0
+    faces: int = 0
+    sent: int = 0
+
+
+def send_webcam(
+    model: Path,
+    target: str,
+    parameters: Parameters,
+    *,
+    camera: int = 0,
+    seconds: float | None = None,
+    ready: Callable[[str], None] = lambda text: None,
+) -> Seen:
+    """Send faces until the time is up, the camera ends, or Ctrl-C.
+
+    model : file of MediaPipe's face landmarker. target : ``kind:address``, as of ``omote translate``.
+
+    Raises MissingPackage, LinkError, PluginError: a package, the model, the camera or the target is not there.
+    """
+    with files.reading(model, LinkError, hint=_MODEL_HINT), files.open_file(model, _LARGEST_MODEL) as file:
+        content = file.read()
+    form, address = parse_end(target)
+    with ExitStack() as closers:
+        results = _results(content, camera, closers)
+        sender = open_sender(address, form.delimiter)
+        closers.callback(sender.close)
+        ready(f"sending the face that camera {camera} sees to {form.kind} at {address}")
+        seen, encoder, end_s = Seen(), form.encoder(parameters), time.monotonic() + (seconds or math.inf)
+        for time_s, result in results:
+            frame = frame_of(result, time_s, parameters)
+            seen.frames, seen.faces = seen.frames + 1, seen.faces + frame.face
+            seen.sent += sum([sender.send(message) for message in encoder.encode(frame)])
+            if time.monotonic() >= end_s:
+                break
+    return seen
+
+
+def frame_of(result: Any, time_s: float, parameters: Parameters) -> Frame:
+    """A frame of a result of the face landmarker; one without a face where it saw none."""
+    values, mask = parameters.neutral(), np.zeros(len(parameters), dtype=bool)
+    if not result.face_blendshapes:
+        return Frame(values, mask, time_s, face=False)
+    for shape in result.face_blendshapes[0]:
+        at = parameters.find(shape.category_name)
+        if at is not None and math.isfinite(shape.score):
+            values[at], mask[at] = shape.score, True
+    matrices = result.facial_transformation_matrixes
+    if matrices:
+        head, angles = _head(np.asarray(matrices[0], dtype=np.float64), parameters)
+        values[head], mask[head] = angles, True
+    return Frame(values, mask, time_s)
+
+
+def _head(matrix: Floats, parameters: Parameters) -> tuple[list[int], Floats]:
+    """Positions and values of the head's yaw, pitch and roll from a matrix (4, 4).
+
+    Rotation as Ry(yaw) Rx(pitch) Rz(roll). The face looks at the camera, along +z; the image's right, +x, is its own
+    left: a turn of its nose to +x is a yaw to its own left, which counts positive. Pitch counts positive downwards, and
+    roll positive where the own left side rises.
+    """
+    turn = matrix[:3, :3]
+    yaw, pitch = math.atan2(turn[0, 2], turn[2, 2]), math.asin(min(max(-turn[1, 2], -1.0), 1.0))
+    roll = math.atan2(turn[1, 0], turn[1, 1])
+    at = [parameters.index(name) for name in ("headYaw", "headPitch", "headRoll")]
+    return at, np.clip(np.array([yaw, pitch, roll]) / parameters.full_scale_rad[at], -1.0, 1.0)
+
+
+def _results(model: bytes, camera: int, closers: ExitStack) -> Iterator[tuple[float, Any]]:
+    """Times (s) and results of the face landmarker, of every picture of the camera."""
+    with importing("omote webcam", "mediapipe", "cv2"):
+        import cv2  # optional: the extra webcam
+        import mediapipe as mp
+    landmarker = _landmarker(mp, model)
+    closers.callback(landmarker.close)
+    capture = cv2.VideoCapture(camera)
+    closers.callback(capture.release)
+    if not capture.isOpened():
+        raise LinkError(f"camera {camera} cannot be opened", hint="another number? --camera 1; look at: ls /dev/video*")
+    return _watch(_pictures(capture), lambda picture, ms: landmarker.detect_for_video(
+        mp.Image(image_format=mp.ImageFormat.SRGB, data=cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)), ms))  # fmt: skip
+
+
+def _landmarker(mp: Any, model: bytes) -> Any:
+    tasks = mp.tasks
+    options = tasks.vision.FaceLandmarkerOptions(
+        base_options=tasks.BaseOptions(model_asset_buffer=model),
+        running_mode=tasks.vision.RunningMode.VIDEO,
+        output_face_blendshapes=True,
+        output_facial_transformation_matrixes=True,
+    )
+    try:
+        return tasks.vision.FaceLandmarker.create_from_options(options)
+    except (RuntimeError, ValueError) as error:
+        why = str(error).splitlines()[0][:200]
+        raise LinkError(f"the model is no face landmarker of MediaPipe: {why}", hint=_MODEL_HINT) from error
+
+
+def _pictures(capture: Any) -> Iterator[Any]:
+    while True:
+        good, picture = capture.read()
+        if not good:
+            return
+        yield picture
+
+
+def _watch(pictures: Iterable[Any], detect: Callable[[Any, int], Any]) -> Iterator[tuple[float, Any]]:
+    begin_s, last_ms = time.monotonic(), -1
+    for picture in pictures:
+        time_s = time.monotonic() - begin_s
+        last_ms = max(last_ms + 1, int(1e3 * time_s))  # it wants times that rise
+        yield time_s, detect(picture, last_ms)
