@@ -46,7 +46,7 @@ void main() {
     float teeth = smoothstep(0.5, 0.7, albedo.g);
     // A tongue past the lips is in the open.
     float open = mix(occlusion, 1.0, max(0.5 * deep, 0.5 * teeth));
-    float reach = mix(clamp(daylight(n) * open, 0.0, 1.0), 1.0, smoothstep(-8.0, 3.0, past));
+    float reach = mix(clamp(daylight(n) * open, 0.0, 1.0), 1.0, smoothstep(-2.0, 4.0, past));
     // Light bounces between here and the red walls of the mouth: the less comes straight in, the more that counts.
     // Teeth pass it on to each other, whiter than those walls do.
     vec3 bounce = mix(0.5 * (albedo + WALLS), NEIGHBOURS, 0.9 * teeth);
