@@ -198,7 +198,7 @@ def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[s
         "sclera_colour": tuple(colours.get("sclera", theme.sclera)),
         "glow": theme.glow,
         "iris_radius": radius,
-        "pupil_radius": _PUPIL * radius,
+        "pupil_radius": _PUPIL * theme.pupil * radius,
         **openings.eye(part),
     }
 
