@@ -225,7 +225,8 @@ def _grooved(part: ViewPart) -> np.ndarray:
     """Occlusion (m, 1) of a tongue, with a furrow along the middle of its upper side."""
     across = np.asarray(part.vertices[:, 0]) - np.median(part.vertices[:, 0])
     furrow = np.exp(-((across / _GROOVE_MM) ** 2)) * np.clip(part.normals[:, 1], 0.0, 1.0)
-    return (_occlusion(part) * (1.0 - _GROOVE * furrow[:, None])).astype(np.float32)
+    grooved: np.ndarray = (_occlusion(part) * (1.0 - _GROOVE * furrow[:, None])).astype(np.float32)
+    return grooved
 
 
 def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0.0) -> Material:

@@ -82,8 +82,8 @@ class Theme:
 
     @property
     def pupil(self) -> float:
-        """How wide pupils are in this light, in those of the theme "skin": after Moon and Spencer, "On the Stiles-
-        Crawford effect", J. Opt. Soc. Am. 34 (1944), with a room's luminance for that theme. A mask's stay as they are."""
+        """How wide pupils are in this light, in those of the theme "skin", for which a room's luminance is assumed; a
+        mask's stay as they are. Moon and Spencer, "On the Stiles-Crawford effect", J. Opt. Soc. Am. 34 (1944)."""
         if not self.use_painted:
             return 1.0
         colours = np.array([self.key.colour, self.fill.colour, self.sky, self.ground]) * [[1.0], [1.0], [0.5], [0.5]]
