@@ -145,7 +145,9 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     occlusion = attribute(part, "occlusion", (1.0,))[:, :1]
     packed = np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), np.clip(occlusion, 0.0, 1.0)])
     thin = attribute(part, "thin", (0.0,))[:, :1]
-    fine = {"lips": attribute(part, "lips", (0.0,))}  # every part has them: parts are drawn together
+    fine = {}
+    if theme.use_painted and openings.lip_tint:
+        fine["lips"] = attribute(part, "lips", (0.0,))  # of every part: they are drawn together
     if "freckles" in part.attributes:
         fine["freckles"] = part.attributes["freckles"]
     lamp = {"lamp": openings.lip_line(part).astype(np.float32)[:, None]} if theme.lit else {}
@@ -180,7 +182,7 @@ def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[
         "through": theme.through,
         "gloss_scale": theme.gloss,
         "detail_strength": 0.16 * theme.detail,
-        "lip_tint": openings.lip_tint,
+        **({"lip_tint": openings.lip_tint} if theme.use_painted and openings.lip_tint else {}),
         **_lamps(theme),
     }
 

@@ -64,7 +64,8 @@ class Renderer:
         self.evaluator = choose(ctx, head, evaluator)
         self.evaluator.pose(self._values)
         self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids))
-        self._fine = [name for name in materials.FINE if any(name in part.attributes for part in head.parts)]
+        self._fine = ["freckles"] if any("freckles" in part.attributes for part in head.parts) else []
+        self._fine += ["lips"] if self.openings.lip_tint else []
         used = {materials.of(part.material).program for part in head.parts}
         self._worn = [name for name in materials.WORN if name in used]
         self._programs = materials.programs(ctx, quality, self.theme, fine=self._fine, worn=self._worn)

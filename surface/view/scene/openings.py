@@ -282,13 +282,13 @@ def vector_area(ring: np.ndarray) -> np.ndarray:
     return 0.5 * np.array([both[1, 2] - both[2, 1], both[2, 0] - both[0, 2], both[0, 1] - both[1, 0]])
 
 
-def lip_tint(skin: ViewPart | None) -> tuple[float, ...]:
-    """(3,) how many times the albedo of the skin around them lips have, by channel; ones where no lips are painted."""
+def lip_tint(skin: ViewPart | None) -> tuple[float, ...] | None:
+    """(3,) how many times the albedo of the skin around them lips have, by channel; None where no lips are painted."""
     lips = None if skin is None else skin.attributes.get("lips")
     if skin is None or lips is None or "albedo" not in skin.attributes:
-        return (1.0, 1.0, 1.0)
+        return None
     albedo = np.asarray(skin.attributes["albedo"], float)
     on, beside = (albedo[chosen[:, 0]] for chosen in (lips > 0.95, (lips > 0.0) & (lips < 0.1)))
     if not len(on) or not len(beside):
-        return (1.0, 1.0, 1.0)
+        return None
     return tuple((on.mean(axis=0) / np.maximum(beside.mean(axis=0), 1e-3)).tolist())
