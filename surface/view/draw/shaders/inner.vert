@@ -42,7 +42,10 @@ void main() {
     float deep = smoothstep(DEEP_MM.x, DEEP_MM.y, -past);
     float teeth = smoothstep(0.5, 0.7, albedo.g);
     // Towards the tongue gums reach far up the teeth, and nothing white is near.
-    float inwards = teeth * smoothstep(-0.1, 0.4, -dot(n, normalize(position - opening_centre + ARCH_MM * out_of)));
+    vec3 side = normalize(opening_side);
+    vec3 away = position - opening_centre;
+    vec3 outwards = normalize(dot(away, side) * side + (past + ARCH_MM) * out_of);
+    float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
     vec3 own = mix(albedo, WALLS, inwards);
     n = normalize(mix(n, out_of, 0.55 * deep));
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
