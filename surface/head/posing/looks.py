@@ -55,7 +55,10 @@ def _colour_skin(part: HeadPart, look: Look) -> None:
 
 
 def _lips(part: HeadPart) -> Floats:
-    """(m, 1) share of each vertex that is lip: what paint makes glossy."""
+    """(m, 1) share of each vertex that is lip: as painted, or what paint makes glossy."""
+    painted = part.attributes.get("lips")
+    if painted is not None:
+        return np.asarray(painted[:, :1], np.float64)
     gloss = part.attributes.get("gloss")
     if gloss is None:
         return np.zeros((len(part.vertices), 1))

@@ -3,7 +3,7 @@
 A layer of paint names a part, an attribute, a value and a field between 0 and 1 in (u, v):
 
 ``band``     along polylines: 1 within ``width`` of any, fading to 0 over ``feather``
-``region``   inside closed polygons, fading to 0 over ``feather`` outside
+``region``   inside closed polygons, fading to 0 over ``feather`` from ``width`` outside on; below 0 it begins inside
 ``spots``    round ``points``, fading to 0 over ``feather`` from ``width`` on
 
 Layers are applied in order: attribute = attribute + amount * field * (value - attribute).
@@ -27,6 +27,7 @@ BASE: dict[str, tuple[float, ...]] = {
     "occlusion": (1.0,),
     "occlusion_floor": (0.0,),  # baked shade leaves at least this much light
     "gloss": (0.3,),
+    "lips": (0.0,),  # 1 on lips, 0.5 at their edge, which quality "full" draws by pixel
     "iris": (0.080, 0.125, 0.150),  # colours of an eyeball, and the iris's radius in eyeball radii: all over it
     "sclera": (0.68, 0.63, 0.59),
     "iris_radius": (0.49,),
@@ -101,7 +102,8 @@ def layer_field(layer: dict[str, Any], uv: Floats) -> Floats:
         nearest_on_line(uv, line, kind == "region", distance, along)
         np.minimum(least, distance, out=least)
         if kind == "region":
-            least[inside(np.hstack([line, np.roll(line, -1, axis=0)]), uv)] = 0.0
+            within = inside(np.hstack([line, np.roll(line, -1, axis=0)]), uv)
+            least[within] = np.minimum(least[within], -distance[within])
     return 1.0 - smoothstep((least - width) / max(feather, 1e-9))
 
 

@@ -28,6 +28,8 @@ _INSIDE = "0.25"
 #: A baked sky without occlusion.
 _OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
 _LOWER_LASHES = 0.42
+#: Half the width of a tongue's furrow, mm, and how much of the light it takes.
+_GROOVE_MM, _GROOVE = 2.2, 0.5
 #: Radius of an iris, in eyeball radii, and of its pupil, in radii of the iris.
 _IRIS, _PUPIL = 0.49, 0.185 / 0.49
 #: How a bar of lamps fades, as brows do in hair.frag.
@@ -36,6 +38,8 @@ _BAR = (2.2, -2.6, 0.08, 0.0)
 INSIDE = ("eye", "teeth", "gums", "mouth")
 #: Programs of what is worn.
 WORN = ("strand", "cloth")
+#: Attributes of skin that are drawn by pixel, with quality "full": freckles, and the edge of the lips.
+FINE = ("freckles", "lips")
 
 
 @dataclass(frozen=True)
@@ -59,13 +63,13 @@ class Material:
 
 
 def programs(
-    ctx: moderngl.Context, quality: str, theme: Theme, *, freckled: bool = False, worn: Collection[str] = ()
+    ctx: moderngl.Context, quality: str, theme: Theme, *, fine: Collection[str] = (), worn: Collection[str] = ()
 ) -> dict[str, moderngl.Program]:
-    """Every program of a quality and a theme, by name; ``freckled`` as in :func:`skin_program`, ``worn`` : which of
-    those for what is worn."""
+    """Every program of a quality and a theme, by name; ``fine`` as in :func:`skin_program`, ``worn`` : which of those
+    for what is worn."""
     flat = ("flat.frag",)
     return {name: worn_program(ctx, name, quality) for name in WORN if name in worn} | {
-        "skin": skin_program(ctx, quality, theme, freckled=freckled),
+        "skin": skin_program(ctx, quality, theme, fine=fine),
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
         "inner": build(
             ctx,
@@ -81,10 +85,10 @@ def programs(
 
 
 def skin_program(
-    ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False, freckled: bool = False
+    ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False, fine: Collection[str] = ()
 ) -> moderngl.Program:
-    """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software; `freckled`
-    draws freckles where the parts' attribute of that name has them, with quality "full"."""
+    """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software; `fine` :
+    attributes of parts that quality "full" draws by pixel, of :data:`FINE`."""
     defines: dict[str, int | str] = {"INSIDE": _INSIDE}
     scale: dict[str, int | str] = {"DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
     if theme.lit:
@@ -94,8 +98,8 @@ def skin_program(
         return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), fragment, defines=defines)
     if theme.seams:
         defines |= {"SEAMS": 1} | scale
-    if freckled and theme.use_painted:
-        defines["FRECKLES"] = 1
+    if theme.use_painted:
+        defines |= {name.upper(): 1 for name in FINE if name in fine}
     if simplified:
         defines["GRAIN_TEXELS"] = f"{_DETAIL_SIZE // 2}.0"
     shared = ("light.glsl", "skin.glsl")
@@ -141,10 +145,14 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     occlusion = attribute(part, "occlusion", (1.0,))[:, :1]
     packed = np.hstack([np.sqrt(np.clip(albedo, 0.0, 1.0)), np.clip(occlusion, 0.0, 1.0)])
     thin = attribute(part, "thin", (0.0,))[:, :1]
-    freckled = {"freckles": part.attributes["freckles"]} if "freckles" in part.attributes else {}
+    fine = {}
+    if theme.use_painted and openings.lip_tint:
+        fine["lips"] = attribute(part, "lips", (0.0,))  # of every part: they are drawn together
+    if "freckles" in part.attributes:
+        fine["freckles"] = part.attributes["freckles"]
     lamp = {"lamp": openings.lip_line(part).astype(np.float32)[:, None]} if theme.lit else {}
     return (
-        freckled
+        fine
         | lamp
         | {
             "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
@@ -174,6 +182,7 @@ def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[
         "through": theme.through,
         "gloss_scale": theme.gloss,
         "detail_strength": 0.16 * theme.detail,
+        **({"lip_tint": openings.lip_tint} if theme.use_painted and openings.lip_tint else {}),
         **_lamps(theme),
     }
 
@@ -191,21 +200,35 @@ def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[s
         "sclera_colour": tuple(colours.get("sclera", theme.sclera)),
         "glow": theme.glow,
         "iris_radius": radius,
-        "pupil_radius": _PUPIL * radius,
+        "pupil_radius": _PUPIL * theme.pupil * radius,
         **openings.eye(part),
     }
 
 
-def _inner(albedo: tuple[float, float, float], wrap: float, wetness: float, **options: Any) -> Material:
+def _inner(
+    albedo: tuple[float, float, float], wrap: float, wetness: float, *, grooved: bool = False, **options: Any
+) -> Material:
     """A material inside the mouth."""
 
     fixed = {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness}
     return Material(
         "inner",
-        lambda part, theme, openings: {"occlusion": attribute(part, "occlusion", (1.0,))[:, :1]},
+        lambda part, theme, openings: {"occlusion": _grooved(part) if grooved else _occlusion(part)},
         lambda part, theme, openings: fixed | _lamps(theme) | openings.mouth(),
         **options,
     )
+
+
+def _occlusion(part: ViewPart) -> np.ndarray:
+    return attribute(part, "occlusion", (1.0,))[:, :1]
+
+
+def _grooved(part: ViewPart) -> np.ndarray:
+    """Occlusion (m, 1) of a tongue, with a furrow along the middle of its upper side."""
+    across = np.asarray(part.vertices[:, 0]) - np.median(part.vertices[:, 0])
+    furrow = np.exp(-((across / _GROOVE_MM) ** 2)) * np.clip(part.normals[:, 1], 0.0, 1.0)
+    grooved: np.ndarray = (_occlusion(part) * (1.0 - _GROOVE * furrow[:, None])).astype(np.float32)
+    return grooved
 
 
 def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0.0) -> Material:
@@ -281,7 +304,7 @@ MATERIALS: dict[str, Material] = {
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
     "brow": _hair("brow", (0.72, 0.50, 0.30, 2.4), 1.0),
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, order=3),
-    "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.22, order=4),
+    "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.42, grooved=True, order=4),
     "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),
     "mouth": _inner((0.32, 0.09, 0.08), 0.3, 0.08, two_sided=True, order=6),
 }

@@ -64,10 +64,11 @@ class Renderer:
         self.evaluator = choose(ctx, head, evaluator)
         self.evaluator.pose(self._values)
         self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids))
-        self._freckled = any("freckles" in part.attributes for part in head.parts)
+        self._fine = ["freckles"] if any("freckles" in part.attributes for part in head.parts) else []
+        self._fine += ["lips"] if self.openings.lip_tint else []
         used = {materials.of(part.material).program for part in head.parts}
         self._worn = [name for name in materials.WORN if name in used]
-        self._programs = materials.programs(ctx, quality, self.theme, freckled=self._freckled, worn=self._worn)
+        self._programs = materials.programs(ctx, quality, self.theme, fine=self._fine, worn=self._worn)
         self._detail = materials.detail_texture(ctx)
         self._background = Rectangles(ctx, self._programs["background"])
         parts = sorted(head.parts, key=lambda part: materials.of(part.material).order)
@@ -99,7 +100,7 @@ class Renderer:
             return
         self._simplified, old = True, [self._programs[name] for name in ("skin", *self._worn)]
         self._programs["skin"] = materials.skin_program(
-            self.ctx, self.quality, self.theme, simplified=True, freckled=self._freckled
+            self.ctx, self.quality, self.theme, simplified=True, fine=self._fine
         )
         for name in self._worn:
             self._programs[name] = materials.worn_program(self.ctx, name, self.quality, simplified=True)

@@ -32,7 +32,7 @@ _LIP_REACH = 45.0
 #: The skin ends inside the lips; the light enters this far in front of its edge, mm.
 _LIP_DEPTH = 14.0
 #: Share of the edge's area at rest that is still hidden behind closed lips.
-_SHUT = 0.75
+_SHUT = 0.96
 #: Half the mouth's width, a little less: how far the opening counts to either side.
 _SLIDE = 0.38
 _FALLBACK_AREA = (0.0, 0.0, 250.0)
@@ -90,6 +90,7 @@ class Openings:
         loops = boundary_loops(self._skin.triangles) if self._skin is not None else []
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
+        self.lip_tint = lip_tint(self._skin)
         area = np.array(_FALLBACK_AREA)
         if self._lips is not None and self._skin is not None:
             area = vector_area(self._read(self._skin, self._lips.loop))
@@ -279,3 +280,15 @@ def vector_area(ring: np.ndarray) -> np.ndarray:
     # The sum of p x q is the antisymmetric part of the sum of p q^T.
     both = points[:-1].T @ points[1:]
     return 0.5 * np.array([both[1, 2] - both[2, 1], both[2, 0] - both[0, 2], both[0, 1] - both[1, 0]])
+
+
+def lip_tint(skin: ViewPart | None) -> tuple[float, ...] | None:
+    """(3,) how many times the albedo of the skin around them lips have, by channel; None where no lips are painted."""
+    lips = None if skin is None else skin.attributes.get("lips")
+    if skin is None or lips is None or "albedo" not in skin.attributes:
+        return None
+    albedo = np.asarray(skin.attributes["albedo"], float)
+    on, beside = (albedo[chosen[:, 0]] for chosen in (lips > 0.95, (lips > 0.0) & (lips < 0.1)))
+    if not len(on) or not len(beside):
+        return None
+    return tuple((on.mean(axis=0) / np.maximum(beside.mean(axis=0), 1e-3)).tolist())

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+import numpy as np
 
 from surface.base.errors import ViewError
 
 Colour = tuple[float, float, float]
+_LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear RGB, ITU-R BT.709
+_OWN_LIGHT = 1.4042  # luminance of the theme "skin" at the eyes, its key and fill and half of sky and ground
+_ROOM = 30.0  # cd/m^2 of that light: a lit room
+_WIDEST = 1.77  # two thirds of the iris
 
 
 @dataclass(frozen=True)
@@ -72,6 +79,21 @@ class Theme:
     def lit(self) -> bool:
         """Whether the face has lamps."""
         return any(self.lamps)
+
+    @property
+    def pupil(self) -> float:
+        """How wide pupils are in this light, in those of the theme "skin", for which a room's luminance is assumed; a
+        mask's stay as they are. Moon and Spencer, "On the Stiles-Crawford effect", J. Opt. Soc. Am. 34 (1944)."""
+        if not self.use_painted:
+            return 1.0
+        colours = np.array([self.key.colour, self.fill.colour, self.sky, self.ground]) * [[1.0], [1.0], [0.5], [0.5]]
+        light = float((colours @ _LUMINANCE).sum()) / _OWN_LIGHT
+        return min(_diameter_mm(_ROOM * max(light, 1e-6)) / _diameter_mm(_ROOM), _WIDEST)
+
+
+def _diameter_mm(luminance: float) -> float:
+    """Of a pupil at a luminance, cd/m^2."""
+    return 4.9 - 3.0 * math.tanh(0.4 * math.log10(luminance))
 
 
 THEMES: dict[str, Theme] = {

@@ -41,10 +41,10 @@ def test_expand_scales_with_intensity(vocabulary: Vocabulary) -> None:
 
 
 def test_a_response_below_1_shows_weak_intensities_more(vocabulary: Vocabulary) -> None:
-    full, half = vocabulary.expand("anger", 1.0), vocabulary.expand("anger", 0.5)
-    assert vocabulary["anger"].response == 0.7
+    full, half = vocabulary.expand("sadness", 1.0), vocabulary.expand("sadness", 0.5)
+    assert vocabulary["sadness"].response == 0.7
     assert all(half[i] == pytest.approx(full[i] * 0.5**0.7) for i in full)
-    assert vocabulary.expand("anger", 0.0) == dict.fromkeys(full, 0.0)
+    assert vocabulary.expand("sadness", 0.0) == dict.fromkeys(full, 0.0)
 
 
 def test_names_in_any_case_and_aliases(vocabulary: Vocabulary) -> None:

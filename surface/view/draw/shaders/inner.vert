@@ -2,6 +2,7 @@
 #define WALLS vec3(0.50, 0.18, 0.16)
 #define NEIGHBOURS vec3(0.84, 0.82, 0.80)
 #define DEEP_MM vec2(12.0, 40.0)  // behind the lips: where the mouth's inside begins to be deep, and where it is
+#define ARCH_MM 45.0              // how far behind the lips the middle of the row of teeth lies
 #define ROUND_WALLS vec3(1.0, 0.86, 0.78)
 
 uniform mat4 view_projection;
@@ -39,19 +40,27 @@ void main() {
     float past = dot(position - opening_centre, out_of);
     // Far in, light has been round the mouth's red walls and comes from everywhere.
     float deep = smoothstep(DEEP_MM.x, DEEP_MM.y, -past);
+    float teeth = smoothstep(0.5, 0.7, albedo.g);
+    // Towards the tongue gums reach far up the teeth, and nothing white is near.
+    vec3 side = normalize(opening_side);
+    vec3 away = position - opening_centre;
+    vec3 outwards = normalize(dot(away, side) * side + (past + ARCH_MM) * out_of);
+    float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
+    vec3 own = mix(albedo, WALLS, inwards);
     n = normalize(mix(n, out_of, 0.55 * deep));
-    vec3 tint = mix(vec3(1.0), ROUND_WALLS, deep);
+    vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
         + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
-    float teeth = smoothstep(0.5, 0.7, albedo.g);
     // A tongue past the lips is in the open.
     float open = mix(occlusion, 1.0, max(0.5 * deep, 0.5 * teeth));
-    float reach = mix(clamp(daylight(n) * open, 0.0, 1.0), 1.0, smoothstep(-8.0, 3.0, past));
+    float area = length(opening_area);
+    float direct = mix(daylight(n) * open, 0.28 * area / (area + 400.0), inwards);
+    float reach = mix(clamp(direct, 0.0, 1.0), 1.0, smoothstep(-2.0, 4.0, past));
     // Light bounces between here and the red walls of the mouth: the less comes straight in, the more that counts.
     // Teeth pass it on to each other, whiter than those walls do.
-    vec3 bounce = mix(0.5 * (albedo + WALLS), NEIGHBOURS, 0.9 * teeth);
+    vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * teeth * (1.0 - inwards));
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach;
-    v_colour = encode(albedo * tint * light * arrives + shine * key_colour);
+    v_colour = encode(own * tint * light * arrives + shine * key_colour);
 }

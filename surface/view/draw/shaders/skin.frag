@@ -19,6 +19,19 @@ float freckle() {
 }
 #endif
 
+#ifdef LIPS
+#define LIP_EDGE 0.20           // of v_lips to both sides of the edge
+
+uniform vec3 lip_tint;
+in float v_lips;
+
+// Vertices have the lips' colour in shares of v_lips, which their triangles would draw as a fringe.
+vec3 lips() {
+    float share = smoothstep(0.5 - LIP_EDGE, 0.5 + LIP_EDGE, v_lips);
+    return mix(vec3(1.0), lip_tint, share) / mix(vec3(1.0), lip_tint, v_lips);
+}
+#endif
+
 #ifdef PANELS
 in float v_lamp;
 #endif
@@ -52,6 +65,9 @@ void main() {
     float narrow = wide * wide;
     narrow *= narrow;
     vec3 lit = v_diffuse * (1.0 + grain.w * vec3(0.7, 1.3, 1.5));
+#ifdef LIPS
+    lit *= lips();
+#endif
     lit += key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w);
 #ifdef FRECKLES
     lit *= mix(vec3(1.0), vec3(0.76, 0.62, 0.52), freckle());

@@ -16,6 +16,10 @@ out vec2 v_uv;
 in float freckles;          // how many grow here, 0..1
 out float v_freckles;
 #endif
+#ifdef LIPS
+in float lips;              // 1 on lips, 0.5 at their edge
+out float v_lips;
+#endif
 #ifdef PANELS
 in float lamp;              // how much of the lamps' light it sends out
 out float v_lamp;
@@ -33,6 +37,9 @@ void main() {
     v_uv = surface_uv_gloss.xy;
 #ifdef FRECKLES
     v_freckles = freckles;
+#endif
+#ifdef LIPS
+    v_lips = lips;
 #endif
 #ifdef PANELS
     v_lamp = lamp;

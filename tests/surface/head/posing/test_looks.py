@@ -41,6 +41,16 @@ def test_a_lip_colour_is_only_on_lips():
     assert painted.attributes["albedo"][1, 2] > 0.6
 
 
+def test_painted_lips_count_instead_of_gloss():
+    own, plain = skin(), skin()
+    for each in (own, plain):
+        each.attributes["lips"] = np.float32([[0.5], [0.0], [0.0]])
+    apply_look([plain], Look(melanin=0.4), EYES)
+    apply_look([own], Look(melanin=0.4, lips=(0.0, 0.0, 1.0)), EYES)
+    changed = (own.attributes["albedo"] != plain.attributes["albedo"]).any(axis=1)
+    assert changed.tolist() == [True, False, False]
+
+
 def test_freckles_grow_where_the_sun_reaches():
     own = skin()
     apply_look([own], Look(freckles=0.5), EYES)

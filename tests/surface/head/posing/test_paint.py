@@ -34,6 +34,15 @@ def test_a_region_is_full_inside():
     assert (got[inside] == 0).all() and (got[(np.abs(UV - 0.5) > 0.41).any(axis=1)] == 1).all()
 
 
+def test_a_region_with_a_width_below_0_fades_across_its_edge():
+    square = [[0.2, 0.2], [0.8, 0.2], [0.8, 0.8], [0.2, 0.8]]
+    got = painted(layer(kind="region", lines=[square], width=-0.05))
+    away = np.abs(UV - 0.5).max(axis=1) - 0.3  # from the edge, below 0 inside
+    straight = (np.abs(UV - 0.5) < 0.3).any(axis=1)  # off its corners
+    assert (got[away < -0.05 - 1e-9] == 0).all() and (got[away > 0.08] == 1).all()
+    np.testing.assert_allclose(got[straight & np.isclose(away, 0.0)], 0.5, atol=1e-6)
+
+
 def test_spots_are_round():
     got = painted(layer(kind="spots", lines=[[[0.5, 0.5]]], width=0.2))
     r = np.linalg.norm(UV - 0.5, axis=1)
@@ -45,7 +54,7 @@ def test_layers_lie_on_each_other_and_other_parts_get_none():
     two = [white, layer(kind="all", attribute="albedo", value=[0, 0, 1], amount=0.5)]
     np.testing.assert_allclose(paint_part(two, "face", UV, "")["albedo"], np.tile([0.5, 0.5, 1], (len(UV), 1)))
     assert paint_part(two, "back", UV, "") == {}
-    assert set(BASE) == {"albedo", "occlusion", "occlusion_floor", "gloss", "iris", "sclera", "iris_radius"}
+    assert set(BASE) == {"albedo", "occlusion", "occlusion_floor", "gloss", "lips", "iris", "sclera", "iris_radius"}
 
 
 @pytest.mark.parametrize(

@@ -25,7 +25,7 @@ def test_text_begins_with_the_version_then_the_defines() -> None:
 def test_every_program_compiles(gl: None, quality: str, theme: str) -> None:
     ctx = open_context()
     try:
-        made = materials.programs(ctx, quality, THEMES[theme], freckled=True, worn=materials.WORN)
+        made = materials.programs(ctx, quality, THEMES[theme], fine=materials.FINE, worn=materials.WORN)
         assert {material.program for material in materials.MATERIALS.values()} <= set(made)
     finally:
         ctx.release()

@@ -228,11 +228,11 @@ def test_the_mouths_opening_is_where_its_lips_are(head: BallHead) -> None:
     assert mouth["opening_centre"] == pytest.approx(ring.mean(axis=0) + 14.0 * outward, abs=1e-3)
     corner = ring[np.argmax(ring[:, 0])] - ring[np.argmin(ring[:, 0])]
     assert mouth["opening_side"] == pytest.approx(0.38 * corner, abs=1e-3)
-    shut = 0.75 * np.linalg.norm(vector_area(face.rest[lips.loop].astype(float)))
+    shut = 0.96 * np.linalg.norm(vector_area(face.rest[lips.loop].astype(float)))
     assert np.linalg.norm(mouth["opening_area"]) == pytest.approx(np.linalg.norm(area) - shut, rel=1e-4)
     head.pose(values())
     openings.refresh()
-    assert np.linalg.norm(openings.mouth()["opening_area"]) == pytest.approx(shut / 3, rel=1e-4)
+    assert np.linalg.norm(openings.mouth()["opening_area"]) == pytest.approx(max(shut / 24, 20.0), rel=1e-4)
 
 
 def test_without_lips_a_mouth_is_open_a_little() -> None:
@@ -274,3 +274,14 @@ def test_lips_pressed_together_still_let_in_a_little_light(head: BallHead, size:
     assert all(np.isfinite(value).all() for value in mouth.values())
     if size > 0.01:
         assert np.linalg.norm(mouth["opening_area"]) == pytest.approx(20.0, rel=1e-4)
+
+
+def test_lips_tint_the_skin_beside_them(head: BallHead) -> None:
+    assert Openings(head.parts).lip_tint is None
+    face = part(head, "face")
+    share = np.linspace(0.0, 1.0, len(face.vertices), dtype=np.float32)[:, None]
+    skin, red = np.float32([0.6, 0.4, 0.3]), np.float32([0.45, 0.1, 0.15])
+    face.attributes = {"lips": share, "albedo": skin + share * (red - skin)}
+    assert Openings(head.parts).lip_tint == pytest.approx(tuple(red / skin), rel=0.15)
+    face.attributes = {"lips": np.zeros_like(share), "albedo": face.attributes["albedo"]}
+    assert Openings(head.parts).lip_tint is None

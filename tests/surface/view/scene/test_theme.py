@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import pytest
 
@@ -90,3 +90,25 @@ def test_only_a_robot_has_lamps() -> None:
     robot = THEMES["robot"]
     assert robot.glow > THEMES["mask"].glow and max(robot.lamps) > 1.0, "brighter than what is lit"
     assert not robot.use_painted and robot.hair == 0.0 and robot.through == (0, 0, 0)
+
+
+def lit(times: float, theme: Theme) -> Theme:
+    """The theme with all its lights so many times as bright."""
+
+    def times_colour(colour: tuple[float, float, float]) -> tuple[float, float, float]:
+        return colour[0] * times, colour[1] * times, colour[2] * times
+
+    lights = {
+        n: replace(getattr(theme, n), colour=times_colour(getattr(theme, n).colour)) for n in ("key", "fill", "rim")
+    }
+    return replace(theme, sky=times_colour(theme.sky), ground=times_colour(theme.ground), **lights)
+
+
+def test_pupils_are_wide_in_the_dark_and_small_in_bright_light() -> None:
+    skin = THEMES["skin"]
+    assert skin.pupil == pytest.approx(1.0, abs=1e-3)
+    found = [lit(times, skin).pupil for times in (0.0, 0.01, 0.1, 1.0, 10.0, 100.0)]
+    assert found == sorted(found, reverse=True) and found[0] < 1.8 and found[-1] > 0.55
+    # Moon and Spencer's diameters at 3 and 30 cd/m^2
+    assert found[2] == pytest.approx(4.34 / 3.32, rel=0.01)
+    assert lit(0.1, THEMES["mask"]).pupil == 1.0
