@@ -27,10 +27,11 @@ from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.refusal import save_or_refuse
 from surface.fit.points.care import POINTS as MORE_POINTS
 from surface.fit.points.care import with_care
+from surface.fit.points.facets import facet_sag
 from surface.fit.points.lid_seating import close_lips, seat_lids
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart
-from surface.fit.points.report import FitReport, FitResult, FittedPart, PartReport, measure
+from surface.fit.points.report import RMS_MM, FitReport, FitResult, FittedPart, PartReport, measure
 from surface.fit.points.strength import strengthen
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
@@ -156,7 +157,8 @@ def _fit_parts(
             chart = with_care(chart, mesh, *plan.eyes)
             request = replace(request, points=request.points + len(plan.eyes[0]) * MORE_POINTS)
         fitted = fit_chart(mesh if part.follows == "skin" else still, chart, request, partial(step, part.name))
-        report = measure(part.name, chart, fitted, mesh.names)
+        fine = facet_sag(mesh, chart) <= RMS_MM * scale
+        report = measure(part.name, chart, fitted, mesh.names, fine)
         if parts and not recipe.parts and report.neutral.rms > LOOSE_MM * scale:
             plan.notes.append(f"{part.name}: left out: it cannot be fitted, {report.neutral.rms:.1f} mm RMS")
             continue

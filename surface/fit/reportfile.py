@@ -69,6 +69,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
             {
                 "name": p.name, "control_points": p.points, "samples": p.samples, "excluded_samples": p.folded,
                 "neutral_mm": asdict(p.neutral), "mean_shape_rms_mm": p.mean_shape_rms,
+                "detailed_mm": asdict(p.detailed) if p.detailed else None, "detailed_share": p.share,
                 "shapes_mm": {n: asdict(e) for n, e in p.shapes.items()},
             }
             for p in report.parts

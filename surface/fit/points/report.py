@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Bools, Floats
 from surface.fit.points.refine import Fitted
 from surface.fit.source.chart import Chart
 from surface.head.model.data import HeadData
@@ -14,6 +14,7 @@ from surface.head.model.data import HeadData
 MOST_NAMES = 4  # of one kind that a line names
 NEUTRAL = "neutral"
 RMS_MM, P99_MM, SHAPES_MM = 0.25, 0.8, 0.08  # bounds for a face on a head of usual size
+FINE, MOST, ALL = "where the mesh has the detail", 0.5, 0.99  # said of at least so much of a face, and not of all of it
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class PartReport:
     """One part: its control points, the errors of neutral and of every shape it has.
 
     Samples inside folds (nostrils, ear canals) are held only loosely and not counted; ``folded`` is their number.
+    detailed : errors of neutral where the mesh itself is nearly as smooth as the surface, which is at a ``share`` of
+        the samples; None where that was not asked for.
     """
 
     name: str
@@ -38,6 +41,8 @@ class PartReport:
     folded: int
     neutral: Errors
     shapes: dict[str, Errors]
+    detailed: Errors | None = None
+    share: float = 1.0
 
     @property
     def mean_shape_rms(self) -> float:
@@ -164,13 +169,33 @@ class FitResult:
 
 
 def face_bounds(report: FitReport) -> str:
-    """Errors of the face, which is the first part, and their bounds, which grow with the head."""
+    """Errors of the face, which is the first part, and their bounds, which grow with the head.
+
+    Where flat faces of the mesh are further from a smooth surface than the bound itself, the mesh has no detail that a
+    fit could follow: both figures are told, and errors may be beyond the bounds there.
+    """
     face = report.parts[0]
-    pairs = [("RMS", face.neutral.rms, RMS_MM), ("99 %", face.neutral.p99, P99_MM)]
-    pairs += [("shapes", face.mean_shape_rms, SHAPES_MM)] if face.shapes else []
-    figures = ", ".join(f"{name} {got:.3f} of {most * report.scale:.3f} mm" for name, got, most in pairs)
-    kept = all(got <= most * report.scale for _, got, most in pairs)
-    return f"{face.name}: {'within' if kept else 'beyond'} the bounds for its size ({report.scale:.2f}): {figures}"
+    own = _bounded(report, face.neutral)
+    own += [("shapes", face.mean_shape_rms, SHAPES_MM * report.scale)] if face.shapes else []
+    fine = _bounded(report, face.detailed) + own[2:] if face.detailed and face.share >= MOST else own
+    verdict = (
+        "within the bounds" if _kept(own) else f"within the bounds {FINE}," if _kept(fine) else "beyond the bounds"
+    )
+    text = f"{face.name}: {verdict} for its size ({report.scale:.2f}): {_said(own)}"
+    return text if fine is own or face.share > ALL else f"{text}; {FINE} ({face.share:.0%} of it) {_said(fine[:2])}"
+
+
+def _bounded(report: FitReport, errors: Errors) -> list[tuple[str, float, float]]:
+    """Names of errors, the errors and their bounds, mm."""
+    return [("RMS", errors.rms, RMS_MM * report.scale), ("99 %", errors.p99, P99_MM * report.scale)]
+
+
+def _kept(figures: list[tuple[str, float, float]]) -> bool:
+    return all(got <= most for _, got, most in figures)
+
+
+def _said(figures: list[tuple[str, float, float]]) -> str:
+    return ", ".join(f"{name} {got:.3f} of {most:.3f} mm" for name, got, most in figures)
 
 
 def kinds_line(report: FitReport) -> str:
@@ -185,12 +210,19 @@ def kinds_line(report: FitReport) -> str:
     return f"pieces: {'; '.join(parts)}" if len(report.pieces) > 1 else ""
 
 
-def measure(name: str, chart: Chart, fitted: Fitted, names: tuple[str, ...]) -> PartReport:
-    """Errors of a fitted chart over all samples outside folds."""
+def measure(
+    name: str, chart: Chart, fitted: Fitted, names: tuple[str, ...], fine: Bools | None = None
+) -> PartReport:  # fmt: skip
+    """Errors of a fitted chart over all samples outside folds, and over those that are ``fine`` (m,) if given."""
     counted = ~chart.folded
     shapes = {n: errors_of(e[counted]) for n, e in zip(names, fitted.shape_error, strict=False)}
     samples = int(counted.sum())
-    return PartReport(name, len(fitted.net), samples, len(counted) - samples, errors_of(fitted.error[counted]), shapes)
+    own = counted if fine is None else counted & fine
+    detailed = None if fine is None else errors_of(fitted.error[own])
+    return PartReport(
+        name, len(fitted.net), samples, len(counted) - samples, errors_of(fitted.error[counted]), shapes,
+        detailed, float(own.sum()) / max(samples, 1),
+    )  # fmt: skip
 
 
 def errors_of(distance: Floats) -> Errors:

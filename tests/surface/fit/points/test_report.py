@@ -65,3 +65,32 @@ def test_the_face_is_held_to_bounds_that_grow_with_the_head(report, verdict):
     assert text.startswith(f"face: {verdict} the bounds for its size ({report.scale:.2f}): RMS ")
     assert ("shapes" in text) == bool(report.parts[0].shapes)
     assert f"{report.parts[0].neutral.p99:.3f} of {0.8 * report.scale:.3f} mm" in text
+
+
+def coarse(rms: float, p99: float, share: float) -> FitReport:
+    """A face beyond its bounds as a whole, with its errors where the mesh has the detail."""
+    report = face(2.0 * RMS_MM, 2.0 * P99_MM, SHAPES_MM)
+    return replace(report, parts=[replace(report.parts[0], detailed=Errors(rms, p99, 1.0), share=share)])
+
+
+@pytest.mark.parametrize(
+    ("report", "verdict"),
+    [
+        (coarse(RMS_MM, P99_MM, 0.8), "within the bounds where the mesh has the detail,"),
+        (coarse(RMS_MM, P99_MM + 1e-9, 0.8), "beyond the bounds"), (coarse(RMS_MM, P99_MM, 0.4), "beyond the bounds"),
+    ],
+)  # fmt: skip
+def test_a_coarse_mesh_is_held_to_the_bounds_where_it_has_the_detail(report, verdict):
+    text = face_bounds(report)
+    assert text.startswith(f"face: {verdict} for its size (1.00): RMS 0.500 of 0.250 mm, 99 % 1.600 of 0.800 mm")
+    assert ("; where the mesh has the detail (80% of it) RMS 0.250" in text) == (report.parts[0].share > 0.5)
+
+
+def test_errors_are_also_measured_where_samples_are_fine():
+    error, folded = np.array([3.0, 4.0, 100.0, 1.0]), np.array([False, False, True, False])
+    fine = np.array([True, False, True, True])
+    report = measure("face", chart(folded), fitted(error, np.zeros((0, 4))), (), fine)
+    assert report.neutral.max == 4.0 and report.detailed == Errors(
+        pytest.approx(np.sqrt(5.0)), pytest.approx(2.98), 3.0
+    )
+    assert report.share == pytest.approx(2 / 3)
