@@ -81,11 +81,13 @@ $(VENV)/.opengl: $(VENV)/.installed
 	fi
 	@touch $@
 
-# The kernels are compiled for this processor and kept beside the code; checking the head uses all of them.
+# The kernels are compiled for this processor and kept beside the code; checking the head uses most of them. Beside it
+# a second process begins with those that the check needs last; no kernel is compiled twice (surface/base/jit.py).
+SECOND := import drivers.core.kernels, controller.motion.braking; from surface.bench.bench import sheet; \
+	from surface.deform.deformation import Deformation; Deformation(*sheet(500))
 $(VENV)/.compiled: $(VENV)/.installed
 	@echo "Compiling the surface engine (half a minute, once) ..."
-	@$(BIN)/omote check ict
-	@$(PY) -c 'import drivers.core.kernels, controller.motion.braking'
+	@$(PY) -c '$(SECOND)' >/dev/null 2>&1 & $(BIN)/omote check ict; checked=$$?; wait; exit $$checked
 	@$(BIN)/omote run everything --headless --seconds 1 >$(VENV)/first-run.log 2>&1 || true # pictures, links and mirror
 	@touch $@
 

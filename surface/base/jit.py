@@ -5,14 +5,20 @@ Compiled code is kept beside the code it was made from, or in the user's cache f
 
 Numba compiles again when the file of a kernel changes. Here it also does when a file of the package changes that this
 one imports, directly or not, since kernels and constants from there are compiled into it.
+
+One process at a time compiles a kernel; others that need it wait and load what was kept. Else all would spend the same
+time, and two that keep code for different types at once could each overwrite what the other one wrote.
 """
 
 from __future__ import annotations
 
 import hashlib
 import logging
+import os
 import re
-from collections.abc import Callable, Sequence
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -20,6 +26,13 @@ from typing import Any
 
 from numba import njit
 from numba.core import event
+from numba.core.caching import FunctionCache
+from numba.core.compiler_lock import global_compiler_lock
+
+try:
+    import fcntl
+except ImportError:  # Windows: there, every process compiles for itself
+    fcntl = None  # type: ignore[assignment]
 
 log = logging.getLogger(__name__)
 
@@ -85,6 +98,7 @@ def _compiled(function: Callable[..., Any], signatures: Sequence[Any] = (), **op
     else:
         _tolerate_full_disks(dispatcher._cache)
         _watch_imports(dispatcher)
+        _compile_in_one_process(dispatcher)
     for signature in signatures:
         dispatcher.compile(signature)
     if signatures:
@@ -103,6 +117,52 @@ def _tolerate_full_disks(kept: Any) -> None:
             _log_once(f"compiled code cannot be kept in {kept.cache_path}: {error.strerror or error}")
 
     kept.save_overload = save_or_log
+
+
+def _compile_in_one_process(dispatcher: Any) -> None:
+    """Let a kernel be looked for on disk, compiled and kept by one process at a time.
+
+    Kernels call each other in no circle, so neither do processes wait for each other in one. Numba's own lock is taken
+    first: a thread that holds it may need the kernel that another thread of this process would hold.
+    """
+    compile_or_load, name = dispatcher.compile, dispatcher._cache._cache_file._index_path
+
+    def alone(signature: Any) -> Any:
+        with global_compiler_lock, _held(name):
+            return compile_or_load(signature)
+
+    dispatcher.compile = alone
+
+
+@contextmanager
+def _held(name: str) -> Iterator[None]:
+    """Hold a name until the end, as far as the system can; other processes of this installation wait for it."""
+    descriptor, place = _lock_file(), zlib.crc32(name.encode()) >> 1  # a file's offset may have 31 bits
+    if descriptor is None:
+        yield
+        return
+    with suppress(OSError):  # a file system without locks
+        fcntl.lockf(descriptor, fcntl.LOCK_EX, 1, place)
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            fcntl.lockf(descriptor, fcntl.LOCK_UN, 1, place)
+
+
+@cache
+def _lock_file() -> int | None:
+    """Descriptor of a file whose bytes stand for kernels, beside compiled code; None where there can be none.
+
+    It stays open: closing any descriptor of a file gives up all locks that a process holds in it.
+    """
+    if fcntl is None:
+        return None
+    try:
+        file = Path(FunctionCache(kernel).cache_path) / "kernels.lock"
+        return os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+    except (OSError, RuntimeError):  # RuntimeError: numba finds no folder
+        return None
 
 
 @cache

@@ -119,7 +119,7 @@ def test_wrong_input_is_one_message_with_the_next_step(
 
 def test_a_process_of_its_own_ends_with_that_code_and_says_it_on_stderr() -> None:
     command = [sys.executable, "-c", "from controller.cli.app import main; main()", "run", "nope"]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert result.returncode == 1
     assert result.stdout == ""
     assert result.stderr.startswith("error: ")
@@ -149,7 +149,7 @@ sys.meta_path.insert(0, Finder())
 main()
 """
     command = [*background, sys.executable, "-c", program, module]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
 
 
@@ -183,7 +183,8 @@ def test_render_draws_what_it_is_told(omote: Omote, tmp_path: Path) -> None:
         out = tmp_path / f"{name}.png"
         result = omote("render", "-o", str(out), "--size", "160x200", *words)
         assert result.returncode == 0, result.stderr
-        assert result.stderr == ""
+        notes = result.stderr.splitlines()
+        assert all(note.startswith("compiling the kernels") for note in notes), notes
         pictures.append(np.asarray(Image.open(out).convert("RGB")).astype(int))
     assert pictures[0].shape == (200, 160, 3)
     assert (np.abs(pictures[1] - pictures[0]).max(axis=2) > 24).mean() > 0.01
@@ -243,7 +244,7 @@ def test_a_reader_that_is_gone_ends_a_command_quietly() -> None:
     command = [sys.executable, "-c", "from controller.cli.app import main; main()", "plugins"]
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=120, check=False)
+    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, text=True, timeout=240, check=False)
     os.close(writing)
     assert (done.returncode, done.stderr) == (1, "")
 

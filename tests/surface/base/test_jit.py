@@ -139,3 +139,54 @@ def test_a_lean_kernel_may_call_one_that_allocates() -> None:
         return np.zeros(3).sum() + array[0]
 
     assert jit.lean(lambda array: allocating(array[1:]) + array[0])(np.array([1.0, 2.0])) == 3.0
+
+
+TOGETHER = """
+import sys, time
+from numba.core import event
+from surface.base import jit
+
+class Log(event.Listener):
+    def on_start(self, event):
+        print("compiles", flush=True)
+        time.sleep(1.0)  # so that the other process comes to the same kernel meanwhile
+
+    def on_end(self, event):
+        pass
+
+event.register("numba:compile", Log())
+from surface.trial.user import twice
+print("ready", flush=True)
+sys.stdin.readline()
+print(twice({}), len(twice.stats.cache_hits), flush=True)
+"""
+
+
+def start_together(copy: Path, *values: str) -> list[str]:
+    """What processes write that use the kernel at the same time, each with a value of its own."""
+    env = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
+    started = [
+        subprocess.Popen(
+            [sys.executable, "-c", TOGETHER.format(value)],
+            cwd=copy, env=env, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        )
+        for value in values
+    ]  # fmt: skip
+    for each in started:
+        assert each.stdout is not None and each.stdout.readline() == "ready\n"
+    for each in started:
+        assert each.stdin is not None
+        each.stdin.write("\n")
+        each.stdin.flush()
+    return [each.communicate(timeout=240)[0] for each in started]
+
+
+@pytest.mark.skipif(jit.fcntl is None, reason="files cannot be locked here")
+def test_of_two_processes_one_compiles_and_the_other_loads(copy: Path) -> None:
+    assert sorted(start_together(copy, "1.0", "1.0")) == ["8.0 1\n", "compiles\n8.0 0\n"]
+
+
+@pytest.mark.skipif(jit.fcntl is None, reason="files cannot be locked here")
+def test_code_for_other_types_that_is_kept_at_once_is_not_overwritten(copy: Path) -> None:
+    assert sorted(start_together(copy, "1.0", "2")) == ["compiles\n10.0 0\n", "compiles\n8.0 0\n"]
+    assert sorted(start_together(copy, "1.0", "2")) == ["10.0 1\n", "8.0 1\n"]
