@@ -16,6 +16,7 @@ EXTRAS = {
     "trimesh": ("trimesh", "fit"),
     "igl": ("libigl", "fit"),
     "rhino3dm": ("rhino3dm", "cad"),
+    "websockets": ("websockets", "web"),
 }
 """Name of a package and the extra of pyproject.toml that brings it, by the name under which it is imported."""
 
