@@ -33,6 +33,7 @@ from controller.links.line.script import Script, load_named_script, load_script,
 from controller.links.line.show import Shows
 from controller.robot.busloop import BusLoop
 from controller.robot.following import MeasuredFace
+from controller.robot.servo_states import servo_states
 from controller.robot.settings import RobotSettings
 from controller.stage.stage import Stage, load_stage
 from controller.takes.livelink import TakePlayer
@@ -79,10 +80,12 @@ class Body:
                 [bus.following for bus in self.buses],
             )
         self.state.servo_monitor = self.measured_face
+        self.state.servo_records = lambda: [record for bus in self.buses for record in servo_states(bus)]
         shows = self.state.shows = Shows(self._find_show, self.state, self._show_names)
         if stage.settings.show is not None:
             script = load_script(stage.settings.show, parameters, stage.vocabulary, beside=stage.path)
             shows.play(self._as_part(script))
+        self._web = options.web
         self.follows_servos = options.mirror and self.measured_face is not None
         self.live = path is None
         voice, settings = options.voice, stage.settings
@@ -190,9 +193,11 @@ class Body:
         def context(closers: Closers) -> LinkContext:
             return LinkContext(state, closers, stage.vocabularies, stage.path)
 
-        choices = [link for link in stage.settings.links if not self.follows_servos or link.simulated is None]
+        links = [*stage.settings.links, *([self._web.link()] if self._web is not None else [])]
+        choices = [link for link in links if not self.follows_servos or link.simulated is None]
         self.links = [LinkPart(choice, context, state.parts) for choice in choices]
         state.link_status = lambda: link_status(self.links)
+        state.link_records = lambda: [link.report() for link in self.links]
         faults: list[tuple[LinkPart, Exception]] = []
         for link in self.links:
             self._closers.callback(link.close)

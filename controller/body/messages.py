@@ -6,6 +6,22 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from controller.body.sources import Voice
+from controller.links.links import LinkSettings, read_link
+
+
+@dataclass(frozen=True)
+class WebPanel:
+    """A web panel beside the links of a stage.
+
+    listen : HOST:PORT. face : the file with the face, which may appear later.
+    """
+
+    listen: str
+    face: Path
+
+    def link(self) -> LinkSettings:
+        """Its link. Raises pydantic.ValidationError: ``listen`` is no address."""
+        return read_link({"kind": "web", "listen": self.listen, "face": str(self.face), "open_to_network": True})
 
 
 @dataclass(frozen=True)
@@ -14,13 +30,14 @@ class RunOptions:
 
     take : a take or recording to play instead of the links. voice : a voice that moves the mouth.
     mirror : leave the servos' torque off; the face follows a head that is moved by hand.
-    record : file for every command and tick.
+    record : file for every command and tick. web : a web panel.
     """
 
     take: Path | None = None
     mirror: bool = False
     voice: Voice | None = None
     record: Path | None = None
+    web: WebPanel | None = None
 
 
 @dataclass(frozen=True)

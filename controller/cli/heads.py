@@ -329,6 +329,7 @@ def export(
             "--rate", min=1, max=1000, help="Frames a second of --take.", show_default="the take's own, or 60"
         ),
     ] = None,
+    web: Annotated[bool, typer.Option("--web", help="A small .glb for pages of browsers: fewer triangles.")] = False,
 ) -> None:
     """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.
 
@@ -350,7 +351,7 @@ def export(
         added = added_exporters()
         kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
         with EXPORTERS.blaming(kind):
-            written = export_head(loaded, out, pose, added, frame, _animation(take, rate_hz))
+            written = export_head(loaded, out, pose, added, frame, _animation(take, rate_hz), web)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
 

@@ -79,6 +79,10 @@ def run(
     theme: Annotated[str | None, typer.Option(help="skin, mask or robot.")] = None,
     camera: Annotated[str | None, typer.Option(help="front, three-quarter, profile and so on.")] = None,
     evaluator: Annotated[str | None, typer.Option(help="Where vertices are computed: auto, cpu or gpu.")] = None,
+    web: Annotated[
+        str | None,
+        typer.Option("--web", metavar="HOST:PORT", help="Serve a web panel; 127.0.0.1:8080 without an address."),
+    ] = None,
 ) -> None:
     """Run a stage until it is stopped (Ctrl-C) or its time is up.
 
@@ -92,7 +96,7 @@ def run(
     look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "fps": fps, "theme": theme,
             "camera": camera, "evaluator": evaluator, "person": parse_person(person)}  # fmt: skip
     _run(stage, seconds, headless, no_face, pictures, report, mirror=mirror, voice=voice, voice_hz=voice_hz,
-         record=record, identity=identity, look=look)  # fmt: skip
+         record=record, identity=identity, look=look, web=web)  # fmt: skip
 
 
 def play(
@@ -165,6 +169,7 @@ def _run(
     record: Path | None = None,
     identity: str | None = None,
     look: Mapping[str, object] | None = None,
+    web: str | None = None,
 ) -> None:
     from controller.body.preload import PreloadedBody, garbage_collection_off  # start-up: --help does without it
 
@@ -178,7 +183,7 @@ def _run(
         from controller.tools.stage_run import StageRun, has_display, write_report
 
         options = RunOptions(take, mirror, None if voice is None else Voice(voice, voice_hz, alone), record)
-        session = StageRun(stage, options, parse_identity(identity), look, status.update, preloaded)
+        session = StageRun(stage, options, parse_identity(identity), look, status.update, preloaded, web)
         if no_face:
             measured = session.run_without_face(seconds)
         elif headless or not has_display():

@@ -124,6 +124,12 @@ class CommandSink(Protocol):
     def status(self) -> dict[str, StatusValue]:
         """The state of the face, as short words and numbers."""
 
+    def overview(self) -> Mapping[str, list[dict[str, Any]]]:
+        """``servos`` and ``links``, one record each; see :mod:`controller.robot.servo_states` and Link.report."""
+
+    def held(self) -> dict[int, float]:
+        """The parameters that were set and not released, by index."""
+
 
 class ServoMonitor(Protocol):
     """Measures the servos; see :class:`controller.robot.following.MeasuredFace`."""
@@ -148,6 +154,7 @@ class CommandState:
     Attributes
     ----------
     link_status : says how links are, for STATUS.
+    servo_records, link_records : every servo and link, for :meth:`overview`.
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
     on_command : called after each command, in the thread that gave it.
     parts : what fails alone; a source of a layer that fails lets its layer fade out, and begins again.
@@ -188,6 +195,8 @@ class CommandState:
         )
         self.servo_monitor: ServoMonitor | None = None
         self.link_status: Callable[[], Mapping[str, StatusValue]] = dict
+        self.servo_records: Callable[[], list[dict[str, Any]]] = list
+        self.link_records: Callable[[], list[dict[str, Any]]] = list
         self.shows: Player | None = None
         self.on_command: Callable[[], None] = _nothing
         self.stop_latch = StopLatch()
@@ -391,6 +400,14 @@ class CommandState:
                 **(self.servo_monitor.status() if self.servo_monitor is not None else {}),
                 **self.link_status(),
             }
+
+    def overview(self) -> Mapping[str, list[dict[str, Any]]]:
+        return {"servos": self.servo_records(), "links": self.link_records()}
+
+    def held(self) -> dict[int, float]:
+        with self._lock:
+            manual = self._manual
+            return {int(i): float(manual.values[i]) for i in np.flatnonzero(manual.held)}
 
     def _stop_looking(self, fade_s: float | None = None) -> None:
         self._gaze.off()

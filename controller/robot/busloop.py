@@ -134,6 +134,11 @@ class BusLoop:
         """The newest measurement, or None before the first."""
         return self._state
 
+    @property
+    def goals_rad(self) -> Floats:
+        """(n,) the goals that were sent last, rad."""
+        return self._goals.sent.copy()
+
     def _resume(self) -> None:
         """Continue from where the servos are, so that the first goals are a ramp from there."""
         here = self._all_fresh().position_rad

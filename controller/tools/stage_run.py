@@ -14,12 +14,14 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from pydantic import ValidationError
+
 from controller.base.errors import ConfigError
 from controller.base.files import replacing
 from controller.base.parameters import PARAMETERS
 from controller.base.parts import Part
 from controller.base.signals import stop_flag
-from controller.body.messages import RunOptions
+from controller.body.messages import RunOptions, WebPanel
 from controller.body.preload import PreloadedBody
 from controller.body.process import BodyProcess, deadline
 from controller.body.sources import Voice
@@ -27,7 +29,9 @@ from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.stage.stage import Stage, check_identity, load_stage, with_picture
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
+from controller.tools.web_face import face_in_the_making
 from drivers.base.priority import lower_process_priority
+from surface.base.extras import require
 
 if TYPE_CHECKING:
     from controller.face.window import WindowFace  # start-up: the body gets its orders first
@@ -52,6 +56,7 @@ class StageRun:
     Finds and checks the stage and the take of ``options``; raises before anything is opened.
 
     name : of the stage, or its file. identity : replaces the stage's own. look : command-line options over its picture.
+    web : HOST:PORT of a web panel.
     status : called with what is being done, in a few words. preloaded : the body's process, if it was started already.
     """
 
@@ -63,6 +68,7 @@ class StageRun:
         look: Mapping[str, object] | None = None,
         status: Callable[[str], object] = lambda _: None,
         preloaded: PreloadedBody | None = None,
+        web: str | None = None,
     ) -> None:
         stage = with_picture(load_stage(name, PARAMETERS), look or {})
         if identity:
@@ -77,6 +83,9 @@ class StageRun:
         if options.mirror and not stage.robots:
             raise ConfigError(f"{stage.path}: robots: a stage without a robot has nothing to mirror")
         self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
+        self._web, self._web_look, self._identity = web, look or {}, identity
+        if web is not None:
+            check_web(web, alone=options.take is not None)
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.
@@ -120,8 +129,21 @@ class StageRun:
         """The body's process and a flag that Ctrl-C sets."""
         self._status("starting")
         preloaded, self._preloaded = self._preloaded, None
-        with stop_flag() as flag, BodyProcess(self.stage, PARAMETERS, self._options, preloaded=preloaded) as body:
+        with (
+            stop_flag() as flag,
+            self._with_web() as options,
+            BodyProcess(self.stage, PARAMETERS, options, preloaded=preloaded) as body,
+        ):
             yield body, flag
+
+    @contextmanager
+    def _with_web(self) -> Iterator[RunOptions]:
+        """The options, with a web panel whose face is being made where one is wanted."""
+        if self._web is None:
+            yield self._options
+            return
+        with face_in_the_making(self.stage.path, self._web_look, self._identity) as face:
+            yield replace(self._options, web=WebPanel(self._web, face))
 
     def _load_head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
         """The head and its values, while the servos start in the body's process."""
@@ -164,6 +186,18 @@ class StageRun:
         if failed is not None:
             report["parts"] = [*report.get("parts", []), failed.report()]
         return report
+
+
+def check_web(listen: str, *, alone: bool) -> None:
+    """Raises ConfigError: no address for a web panel, no packages for it, or a take plays ``alone`` without links."""
+    if alone:
+        raise ConfigError("--web: a take plays without links", hint="omote run STAGE --web")
+    require("a web panel", "websockets")
+    try:
+        WebPanel(listen, Path()).link()
+    except ValidationError as error:
+        why = str(error.errors()[0]["msg"]).removeprefix("Value error, ")
+        raise ConfigError(f"--web {listen}: {why}", hint="--web 127.0.0.1:8080") from error
 
 
 class _Asked:

@@ -21,6 +21,7 @@ EXTRAS = {
     "mcap": ("mcap", "mcap"),
     "onnxruntime": ("onnxruntime", "onnx"),
     "pylsl": ("pylsl", "lsl"),
+    "websockets": ("websockets", "web"),
 }
 """Name of a package and the extra of pyproject.toml that brings it, by the name under which it is imported."""
 

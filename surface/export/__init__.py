@@ -66,7 +66,7 @@ def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
 
 def export_head(
     head: Head, path: str | Path, pose: Mapping[str, float] | None = None, extra: Iterable[Exporter] = (),
-    frame: str = "head", animation: Animation | None = None,
+    frame: str = "head", animation: Animation | None = None, web: bool = False,
 ) -> list[Path]:  # fmt: skip
     """Write a head to a file for other programs; the suffix chooses the exporter (see :func:`exporters`).
 
@@ -76,6 +76,7 @@ def export_head(
     frame : "head" for head space (mm or m, y up, z forward), "file" for axes, origin and unit of the file that the head
         was fitted to.
     animation : motion that the file shall hold; its shapes move over time, and its head turns.
+    web : a small file for pages of browsers: fewer triangles, quantized, with joints for head and eyes.
 
     Returns the paths written.
 
@@ -88,7 +89,7 @@ def export_head(
     for one in known:
         if path.suffix.lower() in one.suffixes:
             try:
-                return _writer(one, frame, animation)(head, path, pose or {})
+                return _writer(one, frame, animation, web)(head, path, pose or {})
             except OSError as e:
                 hint = "choose a folder that can be written to"
                 raise ExportError(f"{path}: cannot be written ({e})", hint=hint) from e
@@ -99,8 +100,15 @@ def export_head(
     )
 
 
-def _writer(exporter: Exporter, frame: str, animation: Animation | None) -> Write:
-    """What writes in a frame, or an animation."""
+def _writer(exporter: Exporter, frame: str, animation: Animation | None, web: bool) -> Write:
+    """What writes in a frame, an animation, or for the web."""
+    if web:
+        if exporter.write_web is None or frame != "head" or animation is not None:
+            raise ExportError(
+                f"{exporter.kind!r}: --web writes a .glb in head space without animation",
+                hint="for example: omote export head.glb --web",
+            )
+        return exporter.write_web
     if animation is not None:
         if exporter.animate is None or frame != "head":
             why = f"{exporter.kind!r} holds no animation" if exporter.animate is None else "--frame file: no animation"

@@ -26,6 +26,7 @@ class Exporter:
     title : short description of the file's content
     suffixes : of such files, in lower case, as (".glb",)
     animate : as ``write``, with an animation before the path; None for a format that has none
+    write_web : as ``write``, small and with what a page of a browser needs; None for a format that has no such files
     install : argument of ``pip install`` for a missing package
     write : is called with the head, the path and a pose (values by parameter, empty at rest) and returns the paths
         written. It leaves no incomplete files, and raises ExportError, or OSError if a path cannot be written to
@@ -39,3 +40,4 @@ class Exporter:
     install: str = ""
     write_in_file: Write | None = None
     animate: Animate | None = None
+    write_web: Write | None = None

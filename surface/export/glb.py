@@ -11,6 +11,7 @@ from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
 from surface.export.glb_document import METRES, Document
 from surface.export.glb_motion import add_motion
+from surface.export.glb_web import web_glb
 from surface.export.shapes import export_parts
 from surface.head import Head
 from surface.head.model.parameters import ANGLES
@@ -42,6 +43,14 @@ def write_animated_glb(head: Head, animation: Animation, path: Path, pose: Mappi
     return [path]
 
 
+def write_web_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
+    """As :func:`write_glb`, small and for pages of browsers; see :mod:`surface.export.glb_web`."""
+    if any(pose.values()):
+        raise ExportError("a file for the web is written at rest", hint="leave out --set and --expression, or --web")
+    _replace(path, web_glb(head))
+    return [path]
+
+
 def _refuse_angles(pose: Mapping[str, float]) -> None:
     angles = [n for n, v in pose.items() if n in ANGLES and v]
     if angles:
@@ -67,4 +76,5 @@ EXPORTER = Exporter(
     write=write_glb,
     animate=write_animated_glb,
     write_in_file=write_glb_in_file,
+    write_web=write_web_glb,
 )

@@ -12,8 +12,8 @@ import numpy as np
 from surface.base.arrays import Floats32
 from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
-from surface.export.glb_document import materials
 from surface.export.shapes import ExportPart, export_parts
+from surface.export.textures import materials
 from surface.head import Head
 
 

@@ -17,6 +17,7 @@ LEAST_NORMAL = 1e-4  # smaller changes of normals are zero
 # Shapes that make sense only together with another one: exported is what they add to it.
 BASE_POSES = {"mouthClose": {"jawOpen": 1.0}, "tongueOut": {"jawOpen": TONGUE_NEEDS}}
 _EYES = ("left_eye", "right_eye")
+_PAINTED = ("iris", "sclera", "iris_radius")
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,7 @@ class ExportPart:
     vertices, normals : (m, 3) float32, mm; uv : (m, 2) float32 inside the unit square, v up.
     triangles : (t, 3) int32. pivot : (3,) centre of rotation of an eyeball, else zero.
     colours : (m, 3) float32 linear RGB, or None for a part that is not painted.
+    painted : what is painted all over an eyeball, by name: "iris" and "sclera", linear RGB, and "iris_radius".
     displacements, normal_changes : by shape, (m, 3) float32: what it adds to vertices and normals.
     """
 
@@ -39,6 +41,7 @@ class ExportPart:
     colours: Floats32 | None
     displacements: dict[str, Floats32] = field(default_factory=dict)
     normal_changes: dict[str, Floats32] = field(default_factory=dict)
+    painted: dict[str, Floats32] = field(default_factory=dict)
 
 
 def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes: bool = True) -> list[ExportPart]:
@@ -54,7 +57,15 @@ def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes:
         vertices, normals, uv = part.vertices.copy(), unit(part.normals), _in_unit_square(part.uv)
         out.append(
             ExportPart(
-                part.name, part.material, vertices, normals, uv, _manifold(vertices, part.triangles), pivot, colours
+                part.name,
+                part.material,
+                vertices,
+                normals,
+                uv,
+                _manifold(vertices, part.triangles),
+                pivot,
+                colours,
+                painted={key: part.attributes[key][0] for key in _PAINTED if key in part.attributes},
             )
         )
     for name in _shapes(head) if shapes else ():

@@ -42,6 +42,7 @@ class Conversation:
         self._subscription: m.Subscribe | None = None
         self._chosen: Indices | None = None
         self._due_ns = 0
+        self._watch_ns, self._watch_due_ns = 0, 0  # period of overviews, 0 for none, and when the next one is due
         self.accepted = 0
         self.refused: Counter[str] = Counter()
 
@@ -72,17 +73,30 @@ class Conversation:
         )
 
     def due_ns(self) -> int | None:
-        """When the next state is due; None without a subscription."""
-        return None if self._subscription is None else self._due_ns
+        """When the next state or overview is due; None where none was asked for."""
+        due = [self._due_ns] if self._subscription is not None else []
+        return min([*due, *([self._watch_due_ns] if self._watch_ns else [])], default=None)
 
-    def state_due(self, now_ns: int) -> m.State | None:
+    def due(self, now_ns: int) -> list[m.Reply]:
+        """What is due: the newest state, and the overview."""
+        found: list[m.Reply] = []
+        state = self.state_due(now_ns)
+        if state is not None:
+            found.append(state)
+        if self._watch_ns and now_ns >= self._watch_due_ns:
+            self._watch_due_ns += self._watch_ns * (1 + (now_ns - self._watch_due_ns) // self._watch_ns)
+            found.append(self._overview(now_ns))
+        return found
+
+    def state_due(self, now_ns: int) -> m.State | m.Frame | None:
         """The newest state, where one is due. Those that were missed are left out."""
         wanted = self._subscription
         if wanted is None or now_ns < self._due_ns:
             return None
         period = round(1e9 / wanted.rate_hz)
         self._due_ns += period * (1 + (now_ns - self._due_ns) // period)
-        return self._state(self._chosen, now_ns, status=False)
+        state = self._state(self._chosen, now_ns, status=False)
+        return state if wanted.form == "names" else _as_numbers(state)
 
     def _refuse(self, request_id: Any, code: Any, message: str, hint: str = "") -> m.Refused:
         self.refused[code] += 1
@@ -99,6 +113,8 @@ class Conversation:
             case m.Subscribe():
                 self._chosen = self._positions(request.parameters)
                 self._subscription, self._due_ns = request, now_ns
+            case m.Watch(rate_hz=rate):
+                self._watch_ns, self._watch_due_ns = round(1e9 / rate) if rate > 0.0 else 0, now_ns
             case m.Unsubscribe():
                 self._subscription = None
             case m.Ping():
@@ -169,6 +185,20 @@ class Conversation:
             status=sink.status() if status else {},
         )
 
+    def _overview(self, now_ns: int) -> m.Overview:
+        sink, names = self._sink, self._sink.parameters.names
+        stopped, found = sink.stop_latch.stopped, sink.overview()
+        return m.Overview(
+            time_s=(now_ns - self._start_ns) * 1e-9,
+            stopped_by=stopped.who if stopped is not None else None,
+            status=sink.status(),
+            held={names[i]: round(value, 4) for i, value in sink.held().items()},
+            holders={name: layer for i, name in enumerate(names) if (layer := sink.holder(i))},
+            show=sink.shows.status() if sink.shows is not None else "off",
+            servos=[m.Servo(**record) for record in found["servos"]],
+            links=found["links"],
+        )
+
     def _named(self, values: Any, chosen: Indices | None) -> dict[str, float]:
         names = self._sink.parameters.names
         which: Sequence[int] = range(len(names)) if chosen is None else chosen.tolist()
@@ -186,6 +216,13 @@ class Conversation:
             "shows": lambda: sink.shows.names() if sink.shows is not None else [],
         }
         return list(kinds[what]())
+
+
+def _as_numbers(state: m.State) -> m.Frame:
+    measured = None if state.measured is None else list(state.measured.values())
+    return m.Frame(
+        time_s=state.time_s, values=list(state.parameters.values()), measured=measured, stopped_by=state.stopped_by
+    )
 
 
 def _in_range(parameters: Parameters, given: dict[str, float]) -> tuple[list[int], list[float]]:

@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 VERSION = 1
 """Version of the messages: grows where one changes its meaning or goes; new ones may come without."""
-MAX_RATE_HZ, MIN_RATE_HZ = 200.0, 0.1
+MAX_RATE_HZ, MIN_RATE_HZ, MAX_WATCH_HZ = 200.0, 0.1, 10.0
 LONGEST = 65_536
 """Bytes of a message."""
 
@@ -144,11 +144,22 @@ class List(Request):
 
 
 class Subscribe(Request):
-    """Get the state at a rate; a client that reads too slowly gets fewer, never older ones."""
+    """Get the state at a rate; a client that reads too slowly gets fewer, never older ones.
+
+    ``form`` : ``names`` for messages ``state``, ``numbers`` for the shorter ``frame``.
+    """
 
     type: Literal["subscribe"]
     rate_hz: Annotated[float, Field(ge=MIN_RATE_HZ, le=MAX_RATE_HZ)] = 30.0
     parameters: Annotated[list[Name], Field(max_length=1000)] | None = None
+    form: Literal["names", "numbers"] = "names"
+
+
+class Watch(Request):
+    """Get an overview of servos, links and layers at a rate; 0 ends that."""
+
+    type: Literal["watch"]
+    rate_hz: Annotated[float, Field(ge=0.0, le=MAX_WATCH_HZ)] = 4.0
 
 
 class Unsubscribe(Request):
@@ -165,7 +176,7 @@ class Ping(Request):
 
 AnyRequest = Annotated[
     Hello | Set | Release | Expression | Emotion | Gaze | GazeAt | GazeOff | Neutral | Life | Show | Stop | Start
-    | Get | List | Subscribe | Unsubscribe | Ping,
+    | Get | List | Subscribe | Watch | Unsubscribe | Ping,
     Field(discriminator="type"),
 ]  # fmt: skip
 REQUESTS: TypeAdapter[AnyRequest] = TypeAdapter(AnyRequest)
@@ -214,6 +225,52 @@ class State(Reply):
     status: dict[str, str | int | float] = {}
 
 
+class Frame(Reply):
+    """The face as numbers, in the order of ``parameters`` of the answer to ``hello``, or of the subscription's."""
+
+    type: Literal["frame"] = "frame"
+    time_s: float
+    values: list[float]
+    measured: list[float] | None = None
+    stopped_by: str | None = None
+
+
+class Overview(Reply):
+    """Servos, links and layers. ``held`` : parameters that were set and not released. ``holders`` : by parameter, the
+    layer that holds it. ``show`` : which one plays and where it is. ``servos``, ``links`` : a record each; a value that
+    is not known is null or missing.
+    """
+
+    type: Literal["overview"] = "overview"
+    time_s: float
+    stopped_by: str | None = None
+    status: dict[str, str | int | float]
+    held: dict[str, float]
+    holders: dict[str, str]
+    show: str
+    servos: list[Servo]
+    links: list[dict[str, Any]]
+
+
+class Servo(BaseModel):
+    """One servo. Angles in degrees; ``error`` : what is wrong, in words, else empty."""
+
+    bus: str
+    id: int
+    name: str
+    model: str
+    low_deg: float
+    high_deg: float
+    wanted_deg: float
+    measured_deg: float | None = None
+    age_s: float | None = None
+    temperature_c: float | None = None
+    voltage_v: float | None = None
+    current_a: float | None = None
+    torque: bool | None = None
+    error: str = ""
+
+
 class Names(Reply):
     """The answer to ``list``."""
 
@@ -237,7 +294,7 @@ class Refused(Reply):
     hint: str = ""
 
 
-AnyReply = Annotated[Welcome | State | Names | Done | Refused, Field(discriminator="type")]
+AnyReply = Annotated[Welcome | State | Frame | Overview | Names | Done | Refused, Field(discriminator="type")]
 REPLIES: TypeAdapter[AnyReply] = TypeAdapter(AnyReply)
 
 

@@ -35,7 +35,7 @@ _WAITING = 256
 """Answers that may wait for a client."""
 _RATE_HZ, _BURST = 1000.0, 2000.0
 """Messages of a client that are taken, in the long run and at once."""
-_START_S, _STOP_S, _CLOSE_S = 10.0, 3.0, 1.0
+_START_S, _STOP_S = 10.0, 3.0
 
 
 def open_websocket(settings: WebSocketSettings, context: LinkContext) -> WebSocketLink:
@@ -51,7 +51,12 @@ def open_websocket(settings: WebSocketSettings, context: LinkContext) -> WebSock
 
 
 class WebSocketLink:
-    """A link that is open; clients come and go."""
+    """A link that is open; clients come and go.
+
+    ``download_s`` : how long an answer to a client that is turned away may take.
+    """
+
+    download_s = 1.0
 
     def __init__(self, settings: WebSocketSettings, sink: CommandSink, token: str | None) -> None:
         self._settings, self._sink, self._token = settings, sink, token
@@ -128,11 +133,16 @@ class WebSocketLink:
         quiet.setLevel(logging.CRITICAL)
         async with serve(
             self._talk, host, port, process_request=self._admit, max_size=LONGEST, max_queue=64, compression=None,
-            logger=quiet, close_timeout=_CLOSE_S, server_header=None,
+            logger=quiet, open_timeout=max(_START_S, self.download_s), close_timeout=self.download_s,
+            server_header=None,
         ) as server:  # fmt: skip
             self._port = _port_of(server)
             self._ready.set()
             await self._stopping.wait()
+            await self._leave()
+
+    async def _leave(self) -> None:
+        """What is done before the server closes."""
 
     def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
         """None for who may connect; an answer that says why not for all others."""
@@ -224,7 +234,7 @@ class _Client:
     async def _send(self) -> None:
         while True:
             reply = await self._next()
-            for each in (reply, self.conversation.state_due(time.monotonic_ns())):
+            for each in (reply, *self.conversation.due(time.monotonic_ns())):
                 if each is not None:
                     await self._connection.send(each.model_dump_json())
 

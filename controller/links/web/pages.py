@@ -1,0 +1,99 @@
+"""Answers browsers: the panel's own files from a fixed list, and the face; nothing else of the disk is served."""
+
+from __future__ import annotations
+
+import gzip
+import ipaddress
+from functools import cache
+from http import HTTPStatus
+from importlib.resources import files as package_files
+from pathlib import Path
+
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from surface.base import files
+
+LARGEST_FACE = 64 << 20
+"""Bytes of a face that is served."""
+_SCRIPTS = (
+    "panel.js", "robot.js", "face.js", "pose.js", "controls.js", "pads.js", "servos.js", "plot.js", "three.min.js",
+)  # fmt: skip
+FILES = {
+    "/": ("index.html", "text/html; charset=utf-8"),
+    "/panel.css": ("panel.css", "text/css; charset=utf-8"),
+    "/icon.svg": ("icon.svg", "image/svg+xml"),
+    **{f"/{name}": (name, "text/javascript; charset=utf-8") for name in _SCRIPTS},
+    "/three.LICENSE.txt": ("three.LICENSE.txt", "text/plain; charset=utf-8"),
+}
+"""File and type by path."""
+SAFE = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
+        "connect-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Cache-Control": "no-cache",
+}
+"""Headers of every answer."""
+
+
+@cache
+def packed(name: str) -> bytes:
+    """A file of ``static``, compressed."""
+    return gzip.compress((package_files(__package__) / "static" / name).read_bytes(), 6, mtime=0)
+
+
+def page(path: str) -> Response:
+    """The answer to a request for one of the panel's own files; not found for everything else."""
+    if path not in FILES:
+        return text(HTTPStatus.NOT_FOUND, f"there is no {path[:80]} here; the panel is at /")
+    name, kind = FILES[path]
+    return _answer(HTTPStatus.OK, packed(name), kind, zipped=True)
+
+
+class Face:
+    """The face's file, which may appear after the server has begun; it is read once."""
+
+    def __init__(self, path: Path | None) -> None:
+        self._path, self._packed = path, b""
+
+    def answer(self) -> Response:
+        """The face; where it is not there yet, when to ask again."""
+        if not self._packed and self._path is not None and self._path.is_file():
+            raw = files.read_file(self._path, LARGEST_FACE)
+            self._packed = raw if raw[:2] == b"\x1f\x8b" else gzip.compress(raw, 6, mtime=0)
+        if self._packed:
+            return _answer(HTTPStatus.OK, self._packed, "model/gltf-binary", zipped=True)
+        if self._path is None:
+            return text(HTTPStatus.NOT_FOUND, 'no face is served here; set face = "head.glb" in the link')
+        answer = text(HTTPStatus.SERVICE_UNAVAILABLE, "the face is being prepared")
+        answer.headers["Retry-After"] = "1"
+        return answer
+
+
+def text(status: HTTPStatus, words: str) -> Response:
+    """A short answer for people."""
+    return _answer(status, (words + "\n").encode(), "text/plain; charset=utf-8")
+
+
+def is_local_name(request: Request) -> bool:
+    """Whether a request names this machine by an address or as localhost: a page whose name was made to lead here by
+    somebody else's name server does not."""
+    host = (request.headers.get("Host") or "").rpartition("@")[2]
+    name = host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
+    try:
+        ipaddress.ip_address(name)
+    except ValueError:
+        return name == "localhost"
+    return True
+
+
+def _answer(status: HTTPStatus, body: bytes, kind: str, *, zipped: bool = False) -> Response:
+    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Connection": "close", **SAFE})
+    if zipped:
+        headers["Content-Encoding"] = "gzip"
+    return Response(status.value, status.phrase, headers, body)

@@ -1,0 +1,39 @@
+// Parameters of a face as weights of its shapes and angles of its eyes and head: as surface/head/model/parameters.py.
+const HEAD_DEG = [60, 40, 30], EYE_DEG = [35, 30], RAD = Math.PI / 180;
+const TONGUE_NEEDS = 0.33, TONGUE_FIRST = 1.7, LID_SHARE = 0.72, GIVE_WAY = 0.75, GIVEN = 0.5;
+const BELOW = ["mouthRollLower", "mouthShrugLower", "mouthPressLeft", "mouthPressRight"];
+const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
+
+function lidDown(look, blink) {
+  if (look <= 0 || blink <= 0) return look;
+  const width = blink * (1 - blink), apart = Math.abs(LID_SHARE * look - blink);
+  const smooth = width > 0 ? Math.max(width - apart, 0) ** 2 / (4 * width) : 0;
+  return (Math.max(LID_SHARE * look - blink, 0) + smooth) / LID_SHARE;
+}
+
+function look(at, side, sign) {
+  const eye = side.toLowerCase();
+  const yaw = clamp((at[`${eye}EyeYaw`] ?? 0) + (at[`eyeLookOut${side}`] - at[`eyeLookIn${side}`]) * sign, -1, 1);
+  const pitch = clamp((at[`${eye}EyePitch`] ?? 0) + at[`eyeLookDown${side}`] - at[`eyeLookUp${side}`], -1, 1);
+  const out = yaw * sign, blink = at[`eyeBlink${side}`];
+  at[`eyeLookDown${side}`] = lidDown(Math.max(pitch, 0), blink);
+  at[`eyeLookUp${side}`] = Math.max(-pitch, 0) * (1 - blink);
+  at[`eyeLookIn${side}`] = Math.max(-out, 0);
+  at[`eyeLookOut${side}`] = Math.max(out, 0);
+  at[`eyeWide${side}`] *= 1 - blink;
+  return [yaw * EYE_DEG[0] * RAD, pitch * EYE_DEG[1] * RAD];
+}
+
+// names, values: of the parameters. Returns { weights by shape, eyes: [yaw, pitch] left and right, head: yaw, pitch, roll }.
+export function readPose(names, values) {
+  const at = {};
+  names.forEach((name, i) => { at[name] = clamp(values[i], -1, 1); });
+  const needed = TONGUE_NEEDS * Math.min(1, TONGUE_FIRST * at.tongueOut);
+  at.jawOpen = Math.max(at.jawOpen, needed);
+  const left = 1 - GIVE_WAY * Math.min(1, at.tongueOut / GIVEN);
+  for (const name of BELOW) at[name] *= left;
+  const eyes = [look(at, "Left", 1), look(at, "Right", -1)];
+  at.mouthClose = Math.min(at.mouthClose, at.jawOpen - needed);
+  const head = ["headYaw", "headPitch", "headRoll"].map((name, i) => (at[name] ?? 0) * HEAD_DEG[i] * RAD);
+  return { weights: at, eyes, head };
+}

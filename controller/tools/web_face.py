@@ -1,0 +1,75 @@
+"""Makes the face that the web panel shows, in a process of its own: it takes seconds that the servos must not wait."""
+
+from __future__ import annotations
+
+import gzip
+import os
+import pickle
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from controller.base.files import replacing
+
+_END_S = 5.0
+
+
+@contextmanager
+def face_in_the_making(stage: Path, look: Mapping[str, object], identity: Mapping[str, float] | None) -> Iterator[Path]:
+    """The path at which the face of a stage will appear; whatever is still at work ends with the context.
+
+    look, identity : what the command line puts over the stage's own.
+    """
+    with tempfile.TemporaryDirectory(prefix="omote-web-", ignore_cleanup_errors=True) as folder:
+        path = Path(folder) / "face.glb.gz"
+        orders = pickle.dumps((str(stage), dict(look), dict(identity or {}), str(path)))
+        command = [sys.executable, "-m", "controller.tools.web_face"]
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True)
+        try:
+            if process.stdin is not None:
+                with suppress(OSError):  # it has ended, and has said why
+                    process.stdin.write(orders)
+                    process.stdin.close()
+            yield path
+        finally:
+            process.terminate()
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(_END_S)
+            process.kill()
+            process.wait()
+
+
+def make_face(stage: str, look: Mapping[str, object], identity: Mapping[str, float], out: Path) -> None:
+    """Write the face of a stage, compressed, whole or not at all.
+
+    Raises ConfigError, SurfaceError: the stage or its head cannot be read.
+    """
+    from dataclasses import replace
+
+    from controller.base.parameters import PARAMETERS
+    from controller.stage.stage import load_stage, with_picture
+    from surface.export.glb_web import web_glb
+
+    found = with_picture(load_stage(stage, PARAMETERS), look)
+    if identity:
+        settings = found.settings.model_copy(update={"identity": dict(identity)})
+        found = replace(found, settings=settings)
+    packed = gzip.compress(web_glb(found.load_head()), 9, mtime=0)
+    with replacing(out) as temporary:
+        temporary.write_bytes(packed)
+
+
+def main() -> None:
+    """Read orders from standard input and carry them out."""
+    orders: Any = pickle.loads(sys.stdin.buffer.read())
+    stage, look, identity, out = orders
+    os.nice(10)
+    make_face(stage, look, identity, Path(out))
+
+
+if __name__ == "__main__":
+    main()
