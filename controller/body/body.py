@@ -25,6 +25,7 @@ from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.body.messages import RunOptions
+from controller.body.panel_requests import carry_out
 from controller.body.panel_state import PanelState
 from controller.body.sources import Sources, Voice, show_part
 from controller.layers.mixer import by_priority
@@ -336,27 +337,12 @@ def _handle(body: Body, pipe: Connection) -> bool:
         request = pipe.recv()
     except (EOFError, OSError):
         return False
-    state, now = body.state, time.monotonic_ns()
-    match request:
-        case messages.Begin():
-            shorten_thread_switches()
-            request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
-            body.begin()
-        case messages.Hold(index, None):
-            state.release([index], now)
-        case messages.Hold(index, float(value)):
-            state.set_parameters([index], [value], now)
-        case messages.Show(name, intensity):
-            state.expression(name, intensity, None, now)
-        case messages.Neutral(seconds):
-            state.neutral(seconds, now)
-        case messages.StopServos():
-            state.stop_latch.stop("panel", now)
-        case messages.StartServos():
-            state.stop_latch.start()
-        case _:
-            return False
-    return True
+    if isinstance(request, messages.Begin):
+        shorten_thread_switches()
+        request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
+        body.begin()
+        return True
+    return carry_out(request, body.state, time.monotonic_ns())
 
 
 def _send(pipe: Connection, message: object) -> None:

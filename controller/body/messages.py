@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 from controller.body.sources import Voice
 from controller.links.links import LinkSettings, read_link
@@ -75,6 +76,44 @@ class Show:
 
 
 @dataclass(frozen=True)
+class LookAt:
+    """Main to body, from the panel: look at a point (mm; x to the subject's left, y up, z forward from the middle
+    between the eyes); None looks at nothing in particular."""
+
+    point: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True)
+class Live:
+    """Main to body, from the panel: the amount of idle motion, 0..1, and the manner; the present one without."""
+
+    amount: float
+    manner: str | None = None
+
+
+@dataclass(frozen=True)
+class PlayShow:
+    """Main to body, from the panel: play a show from its beginning."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class ControlShow:
+    """Main to body, from the panel: ``PLAY``, ``PAUSE`` or ``STOP`` the show that was begun last."""
+
+    what: Literal["PLAY", "PAUSE", "STOP"]
+
+
+@dataclass(frozen=True)
+class Learn:
+    """Main to body, from the panel: know a named expression of weights (P,) from now on, on every link."""
+
+    name: str
+    weights: tuple[float, ...]
+
+
+@dataclass(frozen=True)
 class Neutral:
     """Main to body, from the panel: release everything and return to neutral over ``seconds``."""
 
@@ -91,7 +130,7 @@ class StartServos:
     """Main to body, from the panel: let the servos move again."""
 
 
-PanelRequest = Hold | Show | Neutral | StopServos | StartServos
+PanelRequest = Hold | Show | LookAt | Live | PlayShow | ControlShow | Learn | Neutral | StopServos | StartServos
 
 
 @dataclass(frozen=True)

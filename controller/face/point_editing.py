@@ -88,6 +88,8 @@ class PointEditor:
         self._before = self._moves
         self._model: _Model | None = None
         self._held: _PointDrag | _SculptDrag | None = None
+        self._asked: tuple[tuple[float, float], Screen, Floats, bool] | None = None
+        self._settled = False
         self._thread = threading.Thread(target=self._prepare, args=(copy,), name="point editor", daemon=True)
 
     @property
@@ -97,8 +99,18 @@ class PointEditor:
 
     @property
     def dragging(self) -> bool:
-        """Whether a point is held."""
-        return self._held is not None
+        """Whether a point is held, or will be once points can be taken."""
+        return self._held is not None or self._asked is not None
+
+    @property
+    def settled(self) -> bool:
+        """Whether the last drag was carried out: not while points get ready."""
+        return self._settled
+
+    @property
+    def moves(self) -> Floats:
+        """(n, 3) mm that the control points were moved by; another array after each change."""
+        return self._moves
 
     @property
     def sculpted(self) -> bool:
@@ -113,11 +125,18 @@ class PointEditor:
     def take(self, pixel: tuple[float, float], screen: Screen, values: Floats, *, sculpt: bool = False) -> bool:
         """Take the point of the skin under a pixel; False when there is none.
 
+        One that is asked for while points get ready is taken by :meth:`drag` as soon as they are, where it was then.
+
         ``values`` : (P,) parameters of the shown face. ``sculpt`` : move control points instead of parameters.
         """
-        model = self._model
-        if model is None:
-            return False
+        self._settled = False
+        if self._model is None:
+            self._asked = (pixel, screen, values.copy(), sculpt)
+            self.prepare()
+            return True
+        return self._take(self._model, pixel, screen, values, sculpt)
+
+    def _take(self, model: _Model, pixel: tuple[float, float], screen: Screen, values: Floats, sculpt: bool) -> bool:
         places, turn = self._places(model, values)
         shown = screen.project(places)
         towards = np.einsum("mc,mc->m", model.normals @ turn.T, np.array(screen.camera.eye) - places) > 0.0
@@ -134,7 +153,13 @@ class PointEditor:
 
     def drag(self, pixel: tuple[float, float], screen: Screen, values: Floats) -> dict[int, float]:
         """Move the held point under a pixel; returns indices of parameters and the values to hold them at."""
-        held, model = self._held, self._model
+        model = self._model
+        if model is not None and self._asked is not None:
+            asked, self._asked = self._asked, None
+            self._take(model, *asked)
+        elif model is None and not self._thread.is_alive():
+            self._asked = None  # it failed
+        self._settled, held = self._asked is None, self._held
         if held is None or model is None:
             return {}
         wanted = screen.place(pixel, held.place) + held.offset
@@ -149,11 +174,15 @@ class PointEditor:
 
     def release(self) -> None:
         """Release the point; moved control points stay."""
-        self._held, self._before = None, self._moves
+        self._held, self._asked, self._before = None, None, self._moves
 
     def undo(self) -> None:
         """Move all control points back."""
-        self._set_moves(np.zeros_like(self._rest))
+        self.set_moves(None)
+
+    def set_moves(self, moves: Floats | None) -> None:
+        """Move the control points by (n, 3) mm from where they were at first; None for not at all."""
+        self._set_moves(np.zeros_like(self._rest) if moves is None else moves)
         self.release()
 
     def save(self, path: Path, name: str) -> None:

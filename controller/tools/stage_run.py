@@ -20,12 +20,14 @@ from controller.base.errors import ConfigError
 from controller.base.files import replacing
 from controller.base.parameters import PARAMETERS
 from controller.base.parts import Part
+from controller.base.paths import config_dir
 from controller.base.signals import stop_flag
 from controller.body.messages import RunOptions, WebPanel
 from controller.body.preload import PreloadedBody
 from controller.body.process import BodyProcess, deadline
 from controller.body.sources import Voice
 from controller.face.face import HeadlessFace, HeadValues, Recorder
+from controller.links.line.script import script_names
 from controller.stage.stage import Stage, check_identity, load_stage, with_picture
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
@@ -34,8 +36,9 @@ from drivers.base.priority import lower_process_priority
 from surface.base.extras import require
 
 if TYPE_CHECKING:
-    from controller.face.window import WindowFace  # start-up: the body gets its orders first
-    from surface.head import Head  # start-up: the body gets its orders first
+    from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
+    from controller.panels.window.panel import PanelOptions  # start-up: the same
+    from surface.head import Head  # start-up: the same
 
 REPORT_FORMAT = 1
 """Version of a report's keys: raised when one changes its meaning or is removed; older reports state none."""
@@ -107,11 +110,12 @@ class StageRun:
         """Run with a window until it is closed, the take ends or ``seconds`` are over."""
         with self._body() as (body, flag):
             values, head = self._load_head(body)
-            from controller.face.window import WindowFace  # start-up: the body gets its orders first
+            from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
 
+            stage = self.stage
             face = WindowFace(
-                head, self.stage.settings.face, values, body.send, body.panel_state, self.stage.load_head,
-                self.stage.controls,
+                head, stage.settings.face, values, body.send, body.panel_state, stage.load_head, _panel_options(stage),
+                stage.controls,
             )  # fmt: skip
             failed = self._show(face, self._begin(body, flag, seconds))
             return self._end(body, None if failed else face.report(), failed)
@@ -198,6 +202,14 @@ def check_web(listen: str, *, alone: bool) -> None:
     except ValidationError as error:
         why = str(error.errors()[0]["msg"]).removeprefix("Value error, ")
         raise ConfigError(f"--web {listen}: {why}", hint="--web 127.0.0.1:8080") from error
+
+
+def _panel_options(stage: Stage) -> PanelOptions:
+    """What the window's panel shows of a stage."""
+    from controller.panels.window.panel import PanelOptions  # start-up: the body gets its orders first
+
+    own = [file for file in stage.vocabularies if not file.is_relative_to(config_dir())]
+    return PanelOptions(stage.vocabulary, own, script_names(beside=stage.path), stage.settings.liveliness)
 
 
 class _Asked:

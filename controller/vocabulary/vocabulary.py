@@ -51,6 +51,17 @@ class Vocabulary:
         """Canonical names, in file order."""
         return tuple(self._expressions)
 
+    def add(self, expression: Expression) -> None:
+        """Know one more expression, or another one of the same name; those that name it show it from their next use.
+
+        May be called while others look expressions up. Raises ParameterError: its name is another name of another one.
+        """
+        known = self._lookup.get(fold(expression.name), expression.name)
+        if known != expression.name:
+            raise ParameterError(f"{expression.name!r} is a name of {known!r} already", hint="choose another name")
+        self._expressions = {**self._expressions, expression.name: expression}
+        self._lookup = {**self._lookup, fold(expression.name): expression.name}
+
     def __getitem__(self, name: str) -> Expression:
         """The expression called ``name``, any case, or of a formula.
 

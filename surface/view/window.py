@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,11 @@ import numpy as np
 
 from surface.base.errors import ViewError
 from surface.base.extras import importing
+from surface.view.docks import Dock, PictureArea, add_docks, find_area, show_docks, text_scale
 from surface.view.draw.alternating import Alternating
+from surface.view.draw.placing import Box, Placing
 from surface.view.draw.renderer import Renderer
-from surface.view.draw.target import Target
+from surface.view.draw.target import Target, read_pixels
 from surface.view.scene.camera import Camera
 from surface.view.scene.choice import LEVELS, QualityChoice
 from surface.view.scene.framing import framing_of
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     import moderngl
 
 _MINIMISED_S = 0.02
+_LINE = 16.0  # height of a line of the runner's text, points
 HEADLESS_HINT = "add --headless, or start it under: xvfb-run -a"
 
 
@@ -60,6 +63,8 @@ def run_window(
     evaluator: str = "auto",
     kiosk: bool = False,
     monitor: int = 0,
+    docks: Sequence[Dock] = (),
+    area: PictureArea | None = None,
 ) -> WindowReport:
     """Show the head until the window is closed.
 
@@ -74,6 +79,8 @@ def run_window(
         its rate.
     kiosk : cover a whole monitor, hide the cursor, ignore mouse and keys but for Esc, which closes the window.
     monitor : which one, from 0.
+    docks : panels beside the picture, which takes what they leave; none in a kiosk.
+    area : told once per frame where the picture is.
 
     Raises ViewError: no display, or no OpenGL. MissingPackage: imgui-bundle is not installed. Exceptions of `source`
     and `gui` are raised again after the window is closed.
@@ -87,6 +94,11 @@ def run_window(
     window = _Window(imgui, source, viewpoint, make, quality)
     window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk
     params = window.params = _parameters(hello_imgui, window, size, title)
+    window.area = area or PictureArea()
+    if docks and not kiosk:
+        safe = [replace(dock, draw=window.as_callback(dock.draw)) for dock in docks]
+        add_docks(hello_imgui, params, safe, size, _LINE * text_scale(size[1], 1.0))
+        window.docked = True
     if kiosk:
         geometry = params.app_window_params.window_geometry
         geometry.full_screen_mode = hello_imgui.FullScreenMode.full_screen_desktop_resolution
@@ -168,7 +180,8 @@ class _Window:
     ) -> None:
         self._imgui, self._source, self._viewpoint = imgui, source, viewpoint
         self._make_renderer, self._quality = make_renderer, quality
-        self.kiosk = False
+        self.kiosk = self.docked = False
+        self.area = PictureArea()
         self.gui: Callable[[], None] | None = None
         self.seconds: float | None = None
         self.keep_going: Callable[[], bool] | None = None
@@ -177,6 +190,7 @@ class _Window:
         self._ctx: moderngl.Context | None = None
         self._drawings: dict[str, _Drawing] = {}
         self._alternating: Alternating | None = None
+        self._placing: Placing | None = None
 
     def as_callback(self, action: Callable[[], None]) -> Callable[[], None]:
         """`action` as a callback: an exception is kept and closes the window."""
@@ -216,20 +230,49 @@ class _Window:
         """One frame of the head, under the panels."""
         if self._ctx is None:
             return
-        ctx, size = self._ctx, self._pixels()
+        self._find_area()
+        ctx, box = self._ctx, self._box()
         # The runner's own drawing changes OpenGL's state without moderngl: begin from what is bound.
         screen = ctx.detect_framebuffer()
-        if min(size) < 1:
+        if min(box[2:]) < 1:
             return
-        picture = self._picture(size)
-        picture.scissor = (0, 0, *size)
-        screen.viewport = screen.scissor = (0, 0, *size)
-        ctx.copy_framebuffer(screen, picture)
+        picture = self._picture(box[2:])
+        if self.area.wanted is not None:
+            self.area.wanted, take = None, self.area.wanted
+            take(read_pixels(picture))
+        self._copy(screen, picture, box)
         screen.use()
         ctx.enable_only(ctx.NOTHING)
         self.last = time.perf_counter()
         self.first = self.first if self.frames else self.last
         self.frames += 1
+
+    def _copy(self, screen: moderngl.Framebuffer, picture: moderngl.Framebuffer, box: Box) -> None:
+        """Copy the picture to its place in the window."""
+        assert self._ctx is not None
+        if box[:2] != (0, 0):
+            self._placing = self._placing or Placing(self._ctx)
+            self._placing.copy(screen, picture, box)
+            screen.viewport = screen.scissor = (0, 0, *self._pixels())
+            return
+        picture.scissor = box
+        screen.viewport = screen.scissor = box
+        self._ctx.copy_framebuffer(screen, picture)
+
+    def _box(self) -> Box:
+        """Where the picture is in the window's framebuffer, pixels: left, bottom, width, height."""
+        io, area = self._imgui.get_io(), self.area
+        scale = io.display_framebuffer_scale
+        left, width, height = round(area.left * scale.x), round(area.width * scale.x), round(area.height * scale.y)
+        return left, self._pixels()[1] - round(area.top * scale.y) - height, width, height
+
+    def _find_area(self) -> None:
+        """Where the panels leave room for the picture: all of the window without any."""
+        io = self._imgui.get_io()
+        area = self.area
+        area.left, area.top, area.width, area.height = 0.0, 0.0, io.display_size.x, io.display_size.y
+        if self.docked:
+            find_area(self._imgui, self.params.docking_params, area)
 
     def _picture(self, size: tuple[int, int]) -> moderngl.Framebuffer:
         """The next picture of `size`."""
@@ -245,6 +288,10 @@ class _Window:
 
     def panels(self) -> None:
         """Mouse, keys and the caller's panels."""
+        if self.docked:
+            show_docks(self.params, shown=not self.area.bare)
+            style = self._imgui.get_style()
+            style.font_scale_main = text_scale(self._imgui.get_io().display_size.y, style.font_scale_dpi)
         if self.kiosk:
             self._imgui.set_mouse_cursor(self._imgui.MouseCursor_.none)
             if self._imgui.is_key_pressed(self._imgui.Key.escape, repeat=False):
@@ -263,7 +310,7 @@ class _Window:
             if imgui.is_mouse_down(imgui.MouseButton_.left):
                 viewpoint.turn(moved.x, moved.y)
             elif imgui.is_mouse_down(imgui.MouseButton_.right):
-                viewpoint.shift(moved.x, moved.y, int(io.display_size.y))
+                viewpoint.shift(moved.x, moved.y, int(self.area.height))
             if io.mouse_wheel:
                 viewpoint.zoom(io.mouse_wheel)
         if not io.want_text_input:
@@ -283,10 +330,10 @@ class _Window:
 
     def stop(self) -> None:
         """Release the graphics memory, while the context still exists."""
-        for thing in (self._alternating, *self._drawings.values()):
+        for thing in (self._placing, self._alternating, *self._drawings.values()):
             if thing is not None:
                 thing.release()
-        self._ctx, self._alternating, self._drawings = None, None, {}
+        self._ctx, self._placing, self._alternating, self._drawings = None, None, None, {}
 
     def _pixels(self) -> tuple[int, int]:
         """Size of the window's framebuffer, pixels."""

@@ -179,7 +179,7 @@ def test_a_run_ends_when_its_time_is_over_or_it_is_interrupted(
 def test_a_window_is_given_the_head_and_what_the_body_shows(
     stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import controller.face.window as window
+    import controller.panels.window.face as window
 
     given: list[Any] = []
 
@@ -202,7 +202,8 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
     monkeypatch.setattr(window, "WindowFace", Window)
     session = StageRun(stage, status=told.append)
     report = session.run_window(None)
-    head, settings, values, send, panel_state, copy = given
+    head, settings, values, send, panel_state, copy, options = given
+    assert options.vocabulary is session.stage.vocabulary and "tour" in options.shows
     assert settings is session.stage.settings.face and (send, panel_state) == (body.send, body.panel_state)
     assert values == (body.mailbox, len(head.parameters)) and copy == session.stage.load_head
     assert report["face"] == {"frames": 2} and told.count("frame") == 2

@@ -1,0 +1,140 @@
+"""What the user has set in the panel, with undo and redo.
+
+Independent of the window library.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from controller.base.parameters import Floats
+from controller.body.messages import Hold, Live, LookAt, Neutral, PanelRequest, Show
+
+_CALM_S = 0.6
+_NOTHING_SHOWN = Show("neutral", 1.0)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Everything that the user has set in the panel at one moment.
+
+    held : parameters by index and the values they are held at. expression : the one that is shown.
+    gaze : the point that is looked at, see :class:`controller.body.messages.LookAt`. life : amount of idle motion.
+    moves : (n, 3) mm that the control points of the face were moved by hand; None for none.
+    """
+
+    held: Mapping[int, float] = field(default_factory=dict)
+    expression: Show = _NOTHING_SHOWN
+    gaze: tuple[float, float, float] | None = None
+    life: float = 0.0
+    moves: Floats | None = None
+
+
+class Commands:
+    """Changes what the user has set, tells the body, and takes changes back without limit.
+
+    send : sends requests to the body. life : amount of idle motion at first.
+    show_moves : draws the control points moved by (n, 3) mm, or where they were for None.
+    """
+
+    def __init__(
+        self,
+        send: Callable[[PanelRequest], None],
+        life: float = 0.0,
+        show_moves: Callable[[Floats | None], None] = lambda moves: None,
+    ) -> None:
+        self.send, self.show_moves = send, show_moves
+        self.now = Settings(life=life)
+        self._past: list[Settings] = []
+        self._future: list[Settings] = []
+        self._step: Hashable = None
+
+    @property
+    def undoable(self) -> bool:
+        """Whether there is something to take back."""
+        return bool(self._past)
+
+    @property
+    def redoable(self) -> bool:
+        """Whether there is something taken back to do again."""
+        return bool(self._future)
+
+    def hold(self, values: Mapping[int, float | None], step: Hashable = None) -> None:
+        """Hold parameters at values; None gives one back to the layers. ``step`` : see :meth:`change`."""
+        held = {**self.now.held, **values}
+        self.change(replace(self.now, held={i: x for i, x in held.items() if x is not None}), step)
+
+    def show(self, name: str, intensity: float, step: Hashable = None) -> None:
+        """Show an expression."""
+        self.change(replace(self.now, expression=Show(name, intensity)), step)
+
+    def look(self, point: tuple[float, float, float] | None, step: Hashable = None) -> None:
+        """Look at a point, or at nothing in particular."""
+        self.change(replace(self.now, gaze=point), step)
+
+    def live(self, amount: float, step: Hashable = None) -> None:
+        """Set the amount of idle motion, 0..1."""
+        self.change(replace(self.now, life=amount), step)
+
+    def move(self, moves: Floats | None, step: Hashable = None) -> None:
+        """Move control points."""
+        self.change(replace(self.now, moves=moves), step)
+
+    def neutral(self) -> None:
+        """Give everything back and return to the neutral face; idle motion and moved control points stay."""
+        self._remember()
+        self.now = Settings(life=self.now.life, moves=self.now.moves)
+        self.send(Neutral(_CALM_S))
+
+    def change(self, to: Settings, step: Hashable = None) -> None:
+        """Set everything that differs; changes with one ``step``, as of one drag, are taken back together."""
+        if step is None or step != self._step:
+            self._remember()
+        self._step = step
+        self._apply(to)
+
+    def end_step(self) -> None:
+        """The next change is one of its own."""
+        self._step = None
+
+    def undo(self) -> None:
+        """Take the last change back; without one nothing happens."""
+        if self._past:
+            self._future.append(self.now)
+            self._apply(self._past.pop())
+        self.end_step()
+
+    def redo(self) -> None:
+        """Do again what was taken back last; without it nothing happens."""
+        if self._future:
+            self._past.append(self.now)
+            self._apply(self._future.pop())
+        self.end_step()
+
+    def _remember(self) -> None:
+        self._past.append(self.now)
+        self._future.clear()
+        self.end_step()
+
+    def _apply(self, to: Settings) -> None:
+        before, self.now = self.now, to
+        for request in _differences(before, to):
+            self.send(request)
+        if before.moves is not to.moves:
+            self.show_moves(to.moves)
+
+
+def _differences(before: Settings, after: Settings) -> Iterator[PanelRequest]:
+    """Requests that change ``before`` to ``after``."""
+    for index in before.held.keys() - after.held.keys():
+        yield Hold(index, None)
+    for index, value in after.held.items():
+        if before.held.get(index) != value:
+            yield Hold(index, value)
+    if before.expression != after.expression:
+        yield after.expression
+    if before.gaze != after.gaze:
+        yield LookAt(after.gaze)
+    if before.life != after.life:
+        yield Live(after.life)

@@ -1,0 +1,122 @@
+"""Points of the face that the mouse drags, and where it makes the face look.
+
+Ctrl and the mouse drag a point by moving parameters; with Shift it moves control points. Alt and the mouse turn the
+gaze.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from controller.base.errors import ControllerError
+from controller.base.parameters import PARAMETERS, Floats
+from controller.face.point_editing import PointEditor, Screen
+from controller.panels.window.commands import Commands
+from surface.head import Head
+from surface.view.docks import PictureArea
+from surface.view.scene.camera import Camera
+
+_WHITE = 0xFFFFFFFF
+
+
+class MouseEditing:
+    """Drags points of the face with the mouse; called once a frame.
+
+    area : where the picture is. copy : loads the same head again. newest : the newest parameters (P,).
+    """
+
+    def __init__(
+        self, head: Head, copy: Callable[[], Head], newest: Callable[[], Floats], commands: Commands, area: PictureArea
+    ) -> None:
+        self.editor = PointEditor(head, copy, PARAMETERS)
+        self._newest, self._commands, self._area = newest, commands, area
+        self._eyes = head.data.eyes.mean(axis=0)
+        self._symmetric, self._name, self._message = False, "mine", ""
+        self._mirror = PARAMETERS.mirror()
+        self._grabs, self._pixel = 0, (0.0, 0.0)
+        commands.show_moves = self.editor.set_moves
+
+    def __call__(self, camera: Camera) -> None:
+        """Handle this frame's mouse and keys."""
+        from imgui_bundle import imgui  # optional
+
+        io, area = imgui.get_io(), self._area
+        screen = Screen(camera, (max(area.width, 1.0), max(area.height, 1.0)))
+        pixel = (io.mouse_pos.x - area.left, io.mouse_pos.y - area.top)
+        outside = imgui.is_window_hovered(imgui.HoveredFlags_.any_window)
+        self._drag(imgui, io, pixel, screen, outside)
+        if io.key_alt and imgui.is_mouse_down(imgui.MouseButton_.left) and not outside:
+            self.look(pixel, camera, screen)
+        if self.editor.dragging or io.key_ctrl or io.key_alt:
+            imgui.set_next_frame_want_capture_mouse(True)  # the mouse must not turn the head meanwhile
+
+    def look(self, pixel: tuple[float, float], camera: Camera, screen: Screen) -> None:
+        """Make the face look at what is under a pixel, half-way between its eyes and the camera."""
+        towards = np.asarray(camera.eye, np.float64)
+        point = screen.place(pixel, self._eyes + 0.5 * (towards - self._eyes)) - self._eyes
+        self._commands.look((float(point[0]), float(point[1]), float(point[2])), "gaze")
+
+    def _drag(self, imgui: Any, io: Any, pixel: tuple[float, float], screen: Screen, outside: bool) -> None:
+        editor = self.editor
+        if io.key_ctrl:
+            editor.prepare()
+        if io.key_ctrl and imgui.is_mouse_clicked(imgui.MouseButton_.left) and not outside:
+            editor.take(pixel, screen, self._newest(), sculpt=io.key_shift)
+            self._grabs += 1
+        if not editor.dragging:
+            return
+        if not editor.ready:
+            imgui.set_tooltip("preparing to drag points")
+        down = imgui.is_mouse_down(imgui.MouseButton_.left)
+        self._pixel = pixel if down else self._pixel  # a mouse let go while points get ready has gone on since
+        moved = editor.drag(self._pixel, screen, self._newest())
+        if moved:
+            self._commands.hold(self._both_sides(moved), ("drag", self._grabs))
+        imgui.get_foreground_draw_list().add_circle(io.mouse_pos, 6.0, _WHITE)
+        if not down and editor.settled:
+            self._release()
+
+    def _release(self) -> None:
+        before = self._commands.now.moves
+        self.editor.release()
+        moves = self.editor.moves
+        if moves is not before and (before is not None or moves.any()):
+            self._commands.move(moves)
+
+    def _both_sides(self, moved: dict[int, float]) -> dict[int, float | None]:
+        """What a drag moves, on both sides where that is wanted."""
+        both: dict[int, float | None] = dict(moved)
+        if self._symmetric:
+            both.update({int(self._mirror[i]): x for i, x in moved.items()})
+        return both
+
+    def draw_panel(self) -> None:
+        """The part of the panel about dragging, and about control points that were moved."""
+        from imgui_bundle import imgui  # optional
+
+        imgui.text_wrapped("Ctrl and drag a point of the face: sliders follow. With Shift: the skin itself.")
+        _, self._symmetric = imgui.checkbox("move both sides", self._symmetric)
+        if not self.editor.sculpted:
+            return
+        imgui.set_next_item_width(imgui.get_font_size() * 8)
+        _, self._name = imgui.input_text("name", self._name)
+        if imgui.button("save group"):
+            self.save(self._name)
+        imgui.same_line()
+        if imgui.button("smooth it out"):
+            self._commands.move(None)
+        if self._message:
+            imgui.text_wrapped(self._message)
+
+    def save(self, name: str) -> None:
+        """Save the moved control points as a group file in the present folder."""
+        path = Path(f"{name or 'mine'}.json").absolute()
+        try:
+            self.editor.save(path, name or "mine")
+            self._message = f"wrote {path}"
+        except ControllerError as error:
+            self._message = str(error)

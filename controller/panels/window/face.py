@@ -1,0 +1,106 @@
+"""Draws the face in a window, with the panel docked beside it and points of the face that the mouse can drag."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller.base.parameters import PARAMETERS
+from controller.body.messages import PanelRequest
+from controller.body.panel_state import PanelState
+from controller.face.controls import Controls
+from controller.face.devices import Devices
+from controller.face.face import FrameLog, HeadValues, qualities
+from controller.panels.window.editing import MouseEditing
+from controller.panels.window.panel import Panel, PanelOptions
+from controller.stage.stage import FaceSettings
+from controller.vocabulary.controls import ControlsFile
+from surface.head import Head
+from surface.head.model.parameters import head_angles
+from surface.view.docks import PictureArea
+from surface.view.scene.choice import QualityChoice
+from surface.view.scene.framing import framed, framing_of
+from surface.view.scene.viewpoint import Viewpoint
+from surface.view.window import run_window
+
+_TITLE = "omote"
+
+
+class WindowFace:
+    """Draws the head in a window until it is closed.
+
+    head : the head to draw. settings : size, quality and camera. values : returns the head's newest values.
+    send : sends the panel's requests to the body. panel_state, options : see :class:`Panel`.
+    copy : loads the head again, for dragging points with the mouse; without, none can be dragged.
+    controls : what gamepad and keys do.
+    """
+
+    def __init__(
+        self,
+        head: Head,
+        settings: FaceSettings,
+        values: HeadValues,
+        send: Callable[[PanelRequest], None],
+        panel_state: PanelState | None = None,
+        copy: Callable[[], Head] | None = None,
+        options: PanelOptions | None = None,
+        controls: Collection[ControlsFile] = (),
+    ) -> None:
+        self._head, self._settings, self._values = head, settings, values
+        self._viewpoint = Viewpoint(framed(settings.make_camera(), head), framing_of(head))
+        self._area = PictureArea()
+        newest = lambda: values.full  # noqa: E731
+        self._panel = Panel(newest, send, panel_state, options, self._viewpoint, self._area)
+        self._mouse = None
+        if copy is not None and not settings.kiosk:
+            self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area)
+            self._panel.more.append(self._mouse.draw_panel)
+        self._devices = Devices(Controls(controls, PARAMETERS), send) if controls else None
+        self._log = FrameLog()
+        self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
+
+    def run(self, keep_going: Callable[[], bool]) -> None:
+        """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
+        began = time.monotonic_ns()
+
+        def source() -> NDArray[np.float64]:
+            nonlocal began
+            values = self._values()
+            now = time.monotonic_ns()
+            self._head.sway.advance(head_angles(values), now / 1e9)
+            self._log.add(values, began, now)
+            began = now
+            return values
+
+        kiosk = self._settings.kiosk
+        run_window(
+            self._head,
+            source,
+            size=self._settings.size,
+            title=_TITLE,
+            gui=None if kiosk and self._devices is None else self._gui,
+            keep_going=keep_going,
+            camera=self._viewpoint,
+            quality=self._choice or self._settings.still_quality,
+            theme=self._settings.make_theme(),
+            evaluator=self._settings.evaluator,
+            kiosk=kiosk,
+            monitor=self._settings.monitor,
+            docks=() if kiosk else self._panel.docks(),
+            area=self._area,
+        )
+
+    def _gui(self) -> None:
+        if not self._settings.kiosk:
+            self._panel()
+        if self._devices is not None:
+            self._devices()
+        if self._mouse is not None:
+            self._mouse(self._viewpoint.camera)
+
+    def report(self) -> dict[str, object]:
+        """Frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""
+        return {**self._log.report(self._settings, "window"), **qualities(self._choice)}

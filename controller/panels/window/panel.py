@@ -1,0 +1,141 @@
+"""All parts of the panel, and what its keys do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from controller.base.parameters import PARAMETERS, Floats
+from controller.body.messages import PanelRequest, StartServos, StopServos
+from controller.body.panel_state import PanelState
+from controller.panels.window.capture import Capture
+from controller.panels.window.colours import GREEN, RED
+from controller.panels.window.commands import Commands
+from controller.panels.window.expressions import ExpressionButtons
+from controller.panels.window.keys import Keys
+from controller.panels.window.sliders import Sliders
+from controller.panels.window.view import View
+from controller.vocabulary.vocabulary import Vocabulary
+from surface.view.docks import Dock, PictureArea
+from surface.view.scene.viewpoint import Viewpoint
+
+_STOP_LINES = 2.0
+_OWN = "mine.toml"
+
+
+@dataclass(frozen=True)
+class PanelOptions:
+    """What a panel shows of its stage.
+
+    vocabulary : its expressions. files : the vocabularies it names; saved expressions go into the last one, or into
+    ``mine.toml`` in ``folder``. shows : names of its shows. life : its amount of idle motion.
+    folder : for all that is saved.
+    """
+
+    vocabulary: Vocabulary = field(default_factory=lambda: Vocabulary.load(PARAMETERS))
+    files: Sequence[Path] = ()
+    shows: Sequence[str] = ()
+    life: float = 0.0
+    folder: Path = field(default_factory=Path.cwd)
+
+
+class Panel:
+    """Draws the panel.
+
+    newest : the newest parameters (P,). send : sends requests to the body.
+    state : without it, neither the layer that holds a parameter nor what the servos show of it is drawn.
+    """
+
+    def __init__(
+        self, newest: Callable[[], Floats], send: Callable[[PanelRequest], None], state: PanelState | None = None,
+        options: PanelOptions | None = None, viewpoint: Viewpoint | None = None, area: PictureArea | None = None,
+    ) -> None:  # fmt: skip
+        options = options or PanelOptions()
+        self.area = area or PictureArea()
+        self._send, self._state = send, state
+        self.commands = Commands(send, options.life)
+        self.capture = Capture(self.area, newest, options.folder)
+        own = options.files[-1] if options.files else options.folder / _OWN
+        self.sliders = Sliders(newest, self.commands, state)
+        self.expressions = ExpressionButtons(
+            options.vocabulary, self.commands, newest, send, own, tuple(options.files[:-1])
+        )
+        self.view = View(self.commands, viewpoint or Viewpoint(), self.capture, options.shows, send)
+        self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
+        self.more: list[Callable[[], None]] = []
+
+    def docks(self) -> list[Dock]:
+        """The parts, as tabs beside the picture."""
+        parts = {"Expressions": self.expressions, "Sliders": self._sliders, "View": self.view}
+        return [Dock(title, "left", self._below_top(part)) for title, part in parts.items()]
+
+    def __call__(self) -> None:
+        """What belongs to no tab: keys, recording; called once a frame."""
+        from imgui_bundle import imgui  # optional
+
+        if self._state is not None:
+            self._state.refresh()
+        if not imgui.is_any_mouse_down():
+            self.commands.end_step()
+        self.keys()
+        self.capture()
+
+    def _actions(self) -> dict[str, Callable[[], None]]:
+        return {
+            "space": self.view.toggle_show,
+            "r": self.capture.toggle,
+            "p": self.capture.take_picture,
+            "n": self.commands.neutral,
+            "escape": self._stop,
+            "f": self._toggle_bare,
+        }
+
+    def _stop(self) -> None:
+        self._send(StopServos())
+
+    def _toggle_bare(self) -> None:
+        self.area.bare = not self.area.bare
+
+    def _below_top(self, part: Callable[[], None]) -> Callable[[], None]:
+        """A part below what every tab has on top."""
+
+        def draw() -> None:
+            from imgui_bundle import imgui  # optional
+
+            self._stop_or_start(imgui)
+            self._top(imgui)
+            imgui.begin_child("##part")
+            part()
+            imgui.end_child()
+
+        return draw
+
+    def _sliders(self) -> None:
+        self.sliders()
+        for part in self.more:
+            part()
+
+    def _stop_or_start(self, imgui: Any) -> None:
+        """The button that stops the servos; while they are stopped, who did it and the button that ends that."""
+        by = self._state.stopped_by if self._state is not None else ""
+        if by:
+            imgui.text(f"servos stopped by {by}")
+        label, colour, request = ("START servos", GREEN, StartServos()) if by else ("STOP servos", RED, StopServos())
+        imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(*colour))
+        if imgui.button(label, imgui.ImVec2(-1, _STOP_LINES * imgui.get_font_size())):
+            self._send(request)
+        imgui.pop_style_color()
+
+    def _top(self, imgui: Any) -> None:
+        commands = self.commands
+        actions = {"undo": (commands.undo, commands.undoable), "redo": (commands.redo, commands.redoable),
+                   "neutral": (commands.neutral, True)}  # fmt: skip
+        for name, (action, possible) in actions.items():
+            imgui.begin_disabled(not possible)
+            if imgui.button(f"{name}##top"):
+                action()
+            imgui.end_disabled()
+            imgui.same_line()
+        imgui.text_disabled(f"{imgui.get_io().framerate:.0f} frames/s   H: keys")

@@ -1,0 +1,117 @@
+"""Sliders of all parameters by region: searchable, both sides linked or apart, with what holds each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from controller.base.parameters import PARAMETERS, REGIONS, Floats, fold
+from controller.body.panel_state import PanelState
+from controller.panels.window.colours import layer_colour, packed
+from controller.panels.window.commands import Commands
+
+
+class Sliders:
+    """Draws the sliders.
+
+    newest : the newest parameters (P,). state : the body's state; without it no holder and no servo is shown.
+    """
+
+    def __init__(self, newest: Callable[[], Floats], commands: Commands, state: PanelState | None = None) -> None:
+        self._newest, self._commands, self._state = newest, commands, state
+        self._search, self._linked = "", True
+        self._mirror = PARAMETERS.mirror()
+
+    def __call__(self) -> None:
+        """Draw; called once a frame."""
+        from imgui_bundle import imgui  # optional
+
+        imgui.set_next_item_width(-imgui.calc_text_size("both sides").x - 4 * imgui.get_frame_height() / 2)
+        _, self._search = imgui.input_text_with_hint("##search", "search", self._search)
+        imgui.same_line()
+        _, self._linked = imgui.checkbox("both sides", self._linked)
+        for region in REGIONS:
+            self._region(imgui, region)
+
+    def rows(self, region: str) -> list[tuple[int, ...]]:
+        """Indices that each slider of a region moves: two where sides are linked."""
+        members = [i for i in map(int, PARAMETERS.region(region)) if fold(self._search) in fold(PARAMETERS.names[i])]
+        if not self._linked:
+            return [(i,) for i in members]
+        pairs = {tuple(sorted({i, int(self._mirror[i])})): None for i in members}
+        return [pair for pair in pairs if _same_sense(pair)] + [(i,) for p in pairs if not _same_sense(p) for i in p]
+
+    def _region(self, imgui: Any, region: str) -> None:
+        rows = self.rows(region)
+        if not rows:
+            return
+        if self._search:
+            imgui.set_next_item_open(True)
+        if not imgui.collapsing_header(f"{region}{self._away(region)}###{region}"):
+            return
+        names = [_label(row) for row in rows]
+        if imgui.begin_table(f"##{region}", 2, imgui.TableFlags_.sizing_stretch_prop):
+            width = max(imgui.calc_text_size(name).x for name in names) + imgui.get_frame_height() * 1.4
+            imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, width)
+            imgui.table_setup_column("value", imgui.TableColumnFlags_.width_stretch)
+            for name, row in zip(names, rows, strict=True):
+                self._row(imgui, name, row)
+            imgui.end_table()
+
+    def _row(self, imgui: Any, name: str, row: Sequence[int]) -> None:
+        """The lock with the name, and the slider."""
+        imgui.table_next_row()
+        imgui.table_next_column()
+        held = all(i in self._commands.now.held for i in row)
+        values = self._newest()
+        locked, held = imgui.checkbox(f"{name}##hold", held)
+        if imgui.is_item_hovered():
+            imgui.set_tooltip("hold by hand" if not held else "give back to the layers")
+        if locked:
+            self._commands.hold({i: float(values[i]) if held else None for i in row})
+        imgui.table_next_column()
+        self._slider(imgui, name, row, values)
+
+    def _slider(self, imgui: Any, name: str, row: Sequence[int], values: Floats) -> None:
+        low, high = float(PARAMETERS.low[row[0]]), float(PARAMETERS.high[row[0]])
+        held = [self._commands.now.held.get(i, float(values[i])) for i in row]
+        holder = "" if self._state is None else self._state.holder(row[0])
+        words = f"%.2f  {holder.replace('%', '%%')}" if holder else "%.2f"
+        imgui.push_style_color(imgui.Col_.slider_grab, imgui.ImVec4(*layer_colour(holder)))
+        imgui.set_next_item_width(-1)
+        moved, value = imgui.slider_float(f"##{name}", float(np.mean(held)), low, high, words)
+        imgui.pop_style_color()
+        self._measured(imgui, row, low, high)
+        if moved:
+            self._commands.hold(dict.fromkeys(row, float(np.clip(value, low, high))), ("hold", *row))
+
+    def _measured(self, imgui: Any, row: Sequence[int], low: float, high: float) -> None:
+        """A mark where the servos are, and its value where the mouse is."""
+        measured = [] if self._state is None else [self._state.measured(i) for i in row]
+        known = [x for x in measured if x is not None]
+        if not known:
+            return
+        corner, far = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+        x = corner.x + (far.x - corner.x) * float(np.clip((np.mean(known) - low) / (high - low), 0.0, 1.0))
+        white = packed(imgui, (1.0, 1.0, 1.0, 1.0))
+        imgui.get_window_draw_list().add_line(imgui.ImVec2(x, corner.y), imgui.ImVec2(x, far.y), white, 1.5)
+        if imgui.is_item_hovered():
+            imgui.set_tooltip("servos show " + " and ".join(f"{x:.2f}" for x in known))
+
+    def _away(self, region: str) -> str:
+        """How far the servos of a region are from their wanted angles, for its title."""
+        away = None if self._state is None else self._state.away_deg(region)
+        return "" if away is None else f"   servos {away:.1f} deg away"
+
+
+def _same_sense(row: Sequence[int]) -> bool:
+    """Whether one value fits both: the eyes' angles and sideways looks of two sides have their own."""
+    names = [PARAMETERS.names[i] for i in row]
+    return len(row) == 2 and not any("Eye" in name or "Look" in name for name in names)
+
+
+def _label(row: Sequence[int]) -> str:
+    name = PARAMETERS.names[row[0]]
+    return name.removesuffix("Left").removesuffix("Right") if len(row) > 1 else name

@@ -1,0 +1,86 @@
+"""Panels docked beside the picture of a window, and where the picture is between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Side = Literal["left", "right", "bottom"]
+MAIN = "MainDockSpace"
+_WIDEST = 0.4
+_SHARES: dict[Side, float] = {"left": 21.0, "right": 21.0, "bottom": 13.0}
+"""Width of a column and height of a row, in heights of a line of text."""
+
+
+@dataclass(frozen=True)
+class Dock:
+    """A panel that is docked at a side of the picture; panels of one side share it as tabs.
+
+    title : of its tab. draw : draws its contents with ImGui, once a frame while its tab is in front.
+    """
+
+    title: str
+    side: Side
+    draw: Callable[[], None]
+
+
+@dataclass
+class PictureArea:
+    """Where the picture is in a window, in ImGui's points from the window's top left corner.
+
+    wanted : gets the next picture once, (height, width, 3) uint8. bare : the caller hides all docked panels.
+    """
+
+    left: float = 0.0
+    top: float = 0.0
+    width: float = 1.0
+    height: float = 1.0
+    wanted: Callable[[NDArray[np.uint8]], None] | None = None
+    bare: bool = False
+
+
+def text_scale(height: float, system: float) -> float:
+    """Factor on the size of text, for a window ``height`` points high; ``system`` : the desktop's own factor."""
+    return max(1.0, height / 1080.0 / max(system, 1.0))
+
+
+def add_docks(runner: Any, params: Any, docks: Sequence[Dock], size: tuple[float, float], line: float) -> None:
+    """Make ImGui's runner dock the panels, in a window of ``size`` points whose text is ``line`` points high."""
+    from imgui_bundle import imgui  # optional: the extra view
+
+    places = {"left": imgui.Dir.left, "right": imgui.Dir.right, "bottom": imgui.Dir.down}
+    window = params.imgui_window_params
+    window.default_imgui_window_type = runner.DefaultImGuiWindowType.provide_full_screen_dock_space
+    docking, rest = params.docking_params, 1.0
+    docking.main_dock_space_node_flags = imgui.DockNodeFlags_.passthru_central_node
+    for side in dict.fromkeys(dock.side for dock in docks):
+        across = size[1] if side == "bottom" else size[0] * rest
+        share = min(_SHARES[side] * line / across, _WIDEST)
+        docking.docking_splits += [runner.DockingSplit(MAIN, side, places[side], share)]
+        rest *= 1.0 if side == "bottom" else 1.0 - share
+    docking.dockable_windows = [_window(runner, dock) for dock in docks]
+
+
+def _window(runner: Any, dock: Dock) -> Any:
+    window = runner.DockableWindow(dock.title, dock.side, dock.draw)
+    window.can_be_closed = False
+    return window
+
+
+def show_docks(params: Any, *, shown: bool) -> None:
+    """Show or hide all docked panels; the picture takes the room of hidden ones."""
+    docking = params.docking_params
+    for window in list(docking.dockable_windows):
+        docking.dockable_window_of_name(window.label).is_visible = shown
+
+
+def find_area(imgui: Any, docking: Any, area: PictureArea) -> None:
+    """Write where the middle of the docked panels is to ``area``."""
+    dock_space = docking.dock_space_id_from_name(MAIN)
+    node = imgui.internal.dock_builder_get_central_node(dock_space) if dock_space is not None else None
+    if node is not None:
+        area.left, area.top, area.width, area.height = node.pos.x, node.pos.y, node.size.x, node.size.y
