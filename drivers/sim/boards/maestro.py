@@ -13,35 +13,31 @@ from drivers.base.errors import DriverError
 from drivers.base.options import option
 from drivers.core.families import BOARD_BAUD
 from drivers.core.traffic import HexDecoder
-from drivers.maestro import protocol
-from drivers.maestro.protocol import MaestroError, crc7
+from drivers.sim.boards import maestro_guide as guide
 from drivers.sim.boards.board import Board, RcChannel
+from drivers.sim.boards.maestro_guide import MaestroError, crc7
 from drivers.sim.wire.faults import Fault
 from drivers.sim.wire.line import BufferingReader
 from drivers.sim.wire.simulator import Servos, Setting, Simulator
 
 LIMITS_US = (992.0, 2000.0)
 """Pulse limits of a new board."""
-_MINI_ONLY = (protocol.SET_MULTIPLE, protocol.GET_MOVING, protocol.SET_PWM)
-SPEED_UNIT = 100.0
-"""One step of speed, quarter microseconds per second (0.25 us per 10 ms)."""
-ACCELERATION_UNIT = 1250.0
-"""One step of acceleration, quarter microseconds per second² (0.25 us per 10 ms per 80 ms)."""
+_MINI_ONLY = (guide.SET_MULTIPLE, guide.GET_MOVING, guide.SET_PWM)
 
 _LENGTHS = {
-    protocol.SET_TARGET: 3,
-    protocol.SET_SPEED: 3,
-    protocol.SET_ACCELERATION: 3,
-    protocol.SET_PWM: 4,
-    protocol.GET_POSITION: 1,
-    protocol.GET_MOVING: 0,
-    protocol.GET_ERRORS: 0,
-    protocol.GO_HOME: 0,
-    protocol.STOP_SCRIPT: 0,
-    protocol.RESTART_SCRIPT: 1,
-    protocol.RESTART_WITH_PARAMETER: 3,
-    protocol.SCRIPT_STATUS: 0,
-    protocol.MINI_SSC: 2,
+    guide.SET_TARGET: 3,
+    guide.SET_SPEED: 3,
+    guide.SET_ACCELERATION: 3,
+    guide.SET_PWM: 4,
+    guide.GET_POSITION: 1,
+    guide.GET_MOVING: 0,
+    guide.GET_ERRORS: 0,
+    guide.GO_HOME: 0,
+    guide.STOP_SCRIPT: 0,
+    guide.RESTART_SCRIPT: 1,
+    guide.RESTART_WITH_PARAMETER: 3,
+    guide.SCRIPT_STATUS: 0,
+    guide.MINI_SSC: 2,
 }
 
 
@@ -71,8 +67,8 @@ class MaestroReader(BufferingReader):
     def _take(self, byte: int) -> list[Command]:
         """A byte of 0x80 and more begins a command, wherever it comes; only Mini SSC may carry it as data."""
         buffer, commands = self._buffer, []
-        if byte >= 0x80 and not (buffer and buffer[0] == protocol.MINI_SSC and byte != protocol.MINI_SSC):
-            if buffer and buffer != bytes((protocol.POLOLU,)):
+        if byte >= 0x80 and not (buffer and buffer[0] == guide.MINI_SSC and byte != guide.MINI_SSC):
+            if buffer and buffer != bytes((guide.POLOLU,)):
                 commands.append(Command(0, b"", len(buffer), MaestroError.PROTOCOL))
             self._buffer = b""
         elif not buffer:
@@ -84,14 +80,14 @@ class MaestroReader(BufferingReader):
     def _complete(self) -> Command | None:
         """The command in the buffer, once all its bytes are there."""
         buffer = self._buffer
-        start = 3 if buffer[0] == protocol.POLOLU else 1
+        start = 3 if buffer[0] == guide.POLOLU else 1
         if len(buffer) < start:
             return None
         code = buffer[2] | 0x80 if start == 3 else buffer[0]
         length = _LENGTHS.get(code, -1)
-        if code == protocol.SET_MULTIPLE:
+        if code == guide.SET_MULTIPLE:
             length = 2 + 2 * buffer[start] if len(buffer) > start else 1
-        checked = self._crc and code != protocol.MINI_SSC
+        checked = self._crc and code != guide.MINI_SSC
         size = start + length + checked
         if length >= 0 and len(buffer) < size:
             return None
@@ -126,18 +122,18 @@ class Maestro(Board):
         seed: int = 0,
     ) -> None:
         self._settings = device, crc
-        self._count, self._limits = channels, (4 * limits_us[0], 4 * limits_us[1])
+        self._count, self._limits = channels, (limits_us[0] / guide.TARGET_US, limits_us[1] / guide.TARGET_US)
         self._handlers: dict[int, Callable[[bytes, float], bytes | None]] = {
-            protocol.SET_TARGET: lambda data, now_s: self._go(data[0], _word(data[1:]), now_s),
-            protocol.SET_MULTIPLE: self._set_multiple,
-            protocol.MINI_SSC: self._mini_ssc,
-            protocol.SET_SPEED: lambda data, now_s: self._limit(self.speeds, data, now_s),
-            protocol.SET_ACCELERATION: lambda data, now_s: self._limit(self.accelerations, data, now_s),
-            protocol.GET_POSITION: self._get_position,
-            protocol.GET_MOVING: lambda data, now_s: bytes((any(channel.moving(now_s) for channel in self.channels),)),
-            protocol.GET_ERRORS: self._get_errors,
-            protocol.GO_HOME: lambda data, now_s: self._go_home(now_s),
-            protocol.SCRIPT_STATUS: lambda data, now_s: b"\x01",
+            guide.SET_TARGET: lambda data, now_s: self._go(data[0], _word(data[1:]), now_s),
+            guide.SET_MULTIPLE: self._set_multiple,
+            guide.MINI_SSC: self._mini_ssc,
+            guide.SET_SPEED: lambda data, now_s: self._limit(self.speeds, data, now_s),
+            guide.SET_ACCELERATION: lambda data, now_s: self._limit(self.accelerations, data, now_s),
+            guide.GET_POSITION: self._get_position,
+            guide.GET_MOVING: lambda data, now_s: bytes((any(channel.moving(now_s) for channel in self.channels),)),
+            guide.GET_ERRORS: self._get_errors,
+            guide.GO_HOME: lambda data, now_s: self._go_home(now_s),
+            guide.SCRIPT_STATUS: lambda data, now_s: b"\x01",
         }
         super().__init__(now_s, faults, seed)
 
@@ -163,11 +159,11 @@ class Maestro(Board):
             return []
         handler = self._handlers.get(packet.code)
         data = handler(packet.data, now_s) if handler else None
-        return [(packet.data[0] if packet.code == protocol.GET_POSITION else 0, data)] if data else []
+        return [(packet.data[0] if packet.code == guide.GET_POSITION else 0, data)] if data else []
 
     def describe(self, now_s: float) -> list[dict[str, Any]]:
         """Pulse width in microseconds and target of each channel."""
-        return [channel.describe(k, now_s, 0.25) for k, channel in enumerate(self.channels)]
+        return [channel.describe(k, now_s, guide.TARGET_US) for k, channel in enumerate(self.channels)]
 
     def _refuse(self, error: MaestroError, now_s: float) -> None:
         self.errors |= error
@@ -180,7 +176,8 @@ class Maestro(Board):
             return
         if target:
             target = min(max(target, self._limits[0]), self._limits[1])
-        speed, acceleration = self.speeds[number] * SPEED_UNIT, self.accelerations[number] * ACCELERATION_UNIT
+        speed = self.speeds[number] * guide.SPEED_UNIT
+        acceleration = self.accelerations[number] * guide.ACCELERATION_UNIT
         self.channels[number].go(target, now_s, speed, acceleration)
 
     def _set_multiple(self, data: bytes, now_s: float) -> None:
@@ -188,8 +185,9 @@ class Maestro(Board):
             self._go(data[1] + k, _word(data[2 + 2 * k :]), now_s)
 
     def _mini_ssc(self, data: bytes, now_s: float) -> None:
-        """8-bit target: 1500 us +- 476.25 us over 0 to 254."""
-        self._go(data[0], 4 * (1500 + (data[1] - 127) / 127 * 476.25), now_s)
+        """8-bit target, 0 to 254."""
+        pulse_us = guide.NEUTRAL_US + (data[1] - 127) / 127 * guide.RANGE_US
+        self._go(data[0], pulse_us / guide.TARGET_US, now_s)
 
     def _limit(self, limits: list[int], data: bytes, now_s: float) -> None:
         if data[0] < self._count:
@@ -229,7 +227,7 @@ class MaestroOptions:
     """Options of ``omote simulate maestro``."""
 
     channels: int = option("6 (Micro Maestro), 12, 18 or 24.", 24)
-    device: int = option("Device number, for the Pololu protocol.", 12, at_least=0, at_most=127)
+    device: int = option("Device number, for the Pololu guide.", 12, at_least=0, at_most=127)
     crc: bool = option("Commands end with a CRC-7.", False)
     baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
 

@@ -15,6 +15,8 @@ from drivers.sim.wire.simulator import BoardOptions, Simulator
 
 CHANNELS = 32
 MIN_US, MAX_US = 500, 2500
+QUERY_US = 10
+"""One step of a queried pulse width (SSC-32U guide, pages 24-33, Query Pulse Width: 10 us)."""
 VERSION = b"SSC32-V2.50USB\r"
 MAX_LINE = 2048
 
@@ -66,7 +68,7 @@ class Ssc32(Board):
         """A query or a stop of one channel."""
         pulse = self.channels[number].position(now_s)
         if word == "QP":
-            return [(number, bytes((round(pulse / 10),)))]
+            return [(number, bytes((round(pulse / QUERY_US),)))]
         self.channels[number].go(pulse, now_s)
         return []
 

@@ -32,8 +32,10 @@ class SimulatedServo(ServoState):
         self._effects = self._effects_by_name()
 
     def force(self, name: str, value: int, now_s: float) -> None:
-        """Set a register whatever its access and range, with all effects of a write."""
-        self._store(self.table[name], value, now_s)
+        """Set a register whatever its access, range and lock, with all effects of a write."""
+        item = self.table[name]
+        self._store(item, value, now_s)
+        self.keep_permanent(item.address, min(item.end, self.table.eeprom_end))
         self._sensed_at = -1.0
 
     # ------------------------------------------------------------ instructions
@@ -83,6 +85,7 @@ class SimulatedServo(ServoState):
         """Set RAM to its initial values and clear errors; the servo receives nothing for `BOOT_S`."""
         self._boot(now_s)
         self.deaf_until = now_s + BOOT_S
+        self.on_change()
 
     def factory_reset(self, option: int, now_s: float) -> int:
         """Error byte. 0xFF resets all, 1 keeps the id, 2 keeps id and baud rate."""
@@ -94,8 +97,8 @@ class SimulatedServo(ServoState):
         for name, value in values.items():
             self.registers.put(name, value)
         self.drive.configure()
+        self.keep_permanent(0, self.table.eeprom_end)
         self.reboot(now_s)
-        self.on_change()
         return 0
 
     def clear(self, params: bytes, now_s: float) -> int:
@@ -136,12 +139,18 @@ class SimulatedServo(ServoState):
             return
         self.registers.store(item, value)
         if item.address < self.table.eeprom_end:
-            self.eeprom_writes[item.name] += 1
-            self.deaf_until = max(self.deaf_until, now_s + self.eeprom_busy_s)
-            self.drive.configure()
+            self._store_permanent(item, now_s)
         effect = self._effects.get(item.name)
         if effect is not None:
             effect(value, now_s)
+
+    def _store_permanent(self, item: Item, now_s: float) -> None:
+        """Wear, the time it takes and what a permanent register changes."""
+        self.drive.configure()
+        if self.keeps_writes:
+            self.eeprom_writes[item.name] += 1
+            self.deaf_until = max(self.deaf_until, now_s + self.eeprom_busy_s)
+            self.keep_permanent(item.address, item.end)
 
     def _recover(self) -> bool:
         """Whether writing Torque Enable ends a shutdown; with Protocol 2.0 only a reboot does."""
@@ -153,9 +162,9 @@ class SimulatedServo(ServoState):
         return True
 
     def _write_lock(self, value: int, now_s: float) -> None:
-        """Closes the permanent registers. AX and MX open it again only without power."""
-        closed = bool(value) or (self.registers.locked and not self.is_feetech)
-        self.registers.locked = closed
+        """AX and MX: closes the permanent registers until the supply was off. Feetech: see `keeps_writes`."""
+        closed = bool(value) or self.registers.locked
+        self.registers.locked = closed and not self.is_feetech
         self.registers.put("Lock", int(closed))
 
     def _write_torque(self, value: int, now_s: float) -> None:
@@ -171,6 +180,8 @@ class SimulatedServo(ServoState):
         registers = self.registers
         shaft = round(self.plant.motion(now_s).position)
         registers.put("Homing Offset", shaft - self.table.center)
+        offset = self.table["Homing Offset"]
+        self.keep_permanent(offset.address, offset.end)
         registers.put("Torque Enable", int(self.plant.powered))
         self.drive.configure()
 

@@ -10,6 +10,12 @@ from drivers.tables.tables import to_magnitude
 
 MULTI_TURN = 0x10
 """Feetech's Phase (18): present positions leave the turn."""
+SPEED_STEPS = 1.0
+"""Feetech: steps/s of one unit of Goal and Present Velocity (STS memory table, address 46: steps/s)."""
+LIMIT_STEPS = 50
+"""Feetech: steps/s of one unit of Maximum Velocity Limit (memory tables: 50 steps/s)."""
+ACCELERATION_STEPS = 100
+"""Feetech: steps/s² of one unit of Acceleration (STS memory table, address 41: 100 steps/s²)."""
 DIRECTION_BIT = 10
 """AX, MX and XL-320: speeds and loads are magnitudes with the direction in this bit (set = clockwise)."""
 
@@ -92,6 +98,10 @@ class FeetechDrive(WordDrive):
 
     goals = ("Goal Position", "Goal Velocity", "Goal Time")
 
+    def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
+        super().__init__(registers, plant, now_s)
+        self.ticks_s = SPEED_STEPS
+
     def configure(self) -> None:
         """Present Position is the shaft's less Homing Offset."""
         if "Homing Offset" in self.registers.table:
@@ -106,7 +116,7 @@ class FeetechDrive(WordDrive):
             speed = registers.get("Goal Velocity") * self.ticks_s
             if mode == 2:
                 speed = registers.get("Goal Time") / 1000 * plant.top_speed
-            speed = min(max(speed, -plant.top_speed), plant.top_speed)
+            speed = min(max(speed, -self._top_speed()), self._top_speed())
             plant.trajectory = plan_speed(now_s, now, speed, self._acceleration())
             return
         goal = self.to_shaft(registers.get("Goal Position"))
@@ -116,16 +126,19 @@ class FeetechDrive(WordDrive):
         if time_s > 0.0 and registers.table.ticks_per_turn == 1024:
             plant.trajectory = plan_timed(now_s, now, goal, time_s)
             return
-        speed = abs(registers.get("Goal Velocity")) * self.ticks_s
-        top = min(speed, plant.top_speed) if speed else plant.top_speed
-        plant.trajectory = plan_move(now_s, now, goal, top, self._acceleration())
+        speed, top = abs(registers.get("Goal Velocity")) * self.ticks_s, self._top_speed()
+        plant.trajectory = plan_move(now_s, now, goal, min(speed or top, top), self._acceleration())
+
+    def _top_speed(self) -> float:
+        """The motor's, or Maximum Velocity Limit where that is slower; 0 there is no limit."""
+        limit = self.registers.get("Maximum Velocity Limit") * LIMIT_STEPS
+        return min(limit or self.plant.top_speed, self.plant.top_speed)
 
     def _acceleration(self) -> float:
-        item = self.registers.table.get("Acceleration")
-        value = self.registers.get("Acceleration") if item else 0
-        if not item or not value:
-            return self.plant.top_acceleration
-        return min(value * item.scale / self.registers.table.rad_per_tick, self.plant.top_acceleration)
+        """STS: Acceleration, where it is not 0, and at most Maximum Acceleration, where that is not 0."""
+        top, registers = self.plant.top_acceleration, self.registers
+        names = [name for name in ("Acceleration", "Maximum Acceleration") if name in registers.table]
+        return min((ACCELERATION_STEPS * registers.get(name) or top for name in names), default=top)
 
     def _position(self, motion: Motion) -> int:
         """With multi-turn feedback (STS) it leaves the turn."""

@@ -91,6 +91,7 @@ class ServoState:
         self._errors = 0
         self._has_error_register = "Hardware Error Status" in table
         self.is_feetech = "Response Level" in table
+        self._permanent = bytearray()
         self.registers.put("ID", device_id)
         self.force_baud(baud, self.baud)
         start = float(table.center if position is None else position)
@@ -267,9 +268,11 @@ class ServoState:
     def _boot(self, now_s: float) -> None:
         """Power-up. Startup Configuration bit 0 switches the motor on at once."""
         registers = self.registers
+        registers.memory[: len(self._permanent)] = self._permanent
         registers.reset(self.table.eeprom_end, self.table.size)
         registers.goals_locked = self.shut_down = False
-        registers.locked = self.table.lock == "Lock" and bool(registers.get("Lock"))
+        registers.locked = not self.is_feetech and self.table.lock == "Lock" and bool(registers.get("Lock"))
+        self.keep_permanent(0, self.table.eeprom_end)
         self.hardware_error = 0
         self._pending = []
         self.drive.born_s = now_s
@@ -282,6 +285,16 @@ class ServoState:
         if startup and registers.get(startup.name) & 1:
             registers.put("Torque Enable", 1)
             self._set_power(True, now_s)
+
+    @property
+    def keeps_writes(self) -> bool:
+        """Whether a write below ``table.eeprom_end`` outlasts the supply: not while Feetech's Lock is 1."""
+        return not (self.is_feetech and self.registers.get("Lock"))
+
+    def keep_permanent(self, first: int, end: int) -> None:
+        """Feetech: what these permanent registers hold now is what they hold after the next power-up."""
+        if self.is_feetech:
+            self._permanent[first:end] = self.registers.memory[first:end]
 
     def _reset_goals(self, now_s: float) -> None:
         """Goal Position where the shaft is; current and PWM at their limits, or 0 in the mode that they control."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from drivers.base.errors import DriverError
-from drivers.maestro.protocol import MaestroError, crc7
 from drivers.sim.boards.maestro import SIMULATOR, Maestro, MaestroOptions, MaestroReader
+from drivers.sim.boards.maestro_guide import MaestroError, crc7
 from drivers.sim.wire.simulator import Setting, make_line
 from drivers.sim.wire.timing import Reply
 
@@ -73,6 +73,21 @@ def test_speed_and_acceleration_units():
     other = Maestro()
     send(other, "84 00 00 20 89 00 04 00 84 00 00 30", 0.0)  # 4 x 0.25 us per 10 ms per 80 ms
     assert pulse(other, 0, 0.2) == pytest.approx(1024 + 0.5 * 1250 * 0.04)
+
+
+@pytest.mark.parametrize(("speed", "acceleration"), [(20, 4), (10, 0), (200, 4)])
+def test_a_step_takes_the_time_of_the_guide(speed: int, acceleration: int):
+    """From 1000 to 1500 us; speed in 0.25 us per 10 ms, acceleration in 0.25 us per 10 ms per 80 ms."""
+    us_s, us_s2 = speed * 0.25 / 0.010, acceleration * 0.25 / 0.010 / 0.080
+    seconds = 500 / us_s + (us_s / us_s2 if acceleration else 0.0)
+    if acceleration and us_s**2 / us_s2 > 500:  # it is never as fast
+        seconds = 2 * (500 / us_s2) ** 0.5
+    board = Maestro()
+    limits = f"87 00 {speed & 127:02X} {speed >> 7:02X} 89 00 {acceleration:02X} 00"
+    send(board, f"84 00 20 1F {limits} 84 00 70 2E")
+    assert pulse(board, 0) == 1000
+    assert pulse(board, 0, seconds / 2) == pytest.approx(1250)
+    assert (send(board, "93", 0.99 * seconds), send(board, "93", 1.01 * seconds)) == ("01", "00")
 
 
 def test_go_home_stops_the_pulses():

@@ -74,13 +74,13 @@ def test_writes_move_the_shaft(bus: SimulatedBus, port: PatientPort) -> None:
         assert time.monotonic() < end
 
 
-def test_permanent_memory_opens_with_its_lock(bus: SimulatedBus, port: PatientPort) -> None:
+def test_permanent_memory_counts_as_written_while_its_lock_is_open(bus: SimulatedBus, port: PatientPort) -> None:
     good(packets.write1ByteTxRx(port, 2, LOCK, 1))
     good(packets.write2ByteTxRx(port, 2, OFFSET, 100))
-    assert bus.servo(2).register("Homing Offset") == 0
+    assert (bus.servo(2).register("Homing Offset"), bus.servo(2).eeprom_writes) == (100, {})
     good(packets.write1ByteTxRx(port, 2, LOCK, 0))
-    good(packets.write2ByteTxRx(port, 2, OFFSET, 100))
-    assert bus.servo(2).register("Homing Offset") == 100
+    good(packets.write2ByteTxRx(port, 2, OFFSET, 200))
+    assert (bus.servo(2).register("Homing Offset"), bus.servo(2).eeprom_writes) == (200, {"Homing Offset": 1})
 
 
 def test_registered_writes_wait_for_the_action(bus: SimulatedBus, port: PatientPort) -> None:

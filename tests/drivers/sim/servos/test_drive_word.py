@@ -191,3 +191,17 @@ def test_voltage_and_temperature_stay_in_their_byte(volts: float, celsius: float
     one.plant.supply_v, one.plant.forced_c = volts, celsius
     one.sense(1.0)
     assert (one.registers.get("Present Voltage"), one.registers.get("Present Temperature")) == shown
+
+
+@pytest.mark.parametrize("model", ["sts3215", "scs0009"])
+def test_maximum_velocity_limit_is_in_units_of_50_steps_a_second(model: str):
+    one = drive(model, Goal_Position=900, Maximum_Velocity_Limit=4, Goal_Velocity=900)
+    one.plan(0.0)
+    assert abs(one.plant.motion(0.5).velocity) == pytest.approx(200.0)
+
+
+def test_maximum_acceleration_bounds_the_acceleration_of_an_sts():
+    for own, most, steps in ((0, 20, 2000), (50, 20, 2000), (10, 20, 1000), (10, 0, 1000)):
+        one = drive("sts3215", Goal_Position=3000, Acceleration=own, Maximum_Acceleration=most)
+        one.plan(0.0)
+        assert one.plant.motion(0.01).acceleration == pytest.approx(steps)

@@ -210,15 +210,35 @@ def test_scs_sends_the_high_byte_first_and_keeps_its_time():
     assert ask(bus, 1, I.READ, b"\x38\x02", 1.1)[0].params == bytes.fromhex("0264")
 
 
-def test_feetech_eeprom_opens_with_its_lock():
+def test_a_write_to_locked_feetech_eeprom_acts_until_the_supply_was_off():
     bus = chain("sts3215", (1,))
-    assert ask(bus, 1, I.WRITE, b"\x05\x09") == [Packet1(1, 0, b"")]  # locked: ignored
-    assert bus.servo(1).id == 1
+    one = bus.servo(1)
+    ask(bus, 1, I.WRITE, b"\x05\x09")  # Lock is 1
+    ask(bus, 9, I.WRITE, b"\x1f" + word(100))
+    assert (one.id, one.registers.get("Homing Offset"), dict(one.eeprom_writes)) == (9, 100, {})
+    one.reboot(1.0)
+    assert (one.id, one.registers.get("Homing Offset")) == (1, 0)
+    assert ask(bus, 1, I.PING, b"", 2.0) == [Packet1(1, 0, b"")]
+
+
+def test_a_write_to_open_feetech_eeprom_is_kept():
+    bus = chain("sts3215", (1,))
+    one = bus.servo(1)
+    ask(bus, 1, I.WRITE, b"\x1f" + word(100))
     ask(bus, 1, I.WRITE, b"\x37\x00")
     ask(bus, 1, I.WRITE, b"\x05\x09")
     ask(bus, 9, I.WRITE, b"\x37\x01")
-    ask(bus, 9, I.WRITE, b"\x05\x01")
-    assert bus.servos[0].id == 9
+    one.reboot(1.0)
+    assert (one.id, one.registers.get("Homing Offset")) == (9, 0)
+    assert dict(one.eeprom_writes) == {"ID": 1}
+
+
+@pytest.mark.parametrize(("model", "first", "last"), [("sts3215", 80, 86), ("scs0009", 78, 83)])
+def test_the_last_registers_of_feetech_are_read_and_written(model: str, first: int, last: int):
+    bus = chain(model, (1,))
+    data = bytes(range(1, last - first + 2))
+    ask(bus, 1, I.WRITE, bytes((first,)) + data)
+    assert ask(bus, 1, I.READ, bytes((first, len(data)))) == [Packet1(1, 0, data)]
 
 
 def test_feetech_offset_and_calibration():
