@@ -12,7 +12,7 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check mutate fuzz bench soak setup api lock clean
+.PHONY: help demo test check clients mutate fuzz bench soak setup api lock clean
 
 help: ## print this list
 	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
@@ -26,6 +26,10 @@ test: setup ## set up, then run the tests (no display, graphics processor or ser
 
 check: setup ## check style and types
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy
+
+# Other people's libraries, each in an environment of its own; needs a package index. CLIENT=rustypot runs one.
+clients: setup ## run other people's programs against simulated servos: make clients CLIENT=rustypot
+	@$(PY) -m tests.clients $(CLIENT)
 
 # Not in requirements.lock: only this target needs it, and it depends on a dozen packages.
 mutate: setup ## mutation testing of a room, 50 changed lines: make mutate ROOM=drivers SEED=1

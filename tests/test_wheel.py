@@ -142,6 +142,15 @@ def test_nothing_but_the_rooms_and_configs_is_installed(installed: Installed) ->
     assert [name for name in names if "__pycache__" in name or "/test_" in name] == []
 
 
+def test_pytest_has_the_fixtures(installed: Installed) -> None:
+    """pytest also rewrites the assertions of a package that has a plug-in."""
+    test = "def test_it(servo_bus):\n    bus = servo_bus('xl330-m288', [1])\n    bus.no_jump()\n"
+    (installed.away / "test_mine.py").write_text(test)
+    words = ("-m", "pytest", "-q", "-p", "no:hypothesispytest", "-p", "no:cacheprovider", "test_mine.py")
+    done = installed.run(*words)
+    assert done.returncode == 0 and "1 passed" in done.stdout, done.stdout + done.stderr
+
+
 def test_code_and_configs_come_from_the_environment(installed: Installed, root: Path) -> None:
     code = (
         "import surface, controller, drivers; print(surface.__file__, controller.__file__, drivers.__file__, sep='\\n')"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -130,7 +131,7 @@ def _pulses(specs: Sequence[ServoSpec]) -> dict[int, tuple[float, float]]:
 def open_head(robot: str, *, folder: Path, faults: Iterable[str] = (), port: str = "", wire: bool = False) -> RobotHead:
     """The simulated hardware of a robot, each bus at a port of its own, with what the robot's drivers expect there.
 
-    robot : a name of configs/robots, or a file. folder : where the changed robot file is written.
+    robot : a name of configs/robots, or a file. folder : in a new folder below it the changed robot file is written.
     faults, port, wire : see :func:`drivers.testing.open_servos`; for all buses.
 
     Raises ConfigError: there is no such robot, or its file is wrong. DriverError: as `open_servos`.
@@ -143,7 +144,7 @@ def open_head(robot: str, *, folder: Path, faults: Iterable[str] = (), port: str
             line = far_end(bus, settings.on_bus(bus.name))
             opened = buses[bus.name] = open_line(line, bus.baud, faults=faults, port=port, wire=wire)
             stack.callback(opened.close)
-        file = folder / f"{path.stem}.toml"
+        file = Path(tempfile.mkdtemp(dir=folder)) / f"{path.stem}.toml"
         file.write_text(tomli_w.dumps(_with_ports(path, settings, buses)), encoding="utf-8")
         stack.pop_all()
     return RobotHead(settings, buses, file)

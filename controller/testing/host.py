@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -79,13 +80,13 @@ def open_host(
 ) -> ScriptedHost:
     """A robot host that plays a script of configs/scripts or a file, or ``steps`` as ``"0.5 SET jawOpen 0.5"``.
 
-    loop_s : after how long the steps begin again, 0 for once. folder : where the steps are written as a script.
+    loop_s : after how long the steps begin again, 0 for once. folder : in a new folder below it the steps are written.
 
     Raises ConfigError: there is no such script, or it is wrong. PortError: no pseudo-terminals here.
     """
     name = script
     if steps:
-        file = folder / "steps.toml"
+        file = Path(tempfile.mkdtemp(dir=folder)) / "steps.toml"
         file.write_text(tomli_w.dumps({"name": "steps", "loop_s": float(loop_s), "steps": list(steps)}), "utf-8")
         name = str(file)
     return ScriptedHost(load_script(name, PARAMETERS), link)

@@ -6,6 +6,7 @@ an assertion never passes on a part of what happened.
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
 from drivers.packets.packet import ErrorNumber
@@ -13,6 +14,7 @@ from drivers.sim.boards.board import Board
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.motion import Trajectory
+from drivers.sim.servos.plant import Plant
 from drivers.sim.servos.registers import Change
 
 MOST = 1_000_000
@@ -101,22 +103,18 @@ class ServoRecord(Record):
         self.servos = chain.servos
         self.pieces: list[list[Piece]] = [[_piece(servo, start_s)] for servo in self.servos]
         for servo in self.servos:
-            self._listen(servo)
+            servo.on_write, servo.on_refusal = partial(self._written, servo), partial(self._refused, servo)
 
-    def _listen(self, servo: SimulatedServo) -> None:
-        def written(changes: list[Change], now_s: float) -> None:
-            for item, value in changes:
-                self.keep(self.writes, Write(now_s - self.start_s, servo.id, item.name, value))
+    def _written(self, servo: SimulatedServo, changes: list[Change], now_s: float) -> None:
+        for item, value in changes:
+            self.keep(self.writes, Write(now_s - self.start_s, servo.id, item.name, value))
 
-        def refused(address: int, data: bytes, why: ErrorNumber, now_s: float) -> None:
-            item = servo.table.by_address.get(address)
-            fits = item is not None and len(data) >= item.size
-            value = item.decode(data) if item is not None and fits else int.from_bytes(data, "little")
-            name = item.name if item is not None else f"address {address}"
-            reason = why.name.lower().replace("_", " ")
-            self.keep(self.writes, Write(now_s - self.start_s, servo.id, name, value, reason))
-
-        servo.on_write, servo.on_refusal = written, refused
+    def _refused(self, servo: SimulatedServo, address: int, data: bytes, why: ErrorNumber, now_s: float) -> None:
+        item = servo.table.by_address.get(address)
+        name, value = f"address {address}", int.from_bytes(data, "little")
+        if item is not None:
+            name, value = item.name, item.decode(data) if len(data) >= item.size else value
+        self.keep(self.writes, Write(now_s - self.start_s, servo.id, name, value, why.name.lower().replace("_", " ")))
 
     def after(self, now_s: float) -> None:
         """Keep what a packet has set in motion."""
@@ -126,15 +124,17 @@ class ServoRecord(Record):
         """Keep the motion of each servo that has changed."""
         for servo, pieces in zip(self.servos, self.pieces, strict=True):
             plant, last = servo.plant, pieces[-1]
-            if (
-                plant.trajectory is not last.trajectory
-                or plant.powered is not last.powered
-                or plant.jammed_at != last.jammed_at
-            ):
-                # a bus watchdog is noticed late: its motion began before this packet
-                late = plant.trajectory is not last.trajectory and plant.powered is last.powered
-                start_s = max(last.start_s, plant.trajectory.start_s) if late else now_s
-                self.keep(pieces, _piece(servo, min(start_s, now_s)))
+            if _seen(plant, last):
+                continue
+            # a bus watchdog is noticed late: its motion began before this packet
+            late = plant.trajectory is not last.trajectory and plant.powered is last.powered
+            start_s = max(last.start_s, plant.trajectory.start_s) if late else now_s
+            self.keep(pieces, _piece(servo, min(start_s, now_s)))
+
+
+def _seen(plant: Plant, last: Piece) -> bool:
+    same = plant.trajectory is last.trajectory and plant.powered is last.powered
+    return same and plant.jammed_at == last.jammed_at
 
 
 def _piece(servo: SimulatedServo, start_s: float) -> Piece:

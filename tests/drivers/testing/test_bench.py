@@ -294,7 +294,7 @@ def test_a_head_of_the_line_protocol_is_a_board() -> None:
 
 
 # ---------------------------------------------------------------- ports
-@pytest.mark.parametrize("kind", ["pty", "tcp"])
+@pytest.mark.parametrize("kind", ["pty", "tcp", "rfc2217"])
 def test_another_program_opens_the_port(kind: str) -> None:
     program = (
         "import serial, sys; port = serial.serial_for_url(sys.argv[1], 1000000, timeout=10);"

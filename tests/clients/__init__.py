@@ -1,0 +1,1 @@
+"""Other people's programs against the simulated buses, each in an environment of its own (``make clients``)."""

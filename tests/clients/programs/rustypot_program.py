@@ -1,0 +1,18 @@
+"""rustypot: the Rust library of Reachy's makers, through its Python module."""
+
+import sys
+import time
+
+import rustypot
+
+head = rustypot.Xl330PyController(sys.argv[1], 1_000_000, 0.5)
+IDS = [1, 2, 3]
+here = head.sync_read_present_position(IDS)
+head.sync_write_goal_position(IDS, here)
+head.sync_write_torque_enable(IDS, [True] * 3)
+wanted = [angle + 0.05 for angle in here]
+head.sync_write_goal_position(IDS, wanted)
+end = time.monotonic() + 20
+while max(abs(a - b) for a, b in zip(head.sync_read_present_position(IDS), wanted, strict=True)) > 0.01:
+    assert time.monotonic() < end
+head.sync_write_torque_enable(IDS, [False] * 3)
