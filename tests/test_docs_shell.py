@@ -50,7 +50,7 @@ MORE = {
     "scan": ["--baud", "1000000"], "render": ["--size", "32x32"],
 }  # fmt: skip
 """Options that end a command soon; the last one counts where a line has the same."""
-PARSED = {"simulate", "calibrate", "fit", "landmarks", "bench", "webcam"}
+PARSED = {"simulate", "calibrate", "fit", "landmarks", "bench", "webcam", "study"}
 """Commands that serve until they are interrupted, wait for keys, or work for minutes: their options are parsed only."""
 MESSAGES = {"omote needs Python 3.11 or newer": MAKEFILE}
 """Messages that begin like a command, and the file that prints them."""
