@@ -11,6 +11,7 @@ from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.links.line.script import load_script
 from controller.stage.study import load_study, write_script
+from controller.tools.check import check_anything
 
 STUDY = """
 name = "smiles"
@@ -67,6 +68,11 @@ def test_trials_follow_each_other_with_pauses_and_their_lines_lie_inside(path: P
     assert not any("anger" in line for _, line in study.steps)  # after the end of its condition
     first = study.trials[0]
     assert study.marks[f"1:{first.condition}:begin"] == 1.0 and len(study.marks) == 24
+
+
+def test_omote_check_knows_studies(path: Path) -> None:
+    (path.parent / "mine.toml").write_text('name = "mine"\n')
+    assert check_anything(str(path)) == ["study smiles: 12 trials of 3 conditions, 25 s: good"]
 
 
 def test_a_study_is_a_script(path: Path, tmp_path: Path) -> None:
