@@ -125,6 +125,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         file.writeframes((9000 * np.sin(np.arange(16_000) * 0.1)).astype("<i2").tobytes())
     (here / "hello.wav").write_bytes((here / "voice.wav").read_bytes())
     (here / "mine.toml").write_text("[glee]\nweights = { mouthSmile = 1 }\n")
+    (here / "me.toml").write_text("[ranges]\njawOpen = [0, 0.6]\n")
     (here / "dimple.json").write_text('{"format": 1, "name": "dimple", "part": "face", "ids": [1], '
                                       '"moves_mm": [[0, 0, 1]]}')  # fmt: skip
     (here / "voice.raw").write_bytes((here / "voice.wav").read_bytes()[44:])
