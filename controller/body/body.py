@@ -23,6 +23,7 @@ from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.parts import Part
 from controller.base.signals import termination_signals
 from controller.body import messages
+from controller.body.event_log import EventLog
 from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.body.messages import RunOptions
 from controller.body.panel_requests import carry_out
@@ -82,9 +83,15 @@ class Body:
             )
         self.state.servo_monitor = self.measured_face
         self.state.servo_records = lambda: [record for bus in self.buses for record in servo_states(bus)]
-        shows = self.state.shows = Shows(self._find_show, self.state, self._show_names)
-        if stage.settings.show is not None:
-            script = load_script(stage.settings.show, parameters, stage.vocabulary, beside=stage.path)
+        events = None
+        if options.events is not None:
+            events = EventLog(options.events, lsl=options.lsl)
+            self._closers.callback(events.close)
+        shows = Shows(self._find_show, self.state, self._show_names, events.note if events is not None else None)
+        self.state.shows = shows
+        show = stage.settings.show if options.show is None else str(options.show)
+        if show is not None:
+            script = load_script(show, parameters, stage.vocabulary, beside=stage.path)
             shows.play(self._as_part(script))
         self._web = options.web
         self.follows_servos = options.mirror and self.measured_face is not None

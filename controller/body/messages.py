@@ -31,7 +31,8 @@ class RunOptions:
 
     take : a take or recording to play instead of the links. voice : a voice that moves the mouth.
     mirror : leave the servos' torque off; the face follows a head that is moved by hand.
-    record : file for every command and tick. web : a web panel.
+    record : file for every command and tick. web : a web panel. show : a script to play instead of the stage's show.
+    events : file for the lines and marks of shows. lsl : send those marks as LSL markers.
     """
 
     take: Path | None = None
@@ -39,6 +40,9 @@ class RunOptions:
     voice: Voice | None = None
     record: Path | None = None
     web: WebPanel | None = None
+    show: Path | None = None
+    events: Path | None = None
+    lsl: bool = False
 
 
 @dataclass(frozen=True)

@@ -35,16 +35,16 @@ def _buses() -> tuple[Callable[..., None], ...]:
 
 
 def _others() -> tuple[Callable[..., None], ...]:
-    from controller.cli import bench, check, translate, webcam  # start-up: the same
+    from controller.cli import bench, check, study, translate, webcam  # start-up: the same
 
-    return check.check, check.plugins, bench.bench, translate.translate, webcam.webcam
+    return check.check, check.plugins, bench.bench, translate.translate, webcam.webcam, study.study
 
 
 COMMANDS = (
     (("demo", "run", "play", "convert"), _runs),
     (("render", "fit", "landmarks", "export"), _pictures),
     (("ports", "scan", "set-id", "monitor", "calibrate"), _buses),
-    (("check", "plugins", "bench", "translate", "webcam"), _others),
+    (("check", "plugins", "bench", "translate", "webcam", "study"), _others),
 )
 """Names of commands and what loads them, in the order of ``omote --help``; ``simulate`` has commands of its own."""
 

@@ -138,6 +138,10 @@ def convert(
     voice_model: Annotated[
         Path | None, typer.Option("--voice-model", help="Network in ONNX that makes the face of a voice (WAV).")
     ] = None,
+    ranges: Annotated[
+        Path | None,
+        typer.Option("--ranges", help="File with the ranges of a person's face, which the take is fitted to."),
+    ] = None,
 ) -> None:
     """Write what a take shows for other programs: a table, time,jawOpen,... in seconds and values, or MCAP.
 
@@ -148,7 +152,7 @@ def convert(
     from controller.tools.motion_file import convert as write
 
     with console.status("converting"):
-        motion = write(take, out, PARAMETERS, rate_hz, voice_model)
+        motion = write(take, out, PARAMETERS, rate_hz, voice_model, ranges)
     rows = f"{len(motion.times_s)} rows of {int(motion.mask.sum())} parameters, {motion.times_s[-1]:.1f} s"
     console.print(f"{rows}\nwrote {out}", soft_wrap=True)
 

@@ -41,17 +41,18 @@ class HeadValues:
     """Selects a head's parameters from the full vector that a mailbox holds; names that omote does not know stay 0.
 
     full : (p,) float64, the full vector of the last call.
-    values : (h,) float64, those of the head.
+    values : (h,) float64, those of the head. stamp_ns : when the newest command in them came (monotonic clock).
     """
 
     def __init__(self, mailbox: Mailbox, parameters: Parameters, wanted: Sequence[str]) -> None:
         self._mailbox, self._indices = mailbox, head_indices(parameters, wanted)
         self._padded = np.zeros(len(parameters.names) + 1)
         self.full, self.values = self._padded[:-1], np.zeros(len(wanted))
+        self.stamp_ns = 0
 
     def __call__(self) -> Floats:
         """The newest values in the head's order, (h,) float64; the same array each time."""
-        self._mailbox.read(self.full)
+        _, self.stamp_ns = self._mailbox.read(self.full)
         return np.take(self._padded, self._indices, out=self.values)
 
 
@@ -111,17 +112,27 @@ class Recorder:
 
 
 class FrameLog:
-    """Statistics of frames: how many, how many differed from the one before (``moved``), and the time of each (ms)."""
+    """Statistics of frames: how many, how many differed from the one before (``moved``), and the time of each (ms).
+
+    command_to_picture_ms : from a command's arrival to the end of the first frame that shows it.
+    """
 
     def __init__(self) -> None:
         self.frames = self.moved = 0
-        self.frame_ms = Samples()
+        self.frame_ms, self.command_to_picture_ms = Samples(), Samples()
+        self._stamp_ns = 0
         self._previous: Floats | None = None
         self._first_ns = self._last_ns = 0
         self._start_to_first_s = 0.0
 
-    def add(self, values: Floats, began_ns: int, ended_ns: int) -> None:
-        """Add one frame of ``values`` : (h,), drawn between two monotonic times (ns)."""
+    def add(self, values: Floats, began_ns: int, ended_ns: int, stamp_ns: int = 0) -> None:
+        """Add one frame of ``values`` : (h,), drawn between two monotonic times (ns).
+
+        ``stamp_ns`` : when the newest command came that the frame shows; 0 for none.
+        """
+        if stamp_ns > self._stamp_ns:
+            self._stamp_ns = stamp_ns
+            self.command_to_picture_ms.add((ended_ns - stamp_ns) / 1e6)
         if self._previous is None:
             self._first_ns = began_ns
             self._start_to_first_s = process_age_s()
@@ -141,6 +152,7 @@ class FrameLog:
             "frames_per_second": self.frames / seconds if seconds else 0.0,
             "frames_with_motion": self.moved,
             "frame_ms": self.frame_ms.summary(),
+            "command_to_picture_ms": self.command_to_picture_ms.summary(),
             "start_to_first_frame_s": self._start_to_first_s,
             "size": list(settings.size),
             "quality": settings.quality,
@@ -191,7 +203,7 @@ class HeadlessFace:
             self._screen.draw(values, self._camera)
             if self._recorder is not None and self._recorder.wants(time_s):
                 self._recorder.keep(self._screen.read(), time_s)
-            self._log.add(values, now, time.monotonic_ns())
+            self._log.add(values, now, time.monotonic_ns(), getattr(self._values, "stamp_ns", 0))
 
     def close(self) -> None:
         """Free the graphics memory."""

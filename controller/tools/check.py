@@ -19,8 +19,10 @@ from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import WORN, load_person
 from controller.stage.stage import check_identity, load_stage
+from controller.stage.study import load_study
 from controller.takes.reader import load_take, suffixes
 from controller.takes.recording import SUFFIX, replay
+from controller.takes.retarget import load_ranges
 from controller.tools import file_kinds
 from controller.tools.fault_script import load_fault_script
 from controller.tools.robot_warnings import robot_warnings
@@ -199,6 +201,18 @@ def _describe_controls(path: Path) -> Iterator[str]:
     yield f"controls {path.name}: {', '.join(text for text in counts if not text.startswith('0 ')) or 'nothing'}"
 
 
+def _describe_ranges(path: Path) -> Iterator[str]:
+    low, high = load_ranges(path, PARAMETERS)
+    yield f"ranges {path.name}: of {int(((low != PARAMETERS.low) | (high != PARAMETERS.high)).sum())} parameters"
+
+
+def _describe_study(path: Path) -> Iterator[str]:
+    study = load_study(path, PARAMETERS)
+    load_stage(str(find_config("stages", study.settings.stage, beside=path)), PARAMETERS)
+    conditions = len(study.settings.conditions)
+    yield f"study {study.settings.name}: {len(study.trials)} trials of {conditions} conditions, {study.length_s:.0f} s"
+
+
 def _describe_moods(path: Path) -> Iterator[str]:
     yield f"moods {path.name}: {len(Affect.load(Vocabulary.load(PARAMETERS), path).names) - 1} anchors"
 
@@ -250,6 +264,8 @@ _READERS: dict[file_kinds.FileKind, Callable[[Path], Iterator[str]]] = {
     file_kinds.VISEMES: _describe_visemes,
     file_kinds.PRESETS: _describe_presets,
     file_kinds.CONTROLS: _describe_controls,
+    file_kinds.RANGES: _describe_ranges,
+    file_kinds.STUDY: _describe_study,
     file_kinds.MOODS: _describe_moods,
     file_kinds.LAYERS: _describe_layers,
     file_kinds.EXPRESSIONS: _describe_expressions,

@@ -16,6 +16,8 @@ from controller.robot.calibration import CalibrationFile
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import PersonSettings
 from controller.stage.stage import StageSettings
+from controller.stage.study import StudySettings
+from controller.takes.retarget import RangesFile
 from controller.tools.fault_script import FaultScript
 from controller.vocabulary.controls import ControlsFile
 
@@ -49,6 +51,8 @@ UNITS = FileKind("action units", frozenset({"units", "emotions"}))
 VISEMES = FileKind("visemes", frozenset({"visemes", "rhubarb", "phonemes", "ipa", "sapi", "letters", "through"}))
 PRESETS = FileKind("presets", frozenset({"presets"}))
 CONTROLS = FileKind("controls", frozenset(ControlsFile.known_keys()))
+RANGES = FileKind("ranges", frozenset(RangesFile.known_keys()))
+STUDY = FileKind("study", frozenset({*StudySettings.known_keys()} - {"name", "description"}))
 MOODS = FileKind("moods", frozenset({"anchors"}))
 LAYERS = FileKind("layers", inside=frozenset(LayerTable.known_keys()))
 EXPRESSIONS = FileKind(
@@ -56,8 +60,8 @@ EXPRESSIONS = FileKind(
     inside=frozenset({"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "of", "weights"}),
 )
 KINDS = (
-    STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, FAULTS, LIFE, PARAMETERS, UNITS, VISEMES, PRESETS, CONTROLS, MOODS,
-    LAYERS, EXPRESSIONS,
+    STAGE, ROBOT, CALIBRATION, PERSON, SCRIPT, FAULTS, LIFE, PARAMETERS, UNITS, VISEMES, PRESETS, CONTROLS, RANGES,
+    STUDY, MOODS, LAYERS, EXPRESSIONS,
 )  # fmt: skip
 
 

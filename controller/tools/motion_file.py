@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from controller.takes.mcap_files import write_mcap
 from controller.takes.plain import write_plain
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
+from controller.takes.retarget import load_ranges, retarget
 from controller.takes.voices.network import network_take
 
 SHOW_HZ = 60.0
@@ -104,9 +105,16 @@ def _rising(times: Floats, values: Floats) -> tuple[Floats, Floats]:
 
 
 def convert(
-    path: Path, out: Path, parameters: Parameters, rate_hz: float | None = None, model: Path | None = None
+    path: Path,
+    out: Path,
+    parameters: Parameters,
+    rate_hz: float | None = None,
+    model: Path | None = None,
+    ranges: Path | None = None,
 ) -> Motion:
     """Write what a file shows as a plain table (.csv) or as MCAP (.mcap); returns it.
+
+    ``ranges`` : file with the ranges of a person's face; see :mod:`controller.takes.retarget`.
 
     Raises as :func:`load_motion`; TakeError: another suffix, or a place that cannot be written to. MissingPackage: mcap
     is not installed.
@@ -119,5 +127,8 @@ def convert(
     if out.exists() and out.samefile(path):
         raise TakeError(f"{out}: is the file that is read", hint="choose another name")
     motion = load_motion(path, parameters, rate_hz, model)
+    if ranges is not None:
+        low, high = load_ranges(ranges, parameters)
+        motion = replace(motion, values=retarget(motion.values, low, high, parameters))
     write(out, motion.times_s, motion.values, motion.mask, parameters)
     return motion

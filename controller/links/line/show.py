@@ -14,28 +14,32 @@ from controller.links.line.commands import Grammar
 from controller.links.line.script import Script
 from controller.links.line.session import LineSession
 
+Note = Callable[[int, str, str], None]
+"""Hears of the time (monotonic clock, ns), ``mark`` or ``line``, and which."""
+
 
 class Show:
     """Plays a script on the clock of the control loop.
 
     Parameters
     ----------
-    script : what to play; ``loop_s`` begins it again. sink : the face.
+    script : what to play; ``loop_s`` begins it again. sink : the face. note : hears of every mark and line.
 
     Attributes
     ----------
     playing : whether time passes; the face stays as it is otherwise. position_s : where it is.
     """
 
-    def __init__(self, script: Script, sink: CommandSink) -> None:
-        self.script = script
+    def __init__(self, script: Script, sink: CommandSink, note: Note | None = None) -> None:
+        self.script, self._note = script, note or _nobody
         self.playing = False
         self.position_s = 0.0
         self._sink = sink
         self._grammar = Grammar(sink.parameters, lambda name: sink.vocabulary[name].name, scripted=True)
         self._session = LineSession(sink, 0, name=f"show {script.name}", scripted=True)
         self._times = [at_s for at_s, _ in script.steps]
-        self._next = 0
+        self._marks = sorted((at_s, name) for name, at_s in script.marks.items())
+        self._next = self._next_mark = 0
         self._last_ns: int | None = None
 
     @property
@@ -57,6 +61,7 @@ class Show:
             raise ParameterError(f"a time must be 0 s or later, not {to}", hint="seek to 0 for the beginning")
         self.position_s = to
         self._next = bisect.bisect_left(self._times, to)
+        self._next_mark = bisect.bisect_left(self._marks, (to, ""))
         self._last_ns = None
 
     def tick(self, now_ns: int) -> list[str]:
@@ -70,7 +75,7 @@ class Show:
         sent = self._send_due(now_ns)
         if self.script.loop_s and self.position_s >= self.script.loop_s:
             self.position_s %= self.script.loop_s
-            self._next = 0
+            self._next = self._next_mark = 0
             sent += self._send_due(now_ns)
         return sent
 
@@ -88,25 +93,34 @@ class Show:
 
     def _send_due(self, now_ns: int) -> list[str]:
         sent = []
+        while self._next_mark < len(self._marks) and self._marks[self._next_mark][0] <= self.position_s:
+            self._note(now_ns, "mark", self._marks[self._next_mark][1])
+            self._next_mark += 1
         while self._next < len(self._times) and self._times[self._next] <= self.position_s:
             line = self.script.steps[self._next][1]
             self._session.feed(line.encode("ascii") + b"\n", now_ns)
+            self._note(now_ns, "line", line)
             sent.append(line)
             self._next += 1
         return sent
+
+
+def _nobody(now_ns: int, event: str, text: str) -> None:
+    """Who hears of marks and lines where nobody does."""
 
 
 class Shows:
     """The show that plays now; links change it from their threads, the control loop ticks it.
 
     find : the script of a name that a link may ask for; raises ConfigError. sink : the face.
-    names : gives the names that ``find`` knows.
+    names : gives the names that ``find`` knows. note : hears of every mark and line of every show.
     """
 
     def __init__(
-        self, find: Callable[[str], Script], sink: CommandSink, names: Callable[[], Sequence[str]] = tuple
-    ) -> None:
-        self._find, self._sink, self.names = find, sink, names
+        self, find: Callable[[str], Script], sink: CommandSink, names: Callable[[], Sequence[str]] = tuple,
+        note: Note | None = None,
+    ) -> None:  # fmt: skip
+        self._find, self._sink, self.names, self._note = find, sink, names, note
         self._show: Show | None = None
         self._lock = threading.RLock()  # a show may start another
 
@@ -116,7 +130,7 @@ class Shows:
 
     def play(self, script: Script) -> None:
         """Play a script from its beginning."""
-        show = Show(script, self._sink)
+        show = Show(script, self._sink, self._note)
         show.playing = True
         with self._lock:
             self._show = show

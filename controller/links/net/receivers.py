@@ -23,6 +23,8 @@ Received = list[tuple[str, bytes]]
 MOST_AT_ONCE = 4096
 """Datagrams, or pieces of a stream, that are read before any is looked at."""
 MOST_CONNECTIONS = 8
+AUTH_S = 10.0
+"""How long a caller may take to give its token."""
 _BUFFER = 1 << 21
 _CHUNK = 65_536
 _RETRY_S = 0.5
@@ -128,7 +130,11 @@ class _Call:
 
     def __init__(self, sender: str, gate: Gate | None) -> None:
         self.sender, self._gate = sender, gate
-        self._web, self._start = WebRequests(), b""
+        self._web, self._start, self._since_s = WebRequests(), b"", time.monotonic()
+
+    def is_late(self) -> bool:
+        """Whether it has not given its token in time."""
+        return self._gate is not None and time.monotonic() - self._since_s > AUTH_S
 
     def take(self, data: bytes) -> bytes:
         """What of a piece of its stream counts. Raises ValueError: it must hang up; says why."""
@@ -166,6 +172,9 @@ class TcpListener:
                 self._accept()
             else:
                 found += self._read(key.fileobj, key.data)  # type: ignore[arg-type]
+        for call in [call for call, caller in self._calls.items() if caller.is_late()]:
+            self.error = "a caller without the token, who was turned away"
+            self._hang_up(call)
         return found
 
     def close(self) -> None:
@@ -184,6 +193,7 @@ class TcpListener:
             self.error = f"more than {MOST_CONNECTIONS} connections"
             return
         call.setblocking(False)
+        call.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
         self._calls[call] = _Call(f"{sender[0]}:{sender[1]}", self._gate)
         self._selector.register(call, selectors.EVENT_READ, self._calls[call])
 
@@ -200,10 +210,13 @@ class TcpListener:
             self.error = str(error)
         except OSError:
             pass  # it ended, however it did
+        self._hang_up(call)
+        return [(caller.sender, b"")]
+
+    def _hang_up(self, call: socket.socket) -> None:
         self._selector.unregister(call)
         call.close()
         del self._calls[call]
-        return [(caller.sender, b"")]
 
 
 class TcpCaller:

@@ -64,15 +64,15 @@ class WindowFace:
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
-        began = time.monotonic_ns()
+        began, stamp = time.monotonic_ns(), 0
 
         def source() -> NDArray[np.float64]:
-            nonlocal began
+            nonlocal began, stamp
             values = self._values()
             now = time.monotonic_ns()
             self._head.sway.advance(head_angles(values), now / 1e9)
-            self._log.add(values, began, now)
-            began = now
+            self._log.add(values, began, now, stamp)  # the frame before has been drawn by now
+            began, stamp = now, self._values.stamp_ns
             return values
 
         kiosk = self._settings.kiosk

@@ -157,11 +157,13 @@ def test_a_log_of_frames_is_exact(monkeypatch: pytest.MonkeyPatch) -> None:
     values = np.array([0.0, 1.0])
     for k in range(4):
         values[0] = k // 2  # the log has to keep a copy
-        log.add(values, 10**9 + k * 250_000_000, 10**9 + k * 250_000_000 + 125_000_000)
+        began = 10**9 + k * 250_000_000
+        log.add(values, began, began + 125_000_000, 10**9 - 75_000_000 if k < 3 else began + 25_000_000)
     found = log.report(settings, "x")
     assert found == {
         "frames": 4, "seconds": 0.875, "frames_per_second": 4 / 0.875, "frames_with_motion": 1,
         "frame_ms": dict.fromkeys(("mean", "p50", "p95", "p99", "max"), 125.0), "start_to_first_frame_s": 2.5,
+        "command_to_picture_ms": {"mean": 150.0, "p50": 150.0, "p95": 195.0, "p99": 199.0, "max": 200.0},
         "size": [64, 32], "quality": "fast", "renderer": "x",
     }  # fmt: skip
 

@@ -14,6 +14,7 @@ import pytest
 from controller.base.errors import LinkError
 from controller.formats.format import FORMATS
 from controller.links.line.hostport import HostPort
+from controller.links.net import receivers
 from controller.links.net.address import parse_address
 from controller.links.net.receivers import MOST_CONNECTIONS, Gate, InputReceiver, Receiver, open_receiver
 from drivers.base.errors import PortMissing
@@ -103,6 +104,17 @@ def test_a_stream_without_the_token_is_turned_away(opened: Open, start: bytes) -
             assert time.monotonic() < end_s
             found = receiver.receive(0.1)
     assert [data for _, data in found] == [b""] and "without the token" in receiver.error
+
+
+def test_who_gives_no_token_is_sent_away(opened: Open, monkeypatch: pytest.MonkeyPatch) -> None:
+    port = free_port(socket.SOCK_STREAM)
+    receiver = opened(f"tcp:127.0.0.1:{port}", gate=Gate("abcdef", b"\n"))
+    monkeypatch.setattr(receivers, "AUTH_S", 0.05)
+    with socket.create_connection(("127.0.0.1", port), 10.0) as call:
+        end_s = time.monotonic() + 10
+        while "without the token" not in receiver.error:
+            assert time.monotonic() < end_s and receiver.receive(0.05) == []
+        assert call.recv(1) == b""
 
 
 def test_calls_are_limited(opened: Open) -> None:

@@ -1,0 +1,152 @@
+"""Studies: conditions in a seeded order, as one script with a mark where each begins and ends."""
+
+from __future__ import annotations
+
+import random
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tomli_w
+from pydantic import Field
+
+from controller.base.config import Settings, load
+from controller.base.errors import ConfigError
+from controller.base.files import replacing
+from controller.base.parameters import Parameters
+from controller.base.plain_numbers import plain_number
+from controller.links.line.script import load_script
+
+_Seconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
+_Name = Annotated[str, Field(pattern=r"^[!-)+-~]{1,64}$")]
+_CALM_S = 0.4
+MOST_TRIALS = 2000
+
+
+class Condition(Settings):
+    """One condition: timed lines of the line protocol, as in a script, or the name of a script; and how long it is."""
+
+    steps: Annotated[list[str], Field(max_length=1000)] = []
+    script: str | None = None
+    length_s: Annotated[_Seconds, Field(gt=0)]
+
+
+class StudySettings(Settings):
+    """A study's file.
+
+    order : ``shuffled``, all trials in one order of chance; ``blocks``, every condition once before any comes again;
+    ``given``, as in the file.
+    """
+
+    name: str
+    description: str = ""
+    stage: str
+    seed: Annotated[int, Field(ge=0)] = 0
+    repeats: Annotated[int, Field(ge=1, le=1000)] = 1
+    order: Literal["shuffled", "blocks", "given"] = "blocks"
+    before_s: _Seconds = 1.0
+    pause_s: _Seconds = 1.0
+    conditions: Annotated[dict[_Name, Condition], Field(min_length=1, max_length=200)]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One showing of a condition: its number from 1, and when it begins and ends (s) after the study's beginning."""
+
+    number: int
+    condition: str
+    begin_s: float
+    end_s: float
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study with its trials in order.
+
+    length_s : how long it takes. steps : (time s, line), rising. marks : names of moments (s).
+    """
+
+    settings: StudySettings
+    trials: tuple[Trial, ...]
+    steps: tuple[tuple[float, str], ...]
+    marks: dict[str, float]
+    length_s: float
+
+
+def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> Study:
+    """Read a study. ``seed`` : instead of the file's, such as the number of a participant.
+
+    Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
+    """
+    settings = load(path, StudySettings, _faults)
+    lines = {name: _lines(path, name, each, parameters) for name, each in settings.conditions.items()}
+    order = _order(settings, settings.seed if seed is None else seed)
+    trials, at_s = [], settings.before_s
+    for number, name in enumerate(order, 1):
+        end_s = at_s + settings.conditions[name].length_s
+        trials.append(Trial(number, name, at_s, end_s))
+        at_s = end_s + settings.pause_s
+    steps = [step for trial in trials for step in _steps(trial, lines[trial.condition])]
+    marks = {f"{trial.number}:{trial.condition}:{what}": at for trial in trials
+             for what, at in (("begin", trial.begin_s), ("end", trial.end_s))}  # fmt: skip
+    return Study(settings, tuple(trials), tuple(steps), marks, at_s)
+
+
+def write_script(study: Study, path: Path, parameters: Parameters) -> None:
+    """Write a study as a script that a stage plays as a show.
+
+    Raises ControllerError: it cannot be written. ConfigError: a line of it is wrong, with its place.
+    """
+    table = {
+        "name": study.settings.name,
+        "marks": study.marks,
+        "steps": [f"{at_s:.3f} {line}" for at_s, line in study.steps],
+    }
+    with replacing(path) as temporary:
+        temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
+    load_script(str(path), parameters)
+
+
+def _steps(trial: Trial, lines: list[tuple[float, str]]) -> list[tuple[float, str]]:
+    """The lines of a trial at their times, and the way back to a neutral face at its end."""
+    own = [(trial.begin_s + at_s, line) for at_s, line in lines if trial.begin_s + at_s <= trial.end_s]
+    return [*own, (trial.end_s, f"NEUTRAL {_CALM_S}")]
+
+
+def _order(settings: StudySettings, seed: int) -> list[str]:
+    """The names of the conditions, one for each trial; the same seed gives the same order."""
+    draw, names = random.Random(seed), list(settings.conditions)
+    if settings.order == "given":
+        return names * settings.repeats
+    if settings.order == "shuffled":
+        every = names * settings.repeats
+        draw.shuffle(every)
+        return every
+    return [name for _ in range(settings.repeats) for name in draw.sample(names, len(names))]
+
+
+def _lines(path: Path, name: str, condition: Condition, parameters: Parameters) -> list[tuple[float, str]]:
+    if condition.script is not None:
+        return list(load_script(condition.script, parameters, beside=path).steps)
+    found = []
+    for text in condition.steps:
+        time, _, line = text.strip().partition(" ")
+        at_s = plain_number(time)
+        if at_s is None or not at_s >= 0.0 or not line.strip():
+            raise ConfigError(
+                f"{path}: conditions.{name}: {text!r} is no time and line", hint='write it as "0.5 EXPR happiness"'
+            )
+        found.append((at_s, line.strip()))
+    return sorted(found, key=lambda step: step[0])
+
+
+def _faults(settings: StudySettings) -> list[str]:
+    faults = [
+        f"conditions.{name}: give one of steps and script"
+        for name, each in settings.conditions.items()
+        if (each.script is None) == (not each.steps)
+    ]
+    trials = settings.repeats * len(settings.conditions)
+    if trials > MOST_TRIALS:
+        faults.append(f"repeats: {trials} trials are more than {MOST_TRIALS}")
+    return faults

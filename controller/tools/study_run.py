@@ -1,0 +1,71 @@
+"""Runs a study: its stage with the study as the show, an event log, a recording and what was measured."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from controller.base.errors import ConfigError
+from controller.base.files import replacing
+from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
+from controller.body.messages import RunOptions
+from controller.stage.study import Study, load_study, write_script
+from controller.tools.stage_run import StageRun, write_report
+
+_AFTER_S = 0.5
+
+
+def run_study(
+    path: Path,
+    folder: Path,
+    *,
+    seed: int | None = None,
+    lsl: bool = False,
+    show: Callable[[StageRun, float], dict[str, Any]] = StageRun.run_without_face,
+    status: Callable[[str], object] = lambda _: None,
+) -> dict[str, Any]:
+    """Run a study; writes ``trials.csv``, ``events.csv``, ``run.rec``, ``report.json`` and ``study.toml`` to a folder.
+
+    seed : instead of the file's. lsl : send the marks as LSL markers. show : runs a stage for seconds.
+
+    Raises ConfigError: the study is wrong, or the folder holds one already; whatever the stage raises.
+    """
+    study = load_study(path, PARAMETERS, seed)
+    if (folder / "run.rec").exists():
+        raise ConfigError(f"{folder}: holds a study already", hint="choose another folder: -o participant-7")
+    folder.mkdir(parents=True, exist_ok=True)
+    script = folder / "study.toml"
+    write_script(study, script, PARAMETERS)
+    _write_trials(study, folder / "trials.csv")
+    options = RunOptions(record=folder / "run.rec", show=script, events=folder / "events.csv", lsl=lsl)
+    stage = find_config("stages", study.settings.stage, beside=path)
+    report = show(StageRun(str(stage), options, status=status), study.length_s + _AFTER_S)
+    report["study"] = {
+        "name": study.settings.name,
+        "seed": study.settings.seed if seed is None else seed,
+        "trials": [trial.condition for trial in study.trials],
+        "measured": measured(report),
+    }
+    write_report(report, folder / "report.json")
+    return report
+
+
+def measured(report: dict[str, Any]) -> dict[str, Any]:
+    """Latency of the face and of the servos, and how far these were from the wanted face, of a run's report."""
+    face = report.get("face") or {}
+    buses = report.get("buses", [])
+    return {
+        "face_latency_ms": face.get("command_to_picture_ms"),
+        "servo_latency_ms": {bus["name"]: bus["command_to_wire_ms"] for bus in buses},
+        "pose_error_deg": {bus["name"]: bus.get("face_difference", {}) for bus in buses},
+    }
+
+
+def _write_trials(study: Study, path: Path) -> None:
+    with replacing(path) as temporary, temporary.open("w", encoding="utf-8", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow(["trial", "condition", "begin_s", "end_s"])
+        rows.writerows([t.number, t.condition, f"{t.begin_s:.3f}", f"{t.end_s:.3f}"] for t in study.trials)
