@@ -32,7 +32,7 @@ _LIP_REACH = 45.0
 #: The skin ends inside the lips; the light enters this far in front of its edge, mm.
 _LIP_DEPTH = 14.0
 #: Share of the edge's area at rest that is still hidden behind closed lips.
-_SHUT = 0.96
+_SHUT = 0.9
 #: Half the mouth's width, a little less: how far the opening counts to either side.
 _SLIDE = 0.38
 _FALLBACK_AREA = (0.0, 0.0, 250.0)
