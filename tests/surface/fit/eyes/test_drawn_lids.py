@@ -7,7 +7,7 @@ import pytest
 from eye_face import CENTRES
 from face_measures import Window
 
-from surface.fit.eyes.drawn_lids import BLINKS, seat_drawn_lids
+from surface.fit.eyes.drawn_lids import BLINKS, CORRECTIONS, DrawnLids, seat_drawn_lids
 from surface.head import Group, Head, HeadData
 
 AHEAD = 40.0 + 6.0  # z of what lies before the middle of an eyeball
@@ -91,3 +91,27 @@ def test_a_blink_that_goes_a_third_of_its_way_is_left_alone(head: Head) -> None:
 def test_a_head_without_lids_stays_as_it_is(head: Head) -> None:
     bare = replace(head.data, contacts=[])
     assert seat_drawn_lids(bare) == (bare, [])
+
+
+class Part(DrawnLids):
+    """Lids of a head that is no more than the gap, mm, its blink leaves, and that takes a share of what is added."""
+
+    def __init__(self, share: float) -> None:
+        self.share, self.asked = share, 0
+
+    def corrections(self, head):
+        self.asked += 1
+        return {"gap": head}, head, 0.1
+
+    def with_more(self, head, more):
+        return head - self.share * more["gap"]
+
+
+@pytest.mark.parametrize(
+    ("share", "left", "asked"), [(0.5, 0.5, CORRECTIONS + 1), (1.0, 0.0, 2), (-1.0, 8.0, CORRECTIONS + 1)]
+)
+def test_what_a_head_takes_only_in_part_is_corrected_again(share, left, asked) -> None:
+    """The least of the gaps after a correction counts; before it, other shapes are not corrected either."""
+    lids = Part(share)
+    assert lids.shut(4.0) == (left, 4.0, left)
+    assert lids.asked == asked
