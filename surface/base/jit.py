@@ -159,8 +159,8 @@ def _lock_file() -> int | None:
     if fcntl is None:
         return None
     try:
-        file = Path(FunctionCache(kernel).cache_path) / "kernels.lock"
-        return os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        kept = FunctionCache(kernel)  # type: ignore[no-untyped-call]
+        return os.open(Path(kept.cache_path) / "kernels.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     except (OSError, RuntimeError):  # RuntimeError: numba finds no folder
         return None
 
