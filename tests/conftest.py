@@ -46,6 +46,11 @@ LONGEST = (
     "tests/controller/robot/test_anchors.py",
     "tests/surface/fit/test_round_trip.py",
     "tests/test_process_kill.py",
+    "tests/surface/base/test_jit.py",
+    "tests/surface/fit/eyes/test_search.py",
+    "tests/surface/view/test_window.py",
+    "tests/surface/view/draw/test_renderer.py",
+    "tests/test_examples.py",
 )
 """Files that take longest, in this order: they begin first, so that no worker is left alone with one at the end."""
 

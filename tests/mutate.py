@@ -54,7 +54,7 @@ by a TypeError, and the removal of decorators that compile or cache, which no te
 TIMEOUT_S = 200
 """Of processor time, so that tests that only wait for their turn on a busy machine count as running."""
 LONGEST_S = 1200.0
-"""Of time on the clock, for mutants that wait for ever; the tests of one module take a few minutes on a busy machine."""
+"""Of time on the clock, for mutants that wait for ever: on a busy machine, the tests of a module may take minutes."""
 
 
 @dataclass(frozen=True)

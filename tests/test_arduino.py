@@ -23,7 +23,7 @@ from tests.arduino import compile_sketch
 
 JAW, SMILE = P.index("jawOpen"), P.index("mouthSmileLeft")
 RELEASED, PRESSED = 1, 0
-LIMIT_S = 20.0
+LIMIT_S = 60.0
 
 
 def until(condition: Callable[[], object]) -> None:

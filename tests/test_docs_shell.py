@@ -145,7 +145,7 @@ def said(folder: Path) -> Iterator[dict[str, tuple[int, str]]]:
     with SimulatedBus([1, 2]) as bus, SimulatedBus([1, 2]) as other:
         groups = (recorded + others[::2], bus.path), (others[1::2], other.path)
         running = [start(folder, lines, port) for lines, port in groups]
-        outputs = [process.communicate(timeout=240) for process in running]
+        outputs = [process.communicate(timeout=600) for process in running]
     assert [process.returncode for process in running] == [0, 0], outputs
     lines = [json.loads(line) for out, _ in outputs for line in out.splitlines()]
     found = {line: (code, text) for line, code, text in lines}

@@ -24,7 +24,7 @@ from surface.view.scene.camera import Camera
 JAW_ID = 4
 
 
-def until(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
+def until(condition: Callable[[], bool], seconds: float = 60.0) -> bool:
     """Wait for ``condition``, at most ``seconds``."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
@@ -42,7 +42,7 @@ class Host:
         tty.setraw(self._slave)
         self.path = os.ttyname(self._slave)
 
-    def say(self, line: str, seconds: float = 5.0) -> str:
+    def say(self, line: str, seconds: float = 60.0) -> str:
         """Write one line and return the line that answers it."""
         os.write(self._master, line.encode() + b"\n")
         answer = b""

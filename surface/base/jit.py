@@ -16,6 +16,7 @@ import hashlib
 import logging
 import os
 import re
+import time
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -56,6 +57,8 @@ def _skip_scipy() -> None:
 
 _skip_scipy()
 PACKAGE = Path(__file__).parents[1]
+LONGEST_WAIT_S = 120.0
+"""For a kernel that another process compiles; the largest takes seconds, on a busy machine many."""
 IMPORT = re.compile(r"^from[ ]+(\.*)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n#]*)", re.MULTILINE)
 
 
@@ -141,13 +144,25 @@ def _held(name: str) -> Iterator[None]:
     if descriptor is None:
         yield
         return
-    with suppress(OSError):  # a file system without locks
-        fcntl.lockf(descriptor, fcntl.LOCK_EX, 1, place)
+    _wait_for(descriptor, place)
     try:
         yield
     finally:
         with suppress(OSError):
             fcntl.lockf(descriptor, fcntl.LOCK_UN, 1, place)
+
+
+def _wait_for(descriptor: int, place: int) -> None:
+    """Take a byte's lock; go on without it where there are none, or where its holder seems to have been stopped."""
+    end = time.monotonic() + LONGEST_WAIT_S
+    while time.monotonic() < end:
+        try:
+            fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
+            return
+        except (BlockingIOError, PermissionError):  # another process has it
+            time.sleep(0.02)
+        except OSError:  # a file system without locks
+            return
 
 
 @cache
@@ -159,8 +174,8 @@ def _lock_file() -> int | None:
     if fcntl is None:
         return None
     try:
-        file = Path(FunctionCache(kernel).cache_path) / "kernels.lock"
-        return os.open(file, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
+        kept = FunctionCache(kernel)  # type: ignore[no-untyped-call]
+        return os.open(Path(kept.cache_path) / "kernels.lock", os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o666)
     except (OSError, RuntimeError):  # RuntimeError: numba finds no folder
         return None
 

@@ -51,7 +51,7 @@ def step(bus: Bus, target: np.ndarray | list[float]) -> BusState:
     return bus.read()
 
 
-def read_until(bus: Bus, done: Callable[[BusState], bool], timeout_s: float = 10.0) -> BusState:
+def read_until(bus: Bus, done: Callable[[BusState], bool], timeout_s: float = 60.0) -> BusState:
     """Read until something is known."""
     end = bus._clock() + timeout_s
     while not done(state := bus.read()):

@@ -65,7 +65,7 @@ class Wire:
         """Bytes nobody asked for."""
         os.write(self._master, data)
 
-    def wait_heard(self, count: int, timeout_s: float = 5.0) -> bytes:
+    def wait_heard(self, count: int, timeout_s: float = 60.0) -> bytes:
         """All bytes heard once there are at least ``count``."""
         end = time.monotonic() + timeout_s
         while len(self.heard) < count and time.monotonic() < end:

@@ -9,10 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from controller.base.errors import ConfigError
+from controller.cli import simulate
 from controller.cli.app import make_app
 from controller.tools import simulate as tools
 from controller.tools.simulate import Serving
+from drivers.base.options import entries
 from drivers.core.registry import FAMILIES
+from drivers.sim.wire.simulator import simulator_of
 
 
 def omote(*words: str) -> Any:
@@ -89,3 +92,10 @@ def test_limits_of_options_are_those_of_the_simulator() -> None:
     assert omote("maestro", "--latency", "1001", "--wire").exit_code == 2
     assert "--crc" in help_of("maestro") and "--channels" in help_of("maestro")
     assert "--model" in help_of("dynamixel") and "--crc" not in help_of("dynamixel")
+
+
+def test_a_shell_completes_names_of_models_for_that_option_alone() -> None:
+    made = [simulate._parameter(entry, None) for entry in entries(simulator_of("dynamixel").options)]
+    completed = {each.name: each.annotation.__metadata__[0].autocompletion for each in made}
+    assert completed.pop("model") is simulate.models
+    assert completed and set(completed.values()) == {None}

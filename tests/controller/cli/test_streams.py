@@ -43,7 +43,7 @@ def test_a_closed_output_is_one_message_and_no_port_takes_its_place() -> None:
 
 @pytest.mark.parametrize("redirection", ["2>&-", pytest.param("2>/dev/full", marks=needs_full)])
 def test_an_error_that_cannot_be_written_is_still_an_exit_code(redirection: str) -> None:
-    assert omote(redirection, "run", "nope") == (1, "")
+    assert omote(redirection, "check", "nope") == (1, "")
 
 
 def test_every_stream_may_be_closed() -> None:

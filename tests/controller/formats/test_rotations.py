@@ -49,3 +49,15 @@ def test_angles_come_back(seed: int) -> None:
 def test_what_is_no_rotation_is_refused(none: Quaternion) -> None:
     with pytest.raises(ValueError, match="a rotation that is none"):
         from_unity(none)
+
+
+def test_a_head_that_looks_straight_up_or_down_has_a_pitch_in_spite_of_rounding() -> None:
+    """Rounded products of the quaternion are larger than 1 for a third of these."""
+    half, beyond = math.sqrt(0.5), 0
+    for sign in (1.0, -1.0):
+        for turn in np.linspace(0.0, 3.0, 31):
+            c, s = math.cos(turn), math.sin(turn)
+            x, y, z, w = sign * half * c, half * s, -sign * half * s, half * c
+            beyond += abs(2 * (w * x - y * z)) > 1.0
+            assert from_unity((x, y, z, w))[1] == pytest.approx(sign * math.pi / 2)
+    assert beyond > 5

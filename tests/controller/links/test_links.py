@@ -27,7 +27,7 @@ def test_a_simulated_host_drives_the_face_from_its_own_process(tmp_path: Path) -
     state = CommandState(P)
     with ExitStack() as closers:
         links = open_links([read_link({"port": "simulated", "script": str(script)})], LinkContext(state, closers))
-        end = time.monotonic() + 10
+        end = time.monotonic() + 60
         while state.status()["manual"] != 1:
             assert time.monotonic() < end
             time.sleep(0.01)

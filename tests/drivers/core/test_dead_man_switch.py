@@ -40,7 +40,7 @@ def torques(wire: SimulatedBus) -> list[bool]:
     return [wire.servo(servo).torque for servo in (1, 2)]
 
 
-def wait_until(done: Callable[[], bool], limit_s: float = 20.0) -> None:
+def wait_until(done: Callable[[], bool], limit_s: float = 60.0) -> None:
     end = time.monotonic() + limit_s
     while not done():
         assert time.monotonic() < end
@@ -272,7 +272,7 @@ def torque_after_kill(wire: SimulatedBus, folder: Path, command: list[str], **ho
             assert torques(wire) == [True, True]
         finally:
             child.kill()
-    end = time.monotonic() + 20
+    end = time.monotonic() + 60
     while any(torques(wire)) and time.monotonic() < end:
         time.sleep(0.01)
     return torques(wire)

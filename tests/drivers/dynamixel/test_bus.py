@@ -86,7 +86,7 @@ def positions(wire: ServoBus) -> list[int]:
     return [wire.servo(i).position_ticks for i in IDS]
 
 
-def wait_until(done: Callable[[], bool], timeout_s: float = 10.0) -> None:
+def wait_until(done: Callable[[], bool], timeout_s: float = 60.0) -> None:
     end = time.monotonic() + timeout_s
     while not done():
         assert time.monotonic() < end

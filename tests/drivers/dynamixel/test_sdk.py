@@ -417,6 +417,30 @@ def test_replies_that_come_together_are_returned_one_by_one() -> None:
     assert Packets().rxPacket(port, False) == ([], bare.COMM_RX_TIMEOUT)  # type: ignore[arg-type]
 
 
+class Pieces:
+    """A port whose reply comes in pieces, and which notes how many bytes it was asked for."""
+
+    deadline_s = 1.0
+
+    def __init__(self, *pieces: bytes) -> None:
+        self._pieces, self.asked, self.link = list(pieces), list[int](), self
+
+    def read(self, deadline_s: float) -> bytes:
+        return self._pieces.pop(0)
+
+    def more(self, missing: int) -> bytes:
+        self.asked.append(missing)
+        return self._pieces.pop(0)
+
+
+def test_of_a_reply_in_pieces_only_what_is_missing_is_waited_for() -> None:
+    port = Pieces(b"abc", b"de", b"fghij")
+    assert Packets()._fill(port, 10) == b"abcdefghij"
+    assert port.asked == [7, 5]
+    cut = Pieces(b"abc", b"")
+    assert (Packets()._fill(cut, 10), cut.asked) == (b"abc", [7])
+
+
 def test_broadcast_ping_finds_everybody(wire: Wire, ours: tuple) -> None:
     wire.answer = lambda packet: [encode_status(i, 0, bytes((i, 4, 38))) for i in (3, 9, 200)]
     port, packets = ours

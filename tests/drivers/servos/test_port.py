@@ -234,3 +234,13 @@ def test_opening_forgets_who_owed_an_answer_and_who_was_talking(port: Port) -> N
 def test_another_path_is_used_from_the_next_opening_on(port: Port) -> None:
     port.setPortName("elsewhere")
     assert port.link.path == port.port_name == "elsewhere"
+
+
+def test_a_port_says_whether_it_is_open(wire: Wire) -> None:
+    """The makers' programs ask for it, by the SDK's name."""
+    port = Port(wire.path, margin_s=0.3)
+    assert not port.is_open
+    for open_it in (port.openPort, lambda: port.setBaudRate(57_600)):
+        assert open_it() and port.is_open
+        port.closePort()
+        assert not port.is_open

@@ -118,6 +118,7 @@ def test_indirect_area_depends_on_model_and_firmware(model, firmware, pointer, d
     table = load_table(model, firmware)
     first = table["Indirect Address 1"]
     assert (first.address, first.initial, table["Indirect Data 1"].address) == (pointer, data, data)
+    assert first.writable and table["Indirect Data 1"].writable, "a host writes through the area as it reads through it"
     assert f"Indirect Data {slots}" in table
     assert f"Indirect Data {slots + 1}" not in table
     assert "Indirect Address Read" not in table

@@ -190,3 +190,20 @@ def test_of_two_processes_one_compiles_and_the_other_loads(copy: Path) -> None:
 def test_code_for_other_types_that_is_kept_at_once_is_not_overwritten(copy: Path) -> None:
     assert sorted(start_together(copy, "1.0", "2")) == ["compiles\n10.0 0\n", "compiles\n8.0 0\n"]
     assert sorted(start_together(copy, "1.0", "2")) == ["10.0 1\n", "8.0 1\n"]
+
+
+@pytest.mark.skipif(jit.fcntl is None, reason="files cannot be locked here")
+def test_a_process_that_was_stopped_while_it_compiled_holds_up_no_other_for_ever(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    program = (
+        "import sys; from surface.base import jit\n"
+        "with jit._held('name'):\n    print('held', flush=True)\n    sys.stdin.readline()\n"
+    )
+    pipe = subprocess.PIPE
+    with subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, stdin=pipe, stdout=pipe, text=True) as other:
+        assert other.stdout is not None and other.stdout.readline() == "held\n"
+        monkeypatch.setattr(jit, "LONGEST_WAIT_S", 0.1)
+        with jit._held("name"):
+            assert other.poll() is None
+        other.communicate("\n")

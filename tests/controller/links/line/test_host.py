@@ -33,7 +33,7 @@ def port() -> Iterator[HostPort]:
 def play(port: HostPort, script: Script, until: Callable[[RobotHost], bool]) -> tuple[RobotHost, CommandState]:
     """Play a script against a link until the host has seen enough."""
     state, host = CommandState(P), RobotHost(port, script, P)
-    end = time.monotonic() + 10
+    end = time.monotonic() + 60
     thread = threading.Thread(target=host.run, args=(lambda: time.monotonic() < end and not until(host),))
     with LineLink(port.path, 115200, state):
         thread.start()

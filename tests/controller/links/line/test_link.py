@@ -16,7 +16,7 @@ from controller.links.line.link import LineLink
 from controller.links.line.protocol import MAX_REPLY, LineDecoder, Reply, format_words, parse_reply
 from drivers.base.errors import PortMissing
 
-LIMIT_S = 5.0
+LIMIT_S = 60.0
 
 
 class Peer:

@@ -15,7 +15,7 @@ def free_port(kind: socket.SocketKind = socket.SOCK_DGRAM) -> int:
         return port
 
 
-def wait_for(done: Callable[[], object], what: str = "it", limit_s: float = 10.0) -> None:
+def wait_for(done: Callable[[], object], what: str = "it", limit_s: float = 60.0) -> None:
     """Wait until something is true."""
     end_s = time.monotonic() + limit_s
     while not done():

@@ -56,7 +56,7 @@ def port(bus: SimulatedBus) -> Iterator[PortHandler]:
     handler.closePort()
 
 
-def exchange(path: str, data: bytes, expect: int, wait_s: float = 10.0) -> bytes:
+def exchange(path: str, data: bytes, expect: int, wait_s: float = 60.0) -> bytes:
     """Write bytes to the port as a bare program would and read up to `expect` of what comes back."""
     client = os.open(path, os.O_RDWR | os.O_NOCTTY)
     try:
@@ -70,7 +70,7 @@ def exchange(path: str, data: bytes, expect: int, wait_s: float = 10.0) -> bytes
         os.close(client)
 
 
-def wait_until(condition, limit_s: float = 20.0) -> None:
+def wait_until(condition, limit_s: float = 60.0) -> None:
     deadline = time.monotonic() + limit_s
     while not condition():
         assert time.monotonic() < deadline, "it did not happen in time"
