@@ -241,8 +241,8 @@ def test_one_slider_moves_both_sides_unless_they_are_apart() -> None:
     panel = Panel(PARAMETERS.neutral, lambda request: None)
     smile = tuple(PARAMETERS.indices(["mouthSmileLeft", "mouthSmileRight"]).tolist())
     assert smile in panel.sliders.rows("mouth")
-    turned = PARAMETERS.indices(["leftEyeYaw", "rightEyeYaw"]).tolist()
-    assert all((i,) in panel.sliders.rows("eyes") for i in turned)
+    for region, names in {"eyes": ["leftEyeYaw", "rightEyeYaw"], "mouth": ["mouthLeft", "mouthRight"]}.items():
+        assert all((i,) in panel.sliders.rows(region) for i in PARAMETERS.indices(names).tolist())
     panel.sliders._search = "smile"
     assert panel.sliders.rows("mouth") == [smile] and panel.sliders.rows("jaw") == []
     panel.sliders._linked = False
