@@ -1,4 +1,4 @@
-"""The picture of a run: frames from the mailbox, the window, its panel, dragging by hand, stills.
+"""The picture of a run: frames from the mailbox, points of the face that are dragged, stills.
 
-In: parameters. Out: pictures, and the user's input by mouse and panel. Imports base to body.
+In: parameters. Out: pictures, and parameters or control points for what is dragged. Imports base to body.
 """

@@ -84,7 +84,7 @@ class PointEditor:
     def __init__(self, head: Head, copy: Callable[[], Head], parameters: Parameters) -> None:
         self._rig, self._parameters = head.part(PART).rig, parameters  # type: ignore[attr-defined]
         self._rest = self._rig.rest.copy()
-        self._moves = np.zeros_like(self._rest)
+        self._moves: Floats = np.zeros_like(self._rest)
         self._before = self._moves
         self._model: _Model | None = None
         self._held: _PointDrag | _SculptDrag | None = None

@@ -62,7 +62,9 @@ def add_docks(runner: Any, params: Any, docks: Sequence[Dock], size: tuple[float
         share = min(_SHARES[side] * line / across, _WIDEST)
         docking.docking_splits += [runner.DockingSplit(MAIN, side, places[side], share)]
         rest *= 1.0 if side == "bottom" else 1.0 - share
-    docking.dockable_windows = [_window(runner, dock) for dock in docks]
+    windows = [_window(runner, dock) for dock in docks]
+    windows[0].focus_window_at_next_frame = True
+    docking.dockable_windows = windows
 
 
 def _window(runner: Any, dock: Dock) -> Any:

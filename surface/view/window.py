@@ -238,7 +238,7 @@ class _Window:
             return
         picture = self._picture(box[2:])
         if self.area.wanted is not None:
-            self.area.wanted, take = None, self.area.wanted
+            take, self.area.wanted = self.area.wanted, None
             take(read_pixels(picture))
         self._copy(screen, picture, box)
         screen.use()

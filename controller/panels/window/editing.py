@@ -16,6 +16,7 @@ from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS, Floats
 from controller.face.point_editing import PointEditor, Screen
 from controller.panels.window.commands import Commands
+from controller.panels.window.sliders import same_sense
 from surface.head import Head
 from surface.view.docks import PictureArea
 from surface.view.scene.camera import Camera
@@ -91,7 +92,7 @@ class MouseEditing:
         """What a drag moves, on both sides where that is wanted."""
         both: dict[int, float | None] = dict(moved)
         if self._symmetric:
-            both.update({int(self._mirror[i]): x for i, x in moved.items()})
+            both.update({j: x for i, x in moved.items() if same_sense((i, j := int(self._mirror[i])))})
         return both
 
     def draw_panel(self) -> None:

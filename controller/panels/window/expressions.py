@@ -19,7 +19,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 _KINDS = {"emotion": "emotions", "gesture": "gestures", "user": "own"}
 _FINENESS = 50  # steps of the pad from the middle to its edge
-_PAD_LINES = 11.0
+_PAD_LINES = 16.0
 
 
 class ExpressionButtons:
@@ -93,11 +93,13 @@ class ExpressionButtons:
         draw.add_rect(corner, far, grey)
         draw.add_line(imgui.ImVec2(corner.x + half, corner.y), imgui.ImVec2(corner.x + half, far.y), grey)
         draw.add_line(imgui.ImVec2(corner.x, corner.y + half), imgui.ImVec2(far.x, corner.y + half), grey)
+        taken: list[tuple[float, float, float]] = []
         for name, point in zip(self._affect.names, self._affect.points, strict=True):
             wide = imgui.calc_text_size(name)
             x = corner.x + half * (1 + point[0]) - wide.x / 2
-            y = corner.y + half * (1 - point[1]) - wide.y / 2
             x = min(max(x, corner.x + 2), far.x - wide.x - 2)
+            y = _free_height(taken, x, corner.y + half * (1 - point[1]) - wide.y / 2, wide.x, wide.y)
+            taken.append((x, y, wide.x))
             draw.add_text(imgui.ImVec2(x, y), packed(imgui, (0.85, 0.85, 0.85, 1.0)), name)
         shown = self._commands.now.expression.name
         if shown.startswith("VA:"):
@@ -128,3 +130,10 @@ class ExpressionButtons:
         self._vocabulary.add(Expression(name.strip(), weights))
         self._send(Learn(name.strip(), tuple(map(float, weights))))
         self._message = f"wrote {name.strip()} to {self.own}"
+
+
+def _free_height(taken: list[tuple[float, float, float]], x: float, y: float, width: float, height: float) -> float:
+    """The first height from ``y`` down where a label covers none of those ``taken`` (left, top, width)."""
+    while any(x < left + wide and left < x + width and abs(y - top) < height for left, top, wide in taken):
+        y += 1.0
+    return y

@@ -68,7 +68,11 @@ class Panel:
 
     def docks(self) -> list[Dock]:
         """The parts, as tabs beside the picture."""
-        parts = {"Expressions": self.expressions, "Sliders": self._sliders, "View": self.view}
+        parts: dict[str, Callable[[], None]] = {
+            "Expressions": self.expressions,
+            "Sliders": self._sliders,
+            "View": self.view,
+        }
         return [Dock(title, "left", self._below_top(part)) for title, part in parts.items()]
 
     def __call__(self) -> None:

@@ -12,6 +12,8 @@ from controller.body.panel_state import PanelState
 from controller.panels.window.colours import layer_colour, packed
 from controller.panels.window.commands import Commands
 
+_ASIDE = ("mouthLeft", "mouthRight", "jawLeft", "jawRight")
+
 
 class Sliders:
     """Draws the sliders.
@@ -41,7 +43,7 @@ class Sliders:
         if not self._linked:
             return [(i,) for i in members]
         pairs = {tuple(sorted({i, int(self._mirror[i])})): None for i in members}
-        return [pair for pair in pairs if _same_sense(pair)] + [(i,) for p in pairs if not _same_sense(p) for i in p]
+        return [pair for pair in pairs if same_sense(pair)] + [(i,) for p in pairs if not same_sense(p) for i in p]
 
     def _region(self, imgui: Any, region: str) -> None:
         rows = self.rows(region)
@@ -106,10 +108,11 @@ class Sliders:
         return "" if away is None else f"   servos {away:.1f} deg away"
 
 
-def _same_sense(row: Sequence[int]) -> bool:
-    """Whether one value fits both: the eyes' angles and sideways looks of two sides have their own."""
+def same_sense(row: Sequence[int]) -> bool:
+    """Whether one value fits both sides: not what moves the whole mouth or jaw aside, nor the eyes' directions."""
     names = [PARAMETERS.names[i] for i in row]
-    return len(row) == 2 and not any("Eye" in name or "Look" in name for name in names)
+    aside = any("Eye" in name or "Look" in name or name in _ASIDE for name in names)
+    return len(set(row)) == 2 and not aside
 
 
 def _label(row: Sequence[int]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import FrozenInstanceError
 from pathlib import Path
 
@@ -35,7 +36,7 @@ def head(folder: Path) -> Head:
 @pytest.fixture(scope="module")
 def handles(head: Head, folder: Path) -> PointEditor:
     found = PointEditor(head, lambda: Head.load(folder), P)
-    assert not found.ready and not found.take((0.0, 0.0), Screen(Camera.front(), SIZE), P.neutral())
+    assert not found.ready and not found.dragging
     found.prepare()
     found._thread.join(60.0)
     assert found.ready
@@ -52,6 +53,28 @@ def test_a_pixel_and_a_place_are_each_others_inverse() -> None:
     rng = np.random.default_rng(0)
     for place in rng.uniform(-80, 80, (20, 3)):
         np.testing.assert_allclose(screen.place(pixel(screen, place), place), place, atol=1e-3)
+
+
+def test_a_grab_counts_that_was_made_while_points_got_ready(
+    handles: PointEditor, head: Head, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    screen, values, ready = Screen(Camera.front(), SIZE), P.neutral(), threading.Event()
+
+    def model(*_: object) -> object:
+        assert ready.wait(60.0)
+        return handles._model
+
+    monkeypatch.setattr("controller.face.point_editing._Model", model)
+    editor = PointEditor(head, lambda: head, P)
+    x, y = pixel(screen, CORNER)
+    assert editor.take((x, y), screen, values) and editor.dragging
+    assert editor.drag((x, y - 12), screen, values) == {} and not editor.settled
+    ready.set()
+    editor._thread.join(60.0)
+    moved = editor.drag((x, y - 12), screen, values)
+    assert moved[P.index("mouthSmileLeft")] > 0.05 and editor.settled
+    editor.release()
+    assert not editor.dragging
 
 
 @pytest.mark.parametrize("camera", [Camera.front(), Camera.three_quarter()])

@@ -18,16 +18,20 @@ import pytest
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
-from controller.body.messages import Hold, Neutral, Show, StartServos, StopServos
+from controller.body.messages import ControlShow, Hold, Neutral, PlayShow, Show, StartServos, StopServos
 from controller.body.panel_state import PanelState
-from controller.face.window import MouseEditing, Panel
 from controller.layers.commands import CommandState
+from controller.panels.window.commands import Commands
+from controller.panels.window.editing import MouseEditing
+from controller.panels.window.panel import Panel, PanelOptions
 from controller.robot.channels import build_table
 from controller.robot.following import FollowingStatistics, MeasuredFace
 from controller.robot.robot import load_robot
 from controller.stage.inverse import load_group
 from controller.stage.stage import load_stage
+from controller.vocabulary.vocabulary import Vocabulary
 from drivers.base.bus import BusState
+from surface.view.docks import PictureArea
 
 on_a_display = pytest.mark.skipif(
     shutil.which("xvfb-run") is None, reason="needs xvfb-run (apt-get install xvfb): a display to open a window on"
@@ -38,7 +42,7 @@ STAGE = """
 name = "small"
 robots = ["head24"]
 [face]
-size = [320, 240]
+size = [480, 240]
 quality = "fast"
 """
 
@@ -74,8 +78,7 @@ from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.body.messages import Hold
 from controller.stage.stage import FaceSettings, load_stage
-from controller.face.window import WindowFace
-from surface.view.scene.camera import Camera
+from controller.panels.window.face import WindowFace
 
 CORNER, BY = np.array([[28.6, -34.0, 102.0]]), -2.0  # the left corner of the mouth
 stage = load_stage("demo", P)
@@ -90,14 +93,14 @@ def send(request):
 
 with Mailbox.create(len(P)) as mailbox:
     values = HeadValues(mailbox, P, head.parameters)
-    face = WindowFace(head, FaceSettings(size=(320, 240), quality="fast"), values, send, None, stage.load_head)
+    face = WindowFace(head, FaceSettings(size=(560, 240), quality="fast"), values, send, None, stage.load_head)
     face._mouse.editor.prepare()
     face._mouse.editor._thread.join(60.0)
     assert face._mouse.editor.ready
-    panel = face._panel
+    gui = face._gui
 
     def act():
-        panel()
+        gui()
         from imgui_bundle import imgui
 
         io = imgui.get_io()
@@ -105,12 +108,13 @@ with Mailbox.create(len(P)) as mailbox:
         n %= 24  # twice: parameters, then with Shift control points
         io.add_key_event(imgui.Key.mod_ctrl, 2 <= n < 22)
         io.add_key_event(imgui.Key.mod_shift, frames[0] >= 24)
-        screen = Screen(Camera.front(), (io.display_size.x, io.display_size.y))
+        area = face._area
+        screen = Screen(face._viewpoint.camera, (area.width, area.height))
         x, y, _ = screen.project(CORNER)[0].tolist()
-        io.mouse_pos = imgui.ImVec2(x, y + BY * max(0, min(n - 8, 8)))
+        io.mouse_pos = imgui.ImVec2(area.left + x, area.top + y + BY * max(0, min(n - 8, 8)))
         io.add_mouse_button_event(0, 6 <= n < 20)
 
-    face._panel = act
+    face._gui = act
     face.run(lambda: frames[0] < 46)
     print(json.dumps({**told, "reshaped": face._mouse.editor.sculpted}))
 """
@@ -161,8 +165,10 @@ class Places:
 
     def __init__(self, imgui: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
         self.at: dict[str, tuple[float, float]] = {}
+        self.boxes: dict[str, tuple[float, float]] = {}
+        self.formats: dict[str, object] = {}
         self.texts: list[str] = []
-        for name in ("small_button", "button", "slider_float", "collapsing_header"):
+        for name in ("checkbox", "button", "slider_float", "collapsing_header"):
             monkeypatch.setattr(imgui, name, self._noting(imgui, getattr(imgui, name)))
         for name in ("text", "text_disabled"):
             monkeypatch.setattr(imgui, name, self._telling(getattr(imgui, name)))
@@ -171,6 +177,7 @@ class Places:
         def widget(label: str, *words: Any) -> Any:
             found = real(label, *words)
             low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
+            self.boxes[label], self.formats[label] = (low.x, high.x), words[-1] if words else None
             self.at[label] = (low.x + 0.25 * (high.x - low.x), (low.y + high.y) / 2)
             return found
 
@@ -184,61 +191,91 @@ class Places:
         return text
 
 
+def drawn(panel: Panel, *titles: str) -> Callable[[], None]:
+    """Draws some tabs of a panel, all or those of ``titles``, each in a window beside the others."""
+
+    def draw() -> None:
+        from imgui_bundle import imgui
+
+        panel()
+        for i, dock in enumerate(each for each in panel.docks() if not titles or each.title in titles):
+            imgui.set_next_window_pos(imgui.ImVec2(340.0 * i, 0.0))
+            imgui.set_next_window_size(imgui.ImVec2(336, 2900))
+            imgui.begin(dock.title)
+            dock.draw()
+            imgui.end()
+
+    return draw
+
+
 def test_the_panel_sends_what_its_widgets_ask_for(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
     places, sent, values = Places(screen.imgui, monkeypatch), [], PARAMETERS.neutral()
     panel = Panel(lambda: values, sent.append)
+    draw = drawn(panel, "Expressions")
     for _ in range(3):
-        screen.frame(panel)
+        screen.frame(draw)
     assert sent == []
-    screen.click(panel, *places.at["happiness"])
+    screen.click(draw, *places.at["happiness"])
     assert sent == [Show("happiness", 1.0)]
-    screen.click(panel, *places.at["intensity"])
-    screen.click(panel, *places.at["happiness"])
-    assert sent[1].name == "happiness" and 0.0 < sent[1].intensity < 0.9
-    screen.click(panel, *places.at["jaw###jaw"])
-    screen.frame(panel)
-    screen.click(panel, *places.at["jawOpen"])
+    screen.click(draw, *places.at["intensity"])
+    assert sent[-1].name == "happiness" and 0.0 < sent[-1].intensity < 0.9
+    draw = drawn(panel, "Sliders")
+    for _ in range(3):
+        screen.frame(draw)
+    screen.click(draw, *places.at["jaw###jaw"])
+    screen.frame(draw)
+    screen.click(draw, *places.at["##jawOpen"])
     jaw = PARAMETERS.index("jawOpen")
-    assert sent[2].index == jaw and 0.0 < sent[2].value < 0.9
-    values[jaw] = sent[2].value
-    screen.frame(panel)
+    assert sent[-1].index == jaw and 0.0 < sent[-1].value < 0.9
     before = len(sent)
-    screen.click(panel, *places.at[f"x##{jaw}"])
+    screen.click(draw, *places.at["undo##top"])
     assert sent[before:] == [Hold(jaw, None)]
-    places.at.clear()
-    screen.frame(panel)
-    assert f"x##{jaw}" not in places.at  # nothing is held any more
-    screen.click(panel, *places.at["release all"])
+    screen.click(draw, *places.at["redo##top"])
+    screen.click(draw, *places.at["jawOpen##hold"])
+    assert sent[-1] == Hold(jaw, None)
+    screen.click(draw, *places.at["neutral##top"])
     assert isinstance(sent[-1], Neutral) and sent[-1].seconds > 0.0
 
 
-def test_three_buttons_fill_a_row(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
-    imgui, real = screen.imgui, screen.imgui.button
-    seen: list[tuple[float, float, float, float]] = []
-
-    def button(label: str, size: Any) -> bool:
-        pressed = bool(real(label, size))
-        low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-        seen.append((low.x, high.x, low.y, imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x))
-        return pressed
-
-    monkeypatch.setattr(imgui, "button", button)
+def test_one_slider_moves_both_sides_unless_they_are_apart() -> None:
     panel = Panel(PARAMETERS.neutral, lambda request: None)
+    smile = tuple(PARAMETERS.indices(["mouthSmileLeft", "mouthSmileRight"]).tolist())
+    assert smile in panel.sliders.rows("mouth")
+    for region, names in {"eyes": ["leftEyeYaw", "rightEyeYaw"], "mouth": ["mouthLeft", "mouthRight"]}.items():
+        assert all((i,) in panel.sliders.rows(region) for i in PARAMETERS.indices(names).tolist())
+    panel.sliders._search = "smile"
+    assert panel.sliders.rows("mouth") == [smile] and panel.sliders.rows("jaw") == []
+    panel.sliders._linked = False
+    assert panel.sliders.rows("mouth") == [(smile[0],), (smile[1],)]
+
+
+def test_all_expressions_of_the_stage_have_buttons_that_show_their_names_whole(
+    screen: Screen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    own = tmp_path / "own.toml"
+    own.write_text("[a_smirk_with_a_long_name]\nweights = { mouthSmileLeft = 0.5 }\n")
+    vocabulary = Vocabulary.load(PARAMETERS, more=[own])
+    values, sent = PARAMETERS.neutral(), []
+    values[PARAMETERS.index("jawOpen")] = 0.5
+    panel = Panel(lambda: values, sent.append, options=PanelOptions(vocabulary, [own], folder=tmp_path))
+    places, draw = Places(screen.imgui, monkeypatch), drawn(panel, "Expressions")
     for _ in range(3):
-        seen.clear()
-        screen.frame(panel)
-    gap = imgui.get_style().item_spacing.x
-    del seen[0]  # STOP has a row of its own
-    rows = [seen[i : i + 3] for i in range(0, len(seen) - 2, 3)]
-    assert len(rows) > 1 and all(len({y for _, _, y, _ in row}) == 1 for row in rows)
-    assert rows[0][0][2] < rows[1][0][2]
-    for (left, right, _, _), (next_left, next_right, _, _) in zip(rows[0], rows[0][1:], strict=False):
-        assert right - left == pytest.approx(next_right - next_left, abs=1.0)
-        assert next_left - right == pytest.approx(gap, abs=1.0)
-    assert rows[0][2][1] == pytest.approx(rows[0][2][3], abs=1.5)
+        screen.frame(draw)
+    assert set(vocabulary.names) <= set(places.at)
+    for name in vocabulary.names:
+        low, high = places.boxes[name]
+        assert high >= low + 4.0 * len(name) and high <= 336.0
+    panel.expressions.save("agape")
+    for _ in range(2):
+        screen.frame(draw)
+    assert sent[-1].name == "agape" and "[agape.weights]" in own.read_text()
+    screen.click(draw, *places.at["agape"])
+    assert sent[-1] == Show("agape", 1.0)
+    panel.expressions.choose_mood(0.612, -0.2)
+    assert sent[-1] == Show("VA:0.62,-0.2", 1.0)
 
 
-def test_the_panel_shows_who_holds_a_parameter_and_what_the_servos_show(
+def test_the_panel_shows_who_holds_a_parameter_and_how_far_the_servos_are(
     screen: Screen, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     places, state, out = Places(screen.imgui, monkeypatch), CommandState(PARAMETERS), PARAMETERS.neutral()
@@ -255,13 +292,12 @@ def test_the_panel_shows_who_holds_a_parameter_and_what_the_servos_show(
     with Mailbox.create(PanelState.size(PARAMETERS)) as mailbox:
         PanelState(mailbox, state.layer_names(), PARAMETERS).publish(state, face)
         panel = Panel(lambda: out, lambda request: None, PanelState(mailbox, state.layer_names(), PARAMETERS))
+        draw = drawn(panel, "Sliders")
         for _ in range(2):
-            screen.frame(panel)
-        title = "jaw   servos 3.0 deg away###jaw"
-        screen.click(panel, *places.at[title])
-        screen.frame(panel)
-    assert any(text.startswith("manual  servos 0.") for text in places.texts)
-    assert "expression" in places.texts  # of a parameter without a servo nothing is measured
+            screen.frame(draw)
+        screen.click(draw, *places.at["jaw   servos 3.0 deg away###jaw"])
+        screen.frame(draw)
+    assert places.formats["##jawOpen"] == "%.2f  manual"
 
 
 def test_the_panel_stops_and_starts_the_servos_and_says_who_stopped_them(
@@ -271,44 +307,69 @@ def test_the_panel_stops_and_starts_the_servos_and_says_who_stopped_them(
     with Mailbox.create(PanelState.size(PARAMETERS)) as mailbox:
         body = PanelState(mailbox, state.layer_names(), PARAMETERS)
         panel = Panel(PARAMETERS.neutral, sent.append, PanelState(mailbox, state.layer_names(), PARAMETERS))
+        draw = drawn(panel, "View")
         body.publish(state, None)
         for _ in range(3):
-            screen.frame(panel)
+            screen.frame(draw)
         assert "START servos" not in places.at and not any("stopped" in text for text in places.texts)
-        screen.click(panel, *places.at["STOP servos"])
+        screen.click(draw, *places.at["STOP servos"])
         assert sent == [StopServos()]
         state.stop_latch.stop("line /dev/ttyUSB0", 5)
         body.publish(state, None)
         for _ in range(2):
-            screen.frame(panel)
+            screen.frame(draw)
         assert "servos stopped by line /dev/ttyUSB0" in places.texts
-        screen.click(panel, *places.at["START servos"])
+        screen.click(draw, *places.at["START servos"])
         assert sent == [StopServos(), StartServos()]
 
 
-def test_without_the_state_of_the_body_the_panel_can_stop(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
-    places, sent = Places(screen.imgui, monkeypatch), []
-    panel = Panel(PARAMETERS.neutral, sent.append)
-    for _ in range(3):
-        screen.frame(panel)
-    screen.click(panel, *places.at["STOP servos"])
-    assert sent == [StopServos()]
+def test_keys_do_what_the_help_says(screen: Screen) -> None:
+    sent: list[Any] = []
+    panel = Panel(PARAMETERS.neutral, sent.append, options=PanelOptions(shows=("tour",)))
+    imgui, draw = screen.imgui, drawn(panel, "View")
+
+    def press(*keys: Any) -> None:
+        for down in (True, False):
+            for key in keys:
+                screen.io.add_key_event(key, down)
+            screen.frame(draw)
+
+    key = imgui.Key
+    screen.frame(draw)
+    press(key.space)
+    press(key.space)
+    press(key.space)
+    assert sent == [PlayShow("tour"), ControlShow("PAUSE"), ControlShow("PLAY")]
+    press(key.escape)
+    assert sent[-1] == StopServos()
+    press(key.n)
+    assert isinstance(sent[-1], Neutral)
+    press(key.f)
+    assert panel.area.bare
+    panel.commands.show("anger", 1.0)
+    press(key.mod_ctrl, key.z)
+    assert sent[-1] == Show("neutral", 1.0)
+    press(key.mod_ctrl, key.y)
+    assert sent[-1] == Show("anger", 1.0)
+    press(key.h)
+    assert panel.keys.help_shown
+    press(key.r)
+    assert panel.capture.recording
 
 
 def test_a_reshaped_face_is_saved_or_the_reason_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     stage = load_stage("demo", PARAMETERS)
     head = stage.load_head()
-    mouse = MouseEditing(head, stage.load_head, PARAMETERS.neutral, lambda hold: None)
+    mouse = MouseEditing(head, stage.load_head, PARAMETERS.neutral, Commands(lambda request: None), PictureArea())
     moves = np.zeros_like(mouse.editor._rest)
     moves[7] = [0.0, 0.0, 4.0]
     assert not mouse.editor.sculpted
     mouse.editor._set_moves(moves)
     assert mouse.editor.sculpted
     monkeypatch.chdir(tmp_path)
-    mouse._save()
+    mouse.save("mine")
     assert mouse._message == f"wrote {tmp_path / 'mine.json'}"
     assert load_group(tmp_path / "mine.json", head.data)[1].ids.tolist() == [7]
     (tmp_path / "file").touch()
-    mouse._name = "file/x"
-    mouse._save()
+    mouse.save("file/x")
     assert "cannot be written" in mouse._message
