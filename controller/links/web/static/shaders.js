@@ -99,7 +99,7 @@ varying vec3 v_colour; varying vec3 v_strand;
 void main() {
   vec4 noise = texture2D(map, v_strand.xy);
   if (noise.a * v_strand.z < 0.3) discard;
-  gl_FragColor = vec4(encode(v_colour * (0.15 + 1.9 * noise.g)), 1.0);
+  gl_FragColor = vec4(encode(v_colour * (1.6 * noise.g * noise.g)), 1.0);
 }`];
 
 const CLOTH = [`
