@@ -25,7 +25,9 @@ def test_every_file_of_the_folder_is_served_whole() -> None:
         assert int(answer.headers["Content-Length"]) == len(answer.body)
 
 
-@pytest.mark.parametrize("path", ["/server.py", "/../server.py", "//", "/static/panel.js", "/%2e%2e/kind.py", "/" + "a" * 1999])
+@pytest.mark.parametrize(
+    "path", ["/server.py", "/../server.py", "//", "/static/panel.js", "/%2e%2e/kind.py", "/" + "a" * 1999]
+)
 def test_nothing_else_is_served(path: str) -> None:
     assert page(path).status_code == 404
 
