@@ -15,6 +15,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from typer import Typer  # start-up: Ctrl-C ends it quietly while all this still loads
 
+WEB = "127.0.0.1:8080"
+"""Where ``--web`` without an address serves the web panel."""
+
 
 def _runs() -> tuple[Callable[..., None], ...]:
     from controller.cli import run  # start-up: each of these only where it is needed
@@ -110,6 +113,15 @@ def main() -> None:
         sys.exit(130)
 
 
+def with_web_address(arguments: list[str]) -> list[str]:
+    """Arguments of a command line in which ``--web`` of ``omote run`` has an address."""
+    if arguments[1:2] != ["run"] or "--web" not in arguments:
+        return arguments
+    at = arguments.index("--web") + 1
+    given = at < len(arguments) and ":" in arguments[at] and not arguments[at].startswith("-")
+    return arguments if given else [*arguments[:at], WEB, *arguments[at:]]
+
+
 def _run() -> int:
     """Run the command of this process; returns its exit code."""
     # start-up: main() ends Ctrl-C quietly
@@ -119,6 +131,7 @@ def _run() -> int:
     prepare_streams()
     if sys.argv[1:2] != ["fit"]:  # before numpy: threads are worth it for large equations, and spin between small ones
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    sys.argv[:] = with_web_address(sys.argv)
     try:
         make_app(*sys.argv[1:2])()
         code = 0

@@ -17,7 +17,8 @@ from surface.base import files
 LARGEST_FACE = 64 << 20
 """Bytes of a face that is served."""
 _SCRIPTS = (
-    "panel.js", "robot.js", "face.js", "pose.js", "controls.js", "pads.js", "servos.js", "plot.js", "three.min.js",
+    "panel.js", "robot.js", "face.js", "morph.js", "shaders.js", "pose.js", "controls.js", "pads.js", "servos.js",
+    "plot.js", "three.min.js",
 )  # fmt: skip
 FILES = {
     "/": ("index.html", "text/html; charset=utf-8"),

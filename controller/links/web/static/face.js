@@ -1,59 +1,34 @@
 // Draws the face: loads it once, then poses it from numbers.
 import * as THREE from "/three.min.js";
+import { Part } from "/morph.js";
 import { readPose } from "/pose.js";
+import { material, shared } from "/shaders.js";
 
 const EYES = ["eye_left", "eye_right"], HALF = "Half";
 
-// Light bends round the terminator, red the furthest, and the rest of the head shades skin as it was baked at rest.
-const SKIN = {
-  vertex: ["#include <common>", `#include <common>
-    attribute vec4 _visible; attribute vec4 _skin; uniform vec3 keyAtRest; varying vec3 vSkin;`,
-  "#include <begin_vertex>", `#include <begin_vertex>
-    vSkin = vec3(smoothstep(0.05, 0.95, dot(_visible - 0.5, vec4(4.0, 4.0 * keyAtRest))), _skin.xy);`],
-  fragment: ["#include <common>", "#include <common>\n varying vec3 vSkin;",
-    "#include <lights_fragment_begin>", `#include <lights_fragment_begin>
-    {
-      vec3 key = directionalLights[0].direction;
-      vec3 t = clamp((vec3(dot(geometryNormal, key)) + SKIN_WRAP) / (vec3(1.0) + SKIN_WRAP), 0.0, 1.0);
-      vec3 bent = t * mix(t, vec3(1.0), 0.45) * (0.12 + 0.88 * mix(vec3(1.0), vec3(vSkin.x), 0.5 * (2.0 - SKIN_WRAP)));
-      float hard = clamp(dot(geometryNormal, key), 0.0, 1.0);
-      reflectedLight.directDiffuse += directionalLights[0].color * (bent - hard) * BRDF_Lambert(material.diffuseColor);
-      reflectedLight.directSpecular *= vSkin.x * (0.35 + 1.3 * vSkin.y);
-      reflectedLight.directDiffuse += vSkin.z * vec3(0.16, 0.026, 0.011) * clamp(0.1 - dot(geometryNormal, key), 0.0, 1.0);
-    }`],
-};
+// Whether pictures are computed without a graphics processor: smooth edges would cost a third of the time then.
+function isSoftware() {
+  const gl = document.createElement("canvas").getContext("webgl2"), info = gl?.getExtension("WEBGL_debug_renderer_info");
+  const name = info ? gl.getParameter(info.UNMASKED_RENDERER_WEBGL) : "";
+  gl?.getExtension("WEBGL_lose_context")?.loseContext();
+  return /swiftshader|llvmpipe|software/i.test(name);
+}
 
 export class Face {
-  #eyes = []; #meshes = []; #values = null; #names = []; #drag = null;
+  #eyes = []; #parts = []; #values = null; #names = []; #drag = null;
 
   constructor(canvas) {
     this.canvas = canvas;
-    this.renderer = new THREE.WebGLRenderer({ canvas, alpha: true, antialias: true, powerPreference: "high-performance" });
-    this.renderer.toneMapping = THREE.ACESFilmicToneMapping;
-    this.renderer.toneMappingExposure = 1.18;
+    this.renderer = new THREE.WebGLRenderer({ canvas, alpha: true, antialias: !isSoftware(), powerPreference: "high-performance" });
+    this.renderer.outputColorSpace = THREE.LinearSRGBColorSpace;  // the shaders encode by themselves
     this.scene = new THREE.Scene();
     this.camera = new THREE.PerspectiveCamera(24, 1, 0.05, 10);
     this.turn = { yaw: 0.12, pitch: 0.03, reach: 1 };
     this.frames = 0;
-    this.#light();
     this.#follow();
     new ResizeObserver(() => this.#resize()).observe(canvas);
     canvas.addEventListener("webglcontextlost", (event) => event.preventDefault());
     canvas.addEventListener("webglcontextrestored", () => { this.changed = true; });
-  }
-
-  #light() {
-    const add = (yaw, pitch, colour, strength) => {
-      const light = new THREE.DirectionalLight(new THREE.Color(...colour), strength);
-      const [a, b] = [yaw, pitch].map((degrees) => degrees * Math.PI / 180);
-      light.position.set(Math.sin(a) * Math.cos(b), Math.sin(b), Math.cos(a) * Math.cos(b));
-      this.scene.add(light);
-      return light;
-    };
-    this.key = add(-34, 32, [1, 0.90, 0.78], 3.3);
-    add(48, 6, [0.74, 0.84, 1], 0.75);
-    add(152, 28, [0.85, 0.9, 1], 1.5);
-    this.scene.add(new THREE.HemisphereLight(new THREE.Color(0.85, 0.9, 1), new THREE.Color(0.5, 0.37, 0.31), 0.95));
   }
 
   // Loads the face; while it is being prepared, asks again each second. `tell` hears of it.
@@ -69,34 +44,32 @@ export class Face {
 
   async #take(buffer) {
     const gltf = await new THREE.GLTFLoader().parseAsync(buffer, "");
-    this.half = gltf.userData.omote?.half ?? [];
-    this.head = gltf.scene.getObjectByName("head");
-    gltf.scene.traverse((node) => { if (node.isMesh) this.#mesh(node); });
-    this.scene.add(gltf.scene);
+    const omote = gltf.userData.omote ?? {}, meshes = [];
+    gltf.scene.traverse((node) => { if (node.isMesh) meshes.push(node); });
+    this.half = omote.half ?? [];
+    this.head = new THREE.Object3D();
+    this.head.position.fromArray(omote.neck?.pivot ?? [0, 0, 0]);
+    shared.pivot.value.copy(this.head.position);
+    this.scene.add(this.head);
+    for (const mesh of meshes) this.#add(mesh);
     this.#frame();
     this.changed = true;
-    if (this.#values) this.pose(this.#names, this.#values);
+    if (this.#values) this.#show(this.#names, this.#values);
   }
 
-  #mesh(mesh) {
-    mesh.frustumCulled = false;
-    const kind = mesh.material.name;
-    if (mesh.geometry.attributes._visible) this.#asSkin(mesh.material);
-    if (kind === "lash" || kind === "brow") { mesh.material.depthWrite = false; mesh.material.polygonOffset = true; mesh.material.polygonOffsetFactor = -2; mesh.material.polygonOffsetUnits = -8; }
-    if (EYES.includes(mesh.name)) this.#eyes[EYES.indexOf(mesh.name)] = mesh;
-    else if (mesh.morphTargetDictionary) this.#meshes.push(mesh);
-  }
-
-  #asSkin(material) {
-    if (material.userData.skin) return;
-    material.userData.skin = true;
-    material.onBeforeCompile = (shader) => {
-      shader.uniforms.keyAtRest = { value: this.key.position.clone().normalize() };
-      for (const [part, pairs] of Object.entries(SKIN)) {
-        for (let i = 0; i < pairs.length; i += 2) shader[`${part}Shader`] = shader[`${part}Shader`].replace(pairs[i], pairs[i + 1]);
-      }
-      shader.fragmentShader = `#define SKIN_WRAP vec3(0.42, 0.20, 0.14)\n${shader.fragmentShader}`;
-    };
+  // A part of the file as it is drawn here: positions in metres, shapes by the vertices that they move.
+  #add(mesh) {
+    const inverse = mesh.skeleton?.boneInverses[0].elements, bends = Boolean(inverse), eye = EYES.indexOf(mesh.name);
+    const { map, side, name } = mesh.material;
+    if (map) map.colorSpace = THREE.NoColorSpace;
+    const part = new Part(mesh, bends ? inverse[0] : mesh.scale.x, bends ? inverse.slice(12, 15) : [0, 0, 0]);
+    const drawn = new THREE.Mesh(part.geometry, material(name, { map, side }, bends));
+    drawn.frustumCulled = false;
+    if (bends) this.scene.add(drawn);
+    else { drawn.position.copy(mesh.position); this.head.add(drawn); }
+    if (eye < 0) { this.#parts.push(part); return; }
+    drawn.material.uniforms.eye_axis = { value: new THREE.Vector3(0, 0, 1) };
+    this.#eyes[eye] = drawn;
   }
 
   // The middle of the eyes tells where the face is.
@@ -115,13 +88,20 @@ export class Face {
     this.#values = values;
     this.changed = true;
     if (!this.head) return;
+    this.#show(names, values);
+  }
+
+  #show(names, values) {
     const { weights, eyes, head } = readPose(names, values);
     for (const name of this.half) { const w = weights[name.slice(0, -HALF.length)]; weights[name] = 4 * w * (1 - w); }
-    for (const mesh of this.#meshes) {
-      for (const [name, i] of Object.entries(mesh.morphTargetDictionary)) mesh.morphTargetInfluences[i] = weights[name] ?? 0;
-    }
-    eyes.forEach(([yaw, pitch], i) => this.#eyes[i]?.rotation.set(pitch, yaw, 0, "YXZ"));
+    for (const part of this.#parts) part.show(weights);
     this.head.rotation.set(head[1], head[0], head[2], "YXZ");
+    eyes.forEach(([yaw, pitch], i) => this.#eyes[i]?.rotation.set(pitch, yaw, 0, "YXZ"));
+    this.head.updateMatrixWorld(true);
+    for (const eye of this.#eyes) eye?.material.uniforms.eye_axis.value.set(0, 0, 1).transformDirection(eye.matrixWorld);
+    shared.turn.value.setFromMatrix4(this.head.matrixWorld);
+    const back = this.head.quaternion.clone().invert();
+    for (const light of ["key", "rim"]) shared[`${light}_at_rest`].value.copy(shared[`${light}_direction`].value).applyQuaternion(back);
   }
 
   #resize() {

@@ -25,8 +25,12 @@ function stopped(by) {
   if ($("stopped").textContent !== text) $("stopped").textContent = text;
 }
 
-$("stop").addEventListener("click", () => robot.act({ type: "stop" }));
-$("start").addEventListener("click", () => robot.act({ type: "start" }));
+function stop() {
+  if (!robot.stop()) note("Not connected: the robot is stopped as soon as it is heard", 10);
+}
+
+$("stop").addEventListener("click", stop);
+$("start").addEventListener("click", () => { robot.stopping = false; robot.act({ type: "start" }); });
 $("neutral").addEventListener("click", () => { mood.place(0, 0); robot.act({ type: "neutral" }); });
 $("release").addEventListener("click", () => robot.act({ type: "release" }));
 $("search").addEventListener("input", () => sliders.search($("search").value));
@@ -34,7 +38,7 @@ $("gaze-off").addEventListener("click", () => robot.act({ type: "gaze_off" }));
 $("intensity").addEventListener("input", () => { $("intensity-value").textContent = percent($("intensity").value); if (shown) express(shown); });
 $("life").addEventListener("input", () => { $("life-value").textContent = percent($("life").value); robot.act({ type: "life", amount: Number($("life").value) }); });
 for (const action of ["play", "pause", "stop"]) $(`show-${action}`).addEventListener("click", () => robot.act({ type: "show", action }));
-addEventListener("keydown", (event) => { if (event.key === "Escape") robot.act({ type: "stop" }); });
+addEventListener("keydown", (event) => { if (event.key === "Escape") stop(); });
 
 const mood = new Pad($("mood"), { name: "Mood: valence across, arousal up", ends: ["aroused", "calm", "sad", "glad"], act: (valence, arousal) => robot.act({ type: "emotion", valence, arousal, intensity: Number($("intensity").value) }) });
 // The picture shows the face from the front: its own left is on the right.
@@ -69,7 +73,7 @@ robot.on("overview", (overview) => {
 robot.on("link", ({ good }) => {
   document.body.classList.toggle("lost", !good);
   $("link").dataset.state = good ? "good" : "lost";
-  $("link").textContent = good ? "connected" : "The robot is not heard. Connecting again …";
+  $("link").textContent = good ? "connected" : "robot not heard, trying again";
 });
 robot.on("refused", (error) => note(error.message));
 robot.on("error", (error) => note(error.message));

@@ -1,5 +1,5 @@
 // Talks to omote over the WebSocket API: connects again by itself, and says when it does not hear the robot.
-const SILENCE_MS = 1500, PAUSES_MS = [300, 600, 1200, 2500, 5000];
+const SILENCE_MS = 2500, CHECK_MS = 250, PAUSES_MS = [300, 600, 1200, 2500, 5000];
 
 export function token() {
   const given = new URLSearchParams(location.hash.slice(1)).get("token");
@@ -18,7 +18,8 @@ export class Robot extends EventTarget {
     this.secret = secret;
     this.names = [];
     this.connect();
-    setInterval(() => this.#watch(), 250);
+    this.checked = performance.now();
+    setInterval(() => this.#watch(), CHECK_MS);
   }
 
   connect() {
@@ -32,6 +33,7 @@ export class Robot extends EventTarget {
 
   async #greet() {
     this.#heard = performance.now();
+    if (this.stopping) this.stop();
     const welcome = await this.ask({ type: "hello", version: 1 });
     this.names = Object.keys(welcome.parameters);
     this.emit("hello", welcome);
@@ -50,6 +52,9 @@ export class Robot extends EventTarget {
   }
 
   #watch() {
+    const now = performance.now();
+    if (now - this.checked > 3 * CHECK_MS) this.#heard = now;  // this page was busy: what came meanwhile is still to be read
+    this.checked = now;
     if (this.good && performance.now() - this.#heard > SILENCE_MS) { this.#socket.close(); this.#lose(); }
   }
 
@@ -83,6 +88,12 @@ export class Robot extends EventTarget {
   }
 
   act(message) { this.ask(message).catch((error) => this.emit("refused", error)); }
+
+  // A stop that cannot be sent goes out before anything else when the robot is heard again.
+  stop() {
+    this.stopping = !this.send({ type: "stop" });
+    return !this.stopping;
+  }
 
   // What a finger moves between two frames goes out as one message.
   set(name, value) {

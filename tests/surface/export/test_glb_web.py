@@ -1,0 +1,136 @@
+"""surface.export.glb_web: decoded by the letter of the specification, without omote's reader."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import shutil
+import struct
+import subprocess
+
+import numpy as np
+import pytest
+from small_head import all_points, part, small_head
+
+from surface.base.errors import ExportError
+from surface.export import export_head
+from surface.export.glb_web import web_glb
+from surface.export.shapes import export_parts
+from surface.export.textures import eye_picture, png_bytes, strand_picture, strip_picture
+from surface.export.web_parts import LEAST_MM, web_parts
+from surface.head import Head
+
+TYPES = {5126: "<f4", 5125: "<u4", 5123: "<u2", 5122: "<i2", 5121: "u1", 5120: "i1"}
+WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
+
+
+class Decoded:
+    """A .glb with strides, sparse accessors and whole steps."""
+
+    def __init__(self, raw: bytes) -> None:
+        size = struct.unpack_from("<I", raw, 12)[0]
+        self.document, self.data = json.loads(raw[20 : 20 + size]), raw[28 + size :]
+
+    def accessor(self, index: int) -> np.ndarray:
+        a = self.document["accessors"][index]
+        dtype, width = np.dtype(TYPES[a["componentType"]]), WIDTHS[a["type"]]
+        out = np.zeros((a["count"], width), dtype)
+        if "bufferView" in a:
+            out = self._rows(a["bufferView"], dtype, width, a["count"])
+        if "sparse" in a:
+            s = a["sparse"]
+            ids = self._rows(s["indices"]["bufferView"], np.dtype(TYPES[s["indices"]["componentType"]]), 1, s["count"])
+            out[ids[:, 0]] = self._rows(s["values"]["bufferView"], dtype, width, s["count"])
+        if "min" in a:
+            assert a["min"] == out.min(axis=0).tolist() and a["max"] == out.max(axis=0).tolist()
+        return out
+
+    def _rows(self, view: int, dtype: np.dtype, width: int, count: int) -> np.ndarray:
+        entry = self.document["bufferViews"][view]
+        stride = entry.get("byteStride", width * dtype.itemsize)
+        data = self.data[entry["byteOffset"] :][: entry["byteLength"]]
+        rows = [np.frombuffer(data, dtype, width, k * stride) for k in range(count)]
+        return np.array(rows)
+
+
+@pytest.fixture
+def head() -> Head:
+    eye = part("eye", 20, "left_eye")
+    object.__setattr__(eye, "material", "eye")
+    return Head(small_head(parts=[part("a", -40, groups=[all_points("mouthPucker", (0, 0, 5))]), eye], seams=[]))
+
+
+def test_positions_and_moves_are_within_a_step_of_the_head(head):
+    file = Decoded(web_glb(head))
+    (skin,) = file.document["skins"]
+    bind = file.accessor(skin["inverseBindMatrices"])[0].reshape(4, 4)
+    own, eye = export_parts(head)
+    assert [mesh["name"] for mesh in file.document["meshes"]] == [own.name, eye.name]
+    (primitive,) = file.document["meshes"][0]["primitives"]
+    steps = file.accessor(primitive["attributes"]["POSITION"]).astype(float)
+    places = 1000.0 * (steps @ bind[:3, :3] + bind[3, :3])
+    np.testing.assert_allclose(places, web_parts(head)[0].part.vertices, atol=1000 * bind[0, 0])
+    (target,) = primitive["targets"]
+    moves = 1000.0 * file.accessor(target["POSITION"]).astype(float) * bind[0, 0]
+    np.testing.assert_allclose(moves, web_parts(head)[0].part.displacements["mouthPucker"], atol=LEAST_MM)
+    normals = file.accessor(primitive["attributes"]["NORMAL"]) / 32767.0
+    np.testing.assert_allclose(normals, web_parts(head)[0].part.normals, atol=3e-4)
+
+
+def test_joints_follow_the_neck_and_weights_are_whole(head):
+    file = Decoded(web_glb(head))
+    attributes = file.document["meshes"][0]["primitives"][0]["attributes"]
+    weights, joints = file.accessor(attributes["WEIGHTS_0"]), file.accessor(attributes["JOINTS_0"])
+    assert (weights.astype(int).sum(axis=1) == 255).all()
+    share = np.where(joints[:, 0] == 1, weights[:, 0], 0) / 255.0
+    np.testing.assert_allclose(share, head.data.neck.share(web_parts(head)[0].part.vertices.astype(float)), atol=0.003)
+
+
+def test_eyes_are_nodes_below_the_head_about_their_centres(head):
+    nodes = {node["name"]: node for node in Decoded(web_glb(head)).document["nodes"]}
+    assert len(nodes["head"]["children"]) == 1
+    at = np.add(nodes["head"]["translation"], nodes["eye"]["translation"])
+    np.testing.assert_allclose(at, 0.001 * head.data.eyes[0], atol=1e-9)
+
+
+def test_an_iris_has_the_colour_that_is_painted_and_else_omotes_blue(head):
+    eye = export_parts(head)[1]
+    blue = eye_picture(eye)
+    ring = blue[128, 128 + int(256 * 0.47 * 0.36)].astype(int)
+    assert ring[2] > ring[0]
+    eye.painted["iris"] = np.array([0.4, 0.1, 0.02], np.float32)
+    brown = eye_picture(eye)[128, 128 + int(256 * 0.47 * 0.36)].astype(int)
+    assert brown[0] > brown[2]
+    assert eye_picture(eye)[128, 128].max() < 40, "the pupil"
+
+
+def test_pictures_of_hair_are_png_with_alpha():
+    image = pytest.importorskip("PIL.Image", reason="needs Pillow (extra view)")
+    import io
+
+    for picture in (strand_picture(), strip_picture((0.8, 0.1, 0.2, 1.0), True)):
+        assert image.open(io.BytesIO(png_bytes(picture))).mode == "RGBA"
+        assert picture[..., 3].min() < picture[..., 3].max()
+
+
+def test_what_a_file_for_the_web_cannot_hold_is_refused(tmp_path, head):
+    with pytest.raises(ExportError, match="at rest"):
+        export_head(head, tmp_path / "h.glb", {"mouthPucker": 1.0}, web=True)
+    with pytest.raises(ExportError, match="--web writes a .glb"):
+        export_head(head, tmp_path / "h.obj", web=True)
+    assert export_head(head, tmp_path / "h.glb", web=True) == [tmp_path / "h.glb"]
+    assert len(gzip.compress((tmp_path / "h.glb").read_bytes())) > 100
+
+
+def test_the_validator_of_khronos_finds_no_fault_in_it(tmp_path, head):
+    node = shutil.which("node")
+    if node is None or subprocess.run([node, "-e", "require('gltf-validator')"], capture_output=True).returncode:
+        pytest.skip("needs node and its package gltf-validator (npm install gltf-validator, NODE_PATH)")
+    path = tmp_path / "h.glb"
+    path.write_bytes(web_glb(head))
+    program = (
+        "const b = new Uint8Array(require('fs').readFileSync(process.argv[1]));"
+        "require('gltf-validator').validateBytes(b).then(r => console.log(r.issues.numErrors, r.issues.numWarnings));"
+    )
+    said = subprocess.run([node, "-e", program, str(path)], capture_output=True, text=True, check=True)
+    assert said.stdout.split() == ["0", "0"]

@@ -1,0 +1,176 @@
+"""The web panel in a real Chromium, over a real body with simulated servos: from a finger to the bus."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+
+from controller.base.mailboxes import Mailbox
+from controller.base.parameters import PARAMETERS as P
+from controller.body.body import Body
+from controller.stage.stage import load_stage
+from surface.export.glb_web import web_glb
+from surface.head import Head
+from surface.head.model.parameters import NAMES, SHAPES, read_pose
+from tests.browser import Page, find_chromium, page
+from tests.controller.links.net.sockets import wait_for
+from tests.surface.small_head import small_head
+
+CHROMIUM = find_chromium()
+JAW = P.index("jawOpen")
+needs_chromium = pytest.mark.skipif(
+    CHROMIUM is None, reason="no Chromium here; Debian, Ubuntu: sudo apt-get install chromium"
+)
+
+
+@contextmanager
+def robot(tmp_path: Path) -> Iterator[tuple[Body, Any, str]]:
+    """A body with 24 simulated servos and a panel, the panel's link and its address."""
+    (tmp_path / "face.glb").write_bytes(web_glb(Head(small_head())))
+    path = tmp_path / "stage.toml"
+    path.write_text(
+        'name = "panel"\nrobots = ["head24"]\n[[links]]\nkind = "web"\nlisten = "127.0.0.1:0"\nface = "face.glb"\n'
+    )
+    with Mailbox.create(len(P)) as mailbox:
+        body = Body(load_stage(str(path), P), P, mailbox)
+        body.start()
+        try:
+            body.begin()
+            link = body.links[0]._link
+            yield body, link, f"127.0.0.1:{link.port}"  # type: ignore[union-attr]
+        finally:
+            body.stop()
+
+
+def moved(body: Body, name: str) -> float:
+    """The measured angle of a servo, degrees."""
+    return float(next(each for each in body.state.servo_records() if each["name"] == name)["measured_deg"] or 0.0)
+
+
+def open_panel(browser: Page, where: str, width: int, height: int) -> None:
+    browser.resize(width, height)
+    browser.open(f"http://{where}/")
+    browser.wait("Boolean(globalThis.omote && omote.robot.good && omote.face.head && omote.face.frames > 0)", 90.0)
+    assert browser.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), "fits its width"
+
+
+def axe() -> str | None:
+    """The text of axe-core; None where node or the package is absent."""
+    node = shutil.which("node")
+    if node is None:
+        return None
+    found = subprocess.run([node, "-p", "require.resolve('axe-core/axe.min.js')"], capture_output=True, text=True)
+    return Path(found.stdout.strip()).read_text(encoding="utf-8") if found.returncode == 0 else None
+
+
+def slide(browser: Page, name: str, value: float) -> None:
+    browser.evaluate(
+        f"{{const i = document.getElementById('p-{name}'); i.value = {value}; i.dispatchEvent(new Event('input'));}}"
+    )
+
+
+@needs_chromium
+def test_a_phone_drives_the_head_and_stops_it_while_another_client_floods(tmp_path: Path) -> None:
+    with robot(tmp_path) as (body, link, where), page(CHROMIUM or "") as browser:
+        open_panel(browser, where, 390, 844)
+        before = moved(body, "jawOpen")
+        slide(browser, "jawOpen", 0.8)
+        wait_for(lambda: body.state.held().get(JAW) == 0.8)
+        wait_for(lambda: abs(moved(body, "jawOpen") - before) > 3.0)
+        browser.wait("document.querySelector('#p-jawOpen').closest('.row').classList.contains('held')")
+        ending = threading.Event()
+        flood = threading.Thread(target=_flood, args=(where, ending))
+        flood.start()
+        try:
+            browser.evaluate("document.getElementById('stop').click()")
+            wait_for(lambda: body.state.stop_latch.stopped is not None)
+            wait_for(lambda: not any(loop.bus.running for loop in body.buses))
+            browser.wait("document.getElementById('stopped').textContent.includes('Servos are off')")
+        finally:
+            ending.set()
+            flood.join()
+        browser.evaluate("document.getElementById('start').click()")
+        wait_for(lambda: body.state.stop_latch.stopped is None)
+        link.stop()
+        browser.wait("document.getElementById('link').dataset.state === 'lost'")
+        assert browser.errors == []
+
+
+def _flood(where: str, ending: threading.Event) -> None:
+    try:
+        with connect(f"ws://{where}/ws") as client:
+            while not ending.is_set():
+                for _ in range(100):
+                    client.send('{"type": "set", "parameters": {"browInnerUp": 0.1}}')
+                ending.wait(0.01)
+    except ConnectionClosed:
+        pass
+
+
+@needs_chromium
+def test_two_panels_show_each_others_changes_without_leaving_their_origin(tmp_path: Path) -> None:
+    with robot(tmp_path) as (_, _, where), page(CHROMIUM or "") as browser:
+        open_panel(browser, where, 1280, 720)
+        with connect(f"ws://{where}/ws") as other:
+            other.send('{"type": "expression", "name": "happiness", "intensity": 1.0}')
+            browser.wait("document.querySelector('[data-name=happiness]').getAttribute('aria-pressed') === 'true'")
+            other.send('{"type": "set", "parameters": {"mouthPucker": 0.5}}')
+            browser.evaluate("document.getElementById('tab-sliders').click()")
+            browser.wait("Math.abs(document.getElementById('p-mouthPucker').value - 0.5) < 0.01")
+        browser.evaluate("document.getElementById('tab-servos').click()")
+        browser.wait("document.querySelectorAll('.servo').length === 24")
+        browser.evaluate("document.getElementById('tab-links').click()")
+        browser.wait("document.querySelectorAll('#link-list td').length > 0")
+        loaded = browser.evaluate("performance.getEntriesByType('resource').map(each => new URL(each.name).host)")
+        assert loaded and set(loaded) == {where}
+        assert browser.errors == []
+
+
+@needs_chromium
+@pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1280, "light")])
+def test_axe_has_no_serious_findings(tmp_path: Path, width: int, scheme: str) -> None:
+    script = axe()
+    if script is None:
+        pytest.skip("needs node and its package axe-core (npm install axe-core, NODE_PATH)")
+    with robot(tmp_path) as (_, _, where), page(CHROMIUM or "") as browser:
+        browser.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        open_panel(browser, where, width, 800)
+        browser.evaluate(script + "; true")
+        for name in ("express", "sliders", "shows", "servos", "links"):
+            browser.evaluate(f"document.getElementById('tab-{name}').click()")
+            found = browser.evaluate(
+                "axe.run().then(r => r.violations.filter(v => ['serious', 'critical'].includes(v.impact))"
+                ".map(v => v.id + ': ' + v.nodes[0].html))"
+            )
+            assert found == [], name
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_the_panel_reads_a_pose_as_omote_does(root: Path, tmp_path: Path) -> None:
+    values = np.random.default_rng(3).uniform(0.0, 1.0, (50, len(NAMES)))
+    values[:, len(SHAPES) :] = 2.0 * values[:, len(SHAPES) :] - 1.0
+    (tmp_path / "pose.mjs").write_bytes((root / "controller/links/web/static/pose.js").read_bytes())
+    program = (
+        "import { readPose } from './pose.mjs'; import { readFileSync } from 'fs';"
+        "const { names, values } = JSON.parse(readFileSync(0));"
+        "console.log(JSON.stringify(values.map(row => readPose(names, row))));"
+    )
+    (tmp_path / "run.mjs").write_text(program)
+    orders = json.dumps({"names": list(NAMES), "values": values.tolist()})
+    done = subprocess.run(["node", "run.mjs"], input=orders, capture_output=True, text=True, cwd=tmp_path, check=True)
+    for row, found in zip(values, json.loads(done.stdout), strict=True):
+        wanted = read_pose(row)
+        np.testing.assert_allclose([found["weights"][name] for name in SHAPES], wanted.shapes, atol=1e-9)
+        np.testing.assert_allclose(found["eyes"], wanted.gaze, atol=1e-9)
+        np.testing.assert_allclose(found["head"], wanted.head, atol=1e-9)
