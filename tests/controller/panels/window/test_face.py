@@ -80,7 +80,7 @@ from controller.body.messages import Hold
 from controller.stage.stage import FaceSettings, load_stage
 from controller.panels.window.face import WindowFace
 
-CORNER, BY = np.array([[28.6, -34.0, 102.0]]), -2.0  # the left corner of the mouth
+CORNER, BY = np.array([[28.6, -34.0, 102.0]]), -0.6  # the left corner of the mouth
 stage = load_stage("demo", P)
 head = stage.load_head()
 told, frames = {}, [0]
