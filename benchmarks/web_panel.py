@@ -8,6 +8,7 @@ parameters. Run it with nothing else on the machine. Needs Chromium and the extr
 from __future__ import annotations
 
 import json
+import sys
 import tempfile
 import time
 from contextlib import suppress
@@ -31,7 +32,8 @@ DRAW = """(() => {
   const { face, robot } = omote, gl = face.renderer.getContext(), pixel = new Uint8Array(4), n = %d;
   const began = performance.now();
   for (let i = 0; i < n; i++) {
-    const move = (name, k) => name.startsWith("head") ? 0.2 * Math.sin(0.3 * i) : k %% 4 ? 0 : 0.3 + 0.3 * Math.sin(0.3 * i + k);
+    const swing = (k) => 0.3 * Math.sin(0.3 * i + k);
+    const move = (name, k) => name.startsWith("head") ? swing(0) * 2 / 3 : k %% 4 ? 0 : 0.3 + swing(k);
     face.pose(robot.names, robot.names.map(move));
     face.changed = true;
     face.draw();
@@ -95,7 +97,7 @@ def main() -> None:
         face = Path(folder) / "face.glb"
         face.write_bytes(web_glb(still.load_head()))
         found = {"browser_fps": round(browser_fps(face), 1), "omote_fps": round(own_fps(still), 1)}
-    print(json.dumps(found))
+    sys.stdout.write(json.dumps(found) + "\n")
 
 
 if __name__ == "__main__":
