@@ -6,7 +6,6 @@ import gzip
 import ipaddress
 from functools import cache
 from http import HTTPStatus
-from importlib.resources import files as package_files
 from pathlib import Path
 
 from websockets.datastructures import Headers
@@ -14,6 +13,7 @@ from websockets.http11 import Request, Response
 
 from surface.base import files
 
+STATIC, LARGEST_FILE = Path(__file__).with_name("static"), 4 << 20
 LARGEST_FACE = 64 << 20
 """Bytes of a face that is served."""
 _SCRIPTS = (
@@ -45,7 +45,7 @@ SAFE = {
 @cache
 def packed(name: str) -> bytes:
     """A file of ``static``, compressed."""
-    return gzip.compress((package_files(__package__) / "static" / name).read_bytes(), 6, mtime=0)
+    return gzip.compress(files.read_file(STATIC / name, LARGEST_FILE), 6, mtime=0)
 
 
 def page(path: str) -> Response:

@@ -1,0 +1,104 @@
+"""How fast a browser without a graphics processor draws the panel's face, beside omote's own renderer:
+``python -m benchmarks.web_panel``.
+
+The face is the shipped head with hair, at 1280 x 720 and device pixel ratio 1; every frame moves a quarter of all
+parameters. Run it with nothing else on the machine. Needs Chromium and the extras view and web.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import tempfile
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+
+from controller.base.parameters import PARAMETERS
+from controller.face.still import Still, for_head
+from controller.layers.commands import CommandState
+from controller.links.kind import LinkContext
+from controller.links.links import open_links, read_link
+from drivers.base.shutdown import Closers
+from surface.export.glb_web import web_glb
+from surface.view.pictures.offscreen import Offscreen
+from surface.view.scene.framing import framed
+from tests.browser import find_chromium, page
+
+SIZE, FRAMES = (1280, 720), 40
+DRAW = """(() => {
+  const { face, robot } = omote, gl = face.renderer.getContext(), pixel = new Uint8Array(4), n = %d;
+  const began = performance.now();
+  for (let i = 0; i < n; i++) {
+    const swing = (k) => 0.3 * Math.sin(0.3 * i + k);
+    const move = (name, k) => name.startsWith("head") ? swing(0) * 2 / 3 : k %% 4 ? 0 : 0.3 + swing(k);
+    face.pose(robot.names, robot.names.map(move));
+    face.changed = true;
+    face.draw();
+    gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+  }
+  return 1000 * n / (performance.now() - began);
+})()"""
+
+
+def values(i: int) -> np.ndarray:
+    """The same parameters as the page's."""
+    row = PARAMETERS.neutral()
+    for k, name in enumerate(PARAMETERS.names):
+        if name.startswith("head"):
+            row[k] = 0.2 * np.sin(0.3 * i)
+        elif k % 4 == 0:
+            row[k] = 0.3 + 0.3 * np.sin(0.3 * i + k)
+    return row
+
+
+def browser_fps(face: Path) -> float:
+    """Frames a second of the panel's face in Chromium's SwiftShader."""
+    chromium = find_chromium()
+    if chromium is None:
+        raise SystemExit("no Chromium here; Debian, Ubuntu: sudo apt-get install chromium")
+    closers = Closers()
+    table = {"kind": "web", "listen": "127.0.0.1:0", "face": str(face)}
+    try:
+        (link,) = open_links([read_link(table)], LinkContext(CommandState(PARAMETERS), closers))
+        with page(chromium) as browser:
+            browser.resize(*SIZE)
+            browser.open(f"http://127.0.0.1:{link.port}/")  # type: ignore[attr-defined]
+            browser.wait("Boolean(globalThis.omote && omote.face.head && omote.robot.names.length)", 120.0)
+            browser.evaluate("document.getElementById('stage').style.cssText = 'position:fixed;inset:0;z-index:9'")
+            time.sleep(1.0)
+            browser.evaluate(DRAW % 5)
+            return float(browser.evaluate(DRAW % FRAMES))
+    finally:
+        with suppress(Exception):
+            closers.close()
+
+
+def own_fps(still: Still) -> float:
+    """Frames a second of omote's own renderer, live, in the same size and poses."""
+    head = still.load_head()
+    with Offscreen(head, SIZE, quality="full", theme=still.look.make_theme()) as screen:
+        screen.go_live()
+        camera = framed(still.look.make_camera(), head)
+        for i in range(5):
+            screen.draw(for_head(values(i), head.parameters), camera)
+        began = time.monotonic()
+        for i in range(FRAMES):
+            screen.draw(for_head(values(i), head.parameters), camera)
+        return FRAMES / (time.monotonic() - began)
+
+
+def main() -> None:
+    """Print both."""
+    still = Still.parse([], [], look={"person": "maple"})
+    with tempfile.TemporaryDirectory() as folder:
+        face = Path(folder) / "face.glb"
+        face.write_bytes(web_glb(still.load_head()))
+        found = {"browser_fps": round(browser_fps(face), 1), "omote_fps": round(own_fps(still), 1)}
+    sys.stdout.write(json.dumps(found) + "\n")
+
+
+if __name__ == "__main__":
+    main()
