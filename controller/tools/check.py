@@ -15,6 +15,7 @@ from controller.layers.idle.settings import IdleSettings
 from controller.layers.settings import load_layers
 from controller.links.line.script import load_script
 from controller.robot.calibration import CalibrationFile
+from controller.robot.fault_script import load_fault_script
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import WORN, load_person
@@ -24,7 +25,6 @@ from controller.takes.reader import load_take, suffixes
 from controller.takes.recording import SUFFIX, replay
 from controller.takes.retarget import load_ranges
 from controller.tools import file_kinds
-from controller.tools.fault_script import load_fault_script
 from controller.tools.robot_warnings import robot_warnings
 from controller.tools.traffic_files import describe_traffic
 from controller.vocabulary.affect import Affect

@@ -13,12 +13,12 @@ from typing import Any
 from controller.layers.idle.settings import IdleSettings
 from controller.layers.settings import LayerTable
 from controller.robot.calibration import CalibrationFile
+from controller.robot.fault_script import FaultScript
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import PersonSettings
 from controller.stage.stage import StageSettings
 from controller.stage.study import StudySettings
 from controller.takes.retarget import RangesFile
-from controller.tools.fault_script import FaultScript
 from controller.vocabulary.controls import ControlsFile
 
 

@@ -23,9 +23,9 @@ from controller.links.line.hostport import HostPort
 from controller.links.line.script import load_script
 from controller.robot.buses import SIMULATION, BusSettings
 from controller.robot.channels import servo_specs
+from controller.robot.fault_script import load_fault_script
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
-from controller.tools.fault_script import load_fault_script
 from controller.tools.monitor import BusView
 from controller.tools.traffic_files import Tap, TrafficWriter, all_of, decoder_of, read_traffic
 from drivers import open_bus

@@ -28,10 +28,10 @@ from controller.body.process import BodyProcess, deadline
 from controller.body.sources import Voice
 from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.links.line.script import script_names
+from controller.panels.web_face import face_in_the_making
 from controller.stage.stage import Stage, check_identity, load_stage, with_picture
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
-from controller.tools.web_face import face_in_the_making
 from drivers.base.priority import lower_process_priority
 from surface.base.extras import require
 

@@ -202,7 +202,8 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
     monkeypatch.setattr(window, "WindowFace", Window)
     session = StageRun(stage, status=told.append)
     report = session.run_window(None)
-    head, settings, values, send, panel_state, copy, options = given
+    head, settings, values, send, panel_state, copy, options, controls = given
+    assert controls == session.stage.controls
     assert options.vocabulary is session.stage.vocabulary and "tour" in options.shows
     assert settings is session.stage.settings.face and (send, panel_state) == (body.send, body.panel_state)
     assert values == (body.mailbox, len(head.parameters)) and copy == session.stage.load_head

@@ -100,7 +100,6 @@ with Mailbox.create(len(P)) as mailbox:
     gui = face._gui
 
     def act():
-        gui()
         from imgui_bundle import imgui
 
         io = imgui.get_io()
@@ -111,8 +110,10 @@ with Mailbox.create(len(P)) as mailbox:
         area = face._area
         screen = Screen(face._viewpoint.camera, (area.width, area.height))
         x, y, _ = screen.project(CORNER)[0].tolist()
-        io.mouse_pos = imgui.ImVec2(area.left + x, area.top + y + BY * max(0, min(n - 8, 8)))
         io.add_mouse_button_event(0, 6 <= n < 20)
+        # Last, since the display's own pointer, which is elsewhere, has just been read.
+        io.mouse_pos = imgui.ImVec2(area.left + x, area.top + y + BY * max(0, min(n - 8, 8)))
+        gui()
 
     face._gui = act
     face.run(lambda: frames[0] < 46)

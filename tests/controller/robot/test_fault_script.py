@@ -1,4 +1,4 @@
-"""controller.tools.fault_script: timelines of faults are read, and every wrong entry is told by its place."""
+"""controller.robot.fault_script: timelines of faults are read, and every wrong entry is told by its place."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from controller.base.errors import ConfigError
+from controller.robot.fault_script import load_fault_script
 from controller.tools.check import check_anything
-from controller.tools.fault_script import load_fault_script
 
 GOOD = """
 name = "bad minute"

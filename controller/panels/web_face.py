@@ -10,6 +10,7 @@ import sys
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +28,7 @@ def face_in_the_making(stage: Path, look: Mapping[str, object], identity: Mappin
     with tempfile.TemporaryDirectory(prefix="omote-web-", ignore_cleanup_errors=True) as folder:
         path = Path(folder) / "face.glb.gz"
         orders = pickle.dumps((str(stage), dict(look), dict(identity or {}), str(path)))
-        command = [sys.executable, "-m", "controller.tools.web_face"]
+        command = [sys.executable, "-m", "controller.panels.web_face"]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True)
         try:
             if process.stdin is not None:
@@ -48,8 +49,7 @@ def make_face(stage: str, look: Mapping[str, object], identity: Mapping[str, flo
 
     Raises ConfigError, SurfaceError: the stage or its head cannot be read.
     """
-    from dataclasses import replace
-
+    # start-up: whoever only starts this process does without them
     from controller.base.parameters import PARAMETERS
     from controller.stage.stage import load_stage, with_picture
     from surface.export.glb_web import web_glb
