@@ -336,3 +336,18 @@ def test_a_mistyped_command_names_the_one_that_was_meant(omote: Omote, words: tu
 def test_a_command_that_resembles_none_is_refused(omote: Omote) -> None:
     said = omote("simulate", "xyzzy")
     assert said.returncode == 2 and "No such command 'xyzzy'." in said.stderr and "mean" not in said.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "wanted"),
+    [
+        ("run demo --web", "run demo --web 127.0.0.1:8080"),
+        ("run --web demo", "run --web 127.0.0.1:8080 demo"),
+        ("run demo --web --headless", "run demo --web 127.0.0.1:8080 --headless"),
+        ("run demo --web 0.0.0.0:80 --headless", "run demo --web 0.0.0.0:80 --headless"),
+        ("run demo --headless", "run demo --headless"),
+        ("export a.glb --web", "export a.glb --web"),
+    ],
+)
+def test_the_web_panel_has_an_address_where_none_is_given(words: str, wanted: str) -> None:
+    assert module.with_web_address(["omote", *words.split()]) == ["omote", *wanted.split()]

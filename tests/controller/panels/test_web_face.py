@@ -1,0 +1,50 @@
+"""controller.panels.web_face: the panel's face is made beside a run and ends with it."""
+
+from __future__ import annotations
+
+import gzip
+import time
+from pathlib import Path
+
+import pytest
+
+from controller.base.errors import ConfigError
+from controller.panels.web_face import face_in_the_making, make_face
+from surface.head.model.file import save_data
+from tests.surface.small_head import part, small_head
+
+WAIT_S = 120.0
+
+
+@pytest.fixture
+def stage(tmp_path: Path) -> Path:
+    """A stage whose face is one small patch."""
+    save_data(tmp_path / "small", small_head(parts=[part("face", -40)], seams=[], paint=[]))
+    path = tmp_path / "stage.toml"
+    path.write_text('name = "small"\nhead = "small"\n')
+    return path
+
+
+def test_a_face_is_a_packed_glb(stage: Path, tmp_path: Path) -> None:
+    make_face(str(stage), {}, {}, tmp_path / "face.glb.gz")
+    assert gzip.decompress((tmp_path / "face.glb.gz").read_bytes())[:4] == b"glTF"
+
+
+def test_a_stage_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="nowhere"):
+        make_face(str(tmp_path / "nowhere.toml"), {}, {}, tmp_path / "face.glb.gz")
+
+
+def test_it_appears_while_the_context_lasts_and_leaves_nothing(stage: Path) -> None:
+    with face_in_the_making(stage, {}, None) as path:
+        end = time.monotonic() + WAIT_S
+        while not path.exists() and time.monotonic() < end:
+            time.sleep(0.05)
+        assert gzip.decompress(path.read_bytes())[:4] == b"glTF"
+    assert not path.parent.exists()
+
+
+def test_a_run_that_ends_early_ends_it(stage: Path) -> None:
+    with face_in_the_making(stage, {}, None) as path:
+        pass
+    assert not path.parent.exists()
