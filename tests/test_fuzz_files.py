@@ -62,7 +62,7 @@ def work(path: Path) -> int:
 
 
 def fill(path: Path) -> int:
-    data = bytearray(600 << 20)  # more than the limit of 500 MB
+    data = bytearray(900 << 20)
     data[::4096] = b"x" * len(data[::4096])
     return refuse(path)
 

@@ -257,8 +257,8 @@ def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeyp
     monkeypatch.setattr("controller.tools.plugins.added_exporters", lambda: [other])
     monkeypatch.setattr(
         "surface.export.export_head",
-        lambda head, out, pose, added, frame, animation: (
-            calls.append((head.name, out, pose, added, frame)) or [out, tmp_path / "more"]
+        lambda head, out, pose, added, frame, animation, web: (
+            calls.append((head.name, out, pose, added, frame, web)) or [out, tmp_path / "more"]
         ),
     )
     blamed = []
@@ -266,7 +266,7 @@ def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeyp
     head = ["--head", str(sheet[1])]
     said = CliRunner().invoke(make_app(), ["export", "a.ODD", *head, "--set", "jawOpen=0.5", "--set", "headYaw=0"])
     assert said.exit_code == 0, said.exception
-    assert calls == [("me", Path("a.ODD"), {"jawOpen": 0.5}, [other], "head")]
+    assert calls == [("me", Path("a.ODD"), {"jawOpen": 0.5}, [other], "head", False)]
     assert said.output.replace("\n", "") == f"wrote a.ODDwrote {tmp_path / 'more'}"
     assert CliRunner().invoke(make_app(), ["export", "b.glb", *head]).exit_code == 0
     assert calls[1][2] == {} and blamed == ["odd", ""]

@@ -174,7 +174,10 @@ def test_rows_come_in_the_order_of_a_run_and_name_the_picture() -> None:
 class Session:
     """Stands in for a run: keeps what it is started with, and reports nothing."""
 
-    def __init__(self, stage: str, options: RunOptions, identity: Any, look: Any, status: Any, preloaded: Any) -> None:
+    def __init__(
+        self, stage: str, options: RunOptions, identity: Any, look: Any, status: Any, preloaded: Any, web: Any
+    ) -> None:  # fmt: skip
+        self.web = web
         self.given = {"stage": stage, "options": options, "identity": identity, "look": look}
         self.how: tuple[Any, ...] = ()
         Session.last = self
@@ -234,7 +237,8 @@ def test_every_option_of_a_run_arrives(display: dict[str, bool], tmp_path: Path)
     session = noted("run", "mine", *words, "--evaluator", "cpu", "--identity", "broad=0.5", "--person", "maple")
     assert session.given["look"] == {"kiosk": True, "monitor": 0, "quality": "fast", "fps": 240.0, "theme": "mask",
                                      "camera": "front", "evaluator": "cpu", "person": "maple"}  # fmt: skip
-    assert session.given["identity"] == {"broad": 0.5}
+    assert session.given["identity"] == {"broad": 0.5} and session.web is None
+    assert noted("run", "mine", "--web", "127.0.0.1:8123").web == "127.0.0.1:8123"
 
 
 def test_what_is_played_arrives_with_its_stage(display: dict[str, bool], tmp_path: Path) -> None:

@@ -145,7 +145,7 @@ def test_unseen_skin_follows_better_than_one_parameter_for_one_servo(
         naive = np.array([values[P.index(n)] * c.map.at[-1] for n, c in zip(main, channels, strict=True)])
         for key, pulls in (("naive", naive), ("solved", solved.pulls_mm(values))):
             left[key] += float((rows.project(wanted - field @ pulls) ** 2).sum())
-    assert left["solved"] < 0.3**2 * left["naive"]  # sums of squares: less than a third of the rms
+    assert left["solved"] < (1 / 3) ** 2 * left["naive"]  # sums of squares: less than a third of the rms
 
 
 def test_pulls_stay_within_travel_whatever_is_asked(robot: RobotSettings, solved: AnchorSolver) -> None:

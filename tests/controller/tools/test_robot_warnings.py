@@ -67,10 +67,10 @@ def test_rates_of_servos(tmp_path: Path) -> None:
     )
 
 
-@pytest.mark.parametrize(("speed", "told"), [(611, 0), (700, 1)])
+@pytest.mark.parametrize(("speed", "told"), [(618, 0), (700, 1)])
 def test_speeds_beyond_the_models(tmp_path: Path, speed: float, told: int) -> None:
     found = robot_warnings([robot(tmp_path, {"speed": speed})])
-    assert found == ["r: channels[0].max_speed_deg_s: 700 is beyond the 611 of xl330-m288 without load"][:told]
+    assert found == ["r: channels[0].max_speed_deg_s: 700 is beyond the 618 of xl330-m288 without load"][:told]
 
 
 def test_check_prints_them_and_finds_no_fault(tmp_path: Path) -> None:

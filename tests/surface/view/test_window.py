@@ -205,6 +205,7 @@ def steered(hands: Hands, *, kiosk: bool = False) -> tuple[Camera, bool]:
     viewpoint = Viewpoint()
     window = _Window(hands, lambda: values(), viewpoint, Renderer, "fast")
     window.params, window.kiosk = SimpleNamespace(app_shall_exit=False), kiosk
+    window.area.height = 240.0
     window.panels()
     return viewpoint.camera, window.params.app_shall_exit
 
