@@ -51,6 +51,7 @@ def test_keys_hold_parameters_and_show_expressions() -> None:
     file = ControlsFile.model_validate({"keys": {"j": {"jawOpen": 0.5}, "3": "smile", "left_arrow": "anger"}})
     devices = Devices(Controls([file], PARAMETERS), sent.append, lambda: None)
     context = imgui.create_context()
+    imgui.get_io().set_ini_filename("")  # else it leaves a file in the present folder
     try:
         io = imgui.get_io()
         io.display_size = imgui.ImVec2(100, 100)
