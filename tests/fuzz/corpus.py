@@ -10,6 +10,7 @@ import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ import numpy as np
 from controller.base.parameters import PARAMETERS
 from controller.layers.commands import CommandState
 from controller.links.net.neutral import Neutral, Ranges, load_state, save_state
+from controller.takes.mcap_files import write_mcap
 from controller.takes.recording import recorded
 from drivers.core.pcapng import file_head, packet
 from drivers.core.trafficlog import read_log
@@ -78,6 +80,19 @@ FAULTS = b"""name = "bad minute"
 loop_s = 60
 timeline = ["0.5 fault mute:7 late:3:45ms", "4 clear mute", "5 place 3 1500"]
 """
+STUDY = b"""name = "smiles"
+stage = "demo"
+repeats = 4
+order = "shuffled"
+before_s = 5.0
+[conditions.smile]
+steps = ["0 EXPR smile", "0.5 GAZE 10 0"]
+length_s = 3.0
+[conditions.tour]
+script = "tour"
+length_s = 27.0
+"""
+RANGES = b"[ranges]\njawOpen = [0.1, 0.6]\nmouthSmile = [0.0, 0.8]\nheadYaw = [-0.5, 0.4]\n"
 TRAFFIC = b"""# omote traffic = 1
 # family = dynamixel
 # baud = 1000000
@@ -178,12 +193,14 @@ def _configs() -> list[Kind]:
         **{name: [f"vocabularies/{name}.toml"] for name in ("arkit", "facs", "affect", "visemes", "vrm", "layers")},
         "life": ["life/natural.toml"],
         "person": ["persons/maple.toml", "persons/oak.toml"],
+        "controls": ["controls/keyboard.toml", "controls/gamepad.toml", "controls/midi.toml"],
     }
     found = [Kind(name, f"{name}.toml", [(CONFIGS / f).read_bytes() for f in files]) for name, files in named.items()]
     return [
         *found, Kind("stage-wide", "stage.toml", [WIDE_STAGE]), Kind("expressions", "own.toml", [EXPRESSIONS]),
         Kind("calibration", CALIBRATED, [CALIBRATION]), Kind("faults", "faults.toml", [FAULTS]),
         Kind("traffic", "bus.log", [TRAFFIC]), Kind("pcapng", "bus.pcapng", [_pcapng()]),
+        Kind("study", "study.toml", [STUDY]), Kind("ranges", "ranges.toml", [RANGES]),
     ]  # fmt: skip
 
 
@@ -238,10 +255,20 @@ def _takes(folder: Path) -> list[Kind]:
         Kind("rhubarb", "speech.json", [json.dumps({"metadata": {"duration": 0.9}, "mouthCues": cues}).encode()]),
         Kind("wav", "voice.wav", [wav(8000 * np.sin(np.arange(3000) / 9.0))]),
         *_alignments(),
+        *_recorded_by_others(folder / "take.mcap"),
         Kind("recording", "run.rec", [_recording(folder / "run.rec")]),
         Kind("group", "group.json", [_group()]),
         Kind("link", "phone.json", [_learned(folder / "phone.json")], reports(_read_learned)),  # a link reads it
     ]
+
+
+def _recorded_by_others(path: Path) -> list[Kind]:
+    """A take in MCAP, where its package is installed."""
+    if find_spec("mcap") is None:
+        return []
+    values = np.linspace(0.0, 0.5, 20)[:, None] * np.ones(len(PARAMETERS))
+    write_mcap(path, np.arange(20) / 30.0, values, np.ones(len(PARAMETERS), bool), PARAMETERS)
+    return [Kind("mcap", "take.mcap", [path.read_bytes()])]
 
 
 def _learned(path: Path) -> bytes:
