@@ -56,7 +56,7 @@ def mcap_take(path: Path, parameters: Parameters) -> Take:
         import mcap.exceptions  # optional: the extra mcap
     try:
         with files.reading(path, TakeError, hint=_HINT), files.open_file(path) as file:
-            rows = _rows(_messages(file), parameters)
+            rows = _rows(_plain(_messages(file), path), parameters)
     except (mcap.exceptions.McapError, *files.DAMAGED) as error:
         if isinstance(error, TakeError):
             raise
@@ -65,6 +65,14 @@ def mcap_take(path: Path, parameters: Parameters) -> Take:
     if not rows:
         raise TakeError(f"{path}: no message in it holds parameters", hint=_HINT)
     return _take(path.name, rows, parameters)
+
+
+def _plain(messages: Iterator[tuple[str, int, bytes]], path: Path) -> Iterator[tuple[str, int, bytes]]:
+    """The same messages; a text that the package cannot read is told in plain words. Raises TakeError."""
+    try:
+        yield from messages
+    except UnicodeDecodeError as error:
+        raise TakeError(f"{path}: no whole MCAP file: a text in it is not UTF-8", hint=_HINT) from error
 
 
 def _messages(file: IO[bytes]) -> Iterator[tuple[str, int, bytes]]:

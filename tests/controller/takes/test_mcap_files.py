@@ -62,6 +62,16 @@ def test_a_take_comes_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(take.values, values, atol=1e-6)
 
 
+def test_a_text_that_is_not_utf_8_is_told_in_plain_words(tmp_path: Path) -> None:
+    path = written(tmp_path / "a.mcap", (TOPIC, 0.0, {"parameters": {"jawOpen": 0.5}}), compression="NONE")
+    data = path.read_bytes()
+    assert TOPIC.encode() in data
+    path.write_bytes(data.replace(TOPIC.encode(), b"\xad" * len(TOPIC)))
+    with pytest.raises(TakeError, match="no whole MCAP file") as caught:
+        mcap_take(path, P)
+    assert "codec" not in str(caught.value)
+
+
 @pytest.mark.parametrize("compression", ["NONE", "LZ4", "ZSTD"])
 def test_other_topics_are_left_out_and_what_is_not_named_stays(tmp_path: Path, compression: str) -> None:
     take = mcap_take(
