@@ -23,6 +23,8 @@ from drivers.tools.scan_protocol1 import identity, registers_on
 
 SETTLE_S = 1.0
 """How long a servo may not answer while it writes its permanent memory."""
+TRIES = 3
+"""How often a servo is asked who it is before its id counts as free."""
 REPLY_S = 0.02
 """Time for the reply to a write, which is not read: it may come from the new id."""
 
@@ -55,6 +57,11 @@ def _find(registers: Registers[Any], servo: int) -> ServoInfo | None:
     return ServoInfo(servo, table.number, table.model, found[1], torque=registers.get(servo, "torque") == 1)
 
 
+def _find_surely(registers: Registers[Any], servo: int) -> ServoInfo | None:
+    """What a servo is; None where it does not answer several times: one reply may be lost or late."""
+    return next((found for _ in range(TRIES) if (found := _find(registers, servo)) is not None), None)
+
+
 def _write(registers: Registers[Any], servo: int, name: str, value: int) -> None:
     """Write a register by the maker's name without reading the reply."""
     item, packets = registers.tables[servo][name], registers.packets
@@ -77,10 +84,10 @@ def set_id(port: str, baud: int, protocol: int | None, old: int, new: int, *, re
         if not 0 <= servo <= MAX_ID:
             raise ValueError(f"{name}: an id is 0 to {MAX_ID}, got {servo}")
     with _registers(port, baud, protocol or _protocol_of(port, baud, old)) as registers:
-        info = _find(registers, old)
+        info = _find_surely(registers, old)
         if info is None:
             raise _nobody(port, baud, old)
-        taken = _find(registers, new) if new != old else None
+        taken = _find_surely(registers, new) if new != old else None
         if taken is not None:
             raise _error(f"the id {new} on {port} is taken by another {taken.model}", "choose a free id", port, new)
         if info.torque:
@@ -106,7 +113,7 @@ def _protocol_of(port: str, baud: int, servo: int) -> int:
     found = []
     for protocol in (2, 1):
         with _registers(port, baud, protocol) as registers:
-            found += [protocol] if _find(registers, servo) is not None else []
+            found += [protocol] if _find_surely(registers, servo) is not None else []
     if len(found) > 1:
         message = f"a servo of Protocol 2.0 and one of Protocol 1.0 have the id {servo} on {port}"
         raise _error(message, "add --protocol 2 or --protocol 1", port, servo)

@@ -68,6 +68,7 @@ def port() -> Iterator[HostPort]:
 @pytest.fixture
 def link(port: HostPort, state: CommandState) -> Iterator[LineLink]:
     with LineLink(port.path, 115200, state, retry_s=0.02) as link:
+        eventually(lambda: link.connected)  # what is sent before is thrown away by the opening of the port
         yield link
 
 
