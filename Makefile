@@ -12,16 +12,19 @@ PYTHON ?= $(shell for p in python3 python3.14 python3.13 python3.12 python3.11; 
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test check clients mutate fuzz bench soak setup api lock clean
+.PHONY: help demo test test-all check clients mutate fuzz bench soak setup api lock clean
 
 help: ## print this list
-	@grep -E '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed 's/:.*## /\t/' | expand -t 10
 
 demo: setup ## set up, then drive the face and the simulated servo head
 	@$(BIN)/omote demo
 
 # Without bytecode, where a user has switched it off, every process of a test would compile all modules again.
-test: setup ## set up, then run the tests (no display, graphics processor or servo needed)
+test: setup ## set up, then run the quick tests (no display, graphics processor or servo needed)
+	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m 'not slow'
+
+test-all: setup ## set up, then run every test, as CI does
 	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 check: setup ## check style and types

@@ -24,6 +24,7 @@ def head() -> Head:
     return Head.load(find_config("heads", "ict"))
 
 
+@pytest.mark.slow
 def test_no_unit_is_much_weaker_than_in_people_nor_beyond_them(program: ModuleType, head: Head) -> None:
     rows = [(unit, mm) for unit, mm, _ in program.measured(head) if "people" in unit]
     assert {unit["unit"] for unit, _ in rows} >= {"1+2", "4", "12", "27", "29", "30", "45"}

@@ -119,6 +119,7 @@ def on(cable: Cable) -> str:
     return f'[[links]]\nkind = "line"\nport = "{cable.port.path}"\n'
 
 
+@pytest.mark.slow
 def test_releasing_the_button_keeps_what_the_potentiometer_holds(cable: Cable, tmp_path: Path) -> None:
     with running(tmp_path, on(cable)) as body:
         status = body.state.status
@@ -139,6 +140,7 @@ def quiet(cable: Cable) -> bool:
     return len(cable.sent) == before
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("way", ["damage", "lose"])
 def test_a_line_that_is_lost_or_damaged_is_sent_again(cable: Cable, tmp_path: Path, way: str) -> None:
     with running(tmp_path, on(cable)) as body:

@@ -52,6 +52,7 @@ def test_five_lines_find_the_jump_of_a_naive_program(pytester: pytest.Pytester, 
     assert re.search(pattern, said), said
 
 
+@pytest.mark.slow
 def test_all_other_tests_of_the_page_pass(pytester: pytest.Pytester, folder: Path) -> None:
     result = pytester.runpytest_inprocess("--ignore", NAIVE, "-rs", *ALONE)
     outcomes = result.parseoutcomes()

@@ -43,6 +43,7 @@ def found(draw_head: ModuleType, root: Path) -> list:
     return list(draw_head.parts_of(root / "configs" / "heads" / "ict", SHAPES))
 
 
+@pytest.mark.slow
 def test_a_head_is_evaluated_from_its_files_alone_as_the_engine_does(found: list, root: Path) -> None:
     """Without contacts and lids, which the program leaves out."""
     folder = root / "configs" / "heads" / "ict"
@@ -108,6 +109,7 @@ def page(root: Path, tmp_path_factory: pytest.TempPathFactory) -> str:
     return (folder / "paper.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_page_of_the_paper_has_its_numbers_beside_ours(page: str) -> None:
     rows = [[re.sub("<.*?>", "", cell) for cell in re.split("<t[dh]>", row)[1:]] for row in page.split("<tr>")[1:]]
     rows = [[cell.split("</table>")[0] for cell in row] for row in rows]

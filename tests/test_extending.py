@@ -117,6 +117,7 @@ def test_the_examples_are_short(page: str) -> None:
     assert all(count < MOST_LINES for count in lines.values()), lines
 
 
+@pytest.mark.slow
 def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, root: Path, tmp_path: Path) -> None:
     block = page.partition("## Testing a driver")[2].partition("```python\n")[2].partition("```")[0]
     test = tmp_path / "test_puppet8.py"
@@ -129,6 +130,7 @@ def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, ro
     assert int(re.search(r"(\d+) passed", done.stdout)[1]) >= 12, done.stdout  # type: ignore[index]
 
 
+@pytest.mark.slow
 def test_every_list_has_them(omote: Omote) -> None:
     plugins, simulators, simulator = omote("plugins", "simulate --help", "simulate puppet8 --help")
     for word in ("puppet8", "Puppet8 boards", "jsonudp", "pairs", "track", "xyz", "omote-example 0.1.0"):
@@ -137,6 +139,7 @@ def test_every_list_has_them(omote: Omote) -> None:
     assert "57600" in simulator.stdout and "Example: omote simulate puppet8" in simulator.stdout
 
 
+@pytest.mark.slow
 def test_robot_files_and_stages_are_checked_by_their_own_options(omote: Omote, tmp_path: Path) -> None:
     def robot(name: str, kind: str, more: str) -> None:
         (tmp_path / name).write_text(ROBOT.format(kind=kind, more=more))
@@ -159,6 +162,7 @@ def test_robot_files_and_stages_are_checked_by_their_own_options(omote: Omote, t
     assert "links[0]: listen: must be HOST:PORT" in said["far"].stderr
 
 
+@pytest.mark.slow
 def test_a_stage_runs_with_both(site: Path, root: Path, tmp_path: Path) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         probe.bind(("127.0.0.1", 0))
@@ -185,6 +189,7 @@ def test_a_stage_runs_with_both(site: Path, root: Path, tmp_path: Path) -> None:
     assert bus["bus"]["writes"] > 0 and bus["bus"]["errors"] == {}
 
 
+@pytest.mark.slow
 def test_a_take_and_an_exported_head_go_through_them(omote: Omote, tmp_path: Path) -> None:
     (tmp_path / "a.track").write_text("jawOpen headYaw\n0 0 0\n0.5 1 0.2\n1.0 0 0\n")
     (tmp_path / "b.track").write_text("jawOpen\n0 x\n")
@@ -198,6 +203,7 @@ def test_a_take_and_an_exported_head_go_through_them(omote: Omote, tmp_path: Pat
     assert ".xyz" in stl.stderr
 
 
+@pytest.mark.slow
 def test_a_format_has_a_link_and_is_translated(omote: Omote, tmp_path: Path) -> None:
     (tmp_path / "a.track").write_text("jawOpen headYaw\n0 0 0\n0.05 1 0.2\n")
     link = '[[links]]\nkind = "pairs"\nlisten = "{}"\nmirror = true\n'

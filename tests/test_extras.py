@@ -59,6 +59,7 @@ def without(missing: list[str], *commands: tuple[str, ...], cwd: Path) -> Iterat
     yield from map(json.loads, done.stdout.splitlines())
 
 
+@pytest.mark.slow
 def test_what_drives_a_head_needs_no_scipy(tmp_path: Path) -> None:
     (tmp_path / "smooth.toml").write_text(ROBOT)
     (tmp_path / "stage.toml").write_text('name = "mine"\nrobots = ["smooth.toml"]\n')
@@ -85,6 +86,7 @@ def test_what_needs_scipy_names_the_extra(tmp_path: Path) -> None:
         assert "try: pip install 'omote[fit]'" in said
 
 
+@pytest.mark.slow
 def test_what_draws_names_the_extra_before_anything_starts(tmp_path: Path) -> None:
     commands = (
         ("run", "demo", "--headless", "--seconds", "1"), ("play", "nothing.tsv"), ("demo", "--headless"),
@@ -105,6 +107,7 @@ def texts(path: Path) -> Iterator[tuple[int, str]]:
             yield node.lineno, node.value
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", ROOMS)
 def test_no_message_names_what_only_a_checkout_has(root: Path, room: str) -> None:
     found = [

@@ -28,6 +28,7 @@ MOST_S = 0.4
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="limits of processes as on Linux")
 
 
+@pytest.mark.slow
 def test_damaged_files_of_some_kinds_are_each_one_message() -> None:
     """The short form of ``make fuzz``."""
     kinds = ["stage", "wav", "head.npz", "glb", "rhubarb"]
@@ -76,6 +77,7 @@ def babble(path: Path) -> int:
     return 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("act", "fault"),
     [

@@ -14,6 +14,7 @@ from tests.fuzz.line_corpus import Lines
 from tests.fuzz.lines import Findings, attack
 
 
+@pytest.mark.slow
 def test_a_short_run_finds_no_fault() -> None:
     found = attack(1500, seed=7)
     assert found.faults == Counter() and found.lines >= 1500 and found.probes > 50

@@ -14,6 +14,7 @@ from tests.fuzz import requests
 from tests.fuzz.messages import attack
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_short_run_finds_no_fault(kind: str) -> None:
     found = attack(FORMATS.get(kind), 1500, seed=5)

@@ -83,6 +83,7 @@ def make_stage(folder: Path, root: Path, link: str, wire: str) -> Stage:
     return load_stage(str(folder / "stage.toml"), PARAMETERS)
 
 
+@pytest.mark.slow
 def test_one_line_moves_the_servo_and_the_picture(tmp_path: Path, root: Path, host: Host, servos: SimulatedBus) -> None:
     stage = make_stage(tmp_path, root, host.path, servos.path)
     head = Head.load(stage.head)

@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
@@ -55,6 +56,7 @@ def running(path: Path, text: str) -> Iterator[Body]:
             body.stop()
 
 
+@pytest.mark.slow
 def test_a_take_goes_out_and_comes_in_through_running_bodies(tmp_path: Path) -> None:
     ports = {kind: free_port(socket.SOCK_DGRAM) for kind in EXACT}
     write_take(tmp_path / "take.csv")

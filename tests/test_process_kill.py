@@ -16,6 +16,7 @@ def program(benchmark: Callable[[str], ModuleType]) -> ModuleType:
     return benchmark("process_kill")
 
 
+@pytest.mark.slow
 def test_servos_are_safe_and_nothing_is_left_after_a_kill_and_on_a_full_disk(program: ModuleType) -> None:
     with program.Head(7) as head:
         head.start("SIGKILL")

@@ -5,11 +5,14 @@ from __future__ import annotations
 import difflib
 from pathlib import Path
 
+import pytest
+
 from tests import public_api
 
 SNAPSHOT = "tests/public_api.txt"
 
 
+@pytest.mark.slow
 def test_the_public_api_is_what_it_was(root: Path) -> None:
     before = (root / SNAPSHOT).read_text(encoding="utf-8").splitlines()
     now = "\n".join(public_api.lines()).splitlines()

@@ -96,6 +96,7 @@ def is_against(name: str, other: str) -> bool:
     return there not in BELOW[room] if there != room else position > at
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("room", ORDER)
 def test_every_import_goes_with_the_order(room: str) -> None:
     names = [name for name in MODULES if name.split(".")[0] == room]
@@ -237,6 +238,7 @@ HEAVY = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="forks, to import every module before all others")
 def test_every_folder_can_be_imported_first_and_backwards() -> None:
     """That no import goes in a circle is tested above; this finds what only shows when modules run."""

@@ -81,6 +81,7 @@ class Translator:
         self._thread.join(10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("source", "target"), list(product(KINDS, KINDS)))
 def test_a_face_goes_from_one_format_to_another(source: str, target: str) -> None:
     one, other = FORMATS.get(source), FORMATS.get(target)

@@ -80,6 +80,7 @@ def slide(browser: Page, name: str, value: float) -> None:
     )
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_a_phone_drives_the_head_and_stops_it_while_another_client_floods(tmp_path: Path) -> None:
     with robot(tmp_path) as (body, link, where), page(CHROMIUM or "") as browser:
@@ -118,6 +119,7 @@ def _flood(where: str, ending: threading.Event) -> None:
         pass
 
 
+@pytest.mark.slow
 @needs_chromium
 def test_two_panels_show_each_others_changes_without_leaving_their_origin(tmp_path: Path) -> None:
     with robot(tmp_path) as (_, _, where), page(CHROMIUM or "") as browser:

@@ -38,6 +38,7 @@ def site(root: Path) -> Iterator[str]:
     thread.join()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here; Debian, Ubuntu: sudo apt-get install chromium")
 def test_a_slider_of_the_page_moves_the_face_and_its_button_stops_the_servos(site: str) -> None:
     with served() as (state, link, url), page(CHROMIUM or "") as browser:
@@ -60,6 +61,7 @@ def test_a_slider_of_the_page_moves_the_face_and_its_button_stops_the_servos(sit
         assert browser.errors == []
 
 
+@pytest.mark.slow
 def test_the_python_example_talks_to_a_face(root: Path) -> None:
     program = [sys.executable, str(root / "examples" / "websocket_client.py")]
     with served() as (state, _, url):

@@ -147,6 +147,7 @@ def pipe() -> Iterator[tuple[Connection, Connection]]:
     theirs.close()
 
 
+@pytest.mark.slow
 def test_requests_of_the_panel_reach_the_layers(tmp_path: Path, pipe: tuple[Connection, Connection]) -> None:
     main, end = pipe
     with running(stage_of(tmp_path)) as (body, _):

@@ -26,6 +26,7 @@ def test_it_ends_with_the_block_where_nobody_has_orders() -> None:
     assert waiting.pipe.closed and waiting.voice.closed
 
 
+@pytest.mark.slow
 def test_it_does_as_it_is_told_and_is_left_alone_then() -> None:
     with PreloadedBody() as waiting:
         waiting.send(BodyOrders("no such stage"))
@@ -48,6 +49,7 @@ def test_a_process_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch) 
     assert waiting.process.exitcode == -signal.SIGKILL
 
 
+@pytest.mark.slow
 def test_it_ends_when_main_is_gone() -> None:
     program = """
 import os
@@ -82,6 +84,7 @@ if __name__ == "__main__":
     assert all(held >> number - 1 & 1 for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="starts processes as Linux does")
 def test_a_program_that_is_ended_while_it_starts_the_process_leaves_none_that_complains() -> None:
     program = """

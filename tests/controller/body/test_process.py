@@ -61,6 +61,7 @@ def newest(body: BodyProcess, name: str) -> float:
     return float(values[PARAMETERS.index(name)])
 
 
+@pytest.mark.slow
 def test_servos_stand_until_commands_may_come_obey_the_panel_and_end_limp(stage: Stage, servos: SimulatedBus) -> None:
     jaw, rest = PARAMETERS.index("jawOpen"), 2048
     places = [rest + 10 * i for i in range(1, 25)]
@@ -92,6 +93,7 @@ def test_servos_stand_until_commands_may_come_obey_the_panel_and_end_limp(stage:
     assert bus["ticks"] > 10
 
 
+@pytest.mark.slow
 def test_an_error_on_the_way_out_of_main_still_stops_the_servos(stage: Stage, servos: SimulatedBus) -> None:
     with pytest.raises(RuntimeError, match="mine"), BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
@@ -99,6 +101,7 @@ def test_an_error_on_the_way_out_of_main_still_stops_the_servos(stage: Stage, se
     assert powered(servos) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [signal.SIGTERM, signal.SIGHUP])
 def test_a_body_that_is_told_to_end_stops_the_servos_first(
     stage: Stage, servos: SimulatedBus, ending: signal.Signals
@@ -109,6 +112,7 @@ def test_a_body_that_is_told_to_end_stops_the_servos_first(
         assert until(lambda: powered(servos) == [])
 
 
+@pytest.mark.slow
 def test_a_body_that_is_killed_leaves_the_rest_to_the_bus_watchdog(stage: Stage, servos: SimulatedBus) -> None:
     with pytest.raises(ControllerError, match="ended by itself"), BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
@@ -119,6 +123,7 @@ def test_a_body_that_is_killed_leaves_the_rest_to_the_bus_watchdog(stage: Stage,
             time.sleep(0.02)
 
 
+@pytest.mark.slow
 def test_main_killed_is_noticed_and_the_servos_stopped(stage: Stage, servos: SimulatedBus) -> None:
     program = (
         "import sys, time\n"
@@ -144,6 +149,7 @@ def test_main_killed_is_noticed_and_the_servos_stopped(stage: Stage, servos: Sim
         main.communicate()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("stage")
 def test_a_servo_that_does_not_answer_is_named_and_nothing_moves(tmp_path: Path, servos: SimulatedBus) -> None:
     robot = tmp_path / "robot.toml"

@@ -117,6 +117,7 @@ def test_wrong_input_is_one_message_with_the_next_step(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_process_of_its_own_ends_with_that_code_and_says_it_on_stderr() -> None:
     command = [sys.executable, "-c", "from controller.cli.app import main; main()", "run", "nope"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
@@ -153,6 +154,7 @@ main()
     assert (result.returncode, result.stdout, result.stderr) == (130, "", "")
 
 
+@pytest.mark.slow
 def test_a_missing_or_busy_port_ends_a_run_with_one_message(omote: Omote, tmp_path: Path) -> None:
     stage = tmp_path / "stage.toml"
     stage.write_text('name = "mine"\n[[links]]\nport = "/dev/not-there"\n')
@@ -177,6 +179,7 @@ def test_a_damaged_head_is_one_message(omote: Omote, tmp_path: Path, root: Path)
     assert "Traceback" not in result.stderr
 
 
+@pytest.mark.slow
 def test_render_draws_what_it_is_told(omote: Omote, tmp_path: Path) -> None:
     pictures = []
     for name, words in (("rest", ()), ("open", ("--set", "jawOpen=0.8"))):
@@ -198,6 +201,7 @@ def test_check_names_what_is_good(omote: Omote) -> None:
         assert "good" in result.stdout
 
 
+@pytest.mark.slow
 def test_dry_run_opens_nothing_and_lists_every_channel(omote: Omote) -> None:
     result = omote("run", "demo", "--dry-run")
     assert result.returncode == 0, result.stderr
@@ -240,6 +244,7 @@ def test_every_kind_of_end_has_its_exit_code(omote: Omote, monkeypatch: pytest.M
         omote()
 
 
+@pytest.mark.slow
 def test_a_reader_that_is_gone_ends_a_command_quietly() -> None:
     command = [sys.executable, "-c", "from controller.cli.app import main; main()", "plugins"]
     reading, writing = os.pipe()

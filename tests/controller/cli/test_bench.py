@@ -34,6 +34,7 @@ def said(*words: str) -> str:
     return " ".join(result.output.split())  # a title is broken where its table ends
 
 
+@pytest.mark.slow
 def test_the_surface_with_a_large_one_and_growth(tmp_path: Path) -> None:
     svg = tmp_path / "growth.svg"
     text = said("surface", "--seconds", "0.01", "--vertices", "1000", "--large", "--growth", str(svg))
@@ -65,6 +66,7 @@ def test_drift_of_a_head(head: str) -> None:
     assert "missed" not in text
 
 
+@pytest.mark.slow
 def test_quad_trees_are_drawn_side_by_side(tmp_path: Path, head: str) -> None:
     image = pytest.importorskip("PIL.Image")
     picture = tmp_path / "trees.png"
@@ -124,6 +126,7 @@ def test_without_options_the_shipped_head_is_measured(calls: list[tuple[Any, ...
     assert "three 4.000" in words and "measure ms ratio to reach" in words
 
 
+@pytest.mark.slow
 def test_every_subject_is_given_its_own_options(calls: list[tuple[Any, ...]], tmp_path: Path) -> None:
     said("surface")
     said("drift")

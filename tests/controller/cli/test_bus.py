@@ -44,6 +44,7 @@ def said(*words: str) -> str:
     return " ".join(result.output.split())
 
 
+@pytest.mark.slow
 def test_scan_lists_every_servo_or_says_what_to_look_at(servos: SimulatedBus) -> None:
     text = said("scan", servos.path, "--baud", "57600", "--protocol", "2")
     assert "baud prot. id model fw supply temp. error torque" in " ".join(text.replace("┃", " ").split())
@@ -80,6 +81,7 @@ def test_set_id_says_what_it_wrote(servos: SimulatedBus) -> None:
     assert omote("set-id", servos.path, "253", "5").exit_code == 2
 
 
+@pytest.mark.slow
 def test_monitor_asks_or_only_listens_and_ends_in_time(servos: SimulatedBus) -> None:
     asked = said("monitor", servos.path, "--baud", "57600", "--seconds", "0.3", "--rate", "50")
     assert "Present Position" in asked and "write" not in asked

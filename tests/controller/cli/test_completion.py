@@ -24,6 +24,7 @@ def completed(line: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_a_shell_completes_commands_and_names() -> None:
     assert completed("omote simulate mae") == ["maestro"]
     assert completed("omote render --set jawO") == ["jawOpen="]

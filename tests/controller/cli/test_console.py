@@ -23,6 +23,7 @@ def said(*words: str, **settings: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([*OMOTE, *words], env=given, capture_output=True, text=True, timeout=120, check=False)
 
 
+@pytest.mark.slow
 def test_forced_colours_bring_no_codes_that_move_a_cursor(tmp_path: Path) -> None:
     (tmp_path / "head").mkdir()
     result = said("render", "--head", str(tmp_path / "head"), "-o", str(tmp_path / "x.png"), FORCE_COLOR="1")
@@ -35,17 +36,20 @@ def test_forced_colours_bring_no_codes_that_move_a_cursor(tmp_path: Path) -> Non
     assert "\x1b" not in said("plugins", NO_COLOR="1").stdout
 
 
+@pytest.mark.slow
 def test_a_narrow_terminal_loses_nothing() -> None:
     result = said("run", "demo", "--dry-run", COLUMNS="30")
     assert result.returncode == 0, result.stderr
     assert result.stdout.split().count("xl330-m288;") == 24
 
 
+@pytest.mark.slow
 def test_a_narrow_terminal_wraps_no_line_of_a_file() -> None:
     result = said("check", "head24", COLUMNS="30")
     assert result.stdout.count("\n") == 1 and len(result.stdout) > 30
 
 
+@pytest.mark.slow
 def test_an_interrupt_ends_what_was_started_in_the_background(tmp_path: Path) -> None:
     link = tmp_path / "head"
     words = ["simulate", "dynamixel", "--ids", "1", "--link", str(link)]

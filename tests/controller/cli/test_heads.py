@@ -39,6 +39,7 @@ def sheet(tmp_path_factory):
     return mesh, head, said.output
 
 
+@pytest.mark.slow
 def test_fit_says_what_it_did_and_guessed(sheet):
     mesh, head, output = sheet
     words = " ".join(output.split())
@@ -62,6 +63,7 @@ def test_export_writes_what_fit_wrote(sheet, tmp_path):
     assert back.exit_code == 0 and "out_shapes" in back.output.replace("\n", "")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "kind", "message"),
     [

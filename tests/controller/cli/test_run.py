@@ -90,6 +90,7 @@ def omote(*words: str) -> Result:
     return CliRunner().invoke(make_app(), list(words))
 
 
+@pytest.mark.slow
 def test_a_run_without_a_face_writes_its_report(stage: str, tmp_path: Path) -> None:
     report = tmp_path / "r.json"
     result = omote("run", stage, "--no-face", "--seconds", "0.2", "--report", str(report))
@@ -101,6 +102,7 @@ def test_a_run_without_a_face_writes_its_report(stage: str, tmp_path: Path) -> N
     assert measured["control"]["ticks"] > 0
 
 
+@pytest.mark.slow
 def test_a_take_is_played_to_its_end_and_pictures_are_written(stage: str, tmp_path: Path) -> None:
     out, report = tmp_path / "pictures", tmp_path / "r.json"
     words = ["play", str(tmp_path / "a.tsv"), "--stage", stage, "--headless", "--pictures", str(out)]

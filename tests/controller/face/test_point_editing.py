@@ -55,6 +55,7 @@ def test_a_pixel_and_a_place_are_each_others_inverse() -> None:
         np.testing.assert_allclose(screen.place(pixel(screen, place), place), place, atol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_grab_counts_that_was_made_while_points_got_ready(
     handles: PointEditor, head: Head, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -118,6 +119,7 @@ def test_beside_the_face_there_is_nothing_to_take(handles: PointEditor) -> None:
     assert not handles.take((5.0, 5.0), screen, P.neutral()) and not handles.dragging
 
 
+@pytest.mark.slow
 def test_control_points_go_with_the_mouse_and_are_worn_by_a_stage(
     handles: PointEditor, head: Head, tmp_path: Path
 ) -> None:

@@ -93,6 +93,7 @@ def test_a_stage_lends_a_picture_its_head_expressions_and_look(own: Path) -> Non
     assert (said.size, said.look.theme, said.identity) == ((64, 64), "skin", {})
 
 
+@pytest.mark.slow
 def test_a_picture_wears_groups_and_expressions_named_on_the_command_line(own: Path) -> None:
     still = Still.parse(
         [], ["grin"], vocabularies=[str(own / "mine.toml")], groups=[f"{own / 'dimple.json'}=-0.5"]
@@ -163,6 +164,7 @@ def test_heads_of_a_crowd_differ_and_keep_what_all_of_them_show() -> None:
     assert all((a == b).all() for (_, a), (_, b) in zip(poses, crowd_poses(still, 60), strict=True))
 
 
+@pytest.mark.slow
 def test_a_crowd_is_drawn_on_one_sheet(tmp_path: Path) -> None:
     seen: list[tuple[int, int]] = []
     draw_crowd(Still.parse([], []), 3, tmp_path / "a.png", lambda *at: seen.append(at))

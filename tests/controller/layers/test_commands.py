@@ -175,6 +175,7 @@ def test_hostile_sources_in_many_threads_keep_every_limit() -> None:
     assert np.all(np.abs(np.diff(speed, axis=0)) / 0.01 <= P.max_acceleration * (1 + 1e-9) + 1e-9)
 
 
+@pytest.mark.slow
 def test_life_blinks_by_itself_and_stops(face: Face) -> None:
     face.state.live(1.0, face.now)
     lid = P.index("eyeBlinkLeft")
@@ -237,6 +238,7 @@ def test_life_gives_way_to_set(face: Face) -> None:
     assert max(face.run(0.01)[0] for _ in range(1500)) == 0.0
 
 
+@pytest.mark.slow
 def test_life_stirs_around_a_gaze_without_leaving_it(face: Face) -> None:
     face.state.live(1.0, face.now)
     face.state.gaze(math.radians(30), 0.0, face.now)

@@ -95,6 +95,7 @@ def test_what_an_expression_held_back_comes_back_as_it_fades(monkeypatch: pytest
     assert held[0] < 0.1 and held[-1] == 1.0 and np.diff(held).max() < 0.05
 
 
+@pytest.mark.slow
 def test_a_source_that_never_works_is_switched_off_and_the_others_go_on(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -42,6 +42,7 @@ def test_a_host_process_that_is_killed_does_not_hang_stop() -> None:
     assert host.counts == {}
 
 
+@pytest.mark.slow
 def test_a_host_starts_from_a_folder_with_modules_of_the_same_names(root: Path, tmp_path: Path) -> None:
     """The program finds omote as an uninstalled one is found: by its path alone."""
     for name in ("controller", "drivers", "json", "signal"):

@@ -35,6 +35,7 @@ def test_a_stage_that_is_not_there_is_named(tmp_path: Path) -> None:
         make_face(str(tmp_path / "nowhere.toml"), {}, {}, tmp_path / "face.glb.gz")
 
 
+@pytest.mark.slow
 def test_it_appears_while_the_context_lasts_and_leaves_nothing(stage: Path) -> None:
     with face_in_the_making(stage, {}, None) as path:
         end = time.monotonic() + WAIT_S

@@ -77,6 +77,7 @@ def written(tmp_path: Path, text: str) -> RobotSettings:
     return load_robot(tmp_path / "robot.toml", P)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "values",
     [
@@ -123,6 +124,7 @@ def test_one_anchor_is_pulled_as_far_as_the_skin_goes(tmp_path: Path, head: Head
     assert np.degrees(angle[0]) == pytest.approx(4.0 * one.pulls_mm(face(mouthSmileLeft=0.8))[0])
 
 
+@pytest.mark.slow
 def test_unseen_skin_follows_better_than_one_parameter_for_one_servo(
     head: Head, robot: RobotSettings, solved: AnchorSolver
 ) -> None:
@@ -173,6 +175,7 @@ def test_the_mirror_reads_a_head_of_anchors(robot: RobotSettings, solved: Anchor
     assert read[P.index("jawOpen")] == pytest.approx(0.6, abs=0.2)
 
 
+@pytest.mark.slow
 def test_what_a_head_cannot_show_is_told_by_region(solved: AnchorSolver) -> None:
     vocabulary = Vocabulary.load(P)
     found = {region: (wanted, left) for region, wanted, left in

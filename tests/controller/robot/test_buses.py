@@ -153,6 +153,7 @@ def test_models_and_pulses_are_checked_by_family(
     assert "channels[0]" in str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["eyes-maestro", "head-feetech", "head-dynamixel1", "head-ssc32", "head-text", "head-arduino"]
 )

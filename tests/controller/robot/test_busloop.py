@@ -173,6 +173,7 @@ def test_nothing_is_sent_while_a_pose_is_not_known(servos: SimulatedBus, monkeyp
         pass
 
 
+@pytest.mark.slow
 def test_a_single_missed_answer_is_asked_for_again(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> None:
     loop = make(servos, Face())
     real = loop.bus.start
@@ -212,6 +213,7 @@ def test_a_lost_port_comes_back_and_motion_goes_on_from_the_measured_pose(
     assert sum(message == "bus b is back" for message in messages) == 1
 
 
+@pytest.mark.slow
 def test_no_goal_is_sent_to_a_servo_that_does_not_say_where_it_is_after_a_reconnect(
     servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -404,6 +406,7 @@ def test_a_port_that_comes_back_while_stopped_switches_nothing_on(
     assert loop.error is None
 
 
+@pytest.mark.slow
 def test_a_servo_that_is_not_confirmed_off_is_switched_off_when_it_answers(
     servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -440,6 +443,7 @@ def test_stop_ends_the_way_to_rest(servos: SimulatedBus, monkeypatch: pytest.Mon
 # ---------------------------------------------------------------------------- servos fail alone
 
 
+@pytest.mark.slow
 def test_with_a_silent_servo_the_others_are_driven_after_a_replug_and_it_joins_with_a_ramp(
     servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -189,6 +189,7 @@ def test_a_dead_band_keeps_small_changes_away() -> None:
     assert line.run(1.0, 11.1)[-1, 0] == pytest.approx(11.1)
 
 
+@pytest.mark.slow
 def test_no_hostile_target_gets_past_a_limit_of_the_shipped_head() -> None:
     robot = load_robot(find_config("robots", "head24"), P)
     table = build_table(robot.channels, P)

@@ -152,6 +152,7 @@ def ticks(benchmark: Callable[[str], ModuleType]) -> ModuleType:
     return benchmark("control_tick")
 
 
+@pytest.mark.slow
 def test_no_hostile_layer_breaks_a_limit_at_the_bus(ticks: ModuleType) -> None:
     chain = ticks.Chain(0)
     counts = ticks.faults(chain, range(3800))
@@ -168,6 +169,7 @@ def test_the_check_of_limits_finds_broken_ones(ticks: ModuleType) -> None:
     assert counts["acceleration"] > 0 and counts["speed"] > 0
 
 
+@pytest.mark.slow
 def test_eight_layers_are_active_and_memory_does_not_grow(ticks: ModuleType) -> None:
     chain = ticks.Chain(1)
     assert ticks.growth(chain, 400) < 4096
@@ -235,6 +237,7 @@ def test_a_recording_is_played_from_its_first_face(tmp_path: Path) -> None:
     assert max(jaw[:20]) < 0.1 and jaw[-1] == pytest.approx(28.0, abs=0.5)
 
 
+@pytest.mark.slow
 def test_a_lively_stage_moves_by_itself(tmp_path: Path) -> None:
     (tmp_path / "act.toml").write_text('steps = ["0 NEUTRAL"]')
     still = 'show = "act.toml"\n'
@@ -272,6 +275,7 @@ def test_a_voice_on_standard_input_is_computed_without_a_port(tmp_path: Path) ->
     os.close(near)
 
 
+@pytest.mark.slow
 def test_a_long_take_is_computed_to_its_end(tmp_path: Path) -> None:
     (tmp_path / "long.tsv").write_text("0.0\taa\n40.0\tsil\n")
     stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)

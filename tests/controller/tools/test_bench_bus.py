@@ -37,6 +37,7 @@ def test_a_paced_loop_keeps_its_rate_and_a_free_one_its_own() -> None:
     assert free.late_ms == {}
 
 
+@pytest.mark.slow
 def test_a_run_measures_both_drivers_on_one_wire(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "SERVOS", 4)
     monkeypatch.setattr(module, "ROUNDS", 1)
@@ -217,6 +218,7 @@ def test_figures_past_their_bounds_are_missed(monkeypatch: pytest.MonkeyPatch) -
     assert "taken by the host meanwhile " not in found  # a machine that does not report it
 
 
+@pytest.mark.slow
 def test_goals_of_each_driver_reach_the_servos(monkeypatch: pytest.MonkeyPatch) -> None:
     seen: list[tuple[object, list[int], list[int]]] = []
     buses: list[SimulatedBus] = []

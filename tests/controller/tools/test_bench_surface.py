@@ -37,6 +37,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> str:
     return str(folder)
 
 
+@pytest.mark.slow
 def test_the_head_tables_hold_full_and_incremental_updates() -> None:
     told: list[str] = []
     tables = bench_head("ict", 0.0, told.append)
@@ -52,6 +53,7 @@ def test_the_head_tables_hold_full_and_incremental_updates() -> None:
     assert told
 
 
+@pytest.mark.slow
 def test_the_titles_count_the_head_and_its_largest_part(monkeypatch: pytest.MonkeyPatch) -> None:
     times = iter([10.0, 10.25])
     monkeypatch.setattr(bench_surface.time, "perf_counter", lambda: next(times))

@@ -131,6 +131,7 @@ def opened() -> Iterator[Opened]:
         yield stack.enter_context
 
 
+@pytest.mark.slow
 def test_a_head_is_calibrated_by_hand_and_by_keys_and_saved(tmp_path: Path, opened: Opened) -> None:
     with SimulatedBus([1], link=tmp_path / "port") as head:
         robot = tmp_path / "pair.toml"
@@ -165,6 +166,7 @@ def test_keys_of_a_windows_console_have_the_same_names(monkeypatch: pytest.Monke
     assert len(slept) == 8 and all(0.0 < seconds < 0.1 for seconds in slept)  # until the second is over
 
 
+@pytest.mark.slow
 def test_a_calibration_that_exists_is_not_replaced_without_a_yes(tmp_path: Path, opened: Opened) -> None:
     with SimulatedBus([1], link=tmp_path / "port") as head:
         robot, old = tmp_path / "pair.toml", tmp_path / "pair.desk.calibration.toml"
@@ -186,6 +188,7 @@ def test_a_calibration_that_exists_is_not_replaced_without_a_yes(tmp_path: Path,
     assert "precious" not in old.read_text()
 
 
+@pytest.mark.slow
 def test_a_calibration_that_is_told_to_end_leaves_the_motors_off(tmp_path: Path, opened: Opened) -> None:
     with SimulatedBus([1], link=tmp_path / "port") as head:
         robot = tmp_path / "pair.toml"

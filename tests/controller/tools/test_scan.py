@@ -14,6 +14,7 @@ from drivers.base.errors import PortMissing
 from drivers.sim import SimulatedBus
 
 
+@pytest.mark.slow
 def test_finds_every_servo_at_its_rate_and_says_how_far_it_is() -> None:
     told: list[tuple[str, int]] = []
     with SimulatedBus([3, 17], baud=57_600) as servos:
@@ -26,6 +27,7 @@ def test_finds_every_servo_at_its_rate_and_says_how_far_it_is() -> None:
     assert told[1][0] == "57600 baud, Protocol 2.0"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "ids"), [("ax-12a", [1, 12]), ("sts3215", [9, 200]), ("scs0009", [4, 5])])
 def test_finds_servos_of_protocol_1_and_their_makers(model: str, ids: list[int]) -> None:
     with SimulatedBus(ids, model=model, baud=500_000) as servos:

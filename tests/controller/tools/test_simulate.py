@@ -38,6 +38,7 @@ def served(*words: str) -> Iterator[str]:
         process.communicate()
 
 
+@pytest.mark.slow
 def test_any_program_can_open_the_servos(tmp_path: Path) -> None:
     link = tmp_path / "head"
     with (
@@ -51,6 +52,7 @@ def test_any_program_can_open_the_servos(tmp_path: Path) -> None:
     assert not link.exists()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("words", "asked", "answer"),
     [
@@ -69,6 +71,7 @@ def test_every_family_answers(tmp_path: Path, words: tuple[str, ...], asked: str
         assert port.read(len(answer) // 2) == bytes.fromhex(answer)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("robot", "asked", "answer"),
     [
@@ -87,6 +90,7 @@ def test_every_shipped_robot_is_served_on_tcp(robot: str, asked: str, answer: by
         client.close()
 
 
+@pytest.mark.slow
 def test_a_port_is_a_terminal_or_an_address() -> None:
     command = [sys.executable, "-c", "from controller.cli.app import main; main()", "simulate", "maestro"]
     done = subprocess.run([*command, "--link", "/tmp/x", "--tcp", ":1"], capture_output=True, text=True, check=False)
@@ -111,6 +115,7 @@ def test_a_robot_file_says_which_servos(root: Path) -> None:
     assert "head" in caught.value.hint
 
 
+@pytest.mark.slow
 def test_boards_take_their_time_on_the_wire_and_faults_at_a_socket(tmp_path: Path) -> None:
     link, control = tmp_path / "board", tmp_path / "board.ctl"
     with (
@@ -152,6 +157,7 @@ def test_a_record_cannot_be_changed() -> None:
         object.__new__(Serving).anything = 1
 
 
+@pytest.mark.slow
 def test_faults_come_by_time_and_traffic_is_recorded_and_served_again(tmp_path: Path) -> None:
     faults, record, link = tmp_path / "faults.toml", tmp_path / "bus.log", tmp_path / "bus"
     faults.write_text('timeline = ["0 place 1 1000", "0 fault alert:1"]')

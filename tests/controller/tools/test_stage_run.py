@@ -251,6 +251,7 @@ def test_pictures_are_kept_only_where_a_folder_is_given(
     assert report["written"] == [] and isinstance(recorders[0], Recorder) and recorders[1] is None
 
 
+@pytest.mark.slow
 def test_a_picture_that_fails_leaves_the_servos_their_run(
     told: list[str], monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, stage: str
 ) -> None:

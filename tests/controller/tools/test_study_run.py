@@ -28,6 +28,7 @@ length_s = 0.6
 """
 
 
+@pytest.mark.slow
 def test_a_study_leaves_events_trials_recording_and_figures(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text('name = "mine"\nrobots = ["head24"]\n')
     (tmp_path / "study.toml").write_text(STUDY)

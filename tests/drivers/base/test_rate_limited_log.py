@@ -60,6 +60,7 @@ def test_texts_are_not_kept_for_ever(say: RateLimitedLogger) -> None:
     assert len(say._logged) == KEPT
 
 
+@pytest.mark.slow
 def test_many_servos_that_come_and_go_are_all_told_and_flood_no_log(caplog: pytest.LogCaptureFixture) -> None:
     """A head with a bad cable: what was counted is in the report, the log stays readable."""
     specs = [ServoSpec(i, f"s{i}", "xl330-m288", -1.0, 1.0, 6.0, 60.0) for i in IDS]

@@ -181,6 +181,7 @@ def test_3_every_way_out_switches_all_off(family: str, how: str) -> None:
     assert outputs(board) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_3_signals_switch_all_off(number: int) -> None:
     with (

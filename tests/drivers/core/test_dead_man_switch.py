@@ -278,6 +278,7 @@ def torque_after_kill(wire: SimulatedBus, folder: Path, command: list[str], **ho
     return torques(wire)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("stderr", ["open", "closed"])
 def test_after_a_kill_the_servos_are_let_go(wire: SimulatedBus, root: Path, tmp_path: Path, stderr: str) -> None:
     """Also of a program that finds omote by itself only, from another folder, at a port with a relative path."""

@@ -159,6 +159,7 @@ def test_unplugging_in_the_middle_of_switching_off_is_told(wire: ServoBus) -> No
 # ---------------------------------------------------------------------------- 3: every way out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", [RAISE, "SIGINT", "SIGTERM", "SIGHUP"])
 def test_every_way_out_switches_all_servos_off(wire: ServoBus, how: str) -> None:
     with program("dynamixel", SERVOS, wire.port, how, **CALM) as child:
@@ -186,6 +187,7 @@ def test_the_servos_stop_by_themselves_when_the_program_is_killed(wire: ServoBus
 # ---------------------------------------------------------------------------- 4: errors on the way out
 
 
+@pytest.mark.slow
 def test_the_first_error_is_told_and_the_one_of_closing_is_a_note(wire: ServoBus) -> None:
     bus = open_bus("dynamixel", SERVOS, port=wire.port, margin_s=0.5, watchdog_ms=0)
     with pytest.raises(ZeroDivisionError) as caught, bus:

@@ -53,6 +53,7 @@ def drive(models: tuple[str, ...], options: dict[str, Any], careful: bool) -> It
             bus.recover()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fast", [False, True])
 @pytest.mark.parametrize("feedback", ["full", "position"])
 @pytest.mark.parametrize("models", MODELS.values(), ids=MODELS)

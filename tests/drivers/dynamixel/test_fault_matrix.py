@@ -210,6 +210,7 @@ ROWS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS, ids=[f"{row.number}: {row.spec}" for row in ROWS])
 def test_bytes_on_the_wire(rig: Rig, row: Row) -> None:
     rig.stalls.clear()

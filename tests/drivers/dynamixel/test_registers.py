@@ -61,6 +61,7 @@ def test_lost_answers_are_asked_for_again(wire: SimulatedBus, registers: Registe
     assert [registers.get(1, "torque") for _ in range(6)] == [0] * 6
 
 
+@pytest.mark.slow
 def test_silence_and_damage_are_told_apart(wire: SimulatedBus, registers: Registers) -> None:
     registers.port.margin_s = 0.1
     wire.fault("mute:1")
@@ -72,6 +73,7 @@ def test_silence_and_damage_are_told_apart(wire: SimulatedBus, registers: Regist
         registers.get(2, "torque")
 
 
+@pytest.mark.slow
 def test_a_group_read_asks_the_missing_ones_again_and_names_all_that_fail(
     wire: SimulatedBus, registers: Registers
 ) -> None:

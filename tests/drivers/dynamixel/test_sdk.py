@@ -198,6 +198,7 @@ def test_s4_a_late_reply_is_not_the_answer_to_the_next_question(wire: Wire, thei
     assert port.stray == 1
 
 
+@pytest.mark.slow
 def test_s4_a_shorter_reply_than_asked_for_is_refused(wire: Wire, ours: tuple, patient: Client) -> None:
     wire.answer = lambda packet: [encode_status(packet.id, 0, b"\x00")]
     port, packets = patient
@@ -274,6 +275,7 @@ def test_s13_goals_are_sent_without_waiting(wire: Wire, ours: tuple) -> None:
 # ---------------------------------------------------------------------------- S14 partial and fast group reads
 
 
+@pytest.mark.slow
 def test_s7_s14_a_silent_servo_does_not_cost_the_others_theirs(wire: Wire, ours: tuple, theirs: Client) -> None:
     wire.answer = table({1: four(10), 3: four(30)})
     port, packets = theirs
@@ -310,6 +312,7 @@ def fast_group(client: Client) -> bare.GroupSyncRead:
     return group
 
 
+@pytest.mark.slow
 def test_s14_fast_reads_keep_every_servo_whose_own_bytes_are_right(wire: Wire, ours: tuple, theirs: Client) -> None:
     values = {3: 166, 7: 2079, 4: 1023}
     port, packets = ours

@@ -275,6 +275,7 @@ def test_10_an_interrupt_in_a_transaction_leaves_the_bus_usable(
 # ---------------------------------------------------------------------------- 13, 14, 19: what comes back is wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how",
     [

@@ -88,6 +88,15 @@ def test_two_servos_with_the_old_id_are_left_alone(model: str, protocol: int) ->
         assert bus.servo(3).eeprom_writes == {}
 
 
+@pytest.mark.parametrize(("model", "protocol"), [("xl330-m288", 2), ("sts3215", 1), ("ax-12a", 1)])
+def test_an_id_whose_servo_loses_replies_does_not_count_as_free(model: str, protocol: int) -> None:
+    with SimulatedBus([1, 5], model=model) as bus:
+        bus.fault("drop:5:count=2")
+        with pytest.raises(ServoRefused, match="the id 5 on .* is taken by another"):
+            set_id(bus.path, 1_000_000, protocol, 1, 5)
+        assert bus.servo(1).eeprom_writes == {}
+
+
 @pytest.mark.parametrize(("old", "new", "name"), [(-1, 2, "old"), (1, 253, "new"), (1, 254, "new")])
 def test_ids_that_no_servo_may_have_are_refused(old: int, new: int, name: str) -> None:
     with pytest.raises(ValueError, match=name):
@@ -119,6 +128,7 @@ def test_the_first_and_the_last_id_are_allowed_and_its_own_id_is_not_taken() -> 
         assert bus.servo(0).register("ID") == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("model", "protocol"), [("xl330-m288", 2), ("sts3215", 1)])
 def test_both_protocols_are_tried(model: str, protocol: int) -> None:
     with SimulatedBus([1, 5], model=model) as bus:

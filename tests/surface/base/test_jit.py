@@ -54,6 +54,7 @@ def run(folder: Path) -> list[float]:
     return [float(word) for word in done.stdout.split()]
 
 
+@pytest.mark.slow
 def test_an_edited_file_recompiles_the_kernels_that_depend_on_it(copy: Path) -> None:
     trial = copy / "surface" / "trial"
     assert run(copy) == [8.0, 0]
@@ -91,12 +92,14 @@ def said(folder: Path, **settings: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-c", RUN], cwd=folder, env=env, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 def test_compiling_for_the_first_time_says_so_once(copy: Path) -> None:
     first, second = said(copy), said(copy)
     assert first.stderr == "compiling the kernels of surface for this machine: up to a minute, only once\n"
     assert (second.stdout, second.stderr) == ("8.0 1\n", "")
 
 
+@pytest.mark.slow
 def test_kernels_run_where_no_compiled_code_can_be_kept(copy: Path) -> None:
     nowhere = {"NUMBA_CACHE_DIR": "/dev/null/cache", "HOME": "/dev/null", "XDG_CACHE_HOME": "/dev/null"}
     for folder in copy.rglob("*.py"):
@@ -182,17 +185,20 @@ def start_together(copy: Path, *values: str) -> list[str]:
     return [each.communicate(timeout=240)[0] for each in started]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(jit.fcntl is None, reason="files cannot be locked here")
 def test_of_two_processes_one_compiles_and_the_other_loads(copy: Path) -> None:
     assert sorted(start_together(copy, "1.0", "1.0")) == ["8.0 1\n", "compiles\n8.0 0\n"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(jit.fcntl is None, reason="files cannot be locked here")
 def test_code_for_other_types_that_is_kept_at_once_is_not_overwritten(copy: Path) -> None:
     assert sorted(start_together(copy, "1.0", "2")) == ["compiles\n10.0 0\n", "compiles\n8.0 0\n"]
     assert sorted(start_together(copy, "1.0", "2")) == ["10.0 1\n", "8.0 1\n"]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(jit.fcntl is None, reason="files cannot be locked here")
 def test_a_process_that_was_stopped_while_it_compiled_holds_up_no_other_for_ever(
     monkeypatch: pytest.MonkeyPatch,

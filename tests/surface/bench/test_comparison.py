@@ -29,6 +29,7 @@ def variants() -> list[Variant]:
     return compare(bump(), level=5)
 
 
+@pytest.mark.slow
 def test_the_error_bound_saves_vertices_at_no_more_deviation(variants: list[Variant]) -> None:
     uniform, by_error = variants[0], variants[-1]
     assert uniform.name == "uniform"

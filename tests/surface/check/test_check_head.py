@@ -71,10 +71,12 @@ def findings(head: HeadData) -> list[Finding]:
     return check_head(Head(head))
 
 
+@pytest.mark.slow
 def test_the_shipped_head_passes_without_a_warning(good: HeadData) -> None:
     assert findings(good) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kinds", TOGETHER, ids="+".join)
 @pytest.mark.usefixtures("without_overlaps")
 def test_seeded_defects_are_named_and_nothing_else_is(good: HeadData, kinds: tuple[str, ...]) -> None:
@@ -92,6 +94,7 @@ def test_every_defect_is_seeded() -> None:
     assert sorted(kind for kinds in TOGETHER for kind in kinds) == sorted(DEFECTS)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OTHERS)
 def test_other_forms_of_defects_are_found(good: HeadData, name: str) -> None:
     make, check, words = OTHERS[name]
@@ -99,12 +102,14 @@ def test_other_forms_of_defects_are_found(good: HeadData, name: str) -> None:
     assert words in found.text and not found.warning
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.7, (1.5, 1.3, 1.3)], ids=str)
 @pytest.mark.usefixtures("without_overlaps")
 def test_heads_of_other_sizes_and_proportions_pass(good: HeadData, factor: float | tuple[float, float, float]) -> None:
     assert findings(seeded.scaled(good, factor)) == []
 
 
+@pytest.mark.slow
 def test_an_eye_that_comes_through_the_lids_is_found(good: HeadData) -> None:
     few = seeded.with_groups(good, lambda g: g if g.name == "eyeBlinkLeft" else None)
     assert overlaps.overlap_notes(few) == []
@@ -116,6 +121,7 @@ def test_an_eye_that_comes_through_the_lids_is_found(good: HeadData) -> None:
         assert 2.0 * factor < float(found.text.split(" mm")[0]) < 4.5 * factor  # the radius grew by 3.6 mm
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("without_overlaps")
 def test_a_head_without_eyes_or_blinks_is_a_warning(good: HeadData) -> None:
     none = seeded.without_parts(good, "eye_left", "eye_right", "sockets")

@@ -36,6 +36,7 @@ def fitted(tmp_path_factory) -> tuple:
     return folder / "head", report, heard
 
 
+@pytest.mark.slow
 def test_the_report_has_figures_for_every_part_and_shape(fitted):
     _, report, _ = fitted
     (face,) = report.parts
@@ -185,6 +186,7 @@ def test_eyes_look_where_their_shapes_say_and_else_ahead():
     assert gazes_of(named)[1][0][1] > 0.2 and gazes_of(named)[2].tolist() == [[0, 0, 1], [0, 0, 1]]
 
 
+@pytest.mark.slow
 def test_a_part_that_cannot_be_fitted_is_left_out_by_name_and_the_face_never_is(monkeypatch):
     small = slit_sheet()
     hair = replace(small, vertices=0.4 * small.vertices + [0.0, 90.0, 5.0], names=(), deltas=small.deltas[:0])

@@ -97,6 +97,7 @@ def extent(head: Head, axis: int) -> float:
     return float(np.ptp(head.part("face").vertices[:, axis]))
 
 
+@pytest.mark.slow
 def test_those_that_ship_differ_as_their_names_say(heads):
     base, made = heads
     assert set(made) == set(read_wanted().identities)

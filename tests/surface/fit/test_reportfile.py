@@ -200,6 +200,7 @@ def folder(result, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_the_figures_are_those_of_the_fit(folder, result):
     table = json.loads((folder / "report.json").read_text())
     assert (table["format"], table["version"]) == ("omote fit report", 1)
@@ -255,6 +256,7 @@ def test_excluded_places_have_a_colour_of_their_own(result):
     assert violet.any() and (part.chart.folded[violet].mean() > 0.5)
 
 
+@pytest.mark.slow
 def test_nothing_is_left_where_it_cannot_be_written(result, tmp_path):
     (tmp_path / "file").write_text("")
     with pytest.raises(FitError, match="the report cannot be written"):

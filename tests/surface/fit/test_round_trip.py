@@ -33,6 +33,7 @@ def head() -> Head:
     return Head(replace(data, parts=parts, seams=seams, paint=paint, contacts=contacts, rules=[], placement=SIDEWAYS))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("suffix", "frame"), [(".glb", "head"), (".glb", "file"), (".obj", "head")])
 def test_an_export_comes_back_to_its_place(tmp_path, head, suffix, frame):
     export_head(head, tmp_path / f"head{suffix}", frame=frame)
@@ -51,6 +52,7 @@ def test_an_export_comes_back_to_its_place(tmp_path, head, suffix, frame):
         assert not loaded.notes and np.abs(loaded.placement.shift).max() < 0.05
 
 
+@pytest.mark.slow
 def test_its_plan_has_a_face_and_eyes(tmp_path, head):
     export_head(head, tmp_path / "head.glb")
     loaded = place(load_mesh(tmp_path / "head.glb"))

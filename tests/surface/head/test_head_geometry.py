@@ -275,6 +275,7 @@ def test_lips_stay_together_until_something_opens_them(head, pose):
     assert lips_gap(head) < rest + 0.25
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name, least", [("jawOpen", 30.0), ("mouthFunnel", 12.0), ("mouthUpperUp", 6.5)])
 def test_what_opens_the_lips_parts_them_smoothly_and_at_1_in_full(head, name, least):
     """No step of a hundredth opens them by more than five times the mean step, and none closes them."""

@@ -35,6 +35,7 @@ def dressed() -> Head:
     return Head.load(ICT, {"broad": 0.7}, worn("hair-long", "beard-full", "clothes-shirt"))
 
 
+@pytest.mark.slow
 def test_worn_parts_have_their_colours_and_lie_near_the_head(dressed: Head) -> None:
     names = [part.name for part in dressed.parts[-4:]]
     assert names == ["hair", "tresses", "beard", "clothes"]
@@ -167,6 +168,7 @@ def test_a_garment_with_the_mesh_of_another_is_refused(tmp_path: Path) -> None:
         Head.load(ICT, None, Look(worn=(Worn(tmp_path / "other.npz", GREY),)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("simplified", [False, True])
 def test_what_is_worn_may_hide_all_of_a_part(tmp_path: Path, simplified: bool) -> None:
     with np.load(WARDROBE / "hair-crop.npz") as file:

@@ -85,6 +85,7 @@ def test_what_is_no_archive_is_refused(tmp_path):
         read_npz(path)
 
 
+@pytest.mark.slow
 def test_an_archive_that_unpacks_to_gigabytes_is_refused_before_it_does(tmp_path):
     path = write_npz(tmp_path / "m.npz", slit_sheet())
     with (

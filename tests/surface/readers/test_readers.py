@@ -38,6 +38,7 @@ def damaged(draw: st.DrawFn, text: str) -> str:
     return text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("suffix", GOOD)
 @settings(max_examples=120, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())

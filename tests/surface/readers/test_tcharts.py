@@ -40,6 +40,7 @@ def loop_points(item: NamedSurface, per_unit: int = 8) -> list[np.ndarray]:
     return out
 
 
+@pytest.mark.slow
 def test_away_from_star_points_it_is_the_b_spline(cube: NamedSurface) -> None:
     share = np.array([1, 23, 23, 1]) / 48  # of a uniform cubic in the middle of a span
     wanted = []
@@ -150,6 +151,7 @@ def test_charts_lie_further_apart_than_a_face_is_wide(cube: NamedSurface) -> Non
     assert len(apart) > 20 and min(apart) >= 1.0
 
 
+@pytest.mark.slow
 def test_short_knot_intervals_are_scaled_and_the_form_stays(tmp_path: Path) -> None:
     text, found = cube_tsm(2), []
     for length in ("1", "0.001"):

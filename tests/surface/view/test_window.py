@@ -94,6 +94,7 @@ def child(root: Path, folder: Path, display: str, quality: str = "fast", fail: b
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quality", ["full", "fast"])
 def test_the_window_draws_head_and_panel_and_closes(root: Path, tmp_path: Path, display: str, quality: str) -> None:
     done = child(root, tmp_path, display, quality, seconds=0.6)
@@ -108,12 +109,14 @@ def test_the_window_draws_head_and_panel_and_closes(root: Path, tmp_path: Path, 
     assert [entry.name for entry in tmp_path.iterdir()] == ["shot.npy"], "the window leaves no files behind"
 
 
+@pytest.mark.slow
 def test_what_the_source_raises_comes_through(root: Path, tmp_path: Path, display: str) -> None:
     done = child(root, tmp_path, display, fail=True, seconds=20)
     assert done.returncode == 7, done.stderr
     assert json.loads(done.stdout.splitlines()[-1]) == ["KeyError", "'the source broke'"]
 
 
+@pytest.mark.slow
 def test_a_display_that_is_not_there(root: Path, tmp_path: Path) -> None:
     done = child(root, tmp_path, ":9876", seconds=1)
     assert done.returncode == 7, done.stderr
@@ -138,6 +141,7 @@ def test_without_imgui_bundle(monkeypatch: pytest.MonkeyPatch) -> None:
         run_window(BallHead(), lambda: values())
 
 
+@pytest.mark.slow
 def test_a_kiosk_covers_the_screen(root: Path, tmp_path: Path, display: str) -> None:
     done = child(root, tmp_path, display, seconds=0.4, kiosk=True)
     assert done.returncode == 0, done.stderr

@@ -68,6 +68,7 @@ def test_a_whole_face_fits_sixty_times_a_second_into_115200_baud() -> None:
     assert longest <= 139 and longest * 10 * 60 < 115_200 * 0.75
 
 
+@pytest.mark.slow
 @given(some.binary(max_size=1200))
 def test_stuffed_bytes_have_no_zero_and_come_back(data: bytes) -> None:
     stuffed = stuff(data)

@@ -233,6 +233,7 @@ def test_faults_that_repeat_leave_the_processor_to_others(
     assert link.report()["faults"] == 1 and len(waits) == 1 and 0.0 < waits[0] < 0.5
 
 
+@pytest.mark.slow
 def test_replies_beyond_the_buffer_are_dropped_whole_and_counted(port: HostPort, link: LineLink) -> None:
     count = 250
     for i in range(count):  # one after the other: what arrives at once is dropped at once

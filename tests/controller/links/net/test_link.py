@@ -101,6 +101,7 @@ def test_silence_gives_the_layer_back_and_a_source_comes_again(far: Open) -> Non
     wait_for(lambda: there.holding == len(P) and there.layer[JAW] == pytest.approx(0.75), "the second face")
 
 
+@pytest.mark.slow
 def test_a_lost_source_can_be_held_beyond_the_time_out_of_its_layer(far: Open) -> None:
     there = far(timeout_s=0.1, lost="hold")
     there.jaw(0.5)

@@ -93,6 +93,7 @@ def test_a_message_that_is_too_long_ends_its_client_and_no_other(far: tuple[Comm
     assert link.report()["refused"] == {}
 
 
+@pytest.mark.slow
 def test_a_flood_that_reads_nothing_delays_no_stop_of_its_own_or_another(far: tuple[CommandState, Any, str]) -> None:
     state, link, url = far
     flood = json.dumps({"type": "hello", "id": 1})  # whose answer is long
@@ -200,6 +201,7 @@ def test_closing_the_link_sends_clients_away_and_frees_the_address() -> None:
         assert again.port == port
 
 
+@pytest.mark.slow
 def test_a_subscriber_that_reads_slowly_gets_fresh_states(far: tuple[CommandState, Any, str]) -> None:
     _, _, url = far
     with connect(url, max_queue=1) as slow:

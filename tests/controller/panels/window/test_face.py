@@ -56,6 +56,7 @@ def shown(program: str, *words: str) -> str:
     return result.stdout
 
 
+@pytest.mark.slow
 @on_a_display
 def test_a_run_with_a_window_draws_and_reports(tmp_path: Path) -> None:
     report, stage = tmp_path / "r.json", tmp_path / "small.toml"
@@ -121,6 +122,7 @@ with Mailbox.create(len(P)) as mailbox:
 """
 
 
+@pytest.mark.slow
 @on_a_display
 def test_points_are_dragged_with_the_mouse() -> None:
     told = json.loads(shown(DRAG))

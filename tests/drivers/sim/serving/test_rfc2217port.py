@@ -49,6 +49,7 @@ def test_bytes_that_mean_something_to_telnet_arrive(bus: SimulatedBus) -> None:
         assert bytes((255, 240, 255, 255)) in port.read(15)
 
 
+@pytest.mark.slow
 def test_omotes_own_port_opens_it_and_clients_come_and_go(bus: SimulatedBus) -> None:
     for _ in range(2):
         port = SerialPort(bus.path, 1_000_000)
@@ -66,6 +67,7 @@ def test_a_second_server_is_told(bus: SimulatedBus) -> None:
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "noise",
     [

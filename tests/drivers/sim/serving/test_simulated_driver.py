@@ -40,6 +40,7 @@ def test_servos_keep_their_state_over_a_replug() -> None:
         np.testing.assert_allclose(bus.read().position_rad, 0.2, atol=0.01)
 
 
+@pytest.mark.slow
 def test_faults_reach_the_servos() -> None:
     with (
         open_bus("simulated", SERVOS, faults=["mute:2"], margin_s=0.5) as bus,

@@ -113,6 +113,7 @@ def test_sync_writes_of_whole_entries_are_carried_out(model: str):
     assert leds(bus) == [1, 0, 1], "not to the broadcast id, or cut short"
 
 
+@pytest.mark.slow
 def test_errors_of_faulty_replies_are_those_of_their_protocol():
     for model in MODELS:
         (reply,) = ask(chain(model, "wrongid:2:9"), 2, PING)

@@ -52,6 +52,7 @@ def heads(head: Head) -> tuple[Head, Head, list[str]]:
     return Head(before), Head(after), notes
 
 
+@pytest.mark.slow
 def test_lids_that_cut_through_an_eyeball_are_lifted_out_of_it(heads) -> None:
     before, after, _ = heads
     for side, name in enumerate(BLINKS):
@@ -82,6 +83,7 @@ def test_a_blink_that_leaves_a_gap_is_lengthened_until_it_is_drawn_shut(heads) -
     np.testing.assert_array_equal(jaw[0].moves, jaw[1].moves)
 
 
+@pytest.mark.slow
 def test_a_blink_that_goes_a_third_of_its_way_is_left_alone(head: Head) -> None:
     after, notes = seat_drawn_lids(spoilt(head.data, 0.0, 0.3))
     assert not notes and eye_seen(Head(after), 0, eyeBlinkLeft=1.0) > 5.0

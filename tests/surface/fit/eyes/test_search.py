@@ -65,6 +65,7 @@ KINDS = {
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_round_eyes_are_found_to_a_millimetre(kind: str) -> None:
     mesh = joined([("Head", face()), *KINDS[kind]])
@@ -177,6 +178,7 @@ def test_a_socket_behind_an_eye_is_left_out() -> None:
     assert len(kept) < len(skin.vertices) - 0.4 * (len(skin.vertices) - len(face().vertices))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("other", "found"),
     [
@@ -194,6 +196,7 @@ def test_balls_without_names_are_eyes_where_they_mirror_each_other(other, found:
     assert (make_plan(mesh).eyes[1] > 0) == found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("order", [1, -1])
 def test_of_several_pairs_of_balls_those_as_large_as_eyes_are_taken(order: int) -> None:
     others = [("Ring.L", shell((70, 0, 10), 4)), ("Ring.R", shell((-70, 0, 10), 4)), ("Bun.L", shell((60, 90, 0), 34)),
@@ -208,6 +211,7 @@ def test_a_string_of_beads_is_no_eyes() -> None:
     assert make_plan(joined([("Head", face(lids=False, shapes=False)), *beads])).eyes[1] == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "size", "gone"),
     [("Lens", 1.1, True), ("Lens", 1.35, False), ("Cornea", 0.5, True), ("Eyelid", 0.5, False), ("Lash", 0.5, False),

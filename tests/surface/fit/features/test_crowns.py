@@ -1,6 +1,7 @@
 """Crowns are wrapped by one patch each."""
 
 import numpy as np
+import pytest
 
 from surface.fit.features.crowns import GRID, crown_chart, split_teeth
 from surface.fit.points.refine import FitRequest, fit_chart
@@ -34,6 +35,7 @@ def test_pieces_are_told_apart():
     assert sorted(len(p) for p in pieces) == [299, 299, 299]
 
 
+@pytest.mark.slow
 def test_samples_lie_on_the_tooth_and_the_patch_follows():
     mesh = two_teeth()
     teeth = split_teeth(mesh, np.arange(len(mesh.faces)))

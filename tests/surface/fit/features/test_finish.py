@@ -30,6 +30,7 @@ def test_a_head_without_openings_stays_as_it_is():
     assert finish_head(head, slit_sheet(), {}, Recipe([])) is head
 
 
+@pytest.mark.slow
 def test_the_shipped_head_stands_at_rest_where_its_contacts_put_it(root):
     head = Head(load_data(root / "configs" / "heads" / "ict"))
     before = {p.name: p.vertices.copy() for p in head.parts}
@@ -70,6 +71,7 @@ def test_parts_that_neither_shape_moves_get_no_group(mended):
     assert [(r.group, r.power) for r in mended.rules] == [("mouthLeft*mouthShrugLower", 1.0)]
 
 
+@pytest.mark.slow
 def test_rolled_lips_stay_together(root):
     head = Head.load(root / "configs" / "heads" / "ict")
     head.pose(head.values({"mouthRollLower": 1.0, "mouthRollUpper": 1.0}))

@@ -263,6 +263,7 @@ def test_lashes_begin_just_outside_the_rim_from_the_inner_corner(upper, first, l
     np.testing.assert_allclose(roots[:, 1], v)
 
 
+@pytest.mark.slow
 def test_teeth_are_fitted_finely_by_the_number_of_teeth(monkeypatch):
     asked = []
 

@@ -30,6 +30,7 @@ def opening(data: HeadData, pose: dict[str, float]) -> float:
     return eye_opening(Subject(Head(data)), 0, [np.array(p.vertices) for p in head.parts])
 
 
+@pytest.mark.slow
 def test_a_blink_stays_shut_with_a_squint_that_opened_it(head: Head) -> None:
     bad = squinting(head.data, 0.7, "Left")
     alone = opening(bad, {"eyeBlinkLeft": 1.0})

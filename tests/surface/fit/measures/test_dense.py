@@ -21,6 +21,7 @@ def measured(result: FitResult, mesh: FitMesh, **changed: object):
     return measure_dense(result.head, other, sources_of(other.names), result.parts)
 
 
+@pytest.mark.slow
 def test_a_good_fit_is_near_both_ways_in_every_shape(result: FitResult, mesh: FitMesh) -> None:
     dense = result.report.dense
     assert dense is not None and dense.worst is not None

@@ -36,6 +36,7 @@ def greatest(head: HeadData, result: FitResult, mesh: FitMesh) -> float:
     return max(b.to_mesh.max for b in dense.parts[head.parts[0].name].values())
 
 
+@pytest.mark.slow
 def test_a_spike_at_rest_is_mended(result: FitResult, mesh: FitMesh) -> None:
     head = spiked(result.head, 150.0)
     before = greatest(head, result, mesh)
@@ -100,6 +101,7 @@ def test_a_face_that_is_far_off_or_turned_over_is_faulty(dense: DenseErrors, sca
     assert len(faults) == len(said) and all(word in fault for word, fault in zip(said, faults, strict=True))
 
 
+@pytest.mark.slow
 def test_surface_that_is_turned_over_is_found_and_mended(result: FitResult, mesh: FitMesh) -> None:
     """Control points far beyond their neighbours, along the surface: nothing sticks out, but it runs back."""
     part, bad = result.head.parts[0], fine_point(result.head)

@@ -73,6 +73,7 @@ def test_a_bad_island_is_replaced_and_the_other_stays():
     np.testing.assert_array_equal(np.unique(given.uv, axis=0), np.unique(mesh.uv, axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seam_in_front", [False, True])
 def test_a_decimated_face_with_cylindrical_coordinates_is_fitted_without_spikes(shared, seam_in_front):
     mesh = uv_traps.around(uv_traps.arkit_like(shared), seam_in_front=seam_in_front)

@@ -37,6 +37,7 @@ def wrapped():
     return mesh, chart, fit_chart(mesh, chart, FitRequest(160, coarse=0.2))
 
 
+@pytest.mark.slow
 def test_samples_are_mixes_of_vertices_on_the_skin(wrapped):
     mesh, chart, _ = wrapped
     np.testing.assert_allclose(chart.mix.sum(axis=1), 1.0)
@@ -78,6 +79,7 @@ def test_samples_are_as_far_apart_as_the_rays_and_those_at_the_tip_count_more(wr
     assert (chart.weight[tip & ~chart.folded] == 8.0).all() and (chart.weight[~tip & ~chart.folded] == 1.0).all()
 
 
+@pytest.mark.slow
 def test_rays_that_meet_nothing_take_their_nearest_neighbour_and_are_not_counted():
     mesh, islands = body()
     holed = [Island(i.vertex, i.uv, i.faces[:-40] if k else i.faces) for k, i in enumerate(islands)]
@@ -136,6 +138,7 @@ def test_rays_that_lie_in_one_plane_turn_evenly_within_it():
     np.testing.assert_allclose(angle, np.linspace(90.0, -45.0, wrap.FAN + 1), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_triangles_and_squares_are_wrapped_alike():
     mesh, islands = body()
     split = [Island(i.vertex, i.uv, np.vstack([np.column_stack([i.faces[:, [0, 1, 2]], 0 * i.faces[:, 0] - 1]),

@@ -52,6 +52,7 @@ def test_axes_and_unit_as_told() -> None:
     np.testing.assert_allclose(at.min(axis=0) + at.max(axis=0), 0.0, atol=120.0)  # in the middle, by its samples
 
 
+@pytest.mark.slow
 def test_a_closed_direction_stays_closed(tmp_path: Path) -> None:
     fit_surfaces(write(tmp_path, named(tube=tube(60, 200))), tmp_path / "h", name="h", options=MM)
     head = Head.load(tmp_path / "h")
@@ -71,6 +72,7 @@ def test_the_outside_is_what_is_seen(turned: bool) -> None:
     assert (Head(data).parts[0].normals[:, 2] > 0).all()
 
 
+@pytest.mark.slow
 def test_two_balls_are_eyes_that_turn() -> None:
     items = named(
         ball_b=ball((-30, 30, 40), 12), skin=relief(), ball_a=ball((30, 30, 40), 12), knob=ball((0, 90, 0), 5)
@@ -129,6 +131,7 @@ def starred(tmp_path_factory: pytest.TempPathFactory) -> tuple[HeadData, Surface
     return load_data(folder / "h"), report
 
 
+@pytest.mark.slow
 def test_a_spline_with_star_points_is_told_as_fitted_and_sewn_in_every_pose(starred) -> None:
     data, report = starred
     assert 0 < report.parts[0].deviation_mm < 0.5
@@ -162,6 +165,7 @@ def test_a_head_without_eyes_and_groups_runs_and_is_exported(tmp_path: Path) -> 
     assert written.stat().st_size > 1000
 
 
+@pytest.mark.slow
 def test_names_choose_surfaces(tmp_path: Path) -> None:
     path = write(tmp_path, named(face=relief(), hat=tube(90, 30), other=tube(50, 30)))
     report = fit_surfaces(path, tmp_path / "h", name="h", options=MM)
@@ -180,6 +184,7 @@ def test_names_choose_surfaces(tmp_path: Path) -> None:
     assert not (tmp_path / "none").exists()
 
 
+@pytest.mark.slow
 def test_equal_names_are_told_apart() -> None:
     items = [NamedSurface("a/b", relief()), *named(face=tube(20, 20)), NamedSurface("a/b", tube(30, 20))]
     assert [p.name for p in head_of(items, name="h", options=MM).parts] == ["face", "face 2", "a b 2"]

@@ -90,6 +90,7 @@ def test_groups_move_the_head(tmp_path: Path) -> None:
     assert 2 < (head.parts[0].vertices - before)[:, 1].max() < 5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("text", "why"),
     [

@@ -73,6 +73,7 @@ def test_landmarks_are_written_where_they_are_and_read_again(face, scan_file, kn
         assert (drawn == COLOURS[how]).all(axis=2).sum() > 30, how
 
 
+@pytest.mark.slow
 def test_a_pixel_of_the_picture_corrects_a_landmark(face, scan_file, known, tmp_path):
     out = tmp_path / "marks.toml"
     pick.pick_landmarks(scan_file, "ict", out)

@@ -93,6 +93,7 @@ def aligned(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     return turn.apply(points - points.mean(axis=0)) + others.mean(axis=0)
 
 
+@pytest.mark.slow
 def test_the_face_has_the_form_of_the_scan(shipped, made):
     head, report, heard = made
     before, after = corresponding(shipped, head, {})
@@ -177,6 +178,7 @@ def landmark_table(shipped: Head, turn: np.ndarray = TURN, mirror: bool = False)
     return "\n".join(lines)
 
 
+@pytest.mark.slow
 def test_landmarks_with_left_and_right_exchanged_are_refused(shipped, scan_file, tmp_path):
     (tmp_path / "marks.toml").write_text(landmark_table(shipped, mirror=True))
     with pytest.raises(FitError, match="left and right"):
@@ -184,6 +186,7 @@ def test_landmarks_with_left_and_right_exchanged_are_refused(shipped, scan_file,
     assert not (tmp_path / "head").exists()
 
 
+@pytest.mark.slow
 def test_wrong_options_and_meshes_without_a_face_are_refused(tmp_path):
     grid = [[x, y, 0.02 * np.sin(x + 2 * y)] for x in range(12) for y in range(12)]
     lines = [f"v {x} {y} {z}" for x, y, z in grid]

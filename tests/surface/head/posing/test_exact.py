@@ -51,6 +51,7 @@ def assert_exact(head: Head, part: SkinPart) -> None:
     assert off[free].max() < NORMAL_DEG, part.name
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1])
 def test_random_sequences_end_where_a_fresh_evaluation_does(head: Head, seed: int) -> None:
     for k, values in enumerate(poses(seed)):

@@ -115,6 +115,7 @@ def test_normals_of_a_flipped_mesh_point_the_other_way() -> None:
         assert (normals * head.parts[0].normals).sum(axis=1).min() > 0.999
 
 
+@pytest.mark.slow
 def test_a_closed_part_is_summed_over_its_own_points():
     from relief import named, tube
 

@@ -28,6 +28,7 @@ def crossings(head: Head) -> TongueCrossings:
     return TongueCrossings(head)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "pose",
     [*({"tongueOut": amount} for amount in (0.2, 0.4, 0.6, 0.8, 1.0)), {"tongueOut": 0.5, "mouthRollLower": 0.8},

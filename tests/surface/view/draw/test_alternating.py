@@ -31,6 +31,7 @@ def blinking(k: int) -> np.ndarray:
     return values(eyeBlinkLeft=float(k % 2), jawOpen=0.01 * (k % 7))
 
 
+@pytest.mark.slow
 def test_a_slow_renderer_dissolves_from_full_to_fast_and_shows_its_pictures(gl: None) -> None:
     head, pictures, levels = BallHead(), [], []
     with AdaptiveOffscreen(head, SIZE, rate_hz=60.0, now_s=SlowClock(0.03)) as screen:
@@ -54,6 +55,7 @@ def test_a_slow_renderer_dissolves_from_full_to_fast_and_shows_its_pictures(gl: 
             assert np.abs(pictures[k] - wanted).max() <= 2.0, (k, share)
 
 
+@pytest.mark.slow
 def test_the_shipped_head_alternates_with_its_decimated_triangles(gl: None, root) -> None:  # type: ignore[no-untyped-def]
     head = Head.load(root / "configs" / "heads" / "ict")
     poses = [head.values({"eyeBlinkLeft": float(k % 2), "jawOpen": 0.1}) for k in range(2)]
@@ -69,6 +71,7 @@ def test_the_shipped_head_alternates_with_its_decimated_triangles(gl: None, root
         assert np.abs(found - fast.read()).max() <= 2.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 0.25, 1.0])
 def test_pictures_are_mixed_by_their_share(gl: None, share: float) -> None:
     with Offscreen(BallHead(), SIZE) as screen:

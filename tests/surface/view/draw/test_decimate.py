@@ -36,6 +36,7 @@ def pictures(head: Head, quality: str) -> np.ndarray:
     return np.array(made)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("quality", "mean"), [("full", 0.2), ("fast", 0.6)])
 def test_fewer_triangles_draw_hardly_another_picture(
     gl: None, head: Head, monkeypatch: pytest.MonkeyPatch, quality: str, mean: float

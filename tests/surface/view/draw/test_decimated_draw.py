@@ -29,6 +29,7 @@ def screen(gl: None, head: Head) -> Iterator[Offscreen]:
         yield made
 
 
+@pytest.mark.slow
 def test_the_picture_is_that_of_the_lean_triangles_drawn_part_by_part(screen: Offscreen, root: Path) -> None:
     plain = Head.load(root / "configs" / "heads" / "ict")
     for part in plain.parts:

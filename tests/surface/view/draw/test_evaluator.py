@@ -39,6 +39,7 @@ def poses(head: Head) -> list[np.ndarray]:
     return [np.zeros(len(head.parameters)), *(random.uniform(-0.3, 0.8, (3, len(head.parameters))))]
 
 
+@pytest.mark.slow
 def test_both_draw_the_same_picture(screens: dict[str, Offscreen], head: Head) -> None:
     for values, camera in zip(poses(head), CAMERAS, strict=True):
         cpu, gpu = (screens[name].render(values, camera).astype(int) for name in ("cpu", "gpu"))

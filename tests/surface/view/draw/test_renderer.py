@@ -149,6 +149,7 @@ def test_lights_come_from_where_the_theme_says(name: str) -> None:
     assert light_direction(Light(0, 0, (1, 1, 1)), 90.0) == pytest.approx([1, 0, 0], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quality", ["full", "fast"])
 def test_the_shipped_head_looks_at_you(gl: None, root: Path, quality: str) -> None:
     head = Head.load(root / "configs" / "heads" / "ict")
@@ -317,6 +318,7 @@ def test_lights_follow_half_of_the_cameras_turn_and_none_of_the_pose(screen: Off
     assert np.array(program["key_at_rest"].value) == pytest.approx(wanted, abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("quality", ["full", "fast"])
 @pytest.mark.parametrize(("material", "seen"), [("mouth", True), ("teeth", False), ("skin", False)])
 def test_backs_are_drawn_of_two_sided_materials_only(gl: None, quality: str, material: str, seen: bool) -> None:

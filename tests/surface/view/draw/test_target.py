@@ -12,6 +12,7 @@ from surface.view.draw.target import Target, enlarged
 from surface.view.pictures.offscreen import open_context
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("samples", [1, 4])
 def test_drawing_only_what_moved_leaves_no_trace(gl: None, samples: int) -> None:
     poses = [

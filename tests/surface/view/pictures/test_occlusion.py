@@ -44,6 +44,7 @@ def test_under_a_lid_it_is_dark(gl: None) -> None:
     assert share["lid"][:, 0].min() > 0.95
 
 
+@pytest.mark.slow
 def test_a_disc_above_hides_its_form_factor(gl: None) -> None:
     radius, height = 40.0, 30.0
     points, _, triangles = ball(np.array([radius, 0.01, radius]), 41, 61)
@@ -77,6 +78,7 @@ def test_neighbours_are_calmed_and_lone_vertices_left() -> None:
     assert (result[-1] == 7.0).all()
 
 
+@pytest.mark.slow
 def test_what_opens_does_not_stay_black(gl: None) -> None:
     head = BallHead()
     opened = bake_head(head, values(jawOpen=1.0), directions=12, resolution=96)
@@ -137,6 +139,7 @@ def _flattened(points: np.ndarray) -> np.ndarray:
     return middle + (points - middle) * [1.0, 1.0, 0.1]
 
 
+@pytest.mark.slow
 def test_skin_gets_its_sky_and_its_thinness(gl: None) -> None:
     head = BallHead()
     baked = bake_head(head, values(jawOpen=1.0), directions=24, resolution=96)

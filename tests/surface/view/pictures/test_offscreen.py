@@ -38,6 +38,7 @@ with Offscreen(head, (160, 120), evaluator="gpu") as screen:
 """
 
 
+@pytest.mark.slow
 def test_draws_on_opengl_31(gl: None, root: Path, tmp_path: Path) -> None:
     script = OLD_OPENGL.format(root=str(root), here=str(root / "tests" / "surface"), out=f"{tmp_path}/")
     old = {"MESA_GL_VERSION_OVERRIDE": "3.1", "MESA_GLSL_VERSION_OVERRIDE": "140", "LIBGL_ALWAYS_SOFTWARE": "1"}
@@ -70,6 +71,7 @@ def test_draw_then_read_is_render(gl: None) -> None:
         assert (screen.render(values(jawOpen=1), Camera.three_quarter()) == drawn).all()
 
 
+@pytest.mark.slow
 def test_close_twice_and_again(gl: None) -> None:
     for _ in range(3):
         screen = Offscreen(BallHead(), (32, 32))

@@ -39,6 +39,7 @@ def askew(degrees: float, axis: tuple[float, float, float]) -> np.ndarray:
     return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("turn", "scale"), [
     (SQUARE[18], 1 / 304.8), (askew(140, (-2, 1, 1)), 0.37),
 ])  # fmt: skip
@@ -52,6 +53,7 @@ def test_a_scan_comes_to_its_place(bare, turn, scale):
     assert np.abs(got.mesh.vertices - bare.vertices).max() < 15.0  # of 340 mm: pitch and size are known that well
 
 
+@pytest.mark.slow
 def test_a_face_is_found_on_a_body_without_shapes(bare):
     mesh = transformed(on_body(bare), SQUARE[4], 0.01)
     got = placed(mesh)
@@ -59,6 +61,7 @@ def test_a_face_is_found_on_a_body_without_shapes(bare):
     assert got.mesh.vertices[:, 1].min() > -215 and abs(got.mesh.vertices[:, 1].max() - 145) < 12
 
 
+@pytest.mark.slow
 def test_a_mask_without_the_back_of_the_head_is_found(bare):
     front = bare.vertices[bare.faces[:, 0], 2] > 35.0
     mask = replace(bare, faces=bare.faces[front], face_uv=bare.face_uv[front], piece=bare.piece[front])
@@ -71,6 +74,7 @@ def test_a_mask_without_the_back_of_the_head_is_found(bare):
     np.testing.assert_allclose(face.at(EYES) @ SQUARE[6].T, EYES, atol=4.0)
 
 
+@pytest.mark.slow
 def test_what_is_no_face_is_not_taken_for_one():
     sheet = slit_sheet()
     assert match_face(sheet.vertices, sheet.faces) is None

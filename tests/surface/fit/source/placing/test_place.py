@@ -17,6 +17,7 @@ HEAD = good_head()
 BODY = on_body(HEAD)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", UNITS)
 @pytest.mark.parametrize("k", range(len(SQUARE)))
 def test_any_unit_and_axes_come_to_the_same_place(k, unit):
