@@ -92,7 +92,7 @@ def test_two_servos_with_the_old_id_are_left_alone(model: str, protocol: int) ->
 def test_an_id_whose_servo_loses_replies_does_not_count_as_free(model: str, protocol: int) -> None:
     with SimulatedBus([1, 5], model=model) as bus:
         bus.fault("drop:5:count=2")
-        with pytest.raises(ServoRefused, match="the id 5 on .* is taken by another"):
+        with pytest.raises(ServoRefused, match=r"the id 5 on .* is taken by another"):
             set_id(bus.path, 1_000_000, protocol, 1, 5)
         assert bus.servo(1).eeprom_writes == {}
 

@@ -1,0 +1,84 @@
+"""controller.panels.window.capture"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from controller.base.parameters import PARAMETERS
+from controller.panels.window.capture import LONGEST_S, Capture
+from controller.takes.plain import plain_take
+from surface.view.docks import PictureArea
+
+JAW = PARAMETERS.index("jawOpen")
+
+
+class Bench:
+    """A capture whose clock and face a test sets."""
+
+    def __init__(self, folder: Path) -> None:
+        self.area, self.values, self.now_s = PictureArea(), PARAMETERS.neutral(), 5.0
+        self.capture = Capture(self.area, lambda: self.values, folder, lambda: self.now_s)
+
+    def frame(self, seconds: float, jaw: float) -> None:
+        self.now_s += seconds
+        self.values[JAW] = jaw
+        self.capture()
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Bench:
+    return Bench(tmp_path)
+
+
+def test_a_recording_is_a_take_of_what_was_shown(bench: Bench, tmp_path: Path) -> None:
+    bench.frame(1.0, 0.9)  # nothing is recorded yet
+    bench.capture.toggle()
+    for jaw in (0.0, 0.5, 1.0):
+        bench.frame(0.1, jaw)
+    assert bench.capture.recording and bench.capture.seconds == pytest.approx(0.3)
+    bench.capture.toggle()
+    assert not bench.capture.recording and bench.capture.seconds == 0.0
+    path = tmp_path / "recording1.csv"
+    assert bench.capture.message == f"wrote {path}"
+    take = plain_take(path, PARAMETERS)
+    assert take.values[:, JAW] == pytest.approx([0.0, 0.5, 1.0])
+    assert np.diff(take.times_s) == pytest.approx([0.1, 0.1])
+
+
+def test_a_recording_without_a_frame_writes_nothing(bench: Bench, tmp_path: Path) -> None:
+    bench.capture.toggle()
+    bench.capture.toggle()
+    assert not list(tmp_path.iterdir()) and bench.capture.message == ""
+
+
+def test_a_recording_ends_by_itself(bench: Bench, tmp_path: Path) -> None:
+    bench.capture.toggle()
+    bench.frame(LONGEST_S - 1.0, 0.1)
+    assert bench.capture.recording
+    bench.frame(2.0, 0.2)
+    assert not bench.capture.recording and (tmp_path / "recording1.csv").is_file()
+
+
+def test_no_file_is_written_over(bench: Bench, tmp_path: Path) -> None:
+    picture = np.zeros((4, 6, 3), np.uint8)
+    picture[1, 2] = 250, 20, 30
+    (tmp_path / "face1.png").write_bytes(b"mine")
+    bench.capture.take_picture()
+    assert bench.area.wanted is not None
+    bench.area.wanted(picture)
+    assert (tmp_path / "face1.png").read_bytes() == b"mine"
+    read = cv2.imread(str(tmp_path / "face2.png"))
+    assert read is not None and (read[:, :, ::-1] == picture).all()
+
+
+def test_a_folder_that_is_a_file_is_a_message(tmp_path: Path) -> None:
+    (tmp_path / "gone").write_text("a file")
+    bench = Bench(tmp_path / "gone")
+    bench.capture.toggle()
+    bench.frame(0.1, 0.3)
+    bench.capture.toggle()
+    assert "gone" in bench.capture.message and not bench.capture.message.startswith("wrote")

@@ -1,0 +1,56 @@
+"""surface.view.docks on ImGui's own parameters; test_window.py opens a real window with docked panels."""
+
+from __future__ import annotations
+
+import pytest
+
+from surface.view.docks import Dock, add_docks, show_docks, text_scale
+
+
+@pytest.mark.parametrize(
+    ("height", "system", "scale"),
+    [(600, 1.0, 1.0), (1080, 1.0, 1.0), (2160, 1.0, 2.0), (2160, 2.0, 1.0), (2160, 0.5, 2.0), (4320, 2.0, 2.0)],
+)
+def test_text_grows_with_the_window_but_not_twice(height: float, system: float, scale: float) -> None:
+    assert text_scale(height, system) == pytest.approx(scale)
+
+
+def params(docks: list[Dock], size: tuple[float, float]) -> object:
+    hello_imgui = pytest.importorskip("imgui_bundle").hello_imgui
+    found = hello_imgui.RunnerParams()
+    add_docks(hello_imgui, found, docks, size, 20.0)
+    return found
+
+
+def nothing() -> None:
+    pass
+
+
+DOCKS = [Dock("sliders", "left", nothing), Dock("expressions", "left", nothing), Dock("servos", "right", nothing)]
+
+
+def test_panels_of_one_side_share_a_column_and_columns_are_equally_wide() -> None:
+    docking = params(DOCKS, (2000.0, 900.0)).docking_params  # type: ignore[attr-defined]
+    splits = list(docking.docking_splits)
+    assert [split.new_dock for split in splits] == ["left", "right"]
+    left = splits[0].ratio * 2000
+    right = splits[1].ratio * (2000 - left)  # the second is cut off what the first has left
+    assert left == pytest.approx(420, rel=1e-5) and right == pytest.approx(420, rel=1e-5)
+    assert [window.dock_space_name for window in docking.dockable_windows] == ["left", "left", "right"]
+    assert not any(window.can_be_closed for window in docking.dockable_windows)
+
+
+def test_panels_leave_room_for_the_face_in_a_small_window() -> None:
+    docking = params(DOCKS, (400.0, 300.0)).docking_params  # type: ignore[attr-defined]
+    room = 1.0
+    for split in docking.docking_splits:
+        room *= 1.0 - split.ratio
+    assert room >= 0.35
+
+
+def test_panels_are_hidden_and_shown_again() -> None:
+    found = params(DOCKS, (2000.0, 900.0))
+    docking = found.docking_params  # type: ignore[attr-defined]
+    for shown in (False, True):
+        show_docks(found, shown=shown)
+        assert all(window.is_visible is shown for window in docking.dockable_windows)
