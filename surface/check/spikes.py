@@ -24,6 +24,7 @@ RINGS = {6.0: 0.55, 12.0: 0.45}  # radii of the rings, mm at usual size: most he
 RING = (0.75, 1.3)  # its inner and outer edge, in radii
 OFF_RIM = 0.5  # of the radius: so near to a free border nothing is measured
 MOVED = 0.5  # most height of how far a pose moves a point, in radii; corners of mouth and eyes have up to 0.35
+MIRRORED = 0.8  # the same of what moves alike on both sides: a drawn mouth is small and purses by half its width
 PAIRED = 0.6  # of that height: what is so steep on the other side is its like
 MIRROR_MM = 10.0  # a horn or a pointed ear has its like on the other side, so near to its mirror image
 NOSE = 0.35  # of the distance between the eyes, about the middle: a nose may be as long as it likes
@@ -207,8 +208,9 @@ def _spikes(
     height[_usual(subject, at[: samples.vertices], height, places)] = 0.0
     worst, best, name, where = int(height.argmax()), 0.0, "", 0
     for pose in (n for n in subject.claimed if n in SHAPES):
-        enough = max(best, MOVED * radius)
-        moved = ring.high(at, rims, ring.heights(samples.at(subject.moves(pose)), enough), enough, off)
+        moved = _moved(
+            subject, places, samples.at(subject.moves(pose)), ring, at, rims, radius, max(best, MOVED * radius)
+        )
         if moved.max() > best:
             best, name, where = float(moved.max()), pose, int(moved.argmax())
 
@@ -222,16 +224,34 @@ def _spikes(
     ]
 
 
+def _moved(
+    subject: Subject, places: Places, moves: Floats, ring: Ring, at: Floats, rims: Floats, radius: float, enough: float
+) -> Floats:  # fmt: skip
+    """(k,) how far samples at (m, 3) stick out among moves (m, 3); 0 below ``enough`` or where both sides do alike."""
+    moved = ring.high(at, rims, ring.heights(moves, enough), enough, OFF_RIM * radius)
+    low = moved < MIRRORED * radius
+    if (moved[low] > 0.0).any():
+        height = ring.high(at, rims, ring.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
+        moved[low & _alike(subject, at[: len(height)], height, places)] = 0.0
+    return moved
+
+
+def _alike(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
+    """(k,) which samples at (k, 3) with a height (k,) above 0 have another one at their mirror image."""
+    middle, far = places.centre[0], MIRROR_MM * subject.scale
+    out = np.zeros(len(at), bool)
+    steep = np.flatnonzero(height)
+    mirrored = at[steep] * [-1.0, 1.0, 1.0] + [2.0 * middle, 0.0, 0.0]
+    for row, place in zip(steep, mirrored, strict=True):
+        near = np.linalg.norm(at[steep] - place, axis=1) < far
+        out[row] = bool((near & (np.abs(at[steep, 0] - at[row, 0]) > far)).any())
+    return out
+
+
 def _usual(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
     """(m,) which samples belong to what a head may have: the nose, and what sticks out on both sides alike."""
     middle, apart = places.centre[0], places.apart
     out: Bools = np.abs(at[:, 0] - middle) < NOSE * apart
     out &= (at[:, 2] > places.centre[2]) & (at[:, 1] < places.centre[1] + 0.3 * apart)
     out &= at[:, 1] > places.centre[1] - 0.9 * places.down * apart
-    steep = np.flatnonzero(height)
-    mirrored = at[steep] * [-1.0, 1.0, 1.0] + [2.0 * middle, 0.0, 0.0]
-    for row, place in zip(steep, mirrored, strict=True):
-        near = np.linalg.norm(at[steep] - place, axis=1) < MIRROR_MM * subject.scale
-        apart_ = np.abs(at[steep, 0] - at[row, 0]) > MIRROR_MM * subject.scale
-        out[row] |= bool((near & apart_).any())
-    return out
+    return np.asarray(out | _alike(subject, at, height, places))

@@ -28,6 +28,7 @@ from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj
 
 SUFFIXES = (".glb", ".gltf", ".vrm", ".obj", ".npz")
+VOWELS = ("jawOpen", "mouthFunnel", "mouthPucker")  # made of vowels, where the mesh has no such shapes
 
 
 @dataclass(frozen=True)
@@ -91,10 +92,12 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
 
 
 def _shapes(mesh: FitMesh, named: NameMap) -> dict[str, Floats]:
-    """The mesh's displacements by ARKit's names, before left and right are known."""
-    return shapes_of_sides(
-        {n: [(s.index, s.side) for s in every if not s.region] for n, every in named.sources.items()}, mesh.deltas
-    )
+    """The mesh's displacements by ARKit's names, before left and right are known. Moods of the whole face tell no
+    place; vowels that stand in for a shape of the mouth do."""
+    told = {
+        n: [(s.index, s.side) for s in every if not s.region or n in VOWELS] for n, every in named.sources.items()
+    }  # fmt: skip
+    return shapes_of_sides(told, mesh.deltas)
 
 
 def _turned(frame: Frame) -> Landmarks:

@@ -155,5 +155,19 @@ def test_a_pose_that_throws_a_point_out_is_named() -> None:
     assert worst == ["with jawOpen = 1 part 'face' sticks out by 8.0 mm or more: right cheek"]
 
 
+def test_corners_that_move_alike_may_move_further() -> None:
+    face = cone(0.0, 0.0, 0.0)
+
+    def found(left: float, right: float) -> list[str]:
+        moves = np.zeros_like(face.rest)
+        for x, mm in ((20.0, left), (-20.0, right)):
+            moves[np.hypot(face.rest[:, 0] - x, face.rest[:, 1] + 70.0) < 1.0, 0] = mm
+        return texts(plain.part("face", face.rest, face.triangles, moves={"mouthPucker": moves}))
+
+    assert found(-4.5, 4.5) == []  # half of 6 mm is for one side alone, 0.8 for both
+    assert len(found(-4.5, 0.0)) == len(found(-4.5, 1.0)) == 1
+    assert len(found(-5.0, 5.0)) == 1
+
+
 def test_a_head_without_skin_has_no_spikes() -> None:
     assert texts(plain.eyeball(0)) == []

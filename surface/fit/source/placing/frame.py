@@ -151,7 +151,7 @@ def _say(turn: Floats, convention: Convention, found: Orientation | None, *, tol
     """Note a rotation that a user would not expect."""
     square = bool(np.isclose(np.abs(turn).max(axis=1), 1.0).all())
     said = convention.by and np.allclose(turn, _square(convention.up, convention.forward))
-    if np.array_equal(turn, np.eye(3)) or said:
+    if said or (np.array_equal(turn, np.eye(3)) and not convention.by):
         return
     but = f", although {convention.by} defines {convention.up} and {convention.forward}" if convention.by else ""
     why = "" if told or found is None else " by eyes and mouth (say --up and --forward otherwise)"
