@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 import stat
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -105,27 +106,31 @@ def load_named_script(
 
     Raises ConfigError: there is none of that name, or it is wrong; every fault with its key.
     """
-    folders = [beside.parent, config_dir() / "scripts"] if beside is not None else [config_dir() / "scripts"]
-    for folder in folders if _NAME.fullmatch(name) else ():
+    for folder in _folders(beside) if _NAME.fullmatch(name) else ():
         file = folder / f"{name.removesuffix(_SUFFIX)}{_SUFFIX}"
         state = _state_inside(file)
         if state is not None:
             return _kept(file, state, parameters, vocabulary)
-    known = sorted(path.stem for path in folders[-1].glob(f"*{_SUFFIX}"))
+    known = sorted(path.stem for path in (config_dir() / "scripts").glob(f"*{_SUFFIX}"))
     message = f"no script {quoted(name)} in the folders of the stage and of configs/scripts{did_you_mean(name, known)}"
     raise ConfigError(message, hint=f"there are {', '.join(known)}")
 
 
 def script_names(beside: Path | None = None) -> list[str]:
     """Names of the scripts that a robot may ask for with one word, in order; see :func:`load_named_script`."""
-    folders = [beside.parent, config_dir() / "scripts"] if beside is not None else [config_dir() / "scripts"]
-    paths = [path for folder in folders for path in folder.glob(f"*{_SUFFIX}")]
+    paths = [path for folder in _folders(beside) for path in folder.glob(f"*{_SUFFIX}")]
     fit = {path.stem for path in paths if _WORD.fullmatch(path.stem) and _has_steps(path)}
     return sorted(fit)
 
 
+def _folders(beside: Path | None) -> Iterator[Path]:
+    if beside is not None:
+        yield beside.parent
+    yield config_dir() / "scripts"
+
+
 _State = tuple[int, int, int, int]
-"""Of a file, so that a change is seen: inode, times of the last change of content and of anything (ns), size (bytes)."""
+"""Of a file, so that a change is seen: inode, when its content and when anything changed (ns), size (bytes)."""
 
 
 def _state_inside(path: Path) -> _State | None:
