@@ -88,7 +88,7 @@ def test_a_full_disk_is_told_with_the_name_of_the_file() -> None:
 def test_a_disk_that_fills_ends_the_record_and_nothing_else(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     with TrafficWriter(tmp_path / "bus.log", Wire("dynamixel", 1_000_000)) as writer:
         writer._file.close()
-        writer._file = Path("/dev/full").open("wb", buffering=0)
+        writer._file = Path("/dev/full").open("wb", buffering=0)  # noqa: SIM115  the writer closes it
         for _ in range(3):
             writer.tap(True, b"abc")
     assert [record.message for record in caplog.records] == [
