@@ -28,7 +28,7 @@ class TrafficWriter:
 
     path : file, replaced; a pcapng file where its name ends so, else a text log. wire : what is on the wire.
 
-    What goes beyond the size that omote reads again is left out, with a warning.
+    What goes beyond the size that omote reads again, or comes after the disk is full, is left out, with one message.
 
     Raises ConfigError: the file cannot be written.
     """
@@ -38,10 +38,19 @@ class TrafficWriter:
         self._begun_s, self._begun_ns = time.monotonic(), time.time_ns()
         self._room, self._pieces = files.DATA_LIMIT if self._network else files.TEXT_LIMIT, MOST_PIECES
         try:
-            self._file = path.open("wb")
+            self._file = path.open("wb", buffering=0)  # it is wanted most when the program ends unexpectedly
+            self._write_head(pcapng.file_head(wire) if self._network else wire.head().encode())
         except OSError as error:
             raise ConfigError(f"{path}: cannot be written: {error.strerror}", hint=f"mkdir -p {path.parent}") from error
-        self._write(pcapng.file_head(wire) if self._network else wire.head().encode())
+
+    def _write_head(self, head: bytes) -> None:
+        """Raises OSError; the file is closed then."""
+        self._room, self._pieces = self._room - len(head), self._pieces - 1
+        try:
+            self._file.write(head)
+        except OSError:
+            self._file.close()
+            raise
 
     def tap(self, sent: bool | None, data: bytes) -> None:
         """Keep bytes that passed; ``sent`` None where the direction is not known."""
@@ -57,8 +66,11 @@ class TrafficWriter:
             log.warning("%s is full: what passes from now on is not recorded", self._path)
             self._room = -1
             return
-        self._file.write(data)
-        self._file.flush()  # whoever records wants it most when the program ends unexpectedly
+        try:
+            self._file.write(data)
+        except OSError as error:  # the bus goes on
+            log.error("%s: %s; what passes from now on is not recorded", self._path, error.strerror)
+            self._room = -1
 
     def __enter__(self) -> Self:
         return self

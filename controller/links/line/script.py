@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 import re
+import stat
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -99,43 +101,67 @@ def load_named_script(
 ) -> Script:
     """The script that a robot asks for by name: one in the folder of ``beside`` or in ``configs/scripts``.
 
-    A robot gets no other file: ``name`` is no path, and a link out of these folders is not followed.
+    A robot gets no other file: ``name`` is no path, and a link out of these folders is not followed. It may ask at any
+    rate, beside commands that must not wait, so a file that has not changed is not read again.
 
     Raises ConfigError: there is none of that name, or it is wrong; every fault with its key.
     """
-    folders = [beside.parent, config_dir() / "scripts"] if beside is not None else [config_dir() / "scripts"]
-    for folder in folders if _NAME.fullmatch(name) else ():
+    for folder in _folders(beside) if _NAME.fullmatch(name) else ():
         file = folder / f"{name.removesuffix(_SUFFIX)}{_SUFFIX}"
-        if file.is_file() and file.resolve().parent == folder.resolve():
-            return _load(file, parameters, vocabulary)
-    known = sorted(path.stem for path in folders[-1].glob(f"*{_SUFFIX}"))
+        state = _state_inside(file)
+        if state is not None:
+            return _kept(file, state, parameters, vocabulary)
+    known = sorted(path.stem for path in (config_dir() / "scripts").glob(f"*{_SUFFIX}"))
     message = f"no script {quoted(name)} in the folders of the stage and of configs/scripts{did_you_mean(name, known)}"
     raise ConfigError(message, hint=f"there are {', '.join(known)}")
 
 
 def script_names(beside: Path | None = None) -> list[str]:
     """Names of the scripts that a robot may ask for with one word, in order; see :func:`load_named_script`."""
-    folders = [beside.parent, config_dir() / "scripts"] if beside is not None else [config_dir() / "scripts"]
-    paths = [path for folder in folders for path in folder.glob(f"*{_SUFFIX}")]
+    paths = [path for folder in _folders(beside) for path in folder.glob(f"*{_SUFFIX}")]
     fit = {path.stem for path in paths if _WORD.fullmatch(path.stem) and _has_steps(path)}
     return sorted(fit)
 
 
-def _has_steps(path: Path) -> bool:
+def _folders(beside: Path | None) -> Iterator[Path]:
+    if beside is not None:
+        yield beside.parent
+    yield config_dir() / "scripts"
+
+
+_State = tuple[int, int, int, int]
+"""Of a file, so that a change is seen: inode, when its content and when anything changed (ns), size (bytes)."""
+
+
+def _state_inside(path: Path) -> _State | None:
+    """The state of a file; None for anything else, such as a folder, a named pipe, or a link out of the folder."""
     try:
-        at = path.stat()
-    except OSError:
-        return False
-    return _had_steps(path, (at.st_ino, at.st_mtime_ns, at.st_size))
+        at = path.lstat()
+        if stat.S_ISLNK(at.st_mode) and path.resolve().parent == path.parent.resolve():
+            at = path.stat()
+    except (OSError, ValueError, RuntimeError):  # RuntimeError: links that lead to each other
+        return None
+    return (at.st_ino, at.st_mtime_ns, at.st_ctime_ns, at.st_size) if stat.S_ISREG(at.st_mode) else None
 
 
-@lru_cache(maxsize=512)  # a host may ask for the names at any rate, beside commands that must not wait
-def _had_steps(path: Path, _state: tuple[int, int, int]) -> bool:
+def _has_steps(path: Path) -> bool:
+    state = _state_inside(path)
+    return state is not None and _had_steps(path, state)
+
+
+@lru_cache(maxsize=512)
+def _had_steps(path: Path, _state: _State) -> bool:
     """Whether a file in a given state is a script."""
     try:
-        return path.resolve().parent == path.parent.resolve() and "steps" in read_toml(path)
+        return "steps" in read_toml(path)
     except (OSError, ValueError):
         return False
+
+
+@lru_cache(maxsize=16)
+def _kept(path: Path, _state: _State, parameters: Parameters, vocabulary: Vocabulary | None) -> Script:
+    """The script of a file in a given state."""
+    return _load(path, parameters, vocabulary)
 
 
 def _load(path: Path, parameters: Parameters, vocabulary: Vocabulary | None) -> Script:

@@ -78,3 +78,19 @@ def test_the_decoder_is_that_of_the_wire() -> None:
     assert isinstance(decoder(Wire(), protocol=1), Decoder1)
     assert isinstance(decoder(Wire("maestro")), HexDecoder)
     assert isinstance(decoder(Wire("ssc32")), TextDecoder)
+
+
+def test_a_full_disk_is_told_with_the_name_of_the_file() -> None:
+    with pytest.raises(ConfigError, match="/dev/full: cannot be written: No space left"):
+        TrafficWriter(Path("/dev/full"), Wire("dynamixel", 1_000_000))
+
+
+def test_a_disk_that_fills_ends_the_record_and_nothing_else(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    with TrafficWriter(tmp_path / "bus.log", Wire("dynamixel", 1_000_000)) as writer:
+        writer._file.close()
+        writer._file = Path("/dev/full").open("wb", buffering=0)  # noqa: SIM115  the writer closes it
+        for _ in range(3):
+            writer.tap(True, b"abc")
+    assert [record.message for record in caplog.records] == [
+        f"{tmp_path / 'bus.log'}: No space left on device; what passes from now on is not recorded"
+    ]

@@ -192,3 +192,28 @@ def test_names_follow_files_that_change_and_read_no_others_again(
     assert "mine" not in script_names(beside) and read == ["mine.toml"]
     mine.unlink()
     assert "mine" not in script_names(beside)
+
+
+def test_a_robot_gets_a_script_as_its_file_is_now_and_read_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    read: list[Path] = []
+    load = script._load
+    monkeypatch.setattr(script, "_load", lambda path, *others: read.append(path) or load(path, *others))
+    beside, own = tmp_path / "stage.toml", write(tmp_path / "own.toml")
+    (tmp_path / "link.toml").symlink_to(own)
+    for name in ("own", "link"):
+        first = load_named_script(name, P, VOCABULARY, beside=beside)
+        assert load_named_script(name, P, VOCABULARY, beside=beside) is first
+    assert read == [own, tmp_path / "link.toml"]
+    write(own, "STATUS now")
+    for name in ("own", "link"):
+        with pytest.raises(ConfigError, match="STATUS"):
+            load_named_script(name, P, VOCABULARY, beside=beside)
+    write(own, "NEUTRAL")
+    assert load_named_script("link", P, VOCABULARY, beside=beside).steps == ((0.0, "NEUTRAL"),)
+    own.rename(tmp_path.parent / "moved.toml")
+    own.symlink_to(tmp_path.parent / "moved.toml")
+    for name in ("own", "link"):
+        with pytest.raises(ConfigError, match="no script"):
+            load_named_script(name, P, VOCABULARY, beside=beside)
