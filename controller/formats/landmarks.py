@@ -76,7 +76,7 @@ def _lids(own: Floats) -> dict[str, float]:
     found = {}
     for side, (outer, up_1, up_2, inner, low_2, low_1) in _EYES.items():
         gaps = np.linalg.norm(own[up_1] - own[low_1]) + np.linalg.norm(own[up_2] - own[low_2])
-        ratio = float(gaps / max(2.0 * np.linalg.norm(own[outer] - own[inner]), 1e-9))
+        ratio = float(gaps) / max(2.0 * float(np.linalg.norm(own[outer] - own[inner])), 1e-9)
         found[f"eyeBlink{side}"] = (_RATIO_REST - ratio) / (_RATIO_REST - _RATIO_SHUT)
         found[f"eyeWide{side}"] = (ratio - _RATIO_REST) / (_RATIO_WIDE - _RATIO_REST)
     return found
