@@ -42,6 +42,7 @@ READERS = {
     "FOLDER": "small", "ROBOT": "head24", "NAME": "head24", "OLD": "1", "NEW": "12", "MESH": "me.glb",
     "...": "dynamixel", "configs/stages/serial.toml": "serial.toml", "heads/me": "small",
     "myhead.toml": "my-robot.toml", "livelink:127.0.0.1:11111": "livelink:127.0.0.1:27311",
+    "my-show.mp4": "my-show.webp",
 }  # fmt: skip
 """What only a reader has, and what the test has in its place; the other names are files that the test writes."""
 MORE = {
@@ -110,7 +111,7 @@ def words_of(line: str, port: str = "PORT") -> list[str]:
         ]
     if "--frame" in words:  # this needs a fitted head
         words = ["ict" if word == "small" else word for word in words]
-    elif (words[1] == "export" or "--sheet" in words) and not {"--head", "--person"} & set(words):
+    elif (words[1] == "export" or {"--sheet", "--take"} & set(words)) and not {"--head", "--person"} & set(words):
         words += ["--head", "small"]
     return [*words, *([] if "--dry-run" in words else MORE.get(words[1], []))]
 
@@ -124,6 +125,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (here / "mine").write_text((here / "my-stage.toml").read_text())
     serial = (ROOT / "configs" / "stages" / "serial.toml").read_text(encoding="utf-8")
     (here / "serial.toml").write_text(re.sub(r'(?m)^port = ".*"', 'port = "simulated"', serial))
+    (here / "my-show.toml").write_text('steps = ["0 EXPR smile 1"]\n')
     (here / "a.tsv").write_text("0.0\taa\n0.4\tsil\n")
     (here / "take.csv").write_text(LIVELINK)
     with wave.open(str(here / "voice.wav"), "wb") as file:

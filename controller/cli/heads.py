@@ -14,6 +14,7 @@ from controller.base.errors import ConfigError
 from controller.cli.completion import expressions, identities, names_of
 from controller.cli.completion import settings as setting_names
 from controller.cli.console import console, show_table
+from controller.cli.film import FilmRate, FilmTake, Sound, check_film, render_film
 from surface.base.extras import require
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ HEAD = "Head: a name from configs/heads or a folder."
 
 
 def render(
-    out: Annotated[Path, typer.Option("--out", "-o", help="Picture to write (PNG).")],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Picture to write (PNG), or film (.mp4, .webp, .gif).")],
     settings: Setting = None,
     expression: Expression = None,
     size: Annotated[str | None, typer.Option(help="Width x height in pixels.", show_default="800x800")] = None,
@@ -95,11 +96,16 @@ def render(
             metavar="HEADS", min=1, max=MOST_DRAWN, help="Draw so many heads on one sheet, each with a face of its own."
         ),
     ] = None,
+    take: FilmTake = None,
+    sound: Sound = None,
+    rate_hz: FilmRate = None,
 ) -> None:
-    """Draw one picture of the face, without a display.
+    """Draw one picture of the face, or a film of a take or show, without a display.
 
-    Example: omote render --set jawOpen=0.8 --size 800x800 -o out.png
+    Example: omote render --set jawOpen=0.8 --size 800x800 -o out.png; a film:
+    omote render --take configs/scripts/tour.toml --sound hello.wav -o tour.mp4
     """
+    check_film(take, sound, rate_hz, {"--sheet": sheet, "--crowd": crowd})
     require("a picture", "moderngl", "PIL")
     from controller.face.still import Still, draw_crowd, draw_sheet, draw_still  # start-up: --help does without it
     from controller.stage.persons import parse_person  # start-up: --help does without it
@@ -115,6 +121,9 @@ def render(
     )  # fmt: skip
     if sheet and crowd:
         raise ConfigError("--sheet and --crowd are two pictures", hint="leave out one of them")
+    if take is not None:
+        render_film(still, out, take, sound, rate_hz)
+        return
     if sheet or crowd:
         draw = partial(draw_crowd, still, crowd) if crowd else partial(draw_sheet, still)
         with console.status("drawing") as status:

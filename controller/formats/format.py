@@ -47,6 +47,7 @@ class Format:
     timeout_s : a source that is silent for so long is usually lost; infinity where messages are sent on changes only.
     takes_token : whether a TCP stream that other machines may open must begin with a token: not where programs that
         know nothing of tokens send it.
+    greeting : what a program is told that is called for faces, before it is read; a whole message with its end.
     measured : whether its messages have room for what the servos show, beside the face.
     note : one sentence on what the format cannot carry, for people.
     install : what ``pip install`` takes where a package is missing.
@@ -67,6 +68,7 @@ class Format:
     most: int = 65_536
     timeout_s: float = 0.5
     takes_token: bool = False
+    greeting: bytes = b""
     measured: bool = False
     note: str = ""
     install: str = ""

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import tempfile
-from importlib.util import find_spec
 from pathlib import Path
 from typing import IO
 
@@ -13,7 +11,7 @@ from controller.base.errors import TakeError
 from controller.base.parameters import Parameters
 from controller.takes.livelink import Take
 from controller.takes.voice import voice_take
-from surface.base import files
+from surface.base import ffmpeg, files
 
 _RATE_HZ = 16_000
 _LONGEST_S = 3600
@@ -49,24 +47,10 @@ def _decoded(command: list[str], path: Path, parameters: Parameters, said: IO[by
 
 
 def _command(path: Path) -> list[str]:
-    # a protocol of its own in the name, or a playlist inside the file, must not reach a network
-    source = ["-protocol_whitelist", "file,pipe", "-i", f"file:{path.resolve()}"]
+    """Raises TakeError: ffmpeg is not installed."""
+    program = ffmpeg.find_ffmpeg()
+    if program is None:
+        hint = f"{ffmpeg.INSTALL}, or convert it to .wav elsewhere"
+        raise TakeError(f"{path}: needs the program ffmpeg, which is not installed", hint=hint)
     wanted = ["-t", str(_LONGEST_S), "-vn", "-f", "s16le", "-ac", "1", "-ar", str(_RATE_HZ), "pipe:1"]
-    return [_ffmpeg(path), "-nostdin", "-loglevel", "error", *source, *wanted]
-
-
-def _ffmpeg(path: Path) -> str:
-    """The program: on the path, or that of the package imageio-ffmpeg. Raises TakeError: neither is there."""
-    if found := shutil.which("ffmpeg"):
-        return found
-    if find_spec("imageio_ffmpeg") is not None:
-        import imageio_ffmpeg  # start-up: only where there is no other
-
-        try:
-            return str(imageio_ffmpeg.get_ffmpeg_exe())
-        except RuntimeError:
-            pass
-    raise TakeError(
-        f"{path}: needs the program ffmpeg, which is not installed",
-        hint="apt install ffmpeg, pip install imageio-ffmpeg, or convert it to .wav elsewhere",
-    )
+    return [program, "-nostdin", "-loglevel", "error", *ffmpeg.source(path), *wanted]

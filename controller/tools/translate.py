@@ -19,7 +19,7 @@ from controller.formats.frame import Frame
 from controller.links.net.address import LOOPBACK, Address, parse_address
 from controller.links.net.decoding import Decoding
 from controller.links.net.meter import Meter
-from controller.links.net.receivers import Gate, InputReceiver, open_receiver
+from controller.links.net.receivers import Gate, InputReceiver, greeting_of, open_receiver
 from controller.links.net.senders import Sender, open_sender
 from controller.takes.reader import load_take, suffixes
 from drivers.base.errors import PluginError
@@ -136,7 +136,8 @@ class LiveInput:
         self, form: Format, address: Address, parameters: Parameters, options: Options, closers: ExitStack
     ) -> None:
         gate = None if options.token is None else Gate(options.token, form.delimiter)
-        self._receiver = open_receiver(address, connect=options.connect, baud=options.baud, gate=gate)
+        self._receiver = open_receiver(address, connect=options.connect, baud=options.baud, gate=gate,
+                                       greeting=greeting_of(form, options.token))  # fmt: skip
         closers.callback(self._receiver.close)
         self._decoding = Decoding(form, parameters, streams=address.transport != "udp")
 

@@ -17,8 +17,9 @@ from typing import Any
 import numpy as np
 
 from controller.base.errors import LinkError
-from controller.base.parameters import Floats, Parameters
+from controller.base.parameters import Parameters
 from controller.formats.frame import Frame
+from controller.formats.landmarks import head_angles
 from controller.links.net.senders import open_sender
 from controller.tools.translate import parse_end
 from surface.base import files
@@ -81,23 +82,9 @@ def frame_of(result: Any, time_s: float, parameters: Parameters) -> Frame:
             values[at], mask[at] = shape.score, True
     matrices = result.facial_transformation_matrixes
     if matrices:
-        head, angles = _head(np.asarray(matrices[0], dtype=np.float64), parameters)
+        head, angles = head_angles(np.asarray(matrices[0], dtype=np.float64), parameters)
         values[head], mask[head] = angles, True
     return Frame(values, mask, time_s)
-
-
-def _head(matrix: Floats, parameters: Parameters) -> tuple[list[int], Floats]:
-    """Positions and values of the head's yaw, pitch and roll from a matrix (4, 4).
-
-    Rotation as Ry(yaw) Rx(pitch) Rz(roll). The face looks at the camera, along +z; the image's right, +x, is its own
-    left: a turn of its nose to +x is a yaw to its own left, which counts positive. Pitch counts positive downwards, and
-    roll positive where the own left side rises.
-    """
-    turn = matrix[:3, :3]
-    yaw, pitch = math.atan2(turn[0, 2], turn[2, 2]), math.asin(min(max(-turn[1, 2], -1.0), 1.0))
-    roll = math.atan2(turn[1, 0], turn[1, 1])
-    at = [parameters.index(name) for name in ("headYaw", "headPitch", "headRoll")]
-    return at, np.clip(np.array([yaw, pitch, roll]) / parameters.full_scale_rad[at], -1.0, 1.0)
 
 
 def _results(model: bytes, camera: int, closers: ExitStack) -> Iterator[tuple[float, Any]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
+import math
 import struct
 import tempfile
 from collections.abc import Callable
@@ -283,6 +284,16 @@ def _read_learned(path: Path) -> None:
     load_state(path, PARAMETERS, Neutral(PARAMETERS), Ranges(PARAMETERS))
 
 
+def _results() -> list[dict[str, object]]:
+    """Results of MediaPipe's face landmarker: landmarks, and blend shapes as its task for browsers nests them."""
+    ring = [{"x": 0.5 + 0.2 * math.cos(k), "y": 0.5 + 0.2 * math.sin(k), "z": 0.01 * (k % 7)} for k in range(478)]
+    shapes = [{"categories": [{"categoryName": "jawOpen", "score": 0.4}]}]
+    return [{"faceLandmarks": [ring]}, {"faceBlendshapes": shapes, "faceLandmarks": [ring[:468]]}]
+
+
+RESULTS = _results()
+
+
 def _alignments() -> list[Kind]:
     """Takes that share their suffixes with others, and alignments of speech."""
     tier = b'"IntervalTier"\n"phones"\n0\n1\n2\n0\n0.4\n"AA1"\n0.4\n1\n"sp"\n'
@@ -301,6 +312,7 @@ def _alignments() -> list[Kind]:
         Kind("aeneas", "aeneas.json", [json.dumps({"fragments": [fragment]}).encode()]),
         Kind("azure-visemes", "visemes.json", [json.dumps(visemes).encode()]),
         Kind("azure-shapes", "shapes.json", [json.dumps(shapes).encode()]),
+        Kind("mediapipe", "face.json", [json.dumps(RESULTS * 2).encode()]),
     ]  # fmt: skip
 
 

@@ -9,6 +9,7 @@ damages the same messages in the same way.
 from __future__ import annotations
 
 import argparse
+import json
 import random
 import sys
 import time
@@ -21,6 +22,7 @@ import numpy as np
 from controller.base.parameters import PARAMETERS as P
 from controller.formats.format import FORMATS, Format
 from controller.formats.frame import Frame
+from tests.fuzz.corpus import RESULTS
 
 LONGEST_S = 0.05
 _PROBE = 200
@@ -76,6 +78,7 @@ def damaged(form: Format, draw: random.Random) -> Iterator[bytes]:
     """Messages with bytes changed, left out, doubled, put together, and made of nothing but chance, without end."""
     encoder = form.encoder(P)
     good = [message for _ in range(20) for message in encoder.encode(_face(draw))]
+    good += [json.dumps(each).encode() for each in RESULTS * 3] if form.kind == "json" else []
     while True:
         message = bytearray(draw.choice(good))
         for _ in range(draw.choice((1, 1, 2, 5, 40))):

@@ -38,6 +38,7 @@ class _File(Settings):
     loop_s: _Seconds = 0.0
     frames_hz: Annotated[Number, Field(ge=0, le=200)] = 0.0
     marks: dict[str, _Seconds] = {}
+    sound: str | None = None
     steps: Annotated[list[str], Field(max_length=50_000)] = []
 
 
@@ -49,6 +50,7 @@ class Script:
     loop_s : after how long it begins again; 0 plays it once.
     frames_hz : how often every parameter is sent besides, 0 for never.
     marks : names of moments (s).
+    sound : file with what is heard of it, for a film; a run plays no sound.
     """
 
     steps: tuple[tuple[float, str], ...]
@@ -56,6 +58,7 @@ class Script:
     frames_hz: float = 0.0
     name: str = ""
     marks: dict[str, float] = field(default_factory=dict)
+    sound: Path | None = None
 
 
 def _read_steps(file: _File, grammar: Grammar) -> tuple[list[tuple[float, str]], list[str]]:
@@ -69,7 +72,14 @@ def _read_steps(file: _File, grammar: Grammar) -> tuple[list[tuple[float, str]],
             faults.append(f"steps[{i}]: {error} (is {text!r})")
     if file.loop_s and steps and steps[-1][0] > file.loop_s:
         faults.append(f"loop_s: {file.loop_s:g} is before the last step at {steps[-1][0]:g}")
+    if file.sound is not None and not _lies_beside(file.sound):
+        faults.append(f"sound: must be a file in the folder of the script or below (is {file.sound!r})")
     return steps, faults
+
+
+def _lies_beside(name: str) -> bool:
+    """Whether a file that a script names is no way to other places of this machine."""
+    return bool(name) and not Path(name).is_absolute() and ".." not in Path(name).parts and "\0" not in name
 
 
 def _read_step(text: str, grammar: Grammar, earliest_s: float) -> tuple[float, str]:
@@ -169,7 +179,9 @@ def _load(path: Path, parameters: Parameters, vocabulary: Vocabulary | None) -> 
     grammar = Grammar(parameters, lambda name: vocabulary[name].name, scripted=True)
     file = load(path, _File, lambda file: _read_steps(file, grammar)[1])
     steps, _ = _read_steps(file, grammar)
-    return Script(tuple(steps), file.loop_s, file.frames_hz, path.stem if file.name is None else file.name, file.marks)
+    name = path.stem if file.name is None else file.name
+    sound = None if file.sound is None else path.parent / file.sound
+    return Script(tuple(steps), file.loop_s, file.frames_hz, name, file.marks, sound)
 
 
 class Wave:

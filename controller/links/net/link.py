@@ -11,7 +11,7 @@ from controller.links.kind import LinkContext
 from controller.links.net.incoming import Incoming
 from controller.links.net.neutral import state_file
 from controller.links.net.outgoing import Outgoing
-from controller.links.net.receivers import Gate, open_receiver
+from controller.links.net.receivers import Gate, greeting_of, open_receiver
 from controller.links.net.senders import open_sender
 from controller.links.net.settings import NetSettings
 
@@ -60,7 +60,10 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
     if not address.is_local and settings.connect is None and token is None:
         log.warning("%s: every machine that reaches %s can move this face and its servos", name, address)
     gate = None if token is None else Gate(token, settings.form.delimiter)
-    receiver = open_receiver(address, connect=settings.connect is not None, baud=settings.baud, gate=gate)
+    greeting = greeting_of(settings.form, settings.token)
+    receiver = open_receiver(
+        address, connect=settings.connect is not None, baud=settings.baud, gate=gate, greeting=greeting
+    )
     learns = settings.calibrate != "off" or settings.ranges
     path = state_file(f"{settings.form.kind}-{settings.source or settings.layer}") if learns else None
     try:

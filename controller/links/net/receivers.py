@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from controller.base.errors import LinkError
+from controller.formats.format import Format
 from controller.links.access import WebRequests
 from controller.links.net.address import Address
 from drivers.base.errors import PortError
@@ -69,20 +70,25 @@ def auth_message(token: str) -> bytes:
     return f"AUTH {token}".encode()
 
 
+def greeting_of(form: Format, token: str | None) -> bytes:
+    """What a program is told that is called: the token, where there is one, and what its format wants."""
+    return (b"" if token is None else auth_message(token) + form.delimiter) + form.greeting
+
+
 def open_receiver(
-    address: Address, *, connect: bool = False, baud: int = 115_200, gate: Gate | None = None
+    address: Address, *, connect: bool = False, baud: int = 115_200, gate: Gate | None = None, greeting: bytes = b""
 ) -> Receiver:
     """What an address gives.
 
     connect : call the address instead of waiting for calls (TCP). baud : rate of a serial port. gate : what streams of
-    callers must begin with; None for nothing.
+    callers must begin with; None for nothing. greeting : what a program is told that is called.
 
     Raises LinkError: the address is taken or not of this machine. PortError: the serial port cannot be opened.
     """
     if address.transport == "udp":
         return UdpReceiver(address)
     if address.transport == "tcp":
-        return TcpCaller(address) if connect else TcpListener(address, gate)
+        return TcpCaller(address, greeting) if connect else TcpListener(address, gate)
     if address.transport == "midi":
         from controller.links.net.midi import MidiReceiver  # few links need it
 
@@ -220,11 +226,11 @@ class TcpListener:
 
 
 class TcpCaller:
-    """The stream of a program that is called, and called again where it hangs up."""
+    """The stream of a program that is called, greeted, and called again where it hangs up."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, greeting: bytes = b"") -> None:
         self.error = "not connected yet"
-        self._address = address
+        self._address, self._greeting = address, greeting
         self._socket: socket.socket | None = None
         self._next_s = 0.0
 
@@ -256,8 +262,9 @@ class TcpCaller:
         self._next_s = time.monotonic() + _RETRY_S
         try:
             self._socket = socket.create_connection((self._address.host, self._address.port), _RETRY_S)
+            self._socket.sendall(self._greeting)
         except OSError as error:
-            self.error = error.strerror or type(error).__name__
+            self._hang_up(error.strerror or type(error).__name__)
             return False
         self.error = ""
         return True

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import select
 import socket
 import sys
 import time
+from contextlib import suppress
 from typing import Protocol
 
 from controller.links.net.address import Address
@@ -15,6 +17,7 @@ from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
 
 _RETRY_S = 0.5
+_HEARD = 65_536
 
 
 class Sender(Protocol):
@@ -131,6 +134,7 @@ class TcpSender(_Stream):
     def _push(self) -> None:
         try:
             if self._socket is not None:
+                self._hear(self._socket)
                 self._rest = self._rest[self._socket.send(self._rest) :]
         except BlockingIOError:
             pass
@@ -138,6 +142,13 @@ class TcpSender(_Stream):
             self.error, self._rest = error.strerror or type(error).__name__, b""
             self.close()
             self._socket = None
+
+    @staticmethod
+    def _hear(call: socket.socket) -> None:
+        """Read what the far end answers, so that it never waits for that. Raises OSError: it has hung up."""
+        with suppress(BlockingIOError):
+            if not call.recv(_HEARD):
+                raise ConnectionResetError(errno.ECONNRESET, "the far end hung up")
 
 
 class SerialSender(_Stream):

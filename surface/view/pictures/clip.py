@@ -1,8 +1,7 @@
-"""Video clips: animated WebP and GIF by Pillow, MP4 by an ffmpeg on the PATH."""
+"""Video clips: animated WebP and GIF by Pillow, MP4 with or without sound by ffmpeg."""
 
 from __future__ import annotations
 
-import shutil
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
@@ -12,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from surface.base import ffmpeg
 from surface.base.errors import ViewError
 from surface.view.pictures.imagefile import as_image, replacing
 
@@ -20,15 +20,16 @@ _WEBP_QUALITY = 80
 _MESSAGE_BYTES = 400  # of ffmpeg's output, its end
 
 
-def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 25.0) -> int:
+def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 25.0, sound: Path | None = None) -> int:
     """Write frames as a clip; the suffix chooses the format (.webp, .gif, .mp4).
 
     frames : (height, width, 3) uint8 each, all of one size; taken one by one.
-    fps : frames per second.
+    fps : frames per second. sound : file whose sound the clip has (.mp4), from its beginning, cut or silent at the end.
 
     Returns how many frames were written.
 
-    Raises ViewError: unknown suffix, no frames, no ffmpeg for .mp4, or the file cannot be written.
+    Raises ViewError: unknown suffix, no frames, no ffmpeg for .mp4, a sound that cannot be read or that
+    the format has no room for, or the file cannot be written.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -39,9 +40,14 @@ def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 2
         )
     if not fps > 0:
         raise ViewError(f"a clip cannot run at {fps} frames per second", hint="give a rate above 0")
+    if sound is not None and suffix != ".mp4":
+        raise ViewError(f"{path.name}: a {suffix} has no sound", hint="end the name with .mp4, or leave out the sound")
     counted = _CheckedFrames(frames)
     with replacing(path) as temporary:
-        (_write_mp4 if suffix == ".mp4" else _write_pillow)(temporary, counted, fps)
+        if suffix == ".mp4":
+            _write_mp4(temporary, counted, fps, sound)
+        else:
+            _write_pillow(temporary, counted, fps)
     return counted.count
 
 
@@ -73,26 +79,45 @@ def _write_pillow(path: Path, frames: _CheckedFrames, fps: float) -> None:
     next(images).save(path, save_all=True, append_images=images, **options)
 
 
-def _write_mp4(path: Path, frames: _CheckedFrames, fps: float) -> None:
-    """H.264 through a pipe to ffmpeg; odd sizes lose their last row or column."""
-    program = shutil.which("ffmpeg")
+def _write_mp4(path: Path, frames: _CheckedFrames, fps: float, sound: Path | None) -> None:
+    """H.264 through a pipe to ffmpeg; odd sizes lose their last row or column. The sound is added to what is there."""
+    program = ffmpeg.find_ffmpeg()
     if program is None:
-        raise ViewError(
-            "writing .mp4 needs ffmpeg, which is not on the PATH", hint="apt-get install ffmpeg, or name a .webp"
-        )
+        raise ViewError("writing .mp4 needs ffmpeg, which is not installed", hint=f"{ffmpeg.INSTALL}, or name a .webp")
     height, width = (length & ~1 for length in frames.first.shape[:2])
     command = [program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24"]
     command += ["-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-", "-an"]
     command += ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-crf", "18", "-movflags", "+faststart", str(path)]
+    pieces = (np.ascontiguousarray(frame[:height, :width]).tobytes() for frame in frames)
+    _run(command, pieces, hint="write a .webp instead")
+    if sound is not None:
+        _add_sound(program, path, sound, frames.count / fps)
+
+
+def _add_sound(program: str, path: Path, sound: Path, length_s: float) -> None:
+    """Put the first sound of a file to a film, as AAC and as long as the pictures: silence follows a shorter one."""
+    silent = path.with_name(f"{path.stem}-silent{path.suffix}")
+    path.replace(silent)
+    command = [program, "-y", "-nostdin", "-loglevel", "error", *ffmpeg.source(silent), *ffmpeg.source(sound)]
+    command += ["-map", "0:v", "-map", "1:a:0", "-c:v", "copy", "-c:a", "aac", "-af", "apad", "-t", f"{length_s:.6f}"]
+    try:
+        _run([*command, "-movflags", "+faststart", str(path)], hint=f"look at: ffmpeg -i {sound}")
+    finally:
+        silent.unlink(missing_ok=True)
+
+
+def _run(command: list[str], pieces: Iterable[bytes] = (), *, hint: str) -> None:
+    """Feed ffmpeg, and raise ViewError with its own words where it fails."""
     with tempfile.TemporaryFile() as log:
         with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=log, stderr=log) as process:
+            assert process.stdin is not None
             try:
-                for frame in frames:
-                    process.stdin.write(np.ascontiguousarray(frame[:height, :width]).tobytes())  # type: ignore[union-attr]
-                process.stdin.close()  # type: ignore[union-attr]
+                for piece in pieces:
+                    process.stdin.write(piece)
+                process.stdin.close()
             except BrokenPipeError:
                 pass  # ffmpeg has ended: its exit status is checked below
         if process.returncode != 0:
             log.seek(0)
             message = log.read()[-_MESSAGE_BYTES:].decode(errors="replace").strip()
-            raise ViewError(f"ffmpeg failed ({process.returncode}): {message}", hint="write a .webp instead")
+            raise ViewError(f"ffmpeg failed ({process.returncode}): {message}", hint=hint)

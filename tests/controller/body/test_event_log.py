@@ -56,3 +56,19 @@ def test_a_missing_package_is_named_with_its_extra(tmp_path: Path, monkeypatch: 
     with pytest.raises(MissingPackage) as caught:
         EventLog(tmp_path / "events.csv", lsl=True)
     assert "omote[lsl]" in caught.value.hint and not (tmp_path / "events.csv").exists()
+
+
+def test_a_real_inlet_of_lsl_hears_the_marks(tmp_path: Path) -> None:
+    pylsl = pytest.importorskip("pylsl", reason="needs pylsl: pip install 'omote[lsl]'")
+    events = EventLog(tmp_path / "events.csv", lsl=True)
+    found = pylsl.resolve_byprop("source_id", "omote-marks", timeout=10.0)
+    if not found:
+        events.close()
+        pytest.skip("no network here in which LSL finds streams")
+    inlet = pylsl.StreamInlet(found[0])
+    inlet.open_stream(timeout=10.0)
+    for what, text in (("mark", "begin"), ("line", "NEUTRAL"), ("mark", "end")):
+        events.note(1, what, text)
+    assert [inlet.pull_sample(timeout=10.0)[0] for _ in range(2)] == [["begin"], ["end"]]
+    inlet.close_stream()
+    events.close()

@@ -27,6 +27,7 @@ def test_a_real_take_goes_there_and_back(kind: str, take: Take) -> None:
     rows = take.values[::EVERY]
     sent = [Frame(row, take.mask, float(time_s)) for time_s, row in zip(take.times_s[::EVERY], rows, strict=True)]
     found = there_and_back(form, sent)
+    found = found[len(found) // len(sent) - 1 :: len(found) // len(sent)]  # some send a face as several messages
     assert len(found) == len(sent) > 200
     carried = form.carries(P) & take.mask
     values = np.array([frame.values for frame in found])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -12,20 +10,17 @@ import pytest
 
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
-from controller.takes import compressed
 from controller.takes.reader import load_take
 from controller.takes.voice import wav_take
+from surface.base import ffmpeg
+from surface.base.ffmpeg import INSTALL, find_ffmpeg
 from tests.controller.takes.voices.synthesis import MEN, vowel
 
-HAS_FFMPEG = shutil.which("ffmpeg") is not None or importlib.util.find_spec("imageio_ffmpeg") is not None
-needs_ffmpeg = pytest.mark.skipif(
-    not HAS_FFMPEG, reason="needs ffmpeg: apt install ffmpeg or pip install imageio-ffmpeg"
-)
+needs_ffmpeg = pytest.mark.skipif(find_ffmpeg() is None, reason=f"needs ffmpeg: {INSTALL}")
 
 
 def test_without_ffmpeg_the_message_names_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compressed.shutil, "which", lambda name: None)
-    monkeypatch.setattr(compressed, "find_spec", lambda name: None)
+    monkeypatch.setattr(ffmpeg, "find_ffmpeg", lambda: None)
     (tmp_path / "a.mp3").write_bytes(b"ID3")
     with pytest.raises(TakeError, match="needs the program ffmpeg") as caught:
         load_take(tmp_path / "a.mp3", P)
@@ -39,7 +34,7 @@ def test_without_ffmpeg_the_message_names_it(tmp_path: Path, monkeypatch: pytest
 def test_a_compressed_voice_moves_the_mouth_as_the_voice_does(tmp_path: Path, ending: str) -> None:
     sound = np.concatenate([np.zeros(4000), vowel(MEN["ɑ"], 120.0, 0.5), np.zeros(4000)])
     (tmp_path / "a.s16").write_bytes((sound * 32767).astype("<i2").tobytes())
-    program = compressed._ffmpeg(tmp_path)
+    program = str(find_ffmpeg())
     for name in ("a.wav", f"a.{ending}"):
         source = [program, "-loglevel", "error", "-f", "s16le", "-ar", "16000", "-i", str(tmp_path / "a.s16")]
         subprocess.run([*source, str(tmp_path / name)], check=True, timeout=60)

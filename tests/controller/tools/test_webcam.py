@@ -19,7 +19,7 @@ import pytest
 from controller.base.errors import LinkError
 from controller.base.parameters import PARAMETERS as P
 from controller.formats.format import FORMATS
-from controller.tools.webcam import frame_of, send_webcam
+from controller.tools.webcam import _pictures, frame_of, send_webcam
 from surface.base.errors import MissingPackage
 
 JAW = P.index("jawOpen")
@@ -163,3 +163,14 @@ def test_missing_packages_are_named_with_their_extra(model: Path, monkeypatch: p
     with pytest.raises(MissingPackage, match="omote webcam needs the packages mediapipe and opencv") as caught:
         send_webcam(model, "json", P)
     assert "omote[webcam]" in caught.value.hint
+
+
+def test_a_real_capture_gives_the_pictures_of_a_film(tmp_path: Path) -> None:
+    cv2 = pytest.importorskip("cv2", reason="needs OpenCV: pip install 'omote[webcam]'")
+    path = str(tmp_path / "film.avi")
+    writer = cv2.VideoWriter(path, cv2.VideoWriter.fourcc(*"MJPG"), 30.0, (64, 48))
+    for brightness in range(0, 200, 20):
+        writer.write(np.full((48, 64, 3), brightness, np.uint8))
+    writer.release()
+    seen = list(_pictures(cv2.VideoCapture(path)))
+    assert [round(float(each.mean()), -1) for each in seen] == list(range(0, 200, 20))

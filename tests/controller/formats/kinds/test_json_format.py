@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.formats.frame import Frame
 from controller.formats.kinds.json_format import JsonDecoder, JsonEncoder
 from tests.controller.formats.faces import face
+from tests.controller.formats.test_landmarks import points
 
 
 def given(frame: Frame) -> dict[str, float]:
@@ -89,3 +91,42 @@ def test_nobody_is_seen() -> None:
     (data,) = JsonEncoder(P).encode(Frame(P.neutral(), np.zeros(len(P), dtype=bool), face=False))
     (frame,) = JsonDecoder(P).feed(data)
     assert not frame.face
+
+
+def landmarks(**moved: tuple[float, float, float]) -> list[dict[str, float]]:
+    """Landmarks as MediaPipe gives them for a picture of 640 by 480."""
+    image = points(**moved) * (1.0, -1.0, -1.0) / 40.0 * (1.0, 4 / 3, 1.0) + (0.5, 0.5, 0.0)
+    return [dict(zip("xyz", row, strict=True)) for row in image.tolist()]
+
+
+def test_results_of_mediapipe_nested_as_its_tasks_give_them() -> None:
+    shapes = [{"categories": [{"index": 25, "categoryName": "jawOpen", "score": 0.5, "displayName": ""}],
+               "headIndex": -1, "headName": ""}]  # fmt: skip
+    (frame,) = JsonDecoder(P).feed(json.dumps({"faceBlendshapes": shapes, "faceLandmarks": [landmarks()]}).encode())
+    assert {*given(frame)} == {"jawOpen", "headYaw", "headPitch", "headRoll"} and given(frame)["jawOpen"] == 0.5
+    (frame,) = JsonDecoder(P).feed(json.dumps({"faceBlendshapes": shapes}).encode())
+    assert given(frame) == {"jawOpen": 0.5}
+
+
+@pytest.mark.parametrize("wrap", [
+    lambda face: face, lambda face: [face], lambda face: [[*row.values()] for row in face],
+    lambda face: {"landmarks": face}, lambda face: {"faceLandmarks": [face], "width": 640, "height": 480},
+    lambda face: {"multi_face_landmarks": [{"landmark": face[:468]}]},
+])  # fmt: skip
+def test_landmarks_alone_make_a_face(wrap: Callable[[list[dict[str, float]]], object]) -> None:
+    (frame,) = JsonDecoder(P).feed(json.dumps(wrap(landmarks(p14=(0, -2.0, 0)))).encode())
+    found = given(frame)
+    assert 0.4 < found["jawOpen"] < 0.7 and found["eyeBlinkLeft"] < 0.1 and abs(found["headYaw"]) < 0.02
+
+
+def test_a_result_without_a_face_says_so() -> None:
+    (frame,) = JsonDecoder(P).feed(b'{"faceLandmarks": [], "faceBlendshapes": []}')
+    assert not frame.face
+
+
+@pytest.mark.parametrize("wrong", [{"landmarks": [{"x": 0.5, "y": 0.5, "z": 0}] * 467}, {"landmarks": [[0, 0]] * 468},
+                                   {"landmarks": [[0, 0, None]] * 478}, {"landmarks": [[1, 1, 1]] * 468}])  # fmt: skip
+def test_what_is_no_face_of_landmarks_is_counted(wrong: object) -> None:
+    decoder = JsonDecoder(P)
+    assert decoder.feed(json.dumps(wrong).encode()) == []
+    assert decoder.refused == {"landmarks that are no face of 468 or 478 points": 1}

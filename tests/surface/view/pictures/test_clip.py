@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import wave
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from surface.base import ffmpeg
 from surface.base.errors import ViewError
 from surface.view import write_clip
 
@@ -37,7 +39,7 @@ def test_pillow_formats_keep_frames_and_rate(tmp_path: Path, suffix: str) -> Non
     assert (shown[16, 24:] < 25).all()
 
 
-@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="needs ffmpeg on the PATH")
+@pytest.mark.skipif(shutil.which("ffprobe") is None, reason="needs ffprobe on the PATH: apt install ffmpeg")
 def test_mp4_keeps_frames_and_cuts_odd_sizes(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     assert write_clip(frames(9, (51, 33)), path, fps=25) == 9
@@ -48,9 +50,10 @@ def test_mp4_keeps_frames_and_cuts_odd_sizes(tmp_path: Path) -> None:
 
 
 def test_mp4_without_ffmpeg(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.setattr(ffmpeg, "find_ffmpeg", lambda: None)
     with pytest.raises(ViewError, match="ffmpeg") as caught:
         write_clip(frames(2), tmp_path / "clip.mp4")
+    assert "apt install ffmpeg" in caught.value.hint
     assert ".webp" in caught.value.hint
     assert list(tmp_path.iterdir()) == []
 
@@ -63,6 +66,45 @@ def test_an_ffmpeg_that_fails_is_quoted(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(ViewError, match="no such encoder"):
         write_clip(frames(400, (256, 256)), tmp_path / "clip.mp4")
     assert list(tmp_path.iterdir()) == [fake]
+
+
+needs_ffmpeg = pytest.mark.skipif(ffmpeg.find_ffmpeg() is None, reason=f"needs ffmpeg: {ffmpeg.INSTALL}")
+
+
+def write_tone(path: Path, seconds: float) -> None:
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, 16_000, 0, "NONE", ""))
+        file.writeframes((9000 * np.sin(np.arange(int(16_000 * seconds)) * 0.1)).astype("<i2").tobytes())
+
+
+def heard(path: Path) -> np.ndarray:
+    """Samples (n,) at 16 kHz of the sound of a file, by ffmpeg."""
+    command = [str(ffmpeg.find_ffmpeg()), "-loglevel", "error", "-i", str(path), "-f", "s16le", "-ar", "16000", "-"]
+    return np.frombuffer(subprocess.run(command, capture_output=True, check=True, timeout=60).stdout, "<i2")
+
+
+@needs_ffmpeg
+@pytest.mark.parametrize("seconds", [0.5, 3.0])
+def test_a_sound_begins_with_the_pictures_and_ends_with_them(tmp_path: Path, seconds: float) -> None:
+    write_tone(tmp_path / "a.wav", seconds)
+    assert write_clip(frames(10), tmp_path / "clip.mp4", fps=10.0, sound=tmp_path / "a.wav") == 10
+    sound = heard(tmp_path / "clip.mp4").astype(float)
+    assert 0.8 < len(sound) / 16_000 < 1.3
+    loud = np.abs(sound[: len(sound) // 1600 * 1600]).reshape(-1, 1600).max(1) > 3000  # a value for each tenth
+    assert loud[1:4].all() and loud[7] == (seconds > 1.0)
+
+
+@needs_ffmpeg
+def test_what_is_no_sound_is_named(tmp_path: Path) -> None:
+    (tmp_path / "a.wav").write_bytes(b"no sound")
+    with pytest.raises(ViewError, match="ffmpeg failed") as caught:
+        write_clip(frames(3), tmp_path / "clip.mp4", sound=tmp_path / "a.wav")
+    assert "a.wav" in caught.value.hint and not (tmp_path / "clip.mp4").exists()
+
+
+def test_a_webp_has_no_sound(tmp_path: Path) -> None:
+    with pytest.raises(ViewError, match=r"a \.webp has no sound"):
+        write_clip(frames(3), tmp_path / "clip.webp", sound=tmp_path / "a.wav")
 
 
 @pytest.mark.parametrize("name", ["clip.avi", "clip"])

@@ -1,0 +1,56 @@
+"""Draws a face in motion as a film, frame by frame, however long each takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+
+from controller.base.parameters import PARAMETERS, Floats
+from controller.face.still import Still, for_head
+from surface.head.model.parameters import head_angles
+from surface.view.pictures.clip import write_clip
+from surface.view.pictures.offscreen import Offscreen
+from surface.view.scene.framing import framed
+
+FPS = 30.0
+"""Frames per second unless somebody names others."""
+
+
+def draw_film(
+    still: Still,
+    rows: Floats,
+    out: Path,
+    fps: float = FPS,
+    sound: Path | None = None,
+    progress: Callable[[int, int], None] = lambda done, total: None,
+) -> int:
+    """Draw the head of ``still`` with each row of values, and write the clip, whole or not at all.
+
+    rows : (n, P) float64, one for each frame. out : .mp4, .webp or .gif. sound : file with what is heard (.mp4).
+    progress : told (done, total).
+
+    Returns how many frames were written.
+
+    Raises ViewError: as :func:`surface.view.pictures.clip.write_clip`, or there is no OpenGL.
+    """
+    return write_clip(_pictures(still, rows, fps, progress), out, fps=fps, sound=sound)
+
+
+def _pictures(still: Still, rows: Floats, fps: float, progress: Callable[[int, int], None]) -> Iterator[np.ndarray]:
+    head, look = still.load_head(), still.look
+    camera = framed(look.make_camera(), head)
+    with Offscreen(
+        head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator
+    ) as screen:
+        for number, row in enumerate(rows):
+            values = for_head(row, head.parameters)
+            head.sway.advance(head_angles(values), number / fps)
+            yield screen.render(values, camera)
+            progress(number + 1, len(rows))
+
+
+def base_of(still: Still, values: Floats, mask: np.ndarray) -> Floats:
+    """(n, P) rows of a motion ``values`` : (n, P) that leave what its ``mask`` : (P,) does not move as in ``still``."""
+    return np.clip(np.where(mask, values, still.values), PARAMETERS.low, PARAMETERS.high)
