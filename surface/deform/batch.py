@@ -15,9 +15,10 @@ from surface.base.jit import lean
 
 from .apply import compute_cells
 from .binding import address_table
-from .deformation import Deformation, middles
+from .deformation import Deformation
 from .lists import LANES
 from .updates import measure
+from .working import middles
 
 SLICE_BYTES = 200_000  # of weights: with what belongs to them, they fit a core's own cache
 WEIGHT_BYTES = 12  # of a weight and of its derivatives in u and v
