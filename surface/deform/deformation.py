@@ -30,7 +30,8 @@ from .denominators import denominators, farthest, unusable
 from .lists import LANES, Basis, build_lists
 from .merging import merged
 from .storage import compress
-from .updates import NOT_STORED, REFUSED, measure, move_points
+from .updates import REFUSED, measure, move_points
+from .working import middles, work_arrays
 
 Table = TypeVar("Table", bound=ControlPoints)
 LIMIT = 256  # differences a cell takes before it is computed again
@@ -82,7 +83,7 @@ class Deformation(Generic[Table]):
         self._most = int(MOST_MOVED * len(surface.arrays()[4]))
         self._pool: ThreadPoolExecutor | None = None  # started when first used
         self._make = partial(type(surface).from_padded, closed_u=surface.closed[0], closed_v=surface.closed[1])
-        self._arrays = _work_arrays(self.mesh, surface.arrays()[4], int(self.lists.tile_start[-1]), normals)
+        self._arrays = work_arrays(self.mesh, surface.arrays()[4], int(self.lists.tile_start[-1]), normals)
         self._points, self._ranges, self._count = self._arrays["points"], self._arrays["ranges"], 0
         self._all, self._cells = np.arange(surface.n), np.arange(len(self.mesh.cell_start) - 1, dtype=np.int32)
         self.vertices, self.normals = _view(self._arrays["vertices"]), _view(self._arrays["normals"])
@@ -339,46 +340,6 @@ class Deformation(Generic[Table]):
         work()
         for done in waiting:
             done.result()
-
-
-def _work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[str, np.ndarray]:
-    """The arrays of an update that are not in the lists, by their names in :data:`.binding.NAMES`.
-
-    origin : (c, 3) float64, which positions within a cell are relative to
-    inv_w, dw, numerators : (8 t,), (16 t,) or (0,), (72 t,) or (24 t,) float32 by tile, see :mod:`.apply`
-    points : (n, 3) float64, current, shifted copies included
-    differences : (c,) int64, how many each cell has taken since it was computed again; -1 without numerators
-    vertices, normals : (3 m,) float32, current
-    ranges : (c, 2) int64, the vertex ranges that the last update touched
-    heavy : (c,) float64, how much weights, or their derivatives, add up to at most at a vertex of every cell
-    extent : (7,) float64, the surface's size and place, see :func:`.updates.measure`
-        The others belong to :mod:`.updates`.
-    """
-    m, cells, n = len(mesh.vertices), len(mesh.cell_start) - 1, len(points)
-    single, cell = partial(np.zeros, dtype=np.float32), partial(np.zeros, cells)
-    return {
-        "origin": _with_room(middles(mesh.vertices, mesh.cell_start)), "points": _with_room(points),
-        "inv_w": single(8 * tiles),
-        "dw": single(16 * tiles * normals), "numerators": single((72 if normals else 24) * tiles),
-        "differences": np.full(cells, NOT_STORED), "touched": np.zeros(tiles, np.uint8),
-        "vertices": single(3 * m), "normals": single(3 * m * normals), "ranges": np.zeros((max(cells, 1), 2), np.int64),
-        "hits": cell(dtype=np.int64), "affected": cell(dtype=np.int32), "recomputed": cell(dtype=np.int32),
-        "moved_ids": np.zeros(n, np.int64), "delta": np.zeros((n, 3)),
-        "pull": cell(), "span": cell(), "drift": cell(), "heavy": cell(), "extent": np.zeros(7),
-    }  # fmt: skip
-
-
-def middles(vertices: np.ndarray, cell_start: Ints) -> Floats:
-    """(c, 3) the middle of each cell's vertices (m, 3)."""
-    if not len(vertices):
-        return np.zeros((len(cell_start) - 1, 3))
-    middles: Floats = np.add.reduceat(vertices, cell_start[:-1], dtype=np.float64) / np.diff(cell_start)[:, None]
-    return middles
-
-
-def _with_room(rows: Floats) -> Floats:
-    """A copy of ``rows (n, 3)``, with room behind it: kernels read four numbers of a row."""
-    return np.concatenate([rows, np.zeros((1, 3))])[: len(rows)]
 
 
 def _rows(rows: ArrayLike, name: str) -> Floats:

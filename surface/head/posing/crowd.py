@@ -5,13 +5,14 @@ They share weights, lists, triangles and colours; each has only its control poin
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32
 from surface.deform.batch import DeformationBatch
+from surface.head.model.parameters import Pose
 from surface.head.posing.head import Head
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
 
@@ -39,22 +40,23 @@ class Crowd:
     """``count`` heads like one, at rest at first; hair that sways does so as the one head's.
 
     head : whose parts they share; nobody else poses it meanwhile, except by :meth:`show`.
+    threads : how many threads sum the vertices of the heads; the results are the same.
 
     Attributes
     ----------
     parts : in the order of the head's parts.
     values : (h, P) float64, parameters of the last :meth:`pose`, read-only.
 
-    ValueError for fewer than one head.
+    ValueError for fewer than one head or thread.
     """
 
-    def __init__(self, head: Head, count: int) -> None:
+    def __init__(self, head: Head, count: int, threads: int = 1) -> None:
         if count < 1:
             raise ValueError(f"count: must be at least 1, not {count}")
         self.head = head
         neutral = np.zeros(len(head.parameters))
         head.pose(neutral)
-        self.parts = tuple(_make_part(part, count) for part in head.parts)
+        self.parts = tuple(_make_part(part, count, threads) for part in head.parts)
         at = {id(part): i for i, part in enumerate(head.parts)}
         self._stitches = [(stitch, at[id(stitch.first)], at[id(stitch.second)]) for stitch in head.zippers]
         self._values = np.tile(neutral, (count, 1))
@@ -81,7 +83,12 @@ class Crowd:
         for row in given[np.isnan(given).any(axis=1)]:
             self.head.read_pose(row)  # raises, before anything moves
         moved = np.flatnonzero((given != self._values).any(axis=1)).tolist()
-        finishing = [self._place(k, given[k]) for k in moved]
+        poses = [self.head.read_pose(given[k]) for k in moved]
+        points = {c.part.name: c.part.rig.move_all(poses) for c in self.parts if moved and isinstance(c.part, SkinPart)}
+        finishing = [
+            self._place(k, pose, {name: rows[i] for name, rows in points.items()})
+            for i, (k, pose) in enumerate(zip(moved, poses, strict=True))
+        ]
         for part in self.parts:
             if part.batch is not None:
                 part.batch.compute()
@@ -95,9 +102,10 @@ class Crowd:
         for crowd in self.parts:
             crowd.part.show(crowd.vertices[k], crowd.normals[k])
 
-    def _place(self, k: int, values: Floats) -> Callable[[], None]:
-        """Place the control points of head k; returns what turns and sews it when vertices are computed."""
-        rows, turn = self.head.place_points(values)
+    def _place(self, k: int, pose: Pose, moved: Mapping[str, Floats]) -> Callable[[], None]:
+        """Place the control points of head k, of which groups have ``moved`` those of deforming parts; returns what
+        turns and sews it when vertices are computed."""
+        rows, turn = self.head.place_pose(pose, moved)
         for crowd, points in zip(self.parts, rows, strict=True):
             if crowd.batch is not None:
                 crowd.batch.place(k, points)
@@ -126,8 +134,8 @@ class _Member:
     normals: Floats32
 
 
-def _make_part(part: HeadPart, count: int) -> CrowdPart:
+def _make_part(part: HeadPart, count: int, threads: int) -> CrowdPart:
     """A part of ``count`` heads, as it is now."""
     vertices, normals = (np.tile(array, (count, 1, 1)) for array in (part.vertices, part.normals))
-    batch = DeformationBatch(part.deformation, count) if isinstance(part, SkinPart) else None
+    batch = DeformationBatch(part.deformation, count, threads) if isinstance(part, SkinPart) else None
     return CrowdPart(part, vertices, normals, batch)

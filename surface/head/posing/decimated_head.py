@@ -116,20 +116,20 @@ class JoinedRig(SkinRig):
         self._rigs = [(part.rig, self.rows[part.name]) for part in parts]
         self._seen: list[int] = []
 
-    def apply(self, pose: Pose) -> Floats:
+    def apply(self, pose: Pose, moved: Floats | None = None) -> Floats:
         invalidations = [rig.invalidations for rig, _ in self._rigs]
         if invalidations != self._seen:
             self._seen = invalidations
             for rig, rows in self._rigs:
                 self.rest[rows] = rig.rest
             self.invalidate()
-        return super().apply(pose)
+        return super().apply(pose, moved)
 
     def _pose_key(self, pose: Pose) -> tuple[object, ...]:
         return *super()._pose_key(pose), pose.gaze.tobytes(), pose.shapes.tobytes()
 
-    def _evaluate(self, pose: Pose) -> None:
-        super()._evaluate(pose)
+    def _evaluate(self, pose: Pose, moved: Floats | None) -> None:
+        super()._evaluate(pose, moved)
         for rig, rows in self._rigs:
             rig.apply_contacts(pose, self.points[rows])
 

@@ -152,8 +152,12 @@ class Head:
         Returns (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
         :class:`surface.head.posing.influence.Influence`.
         """
-        pose = self.read_pose(values)
-        return [part.place_points(pose) for part in self.parts], self._turned(pose.head)
+        return self.place_pose(self.read_pose(values), {})
+
+    def place_pose(self, pose: Pose, moved: Mapping[str, Floats]) -> tuple[list[Floats], Turn]:
+        """:meth:`place_points` of a pose; ``moved`` : by part, what :meth:`.rig.SkinRig.move_all` found for it."""
+        rows = [part.place_points(pose, moved.get(part.name)) for part in self.parts]
+        return rows, self._turned(pose.head)
 
     def _turned(self, angles: Floats) -> Turn:
         """The rotation of a pose by its angles (3,); the last one, if they are the same."""

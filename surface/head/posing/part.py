@@ -91,9 +91,9 @@ class HeadPart:
         """(n, 3) control points of the last pose, before the head turns."""
         raise NotImplementedError
 
-    def place_points(self, pose: Pose) -> Floats:
+    def place_points(self, pose: Pose, moved: Floats | None = None) -> Floats:
         """What :class:`surface.head.posing.influence.Influence` sums over, (k, 3), before the head turns; vertices and
-        normals are left as they are."""
+        normals are left as they are. ``moved`` : as :meth:`.rig.SkinRig.apply` takes it."""
         raise NotImplementedError
 
     @property
@@ -178,8 +178,8 @@ class SkinPart(HeadPart):
     def control_points(self) -> Floats:
         return self.deformation.points
 
-    def place_points(self, pose: Pose) -> Floats:
-        return self.rig.apply(pose)
+    def place_points(self, pose: Pose, moved: Floats | None = None) -> Floats:
+        return self.rig.apply(pose, moved)
 
 
 class RigidPart(HeadPart):
@@ -221,6 +221,6 @@ class RigidPart(HeadPart):
         linear, shift = self._motion
         return self.surface.points @ linear.T + shift
 
-    def place_points(self, pose: Pose) -> Floats:
+    def place_points(self, pose: Pose, moved: Floats | None = None) -> Floats:
         linear, shift = rigid_motion(self.follows, self._head, pose)
         return np.vstack([linear.T, shift])

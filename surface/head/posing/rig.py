@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
@@ -33,17 +35,31 @@ class Moves:
         self._group, self._first = (np.array([run[i] for run in runs], np.int64) for i in (0, 1))
         self._start = np.cumsum([0, *(run[2].size for run in runs)])
         self._rows = np.concatenate([np.zeros(0, np.float32), *(run[2].ravel() for run in runs)])
+        self._dense: Floats | None = None  # made when first used
 
     def add(self, amounts: Floats, points: Floats) -> None:
         """Add the displacements by ``amounts (g,)`` of the groups to ``points (n, 3)``, contiguous."""
         add_moves(amounts, self._group, self._first, self._start, self._rows, points.reshape(-1))
 
+    def add_all(self, amounts: Floats, points: Floats) -> Floats:
+        """(h, n, 3) ``points (n, 3)`` with displacements by each of ``amounts (h, g)``: one product of matrices, which
+        reads the displacements once for all."""
+        if self._dense is None:
+            self._dense = self._table().astype(np.float64)
+        moved: Floats = (amounts @ self._dense).reshape(-1, self._n, 3)
+        moved += points
+        return moved
+
     def at(self, ids: Ints) -> Floats32:
         """(g, k, 3) displacements of the points ``ids (k,)``."""
+        return self._table().reshape(len(self.used), self._n, 3)[:, ids]
+
+    def _table(self) -> Floats32:
+        """(g, 3 n) displacements of all points."""
         dense = np.zeros((len(self.used), 3 * self._n), np.float32)
         for group, first, start, stop in zip(self._group, self._first, self._start, self._start[1:], strict=False):
             dense[group, first : first + stop - start] = self._rows[start:stop]
-        return dense.reshape(len(self.used), self._n, 3)[:, ids]
+        return dense
 
 
 def _runs(index: int, group: Group) -> list[tuple[int, int, Floats32]]:
@@ -100,14 +116,20 @@ class SkinRig:
         self.points = np.zeros_like(self.rest)
         self.version = self.invalidations = 0
 
-    def apply(self, pose: Pose) -> Floats:
+    def move_all(self, poses: Sequence[Pose]) -> Floats:
+        """(h, n, 3) control points as groups alone move them in each of the poses: what :meth:`apply` takes."""
+        amounts = np.array([self._drivers.amounts(pose.shapes)[self._moves.used] for pose in poses])
+        return self._moves.add_all(amounts.reshape(len(poses), -1), self.rest)
+
+    def apply(self, pose: Pose, moved: Floats | None = None) -> Floats:
         """Positions (n, 3) of all control points before the head turns, overwritten by the next call; corrections at
-        the part's own contacts are put into ``pose.pushes``."""
+        the part's own contacts are put into ``pose.pushes``. ``moved (n, 3)`` : where groups alone move them, if that
+        is known."""
         np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
         key = self._pose_key(pose)
         if key != self._last_key:
             self._last_key = key
-            self._evaluate(pose)
+            self._evaluate(pose, moved)
             self.version += 1
         pose.pushes.update(self._pushes)
         for solver in self._solvers:
@@ -147,10 +169,11 @@ class SkinRig:
         lag = pose.lag.tobytes() if len(self._sways.used) else b""
         return self._amounts.tobytes(), *rest, jaw, gaze, lag, *seals, *pushes
 
-    def _evaluate(self, pose: Pose) -> None:
+    def _evaluate(self, pose: Pose, moved: Floats | None) -> None:
         """Groups, jaw, lids and contacts, one after the other."""
-        np.copyto(self.points, self.rest)
-        self._moves.add(self._amounts, self.points)
+        np.copyto(self.points, self.rest if moved is None else moved)
+        if moved is None:
+            self._moves.add(self._amounts, self.points)
         if len(self._sways.used) and pose.lag.any():
             self._sways.add(pose.lag[self._sways.used], self.points)
         if pose.jaw > 0 and self._swings:

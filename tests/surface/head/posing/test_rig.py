@@ -119,6 +119,19 @@ def test_sparse_is_dense():
     np.testing.assert_array_equal(moves.at(np.array([7]))[:, 0], [[0, 0, 6], [4, 5, 6]])
 
 
+def test_displacements_of_many_poses_at_once_are_those_of_each():
+    rng = np.random.default_rng(4)
+    groups = [Group(name, rng.permutation(25)[:15], rng.normal(size=(15, 3)).astype(np.float32)) for name in NAMED[:3]]
+    moves, rest = Moves(part("a", 0, groups=groups), NAMED), rng.normal(size=(len(part("a", 0).points), 3))
+    amounts = rng.uniform(-1.0, 1.0, (5, len(moves.used)))
+    wanted = np.tile(rest, (5, 1, 1))
+    for pose, values in zip(wanted, amounts, strict=True):
+        for group, value in zip(groups, values, strict=True):
+            pose[group.ids] += value * group.moves.astype(np.float64)
+    np.testing.assert_allclose(moves.add_all(amounts, rest), wanted, atol=1e-12)
+    assert moves.add_all(amounts[:0], rest).shape == (0, *rest.shape)
+
+
 def test_runs_of_points_are_cut_at_wide_gaps_only():
     ids = np.array([24, 1, 3, 1], np.int32)
     moves = Moves(part("a", 0, groups=[Group("cheekPuff", ids, np.arange(12, dtype=np.float32).reshape(4, 3))]), NAMED)
