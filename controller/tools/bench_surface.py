@@ -171,24 +171,16 @@ def bench_crowd(name: str, count: int, seconds: float, log: Log) -> Tables:
     """Posing a crowd of ``count`` heads with everything changed, beside one head alone, in turn; and its memory."""
     log("loading")
     folder = find_config("heads", name)
-    alone, crowd, shared = (
-        Head.load(folder),
-        Crowd(Head.load(folder), count),
-        Crowd(Head.load(folder), count, threads=2),
-    )
+    alone, crowd = Head.load(folder), Crowd(Head.load(folder), count)
     poses = np.random.default_rng(1).uniform(0, 0.5, (_POSES, count, len(alone.parameters)))
-    each, again = cycle(poses), cycle(poses)
+    each = cycle(poses)
     log(f"{count} heads")
-    calls: list[Callable[[], object]] = [
-        poser(alone, poses[:, 0]), lambda: crowd.pose(next(each)), lambda: shared.pose(next(again))
-    ]  # fmt: skip
-    one, *crowds = least_of(calls, seconds)
-    single, double = (took / count for took in crowds)
+    one, together = least_of([poser(alone, poses[:, 0]), lambda: crowd.pose(next(each))], seconds)
+    share = together / count
     arrays = sum(part.vertices.nbytes + part.normals.nbytes for part in alone.parts)
     rows = [
         Measure("one head alone, every parameter changed", one),
-        Measure("a head of the crowd, every parameter changed", single, single / one, "one alone"),
-        Measure("the same, vertices summed by two threads", double, double / single, "one thread"),
+        Measure("a head of the crowd, every parameter changed", share, share / one, "one alone"),
         Measure("memory of a further head", 0.0, crowd.nbytes / count / arrays, "its vertices and normals", "<= 3"),
     ]
     return [(f"{count} heads like {alone.name}, {arrays / 1e6:.1f} MB of vertices and normals each", rows)]

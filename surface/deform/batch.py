@@ -5,7 +5,6 @@ Cells are taken in slices whose weights stay in the processor's cache while ever
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
@@ -43,27 +42,23 @@ class DeformationBatch:
     ----------
     source : the deformation, of which neither weights nor knots may change while the batch is used.
     count : number of copies. All begin with the source's present control points.
-    threads : how many threads share the copies of :meth:`compute`; the results are the same.
 
     Attributes
     ----------
     points : (h, n, 3) float64; vertices, normals : (h, m, 3) float32, as :meth:`compute` left them; all read-only.
 
-    ``ValueError`` for fewer than one copy or thread.
+    ``ValueError`` for fewer than one copy.
     """
 
-    def __init__(self, source: Deformation[Any], count: int, threads: int = 1) -> None:
-        for name, number in (("count", count), ("threads", threads)):
-            if number < 1:
-                raise ValueError(f"{name}: must be at least 1, not {number}")
+    def __init__(self, source: Deformation[Any], count: int) -> None:
+        if count < 1:
+            raise ValueError(f"count: must be at least 1, not {count}")
         self._source, own = source, source.own_arrays()
         self._arrays = {name: _repeated(array, count) for name, array in own.items()}
         self._n, self._copies = source.basis.n, len(source.basis.shifts)
         every = [{name: array[k] for name, array in self._arrays.items()} for k in range(count)]
         self._tables = np.stack([address_table(source.addressed() | arrays) for arrays in every])
-        work = [source.work() for _ in range(threads)]
-        self._cells, self._sign, self._rooms = *work[0][:2], [rooms for _, _, rooms in work]
-        self._pool = ThreadPoolExecutor(threads - 1, "surface") if threads > 1 else None
+        self._cells, self._sign, self._rooms = source.work()
         self._cuts = slices(source.weights_of_cells * WEIGHT_BYTES, SLICE_BYTES)
         self._waiting: dict[int, None] = {}
         shape = count, len(source.vertices), 3
@@ -103,15 +98,9 @@ class DeformationBatch:
         return copies
 
     def _compute(self, copies: list[int]) -> None:
-        """Compute copies, each thread an equal share of them."""
-        first, *others = zip(np.array_split(np.array(copies, np.int64), len(self._rooms)), self._rooms, strict=True)
-        waiting = [self._pool.submit(self._compute_share, *other) for other in others] if self._pool else []
-        self._compute_share(*first)
-        for done in waiting:
-            done.result()
-
-    def _compute_share(self, copies: Ints, rooms: list[NDArray[Any]]) -> None:
-        compute_copies(self._tables, copies, self._cells, self._cuts, self._sign, *rooms)
+        if copies:
+            which = np.array(copies, np.int64)
+            compute_copies(self._tables, which, self._cells, self._cuts, self._sign, *self._rooms)
 
     def _recentre(self, copy: int) -> None:
         """As the source does where its origins do not fit any more."""

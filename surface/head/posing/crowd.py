@@ -40,23 +40,22 @@ class Crowd:
     """``count`` heads like one, at rest at first; hair that sways does so as the one head's.
 
     head : whose parts they share; nobody else poses it meanwhile, except by :meth:`show`.
-    threads : how many threads sum the vertices of the heads; the results are the same.
 
     Attributes
     ----------
     parts : in the order of the head's parts.
     values : (h, P) float64, parameters of the last :meth:`pose`, read-only.
 
-    ValueError for fewer than one head or thread.
+    ValueError for fewer than one head.
     """
 
-    def __init__(self, head: Head, count: int, threads: int = 1) -> None:
+    def __init__(self, head: Head, count: int) -> None:
         if count < 1:
             raise ValueError(f"count: must be at least 1, not {count}")
         self.head = head
         neutral = np.zeros(len(head.parameters))
         head.pose(neutral)
-        self.parts = tuple(_make_part(part, count, threads) for part in head.parts)
+        self.parts = tuple(_make_part(part, count) for part in head.parts)
         at = {id(part): i for i, part in enumerate(head.parts)}
         self._stitches = [(stitch, at[id(stitch.first)], at[id(stitch.second)]) for stitch in head.zippers]
         self._values = np.tile(neutral, (count, 1))
@@ -134,8 +133,8 @@ class _Member:
     normals: Floats32
 
 
-def _make_part(part: HeadPart, count: int, threads: int) -> CrowdPart:
+def _make_part(part: HeadPart, count: int) -> CrowdPart:
     """A part of ``count`` heads, as it is now."""
     vertices, normals = (np.tile(array, (count, 1, 1)) for array in (part.vertices, part.normals))
-    batch = DeformationBatch(part.deformation, count, threads) if isinstance(part, SkinPart) else None
+    batch = DeformationBatch(part.deformation, count) if isinstance(part, SkinPart) else None
     return CrowdPart(part, vertices, normals, batch)

@@ -90,20 +90,9 @@ def test_what_cannot_be_computed_is_refused_and_changes_nothing(
     np.testing.assert_array_equal(batch.points[0], source.points)
 
 
-@pytest.mark.parametrize(("count", "threads"), [(0, 1), (1, 0)])
-def test_no_copies_or_threads_are_no_batch(source: Deformation[DCPSurface], count: int, threads: int) -> None:
+def test_no_copies_are_no_batch(source: Deformation[DCPSurface]) -> None:
     with pytest.raises(ValueError, match="at least 1"):
-        DeformationBatch(source, count, threads)
-
-
-@pytest.mark.parametrize("moved", [1, 2, 5])
-def test_threads_share_copies_and_change_nothing(source: Deformation[DCPSurface], moved: int) -> None:
-    batches = [DeformationBatch(source, 5, threads) for threads in (1, 3)]
-    for k in range(moved):
-        assert all(batch.place(k, places(source, k)) for batch in batches)
-    assert all(batch.compute() == list(range(moved)) for batch in batches)
-    np.testing.assert_array_equal(batches[0].vertices, batches[1].vertices)
-    np.testing.assert_array_equal(batches[0].normals, batches[1].normals)
+        DeformationBatch(source, 0)
 
 
 def test_arrays_belong_to_the_batch(source: Deformation[DCPSurface]) -> None:

@@ -94,14 +94,6 @@ def test_a_further_head_costs_no_more_than_three_times_its_vertices(crowd: Crowd
     assert crowd.nbytes / len(crowd) <= 3.0 * arrays
 
 
-def test_threads_change_nothing(crowd: Crowd, alone: Head) -> None:
-    two, poses = Crowd(alone, 3, threads=2), draw(5, len(alone.parameters))
-    crowd.pose(poses)
-    assert two.pose(poses) == [0, 1, 2]
-    for one, other in zip(crowd.parts, two.parts, strict=True):
-        np.testing.assert_array_equal(one.vertices, other.vertices)
-
-
 def test_no_heads_are_no_crowd(crowd: Crowd) -> None:
     with pytest.raises(ValueError, match="at least 1"):
         Crowd(crowd.head, 0)
