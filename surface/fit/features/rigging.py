@@ -19,7 +19,7 @@ LEAST_GROUP_MM = 0.25  # a part gets no group for a shape that moves nothing in 
 DROOP = "tongueDroop"
 DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
 LOW = "tongueLow"
-LOW_RULE = Rule(LOW, ({"jawOpen": 1.0},))
+LOW_RULE = Rule(LOW, ({"jawOpen": 1.0, "jawLeft": 0.4, "jawRight": 0.4},))  # upper teeth do not go aside with the jaw
 LOW_NARROWER, LOW_BACK = 0.2, 0.7  # of the width, and back by this share of how much it sinks
 TILTS = ("jawForward", "jawLeft", "jawRight")
 

@@ -138,7 +138,7 @@ class TongueRest:
         away = np.abs(z[None] - along[:, None])
         away[0, z > along[0]] = 0.0  # the tip goes as its first station
         self._fade = 1.0 - smoothstep(away / BEND_MM)
-        self._sideways = smoothstep(z, along[0] - length, along[0] - 0.4 * length)
+        self._sideways = smoothstep(z, along[0] - 0.7 * length, along[0])
         self._whole = np.ones(len(z))
         low, high = _thickness(at, z)
         self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
