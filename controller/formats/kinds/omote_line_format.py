@@ -16,6 +16,7 @@ from controller.base.parameters import Parameters
 from controller.base.plain_numbers import plain_number
 from controller.formats.format import API, Format
 from controller.formats.frame import Frame, Held, Refusals
+from drivers.omote.protocol import checksum
 
 _A_LINE = 24
 """Names in a line, so that none is longer than 1024 bytes."""
@@ -114,16 +115,11 @@ def _lines_of(places: list[int]) -> list[list[int]]:
 
 
 def _checked(line: bytes) -> bytes | None:
-    """A line without its checksum, CRC-8/SMBUS; None where that is wrong."""
+    """A line without its checksum; None where that is wrong."""
     body, star, digits = line.rpartition(b"*")
     if not star:
         return line
-    crc = 0
-    for byte in body:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc << 1 ^ (0x07 if crc & 0x80 else 0)) & 0xFF
-    return body if digits.strip().upper() == b"%02X" % crc else None
+    return body if digits.strip().upper() == b"%02X" % checksum(body) else None
 
 
 def _value(text: str) -> float:
