@@ -23,17 +23,19 @@ _FOLLOW = 8
 class HurriedClock(Clock):
     """A clock whose next tick can be brought forward, to half a period after the last one at the earliest.
 
-    Later deadlines move with an early tick.
+    Later deadlines move with an early tick. Its jitter is how late it came after it was hurried.
     """
 
     def __init__(self, rate_hz: float, *, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
         super().__init__(rate_hz, now_ns=now_ns)
         self._hurried = threading.Event()
-        self._tick_ns = self._thread = 0
+        self._tick_ns = self._hurried_ns = self._thread = 0
 
     def hurry(self) -> None:
         """Tick as soon as possible; any thread may call it. In a tick it does nothing: that one is not over."""
         if threading.get_ident() != self._thread:
+            if not self._hurried.is_set():
+                self._hurried_ns = self._now_ns()
             self._hurried.set()
 
     def _wait(self) -> int:
@@ -44,13 +46,13 @@ class HurriedClock(Clock):
             now = self._now_ns()
         self._hurried.clear()  # before the tick reads what hurried it
         self._deadline_ns, self._tick_ns = min(self._deadline_ns, now), now
-        self.jitter_ms.add((now - self._deadline_ns) / 1e6)
+        self.jitter_ms.add((now - due) / 1e6)
         return now
 
     def _due_ns(self) -> int:
         if not self._hurried.is_set():
             return self._deadline_ns
-        return min(self._deadline_ns, self._tick_ns + self.period_ns // _MOST_TICKS)
+        return min(self._deadline_ns, max(self._hurried_ns, self._tick_ns + self.period_ns // _MOST_TICKS))
 
 
 class FedClock(Clock):
@@ -58,6 +60,7 @@ class FedClock(Clock):
 
     Of several feeds in one period it takes the one nearest to its own deadline, and an urgent one at once, but not
     before half a period since the last tick. A clock that is not fed ticks by itself, half a feeding period late.
+    Its jitter is how far from its deadline it ticks, and how late after an urgent feed.
 
     rate_hz : ticks per second. feed_s : time between feeds; 0 for a clock that nothing feeds.
     """
@@ -70,13 +73,15 @@ class FedClock(Clock):
         self._most_s = self.period_ns * 1e-9 + 0.5 * feed_s
         self._urgent = self._is_fed = False
         self._balance_s = 0.0  # fed, and not used by ticks
-        self._feed_ns = self._tick_ns = 0
+        self._feed_ns = self._urgent_ns = self._tick_ns = 0
 
     def feed(self, step_s: float, *, urgent: bool = False) -> None:
         """Report that the feeding clock has gone on by ``step_s``; any thread may call it."""
         with self._condition:
             self._balance_s += step_s
-            self._feed_ns, self._urgent = self._now_ns(), self._urgent or urgent
+            self._feed_ns = self._now_ns()
+            if urgent and not self._urgent:
+                self._urgent, self._urgent_ns = True, self._feed_ns
             self._condition.notify()
 
     def _wait(self) -> int:
@@ -90,7 +95,7 @@ class FedClock(Clock):
     def _due_ns(self) -> int:
         earliest = self._tick_ns + self.period_ns // _MOST_TICKS
         if self._urgent:
-            return min(self._deadline_ns, earliest)
+            return min(self._deadline_ns, max(self._urgent_ns, earliest))
         # without a near feed wait for the next one, which will be nearer to the deadline than the last
         return (
             max(self._deadline_ns - self._slack_ns, earliest) if self._is_near() else self._deadline_ns + self._slack_ns
@@ -103,9 +108,10 @@ class FedClock(Clock):
     def _keep_deadline(self, now: int) -> None:
         """Count how far the tick is from its deadline, which follows the feeder slowly, and any early tick at once."""
         self._is_fed = self._urgent or self._is_near()
+        due = self._due_ns() if self._urgent else self._deadline_ns
         if self._urgent:
             self._deadline_ns = min(self._deadline_ns, now)
-        self.jitter_ms.add(abs(now - self._deadline_ns) / 1e6)
+        self.jitter_ms.add(abs(now - due) / 1e6)
         if self._is_fed:
             self._deadline_ns += (now - self._deadline_ns) // _FOLLOW
 

@@ -126,6 +126,21 @@ def test_a_hurried_tick_keeps_half_a_period_from_the_last_one() -> None:
     assert list(ticks(clock, time, 5)) == [(0, 10), (10, 10), (15, 5), (20, 5), (30, 10)]
 
 
+@pytest.mark.parametrize(("at", "tick", "late"), [(17, 18.5, 1.5), (12, 15.0, 0.0), (19.5, 21.0, 1.5)])
+def test_how_late_a_hurried_tick_comes_counts_as_jitter(at: float, tick: float, late: float) -> None:
+    """From when it was hurried, or from the half period that it has to keep."""
+    time = Time()
+    clock = hurried(time)
+
+    def slow() -> None:
+        from_outside(clock.hurry)()
+        time.ns += round(1.5 * MS)
+
+    time.events = [(BEGIN_NS + round(at * MS), slow)]
+    assert [began for began, _ in ticks(clock, time, 3)] == [0, 10, tick]
+    assert clock.jitter_ms.maximum == late
+
+
 def test_the_ticking_thread_does_not_hurry_itself() -> None:
     time = Time()
     clock = hurried(time)
@@ -213,6 +228,20 @@ def test_an_urgent_feed_is_taken_at_once_but_not_before_half_a_period() -> None:
     assert began[3] == (52, 12)
     assert began[4] == (62, 4), "fed at 56, half a period after the last"
     assert began[5][0] == 82 + 5, "nothing feeds it any more"
+
+
+def test_how_late_an_urgent_feed_is_taken_counts_as_jitter() -> None:
+    time = Time()
+    clock = fed(time)
+    feeds(time, clock, [10.0 * k for k in range(3)])
+
+    def late() -> None:
+        clock.feed(0.007, urgent=True)
+        time.ns += round(1.5 * MS)
+
+    time.events.append((BEGIN_NS + 27 * MS, late))
+    assert [at for at, _ in ticks(clock, time, 4)] == [0, 10, 20, 28.5]
+    assert clock.jitter_ms.maximum == 1.5
 
 
 def test_a_feeder_that_stands_still_does_not_stop_the_bus_and_no_time_counts_twice() -> None:
