@@ -32,8 +32,11 @@ class LineDecoder:
         self._parameters, self._held = parameters, Held(parameters)
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame for a line that gives or releases something."""
-        body = _checked(message.strip())
+        """One frame for lines that give or release something."""
+        return [frame for line in message.split(b"\n") for frame in self._read(line)][-1:]
+
+    def _read(self, line: bytes) -> list[Frame]:
+        body = _checked(line.strip())
         if body is None:
             self.refused.add("wrong checksums")
             return []
@@ -95,7 +98,8 @@ class LineEncoder:
         self._given = np.zeros(len(parameters), dtype=bool)
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """``FRAME`` where everything is given, else ``RELEASE`` of what is not given any more, and ``SET``."""
+        """``FRAME`` where everything is given, else ``RELEASE`` of what is not given any more, and ``SET``: all lines
+        in one message, so that no face is sent or dropped in part."""
         mask = frame.mask if frame.face else np.zeros_like(frame.mask)
         gone, self._given = np.flatnonzero(self._given & ~mask), mask.copy()
         clipped = np.clip(frame.values, self._parameters.low, self._parameters.high)
@@ -106,7 +110,7 @@ class LineEncoder:
         lines = [["RELEASE", *(names[i] for i in some)] for some in _lines_of(gone.tolist())]
         lines += [["SET", *(word for i in some for word in (names[i], texts[i]))]
                   for some in _lines_of(np.flatnonzero(mask).tolist())]  # fmt: skip
-        return [" ".join(line).encode() for line in lines]
+        return ["\n".join(" ".join(line) for line in lines).encode()] if lines else []
 
 
 def _lines_of(places: list[int]) -> list[list[int]]:

@@ -19,7 +19,7 @@ from controller.layers.commands import CommandState
 from tests.controller.links.net.sockets import wait_for
 from tests.controller.links.websocket.far import served
 
-WAIT_S = 20.0
+WAIT_S = 60.0
 JAW = P.index("jawOpen")
 
 
