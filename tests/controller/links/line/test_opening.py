@@ -66,7 +66,7 @@ def test_a_script_beside_the_stage_uses_the_expressions_of_the_stage(tmp_path: P
         link = open_line(LineSettings(port="simulated", script="own.toml"), context)
         assert os.path.exists(link.port)
         eventually(lambda: link.report()["refused"] == {"23": 1})  # the link itself has only the shipped ones
-    assert not link.connected and not os.path.exists(link.port)
+    assert not link.connected  # its port's number may be another program's by now
 
 
 def test_an_unknown_script_is_refused_before_a_process_starts() -> None:
