@@ -189,6 +189,8 @@ def test_s4_a_late_reply_is_not_the_answer_to_the_next_question(wire: Wire, thei
     port.setPacketTimeout = lambda size: port.setPacketTimeoutMillis(1e3 * GENEROUS_S)
     value, result, _ = packets.read4ByteTxRx(port, 1, GOAL)
     assert (value, result) == (111, bare.COMM_SUCCESS), "the bare SDK tells late replies apart by now"
+    port.ser.timeout = GENEROUS_S
+    assert port.ser.read(15) == encode_status(1, 0, four(222))  # else it may arrive where the next question is asked
     port.ser.close()
 
     wire.answer = LateOnce(111, 222)
