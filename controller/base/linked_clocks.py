@@ -108,9 +108,9 @@ class FedClock(Clock):
     def _keep_deadline(self, now: int) -> None:
         """Count how far the tick is from its deadline, which follows the feeder slowly, and any early tick at once."""
         self._is_fed = self._urgent or self._is_near()
-        due = self._due_ns() if self._urgent else self._deadline_ns
+        due = self._deadline_ns
         if self._urgent:
-            self._deadline_ns = min(self._deadline_ns, now)
+            due, self._deadline_ns = self._due_ns(), min(self._deadline_ns, now)
         self.jitter_ms.add(abs(now - due) / 1e6)
         if self._is_fed:
             self._deadline_ns += (now - self._deadline_ns) // _FOLLOW

@@ -25,8 +25,8 @@ Sound = Annotated[
 FilmRate = Annotated[
     float | None, typer.Option("--rate", min=1, max=240, help="Frames a second of --take.", show_default="30")
 ]
-SOUNDS = {".wav", ".mp3", ".ogg", ".oga", ".opus", ".m4a", ".aac", ".flac", ".webm"}
-"""How the names of takes end that are a sound themselves."""
+_SOUND_READERS = ("wav", "compressed")
+"""Kinds of takes that are a sound themselves."""
 
 
 def check_film(take: Path | None, sound: Path | None, rate_hz: float | None, others: dict[str, object]) -> None:
@@ -72,7 +72,8 @@ def _sound_of(take: Path) -> Path | None:
     # start-up: --help does without them
     from controller.base.parameters import PARAMETERS
     from controller.links.line.script import load_script
+    from controller.takes.reader import TAKES
 
-    if take.suffix.lower() in SOUNDS:
+    if any(take.suffix.lower() in TAKES.get(kind).suffixes for kind in _SOUND_READERS):
         return take
     return load_script(str(take), PARAMETERS).sound if take.suffix.lower() == ".toml" else None
