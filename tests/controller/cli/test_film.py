@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 from controller.base.errors import ConfigError
 from controller.cli.app import make_app
+from controller.cli.film import _sound_of
 from surface.base import ffmpeg
 from surface.base.errors import ViewError
 from surface.head import save_data
@@ -80,3 +81,12 @@ def test_a_show_names_no_sound_of_other_folders(folder: Path, sound: str) -> Non
     (folder / "hello.toml").write_text(SHOW.replace("hello.wav", sound))
     with pytest.raises(ConfigError, match="sound: must be a file in the folder"):
         film(folder, "hello.mp4")
+
+
+@pytest.mark.parametrize("name", ["a.wav", "A.MP3", "a.webm"])
+def test_a_take_that_is_a_voice_is_its_own_sound(name: str) -> None:
+    assert _sound_of(Path(name)) == Path(name)
+
+
+def test_a_take_without_a_voice_has_no_sound() -> None:
+    assert _sound_of(Path("a.csv")) is None
