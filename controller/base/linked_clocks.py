@@ -14,6 +14,8 @@ from controller.base.clock import Clock
 
 _MOST_TICKS = 2
 """Ticks in the length of a period, at most: so much of it, one over this, lies between two ticks at least."""
+_SPARE = 5
+"""A clock that is hurried again and again gains one over this of the time: a flood must not double its rate."""
 _LONGEST_DEBT_S = 0.1
 """For how long a bus that had to go on by itself waits at most, until the control loop has caught up."""
 _FOLLOW = 8
@@ -23,13 +25,16 @@ _FOLLOW = 8
 class HurriedClock(Clock):
     """A clock whose next tick can be brought forward, to half a period after the last one at the earliest.
 
-    Later deadlines move with an early tick. Its jitter is how late it came after it was hurried.
+    Later deadlines move with an early tick. By how much ticks come early is bounded: by a period at once, which comes
+    back slowly. So a command now and then is acted on at once, and a flood hardly raises the rate. Its jitter is how
+    late it came after it was hurried.
     """
 
     def __init__(self, rate_hz: float, *, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
         super().__init__(rate_hz, now_ns=now_ns)
         self._hurried = threading.Event()
         self._tick_ns = self._hurried_ns = self._thread = 0
+        self._credit_ns = 0  # how much earlier than their deadlines the next ticks may come
 
     def hurry(self) -> None:
         """Tick as soon as possible; any thread may call it. In a tick it does nothing: that one is not over."""
@@ -45,14 +50,18 @@ class HurriedClock(Clock):
             self._sleep_s((due - now) / 1e9) if self._hurried.is_set() else self._hurried.wait((due - now) / 1e9)
             now = self._now_ns()
         self._hurried.clear()  # before the tick reads what hurried it
+        gained = min(self._credit_ns + (now - self._tick_ns) // _SPARE, self.period_ns)
+        self._credit_ns = max(gained - max(self._deadline_ns - now, 0), 0)
         self._deadline_ns, self._tick_ns = min(self._deadline_ns, now), now
         self.jitter_ms.add((now - due) / 1e6)
         return now
 
     def _due_ns(self) -> int:
+        deadline = self._deadline_ns
         if not self._hurried.is_set():
-            return self._deadline_ns
-        return min(self._deadline_ns, max(self._hurried_ns, self._tick_ns + self.period_ns // _MOST_TICKS))
+            return deadline
+        earliest = max(self._tick_ns + self.period_ns // _MOST_TICKS, deadline - self._credit_ns)
+        return min(deadline, max(self._hurried_ns, earliest))
 
 
 class FedClock(Clock):

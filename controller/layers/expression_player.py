@@ -32,10 +32,9 @@ class ExpressionPlayer:
     """Moves between expressions, from and back to ``neutral``."""
 
     def __init__(self, neutral: Expression) -> None:
-        self._neutral = neutral
         self._now = np.zeros(len(neutral.weights) + _OVERRIDES)
         self._from = self._now.copy()
-        self._mood = self._target = self._pose(neutral, 1.0)
+        self._neutral = self._mood = self._target = self._pose(neutral, 1.0)
         self._start_s, self._length_s = -np.inf, 0.0
         self._fall_at_s = np.inf
 
@@ -76,7 +75,7 @@ class ExpressionPlayer:
     def rest(self, seconds: float, now_s: float) -> None:
         """Return to the neutral mood over ``seconds``."""
         self.update(now_s)
-        self._mood = self._pose(self._neutral, 1.0)
+        self._mood = self._neutral
         self._fall_at_s = np.inf
         self._go(self._mood, seconds, now_s)
 

@@ -62,11 +62,12 @@ class Layer:
 
     def write(self, indices: Which, values: Floats | Sequence[float] | float, now_s: float) -> None:
         """Hold some parameters at ``values`` from ``now_s`` on; what is not finite changes nothing."""
-        positions = self._positions[indices]
-        given = np.broadcast_to(np.asarray(values, dtype=np.float64), positions.shape)
+        positions, given = self._positions[indices], np.asarray(values, dtype=np.float64)
         finite = np.isfinite(given)
-        positions = positions[finite]
-        self.values[positions] = given[finite]
+        if not finite.all():
+            finite = np.broadcast_to(finite, positions.shape)
+            positions, given = positions[finite], np.broadcast_to(given, positions.shape)[finite]
+        self.values[positions] = given
         self._stamp[positions] = now_s
         self.held[positions] = True
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean
 from controller.base.plain_numbers import plain_number
 from controller.layers.idle.settings import AUTO, MANNERS
 from controller.links.line.checksums import CHECKSUMS
-from controller.links.line.protocol import Code, LineError, Words, parse_words
+from controller.links.line.protocol import KNOWN_LINES, Code, LineError, Words, parse_words
 from controller.vocabulary.visemes import Visemes
 
 MAX_RATE_HZ = 200.0
@@ -90,19 +90,22 @@ class Grammar:
     def request(self, words: Words) -> Request:
         """The request that the words of a line make. Raises LineError, as :meth:`parse`."""
         try:
-            return Request(self._command(words), words.tag, words.checked)
+            return Request(self._command(words.words), words.tag, words.checked)
         except LineError as error:
             error.tag, error.checked = words.tag, words.checked
             raise
 
-    def _command(self, words: Words) -> Command:
-        name = words.words[0].upper()
-        rule = _RULES.get(name)
+    @cached_property
+    def _command(self) -> Callable[[tuple[str, ...]], Command]:
+        return lru_cache(maxsize=KNOWN_LINES)(self._read)
+
+    def _read(self, words: tuple[str, ...]) -> Command:
+        text = words[0]
+        rule = _RULES.get(text.upper())
         if rule is None:
-            text = words.words[0]
             raise LineError(Code.COMMAND, f"unknown command {quoted(text)}{did_you_mean(text[:_SHOWN], COMMANDS)}")
         least, most, usage, read = rule
-        given = words.words[1:]
+        given = words[1:]
         if len(given) < least or (most is not None and len(given) > most):
             raise LineError(Code.ARGUMENTS, f"{_count(len(given), 'argument')}; usage: {usage}")
         return read(self, given)

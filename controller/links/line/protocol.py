@@ -9,6 +9,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import lru_cache
 
 import numpy as np
 
@@ -23,10 +24,14 @@ MAX_LINE = 1024
 MAX_REPLY = 2048
 """Longest line from omote, in bytes, without the line end."""
 
+KNOWN_LINES = 256
+"""Lines whose meaning is kept, so that a repeated one costs less; at most a few kB each."""
+
 _TAG = re.compile(r"#(\d{1,9})")
 _REPLY = re.compile(r"(?:#(\d{1,9}) )?(?:(OK|P|F)|ERR ([0-9]+))(?: (.*))?", re.DOTALL)
 _CHECKSUM = re.compile(rb"\*([0-9A-Fa-f]{2})[ \t]*\Z")
 _UNPRINTABLE = re.compile(rb"[^\x20-\x7e\t]")
+_NOT_SENT = re.compile(rb"[^\x20-\x7e]")
 _STOP = re.compile(rb"[^\x21-\x7e]*(?:#[0-9]*[^\x21-\x7e]+)?STOP(?![\x21-\x29\x2b-\x7e])", re.IGNORECASE)
 
 
@@ -110,8 +115,9 @@ def checksum(data: bytes) -> int:
     return crc
 
 
+@lru_cache(maxsize=KNOWN_LINES)
 def parse_words(line: bytes) -> Words | None:
-    """Parse a line without its line end; None for an empty one.
+    """Parse a line without its line end; None for an empty one. Robots repeat themselves: the last lines are kept.
 
     Raises LineError: not printable ASCII, too long, reserved for binary frames, wrong checksum or tag.
     """
@@ -188,7 +194,7 @@ def _one_line(text: str) -> str:
 
 def _finish(text: str, checked: bool) -> bytes:
     """The bytes of a line; one that contains ``*`` always has a checksum, so that its last ``*`` begins that."""
-    data = re.sub(rb"[^\x20-\x7e]", b"?", text.encode("ascii", "replace"))[: MAX_REPLY - 3]
+    data = _NOT_SENT.sub(b"?", text.encode("ascii", "replace"))[: MAX_REPLY - 3]
     return data + (b"*%02X\n" % checksum(data) if checked or b"*" in data else b"\n")
 
 

@@ -35,7 +35,6 @@ class Show:
         self.playing = False
         self.position_s = 0.0
         self._sink = sink
-        self._grammar = Grammar(sink.parameters, lambda name: sink.vocabulary[name].name, scripted=True)
         self._session = LineSession(sink, 0, name=f"show {script.name}", scripted=True)
         self._times = [at_s for at_s, _ in script.steps]
         self._marks = sorted((at_s, name) for name, at_s in script.marks.items())
@@ -81,7 +80,9 @@ class Show:
 
     def give_back(self, now_ns: int) -> None:
         """Release what the lines of the script hold; the layers below come back over the usual fades."""
-        requests = [self._grammar.parse(line.encode("ascii")) for _, line in self.script.steps]
+        vocabulary = self._sink.vocabulary
+        grammar = Grammar(self._sink.parameters, lambda name: vocabulary[name].name, scripted=True)
+        requests = [grammar.parse(line.encode("ascii")) for _, line in self.script.steps]
         commands = [request.command for request in requests if request is not None]
         self._sink.release(
             sorted({i for command in commands if command.name == "SET" for i in command.indices}), now_ns

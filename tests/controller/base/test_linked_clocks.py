@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -124,6 +125,22 @@ def test_a_hurried_tick_keeps_half_a_period_from_the_last_one() -> None:
     clock = hurried(time)
     time.events = [(BEGIN_NS + at * MS, from_outside(clock.hurry)) for at in (11, 12, 16)]
     assert list(ticks(clock, time, 5)) == [(0, 10), (10, 10), (15, 5), (20, 5), (30, 10)]
+
+
+@pytest.mark.parametrize(("every_ms", "most_hz", "late_ms"), [(1, 121, 9), (1000 / 60, 121, 0.1), (150, 107, 0.0)])
+def test_a_flood_hardly_raises_the_rate_and_a_stream_is_acted_on_at_once(
+    every_ms: float, most_hz: float, late_ms: float
+) -> None:
+    """``late_ms`` : how long 95 of 100 commands wait at most for a tick."""
+    time = Time()
+    clock = hurried(time)
+    sent = np.arange(every_ms, 1900.0, every_ms)
+    with ThreadPoolExecutor(1) as other:
+        time.events = [(BEGIN_NS + round(at * MS), lambda: other.submit(clock.hurry).result()) for at in sent.tolist()]
+        began = np.array([at for at, _ in ticks(clock, time, round(2.0 * most_hz))])
+    assert began[-1] > 2000.0
+    waited = began[np.searchsorted(began, np.round(sent, 3))] - sent
+    assert np.percentile(waited[3:], 95) <= late_ms
 
 
 @pytest.mark.parametrize(("at", "tick", "late"), [(17, 18.5, 1.5), (12, 15.0, 0.0), (19.5, 21.0, 1.5)])

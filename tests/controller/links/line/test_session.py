@@ -14,7 +14,7 @@ from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.version import package_version
 from controller.layers.commands import CommandState
-from controller.links.line.protocol import MAX_LINE, MAX_REPLY, Reply, checksum, format_words, parse_reply
+from controller.links.line.protocol import KNOWN_LINES, MAX_LINE, MAX_REPLY, Reply, checksum, format_words, parse_reply
 from controller.links.line.script import Script
 from controller.links.line.session import LineSession
 from controller.links.line.show import Shows
@@ -236,6 +236,18 @@ def test_a_link_that_had_a_checksum_takes_no_line_without_one(talk: Talk) -> Non
     assert talk.say("HELLO checksum=latched").ok and talk.say("PING").ok
     assert talk.say(checked("SET nothing 1")).code == 23 and talk.say("PING").code == 13
     assert talk.say(checked("HELLO checksum=latched")).ok and talk.say("PING").code == 13
+
+
+def test_a_repeated_line_is_judged_each_time(talk: Talk) -> None:
+    """What a line means is kept, not whether it is taken."""
+    talk.session = LineSession(talk.state, 0, checksum="latched")
+    assert [talk.say(f"#{n} SET jawOpen 0.5").tag for n in (1, 1, 2)] == [1, 1, 2]
+    assert talk.say("SET jawOpen 0.5").ok and talk.say("SET jawOpen 0.5").ok
+    assert talk.say(checked("SET jawOpen 0.5")).checked and talk.say("SET jawOpen 0.5").code == 13
+    for n in range(KNOWN_LINES + 9):
+        assert talk.say(checked(f"SET jawOpen {n / 1000}")).ok
+    kept = talk.session._grammar._command.cache_info()  # type: ignore[attr-defined]
+    assert kept.currsize == KNOWN_LINES
 
 
 def test_a_link_that_demands_checksums_never_takes_a_line_without(talk: Talk) -> None:
