@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import tempfile
 from collections.abc import Iterator
@@ -10,6 +11,13 @@ from pathlib import Path
 
 from controller.base.errors import ControllerError
 
+_NO_PLACE = {
+    errno.ENOENT: "mkdir -p {folder}",
+    errno.ENOTDIR: "choose another folder: {folder} is none",
+    errno.ENOSPC: "make room on the disk: df -h {folder}",
+    errno.EDQUOT: "make room: your quota is used up, see quota -s",
+    errno.EROFS: "choose another folder: {folder} is mounted read-only",
+}
 NEWER = "written by a newer omote"
 
 
@@ -37,6 +45,11 @@ def replacing(path: Path) -> Iterator[Path]:
         raise ControllerError(f"{path}: cannot be written: {error.strerror}", hint=hint) from error
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def place_hint(error: OSError, path: Path) -> str:
+    """What to do where a file of the user's choice cannot be written."""
+    return _NO_PLACE.get(error.errno or 0, "choose another folder: ls -ld {folder}").format(folder=path.parent)
 
 
 def _umask() -> int:

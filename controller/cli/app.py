@@ -81,19 +81,17 @@ def make_app(only: str = "") -> Typer:
 
 def report_error(error: BaseException, remark: str = "") -> None:
     """Print what failed and what to do next on standard error."""
-    from rich.console import Console  # start-up: Ctrl-C ends it quietly from main() on
+    # start-up: Ctrl-C ends it quietly from main() on
+    from rich.console import Console
+    from rich.text import Text
 
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with suppress(OSError):  # where standard error cannot be written either, the exit code says it
-        console.print(f"[bold red]error:[/] {_escape(str(error) or type(error).__name__)}")
+        console.print(Text.assemble(("error:", "bold red"), f" {error}" if str(error) else f" {type(error).__name__}"))
         if hint := getattr(error, "hint", ""):
-            console.print(f"[bold]try:[/] {_escape(hint)}")
+            console.print(Text.assemble(("try:", "bold"), f" {hint}"))
         if remark:
-            console.print(remark, style="dim")
-
-
-def _escape(text: str) -> str:
-    return text.replace("[", r"\[")
+            console.print(Text(remark, "dim"))
 
 
 def _is_interrupt(error: BaseException | None) -> bool:

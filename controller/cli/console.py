@@ -18,7 +18,7 @@ class Screen(Console):
 
     def __init__(self) -> None:
         forced = bool(os.environ.get("FORCE_COLOR")) and not sys.stdout.isatty()
-        super().__init__(highlight=False, color_system="standard" if forced else "auto")
+        super().__init__(highlight=False, emoji=False, color_system="standard" if forced else "auto")
 
     @property
     def is_terminal(self) -> bool:

@@ -40,7 +40,7 @@ def translate(
     from controller.tools.translate import Options
     from controller.tools.translate import translate as run
 
-    console = Console(stderr=True, highlight=False, soft_wrap=True)  # messages may go to standard output
+    console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)  # messages may go to standard output
     options = Options(mirror, connect, baud, open_to_network, token, seconds)
     counts = run(source, target, PARAMETERS, options, lambda text: console.print(escape(f"{text}; Ctrl-C ends")))
     console.print(escape(str(counts)))

@@ -26,7 +26,7 @@ def webcam(
     from controller.base.parameters import PARAMETERS
     from controller.tools.webcam import send_webcam
 
-    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)
     seen = send_webcam(model, target, PARAMETERS, camera=camera, seconds=seconds,
                        ready=lambda text: console.print(escape(f"{text}; Ctrl-C ends")))  # fmt: skip
     console.print(escape(f"{seen.frames} pictures, {seen.faces} of them with a face; {seen.sent} messages went out"))

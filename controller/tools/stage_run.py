@@ -73,6 +73,8 @@ class StageRun:
         preloaded: PreloadedBody | None = None,
         web: str | None = None,
     ) -> None:
+        if web is not None:
+            check_web(web, alone=options.take is not None)
         stage = with_picture(load_stage(name, PARAMETERS), look or {})
         if identity:
             check_identity(stage.head, identity)
@@ -87,8 +89,6 @@ class StageRun:
             raise ConfigError(f"{stage.path}: robots: a stage without a robot has nothing to mirror")
         self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
         self._web, self._web_look, self._identity = web, look or {}, identity
-        if web is not None:
-            check_web(web, alone=options.take is not None)
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.

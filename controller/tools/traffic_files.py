@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Self
 
 from controller.base.errors import ConfigError
+from controller.base.files import place_hint
 from drivers.base.errors import DriverError
 from drivers.core import pcapng
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
@@ -41,7 +42,7 @@ class TrafficWriter:
             self._file = path.open("wb", buffering=0)  # it is wanted most when the program ends unexpectedly
             self._write_head(pcapng.file_head(wire) if self._network else wire.head().encode())
         except OSError as error:
-            raise ConfigError(f"{path}: cannot be written: {error.strerror}", hint=f"mkdir -p {path.parent}") from error
+            raise ConfigError(f"{path}: cannot be written: {error.strerror}", hint=place_hint(error, path)) from error
 
     def _write_head(self, head: bytes) -> None:
         """Raises OSError; the file is closed then."""
@@ -84,6 +85,8 @@ def read_traffic(path: Path) -> TrafficRecord:
     with files.reading(path, ConfigError, hint="record it again"):
         data = files.read_file(path)
         network = data.startswith(pcapng.MAGIC)
+        if path.suffix.lower() == SUFFIX and not data.startswith((pcapng.MAGIC, b"#")):  # a text log begins with #
+            raise ValueError(f"it is damaged: a pcapng file begins with {pcapng.MAGIC.hex(' ')}")
         if not network and len(data) > files.TEXT_LIMIT:
             raise ValueError(f"is larger than {files.TEXT_LIMIT >> 20} MB")
         text = "" if network else files.decode(data)

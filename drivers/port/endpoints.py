@@ -179,10 +179,10 @@ MEMORY_PORTS = MemoryPorts()
 
 
 def address_of(url: str) -> tuple[str, int]:
-    """Host and port of ``socket://host:port``; raises ValueError for another form."""
+    """Host and port of ``socket://host:port`` or another scheme; raises ValueError for another form."""
     parts = urlsplit(url)
     if not parts.hostname or parts.port is None:
-        raise ValueError(f"{url!r} is not socket://HOST:PORT")
+        raise ValueError(f"{url!r} is not {parts.scheme or 'socket'}://HOST:PORT")
     return parts.hostname, parts.port
 
 

@@ -195,7 +195,8 @@ class SerialPort:
             hint = "sudo usermod -a -G dialout $USER, then log out and in again"
         elif "://" in self.path:
             kind, message = PortMissing, f"no port {self.path}: {getattr(error, 'strerror', None) or error}"
-            hint = "start what serves it first, for example: omote simulate dynamixel --tcp HOST:PORT"
+            option = "--rfc2217" if self.path.startswith("rfc2217") else "--tcp"
+            hint = f"start what serves it first, for example: omote simulate dynamixel {option} HOST:PORT"
         elif code in _MISSING or not Path(self.path).exists():
             kind, message, hint = PortMissing, f"no port {self.path}", "`omote ports` lists what is plugged in"
         return kind(message, hint=hint, port=self.path)

@@ -245,7 +245,7 @@ class TcpPort(_SocketPort):
     Raises PortError: the address cannot be listened at; PortBusy where another program does.
     """
 
-    scheme = "socket"
+    scheme, _option = "socket", "--tcp"
 
     def _listen(self) -> socket.socket:
         try:
@@ -253,7 +253,10 @@ class TcpPort(_SocketPort):
             listener = socket.create_server((host, port))
         except (OSError, ValueError) as error:
             kind = PortBusy if isinstance(error, OSError) and "in use" in str(error) else PortError
-            raise kind(f"cannot listen at {self.path}: {error}", hint="for example --tcp 127.0.0.1:4000") from error
+            why = (error.strerror if isinstance(error, OSError) else None) or error
+            raise kind(
+                f"cannot listen at {self.path}: {why}", hint=f"for example {self._option} 127.0.0.1:4000"
+            ) from error
         self.path = f"{self.scheme}://{host}:{listener.getsockname()[1]}"
         return listener
 

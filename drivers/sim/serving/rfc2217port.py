@@ -59,7 +59,7 @@ class _Connection:
 class Rfc2217Port(TcpPort):
     """Listens at ``rfc2217://HOST:PORT``, one client at a time. Port 0 and errors as in the base class."""
 
-    scheme = "rfc2217"
+    scheme, _option = "rfc2217", "--rfc2217"
 
     def __init__(self, url: str) -> None:
         self._settings, self._unsent = _Settings(), b""

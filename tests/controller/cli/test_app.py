@@ -313,6 +313,13 @@ def test_long_messages_are_not_broken_and_numbers_not_coloured(
     assert "word 17 word" in text and "\x1b[1;31merror:" in text and "\x1b[2mremark" in text
 
 
+def test_messages_show_what_was_typed(capsys: pytest.CaptureFixture[str]) -> None:
+    """Names that rich takes for pictures, colours and escapes."""
+    typed = r"nonsense:x: [red]a[/] :smile: \[b] \\[b] c\\"
+    report_error(ConfigError(typed, hint=typed))
+    assert capsys.readouterr().err == f"error: {typed}\ntry: {typed}\n"
+
+
 def test_no_words_show_the_help_and_short_help_works(omote: Omote) -> None:
     for words in ((), ("-h",), ("--help",)):
         said = omote(*words)

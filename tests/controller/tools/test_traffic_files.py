@@ -81,8 +81,19 @@ def test_the_decoder_is_that_of_the_wire() -> None:
 
 
 def test_a_full_disk_is_told_with_the_name_of_the_file() -> None:
-    with pytest.raises(ConfigError, match="/dev/full: cannot be written: No space left"):
+    with pytest.raises(ConfigError, match="/dev/full: cannot be written: No space left") as error:
         TrafficWriter(Path("/dev/full"), Wire("dynamixel", 1_000_000))
+    assert error.value.hint == "make room on the disk: df -h /dev"
+
+
+def test_a_damaged_network_record_is_not_told_to_be_saved_as_text(tmp_path: Path) -> None:
+    path = tmp_path / "a.pcapng"
+    with TrafficWriter(path, WIRE) as writer:
+        writer.tap(True, b"\xff\xfe")
+    path.write_bytes(b"\xff" + path.read_bytes()[1:])
+    with pytest.raises(ConfigError, match="is damaged: a pcapng file begins with 0a 0d 0d 0a") as error:
+        read_traffic(path)
+    assert error.value.hint == "record it again"
 
 
 def test_a_disk_that_fills_ends_the_record_and_nothing_else(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -10,10 +10,11 @@ from collections.abc import Iterator
 import pytest
 import serial
 
-from drivers.base.errors import PortBusy
+from drivers.base.errors import PortBusy, PortError
 from drivers.packets.packet import Instruction, encode_instruction
 from drivers.port.serialport import SerialPort
 from drivers.sim import SimulatedBus
+from drivers.sim.serving.make_port import make_port
 
 pytestmark = pytest.mark.filterwarnings("ignore:set:DeprecationWarning")  # of pyserial's client
 
@@ -65,6 +66,15 @@ def test_omotes_own_port_opens_it_and_clients_come_and_go(bus: SimulatedBus) -> 
 def test_a_second_server_is_told(bus: SimulatedBus) -> None:
     with pytest.raises(PortBusy), SimulatedBus([1], bus.path):
         pass
+
+
+def test_a_wrong_address_is_told_with_the_option_of_its_own() -> None:
+    with pytest.raises(PortError, match="'rfc2217://nowhere' is not rfc2217://HOST:PORT") as error:
+        make_port("rfc2217://nowhere")
+    assert error.value.hint == "for example --rfc2217 127.0.0.1:4000"
+    with pytest.raises(PortError) as error:
+        SerialPort("rfc2217://127.0.0.1:1").open()
+    assert "simulate dynamixel --rfc2217 HOST:PORT" in error.value.hint
 
 
 @pytest.mark.slow
