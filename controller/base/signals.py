@@ -41,11 +41,16 @@ def unblock_signals() -> None:
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, *TERMINATION_SIGNALS})
 
 
+def was_interrupted(handler: object) -> bool:
+    """Whether a handler of SIGINT of the command line has seen one, whatever became of its KeyboardInterrupt."""
+    return bool(getattr(handler, "came", False))
+
+
 @contextmanager
 def stop_flag() -> Iterator[threading.Event]:
     """An event that SIGINT or a signal of :func:`termination_signals` sets; a second SIGINT raises KeyboardInterrupt.
 
-    Main thread only.
+    It is set from the beginning where an earlier SIGINT was swallowed. Main thread only.
     """
     flag = threading.Event()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, *termination_signals())}
@@ -57,6 +62,8 @@ def stop_flag() -> Iterator[threading.Event]:
 
     for number in before:
         signal.signal(number, set_flag)
+    if was_interrupted(before[signal.SIGINT]):
+        flag.set()
     try:
         yield flag
     finally:

@@ -13,6 +13,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from types import FrameType
+
     from typer import Typer  # start-up: Ctrl-C ends it quietly while all this still loads
 
 WEB = "127.0.0.1:8080"
@@ -101,10 +103,26 @@ def _is_interrupt(error: BaseException | None) -> bool:
     return error is not None
 
 
+class Interrupt:
+    """Handler of Ctrl-C that raises KeyboardInterrupt and remembers it: C code, or an ``except:`` of a module that is
+    being imported, may swallow the exception, and a run would begin that nobody wants any more.
+
+    came : whether there was one; see :func:`controller.base.signals.stop_flag`.
+    """
+
+    def __init__(self) -> None:
+        self.came = False
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        self.came = True
+        raise KeyboardInterrupt
+
+
 def main() -> None:
     """Entry point of the ``omote`` command; nothing is imported before Ctrl-C would end it quietly."""
-    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in the background so
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+    # a shell starts what runs in the background with the signal ignored
+    if signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, signal.default_int_handler):
+        signal.signal(signal.SIGINT, Interrupt())
     try:
         sys.exit(_run())
     except KeyboardInterrupt:

@@ -17,7 +17,7 @@ from rich.console import Console
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
-from controller.base.signals import stop_flag
+from controller.base.signals import stop_flag, was_interrupted
 from controller.links.line.host import RobotHost
 from controller.links.line.hostport import HostPort
 from controller.links.line.script import load_script
@@ -133,6 +133,8 @@ def _stop_socket() -> Iterator[socket.socket]:
     writing.setblocking(False)
     before = {number: signal.signal(number, lambda *_: None) for number in (signal.SIGINT, signal.SIGTERM)}
     wakeup = signal.set_wakeup_fd(writing.fileno(), warn_on_full_buffer=False)
+    if was_interrupted(before[signal.SIGINT]):
+        writing.send(b"\0")
     try:
         yield reading
     finally:

@@ -7,6 +7,7 @@ import signal
 import pytest
 
 from controller.base.signals import stop_flag
+from controller.cli.app import Interrupt
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
@@ -17,6 +18,20 @@ def test_a_signal_sets_the_flag(number: signal.Signals) -> None:
         signal.raise_signal(number)
         assert flag.is_set()
     assert signal.getsignal(number) is before
+
+
+def test_an_interrupt_that_was_swallowed_counts_from_the_beginning() -> None:
+    before = signal.signal(signal.SIGINT, handler := Interrupt())
+    try:
+        with stop_flag() as flag:
+            assert not flag.is_set()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        with stop_flag() as flag:
+            assert flag.is_set()
+        assert signal.getsignal(signal.SIGINT) is handler
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def test_a_second_interrupt_is_not_held_back() -> None:

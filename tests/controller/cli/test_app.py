@@ -262,7 +262,8 @@ def test_interrupts_that_were_ignored_count_again_and_others_handlers_stay(
     try:
         signal.signal(signal.SIGINT, signal.SIG_IGN)
         omote()
-        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
 
         def own(*_: object) -> None:
             pass
@@ -272,6 +273,27 @@ def test_interrupts_that_were_ignored_count_again_and_others_handlers_stay(
         assert signal.getsignal(signal.SIGINT) is own
     finally:
         signal.signal(signal.SIGINT, before)
+
+
+def test_an_interrupt_that_a_module_swallows_ends_a_run_that_begins_later() -> None:
+    """As a bare ``except:`` around an import does."""
+    program = """
+import _signal, sys
+from controller.cli import main
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "controller.links.line.host":
+            try:
+                _signal.raise_signal(_signal.SIGINT)
+            except:
+                pass
+
+sys.meta_path.insert(0, Finder())
+main()
+"""
+    command = [sys.executable, "-c", program, "simulate", "dynamixel", "--ids", "1"]
+    assert subprocess.run(command, stdout=subprocess.DEVNULL, timeout=120, check=False).returncode == 0
 
 
 def test_ctrl_c_while_a_class_is_made_is_no_fault_of_omote(monkeypatch: pytest.MonkeyPatch) -> None:
