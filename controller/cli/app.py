@@ -5,18 +5,22 @@ Each command imports the code it needs when it runs, so that ``omote --help`` an
 
 from __future__ import annotations
 
+import _thread
 import os
 import signal
 import sys
+import threading
 from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
     from types import FrameType
 
     from typer import Typer  # start-up: Ctrl-C ends it quietly while all this still loads
 
+_AGAIN_S = 0.01
 WEB = "127.0.0.1:8080"
 """Where ``--web`` without an address serves the web panel."""
 
@@ -111,18 +115,27 @@ class Interrupt:
     """
 
     def __init__(self) -> None:
-        self.came = False
+        self.came, self._report = False, sys.unraisablehook
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         self.came = True
         raise KeyboardInterrupt
+
+    def again(self, lost: UnraisableHookArgs) -> None:
+        """Interrupt once more where Python could not raise it, as in a callback of its import system."""
+        if issubclass(lost.exc_type, KeyboardInterrupt):
+            self.came = False
+            threading.Timer(_AGAIN_S, _thread.interrupt_main).start()
+        else:
+            self._report(lost)
 
 
 def main() -> None:
     """Entry point of the ``omote`` command; nothing is imported before Ctrl-C would end it quietly."""
     # a shell starts what runs in the background with the signal ignored
     if signal.getsignal(signal.SIGINT) in (signal.SIG_IGN, signal.default_int_handler):
-        signal.signal(signal.SIGINT, Interrupt())
+        signal.signal(signal.SIGINT, handler := Interrupt())
+        sys.unraisablehook = handler.again
     try:
         sys.exit(_run())
     except KeyboardInterrupt:

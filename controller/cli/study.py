@@ -34,4 +34,5 @@ def study(
         show = StageRun.run_headless
     with console.status("starting") as status:
         report = run_study(file, out, seed=seed, lsl=lsl, show=show, status=status.update)
-    console.print(f"{len(report['study']['trials'])} trials\nwrote {out}", soft_wrap=True)
+    trials = len(report["study"]["trials"])
+    console.print(f"{trials} trial{'s' if trials != 1 else ''}\nwrote {out}", soft_wrap=True)

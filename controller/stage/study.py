@@ -14,8 +14,12 @@ from controller.base.config import Settings, load
 from controller.base.errors import ConfigError
 from controller.base.files import replacing
 from controller.base.parameters import Parameters
-from controller.base.plain_numbers import plain_number
-from controller.links.line.script import load_script
+from controller.base.paths import find_config
+from controller.links.line.commands import Grammar
+from controller.links.line.protocol import LineError
+from controller.links.line.script import MOST_STEPS, load_script, read_step
+from controller.stage.stage import load_stage
+from controller.vocabulary.vocabulary import Vocabulary
 
 _Seconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
 _Name = Annotated[str, Field(pattern=r"^[!-)+-~]{1,64}$")]
@@ -76,10 +80,13 @@ class Study:
 def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> Study:
     """Read a study. ``seed`` : instead of the file's, such as the number of a participant.
 
-    Raises ConfigError: the file cannot be read or is wrong; every fault with its key.
+    Raises ConfigError: the file, its stage or a script of it cannot be read or is wrong; every fault with its key.
     """
     settings = load(path, StudySettings, _faults)
-    lines = {name: _lines(path, name, each, parameters) for name, each in settings.conditions.items()}
+    vocabulary = load_stage(str(find_config("stages", settings.stage, beside=path)), parameters).vocabulary
+    grammar = Grammar(parameters, lambda name: vocabulary[name].name, scripted=True)
+    load(path, StudySettings, lambda settings: _wrong_lines(settings, grammar))
+    lines = {name: _lines(path, each, parameters, vocabulary, grammar) for name, each in settings.conditions.items()}
     order = _order(settings, settings.seed if seed is None else seed)
     trials, at_s = [], settings.before_s
     for number, name in enumerate(order, 1):
@@ -89,14 +96,14 @@ def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> S
     steps = [step for trial in trials for step in _steps(trial, lines[trial.condition])]
     marks = {f"{trial.number}:{trial.condition}:{what}": at for trial in trials
              for what, at in (("begin", trial.begin_s), ("end", trial.end_s))}  # fmt: skip
+    if len(steps) > MOST_STEPS:
+        fault = f"{path}: repeats: {len(steps)} lines in all are more than {MOST_STEPS}"
+        raise ConfigError(fault, hint="repeat the conditions less often")
     return Study(settings, tuple(trials), tuple(steps), marks, at_s)
 
 
-def write_script(study: Study, path: Path, parameters: Parameters) -> None:
-    """Write a study as a script that a stage plays as a show.
-
-    Raises ControllerError: it cannot be written. ConfigError: a line of it is wrong, with its place.
-    """
+def write_script(study: Study, path: Path) -> None:
+    """Write a study as a script that a stage plays as a show. Raises ControllerError: it cannot be written."""
     table = {
         "name": study.settings.name,
         "marks": study.marks,
@@ -104,7 +111,6 @@ def write_script(study: Study, path: Path, parameters: Parameters) -> None:
     }
     with replacing(path) as temporary:
         temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
-    load_script(str(path), parameters)
 
 
 def _steps(trial: Trial, lines: list[tuple[float, str]]) -> list[tuple[float, str]]:
@@ -125,19 +131,25 @@ def _order(settings: StudySettings, seed: int) -> list[str]:
     return [name for _ in range(settings.repeats) for name in draw.sample(names, len(names))]
 
 
-def _lines(path: Path, name: str, condition: Condition, parameters: Parameters) -> list[tuple[float, str]]:
+def _lines(
+    path: Path, condition: Condition, parameters: Parameters, vocabulary: Vocabulary, grammar: Grammar
+) -> list[tuple[float, str]]:
+    """The timed lines of a condition, in rising time."""
     if condition.script is not None:
-        return list(load_script(condition.script, parameters, beside=path).steps)
-    found = []
-    for text in condition.steps:
-        time, _, line = text.strip().partition(" ")
-        at_s = plain_number(time)
-        if at_s is None or not at_s >= 0.0 or not line.strip():
-            raise ConfigError(
-                f"{path}: conditions.{name}: {text!r} is no time and line", hint='write it as "0.5 EXPR happiness"'
-            )
-        found.append((at_s, line.strip()))
-    return sorted(found, key=lambda step: step[0])
+        return list(load_script(condition.script, parameters, vocabulary, beside=path).steps)
+    return sorted((read_step(text, grammar) for text in condition.steps), key=lambda step: step[0])
+
+
+def _wrong_lines(settings: StudySettings, grammar: Grammar) -> list[str]:
+    """What is wrong with the steps of conditions, each with its key."""
+    faults = []
+    for name, condition in settings.conditions.items():
+        for i, text in enumerate(condition.steps):
+            try:
+                read_step(text, grammar)
+            except (LineError, ValueError) as error:
+                faults.append(f"conditions.{name}.steps[{i}]: {error} (is {text!r})")
+    return faults
 
 
 def _faults(settings: StudySettings) -> list[str]:

@@ -208,7 +208,6 @@ def _describe_ranges(path: Path) -> Iterator[str]:
 
 def _describe_study(path: Path) -> Iterator[str]:
     study = load_study(path, PARAMETERS)
-    load_stage(str(find_config("stages", study.settings.stage, beside=path)), PARAMETERS)
     conditions = len(study.settings.conditions)
     yield f"study {study.settings.name}: {len(study.trials)} trials of {conditions} conditions, {study.length_s:.0f} s"
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -34,11 +35,10 @@ def run_study(
     Raises ConfigError: the study is wrong, or the folder holds one already; whatever the stage raises.
     """
     study = load_study(path, PARAMETERS, seed)
-    if (folder / "run.rec").exists():
+    if os.path.exists(folder / "run.rec"):  # of Path it raises where the folder may not be looked into
         raise ConfigError(f"{folder}: holds a study already", hint="choose another folder: -o participant-7")
-    folder.mkdir(parents=True, exist_ok=True)
     script = folder / "study.toml"
-    write_script(study, script, PARAMETERS)
+    write_script(study, script)  # makes the folder
     _write_trials(study, folder / "trials.csv")
     options = RunOptions(record=folder / "run.rec", show=script, events=folder / "events.csv", lsl=lsl)
     stage = find_config("stages", study.settings.stage, beside=path)

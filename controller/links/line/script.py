@@ -29,6 +29,8 @@ _WORD = re.compile(r"[!-)+-~]{1,100}")
 _NAME = re.compile(r"(?![.])[^/\\\x00-\x1f\x7f]{1,100}")
 """Of a script that a robot may ask for: no folder, nothing hidden, nothing that a file system refuses."""
 
+MOST_STEPS = 50_000
+"""Timed lines in a script."""
 _Seconds = Annotated[Number, Field(ge=0, le=86_400)]
 
 
@@ -39,7 +41,7 @@ class _File(Settings):
     frames_hz: Annotated[Number, Field(ge=0, le=200)] = 0.0
     marks: dict[str, _Seconds] = {}
     sound: str | None = None
-    steps: Annotated[list[str], Field(max_length=50_000)] = []
+    steps: Annotated[list[str], Field(max_length=MOST_STEPS)] = []
 
 
 @dataclass(frozen=True)
@@ -67,7 +69,7 @@ def _read_steps(file: _File, grammar: Grammar) -> tuple[list[tuple[float, str]],
     faults = []
     for i, text in enumerate(file.steps):
         try:
-            steps.append(_read_step(text, grammar, steps[-1][0] if steps else 0.0))
+            steps.append(read_step(text, grammar, steps[-1][0] if steps else 0.0))
         except (LineError, ValueError) as error:
             faults.append(f"steps[{i}]: {error} (is {text!r})")
     if file.loop_s and steps and steps[-1][0] > file.loop_s:
@@ -82,7 +84,8 @@ def _lies_beside(name: str) -> bool:
     return bool(name) and not Path(name).is_absolute() and ".." not in Path(name).parts and "\0" not in name
 
 
-def _read_step(text: str, grammar: Grammar, earliest_s: float) -> tuple[float, str]:
+def read_step(text: str, grammar: Grammar, earliest_s: float = 0.0) -> tuple[float, str]:
+    """Time (s) and line of a step such as ``0.5 EXPR smile``. Raises LineError or ValueError: what is wrong with it."""
     time_text, _, line = text.strip().partition(" ")
     at_s = plain_number(time_text)
     if at_s is None:

@@ -296,6 +296,27 @@ main()
     assert subprocess.run(command, stdout=subprocess.DEVNULL, timeout=120, check=False).returncode == 0
 
 
+def test_an_interrupt_in_a_callback_of_python_ends_the_command_quietly() -> None:
+    """As in the one that ends the lock of an import, where Python prints what is raised and goes on."""
+    program = """
+import _signal, sys, weakref
+from controller.cli import main
+
+class Finder:
+    def find_spec(self, name, path=None, target=None):
+        if name == "controller.links.line.host":
+            seen = Finder()
+            watch = weakref.ref(seen, lambda _: _signal.raise_signal(_signal.SIGINT))
+            del seen
+
+sys.meta_path.insert(0, Finder())
+main()
+"""
+    command = [sys.executable, "-c", program, "simulate", "dynamixel", "--ids", "1"]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert result.returncode in (0, 130) and result.stderr == ""
+
+
 def test_ctrl_c_while_a_class_is_made_is_no_fault_of_omote(monkeypatch: pytest.MonkeyPatch) -> None:
     def app() -> None:
         raise RuntimeError("Error calling __set_name__") from KeyboardInterrupt()

@@ -33,6 +33,7 @@ length_s = 1.5
 
 @pytest.fixture
 def path(tmp_path: Path) -> Path:
+    (tmp_path / "mine.toml").write_text('name = "mine"\n')
     (tmp_path / "study.toml").write_text(STUDY)
     return tmp_path / "study.toml"
 
@@ -71,13 +72,12 @@ def test_trials_follow_each_other_with_pauses_and_their_lines_lie_inside(path: P
 
 
 def test_omote_check_knows_studies(path: Path) -> None:
-    (path.parent / "mine.toml").write_text('name = "mine"\n')
     assert check_anything(str(path)) == ["study smiles: 12 trials of 3 conditions, 25 s: good"]
 
 
 def test_a_study_is_a_script(path: Path, tmp_path: Path) -> None:
     study = load_study(path, P)
-    write_script(study, tmp_path / "script.toml", P)
+    write_script(study, tmp_path / "script.toml")
     script = load_script(str(tmp_path / "script.toml"), P)
     assert script.marks == study.marks and len(script.steps) == len(study.steps)
 
@@ -86,7 +86,7 @@ def test_a_study_is_a_script(path: Path, tmp_path: Path) -> None:
     ("old", "new", "told"),
     [
         ('steps = ["0 NEUTRAL"]', "", "conditions.still: give one of steps and script"),
-        ('steps = ["0 NEUTRAL"]', 'steps = ["NEUTRAL"]', "'NEUTRAL' is no time and line"),
+        ('steps = ["0 NEUTRAL"]', 'steps = ["NEUTRAL"]', "conditions.still.steps[0]: begins with a time"),
         ('steps = ["0 NEUTRAL"]', 'script = "toor"', "did you mean 'tour'"),
         ("length_s = 1.0", "length_s = 0", "conditions.still.length_s"),
         ("repeats = 4", "repeats = 1000", "3000 trials are more than 2000"),
@@ -101,7 +101,26 @@ def test_what_is_wrong_is_told(path: Path, old: str, new: str, told: str) -> Non
     assert told in str(caught.value)
 
 
-def test_a_line_that_is_none_is_told_with_its_place(path: Path, tmp_path: Path) -> None:
-    path.write_text(STUDY.replace("0 EXPR smile", "0 EXPR smil"))
-    with pytest.raises(ConfigError, match=r"steps\[\d+\]: unknown expression 'smil', did you mean 'smile'"):
-        write_script(load_study(path, P), tmp_path / "script.toml", P)
+def test_every_line_that_is_none_is_told_with_its_place(path: Path) -> None:
+    """Before a folder for it is made, and by omote check as well."""
+    path.write_text(STUDY.replace("0 EXPR smile", "0 EXPR smil").replace("0 NEUTRAL", "NEUTRAL"))
+    for read in (lambda: load_study(path, P), lambda: check_anything(str(path))):
+        with pytest.raises(ConfigError) as caught:
+            read()
+        told = str(caught.value)
+        assert "conditions.smile.steps[0]: unknown expression 'smil', did you mean 'smile'" in told
+        assert "conditions.still.steps[0]: begins with a time in seconds, then the line (is 'NEUTRAL')" in told
+
+
+def test_expressions_of_the_stage_are_known(path: Path) -> None:
+    (path.parent / "mine.toml").write_text('name = "mine"\nvocabularies = ["own.toml"]\n')
+    (path.parent / "own.toml").write_text("[beam]\nweights = { mouthSmileLeft = 1.0 }\n")
+    path.write_text(STUDY.replace("0 EXPR smile", "0 EXPR beam"))
+    assert any(line == "EXPR beam" for _, line in load_study(path, P).steps)
+
+
+def test_more_lines_than_a_script_holds_are_refused(path: Path) -> None:
+    lines = ", ".join(f'"{n / 1000} PING"' for n in range(900))
+    path.write_text(STUDY.replace('"0 NEUTRAL"', lines).replace("repeats = 4", "repeats = 100"))
+    with pytest.raises(ConfigError, match="lines in all are more than 50000"):
+        load_study(path, P)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from controller.base.errors import ConfigError
+from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS as P
 from controller.takes.recording import replay
 from controller.tools.study_run import measured, run_study
@@ -52,6 +52,14 @@ def test_a_study_leaves_events_trials_recording_and_figures(tmp_path: Path) -> N
     assert latency["p50"] >= 0.0 and error["rms_deg"] >= 0.0
     with pytest.raises(ConfigError, match="holds a study already"):
         run_study(tmp_path / "study.toml", tmp_path / "out")
+
+
+def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text('name = "mine"\n')
+    (tmp_path / "study.toml").write_text(STUDY)
+    for folder in (tmp_path / "study.toml", tmp_path / "study.toml" / "under", Path("/proc/x")):
+        with pytest.raises(ControllerError, match=r"study\.toml: cannot be written"):
+            run_study(tmp_path / "study.toml", folder)
 
 
 def test_what_is_measured_is_taken_from_the_report() -> None:
