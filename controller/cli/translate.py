@@ -25,7 +25,7 @@ def translate(
     ] = False,
     token: Annotated[
         str | None,
-        typer.Option("--token", envvar="OMOTE_TOKEN", help="What TCP streams begin with, those of IN and that of OUT."),
+        typer.Option("--token", envvar="OMOTE_TOKEN", help="What streams and datagrams begin with, of IN and of OUT."),
     ] = None,
 ) -> None:
     """Take faces in one format and send them in another, without a stage, a face or servos.

@@ -46,6 +46,11 @@ class Address:
             return False
 
 
+def has_token(form: Format, address: Address) -> bool:
+    """Whether messages of a format have room for a token at an address: where a stream begins, or in each datagram."""
+    return address.transport == "tcp" or (address.transport == "udp" and form.takes_token)
+
+
 def parse_address(text: str, form: Format) -> Address:
     """``HOST:PORT``, ``udp:HOST:PORT``, ``tcp:HOST:PORT``, ``midi:NAME``, a serial port, or ``-``, a standard stream.
 

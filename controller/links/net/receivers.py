@@ -48,14 +48,14 @@ class Receiver(Protocol):
 
 @dataclass(frozen=True)
 class Gate:
-    """What a stream must begin with: ``AUTH token`` and the delimiter of its messages."""
+    """What a stream, or each datagram, must begin with: ``AUTH token`` and the delimiter of its messages."""
 
     token: str
     delimiter: bytes
 
     @property
     def first(self) -> bytes:
-        """The first message of a stream, with its end."""
+        """The first message, with its end."""
         return auth_message(self.token) + self.delimiter
 
     def lets_in(self, start: bytes) -> bool | None:
@@ -63,6 +63,10 @@ class Gate:
         if len(start) < len(self.first):
             return None if self.delimiter not in start else False
         return hmac.compare_digest(start[: len(self.first)], self.first)
+
+    def behind(self, datagram: bytes) -> bytes | None:
+        """What of a datagram follows the token; None where that is not right."""
+        return datagram[len(self.first) :] if self.lets_in(datagram) else None
 
 
 def auth_message(token: str) -> bytes:
@@ -81,12 +85,12 @@ def open_receiver(
     """What an address gives.
 
     connect : call the address instead of waiting for calls (TCP). baud : rate of a serial port. gate : what streams of
-    callers must begin with; None for nothing. greeting : what a program is told that is called.
+    callers and datagrams must begin with; None for nothing. greeting : what a program is told that is called.
 
     Raises LinkError: the address is taken or not of this machine. PortError: the serial port cannot be opened.
     """
     if address.transport == "udp":
-        return UdpReceiver(address)
+        return UdpReceiver(address, gate)
     if address.transport == "tcp":
         return TcpCaller(address, greeting) if connect else TcpListener(address, gate)
     if address.transport == "midi":
@@ -97,10 +101,11 @@ def open_receiver(
 
 
 class UdpReceiver:
-    """Datagrams; a sender is its host."""
+    """Datagrams; a sender is its host. ``gate`` : what each must begin with."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, gate: Gate | None = None) -> None:
         self.error = ""
+        self._gate = gate
         self._socket = bound(address, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
         self._selector = selectors.DefaultSelector()
@@ -114,13 +119,19 @@ class UdpReceiver:
         try:
             while len(found) < MOST_AT_ONCE:
                 data, sender = receive(_CHUNK)
-                if data:
-                    found.append((sender[0], data))
+                if counted := data if self._gate is None else self._behind(self._gate, data):
+                    found.append((sender[0], counted))
         except BlockingIOError:
             pass
         except OSError as error:  # an answer of the network to what another program sent
             self.error = str(error.strerror)
         return found
+
+    def _behind(self, gate: Gate, data: bytes) -> bytes:
+        counted = gate.behind(data)
+        if counted is None:
+            self.error = "a datagram without the token, which was left out"
+        return counted or b""
 
     def send(self, data: bytes, host: str, port: int) -> None:
         """Send a datagram from the same port. Raises OSError."""
