@@ -16,9 +16,7 @@ def translate(
     target: Annotated[str, typer.Argument(metavar="OUT", help="KIND:ADDRESS that faces are sent to.")],
     seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
     mirror: Annotated[bool, typer.Option("--mirror", help="Left and right change places.")] = False,
-    connect: Annotated[
-        bool, typer.Option("--connect", help="Call the address of IN instead of listening (TCP).")
-    ] = False,
+    connect: Annotated[bool, typer.Option("--connect", help="Call the address of IN instead of listening.")] = False,
     baud: Annotated[int, typer.Option(help="Rate of serial ports.", min=300)] = 115_200,
     open_to_network: Annotated[
         bool, typer.Option("--open-to-network", help="Let IN listen where other machines reach.")

@@ -16,7 +16,7 @@ from controller.base.errors import LinkError
 from controller.base.parameters import Parameters
 from controller.formats.format import FORMATS, Format
 from controller.formats.frame import Frame
-from controller.links.net.address import LOOPBACK, Address, has_token, parse_address
+from controller.links.net.address import LOOPBACK, Address, has_token, is_called, parse_address
 from controller.links.net.decoding import Decoding
 from controller.links.net.meter import Meter
 from controller.links.net.receivers import Gate, InputReceiver, greeting_of, open_receiver
@@ -33,7 +33,7 @@ _HINT = "write it as KIND:ADDRESS, for example livelink:127.0.0.1:11111; omote p
 class Options:
     """How to translate.
 
-    mirror : left and right change places. connect : call the input's address (TCP). baud : of serial ports.
+    mirror : left and right change places. connect : call the input's address. baud : of serial ports.
     open_to_network : listen where other machines reach. token : what TCP streams, and datagrams of omote's own formats,
         begin with, in and out.
     seconds : how long; None until the input ends.
@@ -126,7 +126,7 @@ def _open_input(source: str, parameters: Parameters, options: Options, closers: 
         )
     if not address.is_local and form.takes_token and options.token is None:
         raise LinkError(f"{source}: other machines need a token there", hint="choose one and add --token TOKEN")
-    if options.connect and address.transport != "tcp":
+    if options.connect and not is_called(form, address):
         raise LinkError(f"{source}: only TCP is called", hint=f"write it as {form.kind}:tcp:HOST:PORT")
     return LiveInput(form, address, parameters, options, closers)
 

@@ -51,6 +51,11 @@ def has_token(form: Format, address: Address) -> bool:
     return address.transport == "tcp" or (address.transport == "udp" and form.takes_token)
 
 
+def is_called(form: Format, address: Address) -> bool:
+    """Whether a program at an address can be called for faces: over TCP, or by UDP where the format has words for it."""
+    return address.transport == "tcp" or (address.transport == "udp" and form.greeting != b"")
+
+
 def parse_address(text: str, form: Format) -> Address:
     """``HOST:PORT``, ``udp:HOST:PORT``, ``tcp:HOST:PORT``, ``midi:NAME``, a serial port, or ``-``, a standard stream.
 

@@ -84,11 +84,15 @@ def open_receiver(
 ) -> Receiver:
     """What an address gives.
 
-    connect : call the address instead of waiting for calls (TCP). baud : rate of a serial port. gate : what streams of
-    callers and datagrams must begin with; None for nothing. greeting : what a program is told that is called.
+    connect : call the address instead of waiting for calls, or ask it by UDP. baud : rate of a serial port. gate : what
+    streams of callers and datagrams must begin with; None for nothing. greeting : what a program that is called is told.
 
     Raises LinkError: the address is taken or not of this machine. PortError: the serial port cannot be opened.
     """
+    if address.transport == "udp" and connect:
+        from controller.links.net.udp_caller import UdpCaller  # it takes the receiver below
+
+        return UdpCaller(address, greeting)
     if address.transport == "udp":
         return UdpReceiver(address, gate)
     if address.transport == "tcp":

@@ -8,7 +8,7 @@ from typing import ClassVar
 from controller.base.parameters import REGIONS, did_you_mean
 from controller.formats.format import Format
 from controller.links.access import check_word
-from controller.links.net.address import Address, has_token, parse_address
+from controller.links.net.address import Address, has_token, is_called, parse_address
 from drivers.base.options import Option, option
 
 LOST = ("fade", "hold", "neutral", "stop")
@@ -29,7 +29,7 @@ class NetSettings:
     """The format; a subclass for each."""
 
     listen: str | None = option("HOST:PORT at which faces are taken; - for standard input.")
-    connect: str | None = option("HOST:PORT of a program that is called for faces (TCP).")
+    connect: str | None = option("HOST:PORT of a program that is called for faces.")
     port: str | None = option("Serial port at which faces are taken.")
     baud: int = option("Rate of a serial port.", 115_200, at_least=300, at_most=12_000_000)
     send: str | None = option("HOST:PORT, or serial port, to which the present face is sent.")
@@ -58,7 +58,7 @@ class NetSettings:
             raise ValueError(f'give listen, connect, port or send, as listen = "127.0.0.1:{self.form.port or 9400}"')
         if sum(each is not None for each in (self.listen, self.connect, self.port)) > 1:
             raise ValueError("give only one of listen, connect and port")
-        if self.connect is not None and parse_address(self.connect, self.form).transport != "tcp":
+        if self.connect is not None and not is_called(self.form, parse_address(self.connect, self.form)):
             raise ValueError("connect: only TCP is called; write it as tcp:HOST:PORT")
         if self.send is not None:
             parse_address(self.send, self.form)
