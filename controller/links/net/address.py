@@ -52,7 +52,7 @@ def has_token(form: Format, address: Address) -> bool:
 
 
 def is_called(form: Format, address: Address) -> bool:
-    """Whether a program at an address can be called for faces: over TCP, or by UDP where the format has words for it."""
+    """Whether a program at an address can be called for faces: over TCP, or by UDP where the format can ask."""
     return address.transport == "tcp" or (address.transport == "udp" and form.greeting != b"")
 
 

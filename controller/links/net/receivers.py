@@ -85,7 +85,7 @@ def open_receiver(
     """What an address gives.
 
     connect : call the address instead of waiting for calls, or ask it by UDP. baud : rate of a serial port. gate : what
-    streams of callers and datagrams must begin with; None for nothing. greeting : what a program that is called is told.
+    streams of callers and datagrams must begin with; None for nothing. greeting : what a program hears that is called.
 
     Raises LinkError: the address is taken or not of this machine. PortError: the serial port cannot be opened.
     """
