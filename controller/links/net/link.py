@@ -69,7 +69,7 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
     learns = settings.calibrate != "off" or settings.ranges
     path = state_file(f"{settings.form.kind}-{settings.source or settings.layer}") if learns else None
     try:
-        incoming = Incoming(settings, receiver, context.sink, name, path)
+        incoming = Incoming(settings, receiver, context.sink, name, path, gate)
     except BaseException:
         receiver.close()
         raise

@@ -8,11 +8,12 @@ import selectors
 import socket
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from controller.base.errors import LinkError
 from controller.formats.format import Format
+from controller.formats.frame import Refusals
 from controller.links.access import WebRequests
 from controller.links.net.address import Address
 from drivers.base.errors import PortError
@@ -48,10 +49,19 @@ class Receiver(Protocol):
 
 @dataclass(frozen=True)
 class Gate:
-    """What a stream, or each datagram, must begin with: ``AUTH token`` and the delimiter of its messages."""
+    """What a stream, or each datagram, must begin with: ``AUTH token`` and the delimiter of its messages.
+
+    turned_away : how many did not.
+    """
 
     token: str
     delimiter: bytes
+    turned_away: Refusals = field(default_factory=Refusals)
+
+    def turn_away(self, what: str) -> str:
+        """Count one that did not begin so; says what, for people."""
+        self.turned_away.add(f"{what} without the token")
+        return f"{what} without the token, which was turned away"
 
     @property
     def first(self) -> bytes:
@@ -134,7 +144,7 @@ class UdpReceiver:
     def _behind(self, gate: Gate, data: bytes) -> bytes:
         counted = gate.behind(data)
         if counted is None:
-            self.error = "a datagram without the token, which was left out"
+            self.error = gate.turn_away("a datagram")
         return counted or b""
 
     def send(self, data: bytes, host: str, port: int) -> None:
@@ -153,9 +163,11 @@ class _Call:
         self.sender, self._gate = sender, gate
         self._web, self._start, self._since_s = WebRequests(), b"", time.monotonic()
 
-    def is_late(self) -> bool:
-        """Whether it has not given its token in time."""
-        return self._gate is not None and time.monotonic() - self._since_s > AUTH_S
+    def late(self) -> str:
+        """What it is, where it has not given its token in time."""
+        if self._gate is None or time.monotonic() - self._since_s <= AUTH_S:
+            return ""
+        return self._gate.turn_away("a caller")
 
     def take(self, data: bytes) -> bytes:
         """What of a piece of its stream counts. Raises ValueError: it must hang up; says why."""
@@ -168,7 +180,7 @@ class _Call:
             case None:
                 return b""
             case False:
-                raise ValueError("a caller without the token, who was turned away")
+                raise ValueError(self._gate.turn_away("a caller"))
         data, self._start = self._start[len(self._gate.first) :], b""
         self._gate = None
         return data
@@ -193,9 +205,10 @@ class TcpListener:
                 self._accept()
             else:
                 found += self._read(key.fileobj, key.data)  # type: ignore[arg-type]
-        for call in [call for call, caller in self._calls.items() if caller.is_late()]:
-            self.error = "a caller without the token, who was turned away"
-            self._hang_up(call)
+        for call, caller in [*self._calls.items()]:
+            if late := caller.late():
+                self.error = late
+                self._hang_up(call)
         return found
 
     def close(self) -> None:

@@ -26,30 +26,25 @@ class UdpCaller:
         self._port, self._greeting = address.port, greeting
         self._receiver = UdpReceiver(Address("udp", own, address.port))
         self._quiet_since_s = -ASK_S
-        self._asked = ""
-
-    @property
-    def error(self) -> str:
-        """What went wrong last."""
-        return self._receiver.error or self._asked
+        self.error = ""
 
     def receive(self, timeout_s: float) -> Received:
         if time.monotonic() - self._quiet_since_s >= ASK_S:
             self._ask()
         found = [each for each in self._receiver.receive(timeout_s) if each[0] == self._host]
         if found:
-            self._quiet_since_s, self._asked = time.monotonic(), ""
+            self._quiet_since_s, self.error = time.monotonic(), self._receiver.error
         return found
 
     def close(self) -> None:
         self._receiver.close()
 
     def _ask(self) -> None:
-        self._quiet_since_s, self._asked = time.monotonic(), f"{self._host} was asked and has not answered"
+        self._quiet_since_s, self.error = time.monotonic(), f"{self._host} was asked and has not answered"
         try:
             self._receiver.send(self._greeting, self._host, self._port)
         except OSError as error:
-            self._asked = error.strerror or type(error).__name__
+            self.error = error.strerror or type(error).__name__
 
 
 def _hosts(address: Address) -> tuple[str, str]:

@@ -205,6 +205,7 @@ def test_beyond_this_machine_a_stream_of_ours_needs_a_token(
         with socket.create_connection(("127.0.0.1", port)) as call:
             call.sendall(b"time,jawOpen\n0,0.5\n")
             wait_for(lambda: "without the token" in link.report()["error"])
+            assert link.report()["refused"] == {"a caller without the token": 1}
 
 
 def test_an_unknown_layer_is_told_with_those_there_are() -> None:
