@@ -21,10 +21,15 @@ from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from typing import Any, Self, TypeVar
 
-from websockets.asyncio.client import ClientConnection as AsyncConnection
-from websockets.asyncio.client import connect as connect_async
-from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidURI
-from websockets.sync.client import ClientConnection, connect
+try:
+    from websockets.asyncio.client import ClientConnection as AsyncConnection
+    from websockets.asyncio.client import connect as connect_async
+    from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidURI
+    from websockets.sync.client import ClientConnection, connect
+except ImportError as error:
+    raise ImportError(
+        f"controller.client needs the package websockets, 13 or newer: pip install 'omote[web]' ({error})"
+    ) from error
 
 URL = "ws://127.0.0.1:8765"
 WAIT_S = 5.0

@@ -1,4 +1,4 @@
-"""examples/arduino/knob_face: the header reads what omote writes and the other way round; C and C++ compile it."""
+"""examples/4_knob_face: the header reads what omote writes and the other way round; C and C++ compile it."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from controller.formats.kinds.binary_format import BinaryDecoder, BinaryEncoder
 from tests.arduino import STUB
 from tests.controller.formats.faces import face
 
-FOLDER = Path(__file__).resolve().parent.parent / "examples" / "arduino" / "knob_face"
+FOLDER = Path(__file__).resolve().parent.parent / "examples" / "4_knob_face"
 STRICT = ["-Wall", "-Wextra", "-Werror", "-Wconversion", "-Wno-unused-function"]
 SANITIZED = "-fsanitize=address,undefined"
 ECHO = """
@@ -90,7 +90,7 @@ def test_rubbish_is_refused_and_the_next_frame_is_read(echo: Path) -> None:
 def test_the_sketch_compiles_and_opens_the_jaw(tmp_path: Path) -> None:
     more = "size_t serial_write(const uint8_t *d, size_t n) { return (size_t)write(1, d, n); }\n"
     more += "void analogWrite(int, int) {}\n"
-    sketch = (FOLDER / "knob_face.ino").read_text().replace("Serial.write", "serial_write")
+    sketch = (FOLDER / "4_knob_face.ino").read_text().replace("Serial.write", "serial_write")
     code = f"{STUB}{more}{sketch}\nint main() {{ setup(); for (;;) loop(); }}\n"
     program = build(tmp_path, "g++", "c++11", code)
     (tmp_path / "inputs").write_text("512 1")

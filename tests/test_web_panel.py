@@ -134,6 +134,8 @@ def test_two_panels_show_each_others_changes_without_leaving_their_origin(tmp_pa
         browser.wait("document.querySelectorAll('.servo').length === 24")
         browser.evaluate("document.getElementById('tab-links').click()")
         browser.wait("document.querySelectorAll('#link-list td').length > 0")
+        head = browser.evaluate("[...document.querySelectorAll('#link-list th')].map(each => each.textContent)")
+        assert head == ["Link", "State", "In", "Jitter", "Lost", "Age", "Refused"]
         loaded = browser.evaluate("performance.getEntriesByType('resource').map(each => new URL(each.name).host)")
         assert loaded and set(loaded) == {where}
         assert browser.errors == []

@@ -1,4 +1,4 @@
-"""examples/websocket_page.html in a real Chromium, and examples/websocket_client.py, over a real link."""
+"""examples/2_browser_page.html in a real Chromium, and examples/1_python_client.py, over a real link."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def site(root: Path) -> Iterator[str]:
 def test_a_slider_of_the_page_moves_the_face_and_its_button_stops_the_servos(site: str) -> None:
     with served() as (state, link, url), page(CHROMIUM or "") as browser:
         browser.resize(390, 844)
-        browser.open(f"{site}/websocket_page.html?face={url}")
+        browser.open(f"{site}/2_browser_page.html?face={url}")
         browser.wait("document.getElementById('status').dataset.on === 'true'")
         assert browser.evaluate("document.querySelectorAll('input[type=range]').length") == len(P)
         assert browser.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), "fits a phone"
@@ -63,7 +63,7 @@ def test_a_slider_of_the_page_moves_the_face_and_its_button_stops_the_servos(sit
 
 @pytest.mark.slow
 def test_the_python_example_talks_to_a_face(root: Path) -> None:
-    program = [sys.executable, str(root / "examples" / "websocket_client.py")]
+    program = [sys.executable, str(root / "examples" / "1_python_client.py")]
     with served() as (state, _, url):
         done = subprocess.run([*program, url], capture_output=True, text=True, timeout=60, cwd=root, check=False)
         assert (done.returncode, done.stderr) == (0, "")

@@ -65,6 +65,6 @@ class EventLog:
 
 
 def _outlet() -> Any:
-    with importing("markers of LSL", "pylsl"):
+    with importing("sending markers of LSL", "pylsl"):
         import pylsl  # optional: the extra lsl
     return pylsl.StreamOutlet(pylsl.StreamInfo("omote", "Markers", 1, 0, "string", "omote-marks"))

@@ -1,21 +1,24 @@
-"""State for the panel besides the values: the layer that holds each parameter, what the servos show, who stopped them.
+"""State for the panel besides the values: who holds each parameter, what the servos show, who stopped them, the links.
 
 The body writes it ten times a second to a mailbox; main reads it when it draws.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from controller.base.mailboxes import Mailbox
-from controller.base.parameters import REGIONS, Parameters
+from controller.base.parameters import REGIONS, Floats, Parameters
 from controller.layers.commands import CommandState
 from controller.robot.following import MeasuredFace
 
 _NAME_LENGTH = 64
 """Characters of the name of who stopped the servos, a number each: a mailbox carries numbers only."""
+_LINKS_LENGTH = 2048
+"""Characters of the table of links."""
 
 
 class PanelState:
@@ -27,13 +30,13 @@ class PanelState:
     def __init__(self, mailbox: Mailbox, layers: Sequence[str], parameters: Parameters) -> None:
         self._mailbox, self._layers, self._p = mailbox, tuple(layers), len(parameters)
         self._all = np.full(self.size(parameters), np.nan)
-        ends = np.cumsum([self._p, self._p, len(REGIONS)])
-        self._holders, self._measured, self._away, self._stopped = np.split(self._all, ends)
+        ends = np.cumsum([self._p, self._p, len(REGIONS), _NAME_LENGTH])
+        self._holders, self._measured, self._away, self._stopped, self._links = np.split(self._all, ends)
 
     @staticmethod
     def size(parameters: Parameters) -> int:
-        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region, a name."""
-        return 2 * len(parameters) + len(REGIONS) + _NAME_LENGTH
+        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region, name, links."""
+        return 2 * len(parameters) + len(REGIONS) + _NAME_LENGTH + _LINKS_LENGTH
 
     def publish(self, state: CommandState, measured_face: MeasuredFace | None) -> None:
         """Write the state of this moment; ``measured_face`` None without servos."""
@@ -46,9 +49,8 @@ class PanelState:
             away = measured_face.differences()
             self._away[:] = [away.get(region, np.nan) for region in REGIONS]
         stopped = state.stop_latch.stopped
-        letters = [ord(letter) for letter in stopped.who[:_NAME_LENGTH]] if stopped is not None else []
-        self._stopped[:] = np.nan
-        self._stopped[: len(letters)] = letters
+        _write(self._stopped, stopped.who if stopped is not None else "")
+        _write(self._links, "\n".join("\t".join(row) for row in link_rows(state.link_records())))
         self._mailbox.publish(self._all)
 
     def refresh(self) -> None:
@@ -64,7 +66,13 @@ class PanelState:
     @property
     def stopped_by(self) -> str:
         """Who stopped the servos; empty while they may move."""
-        return "".join(chr(int(letter)) for letter in self._stopped[np.isfinite(self._stopped)])
+        return _read(self._stopped)
+
+    @property
+    def links(self) -> list[list[str]]:
+        """Of each link what :data:`LINK_COLUMNS` name."""
+        rows = [row.split("\t") for row in _read(self._links).splitlines()]
+        return [row for row in rows if len(row) == len(LINK_COLUMNS)]
 
     def measured(self, index: int) -> float | None:
         """What the servos show of a parameter; None where that is not known."""
@@ -74,3 +82,37 @@ class PanelState:
         """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""
         value = self._away[REGIONS.index(region)]
         return float(value) if np.isfinite(value) else None
+
+
+LINK_COLUMNS = ("link", "in", "jitter", "lost", "age", "state")
+
+
+def link_rows(records: Iterable[Mapping[str, Any]]) -> list[list[str]]:
+    """Reports of links as rows for people: address, rate, jitter, loss, age, and what is wrong."""
+    return [[" ".join(str(cell).split()) for cell in _row(record)] for record in records]
+
+
+def _row(record: Mapping[str, Any]) -> list[object]:
+    fault = record.get("fault") or record.get("error") or record.get("send_error") or "good"
+    if "rate_hz" not in record:
+        return [record.get("port", ""), "", "", "", "", fault]
+    age = record["age_s"]
+    return [
+        record.get("port", ""),
+        f"{record['rate_hz']:.0f} /s",
+        f"{record['jitter_ms']:.1f} ms",
+        record["lost"],
+        "never" if age is None else f"{age:.1f} s",
+        fault,
+    ]
+
+
+def _write(place: Floats, text: str) -> None:
+    """Write a text as numbers, as much as there is room for."""
+    letters = [ord(letter) for letter in text[: len(place)]]
+    place[:] = np.nan
+    place[: len(letters)] = letters
+
+
+def _read(place: Floats) -> str:
+    return "".join(chr(int(letter)) for letter in place[np.isfinite(place)])

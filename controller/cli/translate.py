@@ -16,16 +16,14 @@ def translate(
     target: Annotated[str, typer.Argument(metavar="OUT", help="KIND:ADDRESS that faces are sent to.")],
     seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
     mirror: Annotated[bool, typer.Option("--mirror", help="Left and right change places.")] = False,
-    connect: Annotated[
-        bool, typer.Option("--connect", help="Call the address of IN instead of listening (TCP).")
-    ] = False,
+    connect: Annotated[bool, typer.Option("--connect", help="Call the address of IN instead of listening.")] = False,
     baud: Annotated[int, typer.Option(help="Rate of serial ports.", min=300)] = 115_200,
     open_to_network: Annotated[
         bool, typer.Option("--open-to-network", help="Let IN listen where other machines reach.")
     ] = False,
     token: Annotated[
         str | None,
-        typer.Option("--token", envvar="OMOTE_TOKEN", help="What TCP streams begin with, those of IN and that of OUT."),
+        typer.Option("--token", envvar="OMOTE_TOKEN", help="What streams and datagrams begin with, of IN and of OUT."),
     ] = None,
 ) -> None:
     """Take faces in one format and send them in another, without a stage, a face or servos.

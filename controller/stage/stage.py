@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
-from controller.base.config import Settings, load
+from controller.base.config import Settings, read_toml
+from controller.base.config import check as check_table
 from controller.base.errors import ConfigError, ParameterError, TakeError
 from controller.base.parameters import Parameters, did_you_mean
 from controller.base.paths import find_config
@@ -80,7 +81,7 @@ def check_identity(head: Path, wanted: Mapping[str, float]) -> None:
 
 
 class StageSettings(Settings):
-    """The contents of a stage file."""
+    """The contents of a stage file; without ``name`` the file's own counts."""
 
     name: str
     description: str = ""
@@ -198,7 +199,7 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
         found[:] = [_gather(path, settings, parameters, faults)]
         return faults
 
-    load(path, StageSettings, check)
+    check_table({"name": path.stem, **read_toml(path)}, StageSettings, path, check)
     return found[0]
 
 
@@ -211,7 +212,10 @@ def _layer_faults(links: Sequence[LinkSettings], layers: Sequence[LayerSettings]
         if layer is None:
             continue
         if layer not in names:
-            faults.append(f"links[{i}].layer: unknown layer {layer!r}{did_you_mean(layer, names)}")
+            faults.append(
+                f"links[{i}].layer: unknown layer {layer!r}{did_you_mean(layer, names)}; a new one needs a table, "
+                f"[layers.{layer}] with priority = 55"
+            )
         elif writers.setdefault(layer, i) != i:
             faults.append(
                 f"links[{i}].layer: links[{writers[layer]}] writes {layer} already; give this one its own, as "

@@ -15,6 +15,7 @@ from controller.base.paths import find_config
 from controller.body.messages import RunOptions
 from controller.stage.study import Study, load_study, write_script
 from controller.tools.stage_run import StageRun, write_report
+from surface.base.extras import require
 
 _AFTER_S = 0.5
 
@@ -32,8 +33,11 @@ def run_study(
 
     seed : instead of the file's. lsl : send the marks as LSL markers. show : runs a stage for seconds.
 
-    Raises ConfigError: the study is wrong, or the folder holds one already; whatever the stage raises.
+    Raises ConfigError: the study is wrong, or the folder holds one already. MissingPackage: ``lsl`` without pylsl;
+    whatever the stage raises.
     """
+    if lsl:  # before there is a folder, which another try would be refused
+        require("sending markers of LSL", "pylsl")
     study = load_study(path, PARAMETERS, seed)
     if os.path.exists(folder / "run.rec"):  # of Path it raises where the folder may not be looked into
         raise ConfigError(f"{folder}: holds a study already", hint="choose another folder: -o participant-7")

@@ -16,7 +16,7 @@ from controller.base.errors import LinkError
 from controller.base.parameters import Parameters
 from controller.formats.format import FORMATS, Format
 from controller.formats.frame import Frame
-from controller.links.net.address import LOOPBACK, Address, parse_address
+from controller.links.net.address import LOOPBACK, Address, has_token, is_called, parse_address
 from controller.links.net.decoding import Decoding
 from controller.links.net.meter import Meter
 from controller.links.net.receivers import Gate, InputReceiver, greeting_of, open_receiver
@@ -33,8 +33,9 @@ _HINT = "write it as KIND:ADDRESS, for example livelink:127.0.0.1:11111; omote p
 class Options:
     """How to translate.
 
-    mirror : left and right change places. connect : call the input's address (TCP). baud : of serial ports.
-    open_to_network : listen where other machines reach. token : what TCP streams begin with, in and out.
+    mirror : left and right change places. connect : call the input's address. baud : of serial ports.
+    open_to_network : listen where other machines reach. token : what TCP streams, and datagrams of omote's own formats,
+        begin with, in and out.
     seconds : how long; None until the input ends.
     stop : ends it when it is set.
     """
@@ -90,7 +91,8 @@ def translate(source: str, target: str, parameters: Parameters, options: Options
     form, address = parse_end(target)
     with ExitStack() as closers:
         given = _open_input(source, parameters, options, closers)
-        sender = open_sender(address, form.delimiter, options.baud, options.token)
+        token = options.token if has_token(form, address) else None
+        sender = open_sender(address, form.delimiter, options.baud, token)
         closers.callback(sender.close)
         ready(f"translating {source} to {form.kind} at {address}")
         with suppress(KeyboardInterrupt):
@@ -122,9 +124,9 @@ def _open_input(source: str, parameters: Parameters, options: Options, closers: 
             f"{source}: every machine that reaches this one could send faces there",
             hint="add --open-to-network where that is meant",
         )
-    if not address.is_local and form.takes_token and address.transport == "tcp" and options.token is None:
+    if not address.is_local and form.takes_token and options.token is None:
         raise LinkError(f"{source}: other machines need a token there", hint="choose one and add --token TOKEN")
-    if options.connect and address.transport != "tcp":
+    if options.connect and not is_called(form, address):
         raise LinkError(f"{source}: only TCP is called", hint=f"write it as {form.kind}:tcp:HOST:PORT")
     return LiveInput(form, address, parameters, options, closers)
 
@@ -135,7 +137,7 @@ class LiveInput:
     def __init__(
         self, form: Format, address: Address, parameters: Parameters, options: Options, closers: ExitStack
     ) -> None:
-        gate = None if options.token is None else Gate(options.token, form.delimiter)
+        gate = Gate(options.token, form.delimiter) if options.token is not None and has_token(form, address) else None
         self._receiver = open_receiver(address, connect=options.connect, baud=options.baud, gate=gate,
                                        greeting=greeting_of(form, options.token))  # fmt: skip
         closers.callback(self._receiver.close)

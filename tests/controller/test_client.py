@@ -116,6 +116,12 @@ def test_a_wrong_token_is_told_in_the_words_of_the_face() -> None:
             assert face.hello()["version"] == 1
 
 
+def test_without_its_package_the_extra_is_named() -> None:
+    program = "import sys; sys.modules['websockets'] = None; import controller.client"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=False)
+    assert done.returncode == 1 and "pip install 'omote[web]'" in done.stderr.splitlines()[-1]
+
+
 def test_it_loads_nothing_heavy() -> None:
     code = "import sys, controller.client; print(*sorted({name.partition('.')[0] for name in sys.modules}))"
     root = Path(__file__).resolve().parents[2]

@@ -17,5 +17,6 @@ FORMAT = Format(
     encoder=partial(IFacialMocapEncoder, between="&", suffixed=False),
     carries=carries,
     quantum=0.005,
+    greeting=b"FACEMOTION3D_OtherStreaming",
     note="angles are not rounded",
 )

@@ -135,5 +135,6 @@ FORMAT = Format(
     carries=carries,
     quantum=0.005,
     delimiter=b"___iFacialMocap",
+    greeting=b"iFacialMocap_sahuasouryya9218sauhuiayeta91555dy3719",
     note="angles are not rounded",
 )

@@ -46,6 +46,16 @@ class Address:
             return False
 
 
+def has_token(form: Format, address: Address) -> bool:
+    """Whether messages of a format have room for a token at an address: where a stream begins, or in each datagram."""
+    return address.transport == "tcp" or (address.transport == "udp" and form.takes_token)
+
+
+def is_called(form: Format, address: Address) -> bool:
+    """Whether a program at an address can be called for faces: over TCP, or by UDP where the format can ask."""
+    return address.transport == "tcp" or (address.transport == "udp" and form.greeting != b"")
+
+
 def parse_address(text: str, form: Format) -> Address:
     """``HOST:PORT``, ``udp:HOST:PORT``, ``tcp:HOST:PORT``, ``midi:NAME``, a serial port, or ``-``, a standard stream.
 

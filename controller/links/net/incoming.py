@@ -11,10 +11,11 @@ import numpy as np
 
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.stop_latch import StopLatch
+from controller.formats.frame import Refusals
 from controller.links.net.conditioning import Conditioning
 from controller.links.net.decoding import Arrived, Decoding
 from controller.links.net.meter import Meter
-from controller.links.net.receivers import Receiver
+from controller.links.net.receivers import Gate, Receiver
 from controller.links.net.settings import NetSettings
 
 PASS_S = 0.004
@@ -42,14 +43,15 @@ class LayerSink(Protocol):
 class Incoming:
     """Listens in its own thread until it is stopped.
 
-    name : of the link, for STOP and the thread. path : file in which a neutral face is kept.
+    name : of the link, for STOP and the thread. path : file in which a neutral face is kept. gate : the receiver's.
 
     Raises LinkError: that file is damaged.
     """
 
     def __init__(
-        self, settings: NetSettings, receiver: Receiver, sink: LayerSink, name: str, path: Path | None = None
-    ) -> None:
+        self, settings: NetSettings, receiver: Receiver, sink: LayerSink, name: str, path: Path | None = None,
+        gate: Gate | None = None,
+    ) -> None:  # fmt: skip
         self.name = name
         self._settings, self._receiver, self._sink = settings, receiver, sink
         address = settings.incoming
@@ -57,6 +59,7 @@ class Incoming:
         self._decoding = Decoding(settings.form, sink.parameters, streams=streams, newest=True)
         self._conditioning = Conditioning(settings, sink.parameters, path)
         self._meter = Meter()
+        self._turned_away = gate.turned_away if gate is not None else Refusals()
         self._sender, self._heard_s, self._face_s = "", -np.inf, -np.inf
         self._lost = True  # nothing came yet: nothing to give back
         self._values, self._mask = sink.parameters.neutral(), np.zeros(len(sink.parameters), dtype=bool)
@@ -85,7 +88,7 @@ class Incoming:
         now_s = time.monotonic()
         return {
             "accepted": self._meter.frames,
-            "refused": dict(self._decoding.refused),
+            "refused": {**self._decoding.refused, **self._turned_away},
             **self._meter.report(now_s),
             "sender": self._sender,
             "face": not self._lost,

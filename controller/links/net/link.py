@@ -8,6 +8,7 @@ from controller.base.errors import LinkError
 from controller.base.parameters import did_you_mean
 from controller.links.access import token_for
 from controller.links.kind import LinkContext
+from controller.links.net.address import has_token
 from controller.links.net.incoming import Incoming
 from controller.links.net.neutral import state_file
 from controller.links.net.outgoing import Outgoing
@@ -58,7 +59,8 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
     assert address is not None
     token = token_for(name, address.host, settings.token) if settings.needs_token else None
     if not address.is_local and settings.connect is None and token is None:
-        log.warning("%s: every machine that reaches %s can move this face and its servos", name, address)
+        log.warning("%s: every machine that reaches %s can move this face and its servos, without a password%s",
+                    name, address, "" if settings.source else '; source = "HOST" takes one sender only')  # fmt: skip
     gate = None if token is None else Gate(token, settings.form.delimiter)
     greeting = greeting_of(settings.form, settings.token)
     receiver = open_receiver(
@@ -67,7 +69,7 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
     learns = settings.calibrate != "off" or settings.ranges
     path = state_file(f"{settings.form.kind}-{settings.source or settings.layer}") if learns else None
     try:
-        incoming = Incoming(settings, receiver, context.sink, name, path)
+        incoming = Incoming(settings, receiver, context.sink, name, path, gate)
     except BaseException:
         receiver.close()
         raise
@@ -77,7 +79,8 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
 
 def _open_outgoing(settings: NetSettings, context: LinkContext, name: str) -> Outgoing:
     assert settings.outgoing is not None
-    sender = open_sender(settings.outgoing, settings.form.delimiter, settings.baud, settings.token)
+    token = settings.token if has_token(settings.form, settings.outgoing) else None
+    sender = open_sender(settings.outgoing, settings.form.delimiter, settings.baud, token)
     outgoing = Outgoing(settings, sender, context.sink, name)
     context.closers.callback(outgoing.stop)
     return outgoing

@@ -6,6 +6,54 @@ import math
 
 _SHARE = 0.05  # of a new interval in the averages
 _LONGEST_S = 1.0  # a longer interval is a pause and none of the rate's
+_LARGEST_STEP = 8
+_MOST_LATE, _MOST_MISSING = 100, 3000
+"""Frames by which one may come late, and that may be missing at once; beyond, the source began anew (RFC 3550, A.1)."""
+
+
+class Numbers:
+    """Counts the frames that are missing between the numbers that a source gives them.
+
+    As RFC 3550, appendix A.3: those to be expected from the lowest to the highest number, less those that came, so that
+    a frame which overtook another is not lost. Numbers may rise by more than one.
+    """
+
+    def __init__(self) -> None:
+        self._before = self._came = 0
+        self._first = self._highest = -1
+        self._rises = [0] * _LARGEST_STEP
+
+    def note(self, number: int, skipped: int = 0) -> None:
+        """A frame came; ``skipped`` older ones before it were not read."""
+        rise = number - self._highest
+        if self._first < 0 or not -_MOST_LATE <= rise / self._step <= _MOST_MISSING:
+            self._begin(number)
+        elif rise > 0:
+            if skipped == 0 and rise <= _LARGEST_STEP:
+                self._rises[rise - 1] += 1
+            self._highest = number
+        self._first = min(self._first, number)
+        self._came += 1 + skipped
+
+    @property
+    def lost(self) -> int:
+        """How many are missing."""
+        return self._before + self._missing()
+
+    @property
+    def _step(self) -> int:
+        """By how much the number usually rises; the smaller of two that are as usual."""
+        return 1 + self._rises.index(max(self._rises))
+
+    def _missing(self) -> int:
+        expected = round((self._highest - self._first) / self._step) + 1
+        return max(0, expected - self._came) if self._came else 0
+
+    def _begin(self, number: int) -> None:
+        """The source began anew: at midnight, after the largest number, or as it was started."""
+        self._before += self._missing()
+        self._first = self._highest = number
+        self._came = 0
 
 
 class Meter:
@@ -13,15 +61,14 @@ class Meter:
 
     Attributes
     ----------
-    frames : how many came. lost : how many were missing between their numbers.
+    frames : how many came.
     """
 
     def __init__(self) -> None:
-        self.frames = self.lost = 0
+        self.frames = 0
         self._last_s = -math.inf
         self._interval_s = self._deviation_s = 0.0
-        self._sequence: int | None = None
-        self._step = 0
+        self._numbers = Numbers()
 
     def note(self, now_s: float, sequence: int | None = None, skipped: int = 0) -> None:
         """A frame arrived; ``skipped`` older ones before it were not read."""
@@ -31,7 +78,12 @@ class Meter:
         if interval_s < _LONGEST_S:
             self._average(interval_s)
         if sequence is not None:
-            self._count(sequence, skipped)
+            self._numbers.note(sequence, skipped)
+
+    @property
+    def lost(self) -> int:
+        """How many were missing between their numbers."""
+        return self._numbers.lost
 
     def age_s(self, now_s: float) -> float | None:
         """How old the last frame is; None before the first."""
@@ -52,14 +104,3 @@ class Meter:
         share = _SHARE if self._interval_s > 0.0 else 1.0
         self._deviation_s += _SHARE * (abs(interval_s - self._interval_s) * (share < 1.0) - self._deviation_s)
         self._interval_s += share * (interval_s - self._interval_s)
-
-    def _count(self, sequence: int, skipped: int) -> None:
-        """Frames are missing where the number rises by more than it usually does; a fall begins anew."""
-        before, self._sequence = self._sequence, sequence
-        if before is None or sequence <= before:
-            return
-        step = sequence - before
-        if skipped == 0:
-            self._step = min(self._step, step) if self._step else step
-        if self._step:
-            self.lost += max(0, round(step / self._step) - 1 - skipped)

@@ -8,11 +8,12 @@ import selectors
 import socket
 import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from controller.base.errors import LinkError
 from controller.formats.format import Format
+from controller.formats.frame import Refusals
 from controller.links.access import WebRequests
 from controller.links.net.address import Address
 from drivers.base.errors import PortError
@@ -48,14 +49,23 @@ class Receiver(Protocol):
 
 @dataclass(frozen=True)
 class Gate:
-    """What a stream must begin with: ``AUTH token`` and the delimiter of its messages."""
+    """What a stream, or each datagram, must begin with: ``AUTH token`` and the delimiter of its messages.
+
+    turned_away : how many did not.
+    """
 
     token: str
     delimiter: bytes
+    turned_away: Refusals = field(default_factory=Refusals)
+
+    def turn_away(self, what: str) -> str:
+        """Count one that did not begin so; says what, for people."""
+        self.turned_away.add(f"{what} without the token")
+        return f"{what} without the token, which was turned away"
 
     @property
     def first(self) -> bytes:
-        """The first message of a stream, with its end."""
+        """The first message, with its end."""
         return auth_message(self.token) + self.delimiter
 
     def lets_in(self, start: bytes) -> bool | None:
@@ -63,6 +73,10 @@ class Gate:
         if len(start) < len(self.first):
             return None if self.delimiter not in start else False
         return hmac.compare_digest(start[: len(self.first)], self.first)
+
+    def behind(self, datagram: bytes) -> bytes | None:
+        """What of a datagram follows the token; None where that is not right."""
+        return datagram[len(self.first) :] if self.lets_in(datagram) else None
 
 
 def auth_message(token: str) -> bytes:
@@ -80,13 +94,17 @@ def open_receiver(
 ) -> Receiver:
     """What an address gives.
 
-    connect : call the address instead of waiting for calls (TCP). baud : rate of a serial port. gate : what streams of
-    callers must begin with; None for nothing. greeting : what a program is told that is called.
+    connect : call the address instead of waiting for calls, or ask it by UDP. baud : rate of a serial port. gate : what
+    streams of callers and datagrams must begin with; None for nothing. greeting : what a program hears that is called.
 
     Raises LinkError: the address is taken or not of this machine. PortError: the serial port cannot be opened.
     """
+    if address.transport == "udp" and connect:
+        from controller.links.net.udp_caller import UdpCaller  # it takes the receiver below
+
+        return UdpCaller(address, greeting)
     if address.transport == "udp":
-        return UdpReceiver(address)
+        return UdpReceiver(address, gate)
     if address.transport == "tcp":
         return TcpCaller(address, greeting) if connect else TcpListener(address, gate)
     if address.transport == "midi":
@@ -97,10 +115,11 @@ def open_receiver(
 
 
 class UdpReceiver:
-    """Datagrams; a sender is its host."""
+    """Datagrams; a sender is its host. ``gate`` : what each must begin with."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, gate: Gate | None = None) -> None:
         self.error = ""
+        self._gate = gate
         self._socket = bound(address, socket.SOCK_DGRAM)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, _BUFFER)
         self._selector = selectors.DefaultSelector()
@@ -114,13 +133,19 @@ class UdpReceiver:
         try:
             while len(found) < MOST_AT_ONCE:
                 data, sender = receive(_CHUNK)
-                if data:
-                    found.append((sender[0], data))
+                if counted := data if self._gate is None else self._behind(self._gate, data):
+                    found.append((sender[0], counted))
         except BlockingIOError:
             pass
         except OSError as error:  # an answer of the network to what another program sent
             self.error = str(error.strerror)
         return found
+
+    def _behind(self, gate: Gate, data: bytes) -> bytes:
+        counted = gate.behind(data)
+        if counted is None:
+            self.error = gate.turn_away("a datagram")
+        return counted or b""
 
     def send(self, data: bytes, host: str, port: int) -> None:
         """Send a datagram from the same port. Raises OSError."""
@@ -138,9 +163,11 @@ class _Call:
         self.sender, self._gate = sender, gate
         self._web, self._start, self._since_s = WebRequests(), b"", time.monotonic()
 
-    def is_late(self) -> bool:
-        """Whether it has not given its token in time."""
-        return self._gate is not None and time.monotonic() - self._since_s > AUTH_S
+    def late(self) -> str:
+        """What it is, where it has not given its token in time."""
+        if self._gate is None or time.monotonic() - self._since_s <= AUTH_S:
+            return ""
+        return self._gate.turn_away("a caller")
 
     def take(self, data: bytes) -> bytes:
         """What of a piece of its stream counts. Raises ValueError: it must hang up; says why."""
@@ -153,7 +180,7 @@ class _Call:
             case None:
                 return b""
             case False:
-                raise ValueError("a caller without the token, who was turned away")
+                raise ValueError(self._gate.turn_away("a caller"))
         data, self._start = self._start[len(self._gate.first) :], b""
         self._gate = None
         return data
@@ -178,9 +205,10 @@ class TcpListener:
                 self._accept()
             else:
                 found += self._read(key.fileobj, key.data)  # type: ignore[arg-type]
-        for call in [call for call, caller in self._calls.items() if caller.is_late()]:
-            self.error = "a caller without the token, who was turned away"
-            self._hang_up(call)
+        for call, caller in [*self._calls.items()]:
+            if late := caller.late():
+                self.error = late
+                self._hang_up(call)
         return found
 
     def close(self) -> None:

@@ -36,12 +36,13 @@ class Sender(Protocol):
 
 
 def open_sender(address: Address, delimiter: bytes, baud: int = 115_200, token: str | None = None) -> Sender:
-    """What takes messages to an address; ``delimiter`` ends each on a stream, ``token`` begins one over TCP.
+    """What takes messages to an address; ``delimiter`` ends each on a stream, ``token`` begins a stream over TCP
+    and each datagram.
 
     Raises PortError: the serial port cannot be opened.
     """
     if address.transport == "udp":
-        return UdpSender(address)
+        return UdpSender(address, b"" if token is None else auth_message(token) + delimiter)
     if address.transport == "tcp":
         return TcpSender(address, delimiter, token)
     if address.transport == "midi":
@@ -52,10 +53,11 @@ def open_sender(address: Address, delimiter: bytes, baud: int = 115_200, token: 
 
 
 class UdpSender:
-    """Datagrams."""
+    """Datagrams, each of which begins with ``first``."""
 
-    def __init__(self, address: Address) -> None:
+    def __init__(self, address: Address, first: bytes = b"") -> None:
         self.error = ""
+        self._first = first
         family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -63,7 +65,7 @@ class UdpSender:
 
     def send(self, message: bytes) -> bool:
         try:
-            self._socket.sendto(message, self._to)
+            self._socket.sendto(self._first + message, self._to)
         except ConnectionRefusedError:
             pass  # nobody listened to the one before; somebody may listen now
         except OSError as error:

@@ -8,7 +8,7 @@ from typing import ClassVar
 from controller.base.parameters import REGIONS, did_you_mean
 from controller.formats.format import Format
 from controller.links.access import check_word
-from controller.links.net.address import Address, parse_address
+from controller.links.net.address import Address, has_token, is_called, parse_address
 from drivers.base.options import Option, option
 
 LOST = ("fade", "hold", "neutral", "stop")
@@ -29,7 +29,7 @@ class NetSettings:
     """The format; a subclass for each."""
 
     listen: str | None = option("HOST:PORT at which faces are taken; - for standard input.")
-    connect: str | None = option("HOST:PORT of a program that is called for faces (TCP).")
+    connect: str | None = option("HOST:PORT of a program that is called for faces.")
     port: str | None = option("Serial port at which faces are taken.")
     baud: int = option("Rate of a serial port.", 115_200, at_least=300, at_most=12_000_000)
     send: str | None = option("HOST:PORT, or serial port, to which the present face is sent.")
@@ -50,7 +50,7 @@ class NetSettings:
     calibrate: str = option("Whether a neutral face is learned.", "off", choices=CALIBRATE)
     ranges: bool = option("Whether the range of each parameter is learned.", False)
     open_to_network: bool = option("Allow others than programs on this machine to send faces.", False)
-    token: str | None = option("What TCP streams begin with, those that come and those that are sent.", longest=128)
+    token: str | None = option("What streams and datagrams begin with, in and out.", longest=128)
 
     def check(self) -> None:
         """Raises ValueError: no address, one that is wrong, or one that others reach without leave."""
@@ -58,7 +58,7 @@ class NetSettings:
             raise ValueError(f'give listen, connect, port or send, as listen = "127.0.0.1:{self.form.port or 9400}"')
         if sum(each is not None for each in (self.listen, self.connect, self.port)) > 1:
             raise ValueError("give only one of listen, connect and port")
-        if self.connect is not None and parse_address(self.connect, self.form).transport != "tcp":
+        if self.connect is not None and not is_called(self.form, parse_address(self.connect, self.form)):
             raise ValueError("connect: only TCP is called; write it as tcp:HOST:PORT")
         if self.send is not None:
             parse_address(self.send, self.form)
@@ -74,8 +74,9 @@ class NetSettings:
     def _check_reach(self) -> None:
         here = self.incoming
         if self.token is not None:
-            if not any(end is not None and end.transport == "tcp" for end in (here, self.outgoing)):
-                raise ValueError("token: only TCP streams have one; UDP and serial ports have no place for it")
+            if not any(end is not None and has_token(self.form, end) for end in (here, self.outgoing)):
+                kinds = "TCP and UDP have one" if self.form.takes_token else f"TCP has one for {self.form.kind}"
+                raise ValueError(f"token: only {kinds}; this link has no place for it")
             check_word(self.token)
         if here is not None and self.connect is None and not here.is_local and not self.open_to_network:
             raise ValueError(
@@ -85,9 +86,9 @@ class NetSettings:
 
     @property
     def needs_token(self) -> bool:
-        """Whether streams that come must begin with a token."""
+        """Whether the streams or datagrams that come must begin with a token."""
         here = self.incoming
-        if here is None or here.transport != "tcp" or self.connect is not None:
+        if here is None or not has_token(self.form, here) or self.connect is not None:
             return False
         return self.token is not None or (self.form.takes_token and not here.is_local)
 

@@ -15,6 +15,7 @@ from controller.panels.window.colours import GREEN, RED
 from controller.panels.window.commands import Commands
 from controller.panels.window.expressions import ExpressionButtons
 from controller.panels.window.keys import Keys
+from controller.panels.window.links import Links
 from controller.panels.window.sliders import Sliders
 from controller.panels.window.view import View
 from controller.vocabulary.vocabulary import Vocabulary
@@ -45,7 +46,7 @@ class Panel:
     """Draws the panel.
 
     newest : the newest parameters (P,). send : sends requests to the body.
-    state : without it, neither the layer that holds a parameter nor what the servos show of it is drawn.
+    state : without it, neither the layer that holds a parameter nor what the servos show of it nor a link is drawn.
     """
 
     def __init__(
@@ -63,6 +64,7 @@ class Panel:
             options.vocabulary, self.commands, newest, send, own, tuple(options.files[:-1])
         )
         self.view = View(self.commands, viewpoint or Viewpoint(), self.capture, options.shows, send)
+        self.links = Links(state)
         self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
         self.more: list[Callable[[], None]] = []
 
@@ -72,6 +74,7 @@ class Panel:
             "Expressions": self.expressions,
             "Sliders": self._sliders,
             "View": self.view,
+            "Links": self.links,
         }
         return [Dock(title, "left", self._below_top(part)) for title, part in parts.items()]
 

@@ -123,8 +123,8 @@ def test_a_record_cannot_be_changed() -> None:
         object.__new__(Stage).anything = 1
 
 
-def test_a_stage_that_says_nothing_has_the_usual_settings(tmp_path: Path) -> None:
-    settings = load_stage(stage_file(tmp_path, 'name = "mine"'), PARAMETERS).settings
+def test_a_stage_that_says_nothing_has_the_usual_settings_and_the_name_of_its_file(tmp_path: Path) -> None:
+    settings = load_stage(stage_file(tmp_path, ""), PARAMETERS).settings
     found = settings.model_dump()
     face = found.pop("face")
     assert found == {
@@ -162,7 +162,8 @@ def test_two_links_do_not_write_one_layer_and_a_layer_must_be_there(tmp_path: Pa
     text = 'name = "mine"\n' + link.format("livelink") + link.format("vmc")
     with pytest.raises(ConfigError, match=r"links\[1\].layer: links\[0\] writes capture already"):
         load_stage(stage_file(tmp_path, text), PARAMETERS)
-    with pytest.raises(ConfigError, match=r"links\[1\].layer: unknown layer 'secnd', did you mean 'second'"):
+    unknown = r"links\[1\].layer: unknown layer 'secnd', did you mean 'second'.*\[layers.secnd\] with priority = 55"
+    with pytest.raises(ConfigError, match=unknown):
         load_stage(stage_file(tmp_path, text + 'layer = "secnd"\n[layers.second]\npriority = 55\n'), PARAMETERS)
     stage = load_stage(stage_file(tmp_path, text + 'layer = "second"\n[layers.second]\npriority = 55\n'), PARAMETERS)
     assert [str(each) for each in stage.settings.links] == [

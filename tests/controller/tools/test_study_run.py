@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS as P
 from controller.takes.recording import replay
 from controller.tools.study_run import measured, run_study
+from surface.base.errors import MissingPackage
 
 STUDY = """
 name = "two"
@@ -70,3 +72,12 @@ def test_what_is_measured_is_taken_from_the_report() -> None:
         "pose_error_deg": {"head": {"rms_deg": 1.0}},
     }  # fmt: skip
     assert measured({"face": None, "buses": []})["face_latency_ms"] is None
+
+
+def test_a_package_that_is_missing_is_told_before_there_is_a_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "pylsl", None)
+    with pytest.raises(MissingPackage, match="pylsl: not installed") as told:
+        run_study(tmp_path / "smiles.toml", tmp_path / "seven", lsl=True)
+    assert "omote[lsl]" in told.value.hint and not (tmp_path / "seven").exists()

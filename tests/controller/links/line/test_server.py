@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import math
 import socket
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -193,6 +196,18 @@ def test_another_omote_drives_this_one_as_a_robot_head(far: Callable[..., Far]) 
     finally:
         bus.close()
     assert not there.state.status()["manual"]
+
+
+@pytest.mark.slow
+def test_the_example_without_ros_talks_to_a_face(far: Callable[..., Far], root: Path) -> None:
+    one = far(token=TOKEN)
+    program = [sys.executable, "-I", str(root / "examples" / "3_without_ros.py"), f"127.0.0.1:{one.port}"]
+    done = subprocess.run([*program, TOKEN], capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(done.stdout.splitlines()) > 5 and all("GET jawOpen=" in line for line in done.stdout.splitlines())
+    assert one.state.status()["gaze"] == "off", "it ended with NEUTRAL"
+    refused = subprocess.run(program, capture_output=True, text=True, timeout=60, check=False)
+    assert refused.returncode == 1 and "32" in refused.stderr and "Traceback" not in refused.stderr
 
 
 def test_an_address_that_is_taken_is_told_with_what_to_do(far: Callable[..., Far]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 
@@ -71,5 +72,20 @@ def test_of_several_sources_at_once_the_first_counts() -> None:
             wait_for(lambda: not fed.waiting)
         wait_for(lambda: incoming.report()["accepted"] == 20)
         assert incoming.report()["refused"] == {"a second source while the first one sends": 20}
+    finally:
+        incoming.stop()
+
+
+def test_a_clock_that_differs_delays_nothing() -> None:
+    """Times as those of a source after each three minutes of an hour, whose clock is 1 % fast, then set back."""
+    fed, state, incoming = opened(timeout_s=5.0)
+    encoder, jaw = FORMATS.get("livelink").encoder(P), P.index("jawOpen")
+    times_s = [180.0 * n * 1.01 for n in range(21)] + [10.0]
+    try:
+        for n, time_s in enumerate(times_s):
+            sent = replace(face(n, time_s), values=np.full(len(P), 0.01 * (n + 1)))
+            fed.waiting = [("10.0.0.1", message) for message in encoder.encode(sent)]
+            wait_for(lambda n=n: abs(state.mixer["capture"].values[jaw] - 0.01 * (n + 1)) < 1e-4)
+        assert incoming.report()["accepted"] == len(times_s)
     finally:
         incoming.stop()

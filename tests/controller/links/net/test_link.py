@@ -179,15 +179,17 @@ def test_an_address_that_is_taken_is_told_with_what_to_do(far: Open) -> None:
     assert str(there.port) in told.value.hint
 
 
-def test_two_omotes_share_a_token_over_tcp() -> None:
-    token, address = "a-token-of-two", f"tcp:127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+@pytest.mark.parametrize(("kind", "by"), [("json", "tcp"), ("json", "udp"), ("binary", "udp")])
+def test_two_omotes_share_a_token(kind: str, by: str) -> None:
+    sort = socket.SOCK_STREAM if by == "tcp" else socket.SOCK_DGRAM
+    token, address = "a-token-of-two", f"{by}:127.0.0.1:{free_port(sort)}"
     one, two = CommandState(P), CommandState(P)
     one.set_parameters([JAW], [0.5], 1)
     for n in range(200):
         one.tick(n * 10_000_000, 0.01, P.neutral())
     with ExitStack() as closers:
-        open_links([read_link({"kind": "json", "listen": address, "token": token})], LinkContext(two, closers))
-        open_links([read_link({"kind": "json", "send": address, "token": token})], LinkContext(one, closers))
+        open_links([read_link({"kind": kind, "listen": address, "token": token})], LinkContext(two, closers))
+        open_links([read_link({"kind": kind, "send": address, "token": token})], LinkContext(one, closers))
         wait_for(lambda: two.mixer["capture"].values[JAW] == pytest.approx(0.5, abs=1e-3))
 
 
@@ -203,6 +205,7 @@ def test_beyond_this_machine_a_stream_of_ours_needs_a_token(
         with socket.create_connection(("127.0.0.1", port)) as call:
             call.sendall(b"time,jawOpen\n0,0.5\n")
             wait_for(lambda: "without the token" in link.report()["error"])
+            assert link.report()["refused"] == {"a caller without the token": 1}
 
 
 def test_an_unknown_layer_is_told_with_those_there_are() -> None:

@@ -28,12 +28,38 @@ def test_frames_are_lost_where_numbers_are_missing_whatever_the_usual_step(step:
     assert meter.lost == 3
 
 
+def test_a_frame_that_comes_early_once_does_not_make_all_others_late() -> None:
+    meter = Meter()
+    for n in range(200):
+        meter.note(n / 30, 2 * n - (n % 50 == 7))
+    assert meter.lost == 0
+
+
 def test_messages_that_were_not_read_are_not_lost() -> None:
     meter = Meter()
     meter.note(0.0, 1)
     meter.note(0.01, 2)
     meter.note(0.1, 12, skipped=9)
     assert (meter.lost, meter.frames) == (0, 12)
+
+
+def test_frames_that_overtake_others_are_not_lost() -> None:
+    meter, rng = Meter(), np.random.default_rng(3)
+    for n, late in enumerate(rng.integers(0, 60, 500)):  # as a sender's numbers that go back and forth within a second
+        meter.note(n / 60, 4_707_600 + n - int(late))
+    assert meter.lost <= 60
+    meter = Meter()
+    for n, number in enumerate([1, 2, 4, 3, 5, 7, 8]):
+        meter.note(n / 60, number)
+    assert meter.lost == 1
+
+
+@pytest.mark.parametrize("restarted", [0, 60_000_000])
+def test_a_source_that_begins_anew_keeps_what_it_lost_and_loses_nothing_more(restarted: int) -> None:
+    meter = Meter()
+    for n, number in enumerate([50_000, 50_001, 50_003, 50_004, restarted, restarted + 1, restarted + 2]):
+        meter.note(n / 60, number)
+    assert meter.lost == 1
 
 
 def test_a_silent_source_has_no_rate_and_midnight_loses_nothing() -> None:

@@ -106,6 +106,15 @@ def test_a_stream_without_the_token_is_turned_away(opened: Open, start: bytes) -
     assert [data for _, data in found] == [b""] and "without the token" in receiver.error
 
 
+def test_only_datagrams_that_begin_with_the_token_count(opened: Open) -> None:
+    port = free_port()
+    receiver = opened(f"udp:127.0.0.1:{port}", gate=Gate("abcdef", b"\n"))
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as call:
+        for data in (b"AUTH abcdef\none ", b"AUTH abcdeg\ntwo ", b"three ", b"AUTH abcdef\n", b"AUTH abcdef\nfour"):
+            call.sendto(data, ("127.0.0.1", port))
+        assert taken(receiver, 8) == b"one four" and "without the token" in receiver.error
+
+
 def test_who_gives_no_token_is_sent_away(opened: Open, monkeypatch: pytest.MonkeyPatch) -> None:
     port = free_port(socket.SOCK_STREAM)
     receiver = opened(f"tcp:127.0.0.1:{port}", gate=Gate("abcdef", b"\n"))

@@ -25,7 +25,7 @@ from controller.links.links import read_link
         ({"listen": "127.0.0.1:5", "gains": {"brow": 0.5}}, "no region called 'brow', did you mean 'brows'"),
         ({"listen": "127.0.0.1:5", "gains": {"brows": 5.0}}, "must be 0 to 4"),
         ({"listen": "127.0.0.1:5", "lost": "panic"}, "'fade', 'hold', 'neutral' or 'stop'"),
-        ({"listen": "127.0.0.1:5", "token": "a-token-of-mine"}, "only TCP streams have one"),
+        ({"listen": "127.0.0.1:5", "token": "a-token-of-mine"}, "only TCP has one for vmc"),
         ({"listen": "127.0.0.1:5", "smothing": True}, "Extra inputs"),
     ],
 )
@@ -54,13 +54,17 @@ def test_what_is_right_is_shown_as_people_write_it(keys: dict[str, object], show
         ({"kind": "json", "listen": "tcp:127.0.0.1:5"}, False),
         ({"kind": "json", "listen": "tcp:127.0.0.1:5", "token": "a-token-of-mine"}, True),
         ({"kind": "json", "listen": "tcp:0.0.0.0:5", "open_to_network": True}, True),
-        ({"kind": "json", "listen": "udp:0.0.0.0:5", "open_to_network": True}, False),
+        ({"kind": "json", "listen": "udp:0.0.0.0:5", "open_to_network": True}, True),
+        ({"kind": "json", "listen": "udp:127.0.0.1:5"}, False),
+        ({"kind": "json", "listen": "udp:127.0.0.1:5", "token": "a-token-of-mine"}, True),
+        ({"kind": "au-json", "listen": "udp:0.0.0.0:5", "open_to_network": True}, False),
+        ({"kind": "livelink", "listen": "0.0.0.0:5", "open_to_network": True}, False),
         ({"kind": "ifacialmocap", "listen": "tcp:0.0.0.0:5", "open_to_network": True}, False),
         ({"kind": "json", "connect": "tcp:10.0.0.1:5"}, False),
         ({"kind": "json", "send": "tcp:10.0.0.1:5", "token": "a-token-of-mine"}, False),
     ],
 )
-def test_which_streams_need_a_token(keys: dict[str, object], needed: bool) -> None:
+def test_which_links_need_a_token(keys: dict[str, object], needed: bool) -> None:
     assert read_link(keys).own.needs_token == needed
 
 

@@ -211,6 +211,23 @@ def drawn(panel: Panel, *titles: str) -> Callable[[], None]:
     return draw
 
 
+def test_the_panel_shows_what_arrives_at_links(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
+    texts: list[str] = []
+    real = screen.imgui.text_wrapped
+    monkeypatch.setattr(screen.imgui, "text_wrapped", lambda text: (texts.append(text), real(text)))
+    state = CommandState(PARAMETERS)
+    figures = {"rate_hz": 60.0, "jitter_ms": 2.0, "lost": 4, "age_s": 0.5, "error": "no client"}
+    state.link_records = lambda: [{"port": "udp:127.0.0.1:11111", **figures}]
+    with Mailbox.create(PanelState.size(PARAMETERS)) as mailbox:
+        there = PanelState(mailbox, state.layer_names(), PARAMETERS)
+        draw = drawn(Panel(PARAMETERS.neutral, [].append, there), "Links")
+        screen.frame(draw)
+        assert "no links" in texts[-1]
+        there.publish(state, None)
+        screen.frame(draw)
+        assert texts[-6:] == ["udp:127.0.0.1:11111", "60 /s", "2.0 ms", "4", "0.5 s", "no client"]
+
+
 def test_the_panel_sends_what_its_widgets_ask_for(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
     places, sent, values = Places(screen.imgui, monkeypatch), [], PARAMETERS.neutral()
     panel = Panel(lambda: values, sent.append)

@@ -1,7 +1,7 @@
 """A conversation with a face over its WebSocket API: it listens, is surprised, and watches its own jaw.
 
     omote run websocket                       # in one terminal
-    python examples/websocket_client.py       # in another; ws://HOST:PORT and a token may follow
+    python examples/1_python_client.py       # in another; ws://HOST:PORT and a token may follow
 
 It needs the package websockets, and of omote only the module controller.client.
 """

@@ -1,0 +1,61 @@
+"""Asks a program for its face by UDP, again and again while it is silent, and takes what it sends to the same port."""
+
+from __future__ import annotations
+
+import socket
+import time
+
+from controller.base.errors import LinkError
+from controller.links.net.address import Address
+from controller.links.net.receivers import Received, UdpReceiver
+
+ASK_S = 1.0
+"""How often a program is asked that is silent."""
+
+
+class UdpCaller:
+    """Datagrams of one host, which is asked for them.
+
+    Listens at the port of the far end's number, where phones send to, on the interface that reaches it.
+
+    Raises LinkError: the host is not known or not reached, or the port is taken.
+    """
+
+    def __init__(self, address: Address, greeting: bytes) -> None:
+        self._host, own = _hosts(address)
+        self._port, self._greeting = address.port, greeting
+        self._receiver = UdpReceiver(Address("udp", own, address.port))
+        self._quiet_since_s = -ASK_S
+        self.error = ""
+
+    def receive(self, timeout_s: float) -> Received:
+        if time.monotonic() - self._quiet_since_s >= ASK_S:
+            self._ask()
+        found = [each for each in self._receiver.receive(timeout_s) if each[0] == self._host]
+        if found:
+            self._quiet_since_s, self.error = time.monotonic(), self._receiver.error
+        return found
+
+    def close(self) -> None:
+        self._receiver.close()
+
+    def _ask(self) -> None:
+        self._quiet_since_s, self.error = time.monotonic(), f"{self._host} was asked and has not answered"
+        try:
+            self._receiver.send(self._greeting, self._host, self._port)
+        except OSError as error:
+            self.error = error.strerror or type(error).__name__
+
+
+def _hosts(address: Address) -> tuple[str, str]:
+    """The far end's address in numbers, and the one of this machine that it is reached from."""
+    try:
+        family, _, _, _, there = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)[0]
+        with socket.socket(family, socket.SOCK_DGRAM) as probe:
+            probe.connect(there)  # sends nothing
+            return str(there[0]), str(probe.getsockname()[0])
+    except OSError as error:
+        raise LinkError(
+            f"{address}: cannot be reached: {error.strerror or error}",
+            hint="give the address that the program shows, as 192.168.1.20, and use the same network",
+        ) from error
