@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import importlib.util
 import os
 import signal
@@ -60,6 +61,7 @@ def pytest_configure() -> None:
     for name in SETTINGS:
         os.environ.pop(name, None)
     os.environ["TERM"] = "xterm-256color"
+    gc.disable()  # until all tests are collected: nothing of that is garbage, and there is much of it to look through
     if hasattr(os, "setpriority"):
         os.setpriority = keeping_priority(os.setpriority)
     # a shell starts what runs in the background with Ctrl-C ignored, and nohup ignores the terminal's end
@@ -67,6 +69,12 @@ def pytest_configure() -> None:
     for name in ("SIGTERM", "SIGHUP"):
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
+
+
+def pytest_collection_finish() -> None:
+    """Collect garbage from now on, but look no more through modules and tests, which stay until the end."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -7,6 +7,7 @@ A line that no rule covers fails.
 
 from __future__ import annotations
 
+import functools
 import json
 import os
 import re
@@ -22,7 +23,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from typer.main import get_command
+import typer.main
 
 from controller.cli.app import make_app
 from drivers.sim import SimulatedBus
@@ -176,6 +177,7 @@ def orders(folder: Path, line: str, port: str) -> dict[str, Any]:
     return {"line": line, "words": words_of(line, port=port), "input": str(folder / heard)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("line", RUN)
 def test_a_line_runs(line: str, said: dict[str, tuple[int, str]]) -> None:
     code, text = said[line]
@@ -187,14 +189,20 @@ def test_a_line_runs(line: str, said: dict[str, tuple[int, str]]) -> None:
 # ---------------------------------------------------------------------------- lines that are not run, by rule
 
 
+@functools.cache
+def command_of_omote() -> Any:
+    """The whole command, built once."""
+    return typer.main.get_command(make_app())
+
+
 def parse(line: str) -> None:
     """Read the words of a line as omote does, without running it; of a command that is only mentioned, ask for help."""
     words = words_of(line)[1:]
     with pytest.raises(SystemExit) as end:  # --help ends the command after its other options were read
-        make_app()([*words, "--help"])
+        command_of_omote()([*words, "--help"])
     assert end.value.code == 0
     if len(line.split()) > 2:
-        command, rest = get_command(make_app()), words
+        command, rest = command_of_omote(), words
         while hasattr(command, "get_command"):
             command, rest = (
                 command.get_command(command.make_context("omote", rest, resilient_parsing=True), rest[0]),

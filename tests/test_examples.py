@@ -73,6 +73,7 @@ def test_blending_functions_take_both_limits(draw_head: ModuleType) -> None:
     assert steps.tolist() == [[1, 1, 0, 0]]
 
 
+@pytest.mark.slow
 def test_a_picture_of_a_head_is_drawn(draw_head: ModuleType, found: list, root: Path, tmp_path: Path) -> None:
     """With numpy alone: skin, teeth and the dark of the mouth are there, and the near hides the far."""
     image = pytest.importorskip("PIL.Image", reason="Pillow reads the picture: pip install omote[view]")
@@ -137,6 +138,7 @@ def test_a_mesh_that_saves_nothing_tells_how_much_more_it_needs(root: Path) -> N
     assert [told(x) for x in (0.502, 0.0, -1.663)] == ["50.2 %", "0.0 %", "none: 166.3 % more"]
 
 
+@pytest.mark.slow
 def test_the_page_of_the_paper_has_its_figures(page: str) -> None:
     sections = page.split("<h2>")[1:]
     assert [s.split(".")[0] for s in sections[1:5]] == ["2"] * 4 and sections[5].startswith("3 Experiment")

@@ -24,7 +24,7 @@ ROOMS = ("controller", "surface", "drivers")
 LIMIT_S = 240.0  # kernels that the checkout has not compiled are compiled here
 DEPENDENCIES = sysconfig.get_path("purelib")
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="installs into a POSIX layout")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="installs into a POSIX layout")]
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,6 @@ def take_kernels(root: Path, packages: Path) -> None:
 # ---------------------------------------------------------------------------- what is in it
 
 
-@pytest.mark.slow
 def test_every_file_of_the_rooms_and_configs_is_in_the_wheel(installed: Installed, root: Path) -> None:
     listing = None
     if shutil.which("git"):
@@ -143,7 +142,6 @@ def test_nothing_but_the_rooms_and_configs_is_installed(installed: Installed) ->
     assert [name for name in names if "__pycache__" in name or "/test_" in name] == []
 
 
-@pytest.mark.slow
 def test_pytest_has_the_fixtures(installed: Installed) -> None:
     """pytest also rewrites the assertions of a package that has a plug-in."""
     test = "def test_it(servo_bus):\n    bus = servo_bus('xl330-m288', [1])\n    bus.no_jump()\n"
@@ -171,7 +169,6 @@ def config_of(installed: Installed, **more: str) -> Path:
     return Path(done.stdout.strip())
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("option", "code"), [("--target", "."), ("--prefix", None)])
 def test_configs_are_found_wherever_an_installer_puts_them(
     installed: Installed, tmp_path: Path, option: str, code: str | None
@@ -185,7 +182,6 @@ def test_configs_are_found_wherever_an_installer_puts_them(
 # ---------------------------------------------------------------------------- what it does
 
 
-@pytest.mark.slow
 def test_a_robot_is_checked_on_its_head(installed: Installed) -> None:
     done = installed.omote("check", "head24-anchors")
     assert done.returncode == 0, done.stderr
@@ -193,7 +189,6 @@ def test_a_robot_is_checked_on_its_head(installed: Installed) -> None:
     assert done.stdout.startswith("robot head24-anchors: 1 buses, 24 channels: good\n")
 
 
-@pytest.mark.slow
 def test_an_installation_that_cannot_be_written_keeps_compiled_code_with_the_user(
     installed: Installed, tmp_path: Path
 ) -> None:
@@ -211,7 +206,6 @@ def test_an_installation_that_cannot_be_written_keeps_compiled_code_with_the_use
     assert list(cache.rglob("*.nbi")) and sorted(site.rglob("*")) == before
 
 
-@pytest.mark.slow
 def test_a_picture_is_drawn(installed: Installed) -> None:
     done = installed.omote("render", "--size", "64x64", "-o", "picture.png")
     if "no OpenGL" in done.stderr:
@@ -220,7 +214,6 @@ def test_a_picture_is_drawn(installed: Installed) -> None:
     assert (installed.away / "picture.png").read_bytes().startswith(b"\x89PNG")
 
 
-@pytest.mark.slow
 def test_a_stage_runs_with_all_its_processes(installed: Installed) -> None:
     """The body, the simulated bus and the simulated host of a link are processes of their own."""
     done = installed.omote("run", "everything", "--headless", "--seconds", "1", "--report", "report.json")
@@ -233,7 +226,6 @@ def test_a_stage_runs_with_all_its_processes(installed: Installed) -> None:
     assert [(bus["bus"]["cycles"] > 0, bus["fault"]) for bus in report["buses"]] == [(True, None)]
 
 
-@pytest.mark.slow
 def test_a_bus_is_simulated_until_interrupted(installed: Installed) -> None:
     command = [installed.python, installed.python.with_name("omote"), "simulate", "dynamixel", "--ids", "1-2"]
     with subprocess.Popen(
@@ -260,7 +252,6 @@ def wire() -> Iterator[SimulatedBus]:
         yield simulated
 
 
-@pytest.mark.slow
 def test_after_a_kill_the_servos_are_let_go(installed: Installed, wire: SimulatedBus, tmp_path: Path) -> None:
     script = tmp_path / "programs" / "drive.py"
     script.parent.mkdir()

@@ -19,13 +19,10 @@ from controller.base.errors import ParameterError
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.parts import Parts
 from controller.base.stop_latch import StopLatch
-from controller.layers.expression_player import ExpressionPlayer
-from controller.layers.gaze import Gaze
-from controller.layers.idle.motion import IdleMotion
 from controller.layers.idle.settings import IdleSettings, check_manner
-from controller.layers.layer_part import LayerPart
-from controller.layers.mixer import Layer, LayerSettings, Mixer
+from controller.layers.mixer import LayerSettings, Mixer
 from controller.layers.settings import default_layers
+from controller.layers.sources import Sources, finite
 from controller.motion.motion import MotionLimiter
 from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
@@ -178,20 +175,16 @@ class CommandState:
         self.mixer = Mixer(parameters, default_layers() if layers is None else layers)
         self.limiter = MotionLimiter.of(parameters, period_s)
         self.parts = Parts()
-        self._player = ExpressionPlayer(self.vocabulary["neutral"])
-        self._gaze = Gaze(parameters)
-        self._life_settings, self._seed = life or IdleSettings.named("natural", parameters), seed
-        self._life = IdleMotion(parameters, self._life_settings, seed)
         self._mixed, self._present = parameters.neutral(), parameters.neutral()
-        self._expression, self._looking = self.mixer["expression"], self.mixer["gaze"]
-        self._idle, self._manual = self.mixer["idle"], self.mixer["manual"]
-        self._speech, self._jaw = self.mixer["speech"], parameters.index("jawOpen")
-        self._everything = np.ones(len(parameters), dtype=bool)
-        self._blocks = (0.0, 0.0, 0.0)  # how much the expression holds back blinks, gaze and speech
-        self._expressions = self._part("expressions", self._expression, self._write_expression, self._renew_expression)
-        self._sources = (
-            self._part("idle motion", self._idle, self._write_idle, self._renew_idle),
-            self._part("gaze", self._looking, self._write_gaze, self._renew_gaze),
+        self._manual = self.mixer["manual"]
+        self._sources = Sources(
+            self.mixer,
+            self._present,
+            parameters=parameters,
+            vocabulary=self.vocabulary,
+            life=life or IdleSettings.named("natural", parameters),
+            seed=seed,
+            parts=self.parts,
         )
         self.servo_monitor: ServoMonitor | None = None
         self.link_status: Callable[[], Mapping[str, StatusValue]] = dict
@@ -214,7 +207,7 @@ class CommandState:
         """
         with self._journaled("tick", now_ns, dt, out):
             now_s = self._now_s = now_ns * 1e-9
-            self._write_layers(now_s)
+            self._sources.write(now_s)
             self.mixer.mix(now_s, dt, self._mixed)
             self.limiter.step(dt, self._mixed, self._present)
             self._ticks += 1
@@ -237,52 +230,6 @@ class CommandState:
         if stamp_ns:
             self.on_command()
 
-    def _part(self, name: str, layer: Layer, write: Callable[[float], None], renew: Callable[[], None]) -> LayerPart:
-        return LayerPart(name, layer, self.parts, write, renew)
-
-    def _write_layers(self, now_s: float) -> None:
-        self._expressions.update(now_s)
-        _, gaze_block, mouth_block = (block * self._expressions.share for block in self._blocks)
-        self._looking.attenuate(gaze_block)
-        self._speech.attenuate(mouth_block)
-        for source in self._sources:
-            source.update(now_s)
-
-    def _write_expression(self, now_s: float) -> None:
-        values = _finite(self._player.update(now_s))
-        self._expression.write_masked(values, self._everything, now_s)
-        self._blocks = self._player.blocks
-
-    def _renew_expression(self) -> None:
-        self._player = ExpressionPlayer(self.vocabulary["neutral"])
-
-    def _write_gaze(self, now_s: float) -> None:
-        if self._gaze.active:
-            eyes_rad = self._life.eye_yaw_rad, self._life.eye_pitch_rad
-            values = _finite(self._gaze.update(self._present, eyes_rad, self._life.head_rad[:2]))
-            self._looking.write(self._gaze.indices, values, now_s)
-
-    def _renew_gaze(self) -> None:
-        self._gaze = Gaze(self.parameters)
-
-    def _write_idle(self, now_s: float) -> None:
-        life, (blink_block, gaze_block, _) = self._life, self._blocks
-        if life.liveliness > 0.0:
-            how = {"blink_block": blink_block, "gaze_block": gaze_block, "loudness": self._loudness()}
-            life.update(now_s, looking=self._gaze.active, **how)
-            self._idle.write_masked(_finite(life.values), self._everything, now_s)
-        elif self._idle.holding:
-            life.update(now_s, looking=False)
-            self._idle.release()
-
-    def _loudness(self) -> float:
-        """How loud the face speaks, 0..1, as the jaw of speech shows; 0 without speech."""
-        return float(self._speech.values[self._jaw]) if self._speech.held[self._jaw] else 0.0
-
-    def _renew_idle(self) -> None:
-        old, self._life = self._life, IdleMotion(self.parameters, self._life_settings, self._seed)
-        self._life.liveliness, self._life.chosen = old.liveliness, old.chosen
-
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         with self._journaled("set_parameters", indices, values, stamp_ns, stamp_ns=stamp_ns):
             self._manual.write(list(indices), values, stamp_ns * 1e-9)
@@ -295,39 +242,39 @@ class CommandState:
         expression = self.vocabulary[name]
         _check_finite("EXPR", intensity, duration_s or 0.0)
         with self._journaled("expression", name, intensity, duration_s, stamp_ns, stamp_ns=stamp_ns):
-            self._player.play(expression, intensity, duration_s, self._time(stamp_ns))
+            self._sources.player.play(expression, intensity, duration_s, self._time(stamp_ns))
 
     def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
         _check_finite("GAZE", yaw_rad, pitch_rad)
         with self._journaled("gaze", yaw_rad, pitch_rad, stamp_ns, stamp_ns=stamp_ns):
-            self._gaze.look(yaw_rad, pitch_rad)
-            self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
+            self._sources.gaze.look(yaw_rad, pitch_rad)
+            self._sources.life.shift(self._sources.gaze.shift_rad, self._time(stamp_ns))
 
     def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
         _check_finite("GAZE AT", x_mm, y_mm, z_mm)
         with self._journaled("gaze_at", x_mm, y_mm, z_mm, stamp_ns, stamp_ns=stamp_ns):
-            self._gaze.look_at(x_mm, y_mm, z_mm)
-            self._life.shift(self._gaze.shift_rad, self._time(stamp_ns))
+            self._sources.gaze.look_at(x_mm, y_mm, z_mm)
+            self._sources.life.shift(self._sources.gaze.shift_rad, self._time(stamp_ns))
 
     def gaze_off(self, stamp_ns: int) -> None:
         with self._journaled("gaze_off", stamp_ns, stamp_ns=stamp_ns):
-            self._stop_looking()
+            self._sources.stop_looking()
 
     def neutral(self, seconds: float, stamp_ns: int) -> None:
         _check_finite("NEUTRAL", seconds)
         with self._journaled("neutral", seconds, stamp_ns, stamp_ns=stamp_ns):
             self._manual.release(fade_s=seconds)
-            self._stop_looking(seconds)
-            self._player.rest(seconds, self._time(stamp_ns))
+            self._sources.stop_looking(seconds)
+            self._sources.player.rest(seconds, self._time(stamp_ns))
 
     def live(self, amount: float, stamp_ns: int, manner: str | None = None) -> None:
         _check_finite("LIFE", amount)
         known = check_manner(manner)
         given = (amount, stamp_ns) if manner is None else (amount, stamp_ns, manner)
         with self._journaled("live", *given, stamp_ns=stamp_ns):
-            self._life.liveliness = min(max(amount, 0.0), 1.0)
+            self._sources.life.liveliness = min(max(amount, 0.0), 1.0)
             if manner is not None:
-                self._life.chosen = known
+                self._sources.life.chosen = known
 
     def viseme(self, names: Sequence[str], weights: Sequence[float], stamp_ns: int) -> None:
         _check_finite("VISEME", *weights)
@@ -354,7 +301,7 @@ class CommandState:
 
         Raises KeyError: no layer of that name. ParameterError: not all values are finite; nothing changes then.
         """
-        _finite(values[mask] if through is None else np.concatenate([values[mask], through]))
+        finite(values[mask] if through is None else np.concatenate([values[mask], through]))
         with self._journaled("write_layer", name, values, mask, now_ns, stamp_ns, through, stamp_ns=stamp_ns):
             layer = self.mixer[name]
             layer.write_masked(values, mask, now_ns * 1e-9)
@@ -384,13 +331,13 @@ class CommandState:
 
     def status(self) -> dict[str, StatusValue]:
         with self._lock:
-            yaw, pitch = self._gaze.direction_deg
+            yaw, pitch = self._sources.gaze.direction_deg
             return {
-                "expression": self._player.name,
-                "intensity": round(self._player.intensity, 3),
-                "gaze": f"{yaw:.1f},{pitch:.1f}" if self._gaze.active else "off",
-                "life": self._life.liveliness,
-                "manner": self._life.manner,
+                "expression": self._sources.player.name,
+                "intensity": round(self._sources.player.intensity, 3),
+                "gaze": f"{yaw:.1f},{pitch:.1f}" if self._sources.gaze.active else "off",
+                "life": self._sources.life.liveliness,
+                "manner": self._sources.life.manner,
                 "manual": self._manual.holding,
                 "capture": self.mixer["capture"].holding,
                 "limited": int(np.count_nonzero(self.limiter.limited)),
@@ -409,10 +356,6 @@ class CommandState:
             manual = self._manual
             return {int(i): float(manual.values[i]) for i in np.flatnonzero(manual.held)}
 
-    def _stop_looking(self, fade_s: float | None = None) -> None:
-        self._gaze.off()
-        self._looking.release(fade_s=fade_s)
-
     def _time(self, stamp_ns: int) -> float:
         """When a command takes effect: when it came, but not before the last tick."""
         return max(stamp_ns * 1e-9, self._now_s)
@@ -420,13 +363,6 @@ class CommandState:
 
 def _nothing() -> None:
     """What commands call where nothing waits for them."""
-
-
-def _finite(values: Floats) -> Floats:
-    """``values`` unchanged. Raises ParameterError: not all of them are finite."""
-    if not np.isfinite(values).all():
-        raise ParameterError("not all of its values are finite numbers")
-    return values
 
 
 def _check_finite(what: str, *numbers: float) -> None:

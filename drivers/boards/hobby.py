@@ -95,10 +95,6 @@ class PulseScale:
         angles = _extrapolated(self._sign * pulse_us, self._sign[:, None] * self._us, self._rad)
         return np.where(pulse_us > 0.0, angles, math.nan)
 
-    def radian(self, index: int, pulse_us: float) -> float:
-        """The angle of one servo (rad) for a pulse; NaN for 0, which is no pulse."""
-        return float(self.radians(np.full(len(self._sign), pulse_us))[index])
-
 
 def _curve(servo: ServoSpec) -> tuple[Floats, Floats]:
     """Increasing angles (k,) of a servo, and its pulses (k,) at them."""

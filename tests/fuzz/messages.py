@@ -22,7 +22,7 @@ import numpy as np
 from controller.base.parameters import PARAMETERS as P
 from controller.formats.format import FORMATS, Format
 from controller.formats.frame import Frame
-from tests.fuzz.corpus import RESULTS
+from tests.fuzz.take_corpus import RESULTS
 
 LONGEST_S = 0.05
 _PROBE = 200

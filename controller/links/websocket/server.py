@@ -226,6 +226,8 @@ class _Client:
 
     def _put(self, reply: Reply | None) -> None:
         """Let an answer wait to be sent; None wakes the sender, which may have a new subscription."""
+        if reply is None and not self._waiting.empty():
+            return  # it wakes for what waits already, and the place is for an answer
         try:
             self._waiting.put_nowait(reply)
         except asyncio.QueueFull:

@@ -25,7 +25,7 @@ class Cart(Settings):
 
 def write(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "cart.toml"
-    path.write_text(text)
+    path.write_text(text, encoding="utf-8")
     return path
 
 

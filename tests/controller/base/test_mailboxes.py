@@ -122,6 +122,7 @@ def test_a_file_that_takes_only_some_of_the_bytes_is_full(monkeypatch: pytest.Mo
         signal.signal(signal.SIGXFSZ, handler)
 
 
+@pytest.mark.slow
 def test_no_torn_vector_from_another_process() -> None:
     last = 30_000
     with Mailbox.create(COUNT) as box:

@@ -55,6 +55,7 @@ def test_fit_says_what_it_did_and_guessed(sheet):
     assert (mesh.parent / "report" / "report.md").is_file()
 
 
+@pytest.mark.slow
 def test_export_writes_what_fit_wrote(sheet, tmp_path):
     out = tmp_path / "out.glb"
     said = CliRunner().invoke(make_app(), ["export", str(out), "--head", str(sheet[1]), "--set", "jawOpen=0.5"])
@@ -82,6 +83,7 @@ def test_mistakes_leave_nothing_behind(tmp_path, monkeypatch, words, kind, messa
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_damaged_mesh_leaves_the_old_head(sheet, tmp_path):
     mesh, head, _ = sheet
     before = (head / "head.npz").read_bytes()
@@ -196,6 +198,7 @@ def test_a_transfer_can_be_forced_too(tmp_path, monkeypatch):
     assert [given["force"] for given in heard] == [False, True]
 
 
+@pytest.mark.slow
 def test_a_fit_ends_with_what_a_check_says(sheet):
     _, head, output = sheet
     said = CliRunner().invoke(make_app(), ["check", str(head)])
@@ -253,6 +256,7 @@ def test_render_draws_a_crowd_or_a_sheet(tmp_path, monkeypatch):
     assert both.exit_code != 0 and len(drawn) == 1
 
 
+@pytest.mark.slow
 def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeypatch, sheet):
     calls = []
     other = SimpleNamespace(kind="odd", suffixes=(".odd",))

@@ -79,6 +79,7 @@ def test_a_grab_counts_that_was_made_while_points_got_ready(
     assert not editor.dragging
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("camera", [Camera.front(), Camera.three_quarter()])
 def test_a_corner_of_the_mouth_dragged_up_smiles_on_its_side(handles: PointEditor, camera: Camera) -> None:
     screen, values = Screen(camera, SIZE), P.neutral()

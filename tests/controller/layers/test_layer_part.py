@@ -45,7 +45,7 @@ def nan_values(*_: Any, **__: Any) -> Any:
     return np.full(6, math.nan)
 
 
-CASES = [("idle motion", "_life", "idle"), ("gaze", "_gaze", "gaze"), ("expressions", "_player", "expression")]
+CASES = [("idle motion", "life", "idle"), ("gaze", "gaze", "gaze"), ("expressions", "player", "expression")]
 
 
 @pytest.mark.parametrize("how", [fail, nan_values])
@@ -54,8 +54,8 @@ def test_a_source_that_fails_lets_its_layer_fade_and_begins_again(
     name: str, source: str, layer: str, how: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     face = Face()
-    old = getattr(face.state, source)
-    if how is nan_values and source == "_life":
+    old = getattr(face.state._sources, source)
+    if how is nan_values and source == "life":
         monkeypatch.setattr(old._sway, "_phases", np.full((3, 3), math.nan))  # all that is computed of it is no number
     else:
         monkeypatch.setattr(old, "update", how)
@@ -69,13 +69,13 @@ def test_a_source_that_fails_lets_its_layer_fade_and_begins_again(
     ticks = face.state.status()["ticks"]
     face.run(1.5)
     assert face.state.status()["ticks"] == ticks + 150
-    assert getattr(face.state, source) is not old
+    assert getattr(face.state._sources, source) is not old
     assert face.state.status()["failed"] == "none" and caplog.messages[1:] == [f"{name} works again"]
 
 
 def test_a_layer_fades_evenly_and_is_not_cut() -> None:
     face = Face()
-    face.state._player.update = fail  # type: ignore[method-assign]
+    face.state._sources.player.update = fail  # type: ignore[method-assign]
     levels = []
     for _ in range(60):
         face.run(0.01)
@@ -86,12 +86,12 @@ def test_a_layer_fades_evenly_and_is_not_cut() -> None:
 
 def test_what_an_expression_held_back_comes_back_as_it_fades(monkeypatch: pytest.MonkeyPatch) -> None:
     face = Face()
-    face.state._blocks = (0.0, 1.0, 1.0)
-    monkeypatch.setattr(face.state._player, "update", fail)
+    face.state._sources._blocks = (0.0, 1.0, 1.0)
+    monkeypatch.setattr(face.state._sources.player, "update", fail)
     held = []
     for _ in range(60):
         face.run(0.01)
-        held.append(float(face.state._looking._block[0]))
+        held.append(float(face.state._sources._looking._block[0]))
     assert held[0] < 0.1 and held[-1] == 1.0 and np.diff(held).max() < 0.05
 
 
@@ -116,6 +116,6 @@ def test_a_source_begins_again_only_when_its_layer_has_faded_out(monkeypatch: py
     face.state = CommandState(P, layers=slow)
     face.state.expression("happiness", 1.0, None, face.now)
     face.run(1.0)
-    monkeypatch.setattr(face.state._player, "update", fail)
+    monkeypatch.setattr(face.state._sources.player, "update", fail)
     smiles = face.run(6.0)[:, SMILE]
     assert -np.diff(smiles).min() < 0.01 and smiles[-1] < 1e-6  # a new source would set it to neutral after 1 s

@@ -70,6 +70,7 @@ def test_where_it_would_come_to_rest() -> None:
     assert moving.any() and np.all(turned[moving] > 0.6 * rest[moving])
 
 
+@pytest.mark.slow
 def test_limits_hold_when_steps_differ_in_length() -> None:
     random = np.random.default_rng(3)
     limiter = MotionLimiter.of(P)

@@ -99,6 +99,7 @@ def test_the_sampled_skin_goes_where_the_head_goes(head: Head, solved: AnchorSol
     assert away.max() < 1.0  # mm; arcs and lids meet between the samples
 
 
+@pytest.mark.slow
 def test_anchors_lie_where_their_landmarks_say(robot: RobotSettings, solved: AnchorSolver) -> None:
     wanted = [
         robot.landmarks[c.anchor.point] for c in robot.anchored_channels if c.anchor and isinstance(c.anchor.point, str)

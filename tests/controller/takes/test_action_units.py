@@ -96,3 +96,12 @@ def test_what_is_wrong_is_named(tmp_path: Path, text: str, why: str) -> None:
     with pytest.raises(TakeError, match=why) as caught:
         load_take(tmp_path / "a.csv", P)
     assert caught.value.hint and "a.csv" in str(caught.value)
+
+
+def test_levels_above_the_scale_count_as_full_and_units_together_stay_within_the_parameter(tmp_path: Path) -> None:
+    columns = "timestamp, confidence, AU26_r, AU27_r"
+    (tmp_path / "a.csv").write_text(f"{columns}\n0, 0.9, 5, 0\n1, 0.9, 7.5, 0\n2, 0.9, -1, 0\n3, 0.9, 5, 5\n")
+    full, above, below, both = at(load_take(tmp_path / "a.csv", P), "jawOpen")
+    assert 0.0 < full == above < both == 1.0 and below == 0.0
+    (tmp_path / "b.csv").write_text("frame,FaceScore,AU01,AU26,AU27\n0,1,0,1,0\n1,1,0,1.5,0\n2,1,0,-0.2,0\n3,1,0,1,1\n")
+    assert at(load_take(tmp_path / "b.csv", P), "jawOpen") == [full, above, below, both]

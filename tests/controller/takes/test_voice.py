@@ -155,6 +155,15 @@ def test_a_voice_far_below_the_loudest_closes_the_mouth_and_no_further() -> None
     assert 0.0 <= face[-1, JAW] < 0.01 and face.min() >= 0.0
 
 
+def test_what_was_loud_fades_by_a_factor_of_e_in_four_seconds() -> None:
+    """A soft voice then moves the mouth as one does that is louder by as much and begins later by as little."""
+    loud, soft = vowel(MEN["ɑ"], 120.0, 0.3), 0.05 * vowel(MEN["ɑ"], 120.0, 4.8)
+    late = heard(VoiceEnvelope(P, RATE), np.concatenate([loud, soft]))[:, JAW]
+    soon = heard(VoiceEnvelope(P, RATE), np.concatenate([loud, np.e * soft[:RATE]]))[:, JAW]
+    assert late[60] < 0.01 and soon[70] > 0.03
+    assert late[470] == pytest.approx(soon[70], rel=0.02)
+
+
 AH = np.concatenate([np.zeros(RATE // 4), vowel(MEN["ɑ"], 120.0, 0.6), np.zeros(RATE // 4)])
 
 

@@ -98,6 +98,7 @@ def test_a_port_is_a_terminal_or_an_address() -> None:
     assert "--link and --tcp do not go together" in done.stderr + done.stdout
 
 
+@pytest.mark.slow
 def test_the_host_plays_its_script_to_whoever_opens_it(tmp_path: Path) -> None:
     link = tmp_path / "robot"
     with served("host", "tour", "--link", str(link)), serial.Serial(str(link), 115_200, timeout=10) as port:

@@ -39,7 +39,7 @@ def test_measured_pulses_stand_in_place_of_the_model() -> None:
     points = tuple((math.radians(deg), pulse) for deg, pulse in ((-40, 1900.0), (0, 1510.0), (40, 1080.0)))
     assert us(spec(pulse_us=points), -40, -20, 0, 20, 40) == [1900, 1705, 1510, 1295, 1080]
     scale = PulseScale([spec(pulse_us=points)])
-    assert scale.radian(0, 1295.0) == pytest.approx(math.radians(20))
+    assert scale.radians(np.array([1295.0])) == pytest.approx(math.radians(20))
 
 
 @given(st.floats(-0.8, 0.8), st.sampled_from(sorted(known_models())), st.booleans())

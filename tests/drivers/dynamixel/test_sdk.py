@@ -212,6 +212,13 @@ def test_s4_a_shorter_reply_than_asked_for_is_refused(wire: Wire, ours: tuple, p
     assert packets.read_group(port, [2], POSITION, 4).missing == (2,)
 
 
+def test_s4_the_length_of_a_long_reply_is_checked_too(wire: Wire, ours: tuple) -> None:
+    block = bytes(k % 251 for k in range(300))
+    wire.answer = table({1: block})
+    port, packets = ours
+    assert packets.readTxRx(port, 1, 0, 300)[:2] == (list(block), bare.COMM_SUCCESS)
+
+
 def test_s4_a_silent_servo_is_asked_for_data_only_after_a_ping(wire: Wire, ours: tuple) -> None:
     port, packets = ours
     port.margin_s = 0.02

@@ -235,6 +235,16 @@ def test_packet_behind_one_with_a_damaged_length_arrives_without_a_pause():
     assert (reader.broken_frames, reader.noise_bytes, reader.pending) == (1, len(damaged), 0)
 
 
+def test_what_only_looks_like_a_packet_inside_an_incomplete_one_does_not_end_it():
+    outer = encode_instruction(1, I.WRITE, b"\x74\x00" + bytes(40))[:12]
+    inner = bytearray(encode_instruction(2, I.WRITE, b"\x74\x00\x00\x02\x00\x00"))
+    inner[-1] ^= 1
+    for begun in (bytes(inner), bytes(inner[:-2])):
+        reader = InstructionReader()
+        assert reader.feed(outer + begun) == []
+        assert (reader.broken_frames, reader.noise_bytes, reader.pending) == (0, 0, len(outer) + len(begun))
+
+
 @pytest.mark.parametrize(
     "bad", ["FF FF FD 00 01 02 00", "FF FF FD 00 01 FF 7F", "FF FF FD 00 FD 03 00", "FF FF FD 00 FF 03 00"]
 )

@@ -75,13 +75,15 @@ def test_echoes_are_no_servos(in_virtual_time: Callable[[Answer], FarEnd]) -> No
     assert ping_all(in_virtual_time(lambda p: encode(*p))).ids == ()
 
 
+@pytest.mark.parametrize("baud", [1_000_000, 9_600])
 def test_the_last_id_is_waited_for_longer_and_the_others_no_longer_than_a_ping_takes(
-    in_virtual_time: Callable[[Answer], FarEnd],
+    in_virtual_time: Callable[[Answer], FarEnd], baud: int
 ) -> None:
     far_end = in_virtual_time(lambda packet: b"")
+    far_end.baud = baud
     begin_s = far_end.clock()
     ping_all(far_end)
-    gap_s = 12 * 10 / 1_000_000 + 0.0016
+    gap_s = 12 * 10 / baud + 0.0016
     assert far_end.clock() - begin_s == pytest.approx(254 * gap_s + scan_protocol1.WAIT_S, rel=0.01)
 
 

@@ -129,6 +129,7 @@ def test_a_head_without_eyes_or_blinks_is_a_warning(good: HeadData) -> None:
     assert [(f.kind, f.warning) for f in found if f.kind == "missing eye"] == [("missing eye", True)]
 
 
+@pytest.mark.slow
 def test_places_have_names(good: HeadData) -> None:
     subject = Subject(Head(good))
     mouth = find_mouth(subject)

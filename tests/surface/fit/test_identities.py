@@ -110,6 +110,7 @@ def test_those_that_ship_differ_as_their_names_say(heads):
         assert 1.5 < np.linalg.norm(face - base.part("face").vertices, axis=1).max() < 25
 
 
+@pytest.mark.slow
 def test_eyes_stay_in_their_sockets_and_lids_close(heads):
     base, made = heads
     for head in (base, *made.values()):

@@ -212,6 +212,7 @@ def test_the_figures_are_those_of_the_fit(folder, result):
     assert part["excluded_samples"] == int(result.parts[0].chart.folded.sum())
 
 
+@pytest.mark.slow
 def test_pieces_and_shapes_stand_in_it(folder, result):
     table = json.loads((folder / "report.json").read_text())
     assert table["shapes"] == {"jawOpen": ["jawOpen"], "mouthSmileLeft": ["mouthSmile_L"]}
@@ -226,6 +227,7 @@ def test_pieces_and_shapes_stand_in_it(folder, result):
     assert kinds_line(report) == "pieces: skin (Head); hat, left out (Hat|1)" and kinds_line(result.report) == ""
 
 
+@pytest.mark.slow
 def test_it_can_be_read(folder):
     text = (folder / "report.md").read_text()
     for words in ("left out, not ARKit's: odd", "| jawOpen |", "uniform cubic NURBS net", "unit taken for mm"):
@@ -240,6 +242,7 @@ def test_the_face_stands_beside_bounds_that_grow_with_the_head(scale, said):
     assert f"99 % 0.050 of {0.8 * scale:.3f} mm" in line and f"shapes 0.003 of {0.08 * scale:.3f} mm" in line
 
 
+@pytest.mark.slow
 def test_the_error_is_drawn_on_the_face(folder, gl):
     image = pytest.importorskip("PIL.Image", reason="needs Pillow (extra view)")
     for name in ("error_neutral.png", "error_shapes.png"):
@@ -248,6 +251,7 @@ def test_the_error_is_drawn_on_the_face(folder, gl):
         assert pixels.shape[1] > 1600 and (np.ptp(pixels, axis=2) > 30).mean() > 0.05
 
 
+@pytest.mark.slow
 def test_excluded_places_have_a_colour_of_their_own(result):
     part = result.parts[0]
     assert part.chart.folded.any()

@@ -104,5 +104,7 @@ def test_of_a_smile_and_a_frown_the_difference_comes_back() -> None:
     found = read(data)
     difference = sent.values[P.index("mouthSmileLeft")] - sent.values[P.index("mouthFrownLeft")]
     assert found["mouthSmileLeft"] - found["mouthFrownLeft"] == pytest.approx(difference, abs=1e-6)
+    for name in ("eyeBlinkLeft", "eyeBlinkRight", "jawOpen", "headYaw", "headPitch", "headRoll"):
+        assert found[name] == pytest.approx(sent.values[P.index(name)], abs=1e-5), name
     nobody = Frame(sent.values, sent.mask, face=False)
     assert OpenSeeFaceEncoder(P).encode(nobody) == []

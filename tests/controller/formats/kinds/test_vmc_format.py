@@ -155,6 +155,13 @@ def test_another_library_reads_what_is_sent() -> None:
     assert all(len(each) == 7 and math.hypot(*each[3:]) == pytest.approx(1.0) for each in bones.values())
 
 
+def test_frames_without_a_time_are_a_sixtieth_of_a_second_apart_from_0_on() -> None:
+    osc_bundle = pytest.importorskip("pythonosc.osc_bundle")
+    encoder = VmcEncoder(P)
+    sent = [osc_bundle.OscBundle(encoder.encode(face(3, None))[0]) for _ in range(3)]
+    assert [each.content(1).params[0] for each in sent] == pytest.approx([0.0, 1 / 60, 2 / 60])
+
+
 def test_a_frame_without_a_face_says_that_nothing_is_tracked() -> None:
     osc_bundle = pytest.importorskip("pythonosc.osc_bundle")
     (data,) = VmcEncoder(P).encode(Frame(P.neutral(), np.zeros(len(P), dtype=bool), face=False))

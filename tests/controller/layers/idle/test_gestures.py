@@ -77,3 +77,12 @@ def test_gestures_follow_each_other_at_their_interval(settings: IdleSettings) ->
     begun = np.count_nonzero(np.diff(path.any(axis=1).astype(int)) > 0)
     length_s = mean_of(settings.fidget.interval_s) + settings.fidget.rise_s + 0.7 + settings.fidget.fall_s
     assert 3600.0 / begun == pytest.approx(length_s, rel=0.1)
+
+
+def test_the_first_gesture_comes_after_an_interval_too(settings: IdleSettings) -> None:
+    first_s = []
+    for seed in range(400):
+        gestures = Gestures(P, settings.fidget, generator(seed, "x"))
+        gestures.begin(10.0)
+        first_s.append(gestures.next_s - 10.0)
+    assert min(first_s) > 0.0 and np.mean(first_s) == pytest.approx(mean_of(settings.fidget.interval_s), rel=0.15)

@@ -7,6 +7,7 @@ import logging
 import socket
 import time
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,6 +17,7 @@ from websockets.sync.client import ClientConnection, connect
 from controller.base.errors import LinkError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
+from controller.links.websocket import server
 from tests.controller.links.net.sockets import wait_for
 from tests.controller.links.websocket.far import served
 
@@ -119,6 +121,17 @@ def test_messages_beyond_the_rate_are_dropped_and_the_client_hears_of_it(far: tu
             while reply["type"] == "error":
                 reply = json.loads(client.recv(WAIT_S))
         assert reply == {"id": 1, "type": "ok"}
+
+
+def test_messages_that_have_no_answer_take_no_place_of_one_that_has(far: tuple[CommandState, Any, str]) -> None:
+    """Many may be read in one go, before anything is sent."""
+    state, link, _ = far
+    client = server._Client(SimpleNamespace(remote_address=("127.0.0.1", 9)), state, 0, link._meter)  # type: ignore[arg-type]
+    for _ in range(server._WAITING):
+        client._take('{"type": "neutral"}')
+    client._take('{"type": "stop", "id": 1}')
+    answers = [client._waiting.get_nowait() for _ in range(client._waiting.qsize())]
+    assert [each.model_dump()["id"] for each in answers if each is not None] == [1] and client.unanswered == 0
 
 
 def test_pages_from_elsewhere_are_turned_away(far: tuple[CommandState, Any, str]) -> None:

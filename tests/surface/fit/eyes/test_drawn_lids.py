@@ -61,6 +61,7 @@ def test_lids_that_cut_through_an_eyeball_are_lifted_out_of_it(heads) -> None:
         assert eye_seen(after, side) > 6.0
 
 
+@pytest.mark.slow
 def test_lids_are_drawn_half_a_millimetre_above_the_eyeball(heads) -> None:
     """Middles of the triangles in front of the eye, at rest: the cornea is 0.65 radii, 0.4447 before the middle."""
     after = heads[1]
@@ -72,6 +73,7 @@ def test_lids_are_drawn_half_a_millimetre_above_the_eyeball(heads) -> None:
     assert 0.4 < height.min() < 0.6
 
 
+@pytest.mark.slow
 def test_a_blink_that_leaves_a_gap_is_lengthened_until_it_is_drawn_shut(heads) -> None:
     before, after, notes = heads
     for side, name in enumerate(BLINKS):
@@ -90,6 +92,7 @@ def test_a_blink_that_goes_a_third_of_its_way_is_left_alone(head: Head) -> None:
     np.testing.assert_allclose(after.parts[0].points, head.data.parts[0].points, atol=0.05)
 
 
+@pytest.mark.slow
 def test_a_head_without_lids_stays_as_it_is(head: Head) -> None:
     bare = replace(head.data, contacts=[])
     assert seat_drawn_lids(bare) == (bare, [])

@@ -98,6 +98,7 @@ def seen(head: Head, side: int, **values: float) -> np.ndarray:
 SIDES = ("Left", "Right")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("side", [0, 1])
 def test_eyes_are_seen_between_lids_that_shut(head: Head, side: int) -> None:
     open_eye = seen(head, side)
@@ -107,6 +108,7 @@ def test_eyes_are_seen_between_lids_that_shut(head: Head, side: int) -> None:
     assert 0.2 < half.sum() / open_eye.sum() < 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("look", ["Up", "Down", "In", "Out"])
 def test_eyes_that_turn_stay_behind_the_lids(head: Head, look: str) -> None:
     """What is seen of an eye that turns is what was seen of it before, but for lids that its cornea lifts."""
@@ -114,6 +116,7 @@ def test_eyes_that_turn_stay_behind_the_lids(head: Head, look: str) -> None:
     assert (before != after).sum() < 0.12 * before.sum()
 
 
+@pytest.mark.slow
 def test_no_part_of_an_eye_is_drawn_as_skin(head: Head) -> None:
     assert [(p.name, p.material) for p in head.parts] == [
         ("face", "skin"), ("eye_left", "eye"), ("eye_right", "eye"),

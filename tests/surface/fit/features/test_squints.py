@@ -42,6 +42,7 @@ def test_a_blink_stays_shut_with_a_squint_that_opened_it(head: Head) -> None:
     assert shut_with_squints(mended) == (mended, [])
 
 
+@pytest.mark.slow
 def test_a_squint_that_leaves_the_eye_shut_and_a_head_without_squints_stay(head: Head) -> None:
     good = squinting(head.data, -0.2, "Left", "Right")
     for data in (good, head.data):

@@ -32,6 +32,7 @@ def test_a_good_fit_is_near_both_ways_in_every_shape(result: FitResult, mesh: Fi
     assert dense.added == () and dense.left_out == ()
 
 
+@pytest.mark.slow
 def test_a_head_that_is_off_says_by_how_much(result: FitResult, mesh: FitMesh) -> None:
     (own,) = result.report.dense.parts.values()
     (part,) = measured(result, mesh, vertices=mesh.vertices + np.array([0.0, 0.0, 7.0])).parts.values()
@@ -39,6 +40,7 @@ def test_a_head_that_is_off_says_by_how_much(result: FitResult, mesh: FitMesh) -
     assert part["neutral"].to_mesh.rms > 5 * own["neutral"].to_mesh.rms
 
 
+@pytest.mark.slow
 def test_a_bump_that_the_surface_lacks_is_found_from_the_mesh(result: FitResult, mesh: FitMesh) -> None:
     k = next(iter(sources_of(mesh.names).values()))[0]
     deltas = mesh.deltas.copy()
@@ -51,6 +53,7 @@ def test_a_bump_that_the_surface_lacks_is_found_from_the_mesh(result: FitResult,
     assert dense.lines()[0].startswith(f"greatest error {dense.worst.mm:.2f} mm: shape {mesh.names[k]}, ")
 
 
+@pytest.mark.slow
 def test_faces_that_no_part_holds_are_named(result: FitResult, mesh: FitMesh) -> None:
     n = len(mesh.vertices)
     more = replace(
@@ -65,6 +68,7 @@ def test_faces_that_no_part_holds_are_named(result: FitResult, mesh: FitMesh) ->
     assert any("no fitted part holds: hat" in line for line in dense.lines())
 
 
+@pytest.mark.slow
 def test_it_stands_in_both_reports(result: FitResult) -> None:
     from surface.fit.points.nurbsnet import UniformNet
 

@@ -45,6 +45,7 @@ def test_a_spike_at_rest_is_mended(result: FitResult, mesh: FitMesh) -> None:
     assert len(notes) >= 1 and "neutral" in notes[0] and dense.worst is not None
 
 
+@pytest.mark.slow
 def test_a_spike_in_a_shape_is_mended_and_the_rest_stays(result: FitResult, mesh: FitMesh) -> None:
     part = result.head.parts[0]
     bad = fine_point(result.head)
@@ -62,11 +63,13 @@ def test_a_spike_in_a_shape_is_mended_and_the_rest_stays(result: FitResult, mesh
     np.testing.assert_array_equal(mended.parts[0].points, part.points)
 
 
+@pytest.mark.slow
 def test_a_good_fit_is_left_as_it_is(result: FitResult, mesh: FitMesh) -> None:
     head, _, notes = mend_spikes(result.head, mesh, sources_of(mesh.names), result.parts, 1.0)
     assert head is result.head and notes == []
 
 
+@pytest.mark.slow
 def test_what_cannot_be_mended_is_a_fault(result: FitResult, mesh: FitMesh, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mend, "NEIGHBOURS", 0)
     _, dense, _ = mend_spikes(spiked(result.head, 300.0), mesh, sources_of(mesh.names), result.parts, 1.0)

@@ -147,6 +147,7 @@ def test_a_spline_with_star_points_is_told_as_fitted_and_sewn_in_every_pose(star
     assert len(data.seams) > 50 and crack(Head(replace(data, seams=[])).part("face"))[0] > 1e-4 * size
 
 
+@pytest.mark.slow
 def test_charts_of_a_spline_with_star_points_move_as_one(starred) -> None:
     """By a group of a file: points of several charts in one place, which are regular there, move alike."""
     part = starred[0].parts[0]

@@ -105,6 +105,7 @@ def test_the_face_has_the_form_of_the_scan(shipped, made):
     assert heard == sorted(heard) and heard[0] > 0 and heard[-1] <= 1
 
 
+@pytest.mark.slow
 def test_eyes_sit_in_their_sockets(shipped, made):
     head, _, _ = made
     before, after = corresponding(shipped, head, {})
@@ -115,6 +116,7 @@ def test_eyes_sit_in_their_sockets(shipped, made):
     assert head.data.eye_radius == pytest.approx(shipped.data.eye_radius, rel=0.08)
 
 
+@pytest.mark.slow
 def test_every_expression_is_there_and_moves_as_on_the_shipped_head(shipped, made):
     head, report, _ = made
     assert set(report.fit.parameters) == set(shipped.groups) and not report.fit.missing
@@ -124,6 +126,7 @@ def test_every_expression_is_there_and_moves_as_on_the_shipped_head(shipped, mad
         assert np.sqrt(((ours - theirs) ** 2).sum() / (theirs**2).sum()) < most, name
 
 
+@pytest.mark.slow
 def test_lips_seal_and_lids_close(made):
     head, _, _ = made
     assert gaps(head, "lips", {}).max() < 0.5
@@ -133,6 +136,7 @@ def test_lips_seal_and_lids_close(made):
         assert gaps(head, side, {shape: 1.0}).max() < 0.5
 
 
+@pytest.mark.slow
 def test_the_report_tells_where_landmarks_are_what_was_open_and_what_is_shut(shipped, made, scan_file):
     _, report, _ = made
     own = make_template(shipped, "ict").landmarks
@@ -154,6 +158,7 @@ def test_the_report_tells_where_landmarks_are_what_was_open_and_what_is_shut(shi
         assert (scan_file.parent / "report" / name).read_bytes().startswith(b"\x89PNG")
 
 
+@pytest.mark.slow
 def test_the_skin_has_the_scans_colour(made):
     head, report, _ = made
     linear = ((np.array(SKIN) + 0.055) / 1.055) ** 2.4  # IEC 61966-2-1
@@ -162,6 +167,7 @@ def test_the_skin_has_the_scans_colour(made):
     assert any("colours taken from the scan" in note for note in report.fit.notes)
 
 
+@pytest.mark.slow
 def test_unit_and_turn_are_said(made):
     _, report, _ = made
     notes = " ".join(report.fit.notes)
