@@ -46,8 +46,8 @@ def grow(
 
     lengths (n,), mm. A lock starts at the share ``below`` of the hair's thickness, inside it, and soon lies at its
     share ``lift`` (n,). stiff : how much of its direction a lock keeps at each step. slack : mm by which it may lie
-    higher. ears : are ears in the way? settle : the share of its height that a lock loses towards its tip, so that tips lie
-    on the hair below and none stands off by itself.
+    higher. ears : are ears in the way? settle : the share of its height that a lock loses towards its tip, so
+    that tips lie on the hair below.
     """
     normals, _ = skin.nearest(roots, ears=ears)
     at = roots + (below * thickness(roots))[:, None] * normals
