@@ -348,7 +348,7 @@ def lips_gap(head: Head, step: float = 0.1) -> float:
 def seams_gape(head: Head) -> float:
     """How far the borders of two parts that are one line lie apart at most."""
     widest = 0.0
-    for z in head.zippers:
+    for z in head.stitches:
         if z.first is not z.second:
             a, b = z.first.vertices, z.second.vertices
             edge = a[z.low] + z.share[:, None] * (a[z.high] - a[z.low])

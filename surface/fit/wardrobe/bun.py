@@ -25,12 +25,12 @@ def bun(skin: Skin) -> Style:
     inside = line.inside(among)
     far = np.linalg.norm(among - base, axis=1)
     among, inside = among[far > 34.0], inside[far > 34.0]
-    roots = among[spread(skin, among, np.where(inside < 8.0, 8.0, 17.0), 31)]
+    roots = among[spread(skin, among, np.where(inside < 8.0, 6.0, 15.0), 31)]
     random = np.random.default_rng(32)
     layer = random.uniform(0.0, 1.0, len(roots))
 
     def thickness(at: Floats) -> Floats:
-        return np.asarray(1.5 + 3.6 * step(line.inside(at), -2.0, 40.0))
+        return np.asarray(0.9 + 4.2 * step(line.inside(at), -1.0, 36.0))
 
     def flow(at: Floats, normals: Floats, share: float) -> Floats:
         ahead = tangent(base - at, normals)
@@ -41,12 +41,12 @@ def bun(skin: Skin) -> Style:
     away = np.linalg.norm(roots - base, axis=1)
     length = np.minimum(1.08 * away, 95.0 + 10.0 * layer)
     paths, normals = grow(skin, roots, length, thickness, flow, lift=1.0 + 0.25 * layer, below=0.8, steps=16, stiff=0.5,
-                          slack=0.4)  # fmt: skip
-    width = 13.5 * random.uniform(0.8, 1.25, len(roots))
+                          slack=0.4, settle=0.15)  # fmt: skip
+    width = (10.0 + 3.5 * step(line.inside(roots), 4.0, 20.0)) * random.uniform(0.8, 1.25, len(roots))
     locks = Locks(paths, normals, width, shades(len(roots), 33), layer)
     drawn = lock_patches(locks, 6, (3, 6), (2, 4), np.zeros(len(roots)), bulge=0.07, root=0.9, tip=0.75, tip_cover=0.5,
-                         edge_cover=0.55, fall_from=0.6)  # fmt: skip
-    return Style([_twists(), drawn, _core(), cap(skin, line, thickness)], line)
+                         edge_cover=0.55, fall_from=0.6, root_fade=0.75)  # fmt: skip
+    return Style([_twists(), drawn, _core(), cap(skin, line, thickness, short_mm=0.5)], line)
 
 
 def _frame() -> Floats:

@@ -40,13 +40,14 @@ class Locks:
 
 def grow(
     skin: Skin, roots: Floats, lengths: Floats, thickness: Thickness, flow: Flow, *, lift: Floats, steps: int = 14,
-    stiff: float = 0.5, slack: float = 1.0, ears: bool = False, below: float = 0.7,
+    stiff: float = 0.5, slack: float = 1.0, ears: bool = False, below: float = 0.7, settle: float = 0.0,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Paths (n, steps + 1, 3) of locks from roots (n, 3) on the skin, and the skin's normals along them.
 
     lengths (n,), mm. A lock starts at the share ``below`` of the hair's thickness, inside it, and soon lies at its
     share ``lift`` (n,). stiff : how much of its direction a lock keeps at each step. slack : mm by which it may lie
-    higher. ears : are ears in the way?
+    higher. ears : are ears in the way? settle : the share of its height that a lock loses towards its tip, so
+    that tips lie on the hair below.
     """
     normals, _ = skin.nearest(roots, ears=ears)
     at = roots + (below * thickness(roots))[:, None] * normals
@@ -58,7 +59,7 @@ def grow(
         at = at + ahead * (lengths / steps)[:, None]
         normals, height = skin.nearest(at, ears=ears)
         risen = np.minimum(share * lengths / RISE_MM, 1.0) ** 0.7
-        least = thickness(at - height[:, None] * normals) * (below + (lift - below) * risen)
+        least = thickness(at - height[:, None] * normals) * (below + (lift - below) * risen) * (1.0 - settle * share**2)
         at = at + normals * (np.clip(height, least, least + slack) - height)[:, None]
         paths.append(at)
         along.append(normals)

@@ -42,7 +42,7 @@ def tangent(wanted: Floats, normals: Floats) -> Floats:
 
 def cap(
     skin: Skin, line: Hairline, thickness: Thickness, *, share: float = 0.93, short_mm: float = 3.0,
-    openness: float = 0.72,
+    openness: float = 0.52,
 ) -> Patches:  # fmt: skip
     """One closed patch over the whole scalp, at a share of the hair's thickness, under all locks; its edge thins out
     ``short_mm`` inside the line."""
@@ -50,7 +50,7 @@ def cap(
     points = _cap_points(skin, line, (nu, nv), thickness, share, short_mm)
     t = np.broadcast_to(np.linspace(0, 1, gv), (gu, gv))
     round_it = np.broadcast_to(np.linspace(0, 1, gu)[:, None], (gu, gv))
-    cover = 1.4 - 1.2 * step(t, 0.90, 1.0)
+    cover = 2.2 - 2.0 * step(t, 0.90, 1.0)
     strands = np.stack([round_it * 560 * ACROSS, t * 160 * ALONG, cover, openness + 0.0 * t], axis=-1)
     return Patches(
         points[None], (3, 3), (gu, gv), (25, 7), strands[None], np.zeros((1, gu, gv)), np.full((1, gu, gv), 0.85),
@@ -77,13 +77,13 @@ def _cap_points(
 def lock_patches(
     locks: Locks, count: int, grid: tuple[int, int], fast: tuple[int, int], sway: Floats, *, seed: int = 3,
     tip_cover: float = 0.05, edge_cover: float = 0.45, bulge: float = 0.13, root: float = 0.8, tip: float = 0.25,
-    follow: float = 0.0, below: float = _BELOW, fall_from: float = 0.30,
+    follow: float = 0.0, below: float = _BELOW, fall_from: float = 0.30, root_fade: float = 0.5,
 ) -> Patches:  # fmt: skip
     """Ribbons along locks, in the order of their ``layers`` and roots from above: each lies over the roots of the next,
     so that the depth test spares what is hidden.
 
     sway : (n,) of the tips. tip_cover, edge_cover : how much of a ribbon's tip and sides is left; fall_from : the
-    share of the length from which it thins out.
+    share of the length from which it thins out; root_fade : how much less of its root is left.
     """
     order = np.argsort(np.rint(-2.0 * locks.layers) * 25.0 - locks.paths[:, 0, 1], kind="stable")
     locks = Locks(*(getattr(locks, k)[order] for k in ("paths", "normals", "widths", "shades", "layers")))
@@ -93,7 +93,7 @@ def lock_patches(
     s, t = (x[None] for x in np.meshgrid(np.linspace(-1, 1, gu), np.linspace(0, 1, gv), indexing="ij"))
     start = random.uniform(0.0, 1.0, (n, 2))[:, :, None, None]
     across = start[:, 0] + 0.5 * (s + 1.0) * locks.widths[:, None, None] * ACROSS * (1.0 - 0.35 * t)
-    ends = 1.2 - (1.2 - tip_cover) * step(t, fall_from, 1.0) - 0.5 * (1.0 - step(t, 0.0, 0.06))
+    ends = 1.2 - (1.2 - tip_cover) * step(t, fall_from, 1.0) - root_fade * (1.0 - step(t, 0.0, 0.12 * root_fade))
     cover = ends - (1.0 - edge_cover) * s * s * (0.6 + 0.4 * t)
     layer = locks.layers[:, None, None]
     openness = (below + (1.0 - below) * step(t, 0.0, 0.45)) * (0.68 + 0.32 * layer) * (1.0 - 0.12 * s * s)
@@ -145,7 +145,7 @@ def short(skin: Skin) -> Style:
         return tangent(away * (0.55 + 0.2 * forwards) + forwards * 0.9 * aside + sides * downwards, normals)
 
     paths, normals = grow(
-        skin, roots, length, thickness, flow, lift=1.0 + 0.22 * layer, below=0.86, stiff=0.55, slack=0.5
+        skin, roots, length, thickness, flow, lift=1.0 + 0.22 * layer, below=0.86, stiff=0.55, slack=0.5, settle=0.3
     )
     width = (10.5 + 3.5 * top - 1.5 * low) * random.uniform(0.75, 1.25, len(roots))
     locks = Locks(paths, normals, width, shades(len(roots), 2), layer)

@@ -57,7 +57,7 @@ class Crowd:
         head.pose(neutral)
         self.parts = tuple(_make_part(part, count) for part in head.parts)
         at = {id(part): i for i, part in enumerate(head.parts)}
-        self._stitches = [(stitch, at[id(stitch.first)], at[id(stitch.second)]) for stitch in head.zippers]
+        self._stitches = [(stitch, at[id(stitch.first)], at[id(stitch.second)]) for stitch in head.stitches]
         self._values = np.tile(neutral, (count, 1))
         self.values = self._values.view()
         self.values.flags.writeable = False

@@ -73,7 +73,7 @@ class DecimatedHead:
         self._rig = JoinedRig([part for _, part in skins], head.data)
         self._skins = [_Skin(decimated, part, self._rig.rows[part.name]) for decimated, part in skins]
         self._rigids = [_Rigid(part, head.data) for part in self.parts if isinstance(part.part, RigidPart)]
-        self._seams = _Seams(head.zippers, self.parts)
+        self._seams = _Seams(head.stitches, self.parts)
         self._turn: Turn | None = None
         self.pose(np.zeros(len(head.parameters)))
 
@@ -228,7 +228,7 @@ class _Seams:
 def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
     """Which vertices are drawn or wanted, by part, with those that seams put them between."""
     kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
-    for stitch in reversed(head.zippers):  # a later seam may take what an earlier one moves
+    for stitch in reversed(head.stitches):  # a later seam may take what an earlier one moves
         drawn = np.isin(stitch.ids, kept[stitch.second.name])
         between = [kept[stitch.first.name], stitch.low[drawn], stitch.high[drawn]]
         kept[stitch.first.name] = np.unique(np.concatenate(between))

@@ -101,7 +101,7 @@ class Head:
         raise KeyError(f"no part {name!r}; there are {', '.join(p.name for p in self.parts)}")
 
     @property
-    def zippers(self) -> tuple[SeamStitch, ...]:
+    def stitches(self) -> tuple[SeamStitch, ...]:
         """The head's seams, in the order in which they are closed."""
         return self._stitches
 

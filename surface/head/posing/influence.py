@@ -44,7 +44,7 @@ class Influence:
         self.points = first
         self.part_start = np.cumsum([0, *(len(part.vertices) for part in head.parts)])
         at = {part.name: i for i, part in enumerate(head.parts)}
-        for stitch in head.zippers:
+        for stitch in head.stitches:
             one, two = at[stitch.first.name], at[stitch.second.name]
             _stitch_rows(stitch, rows[one], rows[two], shares[one], shares[two])
         every = [row for part_rows in rows for row in part_rows]

@@ -28,7 +28,7 @@ class DecimatedEvaluator(Evaluator):
     """
 
     def __init__(self, head: Head, level: str, openings: Openings, reason: str) -> None:
-        parts = sorted(head.parts, key=lambda part: materials.of(part.material).order)
+        parts = sorted(head.parts, key=lambda part: materials.material_of(part.material).order)
         self.reason, self.decimated = reason, DecimatedHead(head, parts, level, openings.read_vertices())
         self._parts = {decimated.part.name: decimated for decimated in self.decimated.parts}
         self._rows: dict[tuple[str, int], tuple[np.ndarray, np.ndarray]] = {}
@@ -120,7 +120,7 @@ def draw_calls(
 ) -> list[DrawCall]:
     """Draw calls of a decimated head, in the order in which it is drawn; ``static`` as in :class:`PartBuffers`."""
     calls = []
-    for name, group in groupby(decimated.parts, lambda p: materials.of(p.part.material).program):
+    for name, group in groupby(decimated.parts, lambda p: materials.material_of(p.part.material).program):
         parts = list(group)
         if not any(len(p.triangles) for p in parts):  # clothes hide them
             continue

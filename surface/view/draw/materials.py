@@ -117,7 +117,7 @@ def worn_program(ctx: moderngl.Context, name: str, quality: str, *, simplified: 
     return build(ctx, (*shared, f"{name}.vert"), (*shared, f"{name}.frag"), defines=defines)
 
 
-def of(name: str) -> Material:
+def material_of(name: str) -> Material:
     """The material of that name; an unknown one draws as skin."""
     return MATERIALS.get(name, MATERIALS["skin"])
 
@@ -285,7 +285,7 @@ def _worn_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
         "albedo_gloss": np.rint(packed * 255.0).astype(np.uint8),
         "strands": attribute(part, "strands", (0.0, 0.0, 1.0, 1.0)),
     }
-    if of(part.material).program == "strand":
+    if material_of(part.material).program == "strand":
         static["along"] = attribute(part, "along", (0.0, -1.0, 0.0))
     return static
 

@@ -66,14 +66,14 @@ class Renderer:
         self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids))
         self._fine = ["freckles"] if any("freckles" in part.attributes for part in head.parts) else []
         self._fine += ["lips"] if self.openings.lip_tint else []
-        used = {materials.of(part.material).program for part in head.parts}
+        used = {materials.material_of(part.material).program for part in head.parts}
         self._worn = [name for name in materials.WORN if name in used]
         self._programs = materials.programs(ctx, quality, self.theme, fine=self._fine, worn=self._worn)
         self._detail = materials.detail_texture(ctx)
         self._background = Rectangles(ctx, self._programs["background"])
-        parts = sorted(head.parts, key=lambda part: materials.of(part.material).order)
+        parts = sorted(head.parts, key=lambda part: materials.material_of(part.material).order)
         # Taken from the part at rest: later the face may have moved.
-        self._static = {p.name: materials.of(p.material).static(p, self.theme, self.openings) for p in parts}
+        self._static = {p.name: materials.material_of(p.material).static(p, self.theme, self.openings) for p in parts}
         seen = [part for part in parts if len(part.triangles)]  # clothes may hide all of a part
         self._parts: list[PartBuffers] | list[DrawCall] = [self._buffers(part) for part in seen]
         self._simplified = False
@@ -87,7 +87,7 @@ class Renderer:
 
     def _buffers(self, part: ViewPart) -> PartBuffers:
         """Buffers of `part` with the data that its material needs."""
-        program = self._programs[materials.of(part.material).program]
+        program = self._programs[materials.material_of(part.material).program]
         on_gpu = self.evaluator.name == "gpu"
         return PartBuffers(self.ctx, part, program, self._static[part.name], on_gpu=on_gpu)
 
@@ -175,7 +175,7 @@ class Renderer:
 
     def _draw_part(self, buffers: PartBuffers | DrawCall) -> None:
         """One part with its material's uniforms and culling."""
-        material = materials.of(buffers.part.material)
+        material = materials.material_of(buffers.part.material)
         set_uniforms(self._programs[material.program], material.uniforms(buffers.part, self.theme, self.openings))
         hollow = self._into_bust and material.program == "skin"
         flags = self.ctx.DEPTH_TEST

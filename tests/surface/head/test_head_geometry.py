@@ -172,7 +172,7 @@ def mixture(rng: np.random.Generator) -> np.ndarray:
 
 
 def test_every_vertex_on_a_seam_is_sewn(head):
-    for seam, stitch in zip(head.data.seams, head.zippers, strict=True):
+    for seam, stitch in zip(head.data.seams, head.stitches, strict=True):
         part, line = stitch.second, seam.uv_b
         if part is stitch.first:  # behind the lips
             continue

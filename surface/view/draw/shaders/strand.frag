@@ -1,4 +1,5 @@
 // Strands: locks part and thin out where their cover falls below a strand's height.
+#define STEADY 0.2  // a strand keeps its height along its length, so that no piece of it is left by itself
 uniform sampler2D detail;
 
 in vec3 v_colour;
@@ -12,11 +13,14 @@ out vec4 colour;
 
 void main() {
 #ifdef GRAIN_TEXELS
-    vec4 noise = texelFetch(detail, ivec2(v_strand.xy * GRAIN_TEXELS) & (int(GRAIN_TEXELS) - 1), 1);
-#else
-    vec4 noise = texture(detail, v_strand.xy);
-#endif
+    vec4 noise = texelFetch(detail, ivec2(v_strand.xy * vec2(1.0, STEADY) * GRAIN_TEXELS) & (int(GRAIN_TEXELS) - 1), 1);
     float height = 0.5 + 1.25 * (noise.w - 0.5) + 0.75 * (noise.x - 0.5);
+#else
+    vec4 noise = texture(detail, v_strand.xy * vec2(1.0, STEADY));
+    vec4 fine = texture(detail, v_strand.xy * vec2(2.6, 1.0));
+    float height = 0.5 + 1.0 * (noise.w - 0.5) + 0.6 * (noise.x - 0.5) + 0.5 * (fine.w - 0.5);
+    noise = mix(noise, fine, 0.6);
+#endif
     if (height > v_strand.z) {
         discard;
     }

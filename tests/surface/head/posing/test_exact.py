@@ -42,7 +42,7 @@ def assert_exact(head: Head, part: SkinPart) -> None:
     normals, pivot = np.cross(su, sv) * (-1 if mesh.flip else 1), np.array(head.data.neck.pivot)
     folded = np.linalg.norm(normals, axis=1)
     turns = Rotation.from_rotvec(part.share[:, None] * Rotation.from_matrix(part.turn).as_rotvec())
-    sewn = np.concatenate([np.zeros(0, int), *(s.ids for s in head.zippers if s.second is part)])
+    sewn = np.concatenate([np.zeros(0, int), *(s.ids for s in head.stitches if s.second is part)])
     free = np.setdiff1d(np.arange(m), sewn)
     wanted, size = turns.apply(at - pivot) + pivot, np.ptp(surface.points, axis=0).max()
     assert np.abs(part.vertices[:m] - wanted)[free].max() < 1e-6 * size, part.name

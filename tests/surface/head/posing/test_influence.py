@@ -48,7 +48,7 @@ def test_a_vertex_of_a_seam_takes_the_share_of_those_it_lies_between() -> None:
     finer = replace(data.parts[1], budget=(0, 0.003, 6))
     head = Head(replace(data, parts=[data.parts[0], finer, data.parts[2]]))
     sums = Influence(head)
-    stitch = head.zippers[0]
+    stitch = head.stitches[0]
     own = sums.share[sums.part_start[1] + stitch.ids]
     first = sums.share[: sums.part_start[1]]
     assert first == pytest.approx(head.part("a").share, abs=1e-6) and 0.1 < first.mean() < 0.9
@@ -94,7 +94,7 @@ def test_sums_of_every_vertex_run_over_the_points_of_its_part() -> None:
     assert sums.points == 25 + 25 + 4
     assert sums.part_start.tolist() == np.cumsum([0, *(len(p.vertices) for p in head.parts)]).tolist()
     assert len(sums.start) == sums.part_start[-1] + 1 and sums.start[-1] == len(sums.ids) == len(sums.weights)
-    seam = set((sums.part_start[1] + head.zippers[0].ids).tolist())
+    seam = set((sums.part_start[1] + head.stitches[0].ids).tolist())
     for part, (low, high) in enumerate([(0, 25), (25, 50), (50, 54)]):
         for vertex in range(sums.part_start[part], sums.part_start[part + 1]):
             ids = sums.ids[sums.start[vertex] : sums.start[vertex + 1]]

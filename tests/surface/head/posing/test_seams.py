@@ -67,7 +67,7 @@ def test_a_seam_reports_what_it_wrote():
 def test_a_seam_off_the_border_is_none():
     data = small_head()
     far = data.seams[0].uv_a * 0.2 + 0.4
-    (stitch,) = Head(replace(data, seams=[replace(data.seams[0], uv_a=far, uv_b=far)])).zippers
+    (stitch,) = Head(replace(data, seams=[replace(data.seams[0], uv_a=far, uv_b=far)])).stitches
     assert [len(a) for a in (stitch.ids, stitch.low, stitch.high, stitch.share)] == [0] * 4
     stitch.close()
 

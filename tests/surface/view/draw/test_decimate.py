@@ -53,8 +53,8 @@ def test_fewer_triangles_draw_hardly_another_picture(
 def test_where_parts_meet_all_vertices_stay_and_other_borders_thin_out() -> None:
     head = Head(small_head())
     decimated = decimated_triangles(head)
-    (zipper,) = head.zippers
-    meeting = {zipper.first.name: np.union1d(zipper.low, zipper.high), zipper.second.name: zipper.ids}
+    (stitch,) = head.stitches
+    meeting = {stitch.first.name: np.union1d(stitch.low, stitch.high), stitch.second.name: stitch.ids}
     for part in head.parts:
         full, fast = decimated[f"{part.name}/full"], decimated[f"{part.name}/fast"]
         assert len(fast) <= len(full) < len(part.triangles)
@@ -165,7 +165,7 @@ def test_errors_are_those_of_the_material_and_count_places_normals_and_looks(
     (first, locked, errors), _, (tooth, free, others) = seen
     assert errors == pytest.approx([0.18, 0.5])
     assert others == pytest.approx([0.36 * ERRORS_MM[material], ERRORS_MM[material]])
-    (a, _, rigid), (zipper,) = head.parts, head.zippers
+    (a, _, rigid), (stitch,) = head.parts, head.stitches
     assert first.shape == (len(a.vertices), 5 * 6 + 3), "five poses of places and normals, and a colour"
     np.testing.assert_allclose(first[:, :3], a.vertices, atol=1e-5)
     np.testing.assert_allclose(first[:, 3:6], 2.0 * a.normals, atol=1e-5)
@@ -173,7 +173,7 @@ def test_errors_are_those_of_the_material_and_count_places_normals_and_looks(
     head.pose(head.values({"mouthPucker": 1, "browOuterUpLeft": 1, "eyeWideLeft": 1}))
     np.testing.assert_allclose(first[:, 18:21], a.vertices, atol=1e-5)
     head.pose(np.zeros(len(head.parameters)))
-    assert np.array_equal(np.flatnonzero(locked), np.union1d(zipper.low, zipper.high)) and not free.any()
+    assert np.array_equal(np.flatnonzero(locked), np.union1d(stitch.low, stitch.high)) and not free.any()
     looks = {"skin": np.full((len(tooth), 3), 4.0 * np.sqrt(0.5)), "wool": np.zeros((len(tooth), 0))}
     if material in ("brow", "lash"):
         looks[material] = 1.5 * strip_uv(rigid)

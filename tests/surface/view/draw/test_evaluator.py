@@ -62,7 +62,7 @@ def test_the_graphics_processor_writes_the_vertices_and_normals_of_the_engine(
             part = head.part(buffers.part.name)
             rows = np.frombuffer(buffers.feedback.read(), np.float32).reshape(-1, 6)
             own = np.ones(len(rows), bool)
-            for stitch in head.zippers:
+            for stitch in head.stitches:
                 own[stitch.ids if stitch.second is part else []] = False
             assert np.linalg.norm(rows[own, :3] - part.vertices[own], axis=1).max() < 2e-4
             apart = np.linalg.norm(rows[own, 3:] - part.normals[own], axis=1).max()

@@ -11,7 +11,7 @@ from surface.view.draw.materials import (
     attribute,
     detail_texture,
     detail_uv,
-    of,
+    material_of,
     programs,
     skin_program,
     strip_uv,
@@ -23,28 +23,30 @@ from surface.view.scene.theme import THEMES
 
 
 def test_skin_is_drawn_before_what_it_hides() -> None:
-    assert of("skin").order < of("eye").order < of("teeth").order < of("mouth").order
+    assert (
+        material_of("skin").order < material_of("eye").order < material_of("teeth").order < material_of("mouth").order
+    )
 
 
 def test_an_unknown_material_draws_as_skin() -> None:
-    assert of("velvet") is MATERIALS["skin"]
+    assert material_of("velvet") is MATERIALS["skin"]
 
 
 def test_painted_albedo_and_occlusion_are_packed() -> None:
     part = skin()
     count = len(part.rest)
     part.attributes = {"albedo": np.full((count, 3), 0.25, np.float32), "occlusion": np.full((count, 1), 0.5)}
-    packed = of("skin").static(part, THEMES["skin"], Openings([part]))["albedo_occlusion"]
+    packed = material_of("skin").static(part, THEMES["skin"], Openings([part]))["albedo_occlusion"]
     assert packed.dtype == np.uint8
     assert packed[0] / 255.0 == pytest.approx([0.5, 0.5, 0.5, 0.5], abs=0.003)
-    bare = of("skin").static(part, THEMES["mask"], Openings([part]))["albedo_occlusion"]
+    bare = material_of("skin").static(part, THEMES["mask"], Openings([part]))["albedo_occlusion"]
     assert (bare[0, :3] / 255.0) ** 2 == pytest.approx(THEMES["mask"].albedo, abs=0.006)
 
 
 def test_missing_attributes_have_defaults() -> None:
     part = skin()
     assert attribute(part, "gloss", (0.3,)) == pytest.approx(np.full((len(part.rest), 1), 0.3))
-    assert (of("skin").static(part, THEMES["skin"], Openings([part]))["albedo_occlusion"][:, 3] == 255).all()
+    assert (material_of("skin").static(part, THEMES["skin"], Openings([part]))["albedo_occlusion"][:, 3] == 255).all()
 
 
 def test_detail_is_even_in_millimetres_and_closes_behind_the_head() -> None:
@@ -76,7 +78,7 @@ def test_skin_of_a_mask_is_plain_and_darker_on_wet_lips(theme: str) -> None:
     gloss = np.full((count, 1), 0.3, np.float32)
     gloss[0], gloss[1] = 0.6, 0.45
     part.attributes = {"albedo": np.full((count, 3), 0.25, np.float32), "gloss": gloss}
-    colour = (of("skin").static(part, own, Openings([part]))["albedo_occlusion"][:, :3] / 255.0) ** 2
+    colour = (material_of("skin").static(part, own, Openings([part]))["albedo_occlusion"][:, :3] / 255.0) ** 2
     if theme == "skin":
         assert colour == pytest.approx(np.full((count, 3), 0.25), abs=0.006)
     else:
@@ -89,11 +91,11 @@ def test_vertex_data_of_skin_comes_in_the_order_of_the_shader() -> None:
     count = len(part.rest)
     sky = np.tile([0.0, 0.2, 0.4, 1.0], (count, 1))
     part.attributes = {"visible": sky, "thin": np.full((count, 1), 0.7), "gloss": np.full((count, 1), 0.4)}
-    made = of("skin").static(part, THEMES["skin"], Openings([part]))
+    made = material_of("skin").static(part, THEMES["skin"], Openings([part]))
     assert made["around"].dtype == np.uint8 and made["around"][0].tolist() == [0, 51, 102, 255]
     assert made["surface_uv_gloss"][:, 2:] == pytest.approx(np.tile([0.4, 0.7], (count, 1)))
     assert made["surface_uv_gloss"][:, :2] == pytest.approx(detail_uv(part), abs=1e-5)
-    bare = of("skin").static(skin(), THEMES["skin"], Openings([part]))
+    bare = material_of("skin").static(skin(), THEMES["skin"], Openings([part]))
     assert np.unique(bare["around"], axis=0).tolist() == [[191, 128, 128, 128]]
     assert bare["surface_uv_gloss"][:, 2:] == pytest.approx(np.tile([0.3, 0.0], (count, 1)))
 
@@ -112,12 +114,12 @@ def test_lashes_of_the_lower_lid_are_fainter() -> None:
     at = np.array([[0, 5, 0], [1, 5, 0], [0, -5, 0]])
     part = BallPart("lashes", "lash", np.array([[0, 1, 2]]), at, np.zeros((3, 3)))
     part.uv[:] = [(0.5, 0.25), (0.75, 1.0), (2.5, 0.5)]
-    along = of("lash").static(part, THEMES["skin"], openings())["along"]
+    along = material_of("lash").static(part, THEMES["skin"], openings())["along"]
     assert along == pytest.approx(np.array([[0.5, 0.25, 1], [0.75, 1, 1], [0.5, 0.5, 0.42]]))
     part.material = "brow"
-    assert (of("brow").static(part, THEMES["skin"], openings())["along"][:, 2] == 1.0).all()
-    assert (of("brow").static(part, THEMES["mask"], openings())["along"][:, 2] == 0.0).all()
-    assert (of("brow").static(part, THEMES["robot"], openings())["along"][:, 2] == 1.0).all(), "bars of lamps"
+    assert (material_of("brow").static(part, THEMES["skin"], openings())["along"][:, 2] == 1.0).all()
+    assert (material_of("brow").static(part, THEMES["mask"], openings())["along"][:, 2] == 0.0).all()
+    assert (material_of("brow").static(part, THEMES["robot"], openings())["along"][:, 2] == 1.0).all(), "bars of lamps"
 
 
 def test_uniforms_name_what_the_shaders_read(gl: None) -> None:
@@ -127,7 +129,7 @@ def test_uniforms_name_what_the_shaders_read(gl: None) -> None:
     try:
         made = programs(ctx, "full", THEMES["skin"])
         for part in head.parts:
-            material = of(part.material)
+            material = material_of(part.material)
             given = material.uniforms(part, THEMES["skin"], seen)
             assert [name for name in given if name not in made[material.program]] == []
             static = material.static(part, THEMES["skin"], seen)
@@ -141,26 +143,26 @@ def test_uniforms_follow_the_theme_and_the_openings() -> None:
     head, theme = BallHead(), THEMES["mask"]
     seen = Openings(head.parts)
     by_name = {part.name: part for part in head.parts}
-    eye = of("eye").uniforms(by_name["left_eye"], theme, seen)
+    eye = material_of("eye").uniforms(by_name["left_eye"], theme, seen)
     assert (eye["iris_colour"], eye["sclera_colour"], eye["glow"]) == (theme.iris, theme.sclera, theme.glow)
     assert 0.1 < eye["pupil_radius"] < eye["iris_radius"] < 0.6 and eye["lids"] == 1.0
-    face = of("skin").uniforms(by_name["face"], theme, seen)
+    face = material_of("skin").uniforms(by_name["face"], theme, seen)
     assert face == {"wrap": theme.wrap, "through": theme.through, "gloss_scale": 1.5, "detail_strength": 0.0}
-    assert of("skin").uniforms(by_name["face"], THEMES["skin"], seen)["detail_strength"] == pytest.approx(0.16)
-    teeth, mouth = (of(name).uniforms(by_name[name], theme, seen) for name in ("teeth", "mouth"))
+    assert material_of("skin").uniforms(by_name["face"], THEMES["skin"], seen)["detail_strength"] == pytest.approx(0.16)
+    teeth, mouth = (material_of(name).uniforms(by_name[name], theme, seen) for name in ("teeth", "mouth"))
     assert teeth["opening_area"] is seen.mouth()["opening_area"]
     assert teeth["wrap"] == pytest.approx((0.3, 0.18, 0.18))
     assert sum(teeth["albedo"]) > 3 * sum(mouth["albedo"]) and teeth["wetness"] > mouth["wetness"] > 0
-    assert of("lash").uniforms(by_name["face"], theme, seen)["albedo"] == theme.lash
-    assert of("brow").uniforms(by_name["face"], theme, seen)["albedo"] == theme.brow
+    assert material_of("lash").uniforms(by_name["face"], theme, seen)["albedo"] == theme.lash
+    assert material_of("brow").uniforms(by_name["face"], theme, seen)["albedo"] == theme.brow
 
 
 def test_flags_and_order_of_materials() -> None:
     assert {name for name, one in MATERIALS.items() if one.two_sided} == {"lash", "brow", "mouth", "tress", "cloth"}
     assert {name for name, one in MATERIALS.items() if one.blended} == {"lash", "brow"}
     ordered = ["strand", "cloth", "skin", "eye", "lash", "teeth", "tongue", "gums", "mouth"]
-    assert [of(name).order for name in ordered] == sorted({of(name).order for name in ordered})
-    assert of("brow").order == of("lash").order
+    assert [material_of(name).order for name in ordered] == sorted({material_of(name).order for name in ordered})
+    assert material_of("brow").order == material_of("lash").order
 
 
 def test_each_eye_has_uniforms_of_its_own_and_other_parts_share_them() -> None:
@@ -195,16 +197,18 @@ def test_the_detail_texture_tiles_and_is_even(gl: None) -> None:
 def test_what_is_inside_the_mouth_is_reddish_and_teeth_are_nearly_white() -> None:
     head = BallHead()
     seen, part = Openings(head.parts), head.parts[3]
-    given = {name: of(name).uniforms(part, THEMES["skin"], seen) for name in ("teeth", "tongue", "gums", "mouth")}
+    given = {
+        name: material_of(name).uniforms(part, THEMES["skin"], seen) for name in ("teeth", "tongue", "gums", "mouth")
+    }
     assert {name: (*one["albedo"], one["wrap"][0], one["wetness"]) for name, one in given.items()} == {
         "teeth": (0.76, 0.71, 0.62, 0.3, 0.30), "tongue": (0.50, 0.17, 0.15, 0.4, 0.42),
         "gums": (0.48, 0.15, 0.14, 0.3, 0.20), "mouth": (0.32, 0.09, 0.08, 0.3, 0.08),
     }  # fmt: skip
     for one in given.values():
         assert one["wrap"][1:] == pytest.approx([0.6 * one["wrap"][0]] * 2)
-    bare = of("teeth").static(part, THEMES["skin"], seen)["occlusion"]
+    bare = material_of("teeth").static(part, THEMES["skin"], seen)["occlusion"]
     assert bare.shape == (len(part.vertices), 1) and (bare == 1.0).all()
-    furrow = of("tongue").static(part, THEMES["skin"], seen)["occlusion"][:, 0]
+    furrow = material_of("tongue").static(part, THEMES["skin"], seen)["occlusion"][:, 0]
     upper = part.normals[:, 1] > 0.5
     middle = np.abs(part.vertices[:, 0] - np.median(part.vertices[:, 0])) < 1.0
     assert (furrow[~upper & (part.normals[:, 1] <= 0.0)] == 1.0).all()
@@ -213,10 +217,12 @@ def test_what_is_inside_the_mouth_is_reddish_and_teeth_are_nearly_white() -> Non
 
 def test_hair_fades_towards_its_tip_and_brows_at_their_edges_too() -> None:
     head = BallHead()
-    lash, brow = (of(name).uniforms(head.parts[0], THEMES["skin"], Openings(head.parts)) for name in ("lash", "brow"))
+    lash, brow = (
+        material_of(name).uniforms(head.parts[0], THEMES["skin"], Openings(head.parts)) for name in ("lash", "brow")
+    )
     assert (lash["fade"], lash["edges"]) == ((0.85, 0.15, 0.0, 0.0), 0.0)
     assert (brow["fade"], brow["edges"]) == ((0.72, 0.50, 0.30, 2.4), 1.0)
-    eye = of("eye").uniforms(head.parts[1], THEMES["skin"], Openings(head.parts))
+    eye = material_of("eye").uniforms(head.parts[1], THEMES["skin"], Openings(head.parts))
     assert (eye["iris_radius"], eye["pupil_radius"]) == pytest.approx((0.49, 0.185), rel=1e-3)
 
 
@@ -240,7 +246,7 @@ def test_lashes_of_many_strips_are_upper_or_lower_by_their_height() -> None:
     at = np.array([[0.0, y, 0.0] for y in heights])
     part = BallPart("lashes", "lash", np.array([[0, 1, 2]]), at, np.zeros((4, 3)))
     part.uv[:] = [(2.0 * k + 0.5, 0.5) for k in range(4)]
-    along = of("lash").static(part, THEMES["skin"], openings())["along"]
+    along = material_of("lash").static(part, THEMES["skin"], openings())["along"]
     assert along[:, 2] == pytest.approx([1.0, 1.0, 0.42, 0.42]) and along[:, 0] == pytest.approx([0.5] * 4)
 
 
