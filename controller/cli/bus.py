@@ -44,6 +44,8 @@ def ports() -> None:
     for record in found:
         if record.hint:
             console.print(f"{record.device}: {record.hint}", soft_wrap=True)
+        if record.lasting_hint:
+            console.print(f"{record.device}, after every start, too: {record.lasting_hint}", soft_wrap=True)
 
 
 def scan(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -13,12 +14,16 @@ from drivers.base.bus import BusReport, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError
 from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
+from drivers.port.latency import slow_answers
+from drivers.port.serialport import latency_s
 from drivers.servos.layout import Block
 from drivers.servos.port import Port
 from drivers.servos.registers import Registers
 from drivers.servos.startup import Policy, Started, Startup
 from drivers.servos.telemetry import Telemetry
 from drivers.tables.tables import ControlTable, load_table
+
+log = logging.getLogger(__name__)
 
 
 class ServoBus(WireBus):
@@ -101,7 +106,23 @@ class ServoBus(WireBus):
         startup.identify(servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         self._identified()
-        return startup.bring_up(servos)
+        started = startup.bring_up(servos)
+        self._say_slow_answers()
+        return started
+
+    @property
+    def reply_delay_s(self) -> float | None:
+        """How long after their time on the wire the newest answers of single servos came, seconds; None: not known."""
+        return self._port.delays.median_s
+
+    def slow_answers(self) -> tuple[str, str]:
+        """What of the adapter slows this bus down, and the command that mends it; each empty where nothing does."""
+        return slow_answers(self.path, latency_s(self.path), self.reply_delay_s)
+
+    def _say_slow_answers(self) -> None:
+        message, hint = self.slow_answers()
+        if message:
+            log.warning("%s; try: %s", message, hint)
 
     def _started(self, started: Started) -> Floats:
         """Keep what start-up found and did; returns where the servos are, (n,) rad, NaN for those not started."""
