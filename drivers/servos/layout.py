@@ -23,6 +23,8 @@ NAMES = {
     "moving": ("Moving",),
     "torque": ("Torque Enable",),
     "torque_limit": ("Torque Limit",),
+    "current_limit": ("Current Limit",),
+    "goal_current": ("Goal Current",),
     "watchdog": ("Bus Watchdog",),
     "goal": ("Goal Position",),
     "time": ("Goal Time",),

@@ -1,4 +1,4 @@
-"""controller.tools.bench_real_bus: measures a bus on a pseudo-terminal and writes nothing to its servos."""
+"""controller.hardware.bench_real_bus: measures a bus on a pseudo-terminal and writes nothing to its servos."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ import sys
 import pytest
 
 from controller.tools import bench_bus
-from controller.tools import bench_real_bus as module
+from controller.hardware import bench_real_bus as module
 from controller.tools.bench_bus import Figure
-from controller.tools.bench_real_bus import bench_real_bus, read_limit_hz
+from controller.hardware.bench_real_bus import bench_real_bus, read_limit_hz
 from drivers.base.errors import NoReply
 from drivers.sim import SimulatedBus
 from drivers.testing import open_servos

@@ -73,7 +73,7 @@ def bench_real_bus(
 
 
 def _manners(found: Sequence[ServoInfo]) -> list[tuple[bool, dict[str, Any]]]:
-    """Options of plain reads, and of fast ones where every servo has them; with Protocol 1.0 every servo is read a cycle."""
+    """Options of plain reads, and of fast ones where every servo has them; all servos of Protocol 1.0 a cycle."""
     tables = [load_table(info.model_number, info.firmware) for info in found]
     if any(table.protocol == 1 for table in tables):
         return [(False, {"singles": len(found)})]
