@@ -138,8 +138,8 @@ def _ratio(row: Measure) -> str:
 
 def _bench_bus(seconds: float, face: bool, as_json: bool, real: str, baud: int) -> None:
     # start-up: --help does without any of these
-    from controller.tools.bench_bus import bench_bus, to_json
     from controller.hardware.bench_real_bus import bench_real_bus
+    from controller.tools.bench_bus import bench_bus, to_json
 
     errors = Console(stderr=True)  # lines and no moving bar: drawing one would disturb the measurements
 

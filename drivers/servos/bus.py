@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,6 +24,25 @@ from drivers.servos.telemetry import Telemetry
 from drivers.tables.tables import ControlTable, load_table
 
 log = logging.getLogger(__name__)
+
+
+REVERSE = 0x01
+"""Bit of Drive Mode (Protocol 2.0)."""
+
+
+@dataclass(frozen=True)
+class OwnSettings:
+    """What a servo's permanent registers say, angles as its specification counts them.
+
+    low_rad, high_rad : its own limits of position. reverse : its drive mode turns its direction about, which omote
+    undoes at start. offset_ticks : its homing offset. least_voltage_v : below this supply it reports an error.
+    """
+
+    low_rad: float
+    high_rad: float
+    reverse: bool
+    offset_ticks: int
+    least_voltage_v: float
 
 
 class ServoBus(WireBus):
@@ -109,6 +128,27 @@ class ServoBus(WireBus):
         started = startup.bring_up(servos)
         self._say_slow_answers()
         return started
+
+    def own_settings(self, servo: int) -> OwnSettings:
+        """What a servo's own registers say, of one that :meth:`discover` has found. Nothing is written.
+
+        Raises NoReply, CorruptReply.
+        """
+        registers, index = self._registers, self.ids.index(servo)
+
+        def value(name: str, otherwise: int = 0) -> int:
+            return registers.get(servo, name) if registers.item(servo, name) is not None else otherwise
+
+        table = registers.tables[servo]
+        ends = value("min_ticks"), value("max_ticks", table.first_step + table.ticks_per_turn - 1)
+        low, high = sorted(self._radians(index, end) for end in ends)
+        return OwnSettings(
+            low_rad=low,
+            high_rad=high,
+            reverse=bool(value("drive_mode") & REVERSE) and table.protocol == 2,
+            offset_ticks=value("offset"),
+            least_voltage_v=value("min_voltage") / 10.0,
+        )
 
     @property
     def reply_delay_s(self) -> float | None:

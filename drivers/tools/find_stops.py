@@ -53,6 +53,10 @@ PERIOD_S, WATCHDOG_STEPS = 0.02, 25
 NEAR_RAD = math.radians(1.0)
 
 
+class StillOn(ServoFault):
+    """A servo could not be confirmed off."""
+
+
 @dataclass(frozen=True)
 class Found:
     """What a search found, angles as the servo's specification counts them, rad.
@@ -102,6 +106,7 @@ def find_stops(
     progress : called with what is being done.
 
     Raises ServoRefused: the model cannot, or the motor is on. ServoFault: a hardware error, or it does not follow.
+    StillOn: it could not be confirmed off.
     NoReply, WrongModel, CorruptReply, PortError.
     """
     if reason := why_not(servo.model):
@@ -233,7 +238,7 @@ class _Search:
                     break
         else:
             message = f"servo {registers.label(self._id)} is not confirmed off"
-            raise registers.error(ServoFault, message, "switch its power off", self._id)
+            raise registers.error(StillOn, message, "switch its power off", self._id)
         if item_of(self._table, "watchdog") is not None:
             registers.put(self._id, "watchdog", 0)
         for name, value in reversed(self._before):

@@ -6,10 +6,10 @@ import sys
 
 import pytest
 
-from controller.tools import bench_bus
 from controller.hardware import bench_real_bus as module
-from controller.tools.bench_bus import Figure
 from controller.hardware.bench_real_bus import bench_real_bus, read_limit_hz
+from controller.tools import bench_bus
+from controller.tools.bench_bus import Figure
 from drivers.base.errors import NoReply
 from drivers.sim import SimulatedBus
 from drivers.testing import open_servos
