@@ -1,4 +1,4 @@
-"""``omote preflight``, ``service`` and ``calibrate --find-stops``: a head before it acts, and started with its computer."""
+"""``omote preflight``, ``service`` and ``calibrate --find-stops``: a head before it acts, and with its computer."""
 
 from __future__ import annotations
 
@@ -141,11 +141,16 @@ def _ask_first(what: str, yes: bool) -> None:
     """Ask before anything moves; raises ControllerError where there is nobody to ask, or the answer is no."""
     if yes:
         return
-    if not sys.stdin.isatty():
+    if not _is_asked():
         raise ControllerError("servos would move, and there is no terminal to ask first", hint="add --yes to move them")
     console.print(f"{what} Keep hands away, and a hand at the power switch.", soft_wrap=True)
     if not typer.confirm("Go on?"):
         raise ControllerError("nothing was moved")
+
+
+def _is_asked() -> bool:
+    """Whether there is somebody to ask."""
+    return sys.stdin.isatty()
 
 
 def _say_seen(channel: ChannelSettings, text: str) -> bool | None:

@@ -19,6 +19,7 @@ from rich.table import Table
 from controller.base.errors import ControllerError
 from controller.base.files import replacing
 from controller.base.version import package_version
+from surface.base.files import read_file
 
 FORMAT = 1
 """Version of the report's keys: raised when one changes its meaning or is removed."""
@@ -104,7 +105,7 @@ class Preflight:
             "signed_by": self.signed_by,
             "date": self.date.isoformat(),
             "versions": _versions(),
-            "sha256": {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in self.files},
+            "sha256": {file.name: hashlib.sha256(read_file(file)).hexdigest() for file in self.files},
             "faults": self.faults,
             "buses": [_known(asdict(row)) for row in self.buses],
             "channels": [_known(asdict(row)) for row in self.channels],
