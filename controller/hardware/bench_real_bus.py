@@ -95,7 +95,7 @@ def _round_trips(bus: Bus) -> list[Figure]:
     if not isinstance(bus, ServoBus) or bus.reply_delay_s is None:
         return figures
     message, hint = bus.slow_answers()
-    note = f"{message}; try: {hint}" if message else "<= 4 ms"
+    note = f"{message}; try: {hint}" if message else "<= 5 ms"
     late = Figure("an answer comes after its time on the wire by", 1e3 * bus.reply_delay_s, "ms", note, not message)
     return [*figures, late]
 

@@ -39,7 +39,7 @@ RANGE = 0.75
 """Least share of a small way that a servo must go."""
 LAG_S = 0.25
 ANSWERS = 8
-"""Servos are asked at least so often for the median of their delays."""
+"""Servos are asked at least so often to judge their delays."""
 
 Ask = Callable[[ChannelSettings, str], bool | None]
 """Asks a person whether a channel moved as a text says; None: nobody was asked."""

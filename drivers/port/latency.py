@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from collections import deque
 from pathlib import Path
-from statistics import median
+from statistics import quantiles
 
 SLOW_LATENCY_S = 0.0015
 """A timer above this slows a bus down."""
-LATE_S = 0.004
+LATE_S = 0.005
 """Answers that come so long after their time on the wire wait for something: host and servo need 1 ms together."""
 KEPT, LEAST = 64, 8
-"""Answers whose delays are kept, and how many make a median."""
+"""Answers whose delays are kept, and how many are needed to judge."""
 
 
 class ReplyDelays:
@@ -33,9 +33,9 @@ class ReplyDelays:
         self._delays.clear()
 
     @property
-    def median_s(self) -> float | None:
-        """The median; None before there are enough of them."""
-        return median(self._delays) if len(self._delays) >= LEAST else None
+    def usual_s(self) -> float | None:
+        """The lower quartile, for a timer delays every answer and a busy host some; None before there are enough."""
+        return quantiles(self._delays, n=4)[0] if len(self._delays) >= LEAST else None
 
 
 def latency_remedies(device: str, serial_number: str = "") -> tuple[str, ...]:

@@ -152,8 +152,8 @@ class ServoBus(WireBus):
 
     @property
     def reply_delay_s(self) -> float | None:
-        """How long after their time on the wire the newest answers of single servos came, seconds; None: not known."""
-        return self._port.delays.median_s
+        """By how much most of the newest answers came after their time on the wire, seconds; None: not known."""
+        return self._port.delays.usual_s
 
     def slow_answers(self) -> tuple[str, str]:
         """What of the adapter slows this bus down, and the command that mends it; each empty where nothing does."""
