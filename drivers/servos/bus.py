@@ -21,7 +21,7 @@ from drivers.servos.port import Port
 from drivers.servos.registers import Registers
 from drivers.servos.startup import Policy, Started, Startup
 from drivers.servos.telemetry import Telemetry
-from drivers.tables.tables import ControlTable, load_table
+from drivers.tables.tables import ControlTable, check_driven, load_table
 
 log = logging.getLogger(__name__)
 
@@ -122,6 +122,8 @@ class ServoBus(WireBus):
         return replace(self.policy, takeover="adopt", voltage_wait_s=0.0, reboot_faulted=reboot_faulted, partly=True)
 
     def _start_all(self, servos: Sequence[ServoSpec], startup: Startup[Any]) -> Started:
+        for servo in servos:
+            check_driven(load_table(servo.model))
         startup.identify(servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         self._identified()

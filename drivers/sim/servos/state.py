@@ -16,7 +16,7 @@ from drivers.sim.servos.drive_word import FeetechDrive, WordDrive
 from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM, XDrive
 from drivers.sim.servos.plant import NO_STOPS, Plant, Skin
 from drivers.sim.servos.registers import Change, Registers
-from drivers.tables.tables import load_table
+from drivers.tables.tables import check_driven, load_table
 
 TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""
@@ -76,6 +76,7 @@ class ServoState:
         skin: Skin | None = None,
     ) -> None:
         self.table = table = load_table(model, firmware)
+        check_driven(table)
         self.registers = Registers(table)
         self.registers.reset(0, table.size)
         self.eeprom_writes: Counter[str] = Counter()
