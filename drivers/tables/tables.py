@@ -24,7 +24,7 @@ MAGNITUDE_BIT = 1024
 """XL-320: bit 10 of speed and load is the direction, the rest the magnitude."""
 TRIPPED = 0xFF
 """Value of the bus watchdog's register after it has stopped the servo."""
-FEETECH = ("sts", "sm", "scs")
+FEETECH = ("sts", "sm", "scs", "hls")
 """What the names of Feetech's models begin with."""
 
 
@@ -277,8 +277,8 @@ def check_dynamixel(model: str) -> None:
 def check_driven(table: ControlTable) -> None:
     """Raises DriverError for a model whose registers are known, but which omote does not drive."""
     if not table.driven:
-        hint = "omote scan and omote monitor read it; of the large servos the P-series is driven"
-        raise DriverError(f"{table.model} is not driven by omote yet: its errors and brakes differ", hint=hint)
+        hint = "omote scan and omote monitor --listen know its registers; docs/drivers.md says what it lacks"
+        raise DriverError(f"{table.model} is not driven by omote yet", hint=hint)
 
 
 def check_feetech(model: str) -> None:
@@ -291,6 +291,7 @@ def check_feetech(model: str) -> None:
     if not name.startswith(FEETECH):
         hint = f"use one of {', '.join(sorted(name for name in known.values() if name.startswith(FEETECH)))}"
         raise DriverError(f"servo model {model!r} is no Feetech known here", hint=hint)
+    check_driven(load_table(name))
 
 
 def load_table(model: str | int, firmware: int | None = None) -> ControlTable:

@@ -238,3 +238,62 @@ def test_the_script_writes_what_it_was_written_from(tmp_path: Path) -> None:
 )
 def test_numbers_of_a_cell(text: str, numbers: list[int]) -> None:
     assert manual.numbers(text) == numbers
+
+
+# ---------------------------------------------------------------------------- a second reading
+
+
+def second_reader() -> dict[str, object]:
+    """Names of the script that reads a share of the cells again."""
+    return runpy.run_path(str(ROOT / "docs/check_servo_tables.py"))
+
+
+def page_of(model: str, **changes: str) -> str:
+    """A page as the manual prints it; ``changes`` : rows by register, with _ for blanks."""
+    page = manual.page(model)
+    assert page is not None
+    lines = ["| Address | Size | Area | Name | Access | Default | Range | Unit |", "|:-:|:-:|:-:|:-:|:-:|:-:|:-:|:-:|"]
+    for name, (address, size, access, initial, span, unit) in page.rows.items():
+        row = changes.get(name.replace(" ", "_"), f"{initial} | {span} | {unit}")
+        lines.append(f"| {address} | {size} | RAM | [{name}](#x) | {access} | {row} |")
+    return "\n".join(lines)
+
+
+def test_the_second_reader_chooses_a_tenth_of_all_registers_by_its_seed() -> None:
+    chosen = second_reader()["chosen"]
+    tenth, every = chosen(0.1, 20), chosen(1.0, 20)  # type: ignore[operator]
+    assert len(tenth) == round(0.1 * len(every)) > 350
+    assert tenth == chosen(0.1, 20) != chosen(0.1, 21)  # type: ignore[operator]
+    assert len({model for model, _ in tenth}) >= 60
+    assert set(tenth) <= set(every)
+
+
+@pytest.mark.parametrize("model", ["xm430-w350", "ph54-200-s500", "xl320", "ym080-230-r099"])
+def test_the_second_reader_agrees_with_a_page_that_the_table_was_made_from(model: str, tmp_path: Path) -> None:
+    page = manual.page(model)
+    assert page is not None
+    (tmp_path / page.page).parent.mkdir(parents=True)
+    (tmp_path / page.page).write_text(page_of(model), encoding="utf-8")
+    compare = second_reader()["compare"]
+    verdicts = {name: compare(tmp_path, model, name) for name in page.rows}  # type: ignore[operator]
+    assert {verdict for verdict, _ in verdicts.values()} == {"agree"}, verdicts
+
+
+@pytest.mark.parametrize(
+    ("register", "row", "why"),
+    [
+        ("Current Limit", "1,194 | 0 ~ 1,193 | 2.69 [mA]", "begins with 1,194, not 1193"),
+        ("Current Limit", "1,193 | 0 ~ 1,194 | 2.69 [mA]", "goes from 0 ~ 1,194"),
+        ("Current Limit", "1,193 | 0 ~ 1,193 | 26.9 [mA]", "counts by 26.9 [mA]"),
+    ],
+)
+def test_the_second_reader_finds_each_kind_of_mistake(register: str, row: str, why: str, tmp_path: Path) -> None:
+    page = manual.page("xm430-w350")
+    assert page is not None
+    (tmp_path / page.page).parent.mkdir(parents=True)
+    changed = page_of("xm430-w350", **{register.replace(" ", "_"): row})
+    (tmp_path / page.page).write_text(changed, encoding="utf-8")
+    verdict, said = second_reader()["compare"](tmp_path, "xm430-w350", register)  # type: ignore[operator]
+    assert verdict == "differ"
+    assert why in said
+    assert second_reader()["compare"](tmp_path, "xm430-w210", register) == ("not read", "")  # type: ignore[operator]

@@ -10,6 +10,7 @@ from drivers.tables.tables import (
     ControlTable,
     Item,
     check_dynamixel,
+    check_feetech,
     known_models,
     load_table,
     model_name,
@@ -205,6 +206,16 @@ def test_models_that_are_only_read_say_so():
     with pytest.raises(DriverError, match="not driven by omote yet"):
         check_dynamixel("ym070-210-r051")
     check_dynamixel("ph54-100-s500")
+    hls = load_table("hls3606m")
+    assert (hls.driven, hls["Goal Torque"].address, "Goal Time" in hls, hls["Secondary ID"].address) == (
+        False,
+        44,
+        False,
+        7,
+    )
+    with pytest.raises(DriverError, match="not driven by omote yet"):
+        check_feetech("hls3606m")
+    check_feetech("sts3215")
 
 
 LEGACY = {
