@@ -24,6 +24,7 @@ FAMILIES = (
     ("ax-", "docs/en/dxl/ax/{}.md"),
     ("mx1-", "docs/en/dxl/mx/{}.md"),
     ("mx-", "docs/en/dxl/mx/{}-2.md"),
+    ("ym", "docs/en/dxl/y/{}-rh.md"),
     ("ph", "docs/en/dxl/p/{}-r.md"),
     ("pm", "docs/en/dxl/p/{}-r.md"),
     ("h", "docs/en/dxl/pro/{}.md"),
@@ -38,6 +39,8 @@ NAMES = {
     "Registered": "Registered Instruction",
     "Sencondary ID": "Secondary ID",
     "Sencondary(Shadow) ID": "Secondary(Shadow) ID",
+    "Hybrid Saveve": "Hybrid Save",
+    "Baud Rate (Bus)": "Baud Rate",
 }
 """Names that pages of other ages or with misprints use, and the usual ones."""
 
@@ -89,7 +92,7 @@ def read_cells(text: str) -> dict[str, str]:
         if row[0] == "Address":
             heads = [re.sub(r"<br ?/?>", " ", head).lower() for head in row]
         elif heads and row[0].isdigit() and len(row) >= 5:
-            name = _plain(row[_column(heads, ("data name", "name"))])
+            name = _plain(row[_name_column(heads)])
             if not name.startswith("Indirect "):
                 cells[NAMES.get(name, name)] = _cell(heads, row)
     return cells
@@ -105,6 +108,11 @@ def _cell(heads: list[str], row: list[str]) -> str:
     return f"{row[0]} {row[1]} {access} | {values['initial']} | {span} | {values['unit']}"
 
 
+def _name_column(heads: list[str]) -> int:
+    """The last that is called so: some pages of the Y-series call that of the area "Name", too."""
+    return max(at for at, head in enumerate(heads) if head.startswith(("data name", "name")))
+
+
 def _column(heads: list[str], starts: tuple[str, ...]) -> int:
     return next((at for at, head in enumerate(heads) if head.startswith(starts)), -1)
 
@@ -112,7 +120,7 @@ def _column(heads: list[str], starts: tuple[str, ...]) -> int:
 def _plain(cell: str) -> str:
     """A cell's text without links, breaks and other marks."""
     cell = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", cell).replace("\\", "").replace("&deg;", "°").replace("℃", "°C")
-    cell = cell.replace("<sup>2</sup>", "2").replace("&amp;", "&")
+    cell = cell.replace("<sup>2</sup>", "2").replace("&amp;", "&").replace("²", "2")
     return " ".join(re.sub(r"<br ?/?>", " ", cell).replace("**", "").split())
 
 

@@ -38,9 +38,9 @@ def _pictures() -> tuple[Callable[..., None], ...]:
 
 
 def _buses() -> tuple[Callable[..., None], ...]:
-    from controller.cli import bus  # start-up: the same
+    from controller.cli import bus, hardware  # start-up: the same
 
-    return bus.ports, bus.scan, bus.set_id, bus.monitor, bus.calibrate
+    return bus.ports, bus.scan, bus.set_id, bus.monitor, bus.calibrate, hardware.preflight, hardware.service
 
 
 def _others() -> tuple[Callable[..., None], ...]:
@@ -52,7 +52,7 @@ def _others() -> tuple[Callable[..., None], ...]:
 COMMANDS = (
     (("demo", "run", "play", "convert"), _runs),
     (("render", "fit", "landmarks", "export"), _pictures),
-    (("ports", "scan", "set-id", "monitor", "calibrate"), _buses),
+    (("ports", "scan", "set-id", "monitor", "calibrate", "preflight", "service"), _buses),
     (("check", "plugins", "bench", "translate", "webcam", "study"), _others),
 )
 """Names of commands and what loads them, in the order of ``omote --help``; ``simulate`` has commands of its own."""

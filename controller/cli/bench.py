@@ -66,6 +66,12 @@ def bench(
     updates: Annotated[int, typer.Option(help="Number of updates (drift only).", min=1)] = 1_000_000,
     heads: Annotated[int, typer.Option(help="Number of heads (crowd only).", min=1, max=MOST_HEADS)] = 64,
     face: Annotated[bool, typer.Option("--face", help="Also while the face is drawn (bus only).")] = False,
+    real: Annotated[
+        str, typer.Option("--real", help="Port of a real bus, which is only read (bus only).", metavar="PORT")
+    ] = "",
+    baud: Annotated[int, typer.Option(help="Baud rate, with --real and --buses.", min=300)] = 1_000_000,
+    buses: Annotated[int, typer.Option(help="Several simulated buses at once (bus only).", min=0, max=16)] = 0,
+    servos: Annotated[int, typer.Option(help="Servos on each of --buses.", min=1, max=64)] = 12,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON (bus only).")] = False,
 ) -> None:
     """Measure the engine (full evaluation, incremental updates), other libraries, or a servo bus, in one run.
@@ -74,8 +80,10 @@ def bench(
     """
     require(f"omote bench {what}", *_NEEDS.get(what, ()), *(["moderngl"] if face else []), *(["PIL"] if out else []))
     if what is Subject.bus:
-        _bench_bus(seconds, face, as_json)
+        _bench_bus(seconds, face, as_json, real, baud, buses, servos)
         return
+    if real:
+        raise ControllerError("--real is for a servo bus", hint=f"omote bench bus --real {real}")
     from controller.tools import bench_surface as benches  # start-up: --help does without it
 
     columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
@@ -130,11 +138,24 @@ def _ratio(row: Measure) -> str:
     return "" if row.ratio is None else f"{row.ratio:.2f}{interval}"
 
 
-def _bench_bus(seconds: float, face: bool, as_json: bool) -> None:
-    from controller.tools.bench_bus import bench_bus, to_json  # start-up: --help does without it
+def _bench_bus(seconds: float, face: bool, as_json: bool, real: str, baud: int, buses: int, servos: int) -> None:
+    # start-up: --help does without any of these
+    from controller.hardware.bench_many import bench_many
+    from controller.hardware.bench_real_bus import bench_real_bus
+    from controller.tools.bench_bus import bench_bus, to_json
 
     errors = Console(stderr=True)  # lines and no moving bar: drawing one would disturb the measurements
-    tables = bench_bus(max(seconds, 1.0), lambda text: errors.print(f"measuring {text}", soft_wrap=True), face=face)
+
+    def log(text: str) -> None:
+        errors.print(f"measuring {text}", soft_wrap=True)
+
+    seconds = max(seconds, 1.0)
+    if real:
+        tables = bench_real_bus(real, baud, seconds, log)
+    elif buses:
+        tables = bench_many(buses, servos, baud, seconds, log)
+    else:
+        tables = bench_bus(seconds, log, face=face)
     if as_json:
         console.out(to_json(tables), highlight=False)
         return

@@ -44,6 +44,8 @@ def ports() -> None:
     for record in found:
         if record.hint:
             console.print(f"{record.device}: {record.hint}", soft_wrap=True)
+        if record.lasting_hint:
+            console.print(f"{record.device}, after every start, too: {record.lasting_hint}", soft_wrap=True)
 
 
 def scan(
@@ -155,10 +157,18 @@ def calibrate(
         list[str] | None, typer.Option("--channel", "-c", help="Only this channel; may be repeated.")
     ] = None,
     margin: Annotated[float, typer.Option(min=0, max=20, help="Degrees kept away from the captured ends.")] = 1.0,
+    find_stops: Annotated[
+        bool, typer.Option("--find-stops", help="Find the end stops by current, one servo after the other, and report.")
+    ] = False,
+    torque: Annotated[
+        float, typer.Option(min=0.01, max=0.5, help="Share of its full torque that a servo looks for stops with.")
+    ] = 0.15,
+    yes: Annotated[bool, typer.Option("--yes", help="With --find-stops: do not ask before servos move.")] = False,
 ) -> None:
     """Capture the neutral and end positions of each servo of a head, by hand or by keys, and save them by name.
 
     The motors are off until h is pressed: support what they hold. A file that exists is only replaced after a question.
+    With --find-stops each servo feels for both of its end stops by itself, after a question.
 
     Example: omote calibrate head24 --name desk
     """
@@ -175,6 +185,11 @@ def calibrate(
         if word not in known:
             raise ConfigError(f"robot {settings.name} has no channel called {word!r}{did_you_mean(word, known)}")
     channels = [each for each in settings.channels if not channel or each.name in channel]
+    if find_stops:
+        from controller.cli.hardware import look_for_stops  # start-up: --help does without it
+
+        look_for_stops(settings, channels, torque, margin, yes)
+        return
     target = out or calibration_path(name, path)
     if run_calibration(settings, channels, name, target, margin, console):
         console.print(f"wrote {target}", soft_wrap=True)

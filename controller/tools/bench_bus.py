@@ -136,7 +136,7 @@ def bench_bus(seconds: float, log: Log, *, face: bool = False) -> list[tuple[str
     # of each kind of loop the median, as a host that is busy elsewhere may slow down any round
     rates = {kind: float(np.median([each[kind] for each in rounds])) for kind in rounds[0]}
     figures = _rate_figures(rates) + _loop_figures(paced, sdk_paced, ticks, realtime)
-    tables = [(title, figures + _steal_figures(steal))]
+    tables = [(title, figures + steal_figures(steal))]
     if face:
         restore_priority()  # programs that are started would inherit it, the one that draws among them
         tables.append(("the whole program: face and body, simulated head of 24 servos", _bench_face(seconds, log)))
@@ -262,7 +262,7 @@ def _loop_figures(paced: Loop, sdk_paced: Loop, ticks: Loop, realtime: bool) -> 
     ]
 
 
-def _steal_figures(steal: StealTime, indent: str = "") -> list[Figure]:
+def steal_figures(steal: StealTime, indent: str = "") -> list[Figure]:
     """The processor time that the host of a virtual machine used for others meanwhile."""
     share = steal.share()
     return [] if share is None else [Figure(f"{indent}taken by the host meanwhile", 100 * share, "% of all cores")]
@@ -282,7 +282,7 @@ def _bench_face(seconds: float, log: Log) -> list[Figure]:
             Figure(f"  bus tick at {JITTER_HZ} Hz late by, 99 of 100", worst, "ms", f"<= {bound:g} ms", worst <= bound),
             Figure("  beside it a program that only sleeps", sleeper, "ms"),
             Figure("  ticks left out", bus["skipped"], f"of {bus['ticks'] + bus['skipped']}"),
-            *_steal_figures(steal, "  "),
+            *steal_figures(steal, "  "),
         ]
     return figures
 

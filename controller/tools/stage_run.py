@@ -21,6 +21,7 @@ from controller.base.files import replacing
 from controller.base.parameters import PARAMETERS
 from controller.base.parts import Part
 from controller.base.paths import config_dir
+from controller.base.service_manager import ServiceManager
 from controller.base.signals import stop_flag
 from controller.body.messages import RunOptions, WebPanel
 from controller.body.preload import PreloadedBody
@@ -89,6 +90,7 @@ class StageRun:
             raise ConfigError(f"{stage.path}: robots: a stage without a robot has nothing to mirror")
         self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
         self._web, self._web_look, self._identity = web, look or {}, identity
+        self._manager = ServiceManager()
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.
@@ -163,7 +165,13 @@ class StageRun:
         body.begin()
         self._status("running" + (f" for {seconds:g} s" if seconds else ""))
         in_time = deadline(seconds)
-        return lambda: not flag.is_set() and in_time() and body.alive()
+        self._manager.ready()
+
+        def goes_on() -> bool:
+            self._manager.alive(body.mailbox.sequence)
+            return not flag.is_set() and in_time() and body.alive()
+
+        return goes_on
 
     def _show(self, face: HeadlessFace | WindowFace, keep_going: Callable[[], bool]) -> Part | None:
         """Show the face while the run goes on; returns the part of a face that failed while servos follow.
@@ -184,6 +192,7 @@ class StageRun:
         return None
 
     def _end(self, body: BodyProcess, face: dict[str, object] | None, failed: Part | None = None) -> dict[str, Any]:
+        self._manager.stopping()
         self._status("stopping" if self._options.mirror else "bringing the servos to rest")
         body.stop()
         report: dict[str, Any] = {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}

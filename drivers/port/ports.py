@@ -10,9 +10,8 @@ from typing import Any
 
 from serial.tools import list_ports as _pyserial
 
+from drivers.port.latency import SLOW_LATENCY_S, latency_remedies
 from drivers.port.serialport import latency_s
-
-SLOW_LATENCY_S = 0.0015
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +25,7 @@ class PortRecord:
     usable : this user may read and write it.
     latency_s : the adapter's latency timer in seconds; None where there is none.
     hint : the command that fixes what is wrong; empty when nothing is.
+    lasting_hint : the one that keeps it fixed, where that is another; else empty.
     """
 
     device: str
@@ -36,6 +36,7 @@ class PortRecord:
     usable: bool
     latency_s: float | None
     hint: str
+    lasting_hint: str = ""
 
     @property
     def path(self) -> str:
@@ -70,15 +71,20 @@ def _record(port: Any, by_id: dict[Path, str], sys_root: str | os.PathLike[str])
         usable=usable,
         latency_s=latency,
         hint=_hint(port.device, usable, latency),
+        lasting_hint=latency_remedies(port.device, port.serial_number or "")[2] if _is_slow(latency) else "",
     )
 
 
 def _hint(device: str, usable: bool, latency: float | None) -> str:
     if not usable:
         return f"sudo usermod -a -G {_group(device)} $USER, then log out and in again"
-    if latency is not None and latency > SLOW_LATENCY_S:
-        return f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{Path(device).name}/latency_timer"
+    if _is_slow(latency):
+        return latency_remedies(device)[0]
     return ""
+
+
+def _is_slow(latency: float | None) -> bool:
+    return latency is not None and latency > SLOW_LATENCY_S
 
 
 def _group(device: str) -> str:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,12 +14,35 @@ from drivers.base.bus import BusReport, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError
 from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
+from drivers.port.latency import slow_answers
+from drivers.port.serialport import latency_s
 from drivers.servos.layout import Block
 from drivers.servos.port import Port
 from drivers.servos.registers import Registers
 from drivers.servos.startup import Policy, Started, Startup
 from drivers.servos.telemetry import Telemetry
-from drivers.tables.tables import ControlTable, load_table
+from drivers.tables.tables import ControlTable, check_driven, load_table
+
+log = logging.getLogger(__name__)
+
+
+REVERSE = 0x01
+"""Bit of Drive Mode (Protocol 2.0)."""
+
+
+@dataclass(frozen=True)
+class OwnSettings:
+    """What a servo's permanent registers say, angles as its specification counts them.
+
+    low_rad, high_rad : its own limits of position. reverse : its drive mode turns its direction about, which omote
+    undoes at start. offset_ticks : its homing offset. least_voltage_v : below this supply it reports an error.
+    """
+
+    low_rad: float
+    high_rad: float
+    reverse: bool
+    offset_ticks: int
+    least_voltage_v: float
 
 
 class ServoBus(WireBus):
@@ -98,10 +122,49 @@ class ServoBus(WireBus):
         return replace(self.policy, takeover="adopt", voltage_wait_s=0.0, reboot_faulted=reboot_faulted, partly=True)
 
     def _start_all(self, servos: Sequence[ServoSpec], startup: Startup[Any]) -> Started:
+        for servo in servos:
+            check_driven(load_table(servo.model))
         startup.identify(servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         self._identified()
-        return startup.bring_up(servos)
+        started = startup.bring_up(servos)
+        self._say_slow_answers()
+        return started
+
+    def own_settings(self, servo: int) -> OwnSettings:
+        """What a servo's own registers say, of one that :meth:`discover` has found. Nothing is written.
+
+        Raises NoReply, CorruptReply.
+        """
+        registers, index = self._registers, self.ids.index(servo)
+
+        def value(name: str, otherwise: int = 0) -> int:
+            return registers.get(servo, name) if registers.item(servo, name) is not None else otherwise
+
+        table = registers.tables[servo]
+        ends = value("min_ticks"), value("max_ticks", table.first_step + table.ticks_per_turn - 1)
+        low, high = sorted(self._radians(index, end) for end in ends)
+        return OwnSettings(
+            low_rad=low,
+            high_rad=high,
+            reverse=bool(value("drive_mode") & REVERSE) and table.protocol == 2,
+            offset_ticks=value("offset"),
+            least_voltage_v=value("min_voltage") / 10.0,
+        )
+
+    @property
+    def reply_delay_s(self) -> float | None:
+        """By how much most of the newest answers came after their time on the wire, seconds; None: not known."""
+        return self._port.delays.usual_s
+
+    def slow_answers(self) -> tuple[str, str]:
+        """What of the adapter slows this bus down, and the command that mends it; each empty where nothing does."""
+        return slow_answers(self.path, latency_s(self.path), self.reply_delay_s)
+
+    def _say_slow_answers(self) -> None:
+        message, hint = self.slow_answers()
+        if message:
+            log.warning("%s; try: %s", message, hint)
 
     def _started(self, started: Started) -> Floats:
         """Keep what start-up found and did; returns where the servos are, (n,) rad, NaN for those not started."""

@@ -165,7 +165,10 @@ class Exchanges(ABC, Generic[R]):
         self.send(port, frame)
         try:
             port.expect(size)
-            return self._sort(port, wanted, self._fill(port, size))
+            data = self._fill(port, size)
+            if len(wanted) == 1 and len(data) == size:
+                port.note_delay(size)
+            return self._sort(port, wanted, data)
         finally:
             port.is_using = False
 

@@ -11,6 +11,7 @@ import threading
 from dynamixel_sdk import port_handler
 
 from drivers.base.errors import DriverError
+from drivers.port.latency import ReplyDelays
 from drivers.port.serialport import SerialPort, as_serial_port, reply_margin_s
 
 BITS_PER_BYTE = 10
@@ -42,6 +43,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
     port_name : device path.
     suspects : ids that missed a deadline and may still reply late; see :class:`~drivers.servos.exchange.Exchanges`.
     stray : replies thrown away.
+    delays : how late the newest replies of single servos were.
     """
 
     def __init__(self, path: str | SerialPort, baud: int = 1_000_000, margin_s: float | None = None) -> None:
@@ -52,6 +54,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self.baudrate = baud
         self.suspects: set[int] = set()
         self.stray = 0
+        self.delays = ReplyDelays()
         self.deadline_s = self._free_s = 0.0
         self._held = bytearray()
         self._margin_s = margin_s
@@ -77,6 +80,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self.link.baud = self.baudrate = cflag_baud
         self.link.open()
         self.suspects.clear()
+        self.delays.clear()
         self.is_using = False
         self._tune()
         self.is_open, self.ser = True, self.link.serial
@@ -142,6 +146,10 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
     def expect(self, size: int) -> None:
         """Deadline for ``size`` bytes of reply to what was sent: time on the wire, both ways, plus the margin."""
         self.deadline_s = max(self.clock(), self._free_s) + size * self._byte_s + self.margin_s
+
+    def note_delay(self, size: int) -> None:
+        """Note how long after its time on the wire a reply of ``size`` bytes was there, which was just received."""
+        self.delays.add(self.clock() - self._free_s - size * self._byte_s)
 
     def setPacketTimeout(self, packet_length: int) -> None:
         """Deadline for a reply of ``packet_length`` bytes: wire time plus margin (S7)."""

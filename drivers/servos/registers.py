@@ -109,13 +109,14 @@ class Registers(ABC, Generic[R]):
         """
         try:
             table = self.tables[servo] = find_table()
-            volts, celsius = self.get(servo, "voltage"), self.get(servo, "temperature")
+            volts = self.get(servo, "voltage") * self._known(servo, "voltage").scale
+            celsius = self.get(servo, "temperature")
             hardware, torque = self.hardware_error(servo), self.get(servo, "torque") == 1
         except PortLost:
             raise
         except DriverError:
             return ServoInfo(servo, number, model_name(number), firmware)
-        return ServoInfo(servo, number, table.model, firmware, volts / 10.0, float(celsius), hardware, torque)
+        return ServoInfo(servo, number, table.model, firmware, round(volts, 2), float(celsius), hardware, torque)
 
     # ------------------------------------------------------------------ many servos
 

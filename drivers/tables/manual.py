@@ -29,10 +29,13 @@ _UNITS = {
     "rev/min": (_TURN / 60.0, "rad/s"),
     "rev/min2": (_TURN / 3600.0, "rad/s2"),
     "μsec": (1e-6, "s"),
+    "us": (1e-6, "s"),
+    "Hz": (1.0, "Hz"),
     "msec": (1e-3, "s"),
     "ms": (1e-3, "s"),
     "°C": (1.0, "C"),
 }
+_PULSES = {"pulse": (1.0, "rad"), "pulse/s": (1.0, "rad/s"), "pulse/ms": (1e3, "rad/s")}
 _QUANTITY = re.compile(r"([\d.,]+)\s*\[\s*([^\]]*?)\s*\]")
 _WORDS = re.compile("[A-Za-z]{2}")
 _NUMBER = re.compile(r"[-+]?\d[\d,]*")
@@ -125,8 +128,9 @@ def _unit(unit: str, rad_per_tick: float) -> dict[str, Any]:
     if found is None:
         return {}
     amount, symbol = float(found[1].replace(",", "")), found[2]
-    if symbol == "pulse":
-        return {"scale": amount * rad_per_tick, "unit": "rad"}
+    if symbol in _PULSES:
+        factor, base = _PULSES[symbol]
+        return {"scale": amount * factor * rad_per_tick, "unit": base}
     if (amount, symbol) == (0.229, "rev/min"):
         return {"scale": VELOCITY_STEP, "unit": "rad/s"}
     factor, base = _UNITS[symbol]

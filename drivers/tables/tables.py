@@ -24,7 +24,7 @@ MAGNITUDE_BIT = 1024
 """XL-320: bit 10 of speed and load is the direction, the rest the magnitude."""
 TRIPPED = 0xFF
 """Value of the bus watchdog's register after it has stopped the servo."""
-FEETECH = ("sts", "sm", "scs")
+FEETECH = ("sts", "sm", "scs", "hls")
 """What the names of Feetech's models begin with."""
 
 
@@ -134,6 +134,7 @@ class ControlTable(Mapping[str, Item]):
     hardware_error : bit by cause (``voltage``, ``temperature``, ``overload`` ...) of Hardware Error Status and
         Shutdown; the XL-320 orders them differently from every other model.
     indirect : (first Indirect Address, first Indirect Data, slots) of each indirect area.
+    driven : whether omote drives and simulates the model; else it only scans and monitors it.
     fast_read, time_profile, goal_torque : whether this firmware knows fast reads, the time-based profile and
         torque on by goal update.
     """
@@ -155,6 +156,7 @@ class ControlTable(Mapping[str, Item]):
         self.voltage: int = round(10.0 * self.motor.supply_v) if self.motor else spec["voltage"]
         self.indirect: tuple[tuple[int, int, int], ...] = tuple(tuple(area) for area in spec.get("indirect", ()))
         self.hardware_error: dict[str, int] = spec["hardware_error"]
+        self.driven: bool = spec.get("driven", True)
         self.fast_read = 0 < spec.get("fast_read_firmware", 0) <= firmware
         self.time_profile = 0 < spec.get("time_profile_firmware", 0) <= firmware
         self.goal_torque = 0 < spec.get("goal_torque_firmware", 0) <= firmware
@@ -262,12 +264,21 @@ def _some_models(numbers: dict[str, int], name: str) -> str:
 
 
 def check_dynamixel(model: str) -> None:
-    """Check that a name is a Dynamixel model of either protocol; raises DriverError for any other."""
-    if load_table(model).model.startswith(FEETECH):
+    """Check that a name is a Dynamixel of either protocol that omote drives; raises DriverError for any other."""
+    table = load_table(model)
+    check_driven(table)
+    if table.model.startswith(FEETECH):
         raise DriverError(
             f"servo model {model!r} is no Dynamixel",
             hint='set the kind of its bus to the family it is of, as "feetech"; omote plugins lists them',
         )
+
+
+def check_driven(table: ControlTable) -> None:
+    """Raises DriverError for a model whose registers are known, but which omote does not drive."""
+    if not table.driven:
+        hint = "omote scan and omote monitor --listen know its registers; docs/drivers.md says what it lacks"
+        raise DriverError(f"{table.model} is not driven by omote yet", hint=hint)
 
 
 def check_feetech(model: str) -> None:
@@ -280,6 +291,7 @@ def check_feetech(model: str) -> None:
     if not name.startswith(FEETECH):
         hint = f"use one of {', '.join(sorted(name for name in known.values() if name.startswith(FEETECH)))}"
         raise DriverError(f"servo model {model!r} is no Feetech known here", hint=hint)
+    check_driven(load_table(name))
 
 
 def load_table(model: str | int, firmware: int | None = None) -> ControlTable:

@@ -54,6 +54,11 @@ class Drive(ABC):
         """Write at least current, velocity and position, the registers that control loops read."""
         self.sense(now_s)
 
+    def torque_limit(self) -> float:
+        """Most that the motor may give by its registers, as a share of its stall torque."""
+        item = self.registers.table.get("Torque Limit")
+        return self.registers.get("Torque Limit") / (item.maximum or 1000) if item else 1.0
+
     def to_register(self, shaft: float) -> int:
         """Present Position for a shaft position: reversed about the middle of the turn, then offset."""
         return round(self.mirror + self.side * shaft) + self.offset
@@ -73,8 +78,8 @@ class Drive(ABC):
     def observe(self, now_s: float) -> tuple[Motion, Motion, float]:
         """(motion of the shaft, motion commanded to the motor, load)."""
         plant = self.plant
-        commanded = plant.trajectory.at(now_s)
-        motion = commanded if plant.jammed_at is None else plant.motion(now_s)
+        commanded, motion = plant.trajectory.at(now_s), plant.motion(now_s)
+        plant.torque_limit = self.torque_limit()
         return motion, commanded, plant.load(motion, commanded)
 
     def hardware_errors(self, now_s: float, load: float) -> int:
@@ -86,7 +91,7 @@ class Drive(ABC):
             bits |= cause["voltage"]
         if plant.temperature_c > registers.get("Temperature Limit"):
             bits |= cause["temperature"]
-        since = plant.jammed_since
+        since = plant.pressed_since if plant.jammed_since is None else plant.jammed_since
         if abs(load) >= 1.0 and since is not None and now_s - since > OVERLOAD_AFTER_S:
             bits |= cause["overload"]
         return bits

@@ -87,6 +87,13 @@ class XDrive(Drive):
         self.timed = registers.table.time_profile and bool(registers.get("Drive Mode") & TIME_PROFILE)
         self.reach = self._reach(registers.get("Current Limit")) if self.has_current else math.inf
 
+    def torque_limit(self) -> float:
+        """The lower of Current Limit and, in the mode that it limits, Goal Current."""
+        if not self.has_current:
+            return 1.0
+        names = ("Current Limit", "Goal Current") if self.mode == CURRENT_POSITION else ("Current Limit",)
+        return min(1.0, *(abs(self.registers.get(name)) / self.full_current for name in names))
+
     def _reach(self, current: int) -> float:
         """How far from its rest a current can stretch the skin, ticks."""
         spring = self.plant.skin.spring

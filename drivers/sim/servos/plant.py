@@ -32,6 +32,10 @@ class Skin:
         return cls(spring=cls().spring * fine, inertia=cls().inertia * fine)
 
 
+NO_STOPS = (-math.inf, math.inf)
+"""A shaft that may turn without end."""
+
+
 class Plant:
     """Shaft and motor of one servo.
 
@@ -48,13 +52,16 @@ class Plant:
     powered : the motor holds and moves the shaft; otherwise the shaft stays where it is left.
     jammed_at : position at which the shaft is stuck, or None.
     jammed_since : when it got stuck, or None.
+    stops : lowest and highest position that the mechanics behind the shaft allow.
+    pressed_since : when the shaft came to a stop that the motor still pushes against, or None.
+    torque_limit : most that the motor may give, as a share of its stall torque.
     forced_c : temperature set from outside, or None.
     """
 
     RAMP_S = 0.03
     """Time from rest to the no-load speed: the shortest possible, whatever the profile."""
     STIFFNESS = 0.02
-    """Share of stall torque per tick of following error of a jammed shaft."""
+    """Share of stall torque per tick of following error of a shaft that is jammed or at a stop."""
     RESISTANCE_V = 0.4
     """Drop of the supply at full load, volts."""
     AMBIENT_C, RISE_C, LAG_S = 30.0, 60.0, 200.0
@@ -69,12 +76,25 @@ class Plant:
         self.powered = False
         self.jammed_at: float | None = None
         self.jammed_since: float | None = None
+        self.stops = NO_STOPS
+        self.pressed_since: float | None = None
+        self.torque_limit = 1.0
         self.forced_c: float | None = None
         self._winding_c, self._heated_s = self.AMBIENT_C, now_s
 
     def motion(self, now_s: float) -> Motion:
         """Motion of the shaft."""
-        return self.trajectory.at(now_s) if self.jammed_at is None else Motion(self.jammed_at)
+        if self.jammed_at is not None:
+            return Motion(self.jammed_at)
+        motion = self.trajectory.at(now_s)
+        if self.stops is NO_STOPS:
+            return motion
+        low, high = self.stops
+        if low <= motion.position <= high:
+            self.pressed_since = None
+            return motion
+        self.pressed_since = now_s if self.pressed_since is None else self.pressed_since
+        return Motion(min(max(motion.position, low), high))
 
     def load(self, motion: Motion, commanded: Motion) -> float:
         """Torque the motor gives, as a share of its stall torque (-1 to 1)."""
@@ -84,9 +104,9 @@ class Plant:
         load = skin.spring * (motion.position - self.rest) + skin.inertia * motion.acceleration
         if motion.velocity:
             load += math.copysign(skin.friction, motion.velocity)
-        if self.jammed_at is not None:
+        if self.jammed_at is not None or self.pressed_since is not None:
             load += self.STIFFNESS * (commanded.position - motion.position)
-        return min(max(load, -1.0), 1.0)
+        return min(max(load, -self.torque_limit), self.torque_limit)
 
     def voltage(self, load: float) -> float:
         """Supply at the servo, volts."""
@@ -113,8 +133,14 @@ class Plant:
             self.trajectory = hold(now_s, self.jammed_at)
             self.jammed_at = self.jammed_since = None
 
+    def set_stops(self, now_s: float, stops: tuple[float, float]) -> None:
+        """Put mechanical stops beside the shaft, or take them away (`NO_STOPS`); it stays between them."""
+        self.stops, self.pressed_since = stops, None
+        self.trajectory = hold(now_s, self.motion(now_s).position)
+
     def place(self, now_s: float, position: float) -> None:
-        """Put the shaft somewhere, as by hand with torque off."""
+        """Put the shaft somewhere between its stops, as by hand with torque off."""
+        position = min(max(position, self.stops[0]), self.stops[1])
         self.trajectory = hold(now_s, position)
         if self.jammed_at is not None:
             self.jammed_at = position

@@ -8,14 +8,15 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 from drivers.packets.packet import ALERT, ErrorNumber
 from drivers.sim.servos.drive import Drive, speed_unit
 from drivers.sim.servos.drive_word import FeetechDrive, WordDrive
 from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM, XDrive
-from drivers.sim.servos.plant import Plant, Skin
+from drivers.sim.servos.plant import NO_STOPS, Plant, Skin
 from drivers.sim.servos.registers import Change, Registers
-from drivers.tables.tables import load_table
+from drivers.tables.tables import check_driven, load_table
 
 TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""
@@ -75,6 +76,7 @@ class ServoState:
         skin: Skin | None = None,
     ) -> None:
         self.table = table = load_table(model, firmware)
+        check_driven(table)
         self.registers = Registers(table)
         self.registers.reset(0, table.size)
         self.eeprom_writes: Counter[str] = Counter()
@@ -215,7 +217,7 @@ class ServoState:
         small = self.table.model.startswith(("xl330", "xc330"))
         return self.watchdog_ignored or (small and self.registers.get("Operating Mode") == CURRENT)
 
-    def change_fault(self, kind: str, value: float, begins: bool, now_s: float) -> None:
+    def change_fault(self, kind: str, value: Any, begins: bool, now_s: float) -> None:
         """A fault of this servo begins or ends; kinds as in ``drivers.sim.wire.faults``."""
         plant = self.plant
         if kind == "alert":
@@ -226,6 +228,9 @@ class ServoState:
             self.eeprom_busy_s = value if begins else 0.0
         elif kind == "stall":
             plant.jam(now_s, begins)
+        elif kind == "stops":
+            plant.set_stops(now_s, value if begins else NO_STOPS)
+            self._sensed_at = -1.0
         elif kind == "hw" and begins:
             self.latch(int(value), now_s)
         elif kind == "volts":

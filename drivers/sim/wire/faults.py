@@ -51,6 +51,13 @@ def _integer(text: str) -> int:
     return int(text, 0)
 
 
+def _span(text: str) -> tuple[float, float]:
+    low, high = (float(end) for end in text.split(".."))
+    if not low < high:
+        raise ValueError("LOW..HIGH, the lower end first")
+    return low, high
+
+
 KINDS: dict[str, Kind] = {
     "mute": Kind("servo"),  # neither receives nor answers (loose cable)
     "silent": Kind("reply"),  # receives and executes instructions, but its answers are lost
@@ -65,6 +72,7 @@ KINDS: dict[str, Kind] = {
     "hw": Kind("servo", _integer, 0x20),  # latches these hardware error bits
     "volts": Kind("servo", float),  # supply at so many volts
     "temp": Kind("servo", float),  # motor at so many degrees Celsius
+    "stops": Kind("servo", _span),  # mechanical stops of the shaft, LOW..HIGH in steps
     "stall": Kind("servo"),  # shaft stuck where it is
     "watchdog-ignored": Kind("servo"),  # keeps turning when its bus watchdog trips
     "dup": Kind("servo"),  # a second servo has the same id; their replies collide

@@ -66,7 +66,7 @@ def test_unreadable_specs_are_named_with_the_reason(spec: str, why: str):
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_kind_has_a_help_line_and_can_be_written(kind: str):
     entry = KINDS[kind]
-    value = ":7" if entry.value and entry.default is None else ""
+    value = (":7..9" if kind == "stops" else ":7") if entry.value and entry.default is None else ""
     assert parse_fault(f"{kind}{'' if entry.scope == 'bus' else ':1'}{value}").kind == kind
 
 

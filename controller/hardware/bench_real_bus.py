@@ -1,0 +1,134 @@
+"""Benchmark of ``omote bench bus --real PORT``: what a real bus carries. It only pings and reads: no torque, no goal.
+
+The limit of the wire is counted as in :mod:`controller.tools.bench_bus`, without the goals: 14 + n bytes of request
+and 15 n of replies, or 8 + 8 n of a joint one, for n servos with Protocol 2.0.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from controller.base.clock import Samples
+from controller.tools.bench_bus import Figure, Log, Loop, measure_loop
+from controller.tools.scan import scan_port
+from drivers import open_bus
+from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
+from drivers.base.errors import DriverError, NoReply
+from drivers.servos.bus import ServoBus
+from drivers.tables.tables import FEETECH, load_table
+
+RATES_HZ = (50.0, 100.0)
+ASKED_HZ = 0.99
+"""Share of the ticks in which every servo must answer for a rate to count as carried."""
+PINGS = 100
+_REQUEST_2, _REPLY_2, _JOINT_2, _JOINT_EACH_2 = 14, 15, 8, 8
+
+
+def find_servos(port: str, baud: int, protocols: Sequence[int]) -> list[ServoInfo]:
+    """Servos of known models that answer on a port, in the first protocol in which any do.
+
+    Raises PortError; NoReply: there is none.
+    """
+    for protocol in protocols:
+        found = [item.servo for item in scan_port(port, [(protocol, baud)]) if item.servo]
+        if known := [info for info in found if _is_known(info)]:
+            return known
+    raise NoReply(f"no servo to measure on {port} at {baud} baud", hint=f"omote scan {port}", port=port)
+
+
+def _is_known(info: ServoInfo) -> bool:
+    try:
+        load_table(info.model_number)
+    except DriverError:
+        return False
+    return True
+
+
+def bench_real_bus(
+    port: str, baud: int, seconds: float, log: Log, protocols: Sequence[int] = (2, 1)
+) -> list[tuple[str, list[Figure]]]:
+    """Tables of round trips and read rates of the servos on a port, measured for ``seconds`` each.
+
+    Raises PortError; NoReply where no servo answers.
+    """
+    log("looking for servos")
+    found = find_servos(port, baud, protocols)
+    specs = [ServoSpec(info.id, f"servo {info.id}", info.model, -math.pi, math.pi, 1.0, 1.0) for info in found]
+    kind = "feetech" if found[0].model.startswith(FEETECH) else "dynamixel"
+    title = f"{len(specs)} servos on {port} at {baud} baud, read only"
+    figures: list[Figure] = []
+    for fast, options in _manners(found):
+        with open_bus(kind, specs, port=port, baud=baud, feedback="position", slow_group=0, **options) as bus:
+            if not figures:
+                log("round trips")
+                figures += _round_trips(bus)
+            figures += _rates(bus, baud, seconds, fast, log)
+    return [(title, figures)]
+
+
+def _manners(found: Sequence[ServoInfo]) -> list[tuple[bool, dict[str, Any]]]:
+    """Options of plain reads, and of fast ones where every servo has them; all servos of Protocol 1.0 a cycle."""
+    tables = [load_table(info.model_number, info.firmware) for info in found]
+    if any(table.protocol == 1 for table in tables):
+        return [(False, {"singles": len(found)})]
+    return [(fast, {"fast": fast}) for fast in (False, True)[: 1 + all(table.fast_read for table in tables)]]
+
+
+def _round_trips(bus: Bus) -> list[Figure]:
+    """Time of one read of one servo after the other, and what of it is the adapter's."""
+    times = Samples()
+    for k in range(PINGS):
+        began = time.perf_counter()
+        bus.discover([bus.ids[k % len(bus.ids)]])
+        times.add(1e3 * (time.perf_counter() - began))
+    summary = times.summary()
+    figures = [
+        Figure("a servo described (ping and four reads), median", summary["p50"], "ms"),
+        Figure("  99 of 100", summary["p99"], "ms"),
+    ]
+    if not isinstance(bus, ServoBus) or bus.reply_delay_s is None:
+        return figures
+    message, hint = bus.slow_answers()
+    note = f"{message}; try: {hint}" if message else "<= 5 ms"
+    late = Figure("an answer comes after its time on the wire by", 1e3 * bus.reply_delay_s, "ms", note, not message)
+    return [*figures, late]
+
+
+def _rates(bus: Bus, baud: int, seconds: float, fast: bool, log: Log) -> list[Figure]:
+    name = f"{'fast ' if fast else ''}reads of all"
+    log(f"{name}, as many as there can be")
+    free = _measured(bus, seconds, 0.0)
+    figures = [Figure(name, free.rate_hz, "Hz")]
+    if limit := read_limit_hz([servo.model for servo in bus.servos], baud, fast):
+        figures.append(Figure("  of the wire limit", 100 * free.rate_hz / limit, "%", f"of {limit:.0f} Hz"))
+    figures.append(Figure("  one read, 99 of 100", free.cycle_ms["p99"], "ms"))
+    for rate in RATES_HZ:
+        log(f"{name}, {rate:g} Hz")
+        paced = _measured(bus, seconds, rate)
+        share = paced.rate_hz / rate
+        reach = f">= {ASKED_HZ:.0%}"
+        figures.append(Figure(f"  complete at {rate:g} Hz", 100 * share, "%", reach, share >= ASKED_HZ))
+    return figures
+
+
+def _measured(bus: Bus, seconds: float, rate_hz: float) -> Loop:
+    return measure_loop(partial(_read, bus.read), seconds, rate_hz)
+
+
+def _read(read: Callable[[], BusState], _: object) -> bool:
+    return bool(np.all(read().fresh))
+
+
+def read_limit_hz(models: Sequence[str], baud: int, fast: bool) -> float | None:
+    """Reads a second of the positions of all servos that the wire allows; None where they are read one by one."""
+    n, tables = len(models), [load_table(model) for model in models]
+    if all(table.protocol == 2 for table in tables):
+        size = _REQUEST_2 + n + (_JOINT_2 + _JOINT_EACH_2 * n if fast else _REPLY_2 * n)
+        return baud / (10.0 * size)
+    return None

@@ -1,0 +1,163 @@
+"""A small movement of one servo, watched at every step; it ends at the first sign of load or error."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+from drivers.base.bus import Bus, BusState
+
+PERIOD_S = 0.02
+SETTLE_S = 0.4
+"""How long a servo may take to arrive after its last goal."""
+STALE_S = 0.3
+LEAD_RAD = math.radians(2.5)
+"""A servo that is so far behind its goal is blocked."""
+STARTED_RAD = math.radians(0.25)
+ALERT = 0x80
+
+
+@dataclass
+class Moved:
+    """What was measured. wanted_rad, moved_rad : how far goals and shaft went, from end to end. along : positive where
+    the shaft went with its goals. lag_s : how long it was behind them on the way. Unknown values are NaN.
+    """
+
+    wanted_rad: float = math.nan
+    moved_rad: float = math.nan
+    along: float = math.nan
+    lag_s: float = math.nan
+    peak_current_a: float = math.nan
+    peak_load: float = math.nan
+    least_voltage_v: float = math.nan
+
+
+class NotMoved(Exception):
+    """A movement that ended early; ``moved`` is what was measured until then."""
+
+    def __init__(self, message: str, moved: Moved) -> None:
+        super().__init__(message)
+        self.moved = moved
+
+
+@dataclass
+class Sampler:
+    """Sends goals to the only servo of a bus and watches what it measures.
+
+    load : share of the stall torque, or of ``full_a`` (A), at which it stops. sleep, clock : seconds.
+    """
+
+    bus: Bus
+    load: float
+    full_a: float
+    sleep: Callable[[float], object] = time.sleep
+    clock: Callable[[], float] = time.monotonic
+    goals: list[float] = field(default_factory=list)
+    positions: list[float] = field(default_factory=list)
+    current_a: float = math.nan
+    share: float = math.nan
+    voltage_v: float = math.nan
+    stopped: str = ""
+
+    def step(self, goal_rad: float) -> float:
+        """Send a goal, wait, read; returns the position. Raises NotMoved where it must stop."""
+        begun = self.clock()
+        sent = float(self.bus.write([goal_rad])[0])
+        self.sleep(max(0.0, begun + PERIOD_S - self.clock()))
+        state = self.bus.read()
+        position = float(state.position_rad[0])
+        if state.fresh[0]:
+            self.goals.append(sent)
+            self.positions.append(position)
+        self._keep(state)
+        if why := self._why_stop(state, sent, position):
+            raise NotMoved(why, self.moved())
+        return position
+
+    def _keep(self, state: BusState) -> None:
+        self.current_a = _most(self.current_a, abs(float(state.current_a[0])))
+        load = getattr(self.bus, "load", None)  # servos with Protocol 1.0 measure it
+        self.share = _most(self.share, abs(float(load[0])) if load is not None else math.nan)
+        self.share = _most(self.share, self.current_a / self.full_a if self.full_a > 0.0 else math.nan)
+        self.voltage_v = -_most(-self.voltage_v, -float(state.voltage_v[0]))
+
+    def _why_stop(self, state: BusState, goal: float, position: float) -> str:
+        """Why the movement must end now; empty where it may go on."""
+        if state.hardware_error[0] or state.error[0] & ALERT:
+            return f"stopped: it reports a hardware error (0x{int(state.hardware_error[0]):02X})"
+        if not state.torque[0]:
+            return "stopped: its motor went off by itself"
+        if state.silent[0] or state.age_s[0] > STALE_S:
+            return "stopped: it no longer says where it is"
+        if self.share > self.load:
+            return f"stopped at {100 * self.share:.0f} % of its torque: something blocks it"
+        if abs(goal - position) > LEAD_RAD:
+            return f"stopped: it is {math.degrees(abs(goal - position)):.1f} degrees behind its goal, as if blocked"
+        return ""
+
+    def moved(self) -> Moved:
+        """What was measured so far."""
+        found = Moved(peak_current_a=self.current_a, peak_load=self.share, least_voltage_v=self.voltage_v)
+        if self.goals:
+            found.wanted_rad = max(self.goals) - min(self.goals)
+            found.moved_rad = max(self.positions) - min(self.positions)
+            found.along = _together(self.goals, self.positions)
+            found.lag_s = _lag(self.goals, self.positions) * PERIOD_S
+        return found
+
+
+def move_a_little(sampler: Sampler, by_rad: float, speed_rad_s: float, low_rad: float, high_rad: float) -> Moved:
+    """Move up, down and back by at most ``by_rad``, inside both limits.
+
+    Raises NotMoved: it stopped early, or there is no room. The motor stays on where it is then.
+    """
+    here = sampler.step(math.nan)
+    up, down = min(here + by_rad, high_rad), max(here - by_rad, low_rad)
+    if up - down < by_rad:
+        raise NotMoved("has no room to move within limit_deg", sampler.moved())
+    goal = here
+    for target in (up, down, here):
+        goal = _ramp(sampler, goal, target, speed_rad_s)
+    return sampler.moved()
+
+
+def _ramp(sampler: Sampler, goal: float, target: float, speed_rad_s: float) -> float:
+    """Send goals that go to ``target`` at a speed, and wait until the shaft is there; returns the last goal."""
+    step = speed_rad_s * PERIOD_S
+    position = goal
+    while goal != target:
+        goal += max(min(target - goal, step), -step)
+        position = sampler.step(goal)
+    end_s = sampler.clock() + SETTLE_S
+    while abs(position - target) > STARTED_RAD and sampler.clock() < end_s:
+        position = sampler.step(goal)
+    return goal
+
+
+def _most(one: float, other: float) -> float:
+    """The greater of two values; a known one where the other is unknown."""
+    return other if math.isnan(one) else one if math.isnan(other) else max(one, other)
+
+
+def _together(goals: list[float], positions: list[float]) -> float:
+    """Sum of the products of steps of goals and positions, the latter some samples later: above 0 along the goals."""
+    late = round(_lag(goals, positions))
+    steps = zip(_steps(goals), _steps(positions[late:]), strict=False)
+    return sum(goal * position for goal, position in steps)
+
+
+def _steps(values: list[float]) -> list[float]:
+    return [after - before for before, after in pairwise(values)]
+
+
+def _lag(goals: list[float], positions: list[float]) -> float:
+    """By how many samples the positions are behind the goals: where their distance is least."""
+    most = min(len(goals) // 2, round(1.0 / PERIOD_S))
+    errors = [
+        sum(abs(g - p) for g, p in zip(goals, positions[late:], strict=False)) / (len(goals) - late)
+        for late in range(most)
+    ]
+    return float(errors.index(min(errors))) if errors else math.nan

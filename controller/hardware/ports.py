@@ -1,0 +1,55 @@
+"""The port of a robot's bus as several tools in turn open it; a simulated bus is served meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from controller.robot.buses import SIMULATION, BusSettings
+from drivers import open_bus
+from drivers.base.bus import Bus, ServoSpec
+from drivers.core.registry import SIMULATED
+from drivers.sim import SimulatedBus
+
+
+@dataclass(frozen=True)
+class BusPort:
+    """A bus that can be opened again and again.
+
+    name : of the bus. family : of its servos. port : path or URL. baud : its rate. options : of the driver.
+    """
+
+    name: str
+    family: str
+    port: str
+    baud: int
+    options: dict[str, Any]
+
+    def bus(self, servos: Sequence[ServoSpec], **changes: Any) -> Bus:
+        """A driver of some of its servos, closed."""
+        return open_bus(self.family, servos, port=self.port, baud=self.baud, **self.options | changes)
+
+
+@contextmanager
+def serve_bus(bus: BusSettings, servos: Sequence[ServoSpec]) -> Iterator[BusPort]:
+    """The port of a bus; where its kind is ``"simulated"``, its servos are served as its settings say."""
+    given = bus.options()
+    options = {key: value for key, value in given.items() if key not in (*SIMULATION, "port", "baud")}
+    if bus.kind != SIMULATED:
+        yield BusPort(bus.name, bus.family, bus.port, bus.baud, options)
+        return
+    far_end = open_bus(bus.family, servos, port="", **options).far_end()
+    with SimulatedBus(
+        servos,
+        faults=bus.faults,
+        baud=bus.baud,
+        wire=bus.wire,
+        latency_s=bus.latency_s,
+        seed=bus.seed,
+        process=True,
+        family=bus.family,
+        options=far_end,
+    ) as simulated:
+        yield BusPort(bus.name, bus.family, simulated.path, bus.baud, options)

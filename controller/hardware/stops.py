@@ -1,0 +1,131 @@
+"""``omote calibrate --find-stops``: the end stops of a robot's servos, checked against the limits of its file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from rich.table import Table
+
+from controller.hardware.ports import BusPort, serve_bus
+from controller.robot.channels import servo_specs
+from controller.robot.settings import ChannelSettings, RobotSettings
+from drivers.base.errors import BusError, DriverError
+from drivers.core.registry import FAMILIES
+from drivers.tools.find_stops import TORQUE, Found, StillOn, find_stops, why_not
+
+BEYOND_DEG = 15.0
+"""How far past the limits of the file the search goes."""
+ALIKE_DEG = 1.0
+"""Two approaches of one stop that differ by more do not count."""
+
+
+@dataclass(frozen=True)
+class ChannelStops:
+    """What is known of the stops of one channel, degrees as the robot file counts them.
+
+    low_deg, high_deg : where the servo stopped; None where it met no stop.
+    faults : what does not fit the file, or why nothing was found; empty where all is well.
+    """
+
+    channel: str
+    low_deg: float | None = None
+    high_deg: float | None = None
+    peak_current_a: float = math.nan
+    faults: tuple[str, ...] = ()
+
+    def limit_deg(self, margin_deg: float) -> tuple[float, float] | None:
+        """Limits inside both stops; None where one is not known or nothing lies between them."""
+        if self.low_deg is None or self.high_deg is None:
+            return None
+        low, high = self.low_deg + margin_deg, self.high_deg - margin_deg
+        return (round(low, 1), round(high, 1)) if low < high else None
+
+
+def find_robot_stops(
+    robot: RobotSettings,
+    channels: Sequence[ChannelSettings],
+    *,
+    torque: float = TORQUE,
+    beyond_deg: float = BEYOND_DEG,
+    progress: Callable[[str], object] = lambda text: None,
+) -> list[ChannelStops]:
+    """Find the stops of channels one by one; the motors of all others stay off, and each is off when it is done.
+
+    torque : share of the full current. beyond_deg : how far past its limits in the file a servo is looked at.
+
+    Raises PortError, and StillOn where a servo was not confirmed off; what concerns one servo else is in its faults.
+    """
+    found: list[ChannelStops] = []
+    for bus in robot.buses:
+        own = [channel for channel in channels if channel.bus == bus.name]
+        if not own:
+            continue
+        with serve_bus(bus, servo_specs(robot.on_bus(bus.name))) as port:
+            found += [_channel_stops(port, channel, torque, beyond_deg, progress) for channel in own]
+    return found
+
+
+def _channel_stops(
+    port: BusPort, channel: ChannelSettings, torque: float, beyond_deg: float, progress: Callable[[str], object]
+) -> ChannelStops:
+    if FAMILIES.get(port.family).hobby:
+        return ChannelStops(channel.name, faults=("a hobby servo measures neither its position nor its current",))
+    try:
+        if reason := why_not(channel.model):
+            return ChannelStops(channel.name, faults=(reason,))
+        (servo,) = servo_specs([channel])
+        low, high = channel.limit_deg
+        reach = math.radians(low - beyond_deg), math.radians(high + beyond_deg)
+        found = find_stops(port.port, port.baud, servo, reach, torque=torque, progress=progress)
+    except StillOn:
+        raise
+    except BusError as error:
+        return ChannelStops(channel.name, faults=(f"{error}" + (f" ({error.hint})" if error.hint else ""),))
+    except DriverError as error:
+        if type(error) is not DriverError:
+            raise
+        return ChannelStops(channel.name, faults=(str(error),))
+    return checked_stops(channel, found, beyond_deg)
+
+
+def checked_stops(channel: ChannelSettings, found: Found, beyond_deg: float) -> ChannelStops:
+    """What was found, with what does not fit the channel's limits."""
+    ends = [None if angle is None else math.degrees(angle) for angle in (found.low_rad, found.high_rad)]
+    low, high = ends
+    faults = []
+    if low is None or high is None:
+        side = "either side" if low is high else "the low side" if low is None else "the high side"
+        faults.append(f"no stop on {side}, up to {beyond_deg:g} degrees beyond limit_deg or the end of its turn")
+    if math.degrees(found.spread_rad) > ALIKE_DEG:
+        faults.append(f"two approaches of one stop differ by {math.degrees(found.spread_rad):.1f} degrees")
+    if low is not None and high is not None and high - low < ALIKE_DEG:
+        return ChannelStops(channel.name, None, None, found.peak_current_a, ("it is stuck: it moved to neither side",))
+    if low is not None and channel.limit_deg[0] < low:
+        faults.append(f"limit_deg begins at {channel.limit_deg[0]:g}, beyond the stop at {low:.1f}")
+    if high is not None and channel.limit_deg[1] > high:
+        faults.append(f"limit_deg ends at {channel.limit_deg[1]:g}, beyond the stop at {high:.1f}")
+    return ChannelStops(channel.name, low, high, found.peak_current_a, tuple(faults))
+
+
+def stops_table(found: Sequence[ChannelStops], channels: Sequence[ChannelSettings], margin_deg: float) -> Table:
+    """The stops beside the limits of the file, and limits that would keep a margin."""
+    limits = {channel.name: channel.limit_deg for channel in channels}
+    table = Table("channel", "low stop", "high stop", "limit_deg", "with margin", "current", "")
+    for row in found:
+        inside = row.limit_deg(margin_deg)
+        table.add_row(
+            row.channel,
+            _degrees(row.low_deg),
+            _degrees(row.high_deg),
+            "[{:g}, {:g}]".format(*limits[row.channel]).replace("[", r"\["),
+            "" if inside is None else "[{:g}, {:g}]".format(*inside).replace("[", r"\["),
+            "" if math.isnan(row.peak_current_a) else f"{row.peak_current_a:.2f} A",
+            "; ".join(row.faults) or "as the file says",
+        )
+    return table
+
+
+def _degrees(value: float | None) -> str:
+    return "" if value is None else f"{value:.1f}"
