@@ -225,11 +225,11 @@ def _dry_run(
     from controller.tools.stage_run import write_report
 
     with console.status("computing what would be sent"), ports_forbidden("a dry run"):
-        heard = None
+        heard, loaded = None, load_stage(stage, PARAMETERS)
         if voice is not None:
             with Voice(voice, voice_hz).open() as stream:
-                heard = voice_take(stream, "voice", PARAMETERS, raw_hz=voice_hz, longest_s=seconds)
-        found = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS, heard, alone=alone)
+                heard = voice_take(stream, "voice", loaded.parameters, raw_hz=voice_hz, longest_s=seconds)
+        found = dry_run(loaded, take, seconds, loaded.parameters, heard, alone=alone)
     if found.rows:
         title = f"dry run: no port was opened; computed {_share_played(found.seconds, found.length_s)}"
         table = Table(*found.rows[0], title=title, title_justify="left")

@@ -177,6 +177,7 @@ class CommandState:
         self.vocabulary = vocabulary or Vocabulary.load(parameters)
         self.mixer = Mixer(parameters, default_layers() if layers is None else layers)
         self.limiter = MotionLimiter.of(parameters, period_s)
+        self.limiter.reset(parameters.rest)
         self.parts = Parts()
         self._player = ExpressionPlayer(self.vocabulary["neutral"])
         self._gaze = Gaze(parameters)
@@ -249,7 +250,7 @@ class CommandState:
             source.update(now_s)
 
     def _write_expression(self, now_s: float) -> None:
-        values = _finite(self._player.update(now_s))
+        values = _finite(self.parameters.rest + self._player.update(now_s))
         self._expression.write_masked(values, self._everything, now_s)
         self._blocks = self._player.blocks
 

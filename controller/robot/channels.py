@@ -91,6 +91,7 @@ class ChannelTable:
     curves : n functions from mix to angle, the calibrated points. low_rad, high_rad : (n,) limits of position.
     max_speed_rad_s, max_accel_rad_s2, max_jerk_rad_s3 : (n,) limits of motion; infinite jerk for no limit.
     dead_band_rad, slack_rad : (n,), 0 for none.
+    rest : (p,) the neutral face.
     terms : terms that are more than a weight. anchors, anchored : the solver of k channels, and their indices (k,).
     """
 
@@ -104,6 +105,7 @@ class ChannelTable:
     max_jerk_rad_s3: Floats
     dead_band_rad: Floats
     slack_rad: Floats
+    rest: Floats
     terms: Terms | None = None
     anchors: AnchorSolver | None = None
     anchored: Indices | None = None
@@ -120,7 +122,7 @@ class ChannelTable:
     @property
     def neutral_rad(self) -> Floats:
         """(n,) angles of the neutral face."""
-        return self.angles(np.zeros(self.mix.shape[1]))[0]
+        return self.angles(self.rest)[0]
 
     def mixed(self, values: Floats) -> Floats:
         """(n,) mixes for parameters (p,); mm of pull where a channel is anchored."""
@@ -177,6 +179,7 @@ def build_table(
         max_jerk_rad_s3=np.radians([c.max_jerk_deg_s3 or np.inf for c in channels]),
         dead_band_rad=np.radians([c.dead_band_deg for c in channels]),
         slack_rad=np.radians([c.slack_deg for c in channels]),
+        rest=parameters.neutral(),
         terms=_terms(channels, parameters),
         anchors=anchors,
         anchored=None if anchors is None else np.array([names.index(name) for name in anchors.names], dtype=np.intp),

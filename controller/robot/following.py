@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.base.parameters import REGIONS, Flags, Floats, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.layers.commands import CommandState, StatusValue
 from controller.robot.channels import ChannelTable
@@ -31,7 +31,7 @@ class FollowingStatistics:
     """
 
     def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
-        self._names = table.names
+        self._names, self._region_names = table.names, parameters.region_names
         self._regions = np.array([parameters.regions[int(np.argmax(np.abs(row)))] for row in table.linear])
         self._now: Floats | None = None
         self._squares, self._most = np.zeros((2, len(table.names)))
@@ -61,7 +61,7 @@ class FollowingStatistics:
             "rms_deg": _rms(self._squares, self._count),
             "regions_rms_deg": {
                 region: _rms(self._squares[self._regions == region], self._count[self._regions == region])
-                for region in REGIONS
+                for region in self._region_names
                 if region in self._regions
             },
             "worst": [
@@ -152,7 +152,8 @@ class MeasuredFace:
     ) -> None:
         self._mirrors = [(Mirror(table, parameters), read) for table, read in zip(tables, measured, strict=True)]
         self._touched = [np.abs(table.linear).sum(axis=0) > 0.0 for table in tables]
-        self._following = following
+        self._following, self._region_names = following, parameters.region_names
+        self._rest = parameters.neutral()
         self._lock = threading.Lock()
         for mirror, _ in self._mirrors:  # the solver is compiled before the clock runs
             mirror.read(np.zeros(len(mirror.readable)))
@@ -170,8 +171,8 @@ class MeasuredFace:
         return bool(mask.any())
 
     def measured(self, out: Floats) -> bool:
-        """See :class:`controller.layers.commands.CommandSink`; parameters without a servo are 0."""
-        out.fill(0.0)
+        """See :class:`controller.layers.commands.CommandSink`; parameters without a servo are neutral."""
+        np.copyto(out, self._rest)
         return self.read(out, np.zeros(len(out), dtype=bool))
 
     def capture(self, state: CommandState, now_ns: int) -> None:
@@ -186,7 +187,11 @@ class MeasuredFace:
         for following in self._following:
             for region, away in following.now():
                 found.setdefault(region, []).append(away)
-        return {region: _rms(np.square(found[region]), len(found[region])) for region in REGIONS if region in found}
+        return {
+            region: _rms(np.square(found[region]), len(found[region]))
+            for region in self._region_names
+            if region in found
+        }
 
     def status(self) -> dict[str, StatusValue]:
         """How far the servos are from their wanted angles now: all together, and by region (rms, degrees)."""

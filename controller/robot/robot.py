@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from controller.base.config import load
-from controller.base.errors import ParameterError
+from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import Parameters, did_you_mean
+from controller.base.paths import find_config
 from controller.robot.calibration import calibrated, calibration_path
 from controller.robot.settings import RobotSettings
 from drivers import check_model
@@ -15,14 +16,30 @@ from drivers.core.registry import FAMILIES
 
 
 def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
-    """Read and cross-check a robot file, with its calibration.
+    """Read and cross-check a robot file, with its calibration; :func:`robot_parameters` gives what its mixes name.
 
     Raises ConfigError that lists every fault: unknown keys and parameters, repeated names and ids, missing buses.
     """
-    robot = load(path, RobotSettings, lambda read: _repeated(read) + _references(read, parameters) + _rules(read))
+
+    def faults(read: RobotSettings) -> list[str]:
+        try:
+            known = robot_parameters(read, path, parameters)
+        except ConfigError as error:
+            return [f"vocabularies: {error}".replace("\n", "\n  "), *_repeated(read), *_rules(read)]
+        return _repeated(read) + _references(read, known) + _rules(read)
+
+    robot = load(path, RobotSettings, faults)
     if robot.calibration is None:
         return robot
     return calibrated(robot, calibration_path(robot.calibration, path))
+
+
+def robot_parameters(robot: RobotSettings, path: Path, parameters: Parameters) -> Parameters:
+    """``parameters``, and behind them those of its own that the vocabularies of the robot in ``path`` add.
+
+    Raises ConfigError: one cannot be found or is wrong.
+    """
+    return parameters.with_files(find_config("vocabularies", name, beside=path) for name in robot.vocabularies)
 
 
 def _repeated(robot: RobotSettings) -> list[str]:

@@ -212,12 +212,14 @@ def _for_channels(rules: list[Rule], names: Sequence[str]) -> list[Rule]:
 class RobotSettings(Settings):
     """The channels of one robot, on one or more buses.
 
-    ``calibration`` names a file that ``omote calibrate`` wrote for this head (:mod:`controller.robot.calibration`).
+    ``calibration`` names a file that ``omote calibrate`` wrote for this head (:mod:`controller.robot.calibration`);
+    ``vocabularies`` files with parameters of its own that its mixes name.
     """
 
     name: str
     description: str = ""
     calibration: str | None = None
+    vocabularies: Annotated[list[str], Field(max_length=64)] = []
     buses: list[Bus] = Field(min_length=1, max_length=64)
     channels: list[ChannelSettings] = Field(min_length=1, max_length=1024)
     landmarks: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=3)]] = {}
