@@ -142,6 +142,9 @@ def convert(
         Path | None,
         typer.Option("--ranges", help="File with the ranges of a person's face, which the take is fitted to."),
     ] = None,
+    vocabulary: Annotated[
+        list[str] | None, typer.Option("--vocabulary", help="File with parameters of your own; may be repeated.")
+    ] = None,
 ) -> None:
     """Write what a take shows for other programs: a table, time,jawOpen,... in seconds and values, or MCAP.
 
@@ -149,10 +152,12 @@ def convert(
     """
     # start-up: --help does without either
     from controller.base.parameters import PARAMETERS
+    from controller.base.paths import find_config
     from controller.tools.motion_file import convert as write
 
     with console.status("converting"):
-        motion = write(take, out, PARAMETERS, rate_hz, voice_model, ranges)
+        parameters = PARAMETERS.with_files(find_config("vocabularies", name) for name in vocabulary or ())
+        motion = write(take, out, parameters, rate_hz, voice_model, ranges)
     rows = f"{len(motion.times_s)} rows of {int(motion.mask.sum())} parameters, {motion.times_s[-1]:.1f} s"
     console.print(f"{rows}\nwrote {out}", soft_wrap=True)
 

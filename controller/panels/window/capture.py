@@ -26,8 +26,8 @@ class Capture:
     """
 
     def __init__(
-        self, area: PictureArea, newest: Callable[[], Floats], folder: Path, names: Sequence[str] = (),
-        clock: Callable[[], float] = time.monotonic,
+        self, area: PictureArea, newest: Callable[[], Floats], folder: Path,
+        clock: Callable[[], float] = time.monotonic, names: Sequence[str] = (),
     ) -> None:  # fmt: skip
         self._area, self._newest, self._folder, self._clock = area, newest, folder, clock
         self._names = names or PARAMETERS.names

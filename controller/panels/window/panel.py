@@ -57,7 +57,7 @@ class Panel:
         self.area = area or PictureArea()
         self._send, self._state = send, state
         self.commands = Commands(send, options.life)
-        self.capture = Capture(self.area, newest, options.folder, options.parameters.names)
+        self.capture = Capture(self.area, newest, options.folder, names=options.parameters.names)
         own = options.files[-1] if options.files else options.folder / _OWN
         self.sliders = Sliders(newest, self.commands, state, options.parameters)
         self.expressions = ExpressionButtons(

@@ -135,8 +135,8 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         Parameters.load(path)
     text = str(caught.value)
     for part in (
-        str(path), "8 faults", "colour: unknown key", "parameters.else_.region: unknown region 'jav', did you mean 'jaw'",
-            "parameters.wide.range",
+        str(path), "8 faults", "colour: unknown key", "parameters.wide.range",
+            "parameters.else_.region: unknown region 'jav', did you mean 'jaw'",
         "parameters.slow.max_speed", "parameters.slow.sped: unknown key", "parameters.lost: unknown profile 'b'",
         "parameters.bare: must be a table (is 3)", "aliases.other: unknown parameter 'god', did you mean 'good'",
     ):  # fmt: skip
