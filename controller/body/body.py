@@ -124,7 +124,7 @@ class Body:
         return [
             BusLoop(
                 bus.model_copy(update={"name": prefix + bus.name}), robot.on_bus(bus.name), parameters, self.newest,
-                robot.rules, anchors,
+                robot.rules, anchors, robot.linkages_on(bus.name),
                 limp=limp, feed_s=self.stage.period_s, stop_latch=self.state.stop_latch,
             )
             for bus in robot.buses

@@ -22,6 +22,7 @@ from controller.base.stop_latch import StopLatch
 from controller.robot.buses import BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.following import FollowingStatistics
+from controller.robot.linkages.kind import LinkageSettings
 from controller.robot.safety import GoalFilter
 from controller.robot.settings import ChannelSettings, RuleSettings
 from drivers import open_bus
@@ -49,6 +50,7 @@ class BusLoop:
     newest : returns the newest parameter vector (p,) float64 and the time (monotonic ns) at which its command arrived,
         0 for none.
     rules : the robot's safety rules. anchors : solver of the robot's anchored channels, on this bus or another.
+    linkages : those of this bus's channels.
     limp : switch the motors off and only read the positions of the servos.
     feed_s : time between calls of :meth:`feed`, after which cycles begin; 0 for a bus that cycles by itself.
     stop_latch : while it is set, the motors are off, whatever else is asked, and the positions are read. Afterwards the
@@ -63,13 +65,14 @@ class BusLoop:
         newest: Newest,
         rules: RuleSettings = RuleSettings(),
         anchors: AnchorSolver | None = None,
+        linkages: Sequence[LinkageSettings] = (),
         *,
         limp: bool = False,
         feed_s: float = 0.0,
         stop_latch: StopLatch | None = None,
     ) -> None:
         self.settings = settings
-        self._goals = GoalFilter(channels, parameters, rules, 1.0 / settings.rate_hz, anchors)
+        self._goals = GoalFilter(channels, parameters, rules, 1.0 / settings.rate_hz, anchors, linkages)
         self.table = self._goals.table
         specs = servo_specs(channels, self.table.neutral_rad)
         self.bus: Bus = open_bus(settings.kind, specs, **settings.options())
@@ -288,6 +291,7 @@ class BusLoop:
             "command_to_wire_ms": self.latency_ms.summary(),
             "channels_held_at_limit": self.held,
             "rules": self._goals.guard.report(),
+            "linkages_out_of_reach": self._goals.out_of_reach(),
             "face_difference": self.following.report(),
             "bus": self.bus.report().as_dict(),
             "stopped_by": stopped.who if (stopped := self._stop_latch.stopped) else None,

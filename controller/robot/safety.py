@@ -16,6 +16,8 @@ import numpy as np
 
 from controller.base.parameters import Flags, Floats, Indices, Parameters
 from controller.robot.channels import ChannelTable, build_table
+from controller.robot.linkages.kind import LinkageSettings
+from controller.robot.linkages.linked import LinkedChannels
 from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
 
@@ -273,18 +275,26 @@ class Guard:
 class GoalFilter:
     """Turns the angles wanted of one bus's channels into goals: safety rules first, then limits of motion.
 
-    channels : those of the bus. rules, anchors : of the robot. period_s : of the bus.
+    channels : those of the bus. rules, anchors : of the robot. period_s, linkages : of the bus.
     """
 
     def __init__(self, channels: Sequence[ChannelSettings], parameters: Parameters, rules: RuleSettings,
-                 period_s: float, anchors: AnchorSolver | None = None) -> None:  # fmt: skip
+                 period_s: float, anchors: AnchorSolver | None = None,
+                 linkages: Sequence[LinkageSettings] = ()) -> None:  # fmt: skip
         names = [channel.name for channel in channels]
-        self.table = build_table(channels, parameters, None if anchors is None else anchors.for_channels(names))
+        self.table = build_table(
+            channels, parameters, None if anchors is None else anchors.for_channels(names), linkages
+        )
         self.guard = Guard(rules, self.table)
         self.period_s = period_s
         self._limiter = self.table.limiter(period_s)
         self.sent = np.zeros(len(names))  # rad, the last goals
         self.restart(self.table.neutral_rad)
+
+    def out_of_reach(self) -> dict[str, int]:
+        """Linkages whose inputs went where they cannot go, and how often."""
+        linked = [bound for bound in self.table.bound if isinstance(bound, LinkedChannels)]
+        return {each.name: each.times for each in linked if each.times}
 
     def restart(self, position_rad: Floats) -> None:
         """Continue from positions (n,) rad at rest, as far as the limits of position allow."""

@@ -12,11 +12,13 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from controller.base.config import Settings
 from controller.base.parameters import Floats
 from controller.robot.buses import Bus
+from controller.robot.formulas import parse_formula
+from controller.robot.linkages.kind import AnyLinkage, LinkageSettings
 from controller.robot.terms import Curve, Finite, Term, check_points
 from drivers.base.errors import DriverError
 from drivers.core.registry import usual_rate_hz
@@ -93,6 +95,11 @@ class AnchorSettings(Settings):
         return unit
 
 
+def _readable(text: str) -> str:
+    parse_formula(text)
+    return text
+
+
 class ChannelSettings(Settings):
     """One servo: what it follows, its calibrated points and its limits."""
 
@@ -102,6 +109,7 @@ class ChannelSettings(Settings):
     model: str
     mix: dict[str, Term] = {}
     join: Literal["sum", "min", "max"] = "sum"
+    formula: Annotated[str, AfterValidator(_readable)] | None = None
     anchor: AnchorSettings | None = None
     map: Calibration
     limit_deg: tuple[Degrees, Degrees]
@@ -125,10 +133,15 @@ class ChannelSettings(Settings):
         return value
 
     @model_validator(mode="after")
-    def _has_mix_or_anchor(self) -> ChannelSettings:
-        if bool(self.mix) == (self.anchor is not None):
-            raise ValueError("needs either mix or anchor")
+    def _follows_one(self) -> ChannelSettings:
+        if sum((bool(self.mix), self.anchor is not None, self.formula is not None)) > 1:
+            raise ValueError("needs one of mix, formula and anchor")
         return self
+
+    @property
+    def follows(self) -> bool:
+        """Whether it says itself what it follows; a linkage does for one that does not."""
+        return bool(self.mix) or self.anchor is not None or self.formula is not None
 
 
 class PreventRule(Settings):
@@ -222,6 +235,7 @@ class RobotSettings(Settings):
     vocabularies: Annotated[list[str], Field(max_length=64)] = []
     buses: list[Bus] = Field(min_length=1, max_length=64)
     channels: list[ChannelSettings] = Field(min_length=1, max_length=1024)
+    linkages: Annotated[list[AnyLinkage], Field(max_length=64)] = []
     landmarks: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=3)]] = {}
     profiles: dict[str, dict[str, Any]] = {}
     rules: RuleSettings = RuleSettings()
@@ -249,6 +263,11 @@ class RobotSettings(Settings):
     def anchored_channels(self) -> list[ChannelSettings]:
         """The channels that have an anchor, in file order."""
         return [channel for channel in self.channels if channel.anchor is not None]
+
+    def linkages_on(self, bus: str) -> list[LinkageSettings]:
+        """The linkages of the channels on a bus; a linkage lies on one."""
+        names = {channel.name for channel in self.on_bus(bus)}
+        return [linkage for linkage in self.linkages if names.issuperset(linkage.channels)]
 
     def on_bus(self, name: str) -> list[ChannelSettings]:
         """The channels on the bus called ``name``, in file order."""
