@@ -95,6 +95,25 @@ class AnchorSettings(Settings):
         return unit
 
 
+class SmoothSettings(Settings):
+    """Smoothing of a channel's target: a moving average over ``average_s``, or a One Euro filter.
+
+    min_cutoff_hz : of a target at rest; lower is smoother. beta : how much it rises with speed (Hz for each degree/s).
+    """
+
+    average_s: Annotated[float, Field(ge=0, le=5, allow_inf_nan=False)] | None = None
+    min_cutoff_hz: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
+    beta: Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)] = 0.0
+
+    @model_validator(mode="after")
+    def _is_one(self) -> SmoothSettings:
+        if (self.average_s is None) == (self.min_cutoff_hz is None):
+            raise ValueError("needs either average_s or min_cutoff_hz")
+        if self.average_s is not None and self.beta:
+            raise ValueError("beta goes with min_cutoff_hz")
+        return self
+
+
 def _readable(text: str) -> str:
     parse_formula(text)
     return text
@@ -121,6 +140,8 @@ class ChannelSettings(Settings):
     pulse: PulseSettings | None = None
     wire_name: str = ""
     trim_deg: Degrees = 0.0
+    smooth: SmoothSettings | None = None
+    slow_start_s: Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)] = 0.0
     dead_band_deg: Play = 0.0
     slack_deg: Play = 0.0
     profile: str | None = None
@@ -188,7 +209,26 @@ class LoadRule(Settings):
     rise_deg_s: Positive = 10.0
 
 
-Rule = TypeVar("Rule", TimingRule, LoadRule)
+class HeatRule(Settings):
+    """Temperature: from ``above_c`` to ``full_c`` the range about the neutral face and the top speed shrink.
+
+    At ``full_c`` they are the shares ``range`` and ``speed`` of what they were.
+    """
+
+    channels: Names
+    above_c: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+    full_c: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+    range: Share = 0.5
+    speed: Annotated[float, Field(ge=0.05, le=1, allow_inf_nan=False)] = 0.3
+
+    @model_validator(mode="after")
+    def _rises(self) -> HeatRule:
+        if self.above_c >= self.full_c:
+            raise ValueError("above_c must be below full_c")
+        return self
+
+
+Rule = TypeVar("Rule", TimingRule, LoadRule, HeatRule)
 
 
 class RuleSettings(Settings):
@@ -197,6 +237,7 @@ class RuleSettings(Settings):
     prevent: list[PreventRule] = []
     timing: list[TimingRule] = []
     load: list[LoadRule] = []
+    heat: list[HeatRule] = []
 
     def within(self, names: Sequence[str]) -> RuleSettings:
         """The rules as far as they concern the channels called ``names``; ``prevent`` needs both of its channels."""
@@ -204,6 +245,7 @@ class RuleSettings(Settings):
             prevent=[rule for rule in self.prevent if {rule.channel, rule.other} <= set(names)],
             timing=_for_channels(self.timing, names),
             load=_for_channels(self.load, names),
+            heat=_for_channels(self.heat, names),
         )
 
     def mentions(self) -> Iterator[tuple[str, str]]:
@@ -211,7 +253,7 @@ class RuleSettings(Settings):
         for i, rule in enumerate(self.prevent):
             yield f"rules.prevent[{i}].channel", rule.channel
             yield f"rules.prevent[{i}].other", rule.other
-        for kind in ("timing", "load"):
+        for kind in ("timing", "load", "heat"):
             for i, named in enumerate(getattr(self, kind)):
                 for j, name in enumerate(named.channels):
                     yield f"rules.{kind}[{i}].channels[{j}]", name
