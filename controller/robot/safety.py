@@ -1,9 +1,10 @@
 """Safety rules and limits of motion between the angles of a face's channels and the goals sent to a bus.
 
 The chain is smoothing -> dead band -> slack -> rules -> limiter of motion. Rules only narrow the range [low, high] of
-positions that each servo may be sent; several rules combine by intersection, so their order does not matter. All of them
-act on targets: the :class:`controller.motion.motion.MotionLimiter` behind them keeps speed and acceleration, whatever a
-rule does. After the rules of the Hanson motor stack, without its defects; docs/robots.md lists the differences.
+positions that each servo may be sent; several rules combine by intersection, so their order does not matter. All of
+them act on targets: the :class:`controller.motion.motion.MotionLimiter` behind them keeps speed and acceleration,
+whatever a rule does. After the rules of the Hanson motor stack, without its defects; docs/robots.md lists the
+differences.
 """
 
 from __future__ import annotations
