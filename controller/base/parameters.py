@@ -1,6 +1,7 @@
 """The registry of face parameters: names, order, ranges, regions and motion limits, read from the base vocabulary.
 
-Every parameter vector in omote is (P,) float64 in the order of ``configs/vocabularies/arkit.toml``.
+Every parameter vector in omote is (P,) float64 in the order of ``configs/vocabularies/arkit.toml``; parameters of one's
+own, which vocabularies of a stage or robot add, follow in the order of their files.
 """
 
 from __future__ import annotations
@@ -8,17 +9,17 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterable
-from dataclasses import dataclass, field
-from functools import cache, cached_property
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property, partial
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
-from controller.base.config import Number, Positive, Settings, load
+from controller.base.config import Number, Positive, Settings, check, load, read_toml
 from controller.base.errors import ParameterError
 from controller.base.paths import config_dir
 
@@ -26,11 +27,15 @@ Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
-Region = Literal["brows", "lids", "eyes", "cheeks", "nose", "jaw", "mouth", "tongue", "head"]
-REGIONS: tuple[str, ...] = get_args(Region)
+REGIONS = ("brows", "lids", "eyes", "cheeks", "nose", "jaw", "mouth", "tongue", "head")
 """Regions of the face, in the order reports list them."""
+TABLE_KEYS = ("regions", "profile", "parameters", "aliases")
+"""Keys of a vocabulary that describe parameters; all others are expressions."""
 
-_ARRAYS = ("low", "high", "full_scale_rad", "max_speed", "max_acceleration", "max_jerk", "response_s")
+_ARRAYS = ("low", "high", "full_scale_rad", "max_speed", "max_acceleration", "max_jerk", "response_s", "rest")
+_MOST_OWN = 512
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
+_TAKEN = frozenset({"all", "time", "type", "face", "subject", "measured", "neutral"})  # words of formats and links
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +48,11 @@ class Parameters:
     full_scale_rad : angle (rad) of the value 1; NaN where the parameter is not an angle.
     max_speed : largest speed (units/s). max_acceleration : largest acceleration (units/s^2).
     max_jerk : largest jerk (units/s^3); infinity for none. response_s : time constant (s) of the approach to a target.
+    rest : value of the neutral face; 0 for all of the base vocabulary.
     aliases : other spellings, folded, to canonical names.
+    base : how many of them, the first, are of the base vocabulary; those after them are somebody's own.
+    descriptions : what people are told of some, by name. own_regions : regions that own vocabularies add.
+    files : the vocabularies that were added.
     """
 
     names: tuple[str, ...]
@@ -55,13 +64,64 @@ class Parameters:
     max_acceleration: Floats
     max_jerk: Floats
     response_s: Floats
+    rest: Floats
     aliases: dict[str, str] = field(default_factory=dict)
+    base: int = 0
+    descriptions: dict[str, str] = field(default_factory=dict)
+    own_regions: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
 
     @classmethod
     def load(cls, path: Path | None = None) -> Parameters:
         """Read a base vocabulary; the shipped one without ``path``. Raises ConfigError with every fault."""
         path = path or config_dir() / "vocabularies" / "arkit.toml"
-        return _build(load(path, _File, _unknown_aliases))
+        found = _build(load(path, _File, lambda file: [*_unknown_regions(file), *_unknown_aliases(file)]))
+        return replace(found, base=len(found.names))
+
+    def with_files(self, paths: Iterable[Path]) -> Parameters:
+        """These, and behind them the parameters of their own that vocabularies add.
+
+        ``paths`` : files; one that was added before, or that describes no parameters, adds nothing.
+
+        Raises ConfigError: a file cannot be read or is wrong; every fault with its key.
+        """
+        found = self
+        for path in map(Path.resolve, paths):
+            if path not in found.files:
+                found = found._with_file(path)
+        return found
+
+    def _with_file(self, path: Path) -> Parameters:
+        table = read_toml(path)
+        if not describes_parameters(table):
+            return self
+        own = {key: table[key] for key in TABLE_KEYS if key in table}
+        if isinstance(own.get("profile", {}), Mapping):
+            own["profile"] = {**_shipped_profiles(), **own.get("profile", {})}
+        more = _build(check(own, _File, path, partial(_own_faults, self)))
+        arrays: dict[str, Any] = {name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in _ARRAYS}
+        for array in arrays.values():
+            array.flags.writeable = False
+        return replace(
+            self,
+            names=self.names + more.names,
+            regions=self.regions + more.regions,
+            aliases=self.aliases | more.aliases,
+            descriptions=self.descriptions | more.descriptions,
+            own_regions=(*self.own_regions, *(r for r in more.own_regions if r not in self.region_names)),
+            files=(*self.files, path),
+            **arrays,
+        )
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """Names of those that vocabularies of a stage or robot add."""
+        return self.names[self.base :]
+
+    @property
+    def region_names(self) -> tuple[str, ...]:
+        """Regions of the face, and behind them those that own vocabularies add."""
+        return REGIONS + self.own_regions
 
     def __len__(self) -> int:
         return len(self.names)
@@ -90,8 +150,8 @@ class Parameters:
 
     def region(self, name: str) -> NDArray[np.intp]:
         """Positions of every parameter of a region. Raises ParameterError for an unknown region."""
-        if name not in REGIONS:
-            raise ParameterError(f"unknown region {name!r}{did_you_mean(name, REGIONS)}", hint=", ".join(REGIONS))
+        if name not in (known := self.region_names):
+            raise ParameterError(f"unknown region {name!r}{did_you_mean(name, known)}", hint=", ".join(known))
         return np.array([i for i, region in enumerate(self.regions) if region == name], dtype=np.intp)
 
     def clip(self, values: Floats, out: Floats) -> Floats:
@@ -100,8 +160,8 @@ class Parameters:
         return np.clip(out, self.low, self.high, out=out)
 
     def neutral(self) -> Floats:
-        """A new (P,) vector of the neutral face: all zero."""
-        return np.zeros(len(self.names))
+        """A new (P,) vector of the neutral face: zero, but where one's own parameters rest elsewhere."""
+        return self.rest.copy()
 
     def mirror(self) -> NDArray[np.intp]:
         """(P,) position of each parameter's counterpart on the other side; itself where there is none."""
@@ -156,7 +216,7 @@ def _rising(value: tuple[float, float]) -> tuple[float, float]:
 class _Entry(Settings, validate_default=True):
     """One parameter of the file, with the keys of its profile; the motion limits of an angle are in degrees."""
 
-    region: Region
+    region: str
     profile: str | None = None
     range: Annotated[tuple[Number, Number], AfterValidator(_rising)]
     response_s: Positive
@@ -167,6 +227,16 @@ class _Entry(Settings, validate_default=True):
     max_speed_deg_s: Positive | None = None
     max_acceleration_deg_s2: Positive | None = None
     max_jerk_deg_s3: Positive | None = None
+    rest: Number = 0.0
+    description: Annotated[str, Field(max_length=400)] = ""
+
+    @field_validator("rest")
+    @classmethod
+    def _inside(cls, value: float, info: ValidationInfo) -> float:
+        low, high = info.data.get("range", (value, value))
+        if not low <= value <= high:
+            raise ValueError(f"must lie in the range, {low:g} to {high:g}")
+        return value
 
     @field_validator("max_speed", "max_acceleration", "max_speed_deg_s", "max_acceleration_deg_s2")
     @classmethod
@@ -184,7 +254,7 @@ class _Entry(Settings, validate_default=True):
             scale = full = self.full_scale_deg
             limits = self.max_speed_deg_s, self.max_acceleration_deg_s2, self.max_jerk_deg_s3
         scaled = (math.inf if limit is None else limit / scale for limit in limits)
-        return (*self.range, math.radians(full), *scaled, self.response_s)
+        return (*self.range, math.radians(full), *scaled, self.response_s, self.rest)
 
 
 def _with_profile(given: Any, info: ValidationInfo) -> Any:
@@ -198,8 +268,11 @@ def _with_profile(given: Any, info: ValidationInfo) -> Any:
 
 
 class _File(Settings):
+    regions: Annotated[list[str], Field(max_length=32)] = []
     profile: dict[str, dict[str, Any]] = {}
-    parameters: Annotated[dict[str, Annotated[_Entry, BeforeValidator(_with_profile)]], Field(min_length=1)]
+    parameters: Annotated[
+        dict[str, Annotated[_Entry, BeforeValidator(_with_profile)]], Field(min_length=1, max_length=_MOST_OWN)
+    ]
     aliases: dict[str, str] = {}
 
 
@@ -211,9 +284,62 @@ def _unknown_aliases(file: _File) -> list[str]:
     ]
 
 
+def _unknown_regions(file: _File, known: Sequence[str] = REGIONS) -> Iterator[str]:
+    known = (*known, *file.regions)
+    for name, entry in file.parameters.items():
+        if (region := entry.region) not in known:
+            yield (
+                f"parameters.{name}.region: unknown region {region!r}{did_you_mean(region, known)}; "
+                f"regions = [{region!r}] at the top of a file of your own adds it"
+            )
+
+
+def describes_parameters(table: Mapping[str, Any]) -> bool:
+    """Whether a vocabulary's table adds parameters; an expression of the name has ``weights`` or ``of``."""
+    found = table.get("parameters")
+    return isinstance(found, Mapping) and not {"weights", "of"} & set(found)
+
+
+@cache
+def _shipped_profiles() -> dict[str, Any]:
+    profiles: dict[str, Any] = read_toml(config_dir() / "vocabularies" / "arkit.toml").get("profile", {})
+    return profiles
+
+
+def _own_faults(known: Parameters, file: _File) -> list[str]:
+    """Names that cannot be used, or are taken, regions that there are not, aliases of nothing."""
+    faults = [f"regions: {name!r} must be a letter, then letters, digits or _" for name in file.regions
+              if not _NAME.fullmatch(name)]  # fmt: skip
+    faults += [*_unknown_aliases(file), *_unknown_regions(file, known.region_names)]
+    seen: dict[str, str] = {}
+    for where, name in _spellings(file):
+        key = fold(name)
+        if not _NAME.fullmatch(name):
+            faults.append(f"{where}: must be a letter, then letters, digits or _, 64 at most")
+        elif key in _TAKEN:
+            faults.append(f"{where}: is a word of links and formats; choose another name")
+        elif (found := known.find(name)) is not None:
+            faults.append(f"{where}: is a name of {known.names[found]} already; choose another one")
+        elif seen.setdefault(key, where) != where:
+            faults.append(f"{where}: is the same name as {seen[key]}")
+    return faults
+
+
+def _spellings(file: _File) -> Iterator[tuple[str, str]]:
+    yield from ((f"parameters.{name}", name) for name in file.parameters)
+    yield from ((f"aliases.{name}", name) for name in file.aliases)
+
+
 def _build(file: _File) -> Parameters:
     columns = np.array([entry.numbers() for entry in file.parameters.values()]).T.copy()
     columns.flags.writeable = False
     regions = tuple(entry.region for entry in file.parameters.values())
     aliases = {fold(alias): name for alias, name in file.aliases.items()}
-    return Parameters(tuple(file.parameters), regions, **dict(zip(_ARRAYS, columns, strict=True)), aliases=aliases)
+    return Parameters(
+        tuple(file.parameters),
+        regions,
+        **dict(zip(_ARRAYS, columns, strict=True)),
+        aliases=aliases,
+        descriptions={name: entry.description for name, entry in file.parameters.items() if entry.description},
+        own_regions=tuple(file.regions),
+    )

@@ -124,7 +124,7 @@ class Body:
         return [
             BusLoop(
                 bus.model_copy(update={"name": prefix + bus.name}), robot.on_bus(bus.name), parameters, self.newest,
-                robot.rules, anchors,
+                robot.rules, anchors, robot.linkages_on(bus.name),
                 limp=limp, feed_s=self.stage.period_s, stop_latch=self.state.stop_latch,
             )
             for bus in robot.buses
@@ -310,10 +310,11 @@ def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
 
 def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event) -> None:
     stage = load_stage(orders.stage, PARAMETERS)
-    mailbox = Mailbox.receive(pipe, len(PARAMETERS.names))
-    panel = Mailbox.receive(pipe, PanelState.size(PARAMETERS))
-    panel_state = PanelState(panel, [layer.name for layer in by_priority(stage.layers)], PARAMETERS)
-    body = Body(stage, PARAMETERS, mailbox, orders.options)
+    parameters = stage.parameters
+    mailbox = Mailbox.receive(pipe, len(parameters))
+    panel = Mailbox.receive(pipe, PanelState.size(parameters))
+    panel_state = PanelState(panel, [layer.name for layer in by_priority(stage.layers)], parameters)
+    body = Body(stage, parameters, mailbox, orders.options)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
     body.start()
     try:

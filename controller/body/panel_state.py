@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from controller.base.mailboxes import Mailbox
-from controller.base.parameters import REGIONS, Floats, Parameters
+from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState
 from controller.robot.following import MeasuredFace
 
@@ -30,13 +30,14 @@ class PanelState:
     def __init__(self, mailbox: Mailbox, layers: Sequence[str], parameters: Parameters) -> None:
         self._mailbox, self._layers, self._p = mailbox, tuple(layers), len(parameters)
         self._all = np.full(self.size(parameters), np.nan)
-        ends = np.cumsum([self._p, self._p, len(REGIONS), _NAME_LENGTH])
+        self._regions = parameters.region_names
+        ends = np.cumsum([self._p, self._p, len(self._regions), _NAME_LENGTH])
         self._holders, self._measured, self._away, self._stopped, self._links = np.split(self._all, ends)
 
     @staticmethod
     def size(parameters: Parameters) -> int:
         """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region, name, links."""
-        return 2 * len(parameters) + len(REGIONS) + _NAME_LENGTH + _LINKS_LENGTH
+        return 2 * len(parameters) + len(parameters.region_names) + _NAME_LENGTH + _LINKS_LENGTH
 
     def publish(self, state: CommandState, measured_face: MeasuredFace | None) -> None:
         """Write the state of this moment; ``measured_face`` None without servos."""
@@ -47,7 +48,7 @@ class PanelState:
             measured_face.read(self._measured, known)
             self._measured[~known] = np.nan
             away = measured_face.differences()
-            self._away[:] = [away.get(region, np.nan) for region in REGIONS]
+            self._away[:] = [away.get(region, np.nan) for region in self._regions]
         stopped = state.stop_latch.stopped
         _write(self._stopped, stopped.who if stopped is not None else "")
         _write(self._links, "\n".join("\t".join(row) for row in link_rows(state.link_records())))
@@ -80,7 +81,7 @@ class PanelState:
 
     def away_deg(self, region: str) -> float | None:
         """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""
-        value = self._away[REGIONS.index(region)]
+        value = self._away[self._regions.index(region)]
         return float(value) if np.isfinite(value) else None
 
 

@@ -164,6 +164,10 @@ def calibrate(
         float, typer.Option(min=0.01, max=0.5, help="Share of its full torque that a servo looks for stops with.")
     ] = 0.15,
     yes: Annotated[bool, typer.Option("--yes", help="With --find-stops: do not ask before servos move.")] = False,
+    pairs: Annotated[
+        Path | None,
+        typer.Option("--pairs", help="Fit mixes to a table of parameters and angles instead; nothing moves."),
+    ] = None,
 ) -> None:
     """Capture the neutral and end positions of each servo of a head, by hand or by keys, and save them by name.
 
@@ -180,6 +184,9 @@ def calibrate(
 
     path = find_config("robots", robot)
     settings = load_robot(path, PARAMETERS)
+    if pairs is not None:
+        _fit_pairs(path, pairs, out or path)
+        return
     known = [each.name for each in settings.channels]
     for word in channel or ():
         if word not in known:
@@ -196,3 +203,26 @@ def calibrate(
         console.print(
             f'The robot file takes it with: calibration = "{name if out is None else target}"', soft_wrap=True
         )
+
+
+def _fit_pairs(path: Path, pairs: Path, target: Path) -> None:
+    """Fit the channels of the robot in ``path`` to pairs, write them to ``target`` and say how well they fit."""
+    # start-up: --help does without any of these
+    from controller.base.parameters import PARAMETERS
+    from controller.robot.robot import load_robot, robot_parameters
+    from controller.tools.pairs import fit_channels, read_pairs, report_rows, write_robot
+
+    robot = load_robot(path, PARAMETERS)
+    parameters = robot_parameters(robot, path, PARAMETERS)
+    with console.status("fitting"):
+        fitted = fit_channels(robot, read_pairs(pairs, robot, parameters))
+        kept = write_robot(path, target, fitted, PARAMETERS) if any(not each.why_not for each in fitted) else None
+    table = Table("channel", "moves", "error", "left out", "follows", "", title="degrees, rms", title_justify="left")
+    for row in report_rows(fitted, parameters):
+        table.add_row(*row)
+    show_table(table)
+    if all(each.why_not for each in fitted):
+        raise ConfigError(f"{pairs}: determines no channel; nothing was written", hint="record faces that move them")
+    if kept is not None:
+        console.print(f"kept the old file as {kept}", soft_wrap=True)
+    console.print(f"wrote {target}", soft_wrap=True)

@@ -42,13 +42,12 @@ def check_film(take: Path | None, sound: Path | None, rate_hz: float | None, oth
 def render_film(still: Still, out: Path, take: Path, sound: Path | None, rate_hz: float | None) -> None:
     """Draw the film and say what was written. Raises TakeError, ConfigError, ViewError."""
     # start-up: --help does without any of these
-    from controller.base.parameters import PARAMETERS
     from controller.face.film import FPS, base_of, draw_film
     from controller.tools.motion_file import load_motion
 
     fps = rate_hz or FPS
     with console.status("reading"):
-        motion = load_motion(take, PARAMETERS, fps)
+        motion = load_motion(take, still.parameters, fps)
         heard = sound or _sound_of(take)
     silent = sound is None and out.suffix.lower() != ".mp4"
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())

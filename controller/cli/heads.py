@@ -345,7 +345,6 @@ def export(
     Example: omote export head.glb; with an animation: omote export head.glb --take alex_rom_3.csv
     """
     # start-up: --help does without any of these
-    from controller.base.parameters import PARAMETERS
     from controller.face.still import Still
     from controller.stage.persons import parse_person
     from controller.tools.plugins import EXPORTERS, added_exporters
@@ -355,7 +354,7 @@ def export(
     still = Still.parse(settings or [], expression or [], look=look, head=head, identity=identity)
     with console.status("exporting"):
         loaded = still.load_head()
-        values = zip(PARAMETERS.names, still.values, strict=True)
+        values = zip(still.parameters.names, still.values, strict=True)
         pose = {name: float(value) for name, value in values if value and name in loaded.parameters}
         added = added_exporters()
         kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")

@@ -142,6 +142,9 @@ def convert(
         Path | None,
         typer.Option("--ranges", help="File with the ranges of a person's face, which the take is fitted to."),
     ] = None,
+    vocabulary: Annotated[
+        list[str] | None, typer.Option("--vocabulary", help="File with parameters of your own; may be repeated.")
+    ] = None,
 ) -> None:
     """Write what a take shows for other programs: a table, time,jawOpen,... in seconds and values, or MCAP.
 
@@ -149,10 +152,12 @@ def convert(
     """
     # start-up: --help does without either
     from controller.base.parameters import PARAMETERS
+    from controller.base.paths import find_config
     from controller.tools.motion_file import convert as write
 
     with console.status("converting"):
-        motion = write(take, out, PARAMETERS, rate_hz, voice_model, ranges)
+        parameters = PARAMETERS.with_files(find_config("vocabularies", name) for name in vocabulary or ())
+        motion = write(take, out, parameters, rate_hz, voice_model, ranges)
     rows = f"{len(motion.times_s)} rows of {int(motion.mask.sum())} parameters, {motion.times_s[-1]:.1f} s"
     console.print(f"{rows}\nwrote {out}", soft_wrap=True)
 
@@ -225,11 +230,11 @@ def _dry_run(
     from controller.tools.stage_run import write_report
 
     with console.status("computing what would be sent"), ports_forbidden("a dry run"):
-        heard = None
+        heard, loaded = None, load_stage(stage, PARAMETERS)
         if voice is not None:
             with Voice(voice, voice_hz).open() as stream:
-                heard = voice_take(stream, "voice", PARAMETERS, raw_hz=voice_hz, longest_s=seconds)
-        found = dry_run(load_stage(stage, PARAMETERS), take, seconds, PARAMETERS, heard, alone=alone)
+                heard = voice_take(stream, "voice", loaded.parameters, raw_hz=voice_hz, longest_s=seconds)
+        found = dry_run(loaded, take, seconds, loaded.parameters, heard, alone=alone)
     if found.rows:
         title = f"dry run: no port was opened; computed {_share_played(found.seconds, found.length_s)}"
         table = Table(*found.rows[0], title=title, title_justify="left")

@@ -25,6 +25,9 @@ def translate(
         str | None,
         typer.Option("--token", envvar="OMOTE_TOKEN", help="What streams and datagrams begin with, of IN and of OUT."),
     ] = None,
+    vocabulary: Annotated[
+        list[str] | None, typer.Option("--vocabulary", help="File with parameters of your own; may be repeated.")
+    ] = None,
 ) -> None:
     """Take faces in one format and send them in another, without a stage, a face or servos.
 
@@ -35,10 +38,12 @@ def translate(
     """
     # start-up: --help does without it
     from controller.base.parameters import PARAMETERS
+    from controller.base.paths import find_config
     from controller.tools.translate import Options
     from controller.tools.translate import translate as run
 
     console = Console(stderr=True, highlight=False, emoji=False, soft_wrap=True)  # messages may go to standard output
     options = Options(mirror, connect, baud, open_to_network, token, seconds)
-    counts = run(source, target, PARAMETERS, options, lambda text: console.print(escape(f"{text}; Ctrl-C ends")))
+    parameters = PARAMETERS.with_files(find_config("vocabularies", name) for name in vocabulary or ())
+    counts = run(source, target, parameters, options, lambda text: console.print(escape(f"{text}; Ctrl-C ends")))
     console.print(escape(str(counts)))

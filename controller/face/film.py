@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from controller.base.parameters import PARAMETERS, Floats
+from controller.base.parameters import Floats
 from controller.face.still import Still, for_head
 from surface.head.model.parameters import head_angles
 from surface.view.pictures.clip import write_clip
@@ -45,7 +45,7 @@ def _pictures(still: Still, rows: Floats, fps: float, progress: Callable[[int, i
         head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator
     ) as screen:
         for number, row in enumerate(rows):
-            values = for_head(row, head.parameters)
+            values = for_head(row, head.parameters, still.parameters)
             head.sway.advance(head_angles(values), number / fps)
             yield screen.render(values, camera)
             progress(number + 1, len(rows))
@@ -53,4 +53,4 @@ def _pictures(still: Still, rows: Floats, fps: float, progress: Callable[[int, i
 
 def base_of(still: Still, values: Floats, mask: np.ndarray) -> Floats:
     """(n, P) rows of a motion ``values`` : (n, P) that leave what its ``mask`` : (P,) does not move as in ``still``."""
-    return np.clip(np.where(mask, values, still.values), PARAMETERS.low, PARAMETERS.high)
+    return np.clip(np.where(mask, values, still.values), still.parameters.low, still.parameters.high)

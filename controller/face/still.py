@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.errors import ParameterError
-from controller.base.parameters import PARAMETERS
+from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.paths import find_config
 from controller.face.face import head_indices
 from controller.stage.persons import Person
@@ -39,6 +39,7 @@ class Still:
     values : (p,) float64, the full parameter vector. size : width and height (pixels). look : theme, camera and so on.
     head : folder of the head. identity : its variations, by name. groups : group files and their amounts.
     vocabulary : the named expressions. persons : whom it shows, each with its share.
+    parameters : of the stage and the vocabularies that were named.
     """
 
     values: NDArray[np.float64]
@@ -49,6 +50,7 @@ class Still:
     groups: tuple[tuple[Path, float], ...]
     vocabulary: Vocabulary
     persons: tuple[tuple[Person, float], ...] = ()
+    parameters: Parameters = field(default_factory=lambda: PARAMETERS)
 
     @classmethod
     def parse(
@@ -62,12 +64,13 @@ class Still:
         """
         base = load_stage(stage, PARAMETERS) if stage else None
         files = [*(base.vocabularies if base else ()), *(find_config("vocabularies", name) for name in vocabularies)]
-        vocabulary = Vocabulary.load(PARAMETERS, more=files)
-        values = PARAMETERS.neutral()
+        parameters = (base.parameters if base else PARAMETERS).with_files(files)
+        vocabulary = Vocabulary.load(parameters, more=files)
+        values = parameters.neutral()
         for word in expressions:
-            _add_expression(vocabulary, values, word)
+            _add_expression(parameters, vocabulary, values, word)
         for word in settings:
-            index, value = parse_setting(word)
+            index, value = parse_setting(word, parameters)
             values[index] = value
         folder = base.head if base and head is None else find_config("heads", head or "ict")
         wanted = dict(base.settings.identity) if base and identity is None else parse_identity(identity)
@@ -77,7 +80,7 @@ class Still:
         width_height = parse_size(size or "800x800") if size or base is None else face.size
         picture = with_options(face, look or {})
         persons = tuple(find_persons(picture.person, folder, beside=base.path if base else None))
-        return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons)
+        return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons, parameters)
 
     def load_head(self) -> Head:
         """The head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
@@ -93,16 +96,17 @@ def parse_group(word: str) -> tuple[Path, float]:
     return find_config("groups", name), amount
 
 
-def parse_setting(word: str) -> tuple[int, float]:
+def parse_setting(word: str, parameters: Parameters | None = None) -> tuple[int, float]:
     """``NAME=VALUE`` as parameter index and value; the value must lie in the parameter's range."""
     name, equals, text = word.partition("=")
     if not equals:
         raise ParameterError(f"--set {word}: expected NAME=VALUE", hint="for example --set jawOpen=0.8")
-    index = PARAMETERS.index(name)
+    parameters = parameters or PARAMETERS
+    index = parameters.index(name)
     value = _number(f"--set {word}", text)
-    low, high = PARAMETERS.low[index], PARAMETERS.high[index]
+    low, high = parameters.low[index], parameters.high[index]
     if not low <= value <= high:
-        raise ParameterError(f"--set {word}: {PARAMETERS.names[index]} goes from {low:g} to {high:g}")
+        raise ParameterError(f"--set {word}: {parameters.names[index]} goes from {low:g} to {high:g}")
     return index, value
 
 
@@ -132,12 +136,12 @@ def _name_and_amount(word: str, option: str) -> tuple[str, float]:
     return (name, _number(f"{option} {word}", text)) if equals else (word, 1.0)
 
 
-def _add_expression(vocabulary: Vocabulary, values: NDArray[np.float64], word: str) -> None:
+def _add_expression(parameters: Parameters, vocabulary: Vocabulary, values: NDArray[np.float64], word: str) -> None:
     name, intensity = _name_and_amount(word, "--expression")
     if not 0.0 <= intensity <= 1.0:
         raise ParameterError(f"--expression {word}: the intensity goes from 0 to 1")
-    values += _vector(vocabulary.expand(name, intensity))
-    np.clip(values, PARAMETERS.low, PARAMETERS.high, out=values)
+    values += vocabulary[name].pose(intensity)
+    np.clip(values, parameters.low, parameters.high, out=values)
 
 
 def draw_still(still: Still, out: Path) -> None:
@@ -146,38 +150,49 @@ def draw_still(still: Still, out: Path) -> None:
     with Offscreen(
         head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator
     ) as screen:
-        picture = screen.render(for_head(still.values, head.parameters), framed(look.make_camera(), head))
+        picture = screen.render(
+            for_head(still.values, head.parameters, still.parameters), framed(look.make_camera(), head)
+        )
     write_png(picture, out)
 
 
-def for_head(values: NDArray[np.float64], wanted: tuple[str, ...]) -> NDArray[np.float64]:
-    """The full vector (p,) in a head's own order (h,); names that omote does not know stay 0."""
-    return np.append(values, 0.0)[head_indices(PARAMETERS, wanted)]
+def for_head(
+    values: NDArray[np.float64], wanted: tuple[str, ...], parameters: Parameters | None = None
+) -> NDArray[np.float64]:
+    """The full vector (p,) in a head's own order (h,); names that omote does not know stay 0.
+
+    parameters : of the vector; those of the base vocabulary without.
+    """
+    return np.append(values, 0.0)[head_indices(parameters or PARAMETERS, wanted)]
 
 
-def sheet_poses(vocabulary: Vocabulary | None = None) -> list[tuple[str, NDArray[np.float64]]]:
+def sheet_poses(
+    vocabulary: Vocabulary | None = None, parameters: Parameters | None = None
+) -> list[tuple[str, NDArray[np.float64]]]:
     """Label and full parameter vector of every picture of the sheet: expressions first, then every parameter."""
-    vocabulary = vocabulary or Vocabulary.load(PARAMETERS)
-    poses = [(name, _vector(vocabulary.expand(name, 1.0))) for name in vocabulary.names]
-    for index, name in enumerate(PARAMETERS.names):
-        two_sided = PARAMETERS.low[index] < 0
+    parameters = parameters or PARAMETERS
+    vocabulary = vocabulary or Vocabulary.load(parameters)
+    poses = [(name, parameters.rest + vocabulary[name].pose(1.0)) for name in vocabulary.names]
+    for index, name in enumerate(parameters.names):
+        two_sided = parameters.low[index] < 0
         if two_sided:
-            poses.append((f"{name} \N{MINUS SIGN}", _vector({index: PARAMETERS.low[index]})))
-        poses.append((f"{name} +" if two_sided else name, _vector({index: PARAMETERS.high[index]})))
+            poses.append((f"{name} \N{MINUS SIGN}", _vector(parameters, index, parameters.low[index])))
+        poses.append((f"{name} +" if two_sided else name, _vector(parameters, index, parameters.high[index])))
     return poses
 
 
-def _vector(values: dict[int, float]) -> NDArray[np.float64]:
-    vector = PARAMETERS.neutral()
-    for index, value in values.items():
-        vector[index] = value
+def _vector(parameters: Parameters, index: int, value: float) -> NDArray[np.float64]:
+    """The neutral face but for one parameter."""
+    vector = parameters.neutral()
+    vector[index] = value
     return vector
 
 
 def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
     """Draw every parameter and every named expression on one sheet (PNG); calls ``progress(done, total)``."""
     head, look = still.load_head(), still.look
-    entries = [(label, for_head(values, head.parameters)) for label, values in sheet_poses(still.vocabulary)]
+    poses = sheet_poses(still.vocabulary, still.parameters)
+    entries = [(label, for_head(values, head.parameters, still.parameters)) for label, values in poses]
     page = contact_sheet(
         head, entries, views=[framed(look.make_camera(), head)], quality=look.still_quality, theme=look.make_theme(),
         progress=progress,
@@ -189,13 +204,14 @@ def crowd_poses(still: Still, count: int) -> list[tuple[str, NDArray[np.float64]
     """Label and full parameter vector of ``count`` heads: each shows what ``still`` shows and the next of its named
     expressions, and looks somewhere else, the same in every picture."""
     rng, names = np.random.default_rng(count), still.vocabulary.names
-    looks = [PARAMETERS.index(name) for name in ("headYaw", "headPitch", "headRoll")]
+    parameters = still.parameters
+    looks = [parameters.index(name) for name in ("headYaw", "headPitch", "headRoll")]
     poses = []
     for k in range(count):
         name = names[k % len(names)]
-        values = still.values + _vector(still.vocabulary.expand(name, 1.0 if k < len(names) else 0.6))
+        values = still.values + still.vocabulary[name].pose(1.0 if k < len(names) else 0.6)
         values[looks] += rng.uniform(-0.3, 0.3, len(looks))
-        poses.append((name, np.clip(values, PARAMETERS.low, PARAMETERS.high)))
+        poses.append((name, np.clip(values, parameters.low, parameters.high)))
     return poses
 
 
@@ -208,7 +224,7 @@ def draw_crowd(still: Still, count: int, out: Path, progress: Callable[[int, int
         raise ParameterError("a crowd is posed by the processor", hint="leave out --evaluator gpu")
     head, look, poses = still.load_head(), still.look, crowd_poses(still, count)
     crowd = Crowd(head, count)
-    crowd.pose(np.stack([for_head(values, head.parameters) for _, values in poses]))
+    crowd.pose(np.stack([for_head(values, head.parameters, still.parameters) for _, values in poses]))
     page = crowd_sheet(
         crowd, [label for label, _ in poses], camera=framed(look.make_camera(), head), quality=look.still_quality,
         theme=look.make_theme(), columns=math.isqrt(count - 1) + 1, progress=progress,

@@ -29,6 +29,16 @@ def nothing(parameters: Parameters) -> Flags:
     return np.zeros(len(parameters), dtype=bool)
 
 
+def everything(parameters: Parameters) -> Flags:
+    """Every parameter, somebody's own included: for messages with names."""
+    return np.ones(len(parameters), dtype=bool)
+
+
+def base_only(parameters: Parameters) -> Flags:
+    """Those of the base vocabulary: for messages that number them, or have names of their own for them."""
+    return np.arange(len(parameters)) < parameters.base
+
+
 @dataclass(frozen=True, kw_only=True)
 class Format:
     """One sort of messages.

@@ -174,6 +174,7 @@ class CommandState:
         self.vocabulary = vocabulary or Vocabulary.load(parameters)
         self.mixer = Mixer(parameters, default_layers() if layers is None else layers)
         self.limiter = MotionLimiter.of(parameters, period_s)
+        self.limiter.reset(parameters.rest)
         self.parts = Parts()
         self._mixed, self._present = parameters.neutral(), parameters.neutral()
         self._manual = self.mixer["manual"]

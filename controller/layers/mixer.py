@@ -1,7 +1,7 @@
 """Mixes layers, the values of many sources, into one parameter vector, and says which layer holds each parameter.
 
 A layer keeps the latest value of each parameter it was given; nothing queues. From the lowest priority to the
-highest, with s the layer's share of a parameter (weight x fade) and v its value:
+highest, with s the layer's share of a parameter (weight x fade) and v its value, out begins with the neutral face:
 
     set  out <- out + s (v - out)      add  out <- out + s v      max  out <- max(out, s v)
 """
@@ -145,7 +145,7 @@ class Mixer:
         self._table = _Table(ordered, len(parameters))
         self.layers = tuple(Layer(settings, self._table, i) for i, settings in enumerate(ordered))
         self._by_name = {layer.name: layer for layer in self.layers}
-        self._work = np.zeros(len(parameters))
+        self._work, self._rest = np.zeros(len(parameters)), parameters.neutral()
         self._better = np.zeros(len(parameters), dtype=bool)
         for layer in self.layers:
             for region, factor in layer.settings.gains.items():
@@ -165,7 +165,7 @@ class Mixer:
 
     def mix(self, now_s: float, dt: float, out: Floats) -> Floats:
         """Advance every layer by ``dt`` to ``now_s``; write their mix, not clipped, to ``out`` : (P,)."""
-        out.fill(0.0)
+        np.copyto(out, self._rest)
         table = self._table
         for row in np.flatnonzero(table.advance(now_s, dt)).tolist():
             self._apply(self.layers[row].settings.mode, table.given[row], table.applied[row], out)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Mapping, Sequence
+from functools import cache, partial
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from controller.base.config import Number, Settings, Share, check, read_toml
 from controller.base.parameters import REGIONS, did_you_mean
@@ -31,32 +31,26 @@ class LayerTable(Settings):
     timeout_s: Annotated[float, Field(gt=0)] = math.inf
     gains: dict[str, _Gain] = {}
 
-    @field_validator("gains")
-    @classmethod
-    def _check_regions(cls, value: dict[str, float]) -> dict[str, float]:
-        wrong = [f"no region called {name!r}{did_you_mean(name, REGIONS)}" for name in value if name not in REGIONS]
-        if wrong:
-            raise ValueError("; ".join(wrong))
-        return value
-
 
 class LayersTable(Settings):
     layers: dict[str, LayerTable]
 
 
 def load_layers(
-    changes: Mapping[str, Mapping[str, Any]] | None = None, *, where: Path | None = None, base: Path | None = None
-) -> tuple[LayerSettings, ...]:
+    changes: Mapping[str, Mapping[str, Any]] | None = None, *, where: Path | None = None, base: Path | None = None,
+    regions: Sequence[str] = REGIONS,
+) -> tuple[LayerSettings, ...]:  # fmt: skip
     """The shipped layers, with the ``changes`` of a stage: other values for some keys, or more layers.
 
     ``where`` : the file the changes are from, for messages. ``base`` : a file instead of the shipped one.
+    ``regions`` : those that gains may name.
 
     Raises ConfigError: a wrong key or value; two layers of one priority. The message lists every fault with its key.
     """
     path = base or config_dir() / "vocabularies" / "layers.toml"
     shipped, changes = read_toml(path), changes or {}
     merged = {name: _merged(shipped.get(name, {}), changes.get(name, {})) for name in {**shipped, **changes}}
-    tables = check({"layers": merged}, LayersTable, where or path, _faults).layers
+    tables = check({"layers": merged}, LayersTable, where or path, partial(_faults, regions)).layers
     return tuple(LayerSettings(name, **dict(table)) for name, table in tables.items())
 
 
@@ -71,8 +65,14 @@ def default_layers() -> tuple[LayerSettings, ...]:
     return load_layers()
 
 
-def _faults(file: LayersTable) -> list[str]:
+def _faults(regions: Sequence[str], file: LayersTable) -> list[str]:
     faults = [f"layers.{name}: missing" for name in NEEDED if name not in file.layers]
+    faults += [
+        f"layers.{name}.gains.{region}: no region called {region!r}{did_you_mean(region, regions)}"
+        for name, table in file.layers.items()
+        for region in table.gains
+        if region not in regions
+    ]
     first: dict[int, str] = {}
     for name, table in file.layers.items():
         other = first.setdefault(table.priority, name)

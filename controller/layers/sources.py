@@ -74,7 +74,7 @@ class Sources:
         return LayerPart(name, layer, self._parts, write, renew)
 
     def _write_expression(self, now_s: float) -> None:
-        values = finite(self.player.update(now_s))
+        values = finite(self._parameters.rest + self.player.update(now_s))
         self._expression.write_masked(values, self._everything, now_s)
         self._blocks = self.player.blocks
 

@@ -95,6 +95,7 @@ class MotionLimiter:
         self._low, self._high = _vector(low, n), _vector(high, n)
         self._speed, self._accel = _vector(max_speed, n), _vector(max_acceleration, n)
         self._response, jerk = _vector(response_s, n), _vector(max_jerk, n)
+        self._top_speed = self._speed.copy()
         _check_limits(self._speed, self._accel, self._response, jerk, self._high - self._low)
         self._filter, self._period_s = JerkFilter(self._accel, jerk), period_s
         self._position = np.clip(np.zeros(n), self._low, self._high)
@@ -122,6 +123,10 @@ class MotionLimiter:
         """(n,) where the values would come to rest if they braked from the next step of ``dt`` s on."""
         braking = np.abs(self._velocity) / (2.0 * self._accel) + dt
         return self._position + self._velocity * braking
+
+    def slow(self, share: Floats | float) -> None:
+        """Move at a share of the top speed, 0 to 1, (n,) or one for all, until another is given."""
+        np.multiply(self._top_speed, share, out=self._speed)
 
     def reset(self, values: Floats) -> None:
         """Be at ``values`` : (n,), at rest."""

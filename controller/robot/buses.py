@@ -30,6 +30,8 @@ class BusSettings(Settings):
     port: str = ""
     baud: Baud = SERVO_BAUD
     rate_hz: Annotated[float, Field(ge=1, le=500)] = 50.0
+    let_go_s: Annotated[float, Field(ge=0, le=3600)] = 0.0
+    let_go_below_a: Annotated[float, Field(gt=0, le=5)] = 0.05
 
     simulates: str = "dynamixel"
     transport: Literal["pty", "tcp", "memory"] | None = None

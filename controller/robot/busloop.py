@@ -22,6 +22,8 @@ from controller.base.stop_latch import StopLatch
 from controller.robot.buses import BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.following import FollowingStatistics
+from controller.robot.letting_go import LettingGo
+from controller.robot.linkages.kind import LinkageSettings
 from controller.robot.safety import GoalFilter
 from controller.robot.settings import ChannelSettings, RuleSettings
 from drivers import open_bus
@@ -49,6 +51,7 @@ class BusLoop:
     newest : returns the newest parameter vector (p,) float64 and the time (monotonic ns) at which its command arrived,
         0 for none.
     rules : the robot's safety rules. anchors : solver of the robot's anchored channels, on this bus or another.
+    linkages : those of this bus's channels.
     limp : switch the motors off and only read the positions of the servos.
     feed_s : time between calls of :meth:`feed`, after which cycles begin; 0 for a bus that cycles by itself.
     stop_latch : while it is set, the motors are off, whatever else is asked, and the positions are read. Afterwards the
@@ -63,13 +66,14 @@ class BusLoop:
         newest: Newest,
         rules: RuleSettings = RuleSettings(),
         anchors: AnchorSolver | None = None,
+        linkages: Sequence[LinkageSettings] = (),
         *,
         limp: bool = False,
         feed_s: float = 0.0,
         stop_latch: StopLatch | None = None,
     ) -> None:
         self.settings = settings
-        self._goals = GoalFilter(channels, parameters, rules, 1.0 / settings.rate_hz, anchors)
+        self._goals = GoalFilter(channels, parameters, rules, 1.0 / settings.rate_hz, anchors, linkages)
         self.table = self._goals.table
         specs = servo_specs(channels, self.table.neutral_rad)
         self.bus: Bus = open_bus(settings.kind, specs, **settings.options())
@@ -85,6 +89,7 @@ class BusLoop:
         self._retry_ns: int | None = None  # when to try again what failed; None while nothing has
         self._off = False  # the servos are off, or are being switched off, because of the latch
         self._driven = self.bus.driven
+        self._letting_go, self._let_go = LettingGo(settings.let_go_s, settings.let_go_below_a), False
         self._state: BusState | None = None
         self._stopping, self._begun = threading.Event(), threading.Event()
         self._last_reason = ""
@@ -222,6 +227,8 @@ class BusLoop:
             return
         values, stamp = self._newest()
         angles, held = self.table.angles(values)
+        if self._let_go and not self._take_again(angles):
+            return
         self.held += held
         wanted = np.where(self._driven, angles, self._goals.sent)
         self.bus.write(self._goals.step(wanted, self._state, self.clock.step_s))
@@ -230,6 +237,28 @@ class BusLoop:
             self.latency_ms.add((time.monotonic_ns() - stamp) / 1e6)
         self._state = self.bus.read()
         self.following.add(angles, self._state)
+        if self._letting_go.may_let_go(self._goals.sent, self._state, self.clock.step_s):
+            self.bus.stop()
+            self._let_go = True
+            self._letting_go.begin(angles, self._state)
+            log.info("bus %s: still, and let go", self.settings.name)
+
+    def _take_again(self, wanted: Floats) -> bool:
+        """Switch servos that were let go on again where they are, once a target or a servo moves; whether they are."""
+        state = self._state = self.bus.read()
+        if not self._letting_go.must_hold(wanted, state):
+            return False
+        self._let_go = False
+        try:
+            self.bus.start(partly=True)
+            self._resume()
+        except PortLost:
+            raise
+        except DriverError as error:
+            self._off = True  # as after a STOP: it is tried again
+            self._try_later(time.monotonic_ns(), "not back", error)
+            return False
+        return True
 
     def _follow_absent(self) -> None:
         """Let the goals of servos that are not driven, or were not until the last read, begin where they are."""
@@ -288,6 +317,8 @@ class BusLoop:
             "command_to_wire_ms": self.latency_ms.summary(),
             "channels_held_at_limit": self.held,
             "rules": self._goals.guard.report(),
+            "let_go": {"times": self._letting_go.times, "sagged": self._letting_go.sagged},
+            "linkages_out_of_reach": self._goals.out_of_reach(),
             "face_difference": self.following.report(),
             "bus": self.bus.report().as_dict(),
             "stopped_by": stopped.who if (stopped := self._stop_latch.stopped) else None,

@@ -8,12 +8,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
 from controller.base.parameters import Flags, Floats, Indices, Parameters
 from controller.motion.motion import MotionLimiter
+from controller.robot.formulas import ChannelFormulas, parse_formula
+from controller.robot.linkages.kind import LinkageSettings
+from controller.robot.linkages.linked import LinkedChannels
 from controller.robot.settings import ChannelSettings
 from controller.robot.terms import curve_corners
 from drivers.base.bus import ServoSpec
@@ -22,6 +26,18 @@ if TYPE_CHECKING:
     from controller.robot.anchors import AnchorSolver  # start-up: loads the head
 
 _AT_LIMIT_RAD = 1e-9  # rounding of degrees
+_STEP, _DRAWN, _SEED = 1e-4, 16, 5
+
+
+class BoundChannels(Protocol):
+    """Channels whose mixes are computed together, by formulas or a linkage. at : (n,). needs : (k,) parameters."""
+
+    @property
+    def at(self) -> Indices: ...
+    @property
+    def needs(self) -> Indices: ...
+    def __call__(self, values: Floats) -> Floats:
+        """(n,) their mixes for parameters (p,); NaN where there is none."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +107,9 @@ class ChannelTable:
     curves : n functions from mix to angle, the calibrated points. low_rad, high_rad : (n,) limits of position.
     max_speed_rad_s, max_accel_rad_s2, max_jerk_rad_s3 : (n,) limits of motion; infinite jerk for no limit.
     dead_band_rad, slack_rad : (n,), 0 for none.
+    rest : (p,) the neutral face.
     terms : terms that are more than a weight. anchors, anchored : the solver of k channels, and their indices (k,).
+    bound : formulas and linkages, which give the mixes of their channels.
     """
 
     names: tuple[str, ...]
@@ -104,23 +122,68 @@ class ChannelTable:
     max_jerk_rad_s3: Floats
     dead_band_rad: Floats
     slack_rad: Floats
+    rest: Floats
     terms: Terms | None = None
     anchors: AnchorSolver | None = None
     anchored: Indices | None = None
+    bound: tuple[BoundChannels, ...] = ()
+    low: Floats | None = None
+    high: Floats | None = None
+
+    @cached_property
+    def linear(self) -> Floats:
+        """(n, p) what a unit of each parameter adds to each mix; curves, formulas and linkages by their mean slope."""
+        out = self.mix if self.terms is None else self.mix + self.terms.linear(self.mix.shape)
+        if self.anchors is not None or self.bound:
+            out = out.copy()
+        if self.anchors is not None:
+            out[self.anchored] = self.anchors.linear
+        for bound in self.bound:
+            out[bound.at] = self._mean_slopes(bound)
+        return out
+
+    def slopes(self, values: Floats) -> Floats:
+        """(n, p) what a little more of each parameter adds to each mix at (p,); anchors and curves as in ``linear``."""
+        out = self.linear.copy()
+        for bound in self.bound:
+            out[bound.at] = self._slopes(bound, values)
+        return out
+
+    def _mean_slopes(self, bound: BoundChannels) -> Floats:
+        """(n, p) over points of the whole range, drawn the same each time."""
+        low, high = self._ends
+        points = np.random.default_rng(_SEED).uniform(low, high, (_DRAWN, len(low)))
+        mean: Floats = np.mean([self._slopes(bound, point) for point in points], axis=0)
+        return mean
+
+    def _slopes(self, bound: BoundChannels, values: Floats) -> Floats:
+        """(n, p) central differences; where a value is at its end, or a side has none, towards the other."""
+        low, high = self._ends
+        out = np.zeros((len(bound.at), len(values)))
+        for p in bound.needs:
+            ends = np.array([values, values])
+            ends[:, p] = max(values[p] - _STEP, low[p]), min(values[p] + _STEP, high[p])
+            before, after = bound(ends[0]), bound(ends[1])
+            out[:, p] = np.nan_to_num((after - before) / max(ends[1, p] - ends[0, p], 1e-9))
+        return out
 
     @property
-    def linear(self) -> Floats:
-        """(n, p) what a unit of each parameter adds to each mix, curves by their mean slope."""
-        out = self.mix if self.terms is None else self.mix + self.terms.linear(self.mix.shape)
-        if self.anchors is not None:
-            out = out.copy()
-            out[self.anchored] = self.anchors.linear
+    def _ends(self) -> tuple[Floats, Floats]:
+        p = self.mix.shape[1]
+        return (np.zeros(p) if self.low is None else self.low), (np.ones(p) if self.high is None else self.high)
+
+    @property
+    def reached(self) -> Flags:
+        """(p,) which parameters move any channel."""
+        out: Flags = np.abs(self.linear).sum(axis=0) > 0.0
+        for bound in self.bound:
+            out[bound.needs] = True
         return out
 
     @property
     def neutral_rad(self) -> Floats:
         """(n,) angles of the neutral face."""
-        return self.angles(np.zeros(self.mix.shape[1]))[0]
+        return self.angles(self.rest)[0]
 
     def mixed(self, values: Floats) -> Floats:
         """(n,) mixes for parameters (p,); mm of pull where a channel is anchored."""
@@ -129,6 +192,8 @@ class ChannelTable:
             self.terms.add_to(mixed, values)
         if self.anchors is not None:
             mixed[self.anchored] = self.anchors.pulls_mm(values)
+        for bound in self.bound:
+            mixed[bound.at] = bound(values)
         return mixed
 
     def angles(self, values: Floats) -> tuple[Floats, int]:
@@ -154,9 +219,13 @@ class ChannelTable:
 
 
 def build_table(
-    channels: Sequence[ChannelSettings], parameters: Parameters, anchors: AnchorSolver | None = None
-) -> ChannelTable:
-    """Convert the settings of ``n`` channels to arrays; without ``anchors``, anchored channels stay at 0 mm."""
+    channels: Sequence[ChannelSettings], parameters: Parameters, anchors: AnchorSolver | None = None,
+    linkages: Sequence[LinkageSettings] = (),
+) -> ChannelTable:  # fmt: skip
+    """Convert the settings of ``n`` channels to arrays; without ``anchors``, anchored channels stay at 0 mm.
+
+    ``linkages`` : those of these channels; without them, a channel that follows one stays at 0.
+    """
     mix = np.zeros((len(channels), len(parameters.names)))
     for row, channel in zip(mix, channels, strict=True):
         for name, term in channel.mix.items():
@@ -177,10 +246,19 @@ def build_table(
         max_jerk_rad_s3=np.radians([c.max_jerk_deg_s3 or np.inf for c in channels]),
         dead_band_rad=np.radians([c.dead_band_deg for c in channels]),
         slack_rad=np.radians([c.slack_deg for c in channels]),
+        rest=parameters.neutral(),
         terms=_terms(channels, parameters),
         anchors=anchors,
         anchored=None if anchors is None else np.array([names.index(name) for name in anchors.names], dtype=np.intp),
+        bound=(*_formulas(channels, parameters), *(LinkedChannels.of(each, names, parameters) for each in linkages)),
+        low=parameters.low,
+        high=parameters.high,
     )
+
+
+def _formulas(channels: Sequence[ChannelSettings], parameters: Parameters) -> list[ChannelFormulas]:
+    found = [(i, parse_formula(channel.formula)) for i, channel in enumerate(channels) if channel.formula is not None]
+    return [ChannelFormulas.of(found, parameters)] if found else []
 
 
 def _terms(channels: Sequence[ChannelSettings], parameters: Parameters) -> Terms | None:

@@ -5,19 +5,20 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.base.parameters import REGIONS, Flags, Floats, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.layers.commands import CommandState, StatusValue
 from controller.robot.channels import ChannelTable
 from drivers.base.bus import BusState
 
-_RIDGE = 1e-4
-_SPARSITY = 1e-3
-_TOLERANCE = 1e-5
+_HOW: dict[str, Any] = {"ridge": 1e-4, "sparsity": 1e-3, "tolerance": 1e-5}
+_STEPS = 8
+_GOOD = 0.01
 
 
 def _rms(squares: Floats, counts: NDArray[np.int64] | int) -> float:
@@ -31,7 +32,7 @@ class FollowingStatistics:
     """
 
     def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
-        self._names = table.names
+        self._names, self._region_names = table.names, parameters.region_names
         self._regions = np.array([parameters.regions[int(np.argmax(np.abs(row)))] for row in table.linear])
         self._now: Floats | None = None
         self._squares, self._most = np.zeros((2, len(table.names)))
@@ -39,7 +40,7 @@ class FollowingStatistics:
 
     def add(self, wanted_rad: Floats, state: BusState) -> None:
         """Add one cycle: wanted angles (n,) rad, and the measured ones; stale positions do not count."""
-        good = state.fresh & np.isfinite(state.position_rad)
+        good = state.fresh & np.isfinite(state.position_rad) & np.isfinite(wanted_rad)
         away = np.where(good, np.degrees(np.abs(state.position_rad - wanted_rad)), 0.0)
         self._now = np.where(good, away, np.nan)
         self._squares += away**2
@@ -61,7 +62,7 @@ class FollowingStatistics:
             "rms_deg": _rms(self._squares, self._count),
             "regions_rms_deg": {
                 region: _rms(self._squares[self._regions == region], self._count[self._regions == region])
-                for region in REGIONS
+                for region in self._region_names
                 if region in self._regions
             },
             "worst": [
@@ -90,7 +91,8 @@ class Mirror:
         real = np.diff(self._at, axis=1) > 0.0
         self.readable = np.array([_is_monotonic(row[keep]) for row, keep in zip(steps, real, strict=True)])
         self._solver = lru_cache(64)(self._make_solver)  # most cycles use the same channels
-        self._last = parameters.neutral()
+        self._rest = self._last = parameters.neutral()
+        self._span = np.maximum(self._at[:, -1] - self._at[:, 0], 1e-9)
         self._solver(self.readable.tobytes())  # compiles the solver now, not in a cycle of a bus
 
     def read(self, angles_rad: Floats, fresh: Flags | None = None) -> Floats:
@@ -99,8 +101,47 @@ class Mirror:
         if fresh is not None:
             counted &= fresh
         wanted = np.where(counted, self._mixes(angles_rad), 0.0)
-        self._last = self._solver(counted.tobytes()).solve(wanted, start=self._last)
-        return self._last.copy()
+        if not self._table.bound:
+            self._last = self._solver(counted.tobytes()).solve(wanted, start=self._last)
+            return self._last.copy()
+        found = self._approach(self._last, wanted, counted)
+        if self._apart(found, wanted, counted) > _GOOD:  # another branch of a condition or linkage may fit
+            straight = self._solver(counted.tobytes()).solve(wanted)
+            others = [self._approach(start, wanted, counted) for start in (straight, self._rest)]
+            found = min((found, *others), key=lambda each: self._apart(each, wanted, counted))
+        self._last = found
+        return found.copy()
+
+    def _approach(self, start: Floats, wanted: Floats, counted: Flags) -> Floats:
+        """Parameters (P,) near ``start`` whose mixes fit best: Gauss and Newton's steps inside the bounds, halved where
+        one overshoots."""
+        at, apart = start, self._apart(start, wanted, counted)
+        for _ in range(_STEPS):
+            slopes = self._table.slopes(at)
+            solver = BoundedSolver(slopes, *self._bounds, weights=counted.astype(np.float64), **_HOW)
+            goal = solver.solve(np.where(counted, wanted - self._model(at) + slopes @ at, 0.0), start=at)
+            for share in (1.0, 0.5, 0.25, 0.1):
+                there = at + share * (goal - at)
+                if (now := self._apart(there, wanted, counted)) < apart:
+                    break
+            else:
+                return at
+            at, gain, apart = there, apart - now, now
+            if gain < 1e-3 * _GOOD:
+                return at
+        return at
+
+    def _model(self, values: Floats) -> Floats:
+        """(n,) mixes; those of weights, curves and anchors as straight as in the table's ``linear``."""
+        mixed = self._table.linear @ values
+        for bound in self._table.bound:
+            mixed[bound.at] = bound(values)
+        return np.nan_to_num(mixed)
+
+    def _apart(self, values: Floats, wanted: Floats, counted: Flags) -> float:
+        """How far the mixes are from those wanted, in shares of each channel's range (rms)."""
+        away = np.where(counted, (self._model(values) - wanted) / self._span, 0.0)
+        return float(np.sqrt((away**2).sum() / max(int(counted.sum()), 1)))
 
     def _mixes(self, angles_rad: Floats) -> Floats:
         """(n,) mix values that give the angles, inside the calibrated points."""
@@ -117,9 +158,7 @@ class Mirror:
             self._table.linear,
             *self._bounds,
             weights=np.frombuffer(counted, bool).astype(np.float64),
-            ridge=_RIDGE,
-            sparsity=_SPARSITY,
-            tolerance=_TOLERANCE,
+            **_HOW,
         )
 
 
@@ -151,8 +190,9 @@ class MeasuredFace:
         following: Sequence[FollowingStatistics] = (),
     ) -> None:
         self._mirrors = [(Mirror(table, parameters), read) for table, read in zip(tables, measured, strict=True)]
-        self._touched = [np.abs(table.linear).sum(axis=0) > 0.0 for table in tables]
-        self._following = following
+        self._touched = [table.reached for table in tables]
+        self._following, self._region_names = following, parameters.region_names
+        self._rest = parameters.neutral()
         self._lock = threading.Lock()
         for mirror, _ in self._mirrors:  # the solver is compiled before the clock runs
             mirror.read(np.zeros(len(mirror.readable)))
@@ -170,8 +210,8 @@ class MeasuredFace:
         return bool(mask.any())
 
     def measured(self, out: Floats) -> bool:
-        """See :class:`controller.layers.commands.CommandSink`; parameters without a servo are 0."""
-        out.fill(0.0)
+        """See :class:`controller.layers.commands.CommandSink`; parameters without a servo are neutral."""
+        np.copyto(out, self._rest)
         return self.read(out, np.zeros(len(out), dtype=bool))
 
     def capture(self, state: CommandState, now_ns: int) -> None:
@@ -186,7 +226,11 @@ class MeasuredFace:
         for following in self._following:
             for region, away in following.now():
                 found.setdefault(region, []).append(away)
-        return {region: _rms(np.square(found[region]), len(found[region])) for region in REGIONS if region in found}
+        return {
+            region: _rms(np.square(found[region]), len(found[region]))
+            for region in self._region_names
+            if region in found
+        }
 
     def status(self) -> dict[str, StatusValue]:
         """How far the servos are from their wanted angles now: all together, and by region (rms, degrees)."""

@@ -5,9 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from controller.base.config import load
-from controller.base.errors import ParameterError
+from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import Parameters, did_you_mean
+from controller.base.paths import find_config
 from controller.robot.calibration import calibrated, calibration_path
+from controller.robot.formulas import formula_faults
+from controller.robot.linkages.checks import linkage_faults, with_files
 from controller.robot.settings import RobotSettings
 from drivers import check_model
 from drivers.base.errors import DriverError
@@ -15,14 +18,31 @@ from drivers.core.registry import FAMILIES
 
 
 def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
-    """Read and cross-check a robot file, with its calibration.
+    """Read and cross-check a robot file, with its calibration; :func:`robot_parameters` gives what its mixes name.
 
     Raises ConfigError that lists every fault: unknown keys and parameters, repeated names and ids, missing buses.
     """
-    robot = load(path, RobotSettings, lambda read: _repeated(read) + _references(read, parameters) + _rules(read))
+
+    def faults(read: RobotSettings) -> list[str]:
+        try:
+            known = robot_parameters(read, path, parameters)
+        except ConfigError as error:
+            return [f"vocabularies: {error}".replace("\n", "\n  "), *_repeated(read), *_rules(read)]
+        found = _repeated(read) + _references(read, known) + _rules(read)
+        return found + linkage_faults(with_files(read, path), known)
+
+    robot = with_files(load(path, RobotSettings, faults), path)
     if robot.calibration is None:
         return robot
     return calibrated(robot, calibration_path(robot.calibration, path))
+
+
+def robot_parameters(robot: RobotSettings, path: Path, parameters: Parameters) -> Parameters:
+    """``parameters``, and behind them those of its own that the vocabularies of the robot in ``path`` add.
+
+    Raises ConfigError: one cannot be found or is wrong.
+    """
+    return parameters.with_files(find_config("vocabularies", name, beside=path) for name in robot.vocabularies)
 
 
 def _repeated(robot: RobotSettings) -> list[str]:
@@ -66,6 +86,8 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
         if channel.bus not in buses:
             faults.append(f"channels[{i}].bus: no bus called {channel.bus!r} (buses: {', '.join(sorted(buses))})")
         named = [(f"mix.{name}", name) for name in channel.mix]
+        if channel.formula is not None:
+            faults += [f"channels[{i}].formula: {fault}" for fault in formula_faults(channel.formula, parameters)]
         if (anchor := channel.anchor) is not None:
             named += [("anchor.like", anchor.like)] if anchor.like is not None else []
             if isinstance(point := anchor.point, str) and point not in robot.landmarks:

@@ -1,9 +1,10 @@
 """Safety rules and limits of motion between the angles of a face's channels and the goals sent to a bus.
 
-The chain is dead band -> slack -> rules -> limiter of motion. Rules only narrow the range [low, high] of positions that
-each servo may be sent; several rules combine by intersection, so their order does not matter. All of them act on
-targets: the :class:`controller.motion.motion.MotionLimiter` behind them keeps speed and acceleration, whatever a rule
-does. After the rules of the Hanson motor stack, without its defects; docs/robots.md lists the differences.
+The chain is smoothing -> dead band -> slack -> rules -> limiter of motion. Rules only narrow the range [low, high] of
+positions that each servo may be sent; several rules combine by intersection, so their order does not matter. All of
+them act on targets: the :class:`controller.motion.motion.MotionLimiter` behind them keeps speed and acceleration,
+whatever a rule does. After the rules of the Hanson motor stack, without its defects; docs/robots.md lists the
+differences.
 """
 
 from __future__ import annotations
@@ -16,6 +17,9 @@ import numpy as np
 
 from controller.base.parameters import Flags, Floats, Indices, Parameters
 from controller.robot.channels import ChannelTable, build_table
+from controller.robot.filters import SlowStart, TargetFilter
+from controller.robot.linkages.kind import LinkageSettings
+from controller.robot.linkages.linked import LinkedChannels
 from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
 
@@ -236,14 +240,18 @@ class Guard:
     """Dead band, slack and all safety rules for the channels of one bus."""
 
     def __init__(self, rules: RuleSettings, table: ChannelTable) -> None:
+        from controller.robot.heat import HeatRules  # it uses the classes above
+
         neutral = table.neutral_rad
         rules = rules.within(table.names)
+        self._heat = HeatRules(rules.heat, table, neutral) if rules.heat else None
         self._table = table
         self._slack = DeadBandAndSlack(table.dead_band_rad, table.slack_rad)
         every = (
             AntagonistRules(rules.prevent, table, neutral),
             TimingRules(rules.timing, table, neutral),
             LoadRules(rules.load, table),
+            *((self._heat,) if self._heat is not None else ()),
         )
         self._rules = [rule for rule in every if rule.counter.labels]
 
@@ -265,6 +273,11 @@ class Guard:
             rule.narrow(now, allowed)
         return np.maximum(np.minimum(wanted, allowed.high), np.minimum(allowed.low, allowed.high))
 
+    @property
+    def speed_share(self) -> Floats | float:
+        """Share of its top speed that each channel may use now, by its temperature: (n,), or 1 for all."""
+        return 1.0 if self._heat is None else self._heat.speed_share
+
     def report(self) -> list[dict[str, object]]:
         """The rules that acted: which, how often, for how long (s)."""
         return [row for rule in self._rules for row in rule.counter.report()]
@@ -273,29 +286,44 @@ class Guard:
 class GoalFilter:
     """Turns the angles wanted of one bus's channels into goals: safety rules first, then limits of motion.
 
-    channels : those of the bus. rules, anchors : of the robot. period_s : of the bus.
+    channels : those of the bus. rules, anchors : of the robot. period_s, linkages : of the bus.
     """
 
     def __init__(self, channels: Sequence[ChannelSettings], parameters: Parameters, rules: RuleSettings,
-                 period_s: float, anchors: AnchorSolver | None = None) -> None:  # fmt: skip
+                 period_s: float, anchors: AnchorSolver | None = None,
+                 linkages: Sequence[LinkageSettings] = ()) -> None:  # fmt: skip
         names = [channel.name for channel in channels]
-        self.table = build_table(channels, parameters, None if anchors is None else anchors.for_channels(names))
+        self.table = build_table(
+            channels, parameters, None if anchors is None else anchors.for_channels(names), linkages
+        )
         self.guard = Guard(rules, self.table)
         self.period_s = period_s
+        self._filter, self._slow_start = TargetFilter(channels), SlowStart(channels)
         self._limiter = self.table.limiter(period_s)
         self.sent = np.zeros(len(names))  # rad, the last goals
         self.restart(self.table.neutral_rad)
+
+    def out_of_reach(self) -> dict[str, int]:
+        """Linkages whose inputs went where they cannot go, and how often."""
+        linked = [bound for bound in self.table.bound if isinstance(bound, LinkedChannels)]
+        return {each.name: each.times for each in linked if each.times}
 
     def restart(self, position_rad: Floats) -> None:
         """Continue from positions (n,) rad at rest, as far as the limits of position allow."""
         np.clip(position_rad, self.table.low_rad, self.table.high_rad, out=self.sent)
         self._limiter.reset(self.sent)
+        self._begin(np.ones(len(self.sent), dtype=bool))
+
+    def _begin(self, where: Flags) -> None:
+        self._filter.restart(where)
+        self._slow_start.restart(where)
 
     def restart_some(self, where: Flags, position_rad: Floats) -> None:
         """As ``restart`` for those of ``where`` : (n,); from the last goal where a position is NaN."""
         at = np.where(np.isfinite(position_rad), position_rad, self.sent)
         self._limiter.reset_some(where, at)
         self.sent[where] = np.clip(at, self.table.low_rad, self.table.high_rad)[where]
+        self._begin(where)
 
     def step(self, wanted: Floats, state: BusState | None = None, dt: float | None = None) -> Floats:
         """One cycle of ``dt`` s, by default the bus's own, towards angles (n,) rad, given the newest measurement.
@@ -303,5 +331,7 @@ class GoalFilter:
         Returns goals (n,) rad, the same array each time.
         """
         dt = self.period_s if dt is None else dt
-        allowed = self.guard.apply(wanted, self.sent, self._limiter.rest(dt), state, dt)
+        smooth = self._filter.apply(wanted, dt)
+        allowed = self.guard.apply(smooth, self.sent, self._limiter.rest(dt), state, dt)
+        self._limiter.slow(np.minimum(self._slow_start.step(dt), self.guard.speed_share))
         return self._limiter.step(dt, allowed, self.sent)

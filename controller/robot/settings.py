@@ -12,11 +12,13 @@ from itertools import pairwise
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, field_validator, model_validator
+from pydantic import AfterValidator, Field, field_validator, model_validator
 
 from controller.base.config import Settings
 from controller.base.parameters import Floats
 from controller.robot.buses import Bus
+from controller.robot.formulas import parse_formula
+from controller.robot.linkages.kind import AnyLinkage, LinkageSettings
 from controller.robot.terms import Curve, Finite, Term, check_points
 from drivers.base.errors import DriverError
 from drivers.core.registry import usual_rate_hz
@@ -93,6 +95,30 @@ class AnchorSettings(Settings):
         return unit
 
 
+class SmoothSettings(Settings):
+    """Smoothing of a channel's target: a moving average over ``average_s``, or a One Euro filter.
+
+    min_cutoff_hz : of a target at rest; lower is smoother. beta : how much it rises with speed (Hz for each degree/s).
+    """
+
+    average_s: Annotated[float, Field(ge=0, le=5, allow_inf_nan=False)] | None = None
+    min_cutoff_hz: Annotated[float, Field(gt=0, le=100, allow_inf_nan=False)] | None = None
+    beta: Annotated[float, Field(ge=0, le=10, allow_inf_nan=False)] = 0.0
+
+    @model_validator(mode="after")
+    def _is_one(self) -> SmoothSettings:
+        if (self.average_s is None) == (self.min_cutoff_hz is None):
+            raise ValueError("needs either average_s or min_cutoff_hz")
+        if self.average_s is not None and self.beta:
+            raise ValueError("beta goes with min_cutoff_hz")
+        return self
+
+
+def _readable(text: str) -> str:
+    parse_formula(text)
+    return text
+
+
 class ChannelSettings(Settings):
     """One servo: what it follows, its calibrated points and its limits."""
 
@@ -102,6 +128,7 @@ class ChannelSettings(Settings):
     model: str
     mix: dict[str, Term] = {}
     join: Literal["sum", "min", "max"] = "sum"
+    formula: Annotated[str, AfterValidator(_readable)] | None = None
     anchor: AnchorSettings | None = None
     map: Calibration
     limit_deg: tuple[Degrees, Degrees]
@@ -113,6 +140,8 @@ class ChannelSettings(Settings):
     pulse: PulseSettings | None = None
     wire_name: str = ""
     trim_deg: Degrees = 0.0
+    smooth: SmoothSettings | None = None
+    slow_start_s: Annotated[float, Field(ge=0, le=60, allow_inf_nan=False)] = 0.0
     dead_band_deg: Play = 0.0
     slack_deg: Play = 0.0
     profile: str | None = None
@@ -125,10 +154,15 @@ class ChannelSettings(Settings):
         return value
 
     @model_validator(mode="after")
-    def _has_mix_or_anchor(self) -> ChannelSettings:
-        if bool(self.mix) == (self.anchor is not None):
-            raise ValueError("needs either mix or anchor")
+    def _follows_one(self) -> ChannelSettings:
+        if sum((bool(self.mix), self.anchor is not None, self.formula is not None)) > 1:
+            raise ValueError("needs one of mix, formula and anchor")
         return self
+
+    @property
+    def follows(self) -> bool:
+        """Whether it says itself what it follows; a linkage does for one that does not."""
+        return bool(self.mix) or self.anchor is not None or self.formula is not None
 
 
 class PreventRule(Settings):
@@ -175,7 +209,26 @@ class LoadRule(Settings):
     rise_deg_s: Positive = 10.0
 
 
-Rule = TypeVar("Rule", TimingRule, LoadRule)
+class HeatRule(Settings):
+    """Temperature: from ``above_c`` to ``full_c`` the range about the neutral face and the top speed shrink.
+
+    At ``full_c`` they are the shares ``range`` and ``speed`` of what they were.
+    """
+
+    channels: Names
+    above_c: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+    full_c: Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+    range: Share = 0.5
+    speed: Annotated[float, Field(ge=0.05, le=1, allow_inf_nan=False)] = 0.3
+
+    @model_validator(mode="after")
+    def _rises(self) -> HeatRule:
+        if self.above_c >= self.full_c:
+            raise ValueError("above_c must be below full_c")
+        return self
+
+
+Rule = TypeVar("Rule", TimingRule, LoadRule, HeatRule)
 
 
 class RuleSettings(Settings):
@@ -184,6 +237,7 @@ class RuleSettings(Settings):
     prevent: list[PreventRule] = []
     timing: list[TimingRule] = []
     load: list[LoadRule] = []
+    heat: list[HeatRule] = []
 
     def within(self, names: Sequence[str]) -> RuleSettings:
         """The rules as far as they concern the channels called ``names``; ``prevent`` needs both of its channels."""
@@ -191,6 +245,7 @@ class RuleSettings(Settings):
             prevent=[rule for rule in self.prevent if {rule.channel, rule.other} <= set(names)],
             timing=_for_channels(self.timing, names),
             load=_for_channels(self.load, names),
+            heat=_for_channels(self.heat, names),
         )
 
     def mentions(self) -> Iterator[tuple[str, str]]:
@@ -198,7 +253,7 @@ class RuleSettings(Settings):
         for i, rule in enumerate(self.prevent):
             yield f"rules.prevent[{i}].channel", rule.channel
             yield f"rules.prevent[{i}].other", rule.other
-        for kind in ("timing", "load"):
+        for kind in ("timing", "load", "heat"):
             for i, named in enumerate(getattr(self, kind)):
                 for j, name in enumerate(named.channels):
                     yield f"rules.{kind}[{i}].channels[{j}]", name
@@ -212,14 +267,17 @@ def _for_channels(rules: list[Rule], names: Sequence[str]) -> list[Rule]:
 class RobotSettings(Settings):
     """The channels of one robot, on one or more buses.
 
-    ``calibration`` names a file that ``omote calibrate`` wrote for this head (:mod:`controller.robot.calibration`).
+    ``calibration`` names a file that ``omote calibrate`` wrote for this head (:mod:`controller.robot.calibration`);
+    ``vocabularies`` files with parameters of its own that its mixes name.
     """
 
     name: str
     description: str = ""
     calibration: str | None = None
+    vocabularies: Annotated[list[str], Field(max_length=64)] = []
     buses: list[Bus] = Field(min_length=1, max_length=64)
     channels: list[ChannelSettings] = Field(min_length=1, max_length=1024)
+    linkages: Annotated[list[AnyLinkage], Field(max_length=64)] = []
     landmarks: dict[str, Annotated[list[Finite], Field(min_length=2, max_length=3)]] = {}
     profiles: dict[str, dict[str, Any]] = {}
     rules: RuleSettings = RuleSettings()
@@ -247,6 +305,11 @@ class RobotSettings(Settings):
     def anchored_channels(self) -> list[ChannelSettings]:
         """The channels that have an anchor, in file order."""
         return [channel for channel in self.channels if channel.anchor is not None]
+
+    def linkages_on(self, bus: str) -> list[LinkageSettings]:
+        """The linkages of the channels on a bus; a linkage lies on one."""
+        names = {channel.name for channel in self.on_bus(bus)}
+        return [linkage for linkage in self.linkages if names.issuperset(linkage.channels)]
 
     def on_bus(self, name: str) -> list[ChannelSettings]:
         """The channels on the bus called ``name``, in file order."""

@@ -100,7 +100,14 @@ class OfflineRun:
     ) -> None:
         self._robot, self._state, self._feed, self._dt = robot, state, feed, 1.0 / control_hz
         self._buses = {
-            bus.name: GoalFilter(robot.on_bus(bus.name), state.parameters, robot.rules, 1.0 / bus.rate_hz, anchors)
+            bus.name: GoalFilter(
+                robot.on_bus(bus.name),
+                state.parameters,
+                robot.rules,
+                1.0 / bus.rate_hz,
+                anchors,
+                robot.linkages_on(bus.name),
+            )
             for bus in robot.buses
         }
         self._neutral = {name: bus.sent.copy() for name, bus in self._buses.items()}

@@ -21,7 +21,7 @@ from controller.layers.mixer import LayerSettings
 from controller.layers.settings import load_layers
 from controller.links.line.script import load_script
 from controller.links.links import LinkSettings, LinkTable
-from controller.robot.robot import load_robot
+from controller.robot.robot import load_robot, robot_parameters
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
 from controller.stage.picture import PictureSettings, with_options
@@ -109,12 +109,14 @@ class Stage:
     """A stage with everything it refers to found and checked.
 
     path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
+    parameters : of the base vocabulary, and those that its vocabularies and those of its robots add.
     layers : the layers. life : settings of idle motion. groups : group files added to the head, each with its amount.
     persons : whom the face shows, each with its share. controls : what gamepad and keys do in the window.
     """
 
     path: Path
     settings: StageSettings
+    parameters: Parameters
     head: Path
     robots: tuple[RobotSettings, ...]
     vocabularies: tuple[Path, ...]
@@ -140,10 +142,12 @@ class Stage:
         dressed = self.settings.face.dressed
         return load_head(self.head, self.settings.identity, self.groups, self.persons, dressed=dressed)
 
-    def state(self, parameters: Parameters, seed: int | None = None, period_s: float | None = None) -> CommandState:
-        """A new state of all layers with the stage's settings; nothing is commanded yet."""
+    def state(
+        self, parameters: Parameters | None = None, seed: int | None = None, period_s: float | None = None
+    ) -> CommandState:
+        """A new state of all layers with the stage's settings and parameters; nothing is commanded yet."""
         return CommandState(
-            parameters,
+            parameters or self.parameters,
             self.vocabulary,
             self.layers,
             life=self.life,
@@ -189,6 +193,8 @@ def find_persons(person: PersonName, head: Path, beside: Path | None = None) -> 
 def load_stage(name: str, parameters: Parameters) -> Stage:
     """Find, read and cross-check a stage and all it refers to; ``name`` : a path, or a file in ``configs/stages``.
 
+    ``parameters`` : of the base vocabulary; those of the stage's own vocabularies are added to them.
+
     Raises ConfigError that lists every fault of the stage and of the files it names.
     """
     path = find_config("stages", name)
@@ -224,22 +230,42 @@ def _layer_faults(links: Sequence[LinkSettings], layers: Sequence[LayerSettings]
     return faults
 
 
+def _gain_faults(links: Sequence[LinkSettings], regions: Sequence[str]) -> list[str]:
+    """Links with gains of regions that there are not."""
+    return [
+        f"links[{i}].gains: no region called {name!r}{did_you_mean(name, regions)}"
+        for i, link in enumerate(links)
+        for name in getattr(link.own, "gains", {})
+        if name not in regions
+    ]
+
+
+def _robot(name: str, beside: Path, parameters: Parameters) -> tuple[RobotSettings, Parameters]:
+    """A robot, and the parameters with those of its own."""
+    path = find_config("robots", name, beside=beside)
+    robot = load_robot(path, parameters)
+    return robot, robot_parameters(robot, path, parameters)
+
+
 def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
     """All that a stage refers to; faults are added to ``faults``, and leave the stage unfit for use."""
     head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
     if head is not None and settings.identity:
         _collect(faults, "identity", lambda: check_identity(head, settings.identity))
     persons = _collect(faults, "face.person", lambda: find_persons(settings.face.person, head, path)) if head else ()
-    robots = [
-        _collect(faults, f"robots[{i}]", lambda n=name: load_robot(find_config("robots", n, beside=path), parameters))
-        for i, name in enumerate(settings.robots)
-    ]
     more = _files(faults, "vocabularies", settings.vocabularies, path)
+    parameters = _collect(faults, "vocabularies", lambda: parameters.with_files(more)) or parameters
+    robots: list[Any] = []
+    for i, name in enumerate(settings.robots):
+        found = _collect(faults, f"robots[{i}]", lambda n=name, p=parameters: _robot(n, path, p))
+        robot, parameters = found or (None, parameters)
+        robots.append(robot)
     groups = _files(faults, "groups", list(settings.groups), path)
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
-    layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
+    regions = parameters.region_names
+    layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path, regions=regions))
     life = _collect(faults, "life", lambda: IdleSettings.named(settings.life, parameters))
-    faults += _layer_faults(settings.links, layers or ())
+    faults += _layer_faults(settings.links, layers or ()) + _gain_faults(settings.links, regions)
     scripts = [("show", settings.show)] + [
         (f"links[{i}].script", link.simulated) for i, link in enumerate(settings.links)
     ]
@@ -252,7 +278,9 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     )
     amounts = tuple(zip(groups, settings.groups.values(), strict=False))
     shown = tuple(persons or ())
-    stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, amounts, shown, controls)
+    stage = Stage(
+        path, settings, parameters, head, tuple(robots), more, vocabulary, layers, life, amounts, shown, controls
+    )
     if settings.take is not None:
         _collect(faults, "take", lambda: load_take(stage.file(str(settings.take)), parameters))
     return stage

@@ -157,6 +157,9 @@ def _with_ports(path: Path, settings: RobotSettings, buses: dict[str, Hardware])
         for key in SIMULATION:
             entry.pop(key, None)
         entry |= {"kind": bus.family, "port": buses[bus.name].port}
+    if settings.vocabularies:
+        named = (find_config("vocabularies", name, beside=path) for name in settings.vocabularies)
+        table["vocabularies"] = [str(file.resolve()) for file in named]
     if settings.calibration is not None:
         table["calibration"] = str(calibration_path(settings.calibration, path).resolve())
     return table

@@ -16,7 +16,7 @@ from controller.layers.settings import load_layers
 from controller.links.line.script import load_script
 from controller.robot.calibration import CalibrationFile
 from controller.robot.fault_script import load_fault_script
-from controller.robot.robot import load_robot
+from controller.robot.robot import load_robot, robot_parameters
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import WORN, load_person
 from controller.stage.stage import check_identity, load_stage
@@ -159,7 +159,9 @@ def _describe_expressions(path: Path) -> Iterator[str]:
     shipped = config_dir() / "vocabularies" / "expressions.toml"
     more = () if path.resolve() == shipped.resolve() else (path,)
     known = len(Vocabulary.load(PARAMETERS).names) if more else 0
-    yield f"expressions {path.name}: {len(Vocabulary.load(PARAMETERS, more=more).names) - known}"
+    parameters = PARAMETERS.with_files(more)
+    own = f", parameters of its own: {', '.join(parameters.own)}" if parameters.own else ""
+    yield f"expressions {path.name}: {len(Vocabulary.load(parameters, more=more).names) - known}{own}"
 
 
 def _describe_life(path: Path) -> Iterator[str]:
@@ -178,7 +180,11 @@ def _describe_person(path: Path) -> Iterator[str]:
 
 
 def _describe_parameters(path: Path) -> Iterator[str]:
-    yield f"parameters {path.name}: {len(Parameters.load(path))}"
+    """A base vocabulary, which has the shipped names, or one that adds parameters to it, perhaps with expressions."""
+    if set(PARAMETERS.names) & set(read_toml(path).get("parameters", {})):
+        yield f"parameters {path.name}: {len(Parameters.load(path))}"
+    else:
+        yield from _describe_expressions(path)
 
 
 def _describe_units(path: Path) -> Iterator[str]:
@@ -226,7 +232,8 @@ def _describe_stage(path: Path) -> Iterator[str]:
         stage.load_head()
     links = ", ".join(map(str, stage.settings.links)) or "none"
     robots = ", ".join(robot.name for robot in stage.robots) or "none"
-    yield f"stage {stage.settings.name}: head {stage.head.name}, links: {links}, robots: {robots}"
+    own = f", parameters of its own: {', '.join(stage.parameters.own)}" if stage.parameters.own else ""
+    yield f"stage {stage.settings.name}: head {stage.head.name}, links: {links}, robots: {robots}{own}"
     yield from _warnings(stage.robots)
 
 
@@ -237,16 +244,17 @@ def _warnings(robots: Sequence[RobotSettings]) -> Iterator[str]:
 def _describe_robot(path: Path) -> Iterator[str]:
     """A robot; with anchors, by region how far emotions move the skin and the servos fall short (rms, mm)."""
     robot = load_robot(path, PARAMETERS)
+    parameters = robot_parameters(robot, path, PARAMETERS)
     yield f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels"
     yield from _warnings([robot])
     if not robot.anchored_channels:
         return
     from controller.robot.anchors import load_anchors, residual_rows  # start-up: as Head
 
-    anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), PARAMETERS, where=str(path))
-    vocabulary = Vocabulary.load(PARAMETERS)
+    anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), parameters, where=str(path))
+    vocabulary = Vocabulary.load(parameters)
     emotions = {n: vocabulary[n].weights for n in vocabulary.names if vocabulary[n].kind == "emotion"}
-    for region, wanted, left in residual_rows(anchors, emotions, PARAMETERS) if anchors is not None else ():
+    for region, wanted, left in residual_rows(anchors, emotions, parameters) if anchors is not None else ():
         yield f"  {region}: emotions move it {wanted:.1f} mm, the servos stay {left:.1f} mm behind (rms)"
 
 

@@ -1,4 +1,4 @@
-"""Lists every plug-in: the kinds of bus, link, take and export of omote and of other packages."""
+"""Lists every plug-in: the kinds of bus, linkage, link, take and export of omote and of other packages."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any
 
 from controller.formats.format import FORMATS
 from controller.links.kind import LINKS
+from controller.robot.linkages.kind import LINKAGES
 from controller.takes.reader import TAKES
 from drivers.base.errors import PluginError
 from drivers.base.plugins import Registry
@@ -35,6 +36,7 @@ EXPORTERS: Registry[Exporter] = Registry(
 
 SORTS: dict[str, Registry[Any]] = {
     "bus": FAMILIES,
+    "linkage": LINKAGES,
     "link": LINKS,
     "format": FORMATS,
     "take": TAKES,

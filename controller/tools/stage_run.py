@@ -81,9 +81,9 @@ class StageRun:
             check_identity(stage.head, identity)
             stage = replace(stage, settings=stage.settings.model_copy(update={"identity": dict(identity)}))
         if options.take is not None and options.take.suffix == SUFFIX:
-            next(replay(options.take, PARAMETERS, make=stage.state), None)
+            next(replay(options.take, stage.parameters, make=stage.state), None)
         elif options.take is not None:
-            load_take(options.take, PARAMETERS)
+            load_take(options.take, stage.parameters)
         if (voice := _voice(stage, options)) is not None:
             voice.check()
         if options.mirror and not stage.robots:
@@ -138,7 +138,7 @@ class StageRun:
         with (
             stop_flag() as flag,
             self._with_web() as options,
-            BodyProcess(self.stage, PARAMETERS, options, preloaded=preloaded) as body,
+            BodyProcess(self.stage, self.stage.parameters, options, preloaded=preloaded) as body,
         ):
             yield body, flag
 
@@ -155,7 +155,7 @@ class StageRun:
         """The head and its values, while the servos start in the body's process."""
         lower_process_priority()
         head = self.stage.load_head()
-        return HeadValues(body.mailbox, PARAMETERS, head.parameters), head
+        return HeadValues(body.mailbox, self.stage.parameters, head.parameters), head
 
     def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:
         """Wait for the servos and let commands in; returns a function that is true while the run shall go on."""
@@ -218,7 +218,9 @@ def _panel_options(stage: Stage) -> PanelOptions:
     from controller.panels.window.panel import PanelOptions  # start-up: the body gets its orders first
 
     own = [file for file in stage.vocabularies if not file.is_relative_to(config_dir())]
-    return PanelOptions(stage.vocabulary, own, script_names(beside=stage.path), stage.settings.liveliness)
+    return PanelOptions(
+        stage.vocabulary, own, script_names(beside=stage.path), stage.settings.liveliness, parameters=stage.parameters
+    )
 
 
 class _Asked:

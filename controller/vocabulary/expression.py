@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any, Literal, Protocol
 
 import numpy as np
-from pydantic import Field, RootModel, ValidationInfo, field_validator
+from pydantic import BeforeValidator, Field, RootModel, ValidationInfo, field_validator
 
 from controller.base.config import Number, Settings, Share, load
 from controller.base.errors import ConfigError
-from controller.base.parameters import Floats, Parameters, did_you_mean, fold
+from controller.base.parameters import TABLE_KEYS, Floats, Parameters, describes_parameters, did_you_mean, fold
 from controller.vocabulary.sides import sides, unknown_names
 
 _RISE_S = 0.4
@@ -26,7 +26,7 @@ class Expression:
     """One named expression.
 
     name : canonical name. kind : ``"emotion"``, ``"gesture"`` or ``"user"``. source : where it comes from.
-    weights : (P,) float64, the parameters at intensity 1; read-only.
+    weights : (P,) float64, what it adds to the neutral face at intensity 1; read-only.
     onset_s, offset_s : times to rise and to fall.
     blink, gaze, mouth : ``"keep"``, ``"block"`` or ``"blend"``: what it does to blinks, gaze and speech meanwhile.
     response : exponent of the intensity; below 1, weak intensities show more than in proportion.
@@ -44,7 +44,7 @@ class Expression:
     response: float = 1.0
 
     def pose(self, intensity: float) -> Floats:
-        """(P,) the parameters at an intensity, 0 to 1."""
+        """(P,) what it adds to the neutral face at an intensity, 0 to 1."""
         pose: Floats = self.weights * intensity**self.response
         return pose
 
@@ -81,7 +81,14 @@ class _Table(Settings):
         return {} if weights is None else weights
 
 
-_File = RootModel[dict[str, _Table]]
+def _without_parameters(table: Any) -> Any:
+    """The expressions of a vocabulary; its parameters are read by :meth:`Parameters.with_files`."""
+    if not isinstance(table, Mapping) or not describes_parameters(table):
+        return table
+    return {key: value for key, value in table.items() if key not in TABLE_KEYS}
+
+
+_File = RootModel[Annotated[dict[str, _Table], BeforeValidator(_without_parameters)]]
 
 
 def read_expressions(parameters: Parameters, files: Iterable[Path]) -> tuple[dict[str, Expression], dict[str, str]]:
@@ -119,10 +126,11 @@ def _expressions(
     weights = {name: expression.weights for name, expression in known.items()}
     for name in TopologicalSorter({name: table.of for name, table in tables.items()}).static_order():
         if name in tables:
-            mixed = sum((share * weights[part] for part, share in tables[name].of.items()), parameters.neutral())
-            weights[name] = np.clip(mixed, parameters.low, parameters.high)
+            mixed = sum((share * weights[part] for part, share in tables[name].of.items()), np.zeros(len(parameters)))
+            weights[name] = np.clip(mixed, parameters.low - parameters.rest, parameters.high - parameters.rest)
             for key, value in tables[name].weights.items():
-                weights[name][sides(parameters, key)] = value
+                at = sides(parameters, key)
+                weights[name][at] = value - parameters.rest[at]
             weights[name].flags.writeable = False
     options = {"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "response"}
     return {

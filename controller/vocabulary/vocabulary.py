@@ -91,7 +91,7 @@ class Vocabulary:
         expression = self[name]
         if not 0.0 <= intensity <= 1.0:
             raise ParameterError(f"intensity must be 0 to 1, not {intensity}", hint="0.5 is half of the expression")
-        pose = expression.pose(intensity)
+        pose = self._parameters.rest + expression.pose(intensity)
         return {int(i): float(pose[i]) for i in np.flatnonzero(expression.weights)}
 
     @cached_property

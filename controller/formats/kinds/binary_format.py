@@ -11,8 +11,8 @@ import struct
 
 import numpy as np
 
-from controller.base.parameters import Flags, Parameters
-from controller.formats.format import API, Format
+from controller.base.parameters import Parameters
+from controller.formats.format import API, Format, base_only
 from controller.formats.frame import Frame, Refusals
 
 VERSION = 1
@@ -32,7 +32,7 @@ class BinaryDecoder:
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
-        self._size = len(parameters)
+        self._size, self._base = len(parameters), parameters.base
         self._turns, self._last = 0, 0
 
     def feed(self, message: bytes) -> list[Frame]:
@@ -56,7 +56,7 @@ class BinaryDecoder:
             raise ValueError("a wrong length")
         values, mask = np.zeros(max(self._size, count)), np.zeros(max(self._size, count), dtype=bool)
         values[:count][given] = np.frombuffer(body, "<i2", offset=at) / UNIT
-        mask[:count] = given
+        mask[: min(count, self._base)] = given[: self._base]  # a number means one of the base vocabulary
         time_s = milliseconds / 1000.0 if flags & _TIME else None
         face = bool(flags & _FACE)
         return Frame(values[: self._size], mask[: self._size], time_s, self._count(sequence), face)
@@ -73,16 +73,16 @@ class BinaryEncoder:
     """Writes frames without the zero that ends them; values beyond -2 to 2 are cut off."""
 
     def __init__(self, parameters: Parameters) -> None:
-        self._sequence = 0
+        self._sequence, self._base = 0, parameters.base
 
     def encode(self, frame: Frame) -> list[bytes]:
         """One message."""
         flags = _FACE * frame.face | (_TIME if frame.time_s is not None else 0)
         milliseconds = round((frame.time_s or 0.0) * 1000.0) % _MILLISECONDS
-        mask = frame.mask if frame.face else np.zeros_like(frame.mask)
+        mask = (frame.mask if frame.face else np.zeros_like(frame.mask))[: self._base]
         head = _HEAD.pack(VERSION, self._sequence, milliseconds, flags, len(mask))
         self._sequence = self._sequence + 1 & 0xFFFF
-        values = np.clip(np.rint(frame.values[mask] * UNIT), -LARGEST, LARGEST).astype("<i2")
+        values = np.clip(np.rint(frame.values[: self._base][mask] * UNIT), -LARGEST, LARGEST).astype("<i2")
         body = head + np.packbits(mask, bitorder="little").tobytes() + values.tobytes()
         return [stuff(body + _CRC.pack(binascii.crc_hqx(body, 0xFFFF)))]
 
@@ -114,10 +114,6 @@ def unstuff(data: bytes) -> bytes:
     return bytes(out)
 
 
-def _carries(parameters: Parameters) -> Flags:
-    return np.ones(len(parameters), dtype=bool)
-
-
 FORMAT = Format(
     api=API,
     kind="binary",
@@ -126,7 +122,7 @@ FORMAT = Format(
     port=9401,
     decoder=BinaryDecoder,
     encoder=BinaryEncoder,
-    carries=_carries,
+    carries=base_only,
     delimiter=b"\0",
     most=1024,
     takes_token=True,

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from controller.base.parameters import Flags, Floats, Parameters
-from controller.formats.format import API, Format
+from controller.formats.format import API, Format, everything
 from controller.formats.frame import Frame, Refusals
 
 _TIME = "time"
@@ -112,10 +112,6 @@ def _number(text: str) -> float | None:
     return value if abs(value) < _LARGEST else None
 
 
-def _carries(parameters: Parameters) -> Flags:
-    return np.ones(len(parameters), dtype=bool)
-
-
 FORMAT = Format(
     api=API,
     kind="csv",
@@ -124,7 +120,7 @@ FORMAT = Format(
     port=9402,
     decoder=CsvDecoder,
     encoder=CsvEncoder,
-    carries=_carries,
+    carries=everything,
     delimiter=b"\n",
     takes_token=True,
     measured=True,

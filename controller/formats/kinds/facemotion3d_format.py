@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import partial
 
-from controller.formats.format import API, Format
-from controller.formats.kinds.ifacialmocap_format import IFacialMocapDecoder, IFacialMocapEncoder, carries
+from controller.formats.format import API, Format, base_only
+from controller.formats.kinds.ifacialmocap_format import IFacialMocapDecoder, IFacialMocapEncoder
 
 FORMAT = Format(
     api=API,
@@ -15,7 +15,7 @@ FORMAT = Format(
     port=49993,
     decoder=IFacialMocapDecoder,
     encoder=partial(IFacialMocapEncoder, between="&", suffixed=False),
-    carries=carries,
+    carries=base_only,
     quantum=0.005,
     greeting=b"FACEMOTION3D_OtherStreaming",
     note="angles are not rounded",

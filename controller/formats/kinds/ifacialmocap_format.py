@@ -13,7 +13,7 @@ import re
 import numpy as np
 
 from controller.base.parameters import Flags, Floats, Parameters
-from controller.formats.format import API, Format
+from controller.formats.format import API, Format, base_only
 from controller.formats.frame import Frame, Refusals
 
 _FULL = 100.0
@@ -119,11 +119,6 @@ def _suffixed(name: str) -> str:
     return name if name in _WHOLE else re.sub("Left$", "_L", re.sub("Right$", "_R", name))
 
 
-def carries(parameters: Parameters) -> Flags:
-    """All parameters."""
-    return np.ones(len(parameters), dtype=bool)
-
-
 FORMAT = Format(
     api=API,
     kind="ifacialmocap",
@@ -132,7 +127,7 @@ FORMAT = Format(
     port=49983,
     decoder=IFacialMocapDecoder,
     encoder=IFacialMocapEncoder,
-    carries=carries,
+    carries=base_only,
     quantum=0.005,
     delimiter=b"___iFacialMocap",
     greeting=b"iFacialMocap_sahuasouryya9218sauhuiayeta91555dy3719",

@@ -17,7 +17,7 @@ from typing import Any, TypeGuard
 import numpy as np
 
 from controller.base.parameters import Flags, Floats, Parameters
-from controller.formats.format import API, Format
+from controller.formats.format import API, Format, everything
 from controller.formats.frame import Frame, Held, Refusals
 from controller.formats.landmarks import COUNTS, face_of
 
@@ -181,10 +181,6 @@ def is_number(value: Any) -> TypeGuard[float]:
     return abs(value) < 1e15 and math.isfinite(value)
 
 
-def _carries(parameters: Parameters) -> Flags:
-    return np.ones(len(parameters), dtype=bool)
-
-
 FORMAT = Format(
     api=API,
     kind="json",
@@ -193,7 +189,7 @@ FORMAT = Format(
     port=9400,
     decoder=JsonDecoder,
     encoder=JsonEncoder,
-    carries=_carries,
+    carries=everything,
     delimiter=b"\n",
     timeout_s=math.inf,
     takes_token=True,

@@ -14,7 +14,7 @@ import numpy as np
 
 from controller.base.parameters import Parameters
 from controller.base.plain_numbers import plain_number
-from controller.formats.format import API, Format
+from controller.formats.format import API, Format, everything
 from controller.formats.frame import Frame, Held, Refusals
 from drivers.omote.protocol import checksum
 
@@ -152,7 +152,7 @@ FORMAT = Format(
     port=9404,
     decoder=LineDecoder,
     encoder=LineEncoder,
-    carries=lambda parameters: np.ones(len(parameters), dtype=bool),
+    carries=everything,
     delimiter=b"\n",
     most=4096,
     timeout_s=math.inf,

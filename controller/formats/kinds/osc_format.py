@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from controller.base.parameters import Flags, Parameters
-from controller.formats.format import API, Format
+from controller.base.parameters import Parameters
+from controller.formats.format import API, Format, everything
 from controller.formats.frame import Frame, Held, Refusals
 from controller.formats.osc import bundle, message, read_packet
 
@@ -62,10 +62,6 @@ class OscEncoder:
         return [bundle(messages)]
 
 
-def _carries(parameters: Parameters) -> Flags:
-    return np.ones(len(parameters), dtype=bool)
-
-
 FORMAT = Format(
     api=API,
     kind="osc",
@@ -74,6 +70,6 @@ FORMAT = Format(
     port=9000,
     decoder=OscDecoder,
     encoder=OscEncoder,
-    carries=_carries,
+    carries=everything,
     timeout_s=math.inf,
 )

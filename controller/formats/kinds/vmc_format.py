@@ -12,8 +12,8 @@ from functools import cache
 
 import numpy as np
 
-from controller.base.parameters import Flags, Floats, Parameters
-from controller.formats.format import API, Format
+from controller.base.parameters import Floats, Parameters
+from controller.formats.format import API, Format, base_only
 from controller.formats.frame import Frame, Held, Refusals
 from controller.formats.osc import Argument, bundle, message, read_packet
 from controller.formats.rotations import IDENTITY, Quaternion, from_unity, product, to_unity
@@ -183,10 +183,6 @@ def _raise(frame: Frame, weights: Floats) -> None:
 _presets = cache(Presets.load)
 
 
-def _carries(parameters: Parameters) -> Flags:
-    return np.ones(len(parameters), dtype=bool)
-
-
 FORMAT = Format(
     api=API,
     kind="vmc",
@@ -195,5 +191,5 @@ FORMAT = Format(
     port=39539,
     decoder=VmcDecoder,
     encoder=VmcEncoder,
-    carries=_carries,
+    carries=base_only,
 )

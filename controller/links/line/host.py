@@ -165,10 +165,11 @@ def main(arguments: list[str] | None = None) -> int:
     for ending in (signal.SIGINT, *TERMINATION_SIGNALS):  # they reach the whole group; the end of stdin ends this
         signal.signal(ending, signal.SIG_IGN)
     try:
-        script = load_script(options.script, PARAMETERS, Vocabulary.load(PARAMETERS, more=options.vocabulary))
+        parameters = PARAMETERS.with_files(options.vocabulary)
+        script = load_script(options.script, parameters, Vocabulary.load(parameters, more=options.vocabulary))
         with HostPort(options.link) as port:
             _say(f"ready {port.path}")
-            host = RobotHost(port, script, PARAMETERS)
+            host = RobotHost(port, script, parameters)
             host.run(_stdin_open)
             _say(json.dumps(host.report()))
     except OMOTE_ERRORS as error:

@@ -297,6 +297,7 @@ class LineSession:
     def _info(self, index: int) -> str:
         p = self._parameters
         text = f"{p.names[index]} value={number(self._values[index])} low={p.low[index]:g} high={p.high[index]:g}"
+        text += f" rest={p.rest[index]:g}" if p.rest[index] else ""
         text += f" region={p.regions[index]} layer={self._sink.holder(index) or 'none'}"
         full = math.degrees(p.full_scale_rad[index])
         return text if math.isnan(full) else f"{text} full_scale_deg={full:g}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from controller.base.parameters import REGIONS, did_you_mean
 from controller.formats.format import Format
 from controller.links.access import check_word
 from controller.links.net.address import Address, has_token, is_called, parse_address
@@ -65,9 +64,6 @@ class NetSettings:
         if self.sends == "both" and not self.form.measured:
             raise ValueError(f'sends: {self.form.kind} has no room for both; "servos" sends what the servos show')
         self._check_reach()
-        unknown = [name for name in self.gains if name not in REGIONS]
-        if unknown:
-            raise ValueError(f"gains: no region called {unknown[0]!r}{did_you_mean(unknown[0], REGIONS)}")
         if any(not 0.0 <= gain <= 4.0 for gain in self.gains.values()):
             raise ValueError("gains: must be 0 to 4")
 

@@ -240,7 +240,10 @@ def _in_range(parameters: Parameters, given: dict[str, float]) -> tuple[list[int
 def _parameter(p: Parameters, i: int) -> m.Parameter:
     full = math.degrees(p.full_scale_rad[i])
     angle = None if math.isnan(full) else round(full, 3)
-    return m.Parameter(low=float(p.low[i]), high=float(p.high[i]), region=p.regions[i], full_scale_deg=angle)
+    return m.Parameter(
+        low=float(p.low[i]), high=float(p.high[i]), region=p.regions[i], full_scale_deg=angle, rest=float(p.rest[i]),
+        description=p.descriptions.get(p.names[i], ""),
+    )  # fmt: skip
 
 
 def _mood(request: m.Emotion) -> str:

@@ -203,12 +203,15 @@ class Welcome(Reply):
 
 
 class Parameter(BaseModel):
-    """One parameter: its range, its region of the face, and the angle of the value 1 where it is an angle."""
+    """One parameter: its range, its value at rest, its region of the face, and the angle of the value 1 where it is an
+    angle. ``description`` : what its vocabulary says of it."""
 
     low: float
     high: float
     region: str
     full_scale_deg: float | None = None
+    rest: float = 0.0
+    description: str = ""
 
 
 class State(Reply):

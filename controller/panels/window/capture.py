@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +21,16 @@ class Capture:
     """Takes pictures and records, into ``folder``.
 
     area : of the window, which gives the next picture. newest : the newest parameters (P,). clock : seconds.
+    names : of the parameters, without those of the base vocabulary.
     message : what was written last, or why it was not.
     """
 
     def __init__(
-        self, area: PictureArea, newest: Callable[[], Floats], folder: Path, clock: Callable[[], float] = time.monotonic
-    ) -> None:
+        self, area: PictureArea, newest: Callable[[], Floats], folder: Path,
+        clock: Callable[[], float] = time.monotonic, names: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         self._area, self._newest, self._folder, self._clock = area, newest, folder, clock
+        self._names = names or PARAMETERS.names
         self._rows: list[Floats] | None = None
         self._began = 0.0
         self.message = ""
@@ -54,7 +57,7 @@ class Capture:
         rows, self._rows = self._rows, None
         if rows:
             path = self._free("recording", ".csv")
-            self._write(path, lambda to: _write_table(to, np.array(rows)))
+            self._write(path, lambda to: _write_table(to, self._names, np.array(rows)))
 
     def __call__(self) -> None:
         """Add the present face to the recording; called once a frame. It ends by itself after ten minutes."""
@@ -82,7 +85,7 @@ class Capture:
         return path
 
 
-def _write_table(path: Path, rows: Floats) -> None:
-    names = ",".join(("time", *PARAMETERS.names))
+def _write_table(path: Path, columns: Sequence[str], rows: Floats) -> None:
+    names = ",".join(("time", *columns))
     with replacing(path) as temporary:
         np.savetxt(temporary, rows, fmt="%.5f", delimiter=",", header=names, comments="", encoding="utf-8")

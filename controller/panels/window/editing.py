@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from controller.base.errors import ControllerError
-from controller.base.parameters import PARAMETERS, Floats
+from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.face.point_editing import PointEditor, Screen
 from controller.panels.window.commands import Commands
 from controller.panels.window.sliders import same_sense
@@ -28,16 +28,19 @@ class MouseEditing:
     """Drags points of the face with the mouse; called once a frame.
 
     area : where the picture is. copy : loads the same head again. newest : the newest parameters (P,).
+    parameters : of the stage; those of the base vocabulary without.
     """
 
     def __init__(
-        self, head: Head, copy: Callable[[], Head], newest: Callable[[], Floats], commands: Commands, area: PictureArea
-    ) -> None:
-        self.editor = PointEditor(head, copy, PARAMETERS)
+        self, head: Head, copy: Callable[[], Head], newest: Callable[[], Floats], commands: Commands, area: PictureArea,
+        parameters: Parameters | None = None,
+    ) -> None:  # fmt: skip
+        parameters = self._parameters = parameters or PARAMETERS
+        self.editor = PointEditor(head, copy, parameters)
         self._newest, self._commands, self._area = newest, commands, area
         self._eyes = head.data.eyes.mean(axis=0)
         self._symmetric, self._name, self._message = False, "mine", ""
-        self._mirror = PARAMETERS.mirror()
+        self._mirror = parameters.mirror()
         self._grabs, self._pixel = 0, (0.0, 0.0)
         commands.show_moves = self.editor.set_moves
 
@@ -92,7 +95,9 @@ class MouseEditing:
         """What a drag moves, on both sides where that is wanted."""
         both: dict[int, float | None] = dict(moved)
         if self._symmetric:
-            both.update({j: x for i, x in moved.items() if same_sense((i, j := int(self._mirror[i])))})
+            both.update(
+                {j: x for i, x in moved.items() if same_sense((i, j := int(self._mirror[i])), self._parameters)}
+            )
         return both
 
     def draw_panel(self) -> None:

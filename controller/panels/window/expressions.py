@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from controller.base.errors import ControllerError
-from controller.base.parameters import PARAMETERS, Floats
+from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import Learn, PanelRequest
 from controller.panels.window.colours import LAYERS, packed
 from controller.panels.window.commands import Commands
@@ -26,16 +26,18 @@ class ExpressionButtons:
     """Draws them.
 
     vocabulary : of the stage; a saved expression is added. own : the file that expressions are saved to.
-    earlier : the vocabularies before it.
+    earlier : the vocabularies before it. parameters : of the stage; those of the base vocabulary without.
     newest : the newest parameters (P,). send : tells the body of a saved expression.
     """
 
     def __init__(
         self, vocabulary: Vocabulary, commands: Commands, newest: Callable[[], Floats],
         send: Callable[[PanelRequest], None], own: Path, earlier: Sequence[Path] = (),
+        parameters: Parameters | None = None,
     ) -> None:  # fmt: skip
         self._vocabulary, self._commands, self._newest, self._send = vocabulary, commands, newest, send
         self._affect, self.own, self._earlier = Affect.load(vocabulary), own, earlier
+        self._parameters = parameters or PARAMETERS
         self._intensity, self._name, self._message = 1.0, "", ""
 
     def __call__(self) -> None:
@@ -123,7 +125,7 @@ class ExpressionButtons:
         """Save the present face as an expression, which every link and this panel then know."""
         try:
             face = self._newest().copy()
-            weights = save_expression(self.own, name.strip(), face, self._vocabulary, PARAMETERS, self._earlier)
+            weights = save_expression(self.own, name.strip(), face, self._vocabulary, self._parameters, self._earlier)
         except ControllerError as error:
             self._message = f"{error}; {error.hint}" if getattr(error, "hint", "") else str(error)
             return

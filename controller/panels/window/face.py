@@ -53,12 +53,13 @@ class WindowFace:
         self._viewpoint = Viewpoint(framed(settings.make_camera(), head), framing_of(head))
         self._area = PictureArea()
         newest = lambda: values.full  # noqa: E731
+        parameters = PARAMETERS if options is None else options.parameters
         self._panel = Panel(newest, send, panel_state, options, self._viewpoint, self._area)
         self._mouse = None
         if copy is not None and not settings.kiosk:
-            self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area)
+            self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area, parameters)
             self._panel.more.append(self._mouse.draw_panel)
-        self._devices = Devices(Controls(controls, PARAMETERS), send) if controls else None
+        self._devices = Devices(Controls(controls, parameters), send) if controls else None
         self._log = FrameLog()
         self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
 

@@ -35,10 +35,12 @@ def save_expression(
     ControllerError: the file cannot be read or written, or is wrong.
     """
     _check_name(name, known)
-    weights = np.clip(np.where(np.abs(values) < _LEAST, 0.0, np.round(values, 3)), parameters.low, parameters.high)
+    still = np.abs(values - parameters.rest) < _LEAST
+    face = np.clip(np.where(still, parameters.rest, np.round(values, 3)), parameters.low, parameters.high)
+    weights: Floats = face - parameters.rest
     if not weights.any():
         raise ParameterError("the face is neutral: there is nothing to save", hint="move sliders first")
-    table = {name: {"weights": {parameters.names[i]: float(weights[i]) for i in np.flatnonzero(weights)}}}
+    table = {name: {"weights": {parameters.names[i]: float(face[i]) for i in np.flatnonzero(weights)}}}
     before = "# Expressions saved in the window of omote run.\n"
     if path.exists():
         with reading(path, ConfigError):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from controller.base.parameters import PARAMETERS, Floats
+from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import PanelRequest, StartServos, StopServos
 from controller.body.panel_state import PanelState
 from controller.panels.window.capture import Capture
@@ -32,7 +32,7 @@ class PanelOptions:
 
     vocabulary : its expressions. files : the vocabularies it names; saved expressions go into the last one, or into
     ``mine.toml`` in ``folder``. shows : names of its shows. life : its amount of idle motion.
-    folder : for all that is saved.
+    folder : for all that is saved. parameters : those of the stage.
     """
 
     vocabulary: Vocabulary = field(default_factory=lambda: Vocabulary.load(PARAMETERS))
@@ -40,6 +40,7 @@ class PanelOptions:
     shows: Sequence[str] = ()
     life: float = 0.0
     folder: Path = field(default_factory=Path.cwd)
+    parameters: Parameters = field(default_factory=lambda: PARAMETERS)
 
 
 class Panel:
@@ -57,11 +58,11 @@ class Panel:
         self.area = area or PictureArea()
         self._send, self._state = send, state
         self.commands = Commands(send, options.life)
-        self.capture = Capture(self.area, newest, options.folder)
+        self.capture = Capture(self.area, newest, options.folder, names=options.parameters.names)
         own = options.files[-1] if options.files else options.folder / _OWN
-        self.sliders = Sliders(newest, self.commands, state)
+        self.sliders = Sliders(newest, self.commands, state, options.parameters)
         self.expressions = ExpressionButtons(
-            options.vocabulary, self.commands, newest, send, own, tuple(options.files[:-1])
+            options.vocabulary, self.commands, newest, send, own, tuple(options.files[:-1]), options.parameters
         )
         self.view = View(self.commands, viewpoint or Viewpoint(), self.capture, options.shows, send)
         self.links = Links(state)

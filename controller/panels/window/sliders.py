@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.base.parameters import PARAMETERS, REGIONS, Floats, fold
+from controller.base.parameters import PARAMETERS, Floats, Parameters, fold
 from controller.body.panel_state import PanelState
 from controller.panels.window.colours import layer_colour, packed
 from controller.panels.window.commands import Commands
@@ -19,12 +19,17 @@ class Sliders:
     """Draws the sliders.
 
     newest : the newest parameters (P,). state : the body's state; without it no holder and no servo is shown.
+    parameters : of the stage; those of the base vocabulary without.
     """
 
-    def __init__(self, newest: Callable[[], Floats], commands: Commands, state: PanelState | None = None) -> None:
+    def __init__(
+        self, newest: Callable[[], Floats], commands: Commands, state: PanelState | None = None,
+        parameters: Parameters | None = None,
+    ) -> None:  # fmt: skip
+        self._parameters = parameters or PARAMETERS
         self._newest, self._commands, self._state = newest, commands, state
         self._search, self._linked = "", True
-        self._mirror = PARAMETERS.mirror()
+        self._mirror = self._parameters.mirror()
 
     def __call__(self) -> None:
         """Draw; called once a frame."""
@@ -34,16 +39,21 @@ class Sliders:
         _, self._search = imgui.input_text_with_hint("##search", "search", self._search)
         imgui.same_line()
         _, self._linked = imgui.checkbox("both sides", self._linked)
-        for region in REGIONS:
+        for region in self._parameters.region_names:
             self._region(imgui, region)
 
     def rows(self, region: str) -> list[tuple[int, ...]]:
         """Indices that each slider of a region moves: two where sides are linked."""
-        members = [i for i in map(int, PARAMETERS.region(region)) if fold(self._search) in fold(PARAMETERS.names[i])]
+        members = [
+            i
+            for i in map(int, self._parameters.region(region))
+            if fold(self._search) in fold(self._parameters.names[i])
+        ]
         if not self._linked:
             return [(i,) for i in members]
         pairs = {tuple(sorted({i, int(self._mirror[i])})): None for i in members}
-        return [pair for pair in pairs if same_sense(pair)] + [(i,) for p in pairs if not same_sense(p) for i in p]
+        same = {pair: same_sense(pair, self._parameters) for pair in pairs}
+        return [pair for pair in pairs if same[pair]] + [(i,) for pair in pairs if not same[pair] for i in pair]
 
     def _region(self, imgui: Any, region: str) -> None:
         rows = self.rows(region)
@@ -53,7 +63,7 @@ class Sliders:
             imgui.set_next_item_open(True)
         if not imgui.collapsing_header(f"{region}{self._away(region)}###{region}"):
             return
-        names = [_label(row) for row in rows]
+        names = [_label(row, self._parameters) for row in rows]
         if imgui.begin_table(f"##{region}", 2, imgui.TableFlags_.sizing_stretch_prop):
             width = max(imgui.calc_text_size(name).x for name in names) + imgui.get_frame_height() * 1.4
             imgui.table_setup_column("name", imgui.TableColumnFlags_.width_fixed, width)
@@ -70,14 +80,15 @@ class Sliders:
         values = self._newest()
         locked, held = imgui.checkbox(f"{name}##hold", held)
         if imgui.is_item_hovered():
-            imgui.set_tooltip("hold by hand" if not held else "give back to the layers")
+            about = self._parameters.descriptions.get(self._parameters.names[row[0]], "")
+            imgui.set_tooltip(("hold by hand" if not held else "give back to the layers") + (about and f"\n{about}"))
         if locked:
             self._commands.hold({i: float(values[i]) if held else None for i in row})
         imgui.table_next_column()
         self._slider(imgui, name, row, values)
 
     def _slider(self, imgui: Any, name: str, row: Sequence[int], values: Floats) -> None:
-        low, high = float(PARAMETERS.low[row[0]]), float(PARAMETERS.high[row[0]])
+        low, high = float(self._parameters.low[row[0]]), float(self._parameters.high[row[0]])
         held = [self._commands.now.held.get(i, float(values[i])) for i in row]
         holder = "" if self._state is None else self._state.holder(row[0])
         words = f"%.2f  {holder.replace('%', '%%')}" if holder else "%.2f"
@@ -108,13 +119,13 @@ class Sliders:
         return "" if away is None else f"   servos {away:.1f} deg away"
 
 
-def same_sense(row: Sequence[int]) -> bool:
+def same_sense(row: Sequence[int], parameters: Parameters) -> bool:
     """Whether one value fits both sides: not what moves the whole mouth or jaw aside, nor the eyes' directions."""
-    names = [PARAMETERS.names[i] for i in row]
+    names = [parameters.names[i] for i in row]
     aside = any("Eye" in name or "Look" in name or name in _ASIDE for name in names)
     return len(set(row)) == 2 and not aside
 
 
-def _label(row: Sequence[int]) -> str:
-    name = PARAMETERS.names[row[0]]
+def _label(row: Sequence[int], parameters: Parameters) -> str:
+    name = parameters.names[row[0]]
     return name.removesuffix("Left").removesuffix("Right") if len(row) > 1 else name

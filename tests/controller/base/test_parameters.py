@@ -122,7 +122,8 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         response_s = 0.1
         [parameters]
         good = { region = "mouth", profile = "a" }
-        wide = { region = "moth", profile = "a", range = [1.0, 0.0] }
+        wide = { region = "mouth", profile = "a", range = [1.0, 0.0] }
+        else_ = { region = "jav", profile = "a" }
         slow = { region = "mouth", profile = "a", max_speed = 0.0, sped = 3 }
         lost = { region = "mouth", profile = "b" }
         bare = 3
@@ -134,7 +135,8 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         Parameters.load(path)
     text = str(caught.value)
     for part in (
-        str(path), "8 faults", "colour: unknown key", "parameters.wide.region", "parameters.wide.range",
+        str(path), "8 faults", "colour: unknown key", "parameters.wide.range",
+            "parameters.else_.region: unknown region 'jav', did you mean 'jaw'",
         "parameters.slow.max_speed", "parameters.slow.sped: unknown key", "parameters.lost: unknown profile 'b'",
         "parameters.bare: must be a table (is 3)", "aliases.other: unknown parameter 'god', did you mean 'good'",
     ):  # fmt: skip

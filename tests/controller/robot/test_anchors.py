@@ -202,7 +202,7 @@ def _faults() -> Iterator[tuple[str, str, str]]:
     yield "[0, 1, 0] }", '[0, 1, 0], like = "headYaw" }', "channels[0].anchor.like: the head has no shape"
     yield "[0, 1, 0] }", '[0, 1, 0], like = "eyeBlinkLeft" }', "channels[0].anchor.like: eyeBlinkLeft moves the point"
     yield "[0, 1, 0] }", '[0, 1, 0], like = "jawOpen", both = true }', "channels[0].anchor: both and like"
-    yield "anchor =", "mix = { jawOpen = 1 }\nanchor =", "channels[0]: needs either mix or anchor"
+    yield "anchor =", "mix = { jawOpen = 1 }\nanchor =", "channels[0]: needs one of mix, formula and anchor"
 
 
 @pytest.mark.parametrize(("old", "new", "fault"), list(_faults()))

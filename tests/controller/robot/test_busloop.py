@@ -478,3 +478,36 @@ def test_a_second_instance_on_one_port_is_refused_and_the_first_goes_on(servos: 
         face.values[JAW] = 1.0
         until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
         assert loop.error is None and loop.report()["bus"]["errors"].get("port_lost") is None  # type: ignore[index]
+
+
+def test_still_servos_are_let_go_and_come_back_from_where_they_are(servos: SimulatedBus) -> None:
+    face = Face()
+    with running(servos, face, {"let_go_s": 0.3, "let_go_below_a": 5.0}) as loop:
+        loop.begin()
+        until(lambda: loop._let_go)
+        until(lambda: not servos.servo(1).torque and not servos.servo(2).torque)
+        servos.servo(1).place(2048 + round(2 * TICKS))  # by hand, less than what counts as moved
+        ticked(loop, 10)
+        assert loop._let_go
+        goals: list[float] = []
+        face.values[JAW] = 0.5
+        until(lambda: not loop._let_go)
+        goals.append(degrees(servos, 1))
+        assert goals[0] == pytest.approx(2.0, abs=3.0)  # from where it was, not from 15 degrees
+        until(lambda: abs(degrees(servos, 1) - 15.0) < 0.2)
+        assert servos.servo(1).torque
+        assert loop.report()["let_go"] == {"times": 1, "sagged": 0}
+
+
+def test_a_servo_that_sags_is_taken_again_and_then_held(servos: SimulatedBus) -> None:
+    face = Face()
+    with running(servos, face, {"let_go_s": 0.2, "let_go_below_a": 5.0}) as loop:
+        loop.begin()
+        for count in (1, 2):
+            until(lambda: loop._let_go)
+            servos.servo(2).place(2048 + round(10 * TICKS))
+            until(lambda n=count: loop._letting_go.sagged == n)  # type: ignore[misc]
+            until(lambda: abs(degrees(servos, 2)) < 0.2)
+        ticked(loop, 40)
+        assert not loop._let_go and servos.servo(2).torque
+        assert loop.report()["let_go"] == {"times": 2, "sagged": 2}

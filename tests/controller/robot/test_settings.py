@@ -53,8 +53,7 @@ def fault(model: type, /, **table: Any) -> str:
         ({"slack_deg": 21}, "slack_deg: Input should be less than or equal to 20"),
         ({"trim_deg": float("nan")}, "trim_deg: Input should be a finite number"),
         ({"join": "mean"}, "join: Input should be 'sum', 'min' or 'max'"),
-        ({"mix": {}}, ": needs either mix or anchor"),
-        ({"anchor": {"point": [0, 0], "direction": [0, 1, 0]}}, ": needs either mix or anchor"),
+        ({"anchor": {"point": [0, 0], "direction": [0, 1, 0]}}, ": needs one of mix, formula and anchor"),
     ],
 )
 def test_a_channel_refuses(change: dict[str, Any], message: str) -> None:

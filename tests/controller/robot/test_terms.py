@@ -104,7 +104,7 @@ def test_a_smooth_curve_is_smoother_than_a_straight_one() -> None:
         ("jawOpen = { at = [0, 1], gives = [0] }", "channels[0].mix.jawOpen: at and gives need the same number"),
         ("jawOpen = { at = [0, 1], gives = [0, 1], by = 2 }", "at and gives take the place of by and in"),
         ("jawOpen = { within = [0, 1], inn = 2 }", "channels[0].mix.jawOpen.inn: unknown key"),
-        ("", "channels[0]: needs either mix or anchor"),
+        ("", "channels[0]: 'c' needs one of mix, formula and anchor, or a linkage"),
     ],
 )
 def test_a_faulty_term_is_named_with_its_key(tmp_path: Path, mix: str, fault: str) -> None:

@@ -49,6 +49,10 @@ def test_faults_of_stage_and_references_come_together(tmp_path: Path) -> None:
     [
         ("[face]\nsize = [0, 720]", "face.size[0]: "),
         ("[face]\nqualty = 'full'", "face.qualty: unknown key, did you mean 'quality'?"),
+        (
+            '[[links]]\nkind = "vmc"\nlisten = "127.0.0.1:5"\ngains = { brow = 0.5 }',
+            "links[0].gains: no region called 'brow', did you mean 'brows'",
+        ),
         ("[[links]]\nbaud = 9600", "links[0]: give port, as"),
         ("[[links]]\nport = '/dev/x'\nscript = 'tour'", 'links[0]: script needs port = "simulated"'),
         ("control_hz = 0", "control_hz: "),

@@ -22,7 +22,6 @@ from controller.links.links import read_link
         ({"listen": "0.0.0.0:39539"}, "open_to_network = true allows it"),
         ({"listen": "192.168.1.5:39539"}, "open_to_network = true allows it"),
         ({"listen": "example:39539"}, "open_to_network = true allows it"),
-        ({"listen": "127.0.0.1:5", "gains": {"brow": 0.5}}, "no region called 'brow', did you mean 'brows'"),
         ({"listen": "127.0.0.1:5", "gains": {"brows": 5.0}}, "must be 0 to 4"),
         ({"listen": "127.0.0.1:5", "lost": "panic"}, "'fade', 'hold', 'neutral' or 'stop'"),
         ({"listen": "127.0.0.1:5", "token": "a-token-of-mine"}, "only TCP has one for vmc"),

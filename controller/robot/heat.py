@@ -1,0 +1,55 @@
+"""Limits that follow the temperature: a warm servo moves less far and less fast, long before it switches itself off."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from controller.base.parameters import Floats
+from controller.robot.channels import ChannelTable
+from controller.robot.safety import AllowedRange, RuleCounter, RuleInput
+from controller.robot.settings import HeatRule
+
+_SETTLE_S = 2.0  # in which a reading, which comes in whole degrees, takes effect
+
+
+class HeatRules:
+    """Narrows the range about the neutral face, and the speed, from ``above_c`` to ``full_c``.
+
+    Only measured temperatures count: a servo that has not said how warm it is moves as always, and one that says it no
+    more keeps the last one.
+    """
+
+    def __init__(self, rules: Sequence[HeatRule], table: ChannelTable, neutral: Floats) -> None:
+        each = [(rule, name) for rule in rules for name in rule.channels]
+        self._at = np.array([table.names.index(name) for _, name in each], dtype=np.intp)
+        numbers = np.array([(r.above_c, r.full_c, r.range, r.speed) for r, _ in each]).reshape(-1, 4)
+        self._above, self._full, self._range, self._speed = numbers.T
+        self._neutral = neutral[self._at]
+        self._low, self._high = table.low_rad[self._at], table.high_rad[self._at]
+        self._warmth = np.zeros(len(each))
+        self._share = np.ones(len(table.names))
+        self.counter = RuleCounter([f"heat {name}" for _, name in each])
+
+    def narrow(self, now: RuleInput, allowed: AllowedRange) -> None:
+        """Narrow the allowed range for one cycle."""
+        if now.state is not None:
+            measured = now.state.temperature_c[self._at]
+            wanted = np.clip((measured - self._above) / (self._full - self._above), 0.0, 1.0)
+            wanted = np.where(np.isfinite(measured), wanted, self._warmth)
+            most = now.dt / _SETTLE_S
+            self._warmth += np.clip(wanted - self._warmth, -most, most)
+        kept = 1.0 - self._warmth * (1.0 - self._range)
+        acting = self._warmth > 0.0
+        for sign, end in ((1.0, self._high), (-1.0, self._low)):
+            bound = self._neutral + kept * (end - self._neutral)
+            allowed.narrow(self._at, np.full(len(self._at), sign), bound, acting)
+        self.counter.count(acting, now.dt)
+
+    @property
+    def speed_share(self) -> Floats:
+        """(n,) share of its top speed that each channel of the table may use now."""
+        self._share[:] = 1.0
+        np.minimum.at(self._share, self._at, 1.0 - self._warmth * (1.0 - self._speed))
+        return self._share

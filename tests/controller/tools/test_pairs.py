@@ -1,0 +1,157 @@
+"""omote calibrate --pairs: known mixes come back from pairs that they made; what is not determined is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from controller.base.config import ConfigError
+from controller.base.parameters import PARAMETERS as P
+from controller.cli.app import make_app
+from controller.robot.channels import build_table
+from controller.robot.pairs import fit_servo
+from controller.robot.robot import load_robot
+from controller.tools.pairs import fit_channels, read_pairs, write_robot
+
+JAW, SMILE, FROWN, BLINK = (P.index(n) for n in ("jawOpen", "mouthSmileLeft", "mouthFrownLeft", "eyeBlinkLeft"))
+ROBOT = """
+name = "one"
+buses = [{ name = "head", kind = "simulated", transport = "memory" }]
+
+[profiles.servo]
+bus = "head"
+model = "xl330-m288"
+map = { at = [-1, 1], deg = [-40, 40] }
+limit_deg = [-45, 45]
+max_speed_deg_s = 200
+max_accel_deg_s2 = 2000
+
+# the jaw's own servo
+[[channels]]
+name = "jaw"
+id = 1
+profile = "servo"
+mix = { jawOpen = 1 }
+
+[[channels]]
+name = "corner"
+id = 2
+profile = "servo"
+mix = { mouthSmileLeft = 1 }
+
+[[channels]]
+name = "still"
+id = 3
+profile = "servo"
+mix = { eyeBlinkLeft = 1 }
+"""
+
+
+def faces(count: int = 240, seed: int = 1) -> np.ndarray:
+    """(count, p) smooth motion of four parameters, as a recording has."""
+    rng, t = np.random.default_rng(seed), np.arange(count) / 30
+    values = np.zeros((count, len(P)))
+    for at in (JAW, SMILE, FROWN, BLINK):
+        values[:, at] = 0.5 + 0.5 * np.sin(t * rng.uniform(1.0, 4.0) + rng.uniform(0, 6))
+    return values
+
+
+def true_jaw(values: np.ndarray) -> np.ndarray:
+    return np.asarray(-8.0 + np.interp(values[:, JAW], [0, 0.25, 0.5, 0.75, 1], [0, 2, 6, 16, 40]))
+
+
+def true_corner(values: np.ndarray) -> np.ndarray:
+    return np.asarray(3.0 + 25.0 * values[:, SMILE] - 12.0 * values[:, FROWN])
+
+
+def test_weights_come_back() -> None:
+    values = faces()
+    fit = fit_servo(values, true_corner(values))
+    terms = {term.parameter: float(term.gives[-1] - term.gives[0]) for term in fit.terms}
+    assert set(terms) == {SMILE, FROWN}
+    assert terms[SMILE] == pytest.approx(25.0, abs=0.5)
+    assert terms[FROWN] == pytest.approx(-12.0, abs=0.5)
+    assert fit.left_out_deg < 0.3 and not fit.why_not
+
+
+def test_a_curve_comes_back_monotone_and_predicts_other_faces() -> None:
+    values = faces()
+    fit = fit_servo(values, true_jaw(values) + np.random.default_rng(3).normal(scale=0.2, size=len(values)))
+    (term,) = fit.terms
+    assert term.parameter == JAW and len(term.at) == 5
+    assert (np.diff(term.gives) >= 0.0).all()
+    other = faces(seed=9)
+    assert np.sqrt(((fit.angles(other) - true_jaw(other)) ** 2).mean()) < 0.6
+    assert fit.left_out_deg < 1.0
+
+
+def test_what_the_pairs_do_not_determine_is_said() -> None:
+    values = faces()
+    assert fit_servo(values, np.full(len(values), 4.0)).why_not == "it does not move in the pairs"
+    noise = np.random.default_rng(4).normal(scale=10.0, size=len(values))
+    assert "what was left out is only predicted to" in fit_servo(values, noise).why_not
+    values[:, FROWN] = values[:, SMILE]
+    alike = {frozenset(pair) for pair in fit_servo(values, 10.0 * values[:, SMILE]).alike}
+    assert alike == {frozenset({SMILE, FROWN})}
+    with pytest.raises(ValueError, match="needs 20 pairs or more"):
+        fit_servo(values[:10], np.zeros(10))
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[Path, Path]:
+    (tmp_path / "robot.toml").write_text(ROBOT)
+    values = faces()
+    names = [P.names[i] for i in (JAW, SMILE, FROWN, BLINK)]
+    rows = np.column_stack([np.arange(len(values)) / 30, values[:, [JAW, SMILE, FROWN, BLINK]], true_jaw(values),
+                            true_corner(values), np.zeros(len(values))])  # fmt: skip
+    head = ",".join(["time", *names, "servos:jaw", "servos:corner", "servos:still"])
+    np.savetxt(tmp_path / "pairs.csv", rows, fmt="%.5f", delimiter=",", header=head, comments="")
+    return tmp_path / "robot.toml", tmp_path / "pairs.csv"
+
+
+def test_the_command_writes_the_channels_and_keeps_the_old_file(files: tuple[Path, Path]) -> None:
+    robot, pairs = files
+    result = CliRunner().invoke(make_app(), ["calibrate", str(robot), "--pairs", str(pairs)])
+    assert result.exit_code == 0, result.output
+    assert robot.with_name("robot.before1.toml").read_text() == ROBOT
+    assert "it does not move in the pairs" in " ".join(result.output.split())
+    table, values = build_table(load_robot(robot, P).channels, P), faces(seed=7)
+    angles = np.degrees([table.angles(row)[0] for row in values])
+    assert np.sqrt(((angles[:, 0] - true_jaw(values)) ** 2).mean()) < 1.0
+    assert np.sqrt(((angles[:, 1] - true_corner(values)) ** 2).mean()) < 0.5
+    assert load_robot(robot, P).channels[2].mix == load_robot(robot.with_name("robot.before1.toml"), P).channels[2].mix
+    CliRunner().invoke(make_app(), ["calibrate", str(robot), "--pairs", str(pairs)])
+    assert robot.with_name("robot.before2.toml").exists()
+
+
+def test_limits_of_the_file_stay(files: tuple[Path, Path]) -> None:
+    robot, pairs = files
+    robot.write_text(ROBOT.replace("limit_deg = [-45, 45]", "limit_deg = [-20, 20]").replace("[-40, 40]", "[-20, 20]"))
+    settings = load_robot(robot, P)
+    fitted = fit_channels(settings, read_pairs(pairs, settings, P))
+    write_robot(robot, robot, fitted, P)
+    table = build_table(load_robot(robot, P).channels, P)
+    angles = np.degrees([table.angles(row)[0] for row in faces()])
+    assert np.abs(angles).max() <= 20.0 + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("change", "fault"),
+    [
+        (lambda text: text.replace("servos:jaw", "servos:jaws"), "the robot has no channel of that name"),
+        (lambda text: text.replace("jawOpen", "jawOpn"), "is no parameter, and no servos:NAME"),
+        (lambda text: "\n".join(text.splitlines()[:9]), "has 8 pairs; it takes 20"),
+        (lambda text: text.replace("0.03333", "x", 1), "row 3: has 7 numbers for 8 columns"),
+        (lambda text: "jawOpen\n" + "0.5\n" * 30, "there is no column servos:NAME"),
+    ],
+)
+def test_a_wrong_table_says_what_is_wrong(files: tuple[Path, Path], change: Any, fault: str) -> None:
+    robot, pairs = files
+    pairs.write_text(change(pairs.read_text()))
+    with pytest.raises(ConfigError) as caught:
+        read_pairs(pairs, load_robot(robot, P), P)
+    assert fault in str(caught.value)
