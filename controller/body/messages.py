@@ -47,7 +47,8 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class BodyOrders:
-    """Main to body, first: the stage's file and options. The mailboxes for parameters and panel state follow it."""
+    """Main to body, first: the stage's file and options. The mailboxes for parameters and panel state follow it, two
+    for each head."""
 
     stage: str
     options: RunOptions = RunOptions()
@@ -135,6 +136,14 @@ class StartServos:
 
 
 PanelRequest = Hold | Show | LookAt | Live | PlayShow | ControlShow | Learn | Neutral | StopServos | StartServos
+
+
+@dataclass(frozen=True)
+class ToHead:
+    """Main to body, from the panel: a request for the head of a name; without this it is for the first one."""
+
+    head: str
+    request: PanelRequest
 
 
 @dataclass(frozen=True)

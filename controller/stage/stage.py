@@ -14,6 +14,7 @@ from controller.base.config import Settings, load
 from controller.base.errors import ConfigError, ParameterError, TakeError
 from controller.base.parameters import Parameters, did_you_mean
 from controller.base.paths import find_config
+from controller.base.placement import Placement
 from controller.layers.commands import CommandState
 from controller.layers.idle.settings import IdleSettings
 from controller.layers.mixer import LayerSettings
@@ -22,6 +23,7 @@ from controller.links.line.script import load_script
 from controller.links.links import LinkSettings, LinkTable
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
+from controller.stage.heads import MOST, HeadSettings, Names, head_faults, own_settings
 from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
 from controller.stage.picture import PictureSettings, with_options
 from controller.takes.reader import load_take
@@ -97,10 +99,22 @@ class StageSettings(Settings):
     take: str | None = None
     voice: str | None = None
     voice_hz: Annotated[int, Field(ge=1000)] | None = None
-    groups: Annotated[dict[str, Annotated[float, Field(ge=-1, le=1)]], Field(max_length=64)] = {}
+    groups: Annotated[dict[str, Annotated[float, Field(ge=-1, le=1)] | Names], Field(max_length=64)] = {}
     layers: Annotated[dict[str, dict[str, Any]], Field(max_length=64)] = {}
     face: FaceSettings = FaceSettings()
     links: Annotated[list[LinkTable], Field(max_length=64)] = []
+    heads: Annotated[list[HeadSettings], Field(max_length=MOST)] = []
+    turns: Literal["manual", "auto"] = "manual"
+
+    @property
+    def point_groups(self) -> dict[str, float]:
+        """Group files of control points that are added to the head, each with its amount."""
+        return {name: value for name, value in self.groups.items() if not isinstance(value, list)}
+
+    @property
+    def head_groups(self) -> dict[str, list[str]]:
+        """Names of the heads of each group of them."""
+        return {name: value for name, value in self.groups.items() if isinstance(value, list)}
 
 
 @dataclass(frozen=True)
@@ -110,6 +124,7 @@ class Stage:
     path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
     layers : the layers. life : settings of idle motion. groups : group files added to the head, each with its amount.
     persons : whom the face shows, each with its share. controls : what gamepad and keys do in the window.
+    heads : the heads of a stage with ``[[heads]]``; the rest is that of the first of them. Empty for one head.
     """
 
     path: Path
@@ -123,6 +138,7 @@ class Stage:
     groups: tuple[tuple[Path, float], ...] = ()
     persons: tuple[tuple[Person, float], ...] = ()
     controls: tuple[ControlsFile, ...] = ()
+    heads: tuple[StageHead, ...] = ()
 
     def file(self, name: str) -> Path:
         """A file that the stage names: relative to the stage's folder, or a path."""
@@ -151,6 +167,20 @@ class Stage:
         )
 
 
+@dataclass(frozen=True)
+class StageHead:
+    """One head of a stage that has several. stage : as if it were the only one."""
+
+    name: str
+    stage: Stage
+    placement: Placement
+
+
+def heads_of(stage: Stage) -> tuple[Stage, ...]:
+    """Each head of a stage as a stage of its own; the stage itself where it has one head."""
+    return tuple(head.stage for head in stage.heads) or (stage,)
+
+
 def load_head(
     folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]],
     persons: Sequence[tuple[Person, float]] = (), *, dressed: bool = True,
@@ -174,7 +204,8 @@ def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
     """``stage`` with command-line options over its ``[face]``; see :func:`controller.stage.picture.with_options`."""
     face = with_options(stage.settings.face, wanted)
     persons = tuple(find_persons(face.person, stage.head, beside=stage.path))
-    return replace(stage, persons=persons, settings=stage.settings.model_copy(update={"face": face}))
+    heads = tuple(replace(head, stage=with_picture(head.stage, wanted)) for head in stage.heads)
+    return replace(stage, persons=persons, settings=stage.settings.model_copy(update={"face": face}), heads=heads)
 
 
 def find_persons(person: PersonName, head: Path, beside: Path | None = None) -> list[tuple[Person, float]]:
@@ -195,7 +226,7 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
 
     def check(settings: StageSettings) -> list[str]:
         faults: list[str] = []
-        found[:] = [_gather(path, settings, parameters, faults)]
+        found[:] = [_gather_all(path, settings, parameters, faults)]
         return faults
 
     load(path, StageSettings, check)
@@ -220,6 +251,26 @@ def _layer_faults(links: Sequence[LinkSettings], layers: Sequence[LayerSettings]
     return faults
 
 
+def _gather_all(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
+    """All that a stage and each of its heads refer to."""
+    faults += head_faults(settings.heads, settings.head_groups)
+    if settings.head_groups and not settings.heads:
+        faults.append("groups: groups of heads need [[heads]]")
+    if not settings.heads:
+        return _gather(path, settings, parameters, faults)
+    common: list[str] = []
+    _gather(path, settings.model_copy(update={"heads": [], "robots": [], "links": []}), parameters, common)
+    heads = []
+    for i, head in enumerate(settings.heads):
+        own: list[str] = []
+        update = own_settings(dict(settings), head, i)
+        stage = _gather(path, settings.model_copy(update=update), parameters, own)
+        heads.append(StageHead(head.name, stage, head.placement(i, len(settings.heads))))
+        faults += [f"heads[{i}].{fault.removeprefix('face.')}" for fault in own if fault not in common]
+    faults += common
+    return replace(heads[0].stage, settings=settings, heads=tuple(heads))
+
+
 def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
     """All that a stage refers to; faults are added to ``faults``, and leave the stage unfit for use."""
     head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
@@ -231,7 +282,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
         for i, name in enumerate(settings.robots)
     ]
     more = _files(faults, "vocabularies", settings.vocabularies, path)
-    groups = _files(faults, "groups", list(settings.groups), path)
+    groups = _files(faults, "groups", list(settings.point_groups), path)
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
     layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path))
     life = _collect(faults, "life", lambda: IdleSettings.named(settings.life, parameters))
@@ -246,7 +297,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
         _collect(faults, f"face.controls[{i}]", lambda file=file: load_controls(file, parameters, vocabulary))
         for i, file in enumerate(_files(faults, "controls", settings.face.controls, path) if vocabulary else ())
     )
-    amounts = tuple(zip(groups, settings.groups.values(), strict=False))
+    amounts = tuple(zip(groups, settings.point_groups.values(), strict=False))
     shown = tuple(persons or ())
     stage = Stage(path, settings, head, tuple(robots), more, vocabulary, layers, life, amounts, shown, controls)
     if settings.take is not None:

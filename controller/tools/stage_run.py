@@ -29,13 +29,14 @@ from controller.body.sources import Voice
 from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.links.line.script import script_names
 from controller.panels.web_face import face_in_the_making
-from controller.stage.stage import Stage, check_identity, load_stage, with_picture
+from controller.stage.stage import Stage, check_identity, heads_of, load_stage, with_picture
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
 from drivers.base.priority import lower_process_priority
 from surface.base.extras import require
 
 if TYPE_CHECKING:
+    from controller.face.wall import WallFace  # start-up: the body gets its orders first
     from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
     from controller.panels.window.panel import PanelOptions  # start-up: the same
     from surface.head import Head  # start-up: the same
@@ -83,7 +84,7 @@ class StageRun:
             load_take(options.take, PARAMETERS)
         if (voice := _voice(stage, options)) is not None:
             voice.check()
-        if options.mirror and not stage.robots:
+        if options.mirror and not any(each.robots for each in heads_of(stage)):
             raise ConfigError(f"{stage.path}: robots: a stage without a robot has nothing to mirror")
         self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
         self._web, self._web_look, self._identity = web, look or {}, identity
@@ -95,16 +96,25 @@ class StageRun:
 
         ``pictures`` : folder for a contact sheet and a clip; None reads no picture back.
         """
-        recorder = Recorder() if pictures else None
+        recorder = Recorder(whole=bool(self.stage.heads)) if pictures else None
         with self._body() as (body, flag):
-            values, head = self._load_head(body)
-            with closing(HeadlessFace(head, self.stage.settings.face, values, recorder)) as face:
+            with closing(self._headless_face(body, recorder)) as face:
                 failed = self._show(face, self._begin(body, flag, seconds))
             report = self._end(body, None if failed else face.report(), failed)
         if recorder is not None and pictures is not None:
             self._status("writing the pictures")
             report["written"] = recorder.write(pictures)
         return report
+
+    def _headless_face(self, body: BodyProcess, recorder: Recorder | None) -> HeadlessFace | WallFace:
+        """What draws the head, or the wall of heads."""
+        if self.stage.heads:
+            from controller.face.wall import WallFace  # start-up: the body gets its orders first
+
+            lower_process_priority()
+            return WallFace(self.stage, PARAMETERS, body.mailboxes, recorder)
+        values, head = self._load_head(body)
+        return HeadlessFace(head, self.stage.settings.face, values, recorder)
 
     def run_window(self, seconds: float | None) -> dict[str, Any]:
         """Run with a window until it is closed, the take ends or ``seconds`` are over."""
@@ -165,7 +175,7 @@ class StageRun:
         in_time = deadline(seconds)
         return lambda: not flag.is_set() and in_time() and body.alive()
 
-    def _show(self, face: HeadlessFace | WindowFace, keep_going: Callable[[], bool]) -> Part | None:
+    def _show(self, face: HeadlessFace | WallFace | WindowFace, keep_going: Callable[[], bool]) -> Part | None:
         """Show the face while the run goes on; returns the part of a face that failed while servos follow.
 
         Raises what ends the run, and an error of the face where no servo follows.
@@ -174,7 +184,7 @@ class StageRun:
         try:
             face.run(asked)
         except Exception as error:
-            if asked.ended or not self.stage.robots:
+            if asked.ended or not any(stage.robots for stage in heads_of(self.stage)):
                 raise
             part = Part("the picture", remedy="it comes back with the next start", effect="links and servos go on")
             part.fail(error, time.monotonic())
