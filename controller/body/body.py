@@ -10,6 +10,7 @@ from __future__ import annotations
 import logging
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from controller.base.errors import ConfigError
@@ -40,10 +41,19 @@ from drivers.base.shutdown import Closers
 log = logging.getLogger(__name__)
 
 
+Relay = Callable[[int, float, Floats, int], int]
+"""Gets the time of a tick (ns), its length (s), the values (P,), which it may change, and the time of the newest
+command in them; returns the time of the newest command in what it left."""
+
+
 class Body:
     """Everything between the links and the servos of one head; publishes the parameters to ``mailbox``.
 
     member : it is one of several heads, which :class:`controller.body.hall.Hall` ticks; None where it is alone.
+
+    Attributes
+    ----------
+    relay : passes on what was mixed to other processes, or replaces it by what they want; None where there are none.
     """
 
     def __init__(
@@ -55,6 +65,7 @@ class Body:
         member: Member | None = None,
     ) -> None:
         self.stage, self._member = stage, member
+        self.relay: Relay | None = None
         self._closers = Closers()
         self.state = stage.state(parameters)
         if member is not None:
@@ -262,6 +273,8 @@ class Body:
         begun, values = self._begun.is_set(), self._newest[0].copy()
         self.sources.tick(now_ns, begun)
         stamp = self._tick(now_ns, step_s, values, begun)
+        if self.relay is not None:
+            stamp = self.relay(now_ns, step_s, values, stamp)
         is_new, self._newest = stamp > self._newest[1], (values, stamp)
         for bus in self.buses:
             bus.feed(step_s, urgent=is_new)

@@ -16,10 +16,12 @@ from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.body import Body
 from controller.body.hall import Hall
+from controller.body.nodes import open_node
 from controller.body.panel_requests import carry_out
 from controller.body.panel_state import PanelState
 from controller.layers.mixer import by_priority
 from controller.stage.stage import heads_of, load_stage
+from controller.stage.zenoh import for_role
 from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.base.shutdown import combine_with_context
 
@@ -48,7 +50,7 @@ def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
 
 
 def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event) -> None:
-    stage = load_stage(orders.stage, PARAMETERS)
+    stage = for_role(load_stage(orders.stage, PARAMETERS), orders.options.role, orders.options.heads)
     mailboxes, panels = [], []
     for each in heads_of(stage):
         mailboxes.append(Mailbox.receive(pipe, len(PARAMETERS.names)))
@@ -59,14 +61,18 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event)
         body = Hall(stage, PARAMETERS, mailboxes, panels, orders.options)
     else:
         body = Body(stage, PARAMETERS, mailboxes[0], orders.options)
+    bodies = body.bodies if isinstance(body, Hall) else [body]
+    node = open_node(stage, bodies)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
-    body.start()
     try:
+        body.start()
         _send(pipe, messages.Ready())
         _wait(body, pipe, stop, panels[0])
     finally:
         body.stop()
-    _send(pipe, messages.Report(body.report()))
+        if node is not None:
+            node.close()
+    _send(pipe, messages.Report({**body.report(), **({"zenoh": node.report()} if node is not None else {})}))
 
 
 def _wait(body: Body | Hall, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:

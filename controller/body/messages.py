@@ -33,6 +33,7 @@ class RunOptions:
     mirror : leave the servos' torque off; the face follows a head that is moved by hand.
     record : file for every command and tick. web : a web panel. show : a script to play instead of the stage's show.
     events : file for the lines and marks of shows. lsl : send those marks as LSL markers.
+    role, heads : replace those of the stage's ``[zenoh]``.
     """
 
     take: Path | None = None
@@ -43,6 +44,8 @@ class RunOptions:
     show: Path | None = None
     events: Path | None = None
     lsl: bool = False
+    role: str | None = None
+    heads: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -64,7 +64,7 @@ class CommandState:
     link_status : says how links are, for STATUS.
     servo_records, link_records : every servo and link, for :meth:`overview`.
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
-    on_command : called after each command, in the thread that gave it.
+    on_command : called after each command, in the thread that gave it. on_event : as a journal, but without ticks.
     parts : what fails alone; a source of a layer that fails lets its layer fade out, and begins again.
     stop_latch : keeps the servos off from STOP to START; that of all heads where there are several.
     name : of the head, empty where the stage has one head. heads : all of them by name. placement : where it stands.
@@ -113,6 +113,7 @@ class CommandState:
         self.heads: Directory = Heads()
         self._lock = threading.Lock()
         self._journal: Journal | None = None
+        self.on_event: Journal | None = None
         self._stamp_ns = 0
         self._now_s = 0.0
         self._ticks = 0
@@ -145,6 +146,8 @@ class CommandState:
             self._stamp_ns = max(self._stamp_ns, stamp_ns)
             if self._journal is not None:
                 self._journal(name, *arguments)
+        if self.on_event is not None and name != "tick":
+            self.on_event(name, *arguments)
         if stamp_ns:
             self.on_command()
 
@@ -185,6 +188,12 @@ class CommandState:
         elif self._idle.holding:
             life.update(now_s, looking=False)
             self._idle.release()
+
+    @property
+    def gaze_rad(self) -> tuple[float, float] | None:
+        """Yaw and pitch of what it looks at; None where it looks at nothing in particular."""
+        yaw, pitch = self._gaze.direction_deg
+        return (math.radians(yaw), math.radians(pitch)) if self._gaze.active else None
 
     @property
     def liveliness(self) -> float:

@@ -67,7 +67,7 @@ def own_settings(stage: Mapping[str, Any], head: HeadSettings, index: int) -> di
     stage : the stage's settings by key.
     """
     first = index == 0
-    found: dict[str, Any] = {"heads": [], "seed": stage["seed"] + index}
+    found: dict[str, Any] = {"heads": [], "zenoh": None, "seed": stage["seed"] + index}
     for key in ("head", "identity", "liveliness", "life", "manner", "seed"):
         if (own := getattr(head, key)) is not None:
             found[key] = own

@@ -26,6 +26,7 @@ from controller.robot.settings import RobotSettings
 from controller.stage.heads import MOST, HeadSettings, Names, head_faults, own_settings
 from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
 from controller.stage.picture import PictureSettings, with_options
+from controller.stage.zenoh import ZenohSettings
 from controller.takes.reader import load_take
 from controller.vocabulary.controls import ControlsFile, load_controls
 from controller.vocabulary.vocabulary import Vocabulary
@@ -105,6 +106,7 @@ class StageSettings(Settings):
     links: Annotated[list[LinkTable], Field(max_length=64)] = []
     heads: Annotated[list[HeadSettings], Field(max_length=MOST)] = []
     turns: Literal["manual", "auto"] = "manual"
+    zenoh: ZenohSettings | None = None
 
     @property
     def point_groups(self) -> dict[str, float]:

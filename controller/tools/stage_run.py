@@ -30,6 +30,7 @@ from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.links.line.script import script_names
 from controller.panels.web_face import face_in_the_making
 from controller.stage.stage import Stage, check_identity, heads_of, load_stage, with_picture
+from controller.stage.zenoh import for_role
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
 from drivers.base.priority import lower_process_priority
@@ -74,7 +75,7 @@ class StageRun:
         preloaded: PreloadedBody | None = None,
         web: str | None = None,
     ) -> None:
-        stage = with_picture(load_stage(name, PARAMETERS), look or {})
+        stage = for_role(with_picture(load_stage(name, PARAMETERS), look or {}), options.role, options.heads)
         if identity:
             check_identity(stage.head, identity)
             stage = replace(stage, settings=stage.settings.model_copy(update={"identity": dict(identity)}))
@@ -96,7 +97,9 @@ class StageRun:
 
         ``pictures`` : folder for a contact sheet and a clip; None reads no picture back.
         """
-        recorder = Recorder(whole=bool(self.stage.heads)) if pictures else None
+        recorder = None
+        if pictures:
+            recorder = Recorder(whole=True) if self.stage.heads else Recorder()
         with self._body() as (body, flag):
             with closing(self._headless_face(body, recorder)) as face:
                 failed = self._show(face, self._begin(body, flag, seconds))

@@ -33,6 +33,7 @@ def test_tiles_leave_the_heads_as_large_as_can_be(count: int, size: tuple[int, i
     assert grid(count, size) == wanted
 
 
+@pytest.mark.slow
 def test_heads_that_look_alike_are_a_crowd_and_each_shows_its_own_face(tmp_path: Path) -> None:
     stage = stage_of(tmp_path, "", 'person = "oak"', "")
     rows = np.zeros((3, len(P)))
@@ -47,6 +48,7 @@ def test_heads_that_look_alike_are_a_crowd_and_each_shows_its_own_face(tmp_path:
     np.testing.assert_array_equal(joined[:, 64:128], other)
 
 
+@pytest.mark.slow
 def test_the_newest_face_of_every_head_is_drawn_and_kept(tmp_path: Path) -> None:
     stage = stage_of(tmp_path, 'person = "oak"', "")
     with ExitStack() as stack:
