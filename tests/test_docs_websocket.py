@@ -28,7 +28,8 @@ def test_every_message_of_the_table_is_taken_and_every_message_is_in_it() -> Non
         reply = talk.handle(json.dumps({"id": 1, **json.loads(text)}), 10**9)
         assert reply is not None
         refused = getattr(reply, "message", "")
-        assert not refused or "no shows" in refused, (text, refused)
+        lacking = ("no shows", "there is one head", "no head called")  # here; tests of several heads try those
+        assert not refused or any(each in refused for each in lacking), (text, refused)
     mapping = schema()["properties"]["request"]["discriminator"]["mapping"]
     assert {json.loads(text)["type"] for text in REQUESTS} == set(mapping)
 

@@ -8,28 +8,22 @@ main process, SIGTERM, or an error in this process.
 from __future__ import annotations
 
 import logging
-import os
-import signal
 import threading
 import time
-from contextlib import suppress
-from multiprocessing.connection import Connection
+from collections.abc import Callable
 from pathlib import Path
 
-from controller.base.errors import OMOTE_ERRORS, ConfigError
+from controller.base.errors import ConfigError
 from controller.base.linked_clocks import HurriedClock
 from controller.base.mailboxes import Mailbox
-from controller.base.parameters import PARAMETERS, Floats, Parameters
+from controller.base.parameters import Floats, Parameters
 from controller.base.parts import Part
-from controller.base.signals import termination_signals
-from controller.body import messages
 from controller.body.event_log import EventLog
 from controller.body.link_part import LinkPart, link_status, thread_errors
+from controller.body.member import Member
 from controller.body.messages import RunOptions
-from controller.body.panel_requests import carry_out
 from controller.body.panel_state import PanelState
 from controller.body.sources import Sources, Voice, show_part
-from controller.layers.mixer import by_priority
 from controller.links.kind import LinkContext
 from controller.links.line.script import Script, load_named_script, load_script, script_names
 from controller.links.line.show import Shows
@@ -37,20 +31,30 @@ from controller.robot.busloop import BusLoop
 from controller.robot.following import MeasuredFace
 from controller.robot.servo_states import servo_states
 from controller.robot.settings import RobotSettings
-from controller.stage.stage import Stage, load_stage
+from controller.stage.stage import Stage
 from controller.takes.livelink import TakePlayer
 from controller.takes.reader import load_take, reader_of
 from controller.takes.recording import SUFFIX, Replay, recorded
-from drivers.base.priority import request_realtime, shorten_thread_switches
-from drivers.base.shutdown import Closers, combine_with_context
+from drivers.base.priority import request_realtime
+from drivers.base.shutdown import Closers
 
 log = logging.getLogger(__name__)
 
-_POLL_S = 0.1
+
+Relay = Callable[[int, float, Floats, int], int]
+"""Gets the time of a tick (ns), its length (s), the values (P,), which it may change, and the time of the newest
+command in them; returns the time of the newest command in what it left."""
 
 
 class Body:
-    """Everything between the links and the servos of one stage; publishes the parameters to ``mailbox``."""
+    """Everything between the links and the servos of one head; publishes the parameters to ``mailbox``.
+
+    member : it is one of several heads, which :class:`controller.body.hall.Hall` ticks; None where it is alone.
+
+    Attributes
+    ----------
+    relay : passes on what was mixed to other processes, or replaces it by what they want; None where there are none.
+    """
 
     def __init__(
         self,
@@ -58,16 +62,20 @@ class Body:
         parameters: Parameters,
         mailbox: Mailbox,
         options: RunOptions = RunOptions(),
+        member: Member | None = None,
     ) -> None:
-        self.stage = stage
+        self.stage, self._member = stage, member
+        self.relay: Relay | None = None
         self._closers = Closers()
         self.state = stage.state(parameters)
+        if member is not None:
+            member.join(self.state)
         path, self.replay = options.take, None
         if path is not None and path.suffix == SUFFIX:
             self.replay = Replay(path, parameters, stage.state)
         elif options.record is not None:
             self._record(options.record)
-        self.clock = HurriedClock(stage.settings.control_hz)
+        self.clock = HurriedClock(stage.settings.control_hz) if member is None else member.clock
         self.state.on_command = self.clock.hurry
         liveliness = 0.0 if options.mirror else stage.settings.liveliness
         self.state.live(liveliness, 0, stage.settings.manner)  # 0: no command set it
@@ -120,7 +128,8 @@ class Body:
             from controller.robot.anchors import load_anchors  # start-up: loads the head
 
             anchors = load_anchors(robot, self.stage.head, parameters)
-        prefix = f"{robot.name}/" if len(self.stage.robots) > 1 else ""  # so that all buses have different names
+        prefix = f"{self.state.name}/" if self._member is not None else ""
+        prefix += f"{robot.name}/" if len(self.stage.robots) > 1 else ""  # so that all buses have different names
         return [
             BusLoop(
                 bus.model_copy(update={"name": prefix + bus.name}), robot.on_bus(bus.name), parameters, self.newest,
@@ -174,7 +183,8 @@ class Body:
             for bus in self.buses:
                 bus.start()
                 self._closers.callback(bus.stop)
-            self._thread.start()
+            if self._member is None:
+                self._thread.start()
         except BaseException:
             self._closers.close()
             raise
@@ -255,15 +265,20 @@ class Body:
             self._error = error
 
     def _control_loop(self) -> None:
-        values = self._newest[0].copy()
         for now in self.clock.run(lambda: not self._stopping.is_set()):
-            begun = self._begun.is_set()
-            self.sources.tick(now, begun)
-            stamp = self._tick(now, self.clock.step_s, values, begun)
-            is_new, self._newest = stamp > self._newest[1], (values.copy(), stamp)
-            for bus in self.buses:
-                bus.feed(self.clock.step_s, urgent=is_new)
-            self._mailbox.publish(values, stamp)
+            self.tick(now, self.clock.step_s)
+
+    def tick(self, now_ns: int, step_s: float) -> None:
+        """One step of the face: its sources, the layers, and what of it the buses and the picture get."""
+        begun, values = self._begun.is_set(), self._newest[0].copy()
+        self.sources.tick(now_ns, begun)
+        stamp = self._tick(now_ns, step_s, values, begun)
+        if self.relay is not None:
+            stamp = self.relay(now_ns, step_s, values, stamp)
+        is_new, self._newest = stamp > self._newest[1], (values, stamp)
+        for bus in self.buses:
+            bus.feed(step_s, urgent=is_new)
+        self._mailbox.publish(values, stamp)
 
     def _tick(self, now_ns: int, dt: float, values: Floats, begun: bool) -> int:
         """Write the face of this tick to ``values`` : (P,); a recording that cannot be played on leaves it as it is."""
@@ -285,74 +300,3 @@ class Body:
             "buses": [bus.report() for bus in self.buses],
             "parts": self.state.parts.report(),
         }
-
-
-def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
-    """Run the body's process.
-
-    Sends to main one :class:`Ready` or :class:`Failed`, perhaps :class:`Finished`, at the end a :class:`Report`.
-    Main may send requests of its panel; ``Stop`` and main's own end both mean stop.
-    """
-    stop = threading.Event()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
-    for ending in termination_signals():
-        signal.signal(ending, lambda *_: stop.set())
-    try:
-        _serve(orders, pipe, stop)
-    except OMOTE_ERRORS as error:
-        with_earlier = combine_with_context(error)
-        _send(pipe, messages.Failed(str(with_earlier), getattr(with_earlier, "hint", "")))
-    except Exception as error:
-        if os.environ.get("OMOTE_DEBUG"):
-            raise
-        _send(pipe, messages.Failed(f"the body process failed: {type(error).__name__}: {error}"))
-
-
-def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event) -> None:
-    stage = load_stage(orders.stage, PARAMETERS)
-    parameters = stage.parameters
-    mailbox = Mailbox.receive(pipe, len(parameters))
-    panel = Mailbox.receive(pipe, PanelState.size(parameters))
-    panel_state = PanelState(panel, [layer.name for layer in by_priority(stage.layers)], parameters)
-    body = Body(stage, parameters, mailbox, orders.options)
-    shorten_thread_switches()  # before torque: later garbage collections have few objects to check
-    body.start()
-    try:
-        _send(pipe, messages.Ready())
-        _wait(body, pipe, stop, panel_state)
-    finally:
-        body.stop()
-    _send(pipe, messages.Report(body.report()))
-
-
-def _wait(body: Body, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
-    """Serve main until it requests a stop or has ended, a signal arrives, or a bus failed for good."""
-    finished = False
-    while not stop.is_set():
-        if pipe.poll(_POLL_S) and not _handle(body, pipe):
-            return
-        if panel_state is not None:
-            body.publish(panel_state)
-        if body.finished and not finished:
-            _send(pipe, messages.Finished())
-            finished = True
-        body.check()
-
-
-def _handle(body: Body, pipe: Connection) -> bool:
-    """Carry out a request of main or its panel; False when it requests a stop or has ended."""
-    try:
-        request = pipe.recv()
-    except (EOFError, OSError):
-        return False
-    if isinstance(request, messages.Begin):
-        shorten_thread_switches()
-        request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
-        body.begin()
-        return True
-    return carry_out(request, body.state, time.monotonic_ns())
-
-
-def _send(pipe: Connection, message: object) -> None:
-    with suppress(OSError):  # main has ended; the servos are still stopped
-        pipe.send(message)

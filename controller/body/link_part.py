@@ -15,6 +15,7 @@ from drivers.base.shutdown import Closers
 
 _CLOSE_S = 3.0
 _LONGEST_STATUS = 400
+_PLAIN_HOOK = threading.excepthook
 
 
 class LinkPart:
@@ -136,6 +137,9 @@ def thread_errors(links: Callable[[], list[LinkPart]], parts: Parts) -> Iterator
             if link.owns(dropped.thread):
                 link.fail(error)
                 return
+        if before is not _PLAIN_HOOK:  # that of another head, whose link it may be
+            before(dropped)
+            return
         name = f"thread {dropped.thread.name}" if dropped.thread is not None else "a thread"
         parts.add(Part(name, remedy="it comes back with the next start")).fail(error, time.monotonic())
 

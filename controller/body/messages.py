@@ -33,6 +33,7 @@ class RunOptions:
     mirror : leave the servos' torque off; the face follows a head that is moved by hand.
     record : file for every command and tick. web : a web panel. show : a script to play instead of the stage's show.
     events : file for the lines and marks of shows. lsl : send those marks as LSL markers.
+    role, heads : replace those of the stage's ``[zenoh]``.
     """
 
     take: Path | None = None
@@ -43,11 +44,14 @@ class RunOptions:
     show: Path | None = None
     events: Path | None = None
     lsl: bool = False
+    role: str | None = None
+    heads: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
 class BodyOrders:
-    """Main to body, first: the stage's file and options. The mailboxes for parameters and panel state follow it."""
+    """Main to body, first: the stage's file and options. The mailboxes for parameters and panel state follow it, two
+    for each head."""
 
     stage: str
     options: RunOptions = RunOptions()
@@ -135,6 +139,14 @@ class StartServos:
 
 
 PanelRequest = Hold | Show | LookAt | Live | PlayShow | ControlShow | Learn | Neutral | StopServos | StartServos
+
+
+@dataclass(frozen=True)
+class ToHead:
+    """Main to body, from the panel: a request for the head of a name; without this it is for the first one."""
+
+    head: str
+    request: PanelRequest
 
 
 @dataclass(frozen=True)

@@ -93,7 +93,7 @@ def _wait(pipe: Connection, voice: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
     unblock_signals()
     with garbage_collection_off():
-        from controller.body.body import body_main  # start-up: in the child, while main reads its orders
+        from controller.body.main import body_main  # start-up: in the child, while main reads its orders
     try:
         orders: BodyOrders = pipe.recv()
     except (EOFError, OSError):

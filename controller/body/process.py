@@ -15,7 +15,7 @@ from controller.body.panel_state import PanelState
 from controller.body.preload import PreloadedBody
 from controller.body.sources import pump
 from controller.layers.mixer import by_priority
-from controller.stage.stage import Stage
+from controller.stage.stage import Stage, heads_of
 
 _START_TIMEOUT_S = 60.0
 _STOP_TIMEOUT_S = 30.0
@@ -26,6 +26,10 @@ class BodyProcess:
     """The body as main sees it; a context manager that always stops it.
 
     ``preloaded`` : a process that waits for orders; without one it is started here.
+
+    Attributes
+    ----------
+    mailboxes, panel_states : of each head, in the order of the stage. mailbox, panel_state : of the first one.
     """
 
     def __init__(
@@ -41,15 +45,20 @@ class BodyProcess:
             pump(preloaded.voice)
         else:
             preloaded.voice.close()
-        self.mailbox = Mailbox.create(len(parameters.names))
-        self._panel_mailbox = Mailbox.create(PanelState.size(parameters))
-        self.panel_state = PanelState(
-            self._panel_mailbox, [layer.name for layer in by_priority(stage.layers)], parameters
-        )
+        stages = heads_of(stage)
+        self.mailboxes = [Mailbox.create(len(parameters.names)) for _ in stages]
+        self._panel_mailboxes = [Mailbox.create(PanelState.size(parameters)) for _ in stages]
+        self.panel_states = [
+            PanelState(mailbox, [layer.name for layer in by_priority(each.layers)], parameters)
+            for mailbox, each in zip(self._panel_mailboxes, stages, strict=True)
+        ]
+        self.mailbox, self.panel_state = self.mailboxes[0], self.panel_states[0]
         self.finished = False
         self.report: dict[str, object] = {}
         self._pipe, self._process = preloaded.pipe, preloaded.process
-        preloaded.send(messages.BodyOrders(str(stage.path), options), self.mailbox, self._panel_mailbox)
+        pairs = zip(self.mailboxes, self._panel_mailboxes, strict=True)
+        boxes = [mailbox for pair in pairs for mailbox in pair]
+        preloaded.send(messages.BodyOrders(str(stage.path), options), *boxes)
 
     def wait_ready(self) -> messages.Ready:
         """Wait until the servos are up; raises ControllerError with the body's message when they do not come up."""
@@ -68,7 +77,7 @@ class BodyProcess:
             self._handle(self._receive(0.0))
         return not self.finished
 
-    def send(self, request: messages.Begin | messages.PanelRequest) -> None:
+    def send(self, request: messages.Begin | messages.PanelRequest | messages.ToHead) -> None:
         """Send a request of main or its panel."""
         with suppress(OSError):  # alive() reports a body that has ended
             self._pipe.send(request)
@@ -127,8 +136,8 @@ class BodyProcess:
                 self._end_process()
         finally:
             self._pipe.close()
-            self.mailbox.close()
-            self._panel_mailbox.close()
+            for mailbox in (*self.mailboxes, *self._panel_mailboxes):
+                mailbox.close()
 
 
 def deadline(seconds: float | None) -> Callable[[], bool]:

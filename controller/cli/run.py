@@ -83,6 +83,12 @@ def run(
         str | None,
         typer.Option("--web", metavar="HOST:PORT", help="Serve a web panel; 127.0.0.1:8080 without an address."),
     ] = None,
+    role: Annotated[
+        str | None, typer.Option("--role", help="Of this process, with [zenoh]: conductor, head, face or recorder.")
+    ] = None,
+    heads: Annotated[
+        str | None, typer.Option("--heads", metavar="NAME[,NAME]", help="Heads of this process, with [zenoh].")
+    ] = None,
 ) -> None:
     """Run a stage until it is stopped (Ctrl-C) or its time is up.
 
@@ -96,7 +102,7 @@ def run(
     look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "fps": fps, "theme": theme,
             "camera": camera, "evaluator": evaluator, "person": parse_person(person)}  # fmt: skip
     _run(stage, seconds, headless, no_face, pictures, report, mirror=mirror, voice=voice, voice_hz=voice_hz,
-         record=record, identity=identity, look=look, web=web)  # fmt: skip
+         record=record, identity=identity, look=look, web=web, role=role, heads=heads)  # fmt: skip
 
 
 def play(
@@ -179,6 +185,8 @@ def _run(
     identity: str | None = None,
     look: Mapping[str, object] | None = None,
     web: str | None = None,
+    role: str | None = None,
+    heads: str | None = None,
 ) -> None:
     from controller.body.preload import PreloadedBody, garbage_collection_off  # start-up: --help does without it
 
@@ -191,7 +199,9 @@ def _run(
         from controller.stage.stage import parse_identity
         from controller.tools.stage_run import StageRun, has_display, write_report
 
-        options = RunOptions(take, mirror, None if voice is None else Voice(voice, voice_hz, alone), record)
+        own = tuple(name.strip() for name in (heads or "").split(",") if name.strip())
+        heard = None if voice is None else Voice(voice, voice_hz, alone)
+        options = RunOptions(take, mirror, heard, record, role=role, heads=own)
         session = StageRun(stage, options, parse_identity(identity), look, status.update, preloaded, web)
         if no_face:
             measured = session.run_without_face(seconds)

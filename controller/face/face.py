@@ -61,10 +61,11 @@ class Recorder:
 
     clip_hz : pictures per second in the clip. height : height of the kept pictures (pixels).
     most : pictures kept. A longer run keeps every second one, then every fourth, and so on.
+    whole : keep whole pictures, not their middle squares.
     """
 
-    def __init__(self, *, clip_hz: float = 12.5, height: int = 360, most: int = 400) -> None:
-        self.clip_hz, self.height, self._most = clip_hz, height, most
+    def __init__(self, *, clip_hz: float = 12.5, height: int = 360, most: int = 400, whole: bool = False) -> None:
+        self.clip_hz, self.height, self._most, self._whole = clip_hz, height, most, whole
         self.frames: list[Image] = []
         self.times_s: list[float] = []
         self._next_s = 0.0
@@ -74,14 +75,14 @@ class Recorder:
         return time_s >= self._next_s
 
     def keep(self, picture: Image, time_s: float) -> None:
-        """Keep the middle square of one picture (h, w, 3) uint8, made smaller."""
-        side = min(picture.shape[:2])
-        top, left = (picture.shape[0] - side) // 2, (picture.shape[1] - side) // 2
+        """Keep the middle square of one picture (h, w, 3) uint8, or all of it, made smaller."""
+        height, width = picture.shape[:2] if self._whole else [min(picture.shape[:2])] * 2
+        top, left = (picture.shape[0] - height) // 2, (picture.shape[1] - width) // 2
         step = max(1, picture.shape[0] // self.height)
-        n = side // step
-        square, total = picture[top : top + n * step, left : left + n * step], np.zeros((n, n, 3), np.uint16)
+        m, n = height // step, width // step
+        kept, total = picture[top : top + m * step, left : left + n * step], np.zeros((m, n, 3), np.uint16)
         for row, column in np.ndindex(step, step):
-            total += square[row::step, column::step]
+            total += kept[row::step, column::step]
         self.frames.append((total // step**2).astype(np.uint8))
         self.times_s.append(time_s)
         if len(self.frames) > self._most:

@@ -15,20 +15,23 @@ from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS, Parameters
 from controller.base.paths import find_config
 from controller.face.face import head_indices
+from controller.face.wall import Wall
 from controller.stage.persons import Person
 from controller.stage.picture import PictureSettings, with_options
 from controller.stage.stage import (
     FaceSettings,
+    Stage,
     check_identity,
     find_persons,
     load_head,
     load_stage,
     parse_identity,
+    with_picture,
 )
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Crowd, Head
 from surface.view.pictures.offscreen import Offscreen
-from surface.view.pictures.sheet import contact_sheet, crowd_sheet, write_png
+from surface.view.pictures.sheet import compose, contact_sheet, crowd_sheet, write_png
 from surface.view.scene.framing import framed
 
 
@@ -40,6 +43,7 @@ class Still:
     head : folder of the head. identity : its variations, by name. groups : group files and their amounts.
     vocabulary : the named expressions. persons : whom it shows, each with its share.
     parameters : of the stage and the vocabularies that were named.
+    wall : a stage of several heads, all of which are drawn; None for one head.
     """
 
     values: NDArray[np.float64]
@@ -51,6 +55,7 @@ class Still:
     vocabulary: Vocabulary
     persons: tuple[tuple[Person, float], ...] = ()
     parameters: Parameters = field(default_factory=lambda: PARAMETERS)
+    wall: Stage | None = None
 
     @classmethod
     def parse(
@@ -80,7 +85,10 @@ class Still:
         width_height = parse_size(size or "800x800") if size or base is None else face.size
         picture = with_options(face, look or {})
         persons = tuple(find_persons(picture.person, folder, beside=base.path if base else None))
-        return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons, parameters)
+        wall = None
+        if base is not None and base.heads and head is None:
+            wall = with_picture(base, look or {})
+        return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons, parameters, wall)
 
     def load_head(self) -> Head:
         """The head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
@@ -146,6 +154,9 @@ def _add_expression(parameters: Parameters, vocabulary: Vocabulary, values: NDAr
 
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
+    if still.wall is not None:
+        _draw_wall(still.wall, still, out)
+        return
     head, look = still.load_head(), still.look
     with Offscreen(
         head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator
@@ -154,6 +165,13 @@ def draw_still(still: Still, out: Path) -> None:
             for_head(still.values, head.parameters, still.parameters), framed(look.make_camera(), head)
         )
     write_png(picture, out)
+
+
+def _draw_wall(stage: Stage, still: Still, out: Path) -> None:
+    """Draw all heads of a stage side by side, each with its name."""
+    with Wall(stage, still.parameters, still.size) as wall:
+        pictures = wall.pictures(np.tile(still.values, (len(wall.names), 1)))
+        write_png(compose(pictures, wall.names, columns=wall.columns), out)
 
 
 def for_head(

@@ -18,114 +18,22 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.parts import Parts
+from controller.base.placement import Placement
 from controller.base.stop_latch import StopLatch
-from controller.layers.idle.settings import IdleSettings, check_manner
+from controller.layers.heads import Heads
+from controller.layers.idle.settings import AUTO, IdleSettings, check_manner
 from controller.layers.mixer import LayerSettings, Mixer
 from controller.layers.settings import default_layers
+from controller.layers.sink import CommandSink, Directory, Player, StatusValue
 from controller.layers.sources import Sources, finite
 from controller.motion.motion import MotionLimiter
 from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
 
-StatusValue = str | int | float
+__all__ = ["CommandSink", "CommandState", "Journal", "Player", "ServoMonitor", "StatusValue"]
+
 Journal = Callable[..., None]
 """Gets the name of a method and its arguments, in the order in which calls took effect."""
-
-
-class Player(Protocol):
-    """Plays shows on the clock of the control loop; see :class:`controller.links.line.show.Shows`."""
-
-    def start(self, name: str) -> None:
-        """Play a script from its beginning. Raises ConfigError."""
-
-    def names(self) -> Sequence[str]:
-        """The scripts that can be played, by name."""
-
-    def control(self, what: str, to: str | float = 0.0) -> None:
-        """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s). Raises ParameterError."""
-
-    def tick(self, now_ns: int) -> None:
-        """Send the lines that are due."""
-
-    @property
-    def name(self) -> str | None:
-        """Of the show that was begun last; None where there is none."""
-
-    def abandon(self, now_ns: int) -> None:
-        """End a show that failed, and give back what it moves."""
-
-    def status(self) -> str:
-        """Which show plays and where it is, in one word."""
-
-
-class CommandSink(Protocol):
-    """What a link may ask of the face. ``stamp_ns`` is when the command arrived (monotonic clock, ns).
-
-    vocabulary : the named expressions. shows : plays scripts; None where none can be.
-    stop_latch : set by STOP, released by START.
-    """
-
-    stop_latch: StopLatch
-    parameters: Parameters
-    vocabulary: Vocabulary
-    shows: Player | None
-
-    def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
-        """Hold parameters at values, until released."""
-
-    def release(self, indices: Sequence[int], stamp_ns: int) -> None:
-        """Give held parameters back to the layers below."""
-
-    def write_layer(self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
-        """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest."""
-
-    def release_layer(self, name: str) -> None:
-        """Let a layer fade out, whose source is lost."""
-
-    def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
-        """Show a named expression; without a duration until the next one."""
-
-    def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
-        """Look in a direction."""
-
-    def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
-        """Look at a point."""
-
-    def gaze_off(self, stamp_ns: int) -> None:
-        """Stop looking at anything."""
-
-    def neutral(self, seconds: float, stamp_ns: int) -> None:
-        """Release everything that was commanded and return to neutral."""
-
-    def live(self, amount: float, stamp_ns: int, manner: str | None = None) -> None:
-        """Set the amount of idle motion, 0..1, and how the face behaves; the present manner without.
-
-        ``manner`` : one of :data:`controller.layers.idle.settings.MANNERS`, or ``auto``.
-        """
-
-    def viseme(self, names: Sequence[str], weights: Sequence[float], stamp_ns: int) -> None:
-        """Form the mouth of visemes, each at its weight 0..1, until the next ones; released after a second without."""
-
-    def snapshot(self, out: Floats) -> None:
-        """Copy the present parameters to ``out`` : (P,)."""
-
-    def measured(self, out: Floats) -> bool:
-        """Copy the parameters that the servos show to ``out`` : (P,); False when no servo reports its position."""
-
-    def holder(self, index: int) -> str | None:
-        """The layer that holds a parameter."""
-
-    def layer_names(self) -> tuple[str, ...]:
-        """Layers, lowest priority first."""
-
-    def status(self) -> dict[str, StatusValue]:
-        """The state of the face, as short words and numbers."""
-
-    def overview(self) -> Mapping[str, list[dict[str, Any]]]:
-        """``servos`` and ``links``, one record each; see :mod:`controller.robot.servo_states` and Link.report."""
-
-    def held(self) -> dict[int, float]:
-        """The parameters that were set and not released, by index."""
 
 
 class ServoMonitor(Protocol):
@@ -153,9 +61,10 @@ class CommandState:
     link_status : says how links are, for STATUS.
     servo_records, link_records : every servo and link, for :meth:`overview`.
     servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
-    on_command : called after each command, in the thread that gave it.
+    on_command : called after each command, in the thread that gave it. on_event : as a journal, but without ticks.
     parts : what fails alone; a source of a layer that fails lets its layer fade out, and begins again.
-    stop_latch : keeps the servos off from STOP to START.
+    stop_latch : keeps the servos off from STOP to START; that of all heads where there are several.
+    name : of the head, empty where the stage has one head. heads : all of them by name. placement : where it stands.
 
     Raises ConfigError: the shipped expressions or figures cannot be read.
     """
@@ -194,8 +103,11 @@ class CommandState:
         self.shows: Player | None = None
         self.on_command: Callable[[], None] = _nothing
         self.stop_latch = StopLatch()
+        self.name, self.placement = "", Placement()
+        self.heads: Directory = Heads()
         self._lock = threading.Lock()
         self._journal: Journal | None = None
+        self.on_event: Journal | None = None
         self._stamp_ns = 0
         self._now_s = 0.0
         self._ticks = 0
@@ -228,8 +140,32 @@ class CommandState:
             self._stamp_ns = max(self._stamp_ns, stamp_ns)
             if self._journal is not None:
                 self._journal(name, *arguments)
+        if self.on_event is not None and name != "tick":
+            self.on_event(name, *arguments)
         if stamp_ns:
             self.on_command()
+
+    @property
+    def gaze_rad(self) -> tuple[float, float] | None:
+        """Yaw and pitch of what it looks at; None where it looks at nothing in particular."""
+        gaze = self._sources.gaze
+        yaw, pitch = gaze.direction_deg
+        return (math.radians(yaw), math.radians(pitch)) if gaze.active else None
+
+    @property
+    def liveliness(self) -> float:
+        """The amount of idle motion, 0..1."""
+        return self._sources.life.liveliness
+
+    @property
+    def manner(self) -> str:
+        """How the face was told to behave: a manner, or ``auto``."""
+        return self._sources.life.chosen or AUTO
+
+    @property
+    def loudness(self) -> float:
+        """How loud the face speaks, 0..1, as the jaw of speech shows; 0 without speech."""
+        return self._sources.loudness
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         with self._journaled("set_parameters", indices, values, stamp_ns, stamp_ns=stamp_ns):
@@ -256,6 +192,16 @@ class CommandState:
         with self._journaled("gaze_at", x_mm, y_mm, z_mm, stamp_ns, stamp_ns=stamp_ns):
             self._sources.gaze.look_at(x_mm, y_mm, z_mm)
             self._sources.life.shift(self._sources.gaze.shift_rad, self._time(stamp_ns))
+
+    def gaze_room(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        _check_finite("GAZE ROOM", x_mm, y_mm, z_mm)
+        self.gaze_at(*self.placement.to_head((x_mm, y_mm, z_mm)), stamp_ns)
+
+    def gaze_head(self, name: str, stamp_ns: int) -> None:
+        other = self.heads.head(name)
+        if other is self:
+            raise ParameterError(f"{name} is the head that shall look", hint="name another head")
+        self.gaze_room(*other.placement.position_mm, stamp_ns)
 
     def gaze_off(self, stamp_ns: int) -> None:
         with self._journaled("gaze_off", stamp_ns, stamp_ns=stamp_ns):
@@ -334,6 +280,7 @@ class CommandState:
         with self._lock:
             yaw, pitch = self._sources.gaze.direction_deg
             return {
+                **self._who(),
                 "expression": self._sources.player.name,
                 "intensity": round(self._sources.player.intensity, 3),
                 "gaze": f"{yaw:.1f},{pitch:.1f}" if self._sources.gaze.active else "off",
@@ -348,6 +295,13 @@ class CommandState:
                 **(self.servo_monitor.status() if self.servo_monitor is not None else {}),
                 **self.link_status(),
             }
+
+    def _who(self) -> dict[str, StatusValue]:
+        """Which head this is, and who speaks, where there are several."""
+        if not self.name:
+            return {}
+        turns = self.heads.turns
+        return {"head": self.name, "turn": (turns.speaker if turns is not None else None) or "none"}
 
     def overview(self) -> Mapping[str, list[dict[str, Any]]]:
         return {"servos": self.servo_records(), "links": self.link_records()}

@@ -93,14 +93,15 @@ class Sources:
     def _write_idle(self, now_s: float) -> None:
         life, (blink_block, gaze_block, _) = self.life, self._blocks
         if life.liveliness > 0.0:
-            how = {"blink_block": blink_block, "gaze_block": gaze_block, "loudness": self._loudness()}
+            how = {"blink_block": blink_block, "gaze_block": gaze_block, "loudness": self.loudness}
             life.update(now_s, looking=self.gaze.active, **how)
             self._idle.write_masked(finite(life.values), self._everything, now_s)
         elif self._idle.holding:
             life.update(now_s, looking=False)
             self._idle.release()
 
-    def _loudness(self) -> float:
+    @property
+    def loudness(self) -> float:
         """How loud the face speaks, 0..1, as the jaw of speech shows; 0 without speech."""
         return float(self._speech.values[self._jaw]) if self._speech.held[self._jaw] else 0.0
 

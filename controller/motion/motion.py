@@ -136,6 +136,11 @@ class MotionLimiter:
         self._target[:] = self._position
         self._filter.reset(self._position)
 
+    def reset_moving(self, values: Floats, velocity: Floats) -> None:
+        """Be at ``values`` : (n,), and move on at ``velocity`` : (n,), units/s, as far as the limits allow."""
+        self.reset(values)
+        np.clip(velocity, -self._speed, self._speed, out=self._velocity)
+
     def reset_some(self, where: Flags, values: Floats) -> None:
         """Let those of ``where`` : (n,) be at ``values`` : (n,), at rest."""
         self._position[where] = np.clip(values, self._low, self._high)[where]

@@ -67,6 +67,8 @@ def dry_run(
 
     Two robots may have buses of one name, so with more than one robot the rows have the robot's name before the bus's.
     """
+    if stage.heads:
+        return _of_heads(stage, take, seconds, parameters, voice, alone)
     found = Rehearsal()
     for robot in stage.robots:
         state = stage.state(parameters)
@@ -80,6 +82,20 @@ def dry_run(
         prefix = f"{robot.name}/" if len(stage.robots) > 1 else ""
         found.rows += [row | {"servo": prefix + row["servo"]} for row in offline.rows()]
         found.buses += offline.report()
+    return found
+
+
+def _of_heads(
+    stage: Stage, take: Path | None, seconds: float | None, parameters: Parameters, voice: Take | None, alone: bool
+) -> Rehearsal:
+    """A dry run of each head in turn; what is played goes to the first. Rows and buses have the head's name."""
+    found = Rehearsal()
+    for i, head in enumerate(stage.heads):
+        given = (take, voice) if i == 0 else (None, None)
+        one = dry_run(head.stage, given[0], seconds, parameters, given[1], alone=alone and i == 0)
+        found.rows += [row | {"servo": f"{head.name}/{row['servo']}"} for row in one.rows]
+        found.buses += [{"head": head.name, **bus} for bus in one.buses]
+        found.seconds, found.length_s = max(found.seconds, one.seconds), max(found.length_s, one.length_s)
     return found
 
 

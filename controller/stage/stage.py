@@ -15,6 +15,7 @@ from controller.base.config import check as check_table
 from controller.base.errors import ConfigError, ParameterError, TakeError
 from controller.base.parameters import Parameters, did_you_mean
 from controller.base.paths import find_config
+from controller.base.placement import Placement
 from controller.layers.commands import CommandState
 from controller.layers.idle.settings import IdleSettings
 from controller.layers.mixer import LayerSettings
@@ -23,8 +24,10 @@ from controller.links.line.script import load_script
 from controller.links.links import LinkSettings, LinkTable
 from controller.robot.robot import load_robot, robot_parameters
 from controller.robot.settings import RobotSettings
+from controller.stage.heads import MOST, HeadSettings, Names, head_faults, own_settings
 from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
 from controller.stage.picture import PictureSettings, with_options
+from controller.stage.zenoh import ZenohSettings
 from controller.takes.reader import load_take
 from controller.vocabulary.controls import ControlsFile, load_controls
 from controller.vocabulary.vocabulary import Vocabulary
@@ -98,10 +101,23 @@ class StageSettings(Settings):
     take: str | None = None
     voice: str | None = None
     voice_hz: Annotated[int, Field(ge=1000)] | None = None
-    groups: Annotated[dict[str, Annotated[float, Field(ge=-1, le=1)]], Field(max_length=64)] = {}
+    groups: Annotated[dict[str, Annotated[float, Field(ge=-1, le=1)] | Names], Field(max_length=64)] = {}
     layers: Annotated[dict[str, dict[str, Any]], Field(max_length=64)] = {}
     face: FaceSettings = FaceSettings()
     links: Annotated[list[LinkTable], Field(max_length=64)] = []
+    heads: Annotated[list[HeadSettings], Field(max_length=MOST)] = []
+    turns: Literal["manual", "auto"] = "manual"
+    zenoh: ZenohSettings | None = None
+
+    @property
+    def point_groups(self) -> dict[str, float]:
+        """Group files of control points that are added to the head, each with its amount."""
+        return {name: value for name, value in self.groups.items() if not isinstance(value, list)}
+
+    @property
+    def head_groups(self) -> dict[str, list[str]]:
+        """Names of the heads of each group of them."""
+        return {name: value for name, value in self.groups.items() if isinstance(value, list)}
 
 
 @dataclass(frozen=True)
@@ -112,6 +128,7 @@ class Stage:
     parameters : of the base vocabulary, and those that its vocabularies and those of its robots add.
     layers : the layers. life : settings of idle motion. groups : group files added to the head, each with its amount.
     persons : whom the face shows, each with its share. controls : what gamepad and keys do in the window.
+    heads : the heads of a stage with ``[[heads]]``; the rest is that of the first of them. Empty for one head.
     """
 
     path: Path
@@ -126,6 +143,7 @@ class Stage:
     groups: tuple[tuple[Path, float], ...] = ()
     persons: tuple[tuple[Person, float], ...] = ()
     controls: tuple[ControlsFile, ...] = ()
+    heads: tuple[StageHead, ...] = ()
 
     def file(self, name: str) -> Path:
         """A file that the stage names: relative to the stage's folder, or a path."""
@@ -156,6 +174,20 @@ class Stage:
         )
 
 
+@dataclass(frozen=True)
+class StageHead:
+    """One head of a stage that has several. stage : as if it were the only one."""
+
+    name: str
+    stage: Stage
+    placement: Placement
+
+
+def heads_of(stage: Stage) -> tuple[Stage, ...]:
+    """Each head of a stage as a stage of its own; the stage itself where it has one head."""
+    return tuple(head.stage for head in stage.heads) or (stage,)
+
+
 def load_head(
     folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]],
     persons: Sequence[tuple[Person, float]] = (), *, dressed: bool = True,
@@ -179,7 +211,8 @@ def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
     """``stage`` with command-line options over its ``[face]``; see :func:`controller.stage.picture.with_options`."""
     face = with_options(stage.settings.face, wanted)
     persons = tuple(find_persons(face.person, stage.head, beside=stage.path))
-    return replace(stage, persons=persons, settings=stage.settings.model_copy(update={"face": face}))
+    heads = tuple(replace(head, stage=with_picture(head.stage, wanted)) for head in stage.heads)
+    return replace(stage, persons=persons, settings=stage.settings.model_copy(update={"face": face}), heads=heads)
 
 
 def find_persons(person: PersonName, head: Path, beside: Path | None = None) -> list[tuple[Person, float]]:
@@ -202,7 +235,7 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
 
     def check(settings: StageSettings) -> list[str]:
         faults: list[str] = []
-        found[:] = [_gather(path, settings, parameters, faults)]
+        found[:] = [_gather_all(path, settings, parameters, faults)]
         return faults
 
     check_table({"name": path.stem, **read_toml(path)}, StageSettings, path, check)
@@ -247,6 +280,29 @@ def _robot(name: str, beside: Path, parameters: Parameters) -> tuple[RobotSettin
     return robot, robot_parameters(robot, path, parameters)
 
 
+def _gather_all(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
+    """All that a stage and each of its heads refer to; all heads have the parameters of all their vocabularies."""
+    faults += head_faults(settings.heads, settings.head_groups)
+    if settings.head_groups and not settings.heads:
+        faults.append("groups: groups of heads need [[heads]]")
+    if not settings.heads:
+        return _gather(path, settings, parameters, faults)
+    common: list[str] = []
+    shared = settings.model_copy(update={"heads": [], "robots": [], "links": []})
+    parameters = _gather(path, shared, parameters, common).parameters
+    alone = [settings.model_copy(update=own_settings(dict(settings), head, i)) for i, head in enumerate(settings.heads)]
+    for each in alone:
+        parameters = _gather(path, each, parameters, []).parameters
+    heads = []
+    for i, (head, each) in enumerate(zip(settings.heads, alone, strict=True)):
+        own: list[str] = []
+        stage = _gather(path, each, parameters, own)
+        heads.append(StageHead(head.name, stage, head.placement(i, len(settings.heads))))
+        faults += [f"heads[{i}].{fault.removeprefix('face.')}" for fault in own if fault not in common]
+    faults += common
+    return replace(heads[0].stage, settings=settings, heads=tuple(heads))
+
+
 def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
     """All that a stage refers to; faults are added to ``faults``, and leave the stage unfit for use."""
     head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
@@ -260,7 +316,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
         found = _collect(faults, f"robots[{i}]", lambda n=name, p=parameters: _robot(n, path, p))
         robot, parameters = found or (None, parameters)
         robots.append(robot)
-    groups = _files(faults, "groups", list(settings.groups), path)
+    groups = _files(faults, "groups", list(settings.point_groups), path)
     vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
     regions = parameters.region_names
     layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path, regions=regions))
@@ -276,7 +332,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
         _collect(faults, f"face.controls[{i}]", lambda file=file: load_controls(file, parameters, vocabulary))
         for i, file in enumerate(_files(faults, "controls", settings.face.controls, path) if vocabulary else ())
     )
-    amounts = tuple(zip(groups, settings.groups.values(), strict=False))
+    amounts = tuple(zip(groups, settings.point_groups.values(), strict=False))
     shown = tuple(persons or ())
     stage = Stage(
         path, settings, parameters, head, tuple(robots), more, vocabulary, layers, life, amounts, shown, controls

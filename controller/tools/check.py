@@ -19,7 +19,7 @@ from controller.robot.fault_script import load_fault_script
 from controller.robot.robot import load_robot, robot_parameters
 from controller.robot.settings import RobotSettings
 from controller.stage.persons import WORN, load_person
-from controller.stage.stage import check_identity, load_stage
+from controller.stage.stage import Stage, check_identity, heads_of, load_stage
 from controller.stage.study import load_study
 from controller.takes.reader import load_take, suffixes
 from controller.takes.recording import SUFFIX, replay
@@ -230,11 +230,22 @@ def _describe_stage(path: Path) -> Iterator[str]:
     stage = load_stage(str(path), PARAMETERS)
     if stage.groups:
         stage.load_head()
+    name = f"stage {stage.settings.name}"
+    if stage.heads:
+        yield f"{name}: heads {', '.join(head.name for head in stage.heads)}"
+    else:
+        yield f"{name}: {_parts_of(stage)}"
+    for head in stage.heads:
+        yield f"head {head.name}: {_parts_of(head.stage)}"
+    for each in heads_of(stage):
+        yield from _warnings(each.robots)
+
+
+def _parts_of(stage: Stage) -> str:
     links = ", ".join(map(str, stage.settings.links)) or "none"
     robots = ", ".join(robot.name for robot in stage.robots) or "none"
     own = f", parameters of its own: {', '.join(stage.parameters.own)}" if stage.parameters.own else ""
-    yield f"stage {stage.settings.name}: head {stage.head.name}, links: {links}, robots: {robots}{own}"
-    yield from _warnings(stage.robots)
+    return f"head {stage.head.name}, links: {links}, robots: {robots}{own}"
 
 
 def _warnings(robots: Sequence[RobotSettings]) -> Iterator[str]:

@@ -30,13 +30,15 @@ from controller.body.sources import Voice
 from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.links.line.script import script_names
 from controller.panels.web_face import face_in_the_making
-from controller.stage.stage import Stage, check_identity, load_stage, with_picture
+from controller.stage.stage import Stage, check_identity, heads_of, load_stage, with_picture
+from controller.stage.zenoh import for_role
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
 from drivers.base.priority import lower_process_priority
 from surface.base.extras import require
 
 if TYPE_CHECKING:
+    from controller.face.wall import WallFace  # start-up: the body gets its orders first
     from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
     from controller.panels.window.panel import PanelOptions  # start-up: the same
     from surface.head import Head  # start-up: the same
@@ -76,7 +78,7 @@ class StageRun:
     ) -> None:
         if web is not None:
             check_web(web, alone=options.take is not None)
-        stage = with_picture(load_stage(name, PARAMETERS), look or {})
+        stage = for_role(with_picture(load_stage(name, PARAMETERS), look or {}), options.role, options.heads)
         if identity:
             check_identity(stage.head, identity)
             stage = replace(stage, settings=stage.settings.model_copy(update={"identity": dict(identity)}))
@@ -86,7 +88,7 @@ class StageRun:
             load_take(options.take, stage.parameters)
         if (voice := _voice(stage, options)) is not None:
             voice.check()
-        if options.mirror and not stage.robots:
+        if options.mirror and not any(each.robots for each in heads_of(stage)):
             raise ConfigError(f"{stage.path}: robots: a stage without a robot has nothing to mirror")
         self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
         self._web, self._web_look, self._identity = web, look or {}, identity
@@ -97,16 +99,27 @@ class StageRun:
 
         ``pictures`` : folder for a contact sheet and a clip; None reads no picture back.
         """
-        recorder = Recorder() if pictures else None
+        recorder = None
+        if pictures:
+            recorder = Recorder(whole=True) if self.stage.heads else Recorder()
         with self._body() as (body, flag):
-            values, head = self._load_head(body)
-            with closing(HeadlessFace(head, self.stage.settings.face, values, recorder)) as face:
+            with closing(self._headless_face(body, recorder)) as face:
                 failed = self._show(face, self._begin(body, flag, seconds))
             report = self._end(body, None if failed else face.report(), failed)
         if recorder is not None and pictures is not None:
             self._status("writing the pictures")
             report["written"] = recorder.write(pictures)
         return report
+
+    def _headless_face(self, body: BodyProcess, recorder: Recorder | None) -> HeadlessFace | WallFace:
+        """What draws the head, or the wall of heads."""
+        if self.stage.heads:
+            from controller.face.wall import WallFace  # start-up: the body gets its orders first
+
+            lower_process_priority()
+            return WallFace(self.stage, self.stage.parameters, body.mailboxes, recorder)
+        values, head = self._load_head(body)
+        return HeadlessFace(head, self.stage.settings.face, values, recorder)
 
     def run_window(self, seconds: float | None) -> dict[str, Any]:
         """Run with a window until it is closed, the take ends or ``seconds`` are over."""
@@ -173,7 +186,7 @@ class StageRun:
 
         return goes_on
 
-    def _show(self, face: HeadlessFace | WindowFace, keep_going: Callable[[], bool]) -> Part | None:
+    def _show(self, face: HeadlessFace | WallFace | WindowFace, keep_going: Callable[[], bool]) -> Part | None:
         """Show the face while the run goes on; returns the part of a face that failed while servos follow.
 
         Raises what ends the run, and an error of the face where no servo follows.
@@ -182,7 +195,7 @@ class StageRun:
         try:
             face.run(asked)
         except Exception as error:
-            if asked.ended or not self.stage.robots:
+            if asked.ended or not any(stage.robots for stage in heads_of(self.stage)):
                 raise
             part = Part("the picture", remedy="it comes back with the next start", effect="links and servos go on")
             part.fail(error, time.monotonic())

@@ -19,6 +19,7 @@ EXTRAS = {
     "mediapipe": ("mediapipe", "webcam"),
     "cv2": ("opencv-python-headless", "webcam"),
     "mcap": ("mcap", "mcap"),
+    "zenoh": ("eclipse-zenoh", "zenoh"),
     "onnxruntime": ("onnxruntime", "onnx"),
     "pylsl": ("pylsl", "lsl"),
     "websockets": ("websockets", "web"),

@@ -28,7 +28,7 @@ MAX_DURATION_S = 3600.0
 MAX_FADE_S = 60.0
 READINGS = ("UNITS", "EMOTION", "VISEMES", "MOOD")
 """What a face can be read as: action units, the nearest emotion, mouth shapes, valence-arousal-dominance."""
-LISTS = ("COMMANDS", "EXPRESSIONS", "HOLDERS", "LAYERS", "PARAMETERS", "SHOWS", "VISEMES")
+LISTS = ("COMMANDS", "EXPRESSIONS", "GROUPS", "HEADS", "HOLDERS", "LAYERS", "PARAMETERS", "SHOWS", "VISEMES")
 _SHOWN = 32
 
 
@@ -36,7 +36,8 @@ _SHOWN = 32
 class Command:
     """A command whose names and numbers are right.
 
-    name : its first word, or two for ``GAZE AT`` and ``GAZE OFF``; FRAME becomes SET and VERSION becomes HELLO.
+    name : its first word, or two for ``GAZE AT``, ``GAZE ROOM``, ``GAZE HEAD`` and ``GAZE OFF``; FRAME becomes SET and
+        VERSION becomes HELLO.
     indices : positions of the parameters it names. values : its numbers, of SET one for each of ``indices``.
     words : other names in it: of an expression, visemes, a list, a reading, a script or a mark; of HELLO
         one of :data:`controller.links.line.checksums.CHECKSUMS`.
@@ -57,11 +58,12 @@ class Command:
 
 @dataclass(frozen=True)
 class Request:
-    """A command with the tag of its line, and whether that had a checksum."""
+    """A command with the tag of its line, whether that had a checksum, and the head or group it is for."""
 
     command: Command
     tag: int | None = None
     checked: bool = False
+    to: str = ""
 
 
 class Grammar:
@@ -90,7 +92,7 @@ class Grammar:
     def request(self, words: Words) -> Request:
         """The request that the words of a line make. Raises LineError, as :meth:`parse`."""
         try:
-            return Request(self._command(words.words), words.tag, words.checked)
+            return Request(self._command(words.words), words.tag, words.checked, words.to)
         except LineError as error:
             error.tag, error.checked = words.tag, words.checked
             raise
@@ -216,13 +218,15 @@ def _gaze(_: Grammar, given: Sequence[str]) -> Command:
     first = given[0].upper()
     if first == "OFF" and len(given) == 1:
         return Command("GAZE OFF")
-    if first == "AT" and len(given) == 4:
+    if first == "HEAD" and len(given) == 2:
+        return Command("GAZE HEAD", words=(given[1],))
+    if first in ("AT", "ROOM") and len(given) == 4:
         limit = MAX_DISTANCE_MM
         point = tuple(in_range(axis, text, -limit, limit) for axis, text in zip("xyz", given[1:], strict=True))
-        if math.hypot(*point) < 1.0:
+        if first == "AT" and math.hypot(*point) < 1.0:
             raise LineError(Code.RANGE, "the point must be at least 1 mm from the middle between the eyes")
-        return Command("GAZE AT", values=point)
-    if first in ("OFF", "AT") or len(given) != 2:
+        return Command(f"GAZE {first}", values=point)
+    if first in ("OFF", "AT", "ROOM", "HEAD") or len(given) != 2:
         raise LineError(Code.ARGUMENTS, _usage("GAZE"))
     yaw = in_range("yaw", given[0], -GAZE_YAW_DEG, GAZE_YAW_DEG)
     return Command("GAZE", values=(yaw, in_range("pitch", given[1], -GAZE_PITCH_DEG, GAZE_PITCH_DEG)))
@@ -292,10 +296,14 @@ _RULES: dict[str, Rule] = {
     "RELEASE": (1, None, "RELEASE name ... or RELEASE ALL", _named("RELEASE")),
     "EXPR": (1, 3, "EXPR name [intensity [duration_s]]", Grammar.read_expr),
     "VISEME": (1, 30, "VISEME name [weight [name weight ...]]", Grammar.read_viseme),
-    "GAZE": (1, 4, "GAZE yaw_deg pitch_deg, GAZE AT x_mm y_mm z_mm, or GAZE OFF", _gaze),
+    "GAZE": (1, 4,
+             "GAZE yaw_deg pitch_deg, GAZE AT x_mm y_mm z_mm, GAZE ROOM x_mm y_mm z_mm, GAZE HEAD name, or GAZE OFF",
+             _gaze),
     "NEUTRAL": (0, 1, "NEUTRAL [seconds]", _neutral),
     "LIFE": (1, 2, "LIFE amount [AUTO|ALONE|LISTEN|SPEAK]", _life),
     "SHOW": (1, 2, "SHOW name, SHOW PLAY, SHOW PAUSE, SHOW STOP, or SHOW SEEK mark (or seconds)", _show),
+    "TO": (1, 1, "TO head, TO group, or TO ALL", lambda _, given: Command("TO", words=tuple(given))),
+    "TURN": (1, 1, "TURN head, or TURN OFF", lambda _, given: Command("TURN", words=tuple(given))),
     "GET": (1, None, "GET name ... or GET ALL", _named("GET")),
     "MEASURED": (1, None, "MEASURED name ... or MEASURED ALL", _named("MEASURED")),
     "READ": (1, 2, f"READ {', '.join(READINGS[:-1])} or {READINGS[-1]}, and MEASURED for what the servos show", _read),

@@ -32,7 +32,9 @@ _REPLY = re.compile(r"(?:#(\d{1,9}) )?(?:(OK|P|F)|ERR ([0-9]+))(?: (.*))?", re.D
 _CHECKSUM = re.compile(rb"\*([0-9A-Fa-f]{2})[ \t]*\Z")
 _UNPRINTABLE = re.compile(rb"[^\x20-\x7e\t]")
 _NOT_SENT = re.compile(rb"[^\x20-\x7e]")
-_STOP = re.compile(rb"[^\x21-\x7e]*(?:#[0-9]*[^\x21-\x7e]+)?STOP(?![\x21-\x29\x2b-\x7e])", re.IGNORECASE)
+_STOP = re.compile(
+    rb"[^\x21-\x7e]*(?:#[0-9]*[^\x21-\x7e]+)?(?:@[\x21-\x7e]*[^\x21-\x7e]+)?STOP(?![\x21-\x29\x2b-\x7e])", re.IGNORECASE
+)
 
 
 class Code(IntEnum):
@@ -68,11 +70,15 @@ class LineError(LinkError):
 
 @dataclass(frozen=True)
 class Words:
-    """A parsed line: its tag, its words, and whether it had a checksum."""
+    """A parsed line: its tag, its words, whether it had a checksum, and whom it is for.
+
+    to : the name of a head or a group, without its ``@``; empty for whom the link talks to.
+    """
 
     words: tuple[str, ...]
     tag: int | None = None
     checked: bool = False
+    to: str = ""
 
 
 @dataclass(frozen=True)
@@ -135,9 +141,10 @@ def parse_words(line: bytes) -> Words | None:
             raise LineError(Code.TAG, "a tag is # and 1 to 9 digits", checked=checked)
         tag = int(match[1])
         words = words[1:]
+    to = words.pop(0)[1:] if words and words[0].startswith("@") else ""
     if not words:
         raise LineError(Code.COMMAND, "no command in this line", tag=tag, checked=checked)
-    return Words(tuple(words), tag, checked)
+    return Words(tuple(words), tag, checked, to)
 
 
 def _check_bytes(line: bytes) -> None:

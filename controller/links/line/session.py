@@ -71,7 +71,7 @@ class LineSession:
         scripted: bool = False,
         token: str | None = None,
     ) -> None:
-        self._sink = sink
+        self._sink = self._target = self._streamed_sink = sink  # of this line, of lines without @, of the stream
         self._name = name
         self._checksums = ChecksumRule(checksum)
         self._version = package_version()  # read once at the start: later there may be no file descriptor left
@@ -124,6 +124,7 @@ class LineSession:
             return b""
 
     def _streamed(self, question: Command, time_ms: int, checked: bool) -> bytes:
+        self._sink = self._streamed_sink
         if not self._look(question.measured):
             return b""
         if question.name == "READ":
@@ -151,7 +152,9 @@ class LineSession:
                 return b""
             if self.locked:
                 self._check_token(words)
-            text = self._do(self._grammar.request(words), now_ns)
+            request = self._grammar.request(words)
+            self._sink = self._find(words.to) if words.to else self._target
+            text = self._do(request, now_ns)
         except Exception as error:  # noqa: BLE001  one line must not cost another its answer
             refusal = self._refusal(error)
             if words is not None:
@@ -173,6 +176,13 @@ class LineSession:
         if words is not None and not stop:
             self._checksums.check(words)
         return words
+
+    def _find(self, name: str) -> CommandSink:
+        """Whom a name means. Raises LineError: nobody."""
+        try:
+            return self._sink.heads.find(name)
+        except ParameterError as error:
+            raise LineError(Code.NAME, str(error)) from error
 
     def _check_token(self, words: Words) -> None:
         """Raises LineError for anything but the token."""
@@ -197,6 +207,9 @@ class LineSession:
         match command.name:
             case "SUB" | "UNSUB":
                 self._stream, self._due_ns = (request if command.question else None), now_ns
+                self._streamed_sink = self._sink
+            case "TO":
+                self._target = self._find(command.words[0])
             case "STOP":
                 self._stops_waiting = max(0, self._stops_waiting - 1)
                 self._sink.stop_latch.stop(self._name, now_ns)
@@ -232,8 +245,10 @@ class LineSession:
                 sink.expression(command.words[0], values[0], values[1] if values[1:] else None, now_ns)
             case "VISEME":
                 sink.viseme(command.words, values, now_ns)
-            case "GAZE" | "GAZE AT" | "GAZE OFF":
+            case "GAZE" | "GAZE AT" | "GAZE ROOM" | "GAZE HEAD" | "GAZE OFF":
                 self._gaze(command, now_ns)
+            case "TURN":
+                self._turn(command.words[0], now_ns)
             case "NEUTRAL":
                 sink.neutral(values[0], now_ns)
             case "LIFE":
@@ -245,13 +260,23 @@ class LineSession:
         return True
 
     def _gaze(self, command: Command, now_ns: int) -> None:
-        match command.values:
-            case ():
-                self._sink.gaze_off(now_ns)
-            case (yaw, pitch):
-                self._sink.gaze(math.radians(yaw), math.radians(pitch), now_ns)
-            case (x, y, z):
+        match command.name, command.values:
+            case "GAZE HEAD", _:
+                self._sink.gaze_head(command.words[0], now_ns)
+            case "GAZE ROOM", (x, y, z):
+                self._sink.gaze_room(x, y, z, now_ns)
+            case _, (x, y, z):
                 self._sink.gaze_at(x, y, z, now_ns)
+            case _, (yaw, pitch):
+                self._sink.gaze(math.radians(yaw), math.radians(pitch), now_ns)
+            case _:
+                self._sink.gaze_off(now_ns)
+
+    def _turn(self, name: str, now_ns: int) -> None:
+        turns = self._sink.heads.turns
+        if turns is None:
+            raise LineError(Code.NAME, "there is one head here: nobody to take turns with")
+        turns.give(None if name.upper() == "OFF" else name, now_ns)
 
     def _start(self) -> None:
         """Let the servos move again, unless a STOP has arrived behind this line."""
@@ -321,6 +346,8 @@ class LineSession:
             "LAYERS": self._sink.layer_names,
             "VISEMES": lambda: self._grammar.visemes.names,
             "SHOWS": lambda: self._sink.shows.names() if self._sink.shows is not None else (),
+            "HEADS": lambda: self._sink.heads.names,
+            "GROUPS": lambda: self._sink.heads.groups,
             "HOLDERS": lambda: [self._sink.holder(i) or "none" for i in range(len(self._parameters))],
             "COMMANDS": lambda: COMMANDS,
         }

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from controller.base.errors import ParameterError
 from controller.base.parameters import did_you_mean
 from controller.layers.commands import CommandSink
-from controller.links.line.commands import Grammar
+from controller.links.line.commands import Command, Grammar
 from controller.links.line.script import Script
 from controller.links.line.session import LineSession
 
@@ -83,14 +83,14 @@ class Show:
         vocabulary = self._sink.vocabulary
         grammar = Grammar(self._sink.parameters, lambda name: vocabulary[name].name, scripted=True)
         requests = [grammar.parse(line.encode("ascii")) for _, line in self.script.steps]
-        commands = [request.command for request in requests if request is not None]
-        self._sink.release(
-            sorted({i for command in commands if command.name == "SET" for i in command.indices}), now_ns
-        )
-        if any(command.name == "EXPR" for command in commands):
-            self._sink.expression("neutral", 1.0, None, now_ns)
-        if any(command.name.startswith("GAZE") for command in commands):
-            self._sink.gaze_off(now_ns)
+        commands: dict[str, list[Command]] = {}
+        present = ""
+        for request in filter(None, requests):
+            present = request.command.words[0] if request.command.name == "TO" else present
+            commands.setdefault(request.to or present, []).append(request.command)
+        for to, given in commands.items():
+            sink = self._sink.heads.find(to) if to else self._sink
+            _give_back(sink, given, now_ns)
 
     def _send_due(self, now_ns: int) -> list[str]:
         sent = []
@@ -104,6 +104,14 @@ class Show:
             sent.append(line)
             self._next += 1
         return sent
+
+
+def _give_back(sink: CommandSink, commands: list[Command], now_ns: int) -> None:
+    sink.release(sorted({i for command in commands if command.name == "SET" for i in command.indices}), now_ns)
+    if any(command.name == "EXPR" for command in commands):
+        sink.expression("neutral", 1.0, None, now_ns)
+    if any(command.name.startswith("GAZE") for command in commands):
+        sink.gaze_off(now_ns)
 
 
 def _nobody(now_ns: int, event: str, text: str) -> None:

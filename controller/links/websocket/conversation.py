@@ -19,6 +19,8 @@ from controller.links.websocket import messages as m
 
 log = logging.getLogger(__name__)
 
+AnyGaze = m.Gaze | m.GazeAt | m.GazeRoom | m.GazeHead | m.GazeOff
+
 _SHOWN = 3
 """Faults of a message that its answer names."""
 
@@ -37,7 +39,8 @@ class Conversation:
     """
 
     def __init__(self, sink: CommandSink, who: str, start_ns: int) -> None:
-        self._sink, self._who, self._start_ns = sink, who, start_ns
+        self._home, self._who, self._start_ns = sink, who, start_ns
+        self._sink = self._state_sink = self._watch_sink = sink  # of this request, of states and of overviews
         self._values, self._shown = sink.parameters.neutral(), sink.parameters.neutral()
         self._subscription: m.Subscribe | None = None
         self._chosen: Indices | None = None
@@ -53,6 +56,7 @@ class Conversation:
         except ValidationError as error:
             return self._refuse(None, "message", _faults(error))
         try:
+            self._sink = self._home if request.address is None else self._home.heads.find(request.address)
             reply = self._answer(request, now_ns)
         except ParameterError as error:
             return self._refuse(request.id, "name", str(error), error.hint)
@@ -84,6 +88,7 @@ class Conversation:
         if state is not None:
             found.append(state)
         if self._watch_ns and now_ns >= self._watch_due_ns:
+            self._sink = self._watch_sink
             self._watch_due_ns += self._watch_ns * (1 + (now_ns - self._watch_due_ns) // self._watch_ns)
             found.append(self._overview(now_ns))
         return found
@@ -95,6 +100,7 @@ class Conversation:
             return None
         period = round(1e9 / wanted.rate_hz)
         self._due_ns += period * (1 + (now_ns - self._due_ns) // period)
+        self._sink = self._state_sink
         state = self._state(self._chosen, now_ns, status=False)
         return state if wanted.form == "names" else _as_numbers(state)
 
@@ -112,8 +118,11 @@ class Conversation:
                 return m.Names(what=request.what, names=self._names(request.what))
             case m.Subscribe():
                 self._chosen = self._positions(request.parameters)
-                self._subscription, self._due_ns = request, now_ns
+                self._one_head()
+                self._subscription, self._due_ns, self._state_sink = request, now_ns, self._sink
             case m.Watch(rate_hz=rate):
+                self._one_head()
+                self._watch_sink = self._sink
                 self._watch_ns, self._watch_due_ns = round(1e9 / rate) if rate > 0.0 else 0, now_ns
             case m.Unsubscribe():
                 self._subscription = None
@@ -146,10 +155,16 @@ class Conversation:
                 sink.live(request.amount, now_ns, *([request.manner] if request.manner else []))
             case m.Show():
                 _play(sink, request)
-            case m.Gaze() | m.GazeAt() | m.GazeOff():
+            case m.Turn(head=name):
+                _give_turn(sink, name, now_ns)
+            case m.Gaze() | m.GazeAt() | m.GazeRoom() | m.GazeHead() | m.GazeOff():
                 self._look(request, now_ns)
 
-    def _look(self, request: m.Gaze | m.GazeAt | m.GazeOff, now_ns: int) -> None:
+    def _one_head(self) -> None:
+        """Raises ParameterError: the request is for several heads."""
+        self._sink.held()
+
+    def _look(self, request: AnyGaze, now_ns: int) -> None:
         match request:
             case m.Gaze():
                 self._sink.gaze(math.radians(request.yaw_deg), math.radians(request.pitch_deg), now_ns)
@@ -157,6 +172,10 @@ class Conversation:
                 if math.hypot(*point) < 1.0:
                     raise ParameterError("the point must be at least 1 mm from the middle between the eyes")
                 self._sink.gaze_at(*point, now_ns)
+            case m.GazeRoom(point_mm=point):
+                self._sink.gaze_room(*point, now_ns)
+            case m.GazeHead(head=name):
+                self._sink.gaze_head(name, now_ns)
             case m.GazeOff():
                 self._sink.gaze_off(now_ns)
 
@@ -171,6 +190,7 @@ class Conversation:
             parameters={name: _parameter(p, i) for i, name in enumerate(p.names)},
             expressions=list(self._sink.vocabulary.names),
             layers=list(self._sink.layer_names()),
+            heads=list(self._sink.heads.names),
         )
 
     def _state(self, chosen: Indices | None, now_ns: int, *, status: bool) -> m.State:
@@ -213,6 +233,8 @@ class Conversation:
             "parameters": lambda: sink.parameters.names,
             "expressions": lambda: sink.vocabulary.names,
             "layers": sink.layer_names,
+            "heads": lambda: sink.heads.names,
+            "groups": lambda: sink.heads.groups,
             "shows": lambda: sink.shows.names() if sink.shows is not None else [],
         }
         return list(kinds[what]())
@@ -250,6 +272,12 @@ def _mood(request: m.Emotion) -> str:
     """The formula of an emotion, as :class:`controller.vocabulary.vocabulary.Vocabulary` reads it."""
     point = [request.valence, request.arousal, *([] if request.dominance is None else [request.dominance])]
     return f"{'VA' if len(point) == 2 else 'VAD'}:{','.join(f'{value:.4f}' for value in point)}"
+
+
+def _give_turn(sink: CommandSink, name: str | None, now_ns: int) -> None:
+    if sink.heads.turns is None:
+        raise ParameterError("there is one head here: nobody to take turns with", hint="add [[heads]] to the stage")
+    sink.heads.turns.give(name, now_ns)
 
 
 def _play(sink: CommandSink, request: m.Show) -> None:

@@ -24,11 +24,22 @@ Finite = Annotated[float, Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 Id = Annotated[int, Field(ge=-(2**53), le=2**53)] | Annotated[str, Field(max_length=64)]
 
 
-class Request(BaseModel):
+class Message(BaseModel):
     """What every request may have. ``id`` : comes back with its answer."""
 
     model_config = ConfigDict(extra="forbid", strict=False, frozen=True)
     id: Id | None = None
+
+
+class Request(Message):
+    """A request for the first head, or for whom ``to`` names: a head, a group of heads, or ``all``."""
+
+    to: Annotated[str, Field(max_length=64)] | None = None
+
+    @property
+    def address(self) -> str | None:
+        """Whom it is for; None for the first head."""
+        return self.to
 
 
 class Hello(Request):
@@ -87,6 +98,27 @@ class GazeAt(Request):
     point_mm: tuple[Finite, Finite, Finite]
 
 
+class GazeRoom(Request):
+    """Look at a point (x, y, z) of the room that several heads share, mm, from where the head stands."""
+
+    type: Literal["gaze_room"]
+    point_mm: tuple[Finite, Finite, Finite]
+
+
+class GazeHead(Request):
+    """Look at another head of the stage."""
+
+    type: Literal["gaze_head"]
+    head: Name
+
+
+class Turn(Request):
+    """Give a head the turn: it speaks, the others listen and look at it; null gives it to nobody."""
+
+    type: Literal["turn"]
+    head: Name | None
+
+
 class GazeOff(Request):
     """Stop looking at anything."""
 
@@ -108,13 +140,22 @@ class Life(Request):
     manner: Literal["auto", "alone", "listen", "speak"] | None = None
 
 
-class Show(Request):
-    """Play a script by name; or pause, stop or go on with the one that was begun, or seek a mark or a time (s)."""
+class Show(Message):
+    """Play a script by name; or pause, stop or go on with the one that was begun, or seek a mark or a time (s).
+
+    ``to`` is where to seek, so ``head`` says whom it is for.
+    """
 
     type: Literal["show"]
     name: Name | None = None
     action: Literal["play", "pause", "stop", "seek"] | None = None
     to: Annotated[float, Field(ge=0.0, le=86_400.0)] | Name | None = None
+    head: Annotated[str, Field(max_length=64)] | None = None
+
+    @property
+    def address(self) -> str | None:
+        """Whom it is for; None for the first head."""
+        return self.head
 
 
 class Stop(Request):
@@ -140,7 +181,7 @@ class List(Request):
     """Ask for names."""
 
     type: Literal["list"]
-    what: Literal["parameters", "expressions", "layers", "shows"]
+    what: Literal["parameters", "expressions", "layers", "shows", "heads", "groups"]
 
 
 class Subscribe(Request):
@@ -175,7 +216,8 @@ class Ping(Request):
 
 
 AnyRequest = Annotated[
-    Hello | Set | Release | Expression | Emotion | Gaze | GazeAt | GazeOff | Neutral | Life | Show | Stop | Start
+    Hello | Set | Release | Expression | Emotion | Gaze | GazeAt | GazeRoom | GazeHead | Turn | GazeOff | Neutral
+    | Life | Show | Stop | Start
     | Get | List | Subscribe | Watch | Unsubscribe | Ping,
     Field(discriminator="type"),
 ]  # fmt: skip
@@ -190,7 +232,7 @@ class Reply(BaseModel):
 
 
 class Welcome(Reply):
-    """The answer to ``hello``."""
+    """The answer to ``hello``. ``heads`` : names of the heads of the stage; empty where there is one."""
 
     type: Literal["hello"] = "hello"
     version: int = VERSION
@@ -198,6 +240,7 @@ class Welcome(Reply):
     parameters: dict[str, Parameter]
     expressions: list[str]
     layers: list[str]
+    heads: list[str] = []
     max_rate_hz: float = MAX_RATE_HZ
     max_bytes: int = LONGEST
 

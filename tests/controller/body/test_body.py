@@ -19,7 +19,8 @@ from controller.base.errors import ConfigError, LinkError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.body import messages
-from controller.body.body import Body, _handle, _wait
+from controller.body.body import Body
+from controller.body.main import _handle, _wait
 from controller.body.messages import RunOptions
 from controller.body.panel_state import PanelState
 from controller.body.sources import Voice, show_part

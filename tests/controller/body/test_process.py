@@ -203,7 +203,8 @@ class Ended:
 def body_of(end: Ended) -> BodyProcess:
     body = BodyProcess.__new__(BodyProcess)
     body.report, body.finished = {}, False
-    body._pipe = body._process = body.mailbox = body._panel_mailbox = cast(Any, end)
+    body._pipe = body._process = cast(Any, end)
+    body.mailboxes = body._panel_mailboxes = [cast(Any, end)]
     return body
 
 

@@ -135,6 +135,7 @@ def test_a_stage_that_says_nothing_has_the_usual_settings_and_the_name_of_its_fi
         "name": "mine", "description": "", "head": "ict", "identity": {}, "robots": [],
         "control_hz": 100.0, "liveliness": 0.0, "life": "natural", "manner": "auto", "seed": 0, "vocabularies": [],
         "show": None, "take": None, "voice": None, "voice_hz": None, "groups": {}, "layers": {}, "links": [],
+        "heads": [], "turns": "manual", "zenoh": None,
     }  # fmt: skip
     assert (face["size"], face["fps"]) == ((1280, 720), 60.0)
 

@@ -1,0 +1,111 @@
+"""The process of the body: gets its orders over a pipe, runs the body, and reports."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from contextlib import suppress
+from multiprocessing.connection import Connection
+
+from controller.base.errors import OMOTE_ERRORS
+from controller.base.mailboxes import Mailbox
+from controller.base.parameters import PARAMETERS
+from controller.base.signals import termination_signals
+from controller.body import messages
+from controller.body.body import Body
+from controller.body.hall import Hall
+from controller.body.nodes import open_node
+from controller.body.panel_requests import carry_out
+from controller.body.panel_state import PanelState
+from controller.layers.mixer import by_priority
+from controller.stage.stage import heads_of, load_stage
+from controller.stage.zenoh import for_role
+from drivers.base.priority import request_realtime, shorten_thread_switches
+from drivers.base.shutdown import combine_with_context
+
+_POLL_S = 0.1
+
+
+def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
+    """Run the body's process.
+
+    Sends to main one :class:`Ready` or :class:`Failed`, perhaps :class:`Finished`, at the end a :class:`Report`.
+    Main may send requests of its panel; ``Stop`` and main's own end both mean stop.
+    """
+    stop = threading.Event()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
+    for ending in termination_signals():
+        signal.signal(ending, lambda *_: stop.set())
+    try:
+        _serve(orders, pipe, stop)
+    except OMOTE_ERRORS as error:
+        with_earlier = combine_with_context(error)
+        _send(pipe, messages.Failed(str(with_earlier), getattr(with_earlier, "hint", "")))
+    except Exception as error:
+        if os.environ.get("OMOTE_DEBUG"):
+            raise
+        _send(pipe, messages.Failed(f"the body process failed: {type(error).__name__}: {error}"))
+
+
+def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event) -> None:
+    stage = for_role(load_stage(orders.stage, PARAMETERS), orders.options.role, orders.options.heads)
+    parameters, mailboxes, panels = stage.parameters, [], []
+    for each in heads_of(stage):
+        mailboxes.append(Mailbox.receive(pipe, len(parameters)))
+        panel = Mailbox.receive(pipe, PanelState.size(parameters))
+        panels.append(PanelState(panel, [layer.name for layer in by_priority(each.layers)], parameters))
+    body: Body | Hall
+    if stage.heads:
+        body = Hall(stage, parameters, mailboxes, panels, orders.options)
+    else:
+        body = Body(stage, parameters, mailboxes[0], orders.options)
+    bodies = body.bodies if isinstance(body, Hall) else [body]
+    node = open_node(stage, bodies)
+    shorten_thread_switches()  # before torque: later garbage collections have few objects to check
+    try:
+        body.start()
+        _send(pipe, messages.Ready())
+        _wait(body, pipe, stop, panels[0])
+    finally:
+        body.stop()
+        if node is not None:
+            node.close()
+    _send(pipe, messages.Report({**body.report(), **({"zenoh": node.report()} if node is not None else {})}))
+
+
+def _wait(body: Body | Hall, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
+    """Serve main until it requests a stop or has ended, a signal arrives, or a bus failed for good."""
+    finished = False
+    while not stop.is_set():
+        if pipe.poll(_POLL_S) and not _handle(body, pipe):
+            return
+        if panel_state is not None:
+            body.publish(panel_state)
+        if body.finished and not finished:
+            _send(pipe, messages.Finished())
+            finished = True
+        body.check()
+
+
+def _handle(body: Body | Hall, pipe: Connection) -> bool:
+    """Carry out a request of main or its panel; False when it requests a stop or has ended."""
+    try:
+        request = pipe.recv()
+    except (EOFError, OSError):
+        return False
+    if isinstance(request, messages.Begin):
+        shorten_thread_switches()
+        request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
+        body.begin()
+        return True
+    state = body.state
+    if isinstance(request, messages.ToHead) and isinstance(body, Hall):
+        state, request = body.state_of(request.head), request.request
+    return carry_out(request, state, time.monotonic_ns())
+
+
+def _send(pipe: Connection, message: object) -> None:
+    with suppress(OSError):  # main has ended; the servos are still stopped
+        pipe.send(message)

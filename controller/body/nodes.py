@@ -1,0 +1,37 @@
+"""Connects the bodies of a process with the other processes of their stage."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING
+
+from controller.body.body import Body
+from controller.stage.stage import Stage
+
+if TYPE_CHECKING:
+    from controller.fleet.node import Node  # optional: most stages need no network
+
+
+def open_node(stage: Stage, bodies: Sequence[Body]) -> Node | None:
+    """What joins the others by the stage's ``[zenoh]``; None without that.
+
+    Raises LinkError: an endpoint or a file cannot be used. MissingPackage: Zenoh is not installed.
+    """
+    settings = stage.settings.zenoh
+    if settings is None:
+        return None
+    from controller.fleet.node import Node  # optional: most stages need no network
+
+    heads = {head_key(body.state.name or stage.settings.name): body for body in bodies}
+    states = {name: body.state for name, body in heads.items()}
+    node = Node(settings, stage.parameters, states, stage.path, bodies[0].clock.hurry)
+    for name, body in heads.items():
+        body.relay = partial(node.relay, name)
+    return node
+
+
+def head_key(name: str) -> str:
+    """A name as a part of a key: letters, digits, ``_`` and ``-``."""
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-_") or "head"

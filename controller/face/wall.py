@@ -1,0 +1,207 @@
+"""Draws the heads of a stage side by side: a wall of pictures, each head as its own person.
+
+Heads that look alike share one surface and are posed in one batch (:class:`surface.head.Crowd`).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from controller.base.clock import Clock
+from controller.base.mailboxes import Mailbox
+from controller.base.parameters import Floats, Parameters
+from controller.face.face import FrameLog, Image, Recorder, head_indices
+from controller.stage.stage import FaceSettings, Stage, heads_of
+from surface.head import Crowd, Head
+from surface.head.model.parameters import head_angles
+from surface.view.pictures.offscreen import Offscreen
+from surface.view.pictures.sheet import zoom_to_head
+from surface.view.scene.camera import Camera
+from surface.view.scene.framing import framed
+
+_ASPECT = 0.8
+"""Width over height of the tile that a head with its shoulders fills best."""
+
+
+def grid(count: int, size: tuple[int, int]) -> tuple[int, int]:
+    """Columns and rows of ``count`` tiles in a picture of a size, so that the heads in them are as large as can be."""
+    width, height = size
+
+    def tall(columns: int) -> float:
+        rows = -(-count // columns)
+        return min(width / columns / _ASPECT, height / rows)
+
+    columns = max(range(1, count + 1), key=tall)
+    return columns, -(-count // columns)
+
+
+@dataclass
+class _Alike:
+    """Heads that look alike. places : their numbers in the stage. crowd : poses them where they are several."""
+
+    head: Head
+    camera: Camera
+    order: np.ndarray
+    places: list[int] = field(default_factory=list)
+    crowd: Crowd | None = None
+    screen: Offscreen | None = None
+
+    def begin(self, tile: tuple[int, int], face: FaceSettings, first: Offscreen | None) -> Offscreen:
+        """Open what draws it, in the context of the first one."""
+        if len(self.places) > 1:
+            self.crowd = Crowd(self.head, len(self.places))
+        self.screen = Offscreen(
+            self.head, tile, quality=face.still_quality, theme=face.make_theme(),
+            evaluator="cpu" if self.crowd is not None else face.evaluator, ctx=None if first is None else first.ctx,
+        )  # fmt: skip
+        return self.screen
+
+    def draw(self, rows: Floats, time_s: float) -> None:
+        """Begin a frame of a moving picture of a single head, without reading it back."""
+        if self.crowd is None and self.screen is not None:
+            values = self._ordered(rows)[0]
+            self.head.sway.advance(head_angles(values), time_s)
+            self.screen.draw(values, self.camera)
+
+    def pictures(self, rows: Floats, *, drawn: bool) -> list[Image]:
+        """One picture for each of its heads, which show ``rows`` : (h, P); the one that was begun where ``drawn``."""
+        assert self.screen is not None
+        values = self._ordered(rows)
+        if self.crowd is None:
+            return [self.screen.read() if drawn else self.screen.render(values[0], self.camera)]
+        self.crowd.pose(values)
+        found = []
+        for k in range(len(self.crowd)):
+            self.crowd.show(k)
+            found.append(self.screen.render_present(self.camera))
+        return found
+
+    def _ordered(self, rows: Floats) -> Floats:
+        """(h, p) in the head's own order; names that omote does not know stay 0."""
+        return np.hstack([rows, np.zeros((len(rows), 1))])[:, self.order]
+
+
+class Wall:
+    """The heads of a stage, each in a tile of one picture; a context manager.
+
+    stage : one with ``[[heads]]``. size : of the whole, pixels.
+
+    Attributes
+    ----------
+    names : of the heads, in the order of the stage. columns, tile : how the picture is divided, and the size of a part.
+
+    Raises SurfaceError: a head cannot be read. ViewError: there is no OpenGL.
+    """
+
+    def __init__(self, stage: Stage, parameters: Parameters, size: tuple[int, int]) -> None:
+        stages, face = heads_of(stage), stage.settings.face
+        self.names = tuple(head.name for head in stage.heads)
+        self.columns, rows = grid(len(stages), size)
+        self.tile = max(16, size[0] // self.columns), max(16, size[1] // rows)
+        self._alike: dict[object, _Alike] = {}
+        for i, each in enumerate(stages):
+            look = _look_of(each)
+            if look not in self._alike:
+                self._alike[look] = _Alike(*_head_of(each, parameters, self.tile))
+            self._alike[look].places.append(i)
+        self._closers, first = ExitStack(), None
+        for alike in self._alike.values():
+            screen = self._closers.enter_context(alike.begin(self.tile, face, first))
+            first = first or screen
+        assert first is not None
+        self.renderer = first.ctx.info["GL_RENDERER"]
+
+    def draw(self, rows: Floats, time_s: float) -> None:
+        """Begin a frame of a moving picture of heads that are like no other; the others wait for :meth:`pictures`.
+
+        rows : (n, P) full parameter vectors, in the order of the stage.
+        """
+        for alike in self._alike.values():
+            alike.draw(rows[alike.places], time_s)
+
+    def pictures(self, rows: Floats, *, drawn: bool = False) -> list[Image]:
+        """A picture (h, w, 3) uint8 of each head, in the order of the stage.
+
+        drawn : :meth:`draw` has begun them.
+        """
+        found: dict[int, Image] = {}
+        for alike in self._alike.values():
+            found.update(zip(alike.places, alike.pictures(rows[alike.places], drawn=drawn), strict=True))
+        return [found[i] for i in range(len(rows))]
+
+    @property
+    def crowded(self) -> bool:
+        """Whether some heads look alike, so that :meth:`draw` does not draw all of them."""
+        return any(alike.crowd is not None for alike in self._alike.values())
+
+    def joined(self, pictures: Sequence[Image]) -> Image:
+        """Pictures of the heads as one, (h, w, 3) uint8."""
+        missing = -len(pictures) % self.columns
+        filled = [*pictures, *[np.zeros_like(pictures[0])] * missing]
+        return np.vstack([np.hstack(filled[i : i + self.columns]) for i in range(0, len(filled), self.columns)])
+
+    def close(self) -> None:
+        """Free the graphics memory."""
+        self._closers.close()
+
+    def __enter__(self) -> Wall:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+class WallFace:
+    """Draws frame after frame of all heads without a display; as :class:`controller.face.face.HeadlessFace`.
+
+    mailboxes : of the heads, in the order of the stage. Raises as :class:`Wall`.
+    """
+
+    def __init__(
+        self, stage: Stage, parameters: Parameters, mailboxes: Sequence[Mailbox], recorder: Recorder | None = None
+    ) -> None:
+        self._settings, self._mailboxes, self._recorder = stage.settings.face, mailboxes, recorder
+        self._wall = Wall(stage, parameters, self._settings.size)
+        self._rows = np.zeros((len(mailboxes), len(parameters)))
+        self._log = FrameLog()
+        self._wall.draw(self._rows, 0.0)  # loads more code
+
+    def run(self, keep_going: Callable[[], bool]) -> None:
+        """Draw until ``keep_going()`` is false, at most ``fps`` times a second."""
+        started = time.monotonic_ns()
+        for now in Clock(self._settings.fps, prompt=True).run(keep_going):
+            stamps = [mailbox.read(row)[1] for mailbox, row in zip(self._mailboxes, self._rows, strict=True)]
+            time_s = (now - started) / 1e9
+            self._wall.draw(self._rows, time_s)
+            if self._recorder is not None and self._recorder.wants(time_s):
+                self._recorder.keep(self._wall.joined(self._wall.pictures(self._rows, drawn=True)), time_s)
+            elif self._wall.crowded:
+                self._wall.pictures(self._rows, drawn=True)
+            self._log.add(self._rows, now, time.monotonic_ns(), max(stamps))
+
+    def close(self) -> None:
+        """Free the graphics memory."""
+        self._wall.close()
+
+    def report(self) -> dict[str, object]:
+        """Frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""
+        return {**self._log.report(self._settings, self._wall.renderer), "heads": list(self._wall.names)}
+
+
+def _look_of(stage: Stage) -> object:
+    """Equal for stages whose heads look alike."""
+    identity = tuple(sorted(stage.settings.identity.items()))
+    return stage.head, identity, stage.groups, tuple((person.path, share) for person, share in stage.persons)
+
+
+def _head_of(stage: Stage, parameters: Parameters, tile: tuple[int, int]) -> tuple[Head, Camera, np.ndarray]:
+    """A head, a camera that shows it whole in a tile, and the place of each of its parameters."""
+    head = stage.load_head()
+    narrow = min(1.0, tile[0] / tile[1] / _ASPECT)
+    camera = zoom_to_head(framed(stage.settings.face.make_camera(), head)).zoom(narrow)
+    return head, camera, head_indices(parameters, head.parameters)

@@ -1,0 +1,152 @@
+"""Follows a conductor: shows exactly what it sends, one's own life without it, and no jump between; no I/O here."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter, deque
+
+import numpy as np
+
+from controller.base.parameters import Floats, Parameters
+from controller.fleet.lease import NOBODY, Token
+from controller.fleet.payload import Header
+from controller.motion.motion import MotionLimiter, minimum_jerk
+
+_SHARE = 0.25
+"""How much of the limits of speed and acceleration passing from one source to the other may use, beside the motion of
+the sources themselves; the limiter behind it holds them in any case."""
+_SHORTEST_S = 0.3
+_PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
+"""Of the minimum-jerk curve over one second."""
+_NEAR = 1e-4
+"""From so near on, in units of a parameter, what is shown is exactly what was sent: half a step of a servo or less."""
+_WAITING = 128
+
+
+class Follower:
+    """What one head shows of a conductor and of its own life.
+
+    Faces come in by :meth:`take`, from any thread; the control loop calls :meth:`step`.
+
+    Parameters
+    ----------
+    patience_s : a conductor that is silent for so long is lost. delay_ns : a face is shown so long after it was mixed,
+        by the conductor's clock; 0 shows the newest at once.
+
+    Attributes
+    ----------
+    highest : the highest token obeyed. taken, refused : counts; refused by reason.
+    conducted : whether a conductor is followed. exact : whether what is shown is exactly what it sent.
+    header : of the face that is shown. offset_ns : what one's own clock lacks to the conductor's.
+    """
+
+    def __init__(self, parameters: Parameters, patience_s: float = 0.5, delay_ns: int = 0) -> None:
+        p = parameters
+        self._limiter = MotionLimiter(p.max_speed, p.max_acceleration, p.low, p.high, response_s=p.response_s)
+        self._p, self._patience_s, self._delay_ns = p, patience_s, delay_ns
+        self.highest: Token = NOBODY
+        self.taken, self.refused = 0, Counter[str]()
+        self.conducted, self.exact = False, False
+        self.header: Header | None = None
+        self.offset_ns = 0
+        self._lock = threading.Lock()
+        self._waiting: deque[tuple[Header, Floats]] = deque(maxlen=_WAITING)
+        self._sequence = -1
+        self._sent = p.neutral()  # what the conductor sent last
+        self._shown = p.neutral()
+        self._blend_before = p.neutral()
+        self._gap, self._passed_s, self._whole_s = np.zeros(len(p)), 0.0, 0.0
+        self._heard_s = -np.inf
+        self._begun, self._leads = False, False
+
+    def take(self, header: Header, values: Floats) -> bool:
+        """Take a face that arrived; False where it is refused: of a conductor that was replaced, or an old one."""
+        with self._lock:
+            if header.token < self.highest:
+                self.refused["of a conductor that was replaced"] += 1
+                return False
+            if header.token > self.highest:
+                self.highest, self._sequence = header.token, -1
+                self._waiting.clear()
+            if header.sequence <= self._sequence:
+                self.refused["older than the last one"] += 1
+                return False
+            self._sequence, self.taken = header.sequence, self.taken + 1
+            self._waiting.append((header, values))
+            return True
+
+    def lead(self, token: Token) -> None:
+        """Conduct by oneself: nobody with a lower token is followed from now on."""
+        with self._lock:
+            if token > self.highest:
+                self.highest, self._sequence = token, -1
+                self._waiting.clear()
+                self._leads = True
+
+    def step(self, now_ns: int, dt: float, own: Floats, out: Floats) -> int:
+        """Write to ``out`` : (P,) what is shown ``dt`` s after the last step; ``own`` : (P,) is one's own life.
+
+        Returns when the newest command in it came, by one's own clock (ns); 0 for none.
+        """
+        newest = self._due(now_ns)
+        now_s = now_ns * 1e-9
+        leads, self._leads = self._leads, False
+        if newest is not None:
+            changed = self.header is None or newest[0].token != self.header.token
+            self.header, self._sent = newest
+            self._heard_s = now_s
+            if not self.conducted or changed:
+                self._pass_to(self._sent, first=not self._begun)
+                self.conducted = True
+        elif self.conducted and (leads or now_s - self._heard_s > self._patience_s):
+            self.conducted = False
+            self._pass_to(own)
+        elif not self._begun:
+            self._pass_to(own, first=True)
+        self._begun = True
+        self._show(self._sent if self.conducted else own, dt, out)
+        header = self.header
+        return 0 if not self.conducted or header is None or not header.stamp_ns else header.stamp_ns - self.offset_ns
+
+    def _due(self, now_ns: int) -> tuple[Header, Floats] | None:
+        """The newest face that is to be shown by now."""
+        found = None
+        with self._lock:
+            while self._waiting:
+                if self._delay_ns and self._waiting[0][0].time_ns + self._delay_ns > now_ns + self.offset_ns:
+                    break
+                found = self._waiting.popleft()
+        return found
+
+    def _pass_to(self, source: Floats, *, first: bool = False) -> None:
+        """Begin to pass to another source: the gap to it closes along a minimum-jerk curve."""
+        self._gap = np.zeros_like(source) if first else self._shown - source
+        if first:
+            self._shown[:] = source
+        size = np.abs(self._gap)
+        speed = _PEAK_SPEED * size / (_SHARE * self._p.max_speed)
+        acceleration = np.sqrt(_PEAK_ACCELERATION * size / (_SHARE * self._p.max_acceleration))
+        self._whole_s = 0.0 if first else max(_SHORTEST_S, float(speed.max()), float(acceleration.max()))
+        self._passed_s = 0.0
+        self._blend_before = source + self._gap
+        self.exact = first
+
+    def _show(self, source: Floats, dt: float, out: Floats) -> None:
+        if not self.exact:
+            self._approach(source, dt, out)
+        if self.exact:
+            out[:] = source
+            velocity = (out - self._shown) / dt if dt > 0.0 else np.zeros_like(out)
+            self._limiter.reset_moving(out, velocity)
+        self._shown = out.copy()
+
+    def _approach(self, source: Floats, dt: float, out: Floats) -> None:
+        """Follow the blend of both sources within the limits; led by its speed, so that nothing lags behind."""
+        self._passed_s += dt
+        left = 1.0 - minimum_jerk(self._passed_s / self._whole_s) if self._whole_s > 0.0 else 0.0
+        blend = source + left * self._gap
+        speed = (blend - self._blend_before) / dt if dt > 0.0 else np.zeros_like(blend)
+        self._blend_before = blend
+        self._limiter.step(dt, blend + speed * self._p.response_s, out)
+        if left == 0.0 and float(np.abs(out - source).max()) < _NEAR:
+            self.exact = True

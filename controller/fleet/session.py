@@ -1,0 +1,85 @@
+"""Opens a session of Zenoh: explicit endpoints only, with TLS and access control where the stage says so."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from controller.base.errors import LinkError
+from controller.stage.zenoh import TlsSettings, ZenohSettings
+from surface.base.extras import importing
+
+if TYPE_CHECKING:
+    import zenoh  # optional: the extra zenoh
+
+
+def open_session(settings: ZenohSettings, beside: Path) -> zenoh.Session:
+    """A session by a stage's ``[zenoh]``; ``beside`` : the stage's file, from whose folder other files are named.
+
+    Raises LinkError: an endpoint cannot be used, or a file of certificates or settings cannot be read. MissingPackage:
+    Zenoh is not installed.
+    """
+    with importing("heads in several processes", "zenoh"):
+        import zenoh  # optional: the extra zenoh
+    zenoh.init_log_from_env_or("error")
+    where = ", ".join([*settings.listen, *settings.connect]) or str(settings.config)
+    try:
+        return zenoh.open(_configuration(settings, beside.parent))
+    except zenoh.ZError as error:
+        why = str(error).partition(" at ")[0]
+        raise LinkError(
+            f"zenoh at {where}: {why}", hint="look whether another program has the port: ss -ltnp"
+        ) from error
+
+
+def _configuration(settings: ZenohSettings, folder: Path) -> zenoh.Config:
+    import zenoh  # optional: the extra zenoh
+
+    own = None if settings.config is None else _file(folder, settings.config, "zenoh.config")
+    config = zenoh.Config() if own is None else zenoh.Config.from_file(str(own))
+    for key, value in _entries(settings, folder).items():
+        config.insert_json5(key, json.dumps(value))
+    return config
+
+
+def _entries(settings: ZenohSettings, folder: Path) -> dict[str, object]:
+    """What the table says, as Zenoh's own keys. Nothing is searched for: no multicast, and gossip connects nobody."""
+    found: dict[str, object] = {
+        "mode": settings.way,
+        "scouting/multicast/enabled": False,
+        "scouting/gossip/autoconnect": {"router": [], "peer": []},
+        "transport/shared_memory/enabled": settings.shared_memory,
+        "timestamping/enabled": False,
+    }
+    if settings.connect or settings.listen:
+        found |= {"connect/endpoints": settings.connect, "listen/endpoints": settings.listen}
+    if settings.connect:
+        found |= {"connect/timeout_ms": -1, "connect/exit_on_failure": False}
+    return found | (_tls(settings.tls, folder) if settings.tls is not None else {})
+
+
+def _tls(tls: TlsSettings, folder: Path) -> dict[str, object]:
+    base = "transport/link/tls/"
+    found: dict[str, object] = {
+        base + "root_ca_certificate": str(_file(folder, tls.ca, "zenoh.tls.ca")),
+        base + "enable_mtls": tls.mutual,
+        base + "verify_name_on_connect": True,
+    }
+    if tls.certificate is not None and tls.key is not None:
+        certificate, key = (
+            _file(folder, tls.certificate, "zenoh.tls.certificate"),
+            _file(folder, tls.key, "zenoh.tls.key"),
+        )
+        for side in ("listen", "connect"):
+            found |= {f"{base}{side}_certificate": str(certificate), f"{base}{side}_private_key": str(key)}
+    return found
+
+
+def _file(folder: Path, name: str, key: str) -> Path:
+    """A file that the table names. Raises LinkError: it cannot be read."""
+    path = folder / name
+    if not os.access(path, os.R_OK):
+        raise LinkError(f"{key}: {path} cannot be read", hint=f"look at: ls -l {path}")
+    return path

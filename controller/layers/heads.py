@@ -1,0 +1,267 @@
+"""The heads of a run by name, groups of them, and turn-taking: whom a command means.
+
+Every head is a :class:`controller.layers.commands.CommandSink` of its own. :meth:`Heads.find` gives the sink of a name,
+a group, or everybody; links pass on commands to what it gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from controller.base.errors import ParameterError
+from controller.base.parameters import Flags, Floats, did_you_mean
+from controller.layers.sink import CommandSink, Directory, HeadSink, Player, StatusValue
+
+EVERYBODY = "all"
+"""The name that means every head."""
+
+
+class Heads:
+    """The heads of a run, which it fills with :meth:`add`; empty where there is one head without a name.
+
+    groups : names of the heads of each group.
+
+    Attributes
+    ----------
+    turns : who speaks; None where nobody takes turns.
+    """
+
+    def __init__(self, groups: Mapping[str, Sequence[str]] | None = None) -> None:
+        self._members: dict[str, HeadSink] = {}
+        self._groups = {name.lower(): (name, tuple(members)) for name, members in (groups or {}).items()}
+        self.turns: Turns | None = None
+
+    def add(self, state: HeadSink) -> None:
+        """Know one more head, by its name."""
+        self._members[state.name.lower()] = state
+
+    @property
+    def members(self) -> tuple[HeadSink, ...]:
+        """Every head, in the order of the stage."""
+        return tuple(self._members.values())
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the heads, in the order of the stage."""
+        return tuple(state.name for state in self._members.values())
+
+    @property
+    def groups(self) -> tuple[str, ...]:
+        """Names of the groups."""
+        return tuple(name for name, _ in self._groups.values())
+
+    def find(self, name: str) -> CommandSink:
+        """Whom a name means, in any case; ``@`` may stand before it. Raises ParameterError: nobody."""
+        wanted = name.removeprefix("@").lower()
+        if wanted in self._members:
+            return self._members[wanted]
+        if wanted == EVERYBODY and self._members:
+            return Group(EVERYBODY, self.members)
+        if wanted in self._groups:
+            group, members = self._groups[wanted]
+            return Group(group, tuple(self._members[member.lower()] for member in members))
+        if not self._members:
+            raise ParameterError(f"{name}: there is one head here, which has no name", hint="leave the name out")
+        known = [*self.names, *self.groups, EVERYBODY]
+        raise ParameterError(f"no head or group called {name!r}{did_you_mean(wanted, known)}",
+                             hint=f"there are {', '.join(known)}")  # fmt: skip
+
+    def head(self, name: str) -> HeadSink:
+        """The one head of a name. Raises ParameterError: no head is called so."""
+        found = self._members.get(name.removeprefix("@").lower())
+        if found is None:
+            raise ParameterError(f"no head called {name!r}{did_you_mean(name, self.names)}",
+                                 hint=f"there are {', '.join(self.names) or 'no heads with names'}")  # fmt: skip
+        return found
+
+
+class Group:
+    """Several heads as one :class:`controller.layers.commands.CommandSink`: each gets every command.
+
+    Questions need one head: they raise ParameterError.
+    """
+
+    def __init__(self, name: str, members: Sequence[HeadSink]) -> None:
+        first = members[0]
+        self.name, self.members = name, tuple(members)
+        self.parameters, self.vocabulary, self.stop_latch = first.parameters, first.vocabulary, first.stop_latch
+        self.heads: Directory = first.heads
+
+    @property
+    def shows(self) -> Player | None:
+        """The shows of all of them; None where none plays any."""
+        players = [state.shows for state in self.members if state.shows is not None]
+        return _Players(players) if players else None
+
+    def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
+        self._each(lambda state: state.set_parameters(indices, values, stamp_ns))
+
+    def release(self, indices: Sequence[int], stamp_ns: int) -> None:
+        self._each(lambda state: state.release(indices, stamp_ns))
+
+    def write_layer(self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
+        self._each(lambda state: state.write_layer(name, values, mask, now_ns, stamp_ns))
+
+    def release_layer(self, name: str) -> None:
+        self._each(lambda state: state.release_layer(name))
+
+    def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
+        self._each(lambda state: state.expression(name, intensity, duration_s, stamp_ns))
+
+    def gaze(self, yaw_rad: float, pitch_rad: float, stamp_ns: int) -> None:
+        self._each(lambda state: state.gaze(yaw_rad, pitch_rad, stamp_ns))
+
+    def gaze_at(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        self._each(lambda state: state.gaze_at(x_mm, y_mm, z_mm, stamp_ns))
+
+    def gaze_room(self, x_mm: float, y_mm: float, z_mm: float, stamp_ns: int) -> None:
+        self._each(lambda state: state.gaze_room(x_mm, y_mm, z_mm, stamp_ns))
+
+    def gaze_head(self, name: str, stamp_ns: int) -> None:
+        target = self.heads.head(name)
+        for state in self.members:
+            if state is not target:  # nobody can look at itself
+                state.gaze_head(name, stamp_ns)
+
+    def gaze_off(self, stamp_ns: int) -> None:
+        self._each(lambda state: state.gaze_off(stamp_ns))
+
+    def neutral(self, seconds: float, stamp_ns: int) -> None:
+        self._each(lambda state: state.neutral(seconds, stamp_ns))
+
+    def live(self, amount: float, stamp_ns: int, manner: str | None = None) -> None:
+        self._each(lambda state: state.live(amount, stamp_ns, manner))
+
+    def viseme(self, names: Sequence[str], weights: Sequence[float], stamp_ns: int) -> None:
+        self._each(lambda state: state.viseme(names, weights, stamp_ns))
+
+    def snapshot(self, out: Floats) -> None:
+        self._refuse()
+
+    def measured(self, out: Floats) -> bool:
+        self._refuse()
+        return False
+
+    def holder(self, index: int) -> str | None:
+        self._refuse()
+        return None
+
+    def layer_names(self) -> tuple[str, ...]:
+        """Layers that all of them have, in the order of the first one."""
+        others = [set(state.layer_names()) for state in self.members]
+        return tuple(name for name in self.members[0].layer_names() if all(name in each for each in others))
+
+    def status(self) -> dict[str, StatusValue]:
+        self._refuse()
+        return {}
+
+    def overview(self) -> Mapping[str, list[dict[str, Any]]]:
+        self._refuse()
+        return {}
+
+    def held(self) -> dict[int, float]:
+        self._refuse()
+        return {}
+
+    def _each(self, command: Callable[[HeadSink], object]) -> None:
+        for state in self.members:
+            command(state)
+
+    def _refuse(self) -> None:
+        names = ", ".join(state.name for state in self.members)
+        raise ParameterError(f"@{self.name} is several heads: a question needs one of {names}",
+                             hint=f"ask one: @{self.members[0].name}")  # fmt: skip
+
+
+class _Players:
+    """The shows of several heads as one :class:`controller.layers.commands.Player`."""
+
+    def __init__(self, players: Sequence[Player]) -> None:
+        self._players = players
+
+    def start(self, name: str) -> None:
+        for player in self._players:
+            player.start(name)
+
+    def names(self) -> Sequence[str]:
+        return self._players[0].names()
+
+    def control(self, what: str, to: str | float = 0.0) -> None:
+        for player in self._players:
+            player.control(what, to)
+
+    def tick(self, now_ns: int) -> None:
+        """Nothing: each head ticks its own."""
+
+    @property
+    def name(self) -> str | None:
+        return self._players[0].name
+
+    def abandon(self, now_ns: int) -> None:
+        for player in self._players:
+            player.abandon(now_ns)
+
+    def status(self) -> str:
+        return self._players[0].status()
+
+
+_LOUD = 0.04
+"""How far speech opens the jaw of who is heard."""
+_PAUSE_S = 0.7
+"""A speaker that is silent for so long can lose its turn: longer than pauses within a sentence."""
+
+
+class Turns:
+    """Who speaks: that head behaves as one who speaks, the others listen to it and look at it.
+
+    heads : all heads. auto : whoever begins to speak while nobody else does has the turn.
+
+    Attributes
+    ----------
+    speaker : the name of who has the turn; None where nobody has.
+    """
+
+    def __init__(self, heads: Heads, *, auto: bool = False) -> None:
+        self._heads, self._auto = heads, auto
+        self.speaker: str | None = None
+        self._manners: dict[str, str] = {}
+        self._heard_ns: dict[str, int] = {}
+
+    def give(self, name: str | None, stamp_ns: int) -> None:
+        """Give the turn to a head; None: to nobody, and everybody behaves and looks as before.
+
+        Raises ParameterError: no head is called so.
+        """
+        speaker = None if name is None else self._heads.head(name)
+        if speaker is None:
+            self._end(stamp_ns)
+            return
+        for state in self._heads.members:
+            self._manners.setdefault(state.name, state.manner)
+            state.live(state.liveliness, stamp_ns, "speak" if state is speaker else "listen")
+            if state is not speaker:
+                state.gaze_head(speaker.name, stamp_ns)
+        if self.speaker != speaker.name:
+            speaker.gaze_off(stamp_ns)  # it no longer looks at who spoke before
+        self.speaker = speaker.name
+
+    def tick(self, now_ns: int) -> None:
+        """Hear who speaks, and give the turn to who begins."""
+        if not self._auto:
+            return
+        for state in self._heads.members:
+            if state.loudness > _LOUD:
+                self._heard_ns[state.name] = now_ns
+        loud = [name for name, at_ns in self._heard_ns.items() if now_ns - at_ns < _PAUSE_S * 1e9]
+        if self.speaker not in loud and loud:
+            self.give(min(loud, key=lambda name: -self._heard_ns[name]), now_ns)
+
+    def _end(self, stamp_ns: int) -> None:
+        if self.speaker is None:
+            return
+        for state in self._heads.members:
+            state.live(state.liveliness, stamp_ns, self._manners.get(state.name, "auto"))
+            if state.name != self.speaker:
+                state.gaze_off(stamp_ns)
+        self.speaker, self._manners = None, {}

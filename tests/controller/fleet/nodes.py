@@ -1,0 +1,91 @@
+"""What tests of several nodes share: a free port, a router, nodes that tick in threads."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zenoh
+
+from controller.base.parameters import PARAMETERS as P
+from controller.fleet.node import Node
+from controller.layers.commands import CommandState
+from controller.stage.zenoh import ZenohSettings
+
+LEASE_MS = 200.0
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return
+        time.sleep(0.005)
+    raise AssertionError("waited in vain")
+
+
+@contextmanager
+def router(config: dict[str, Any] | None = None, endpoint: str | None = None) -> Iterator[str]:
+    """A router of the library itself; yields its endpoint."""
+    import json
+
+    endpoint = endpoint or f"tcp/127.0.0.1:{free_port()}"
+    made = zenoh.Config()
+    entries = {"mode": "router", "listen/endpoints": [endpoint], "scouting/multicast/enabled": False}
+    for key, value in {**entries, **(config or {})}.items():
+        made.insert_json5(key, json.dumps(value))
+    with zenoh.open(made):
+        yield endpoint
+
+
+class Running:
+    """A node whose heads are ticked 100 times a second in a thread.
+
+    rows : for each head, what was shown, in order, with the time. paused : ticks nothing, as a stopped process.
+    """
+
+    def __init__(self, endpoint: str, role: str, *, folder: Path, seed: int = 1, heads: tuple[str, ...] = ("maple",),
+                 **more: Any) -> None:  # fmt: skip
+        settings = {"role": role, "connect": [endpoint], "lease_ms": LEASE_MS, **more}
+        self.states = {name: CommandState(P, seed=seed + i) for i, name in enumerate(heads)}
+        for state in self.states.values():
+            state.live(1.0, 0)
+        self.node = Node(ZenohSettings.model_validate(settings), P, self.states, folder / "stage.toml")
+        self.rows: dict[str, list[np.ndarray]] = {name: [P.neutral()] for name in heads}
+        self.paused, self._stopping = threading.Event(), threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        due = time.monotonic()
+        while not self._stopping.is_set():
+            while self.paused.is_set() and not self._stopping.is_set():
+                time.sleep(0.001)
+            due = max(due + 0.01, time.monotonic() - 0.05)
+            time.sleep(max(0.0, due - time.monotonic()))
+            now = time.monotonic_ns()
+            for name, state in self.states.items():
+                values = P.neutral()
+                stamp = state.tick(now, 0.01, values)
+                self.node.relay(name, now, 0.01, values, stamp)
+                self.rows[name].append(values)
+
+    def __enter__(self) -> Running:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+        self.node.close()

@@ -1,0 +1,126 @@
+"""controller.fleet.follower: exactly what a conductor sends, one's own life without it, and no jump between."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from controller.base.parameters import PARAMETERS as P
+from controller.fleet.follower import Follower
+from controller.fleet.lease import Token
+from controller.fleet.payload import Header
+from controller.layers.commands import CommandState
+
+DT, STEP_NS = 0.01, 10**7
+FIRST, SECOND = Token(1, 5), Token(2, 3)
+
+
+class Faces:
+    """A conductor's faces: one that changes its expression now and then, by the real layers."""
+
+    def __init__(self, seed: int, token: Token) -> None:
+        self.state, self.token, self.sequence = CommandState(P, seed=seed), token, 0
+        self.state.live(1.0, 0)
+        self._names = ("happiness", "anger", "surprise", "sadness")
+
+    def next(self, now_ns: int) -> tuple[Header, np.ndarray]:
+        if self.sequence % 90 == 0:
+            self.state.expression(self._names[self.sequence // 90 % 4], 1.0, None, now_ns)
+            self.state.gaze(0.4 * (-1) ** (self.sequence // 90), 0.1, now_ns)
+        self.sequence += 1
+        values = P.neutral()
+        self.state.tick(now_ns, DT, values)
+        return Header(self.token, self.sequence, now_ns, now_ns), values
+
+
+def play(follower: Follower, spans: list[tuple[Faces | None, float]]) -> tuple[np.ndarray, list[np.ndarray | None]]:
+    """What is shown, (n, P), and what was sent in each tick."""
+    own, now_ns, mine = CommandState(P, seed=99), 10**9, P.neutral()
+    own.live(1.0, 0)
+    shown, sent = [], []
+    for faces, seconds in spans:
+        for _ in range(round(seconds / DT)):
+            now_ns += STEP_NS
+            own.tick(now_ns, DT, mine)
+            values = None
+            if faces is not None:
+                header, values = faces.next(now_ns)
+                follower.take(header, values)
+            out = P.neutral()
+            follower.step(now_ns, DT, mine, out)
+            shown.append(out)
+            sent.append(values)
+    return np.array(shown), sent
+
+
+def check_limits(shown: np.ndarray) -> None:
+    """Every step within the limits of speed, and of acceleration."""
+    speed = np.diff(shown, axis=0) / DT
+    assert (np.abs(speed) <= P.max_speed * 1.001 + 1e-9).all()
+    acceleration = np.diff(speed, axis=0) / DT
+    over = np.abs(acceleration) / P.max_acceleration
+    assert over.max() < 1.05, P.names[int(np.unravel_index(over.argmax(), over.shape)[1])]
+
+
+def test_what_is_sent_is_shown_bit_for_bit() -> None:
+    shown, sent = play(Follower(P), [(Faces(1, FIRST), 2.0)])
+    np.testing.assert_array_equal(shown, np.array(sent))
+
+
+def test_a_head_that_loses_its_conductor_goes_over_to_its_own_life_and_back_without_a_jump() -> None:
+    follower, faces = Follower(P, patience_s=0.4), Faces(1, FIRST)
+    shown, sent = play(follower, [(faces, 1.5), (None, 4.0), (faces, 4.0)])
+    check_limits(shown)
+    frozen = shown[150:185]
+    assert np.abs(frozen - shown[149]).max() < 1e-12  # it waits for so long only
+    moves = np.abs(np.diff(shown[195:550], axis=0)).max(axis=1)
+    assert (moves > 0.0).mean() > 0.9
+    assert follower.exact and np.array_equal(shown[-1], sent[-1])
+    late = [np.array_equal(a, b) for a, b in zip(shown[-200:], sent[-200:], strict=True)]
+    assert all(late)  # in step again within two seconds
+
+
+def test_another_conductor_takes_over_without_a_jump_and_the_old_one_is_not_obeyed_again() -> None:
+    follower, old, new = Follower(P), Faces(1, FIRST), Faces(2, SECOND)
+    shown, _ = play(follower, [(old, 1.5), (None, 0.3), (new, 3.0)])
+    check_limits(shown)
+    refused = [follower.take(*old.next(9 * 10**9 + k * STEP_NS)) for k in range(5)]
+    assert not any(refused) and sum(follower.refused.values()) == 5 and follower.highest == SECOND
+
+
+def test_old_and_repeated_faces_are_refused() -> None:
+    follower, faces = Follower(P), Faces(1, FIRST)
+    one, two = faces.next(10**9), faces.next(10**9 + STEP_NS)
+    assert follower.take(*two) and not follower.take(*one) and not follower.take(*two)
+    assert follower.refused == {"older than the last one": 2}
+
+
+def test_faces_wait_until_they_are_due_by_the_conductors_clock() -> None:
+    follower = Follower(P, delay_ns=50 * 10**6)
+    follower.offset_ns = 10**12  # the conductor's clock is ahead
+    values = P.neutral()
+    values[P.index("jawOpen")] = 0.5
+    out = P.neutral()
+    follower.take(Header(FIRST, 1, 10**12 + 10**9), values)
+    follower.step(10**9 + 49 * 10**6, DT, P.neutral(), out)
+    assert not follower.conducted and out[P.index("jawOpen")] == 0.0
+    follower.step(10**9 + 50 * 10**6, DT, P.neutral(), out)
+    assert follower.conducted
+
+
+def test_who_conducts_itself_shows_its_own_face_from_where_it_was() -> None:
+    follower, faces = Follower(P), Faces(1, FIRST)
+    own, out = P.neutral(), P.neutral()
+    for k in range(1, 60):
+        follower.take(*faces.next(k * STEP_NS))
+        follower.step(k * STEP_NS, DT, own, out)
+    before = out.copy()
+    follower.lead(SECOND)
+    rows = [before]
+    for k in range(60, 400):
+        follower.step(k * STEP_NS, DT, own, out)
+        rows.append(out.copy())
+    assert not follower.conducted and np.array_equal(rows[-1], own)
+    assert np.abs(rows[1] - before).max() < P.max_speed.max() * DT
+    with pytest.raises(AssertionError):
+        check_limits(np.array([before, own, own]))  # a jump would be seen

@@ -1,0 +1,170 @@
+"""controller.fleet.node: real sessions of Zenoh in one process, on a router of the library itself."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+zenoh = pytest.importorskip("zenoh", reason="pip install 'omote[zenoh]'")
+
+from controller.base.errors import LinkError  # noqa: E402
+from controller.base.parameters import PARAMETERS as P  # noqa: E402
+from controller.fleet.lease import Token  # noqa: E402
+from controller.fleet.payload import Header, Payloads  # noqa: E402
+from controller.takes.reader import load_take  # noqa: E402
+from tests.controller.fleet.nodes import Running, free_port, router, until  # noqa: E402
+
+JAW = P.index("jawOpen")
+
+
+@pytest.fixture(scope="module")
+def hub() -> Iterator[str]:
+    with router() as endpoint:
+        yield endpoint
+
+
+def client(endpoint: str) -> zenoh.Session:
+    config = zenoh.Config()
+    config.insert_json5("mode", '"client"')
+    config.insert_json5("connect/endpoints", json.dumps([endpoint]))
+    config.insert_json5("scouting/multicast/enabled", "false")
+    return zenoh.open(config)
+
+
+def ask(endpoint: str, key: str, payload: str | None = None) -> list[str]:
+    """What a session of its own is answered."""
+    with client(endpoint) as session:
+        replies = session.get(key, payload=payload, timeout=3.0)
+        return [reply.ok.payload.to_string() for reply in replies if reply.ok is not None]
+
+
+@pytest.mark.slow
+def test_heads_show_bit_for_bit_what_is_conducted_and_say_so(hub: str, tmp_path: Path) -> None:
+    more = {"folder": tmp_path, "prefix": "bits", "heads": ("maple", "oak")}
+    with (
+        Running(hub, "conductor", **more) as conductor,
+        Running(hub, "head", seed=50, folder=tmp_path, prefix="bits") as head,
+        Running(hub, "recorder", seed=60, **more) as recorder,
+    ):
+        follower = head.node.followers["maple"]
+        until(lambda: follower.exact and follower.taken > 20)
+        begin = len(head.rows["maple"])
+        conductor.states["maple"].expression("happiness", 1.0, None, time.monotonic_ns())
+        until(lambda: follower.taken > 120)
+        shown = {row.tobytes() for row in head.rows["maple"][begin:]}
+        sent = [row.tobytes() for row in conductor.rows["maple"]]
+        assert shown <= set(sent) and len(shown) > 50
+        assert not follower.refused and not head.node.refused
+        states = [json.loads(each) for at in ("", "/head") for each in ask(hub, f"bits/maple/state{at}")]
+        roles = {state["role"]: state for state in states}
+        assert roles["conductor"]["conducting"] and roles["conductor"]["commanded"]["expression"][0] == "happiness"
+        assert roles["head"]["conducted"] and roles["head"]["token"] == roles["conductor"]["token"]
+        (about,) = ask(hub, "bits/maple/configuration")
+        assert json.loads(about)["role"] == "conductor" and "tls" not in json.loads(about)
+        assert ask(hub, "bits/oak/commands", "SET jawOpen 0.9") == ["OK SET 1\n"]
+        assert ask(hub, "bits/oak/commands", "SET jaw 2")[0].startswith("ERR 23")
+        until(lambda: conductor.rows["oak"][-1][JAW] > 0.85)
+        until(lambda: recorder.node.followers["oak"].exact)
+        report = head.node.report()
+        assert report["role"] == "head" and report["heads"]["maple"]["taken"] > 120
+    take = load_take(tmp_path / "recorded-oak.csv", P)
+    assert take.values[:, JAW].max() > 0.85 and take.duration_s > 0.5
+
+
+def test_the_parts_of_a_stage_are_alive_as_tokens(hub: str, tmp_path: Path) -> None:
+    with Running(hub, "head", folder=tmp_path, prefix="tokens"), client(hub) as session:
+        found = [str(reply.ok.key_expr) for reply in session.liveliness().get("tokens/**") if reply.ok]
+    assert len(found) == 1 and found[0].startswith("tokens/maple/alive/head/")
+
+
+def test_a_stop_anywhere_stops_the_heads_until_start(hub: str, tmp_path: Path) -> None:
+    with (
+        Running(hub, "conductor", folder=tmp_path, prefix="stop") as conductor,
+        Running(hub, "head", folder=tmp_path, prefix="stop") as head,
+    ):
+        until(lambda: head.node.followers["maple"].conducted)
+        assert ask(hub, "stop/maple/commands", "STOP") == ["OK STOP\n"]
+        latch = head.states["maple"].stop_latch
+        until(lambda: latch.stopped is not None)
+        assert latch.stopped is not None and latch.stopped.who == "conductor"
+        ask(hub, "stop/maple/commands", "START")
+        until(lambda: latch.stopped is None)
+        latch.stop("line here", 1)
+        time.sleep(0.1)
+        assert latch.stopped is not None  # what was stopped here is let go here
+        assert conductor.states["maple"].stop_latch.stopped is None
+
+
+@pytest.mark.parametrize(("payload", "off"), [("binary", 0.51 / 16384), ("json", 0.0)])
+def test_other_payloads_arrive_too(hub: str, tmp_path: Path, payload: str, off: float) -> None:
+    with (
+        Running(hub, "conductor", folder=tmp_path, prefix=payload, payload=payload) as conductor,
+        Running(hub, "head", folder=tmp_path, prefix=payload) as head,
+    ):
+        conductor.states["maple"].set_parameters([JAW], [0.6], time.monotonic_ns())
+        until(lambda: abs(head.rows["maple"][-1][JAW] - 0.6) <= off + 1e-4 and head.node.followers["maple"].exact)
+
+
+def test_what_is_no_conductors_is_refused_and_counted(hub: str, tmp_path: Path) -> None:
+    with Running(hub, "head", folder=tmp_path, prefix="strange") as head, client(hub) as session:
+        key, good = "strange/maple/parameters", Payloads(P).encode(P.neutral())
+        header = Header(Token(3, 3), 1, 1)
+        for payload, attachment in ((good, None), (good, b"x"), (b"x", header.encode())):
+            session.put(key, payload, encoding="omote/exact;1", attachment=attachment)
+        until(lambda: sum(head.node.refused.values()) == 3)
+        session.put(key, good, encoding="omote/exact;1", attachment=header.encode())
+        until(lambda: head.node.followers["maple"].taken == 1)
+        session.put(key, good, encoding="omote/exact;1", attachment=Header(Token(2, 9), 5, 1).encode())
+        until(lambda: head.node.followers["maple"].refused)
+
+
+@pytest.mark.slow
+def test_a_conductor_that_dies_or_is_stopped_is_replaced_and_nobody_obeys_it_again(hub: str, tmp_path: Path) -> None:
+    more = {"folder": tmp_path, "prefix": "fail"}
+    with Running(hub, "conductor", **more) as first:
+        until(lambda: first.node.lease.active)
+        first.states["maple"].set_parameters([JAW], [0.7], time.monotonic_ns())
+        with Running(hub, "conductor", seed=9, **more) as second, Running(hub, "head", seed=5, **more) as head:
+            until(lambda: head.node.followers["maple"].exact and JAW in second.states["maple"].held())
+            assert not second.node.lease.active  # it stands by, and knows what was commanded before it came
+            first.states["maple"].expression("anger", 1.0, None, time.monotonic_ns())
+            until(lambda: second.states["maple"].status()["expression"] == "anger")
+            begin, stopped = len(head.rows["maple"]), time.monotonic()
+            first.paused.set()
+            until(lambda: second.node.lease.active and head.node.followers["maple"].highest.holder
+                  == second.node.lease.holder)  # fmt: skip
+            assert time.monotonic() - stopped < 0.5 + 0.3  # of a busy machine
+            taken = head.node.followers["maple"].taken
+            first.paused.clear()
+            until(lambda: head.node.followers["maple"].taken > taken + 100)
+            assert not first.node.lease.active and second.node.lease.active
+            assert first.node.followers["maple"].conducted
+            steps = np.abs(np.diff(np.array(head.rows["maple"][begin:]), axis=0)) / (P.max_speed * 0.01)
+            assert steps.max() < 4.0  # of one tick; none is a jump, ticks of a busy machine differ
+            assert head.rows["maple"][-1][JAW] > 0.6
+
+
+@pytest.mark.slow
+def test_a_head_without_a_conductor_lives_on_and_joins_again(hub: str, tmp_path: Path) -> None:
+    more = {"folder": tmp_path, "prefix": "alone"}
+    with Running(hub, "head", seed=5, **more) as head:
+        follower = head.node.followers["maple"]
+        with Running(hub, "conductor", **more) as conductor:
+            conductor.states["maple"].set_parameters([JAW], [0.8], time.monotonic_ns())
+            until(lambda: follower.exact and follower.conducted and head.rows["maple"][-1][JAW] > 0.7)
+        until(lambda: not follower.conducted)
+        until(lambda: follower.exact and head.rows["maple"][-1][JAW] < 0.1)
+        with Running(hub, "conductor", **more):
+            until(lambda: follower.conducted and follower.exact)
+
+
+def test_endpoints_and_files_that_cannot_be_used_are_named(hub: str, tmp_path: Path) -> None:
+    with pytest.raises(LinkError, match=r"zenoh at tcp/127\.0\.0\.1"):
+        Running("", "head", folder=tmp_path, connect=[], listen=[hub]).node.close()
+    with pytest.raises(LinkError, match=r"zenoh\.tls\.ca: .*none\.pem cannot be read"):
+        Running(f"tls/127.0.0.1:{free_port()}", "head", folder=tmp_path, tls={"ca": "none.pem"})
