@@ -23,6 +23,7 @@ from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.parts import Part
 from controller.base.signals import termination_signals
 from controller.body import messages
+from controller.body.details import Notes, details_of
 from controller.body.event_log import EventLog
 from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.body.messages import RunOptions
@@ -60,7 +61,7 @@ class Body:
         options: RunOptions = RunOptions(),
     ) -> None:
         self.stage = stage
-        self._closers = Closers()
+        self._closers, self.notes = Closers(), Notes()
         self.state = stage.state(parameters)
         path, self.replay = options.take, None
         if path is not None and path.suffix == SUFFIX:
@@ -218,6 +219,13 @@ class Body:
         for link, fault in faults:
             link.fail(fault)
 
+    def play_take(self, path: Path) -> None:
+        """Play a take from its beginning, beside the links; one that cannot be read is logged and changes nothing."""
+        try:
+            self.sources.play(TakePlayer(load_take(path, self.state.parameters), self.state, reader_of(path).layer))
+        except OMOTE_ERRORS as error:
+            log.warning("%s", error)
+
     def publish(self, panel_state: PanelState) -> None:
         """Write the state for the panel."""
         self._panel.run(lambda: panel_state.publish(self.state, self.measured_face), time.monotonic())
@@ -314,12 +322,14 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event)
     panel = Mailbox.receive(pipe, PanelState.size(PARAMETERS))
     panel_state = PanelState(panel, [layer.name for layer in by_priority(stage.layers)], PARAMETERS)
     body = Body(stage, PARAMETERS, mailbox, orders.options)
+    logging.getLogger().addHandler(body.notes)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
     body.start()
     try:
         _send(pipe, messages.Ready())
         _wait(body, pipe, stop, panel_state)
     finally:
+        logging.getLogger().removeHandler(body.notes)
         body.stop()
     _send(pipe, messages.Report(body.report()))
 
@@ -348,6 +358,12 @@ def _handle(body: Body, pipe: Connection) -> bool:
         shorten_thread_switches()
         request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
         body.begin()
+        return True
+    if isinstance(request, messages.AskDetails):
+        _send(pipe, details_of(body))
+        return True
+    if isinstance(request, messages.PlayTake):
+        body.play_take(request.path)
         return True
     return carry_out(request, body.state, time.monotonic_ns())
 

@@ -25,6 +25,7 @@ _TERMINATE_TIMEOUT_S = 5.0
 class BodyProcess:
     """The body as main sees it; a context manager that always stops it.
 
+    details : the newest answer to :class:`AskDetails`.
     ``preloaded`` : a process that waits for orders; without one it is started here.
     """
 
@@ -47,6 +48,7 @@ class BodyProcess:
             self._panel_mailbox, [layer.name for layer in by_priority(stage.layers)], parameters
         )
         self.finished = False
+        self.details: messages.Details | None = None
         self.report: dict[str, object] = {}
         self._pipe, self._process = preloaded.pipe, preloaded.process
         preloaded.send(messages.BodyOrders(str(stage.path), options), self.mailbox, self._panel_mailbox)
@@ -88,6 +90,8 @@ class BodyProcess:
     def _handle(self, message: object) -> None:
         if isinstance(message, messages.Report):
             self.report = message.content
+        elif isinstance(message, messages.Details):
+            self.details = message
         elif isinstance(message, messages.Finished):
             self.finished = True
 
