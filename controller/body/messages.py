@@ -146,7 +146,20 @@ class PlayTake:
     path: Path
 
 
-PanelRequest = Hold | Show | LookAt | Live | PlayShow | ControlShow | Learn | Neutral | StopServos | StartServos | AskDetails | PlayTake
+PanelRequest = (
+    Hold
+    | Show
+    | LookAt
+    | Live
+    | PlayShow
+    | ControlShow
+    | Learn
+    | Neutral
+    | StopServos
+    | StartServos
+    | AskDetails
+    | PlayTake
+)
 
 
 @dataclass(frozen=True)

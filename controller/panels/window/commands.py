@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from controller.base.parameters import Floats
 from controller.body.messages import Hold, Live, LookAt, Neutral, PanelRequest, Show
+from controller.panels.window.looks import Look
 
 _CALM_S = 0.6
 _NOTHING_SHOWN = Show("neutral", 1.0)
@@ -22,6 +23,7 @@ class Settings:
     held : parameters by index and the values they are held at. expression : the one that is shown.
     gaze : the point that is looked at, see :class:`controller.body.messages.LookAt`. life : amount of idle motion.
     moves : (n, 3) mm that the control points of the face were moved by hand; None for none.
+    look : theme, quality, person and head; None for those of the stage.
     """
 
     held: Mapping[int, float] = field(default_factory=dict)
@@ -29,6 +31,7 @@ class Settings:
     gaze: tuple[float, float, float] | None = None
     life: float = 0.0
     moves: Floats | None = None
+    look: Look | None = None
 
 
 class Commands:
@@ -36,6 +39,7 @@ class Commands:
 
     send : sends requests to the body. life : amount of idle motion at first.
     show_moves : draws the control points moved by (n, 3) mm, or where they were for None.
+    show_look : shows a look, or the first one for None; set by who can.
     """
 
     def __init__(
@@ -45,6 +49,7 @@ class Commands:
         show_moves: Callable[[Floats | None], None] = lambda moves: None,
     ) -> None:
         self.send, self.show_moves = send, show_moves
+        self.show_look: Callable[[Look | None], None] = lambda look: None
         self.now = Settings(life=life)
         self._past: list[Settings] = []
         self._future: list[Settings] = []
@@ -81,10 +86,14 @@ class Commands:
         """Move control points."""
         self.change(replace(self.now, moves=moves), step)
 
+    def appear(self, look: Look | None) -> None:
+        """Change the look."""
+        self.change(replace(self.now, look=look))
+
     def neutral(self) -> None:
-        """Give everything back and return to the neutral face; idle motion and moved control points stay."""
+        """Give everything back and return to the neutral face; idle motion, moved control points and the look stay."""
         self._remember()
-        self.now = Settings(life=self.now.life, moves=self.now.moves)
+        self.now = Settings(life=self.now.life, moves=self.now.moves, look=self.now.look)
         self.send(Neutral(_CALM_S))
 
     def change(self, to: Settings, step: Hashable = None) -> None:
@@ -123,6 +132,8 @@ class Commands:
             self.send(request)
         if before.moves is not to.moves:
             self.show_moves(to.moves)
+        if before.look != to.look:
+            self.show_look(to.look)
 
 
 def _differences(before: Settings, after: Settings) -> Iterator[PanelRequest]:

@@ -33,13 +33,23 @@ class MouseEditing:
     def __init__(
         self, head: Head, copy: Callable[[], Head], newest: Callable[[], Floats], commands: Commands, area: PictureArea
     ) -> None:
-        self.editor = PointEditor(head, copy, PARAMETERS)
-        self._newest, self._commands, self._area = newest, commands, area
-        self._eyes = head.data.eyes.mean(axis=0)
+        self._newest, self._commands, self._area, self._copy = newest, commands, area, copy
         self._symmetric, self._name, self._message = False, "mine", ""
         self._mirror = PARAMETERS.mirror()
         self._grabs, self._pixel = 0, (0.0, 0.0)
-        commands.show_moves = self.editor.set_moves
+        commands.show_moves = self._show_moves
+        self.change(head)
+
+    def change(self, head: Head) -> None:
+        """Drag points of another head from now on; control points stay moved where it has as many."""
+        self.editor = PointEditor(head, self._copy, PARAMETERS)
+        self._eyes = head.data.eyes.mean(axis=0)
+        if self._commands.now.moves is not None:
+            self._show_moves(self._commands.now.moves)
+
+    def _show_moves(self, moves: Floats | None) -> None:
+        fits = moves is not None and moves.shape == self.editor.moves.shape
+        self.editor.set_moves(moves if fits else None)
 
     def __call__(self, camera: Camera) -> None:
         """Handle this frame's mouse and keys."""
