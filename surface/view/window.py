@@ -211,7 +211,9 @@ class _Window:
 
     def _accept_files(self) -> None:
         """Hand files that are dropped on the window to the caller."""
-        window, glfw = glfw_window() if self.area.dropped is not None else (None, None)
+        if self.area.dropped is None:
+            return
+        window, glfw = glfw_window()
         if window is not None:
             glfw.set_drop_callback(window, lambda _, names: self.drop(names))
 

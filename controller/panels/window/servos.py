@@ -38,7 +38,7 @@ class ServoBars:
             for servo in details.servos:
                 self._row(imgui, servo)
             imgui.end_table()
-        imgui.text_disabled("bar: limits; filled mark: wanted; line: measured. Click one to plot it")
+        imgui.text_wrapped("bar: limits; mark: wanted; line: measured. Click one to plot it.")
         self._plots(imgui, details.servos)
 
     def _columns(self, imgui: Any, names: list[str]) -> None:
