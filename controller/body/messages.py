@@ -72,6 +72,14 @@ class Hold:
 
 
 @dataclass(frozen=True)
+class HoldAll:
+    """Main to body, from the panel: hold several parameters at once; without values release them."""
+
+    indices: tuple[int, ...]
+    values: tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
 class Show:
     """Main to body, from the panel: show a named expression at an intensity 0..1."""
 
@@ -148,6 +156,7 @@ class PlayTake:
 
 PanelRequest = (
     Hold
+    | HoldAll
     | Show
     | LookAt
     | Live

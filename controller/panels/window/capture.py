@@ -11,6 +11,7 @@ import numpy as np
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.files import replacing
 from controller.base.parameters import PARAMETERS, Floats
+from controller.takes.livelink import Take
 from surface.view.docks import PictureArea
 from surface.view.pictures.sheet import write_png
 
@@ -21,7 +22,7 @@ class Capture:
     """Takes pictures and records, into ``folder``.
 
     area : of the window, which gives the next picture. newest : the newest parameters (P,). clock : seconds.
-    message : what was written last, or why it was not.
+    message : what was written last, or why it was not. last : the last recording as a take, which can be edited.
     """
 
     def __init__(
@@ -31,6 +32,7 @@ class Capture:
         self._rows: list[Floats] | None = None
         self._began = 0.0
         self.message = ""
+        self.last: Take | None = None
 
     @property
     def recording(self) -> bool:
@@ -53,6 +55,7 @@ class Capture:
             return
         rows, self._rows = self._rows, None
         if rows:
+            self.last = _take_of(np.array(rows))
             path = self._free("recording", ".csv")
             self._write(path, lambda to: _write_table(to, np.array(rows)))
 
@@ -80,6 +83,14 @@ class Capture:
         while (path := self._folder / f"{stem}{number}{suffix}").exists():
             number += 1
         return path
+
+
+def _take_of(rows: Floats) -> Take:
+    values = rows[:, 1:].copy()
+    values.flags.writeable = False
+    return Take(
+        "recording", rows[:, 0] - rows[0, 0], values, np.ones(len(PARAMETERS), bool), PARAMETERS.low, PARAMETERS.high
+    )
 
 
 def _write_table(path: Path, rows: Floats) -> None:

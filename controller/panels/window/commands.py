@@ -11,6 +11,8 @@ from dataclasses import dataclass, field, replace
 from controller.base.parameters import Floats
 from controller.body.messages import Hold, Live, LookAt, Neutral, PanelRequest, Show
 from controller.panels.window.looks import Look
+from controller.takes.livelink import Take
+from controller.takes.timeline import Timeline
 
 _CALM_S = 0.6
 _NOTHING_SHOWN = Show("neutral", 1.0)
@@ -24,6 +26,7 @@ class Settings:
     gaze : the point that is looked at, see :class:`controller.body.messages.LookAt`. life : amount of idle motion.
     moves : (n, 3) mm that the control points of the face were moved by hand; None for none.
     look : theme, quality, person and head; None for those of the stage.
+    timeline : keys that become a show. take : the recording that is edited.
     """
 
     held: Mapping[int, float] = field(default_factory=dict)
@@ -32,6 +35,8 @@ class Settings:
     life: float = 0.0
     moves: Floats | None = None
     look: Look | None = None
+    timeline: Timeline = field(default_factory=Timeline)
+    take: Take | None = None
 
 
 class Commands:
@@ -90,10 +95,19 @@ class Commands:
         """Change the look."""
         self.change(replace(self.now, look=look))
 
+    def arrange(self, timeline: Timeline, step: Hashable = None) -> None:
+        """Change the timeline."""
+        self.change(replace(self.now, timeline=timeline), step)
+
+    def retake(self, take: Take | None) -> None:
+        """Edit a recording, or another version of it."""
+        self.change(replace(self.now, take=take))
+
     def neutral(self) -> None:
         """Give everything back and return to the neutral face; idle motion, moved control points and the look stay."""
         self._remember()
-        self.now = Settings(life=self.now.life, moves=self.now.moves, look=self.now.look)
+        kept = {name: getattr(self.now, name) for name in ("life", "moves", "look", "timeline", "take")}
+        self.now = Settings(**kept)
         self.send(Neutral(_CALM_S))
 
     def change(self, to: Settings, step: Hashable = None) -> None:

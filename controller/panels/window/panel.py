@@ -21,9 +21,11 @@ from controller.panels.window.jobs import Jobs, draw_jobs
 from controller.panels.window.keys import Keys
 from controller.panels.window.link_list import LinkList
 from controller.panels.window.looks import Look, LookControls, Looks
+from controller.panels.window.playback import Playback
 from controller.panels.window.problems import Problems, draw_problems
 from controller.panels.window.servos import ServoBars
 from controller.panels.window.sliders import Sliders
+from controller.panels.window.timeline_panel import TimelinePanel
 from controller.panels.window.view import View
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.view.docks import Dock, PictureArea
@@ -77,6 +79,10 @@ class Panel:
             options.vocabulary, self.commands, newest, send, own, tuple(options.files[:-1])
         )
         self.view = View(self.commands, viewpoint or Viewpoint(), self.capture, options.shows, send)
+        self.playback = Playback(self.commands, newest, send)
+        self.timeline = TimelinePanel(
+            self.playback, self.commands, self.capture, options.vocabulary, self.problems, options.folder
+        )
         if self.feed is not None:
             self.servos, self.links = ServoBars(self.feed), LinkList(self.feed)
         self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
@@ -88,6 +94,7 @@ class Panel:
             "Expressions": self.expressions,
             "Sliders": self._sliders,
             "View": self.view,
+            "Timeline": self.timeline,
         }
         if self.feed is not None:
             parts |= {"Servos": self.servos, "Links": self.links}
@@ -104,6 +111,7 @@ class Panel:
         self.keys()
         self.capture()
         self.jobs()
+        self.playback()
         if self.feed is not None:
             self.feed()
         if self.area.bare:

@@ -45,7 +45,7 @@ class Places:
         self.boxes: dict[str, tuple[float, float]] = {}
         self.formats: dict[str, object] = {}
         self.texts: list[str] = []
-        for name in ("checkbox", "button", "slider_float", "collapsing_header", "selectable"):
+        for name in ("checkbox", "button", "slider_float", "collapsing_header", "selectable", "invisible_button"):
             monkeypatch.setattr(imgui, name, self._noting(imgui, getattr(imgui, name)))
         for name in ("text", "text_disabled", "text_wrapped", "text_colored"):
             monkeypatch.setattr(imgui, name, self._telling(getattr(imgui, name)))
