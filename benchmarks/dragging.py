@@ -15,10 +15,42 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.anchors import head_order, sample_skin, skin_points
 from controller.stage.inverse import PointSolver, SculptSolver
+from controller.stage.pulling import Pin, PullSolver, lip_pairs
 from surface.head import Head
 
 FRAMES = 400
 MOVES = ("jawOpen", "mouthSmileLeft", "mouthSmileRight", "browInnerUp", "eyeBlinkLeft", "mouthPucker")
+
+
+PULLS = {
+    "left corner of the mouth up": ((28.6, -34.0, 102.0), (0.0, 8.0)),
+    "right corner of the mouth up": ((-28.6, -34.0, 102.0), (0.0, 8.0)),
+    "left corner of the mouth down": ((28.6, -34.0, 102.0), (0.0, -6.0)),
+    "right corner of the mouth down": ((-28.6, -34.0, 102.0), (0.0, -6.0)),
+    "brow up": ((25.0, 53.0, 103.0), (0.0, 6.0)),
+    "cheek up": ((46.0, -17.0, 91.0), (0.0, 4.0)),
+    "chin down": ((4.0, -71.0, 108.0), (0.0, -12.0)),
+    "upper lid down": ((32.0, 40.0, 97.0), (0.0, -6.0)),
+}
+"""Points of the skin (mm) and how far they are pulled (mm, as seen from the front)."""
+STEPS = 20
+
+
+def measure_pulls(console: Console, head: Head) -> None:
+    """Print how far each pulled point is from the mouse at the end, and how long a solve takes on the way."""
+    skin, lips = sample_skin(head, "face", skin_points(head, "face", 900, 11)), lip_pairs(head, "face")
+    order = head_order(head.parameters, P)
+    for name, (at, by) in PULLS.items():
+        point = int(np.argmin(np.linalg.norm(skin.rest - at, axis=1)))
+        solver, took = PullSolver(skin, lips, order, P, P.neutral()), []
+        for share in np.linspace(1 / STEPS, 1.0, STEPS):
+            goal = skin.rest[point] + share * np.array([*by, 0.0])
+            began = time.perf_counter()
+            solver.solve([Pin(point, goal, np.array([0.0, 0.0, 1.0]))])
+            took.append(1e3 * (time.perf_counter() - began))
+        console.print(
+            f"{name}: {solver.missed_mm:.2f} mm away, median {np.median(took):.1f} ms, most {max(took[1:]):.1f} ms"
+        )
 
 
 def main() -> None:
@@ -43,6 +75,7 @@ def main() -> None:
     median, late = np.percentile(took[5:], [50, 99])
     console.print(f"{count} tracked points, 52 parameters: median {median:.2f} ms, p99 {late:.2f} ms (reach 2 ms)")
     console.print(f"worst value off by {missed.max():.2f}")
+    measure_pulls(console, head)
     reshaper = SculptSolver(head)
     uv = skin_points(head, "face", 5, 8)
     began = time.perf_counter_ns()

@@ -15,6 +15,9 @@ from tests.browser import Page, find_chromium, page
 ADDRESS = "127.0.0.1:8097"
 OUT = Path(__file__).parent / "pictures" / "web-panel.webp"
 SHOTS = ((1280, 720, "light", "happiness"), (390, 720, "dark", "surprise"))
+SHOWN = {"happiness": ("mouthSmileLeft", 0.5), "surprise": ("browInnerUp", 0.5)}
+"""A parameter of each expression, and how much of it a face that shows it has at least."""
+LONGEST_S = 120.0
 
 
 def main() -> None:
@@ -41,10 +44,19 @@ def _shot(browser: Page, path: Path, width: int, height: int, scheme: str, expre
     browser.open(f"http://{ADDRESS}/")
     browser.wait("Boolean(globalThis.omote && omote.robot.good && omote.face.head)", 120.0)
     browser.evaluate(f"omote.robot.act({{type: 'expression', name: '{expression}', intensity: 0.9}})")
-    time.sleep(4.0)
-    browser.wait("Boolean(omote.robot.good)", 30.0)
+    _wait_for(browser, *SHOWN[expression])
     browser.screenshot(path)
     return Image.open(path).convert("RGB")
+
+
+def _wait_for(browser: Page, parameter: str, least: float) -> None:
+    """Wait until the face that is drawn has an expression, however slowly this machine draws."""
+    browser.evaluate("omote.robot.on('frame', (frame) => { globalThis.shown = frame; })")
+    at = f"omote.robot.names.indexOf('{parameter}')"
+    browser.wait(f"Boolean(omote.robot.good) && (globalThis.shown?.values ?? [])[{at}] > {least}", LONGEST_S)
+    browser.evaluate("omote.face.changed = true")
+    drawn = browser.evaluate("omote.face.frames")
+    browser.wait(f"omote.face.frames > {drawn + 2}", LONGEST_S)
 
 
 def _beside(shots: list[Image.Image]) -> Image.Image:

@@ -38,12 +38,12 @@ class Page:
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")
 
-    def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """Call a method of the protocol."""
+    def call(self, method: str, limit_s: float = WAIT_S, **parameters: Any) -> dict[str, Any]:
+        """Call a method of the protocol; ``limit_s`` : how long the browser may be silent."""
         number = next(self._numbers)
         self._connection.send(json.dumps({"id": number, "method": method, "params": parameters}))
         while True:
-            message = json.loads(self._connection.recv(WAIT_S))
+            message = json.loads(self._connection.recv(limit_s))
             if message.get("id") == number:
                 assert "error" not in message, message
                 result: dict[str, Any] = message["result"]
@@ -59,9 +59,9 @@ class Page:
         self.call("Page.navigate", url=url)
         self.wait("document.readyState === 'complete'")
 
-    def evaluate(self, script: str) -> Any:
+    def evaluate(self, script: str, limit_s: float = WAIT_S) -> Any:
         """The value of an expression, or of what its promise gives."""
-        found = self.call("Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True)
+        found = self.call("Runtime.evaluate", limit_s, expression=script, returnByValue=True, awaitPromise=True)
         assert "exceptionDetails" not in found, found
         return found["result"].get("value")
 

@@ -8,6 +8,7 @@ import subprocess
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import synchronize
 from pathlib import Path
 from typing import Any
 
@@ -91,7 +92,7 @@ def test_a_phone_drives_the_head_and_stops_it_while_another_client_floods(tmp_pa
         wait_for(lambda: abs(moved(body, "jawOpen") - before) > 3.0)
         browser.wait("document.querySelector('#p-jawOpen').closest('.row').classList.contains('held')")
         ending = threading.Event()
-        flood = threading.Thread(target=_flood, args=(where, ending))
+        flood = threading.Thread(target=flood_panel, args=(where, ending))
         flood.start()
         try:
             browser.evaluate("document.getElementById('stop').click()")
@@ -108,7 +109,8 @@ def test_a_phone_drives_the_head_and_stops_it_while_another_client_floods(tmp_pa
         assert browser.errors == []
 
 
-def _flood(where: str, ending: threading.Event) -> None:
+def flood_panel(where: str, ending: threading.Event | synchronize.Event) -> None:
+    """Send commands as fast as the panel takes them, until it ends them or ``ending``."""
     try:
         with connect(f"ws://{where}/ws") as client:
             while not ending.is_set():
@@ -138,6 +140,10 @@ def test_two_panels_show_each_others_changes_without_leaving_their_origin(tmp_pa
         assert head == ["Link", "State", "In", "Jitter", "Lost", "Age", "Refused"]
         loaded = browser.evaluate("performance.getEntriesByType('resource').map(each => new URL(each.name).host)")
         assert loaded and set(loaded) == {where}
+        open_panel(browser, where, 1280, 720)  # again: what the browser has is not sent again
+        sent = browser.evaluate("performance.getEntriesByType('resource').map(each => [each.name, each.transferSize])")
+        sizes = {name.rpartition("/")[2]: size for name, size in sent}
+        assert 0 < sizes["face.glb"] < 2000 and sizes["three.min.js"] < 2000, sizes
         assert browser.errors == []
 
 

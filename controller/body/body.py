@@ -13,11 +13,12 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from controller.base.errors import ConfigError
+from controller.base.errors import OMOTE_ERRORS, ConfigError
 from controller.base.linked_clocks import HurriedClock
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import Floats, Parameters
 from controller.base.parts import Part
+from controller.body.details import Notes
 from controller.body.event_log import EventLog
 from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.body.member import Member
@@ -66,7 +67,7 @@ class Body:
     ) -> None:
         self.stage, self._member = stage, member
         self.relay: Relay | None = None
-        self._closers = Closers()
+        self._closers, self.notes = Closers(), Notes()
         self.state = stage.state(parameters)
         if member is not None:
             member.join(self.state)
@@ -227,6 +228,13 @@ class Body:
             raise faults[0][1]
         for link, fault in faults:
             link.fail(fault)
+
+    def play_take(self, path: Path) -> None:
+        """Play a take from its beginning, beside the links; one that cannot be read is logged and changes nothing."""
+        try:
+            self.sources.play(TakePlayer(load_take(path, self.state.parameters), self.state, reader_of(path).layer))
+        except OMOTE_ERRORS as error:
+            log.warning("%s", error)
 
     def publish(self, panel_state: PanelState) -> None:
         """Write the state for the panel."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
@@ -15,6 +16,7 @@ from controller.base.parameters import PARAMETERS
 from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.body import Body
+from controller.body.details import details_of
 from controller.body.hall import Hall
 from controller.body.nodes import open_node
 from controller.body.panel_requests import carry_out
@@ -63,12 +65,14 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event)
         body = Body(stage, parameters, mailboxes[0], orders.options)
     bodies = body.bodies if isinstance(body, Hall) else [body]
     node = open_node(stage, bodies)
+    logging.getLogger().addHandler(bodies[0].notes)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
     try:
         body.start()
         _send(pipe, messages.Ready())
         _wait(body, pipe, stop, panels[0])
     finally:
+        logging.getLogger().removeHandler(bodies[0].notes)
         body.stop()
         if node is not None:
             node.close()
@@ -99,6 +103,13 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
         shorten_thread_switches()
         request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
         body.begin()
+        return True
+    first = body.bodies[0] if isinstance(body, Hall) else body
+    if isinstance(request, messages.AskDetails):
+        _send(pipe, details_of(first))
+        return True
+    if isinstance(request, messages.PlayTake):
+        first.play_take(request.path)
         return True
     state = body.state
     if isinstance(request, messages.ToHead) and isinstance(body, Hall):

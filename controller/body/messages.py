@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from controller.body.sources import Voice
 from controller.links.links import LinkSettings, read_link
@@ -76,6 +76,14 @@ class Hold:
 
 
 @dataclass(frozen=True)
+class HoldAll:
+    """Main to body, from the panel: hold several parameters at once; without values release them."""
+
+    indices: tuple[int, ...]
+    values: tuple[float, ...] | None
+
+
+@dataclass(frozen=True)
 class Show:
     """Main to body, from the panel: show a named expression at an intensity 0..1."""
 
@@ -138,7 +146,33 @@ class StartServos:
     """Main to body, from the panel: let the servos move again."""
 
 
-PanelRequest = Hold | Show | LookAt | Live | PlayShow | ControlShow | Learn | Neutral | StopServos | StartServos
+@dataclass(frozen=True)
+class AskDetails:
+    """Main to body, from the panel: answer with :class:`Details`. One at a time, so that none pile up."""
+
+
+@dataclass(frozen=True)
+class PlayTake:
+    """Main to body, from the panel: play a take from its beginning, beside the links."""
+
+    path: Path
+
+
+PanelRequest = (
+    Hold
+    | HoldAll
+    | Show
+    | LookAt
+    | Live
+    | PlayShow
+    | ControlShow
+    | Learn
+    | Neutral
+    | StopServos
+    | StartServos
+    | AskDetails
+    | PlayTake
+)
 
 
 @dataclass(frozen=True)
@@ -165,6 +199,22 @@ class Failed:
 @dataclass(frozen=True)
 class Finished:
     """Body to main: there is nothing left to play."""
+
+
+@dataclass(frozen=True)
+class Details:
+    """Body to main: what every servo, link and bus reports now, and the parts that failed.
+
+    servos : see :func:`controller.robot.servo_states.servo_states`. links : a report each, with its ``name``.
+    buses : ``name``, ``running``, ``fault``. parts : see :meth:`controller.base.parts.Part.report`.
+    notes : warnings and errors since the last one, oldest first.
+    """
+
+    servos: list[dict[str, Any]] = field(default_factory=list)
+    links: list[dict[str, Any]] = field(default_factory=list)
+    buses: list[dict[str, Any]] = field(default_factory=list)
+    parts: list[dict[str, Any]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
 
 @dataclass(frozen=True)

@@ -17,18 +17,34 @@ log = logging.getLogger(__name__)
 def carry_out(request: object, state: CommandState, now_ns: int) -> bool:
     """Carry out a request; False when it is none of a panel's. One that is refused changes nothing and is logged."""
     try:
-        return _face(request, state, now_ns) or _show(request, state) or _servos(request, state, now_ns)
+        return (
+            _held(request, state, now_ns)
+            or _face(request, state, now_ns)
+            or _show(request, state)
+            or _servos(request, state, now_ns)
+        )
     except ControllerError as error:
         log.warning("panel: %s", error)
         return True
 
 
-def _face(request: object, state: CommandState, now: int) -> bool:
+def _held(request: object, state: CommandState, now: int) -> bool:
     match request:
         case messages.Hold(index, None):
             state.release([index], now)
         case messages.Hold(index, float(value)):
             state.set_parameters([index], [value], now)
+        case messages.HoldAll(indices, None):
+            state.release(list(indices), now)
+        case messages.HoldAll(indices, tuple(values)):
+            state.set_parameters(list(indices), list(values), now)
+        case _:
+            return False
+    return True
+
+
+def _face(request: object, state: CommandState, now: int) -> bool:
+    match request:
         case messages.Show(name, intensity):
             state.expression(name, intensity, None, now)
         case messages.LookAt(None):

@@ -1,12 +1,11 @@
-"""State for the panel besides the values: who holds each parameter, what the servos show, who stopped them, the links.
+"""State for the panel besides the values: who holds each parameter, what the servos show, who stopped them.
 
 The body writes it ten times a second to a mailbox; main reads it when it draws.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,8 +16,6 @@ from controller.robot.following import MeasuredFace
 
 _NAME_LENGTH = 64
 """Characters of the name of who stopped the servos, a number each: a mailbox carries numbers only."""
-_LINKS_LENGTH = 2048
-"""Characters of the table of links."""
 
 
 class PanelState:
@@ -31,13 +28,13 @@ class PanelState:
         self._mailbox, self._layers, self._p = mailbox, tuple(layers), len(parameters)
         self._all = np.full(self.size(parameters), np.nan)
         self._regions = parameters.region_names
-        ends = np.cumsum([self._p, self._p, len(self._regions), _NAME_LENGTH])
-        self._holders, self._measured, self._away, self._stopped, self._links = np.split(self._all, ends)
+        ends = np.cumsum([self._p, self._p, len(self._regions)])
+        self._holders, self._measured, self._away, self._stopped = np.split(self._all, ends)
 
     @staticmethod
     def size(parameters: Parameters) -> int:
-        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region, name, links."""
-        return 2 * len(parameters) + len(parameters.region_names) + _NAME_LENGTH + _LINKS_LENGTH
+        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region, a name."""
+        return 2 * len(parameters) + len(parameters.region_names) + _NAME_LENGTH
 
     def publish(self, state: CommandState, measured_face: MeasuredFace | None) -> None:
         """Write the state of this moment; ``measured_face`` None without servos."""
@@ -51,7 +48,6 @@ class PanelState:
             self._away[:] = [away.get(region, np.nan) for region in self._regions]
         stopped = state.stop_latch.stopped
         _write(self._stopped, stopped.who if stopped is not None else "")
-        _write(self._links, "\n".join("\t".join(row) for row in link_rows(state.link_records())))
         self._mailbox.publish(self._all)
 
     def refresh(self) -> None:
@@ -69,12 +65,6 @@ class PanelState:
         """Who stopped the servos; empty while they may move."""
         return _read(self._stopped)
 
-    @property
-    def links(self) -> list[list[str]]:
-        """Of each link what :data:`LINK_COLUMNS` name."""
-        rows = [row.split("\t") for row in _read(self._links).splitlines()]
-        return [row for row in rows if len(row) == len(LINK_COLUMNS)]
-
     def measured(self, index: int) -> float | None:
         """What the servos show of a parameter; None where that is not known."""
         return float(self._measured[index]) if np.isfinite(self._measured[index]) else None
@@ -83,29 +73,6 @@ class PanelState:
         """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""
         value = self._away[self._regions.index(region)]
         return float(value) if np.isfinite(value) else None
-
-
-LINK_COLUMNS = ("link", "in", "jitter", "lost", "age", "state")
-
-
-def link_rows(records: Iterable[Mapping[str, Any]]) -> list[list[str]]:
-    """Reports of links as rows for people: address, rate, jitter, loss, age, and what is wrong."""
-    return [[" ".join(str(cell).split()) for cell in _row(record)] for record in records]
-
-
-def _row(record: Mapping[str, Any]) -> list[object]:
-    fault = record.get("fault") or record.get("error") or record.get("send_error") or "good"
-    if "rate_hz" not in record:
-        return [record.get("port", ""), "", "", "", "", fault]
-    age = record["age_s"]
-    return [
-        record.get("port", ""),
-        f"{record['rate_hz']:.0f} /s",
-        f"{record['jitter_ms']:.1f} ms",
-        record["lost"],
-        "never" if age is None else f"{age:.1f} s",
-        fault,
-    ]
 
 
 def _write(place: Floats, text: str) -> None:

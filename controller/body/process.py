@@ -25,6 +25,7 @@ _TERMINATE_TIMEOUT_S = 5.0
 class BodyProcess:
     """The body as main sees it; a context manager that always stops it.
 
+    details : the newest answer to :class:`AskDetails`.
     ``preloaded`` : a process that waits for orders; without one it is started here.
 
     Attributes
@@ -54,6 +55,7 @@ class BodyProcess:
         ]
         self.mailbox, self.panel_state = self.mailboxes[0], self.panel_states[0]
         self.finished = False
+        self.details: messages.Details | None = None
         self.report: dict[str, object] = {}
         self._pipe, self._process = preloaded.pipe, preloaded.process
         pairs = zip(self.mailboxes, self._panel_mailboxes, strict=True)
@@ -97,6 +99,8 @@ class BodyProcess:
     def _handle(self, message: object) -> None:
         if isinstance(message, messages.Report):
             self.report = message.content
+        elif isinstance(message, messages.Details):
+            self.details = message
         elif isinstance(message, messages.Finished):
             self.finished = True
 

@@ -183,6 +183,15 @@ class Sources:
         if self._voice is not None:
             threading.Thread(target=self._listen, args=(self._voice,), name="voice", daemon=True).start()
 
+    def play(self, player: TakePlayer) -> None:
+        """Play another take from its beginning; the one before ends, and its layer is given back."""
+        before, self._player = self._player, None
+        if before is not None:
+            self._state.release_layer(before.layer)
+        self._take = self._part(f"take {player.take.name}", player.layer)
+        self._take.recover()
+        self._player, self._beside = player, True
+
     def stop(self) -> None:
         """Stop listening; a thread that waits for a silent stream ends with the process."""
         self._stopping.set()
@@ -199,10 +208,11 @@ class Sources:
             self._play_show(self._state.shows, self._state.shows.name, now_ns)
 
     def _play_take(self, now_ns: int) -> None:
-        if self._player is None or self._take is None or self._take.failed:
+        player = self._player  # the panel may begin another
+        if player is None or self._take is None or self._take.failed:
             return
         try:
-            self._player.tick(now_ns)
+            player.tick(now_ns)
         except Exception as error:  # noqa: BLE001  the rest goes on
             if self._beside:
                 self._take.fail(error, now_ns * 1e-9)

@@ -45,10 +45,15 @@ class HeadValues:
     """
 
     def __init__(self, mailbox: Mailbox, parameters: Parameters, wanted: Sequence[str]) -> None:
-        self._mailbox, self._indices = mailbox, head_indices(parameters, wanted)
+        self._mailbox, self._parameters = mailbox, parameters
         self._padded = np.zeros(len(parameters.names) + 1)
-        self.full, self.values = self._padded[:-1], np.zeros(len(wanted))
+        self.full = self._padded[:-1]
         self.stamp_ns = 0
+        self.follow(wanted)
+
+    def follow(self, wanted: Sequence[str]) -> None:
+        """Select for another head, whose parameters ``wanted`` are."""
+        self._indices, self.values = head_indices(self._parameters, wanted), np.zeros(len(wanted))
 
     def __call__(self) -> Floats:
         """The newest values in the head's order, (h,) float64; the same array each time."""

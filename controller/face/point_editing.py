@@ -7,7 +7,7 @@ Independent of the window library.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +15,8 @@ import numpy as np
 
 from controller.base.parameters import Floats, Parameters
 from controller.robot.anchors import head_order, sample_skin, shapes_of, skin_points
-from controller.stage.inverse import GroupMoves, PointSolver, SculptSolver, save_group
+from controller.stage.inverse import GroupMoves, SculptSolver, save_group
+from controller.stage.pulling import Pin, PullSolver, lip_pairs
 from surface.head import Head
 from surface.head.model.parameters import read_pose, rotation
 from surface.view.scene.camera import Camera
@@ -24,8 +25,6 @@ PART = "face"
 _POINTS = 900
 _SEED = 11
 _PICK_PIXELS, _HIDING_PIXELS, _HIDDEN_MM = 16.0, 48.0, 40.0
-_SPARSITY = 1.5  # one drag should move few parameters
-_FIXED, _FIXED_MM, _FIXED_WEIGHT = 24, 30.0, 0.4  # points that shall stay: count, least distance, weight
 _LEAST_CHANGE, _LEAST_MM = 0.004, 0.01
 
 
@@ -70,6 +69,7 @@ class _Model:
         if self.normals[np.argmax(self.skin.rest[:, 2]), 2] < 0.0:
             self.normals = -self.normals
         self.sculptor = SculptSolver(head, PART)
+        self.lips = lip_pairs(head, PART)
         self.pivot = np.array(head.data.neck.pivot)
 
 
@@ -88,7 +88,8 @@ class PointEditor:
         self._before = self._moves
         self._model: _Model | None = None
         self._held: _PointDrag | _SculptDrag | None = None
-        self._asked: tuple[tuple[float, float], Screen, Floats, bool] | None = None
+        self._asked: tuple[tuple[float, float], Screen, Floats, bool, bool] | None = None
+        self._pins: dict[int, Floats] = {}
         self._settled = False
         self._thread = threading.Thread(target=self._prepare, args=(copy,), name="point editor", daemon=True)
 
@@ -122,21 +123,26 @@ class PointEditor:
         if self._thread.ident is None:
             self._thread.start()
 
-    def take(self, pixel: tuple[float, float], screen: Screen, values: Floats, *, sculpt: bool = False) -> bool:
+    def take(
+        self, pixel: tuple[float, float], screen: Screen, values: Floats, *, sculpt: bool = False, tied: bool = False
+    ) -> bool:
         """Take the point of the skin under a pixel; False when there is none.
 
         One that is asked for while points get ready is taken by :meth:`drag` as soon as they are, where it was then.
 
         ``values`` : (P,) parameters of the shown face. ``sculpt`` : move control points instead of parameters.
+        ``tied`` : both sides of the face change alike.
         """
         self._settled = False
         if self._model is None:
-            self._asked = (pixel, screen, values.copy(), sculpt)
+            self._asked = (pixel, screen, values.copy(), sculpt, tied)
             self.prepare()
             return True
-        return self._take(self._model, pixel, screen, values, sculpt)
+        return self._take(self._model, pixel, screen, values, sculpt, tied)
 
-    def _take(self, model: _Model, pixel: tuple[float, float], screen: Screen, values: Floats, sculpt: bool) -> bool:
+    def _take(
+        self, model: _Model, pixel: tuple[float, float], screen: Screen, values: Floats, sculpt: bool, tied: bool
+    ) -> bool:
         places, turn = self._places(model, values)
         shown = screen.project(places)
         towards = np.einsum("mc,mc->m", model.normals @ turn.T, np.array(screen.camera.eye) - places) > 0.0
@@ -147,7 +153,8 @@ class PointEditor:
             return False
         offset = places[point] - screen.place(pixel, places[point])
         self._held = _SculptDrag(model, point, places[point], offset) if sculpt else _PointDrag(
-            model, point, places[point], offset, self._parameters, values, self._sculpted_by(model)
+            model, point, places[point], offset, self._parameters, values, self._sculpted_by(model), self._pins,
+            tied=tied,
         )  # fmt: skip
         return True
 
@@ -166,11 +173,38 @@ class PointEditor:
         turn = _turn(values[model.order])
         local = model.pivot + turn.T @ (wanted - model.pivot)
         if isinstance(held, _PointDrag):
-            return held.solve(local)
+            return held.solve(local, turn.T @ (wanted - np.array(screen.camera.eye)))
         moves = self._before.copy()
         moves[held.ids] += held.share[:, None] * (turn.T @ (wanted - held.place))
         self._set_moves(moves)
         return {}
+
+    @property
+    def missed_mm(self) -> float:
+        """How far the farthest held or pinned point is from where it shall be, as it is seen; 0 without a pull."""
+        return self._held.missed_mm if isinstance(self._held, _PointDrag) else 0.0
+
+    def pin(self, values: Floats) -> None:
+        """Pin the held point where it is in the face ``values`` (P,); later pulls of others leave it there."""
+        if isinstance(self._held, _PointDrag) and self._model is not None:
+            self._pins[self._held.point] = self._local(self._model, values)[self._held.point]
+
+    def unpin(self) -> None:
+        """Let go of all pinned points."""
+        self._pins = {}
+
+    @property
+    def pinned(self) -> int:
+        """How many points are pinned."""
+        return len(self._pins)
+
+    def pin_pixels(self, screen: Screen, values: Floats) -> list[tuple[float, float]]:
+        """Where the pinned points shall be in the picture."""
+        if self._model is None or not self._pins:
+            return []
+        turn, pivot = _turn(values[self._model.order]), self._model.pivot
+        shown = screen.project(pivot + (np.array(list(self._pins.values())) - pivot) @ turn.T)
+        return [(float(x), float(y)) for x, y, _ in shown]
 
     def release(self) -> None:
         """Release the point; moved control points stay."""
@@ -201,38 +235,49 @@ class PointEditor:
 
     def _places(self, model: _Model, values: Floats) -> tuple[Floats, Floats]:
         """(m, 3) mm where the points are in the picture, and the head's rotation (3, 3)."""
-        local = model.skin.rest + model.skin.displacement(shapes_of(values, model.order)) + self._sculpted_by(model)
         turn = _turn(values[model.order])
-        return model.pivot + (local - model.pivot) @ turn.T, turn
+        return model.pivot + (self._local(model, values) - model.pivot) @ turn.T, turn
+
+    def _local(self, model: _Model, values: Floats) -> Floats:
+        """(m, 3) mm where the points are, head not turned."""
+        moved = model.skin.displacement(shapes_of(values, model.order))
+        local: Floats = model.skin.rest + moved + self._sculpted_by(model)
+        return local
 
     def _prepare(self, copy: Callable[[], Head]) -> None:
         model = _Model(copy(), self._parameters)
-        _PointDrag(model, 0, np.zeros(3), np.zeros(3), self._parameters, self._parameters.neutral(), np.zeros(3)).solve(
-            model.skin.rest[0]
-        )  # compile the solver before the first drag needs it
+        solver = PullSolver(model.skin, model.lips, model.order, self._parameters, self._parameters.neutral())
+        solver.solve([Pin(0, model.skin.rest[0])])  # compile before the first drag needs it
         self._model = model
 
 
 class _PointDrag:
-    """A held point whose place determines parameters, among other points that shall stay where they are."""
+    """A held point whose place determines parameters, among pinned ones and others that shall stay where they are.
 
-    def __init__(self, model: _Model, point: int, place: Floats, offset: Floats, parameters: Parameters, values: Floats,
-                 sculpted: Floats) -> None:  # fmt: skip
-        self.place, self.offset = place, offset
-        skin = model.skin
-        far = np.flatnonzero(np.linalg.norm(skin.rest - skin.rest[point], axis=1) > _FIXED_MM)
-        part = skin.subset(np.concatenate([[point], far[:: max(1, len(far) // _FIXED)]]))
-        weights = np.full(len(part.rest), _FIXED_WEIGHT)
-        weights[0] = 1.0
-        self._sculpted = np.broadcast_to(sculpted, skin.rest.shape)[point]
-        self._solver = PointSolver(part, model.order, parameters, weights=weights, start=values, sparsity=_SPARSITY)
-        self._places = part.rest + part.displacement(shapes_of(values, model.order))
+    pins : goals of the pinned points (3,) mm, by point.
+    """
+
+    def __init__(
+        self, model: _Model, point: int, place: Floats, offset: Floats, parameters: Parameters, values: Floats,
+        sculpted: Floats, pins: Mapping[int, Floats], *, tied: bool,
+    ) -> None:  # fmt: skip
+        self.place, self.offset, self.point = place, offset, point
+        self._sculpted = np.broadcast_to(sculpted, model.skin.rest.shape)
+        self._pins = [Pin(i, goal - self._sculpted[i]) for i, goal in pins.items() if i != point]
+        self._solver = PullSolver(model.skin, model.lips, model.order, parameters, values, tied=tied)
         self._returned = values.copy()
 
-    def solve(self, local: Floats) -> dict[int, float]:
-        """Parameters that changed since the last call, for the point at ``local`` : (3,), head not turned."""
-        self._places[0] = local - self._sculpted
-        found = self._solver.solve(self._places)
+    @property
+    def missed_mm(self) -> float:
+        """How far the farthest point is from its goal, as it is seen."""
+        return self._solver.missed_mm
+
+    def solve(self, local: Floats, sight: Floats) -> dict[int, float]:
+        """Parameters that changed since the last call, for the point at ``local`` : (3,), head not turned.
+
+        ``sight`` : (3,) the line of sight to it.
+        """
+        found = self._solver.solve([*self._pins, Pin(self.point, local - self._sculpted[self.point], sight)])
         at = self._solver.moved
         changed = at[np.abs(found[at] - self._returned[at]) > _LEAST_CHANGE]
         self._returned[changed] = found[changed]

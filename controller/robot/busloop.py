@@ -307,6 +307,12 @@ class BusLoop:
             log.warning("bus %s is %s: %s", self.settings.name, what, error)
         self._retry_ns = now + _RETRY_NS
 
+    def condition(self) -> dict[str, object]:
+        """Its name, whether it drives its servos, and why it does not; for people who watch it, from any thread."""
+        absent = self._last_reason if self._retry_ns is not None else ""
+        fault = str(self.error) if self.error is not None else absent
+        return {"name": self.settings.name, "running": bool(self.bus.running), "fault": fault}
+
     def report(self) -> dict[str, object]:
         """Measurements: rate and jitter, command-to-wire latency, errors by kind, limits hit."""
         return {

@@ -64,6 +64,7 @@ class StageRun:
     name : of the stage, or its file. identity : replaces the stage's own. look : command-line options over its picture.
     web : HOST:PORT of a web panel.
     status : called with what is being done, in a few words. preloaded : the body's process, if it was started already.
+    next_stage : after a run, the file of a stage that the user dropped on the window.
     """
 
     def __init__(
@@ -93,6 +94,7 @@ class StageRun:
         self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
         self._web, self._web_look, self._identity = web, look or {}, identity
         self._manager = ServiceManager()
+        self.next_stage: Path | None = None
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.
@@ -130,9 +132,10 @@ class StageRun:
             stage = self.stage
             face = WindowFace(
                 head, stage.settings.face, values, body.send, body.panel_state, stage.load_head, _panel_options(stage),
-                stage.controls,
+                stage.controls, stage=stage, details=lambda: body.details,
             )  # fmt: skip
             failed = self._show(face, self._begin(body, flag, seconds))
+            self.next_stage = face.next_stage
             return self._end(body, None if failed else face.report(), failed)
 
     def run_without_face(self, seconds: float | None) -> dict[str, Any]:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from surface.view.draw.renderer import Renderer
+    from surface.view.scene.choice import QualityChoice
 
 Side = Literal["left", "right", "bottom"]
 MAIN = "MainDockSpace"
@@ -28,11 +33,25 @@ class Dock:
     draw: Callable[[], None]
 
 
+@dataclass(frozen=True)
+class Remake:
+    """Another head or look for a window that is open.
+
+    make : makes a renderer for a context and a quality. quality : one, or a choice between them.
+    done : called when it is drawn from now on, or with the error for which the picture stays as it was.
+    """
+
+    make: Callable[..., Renderer]
+    quality: str | QualityChoice
+    done: Callable[[Exception | None], None]
+
+
 @dataclass
 class PictureArea:
     """Where the picture is in a window, in ImGui's points from the window's top left corner.
 
     wanted : gets the next picture once, (height, width, 3) uint8. bare : the caller hides all docked panels.
+    remake : drawn from the next frame on. dropped : gets files that are dropped on the window.
     """
 
     left: float = 0.0
@@ -41,6 +60,8 @@ class PictureArea:
     height: float = 1.0
     wanted: Callable[[NDArray[np.uint8]], None] | None = None
     bare: bool = False
+    remake: Remake | None = None
+    dropped: Callable[[Sequence[Path]], None] | None = None
 
 
 def text_scale(height: float, system: float) -> float:

@@ -8,22 +8,24 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from surface.base.errors import ViewError
 from surface.base.extras import importing
-from surface.view.docks import Dock, PictureArea, add_docks, find_area, show_docks, text_scale
+from surface.view.docks import Dock, PictureArea, Remake, add_docks, find_area, show_docks, text_scale
 from surface.view.draw.alternating import Alternating
 from surface.view.draw.placing import Box, Placing
 from surface.view.draw.renderer import Renderer
-from surface.view.draw.target import Target, read_pixels
+from surface.view.draw.target import read_pixels
+from surface.view.fullscreen import glfw_window
+from surface.view.live import LiveDrawing
 from surface.view.scene.camera import Camera
 from surface.view.scene.choice import LEVELS, QualityChoice
 from surface.view.scene.framing import framing_of
 from surface.view.scene.parts import ViewHead
-from surface.view.scene.sampling import AdaptiveSampling, is_software
 from surface.view.scene.theme import Theme
 from surface.view.scene.viewpoint import Viewpoint
 
@@ -127,44 +129,6 @@ def _no_window(error: Exception) -> ViewError:
     return ViewError(f"no window on display {display!r}: {str(error).splitlines()[0]}", hint=HEADLESS_HINT)
 
 
-class _Drawing:
-    """The head in one quality, on a context whose size changes.
-
-    size : (width, height), pixels, of the next frame.
-    """
-
-    target: Target
-
-    def __init__(self, renderer: Renderer) -> None:
-        self.renderer, self.size = renderer, (1, 1)
-        self._sampling = AdaptiveSampling(renderer.quality, software=is_software(renderer.ctx))
-        self._sampling.start_live()
-        if self._sampling.simplified:
-            renderer.hurry()
-        self._settings: tuple[object, ...] = ()
-
-    def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
-        """Pose the head with ``values`` (P,) and draw it."""
-        self.renderer.pose(values)
-        started, settings = time.perf_counter(), (*self.size, *self._sampling.settings)
-        if self._settings != settings:
-            old = self.target if self._settings else None
-            self.target = Target(self.renderer.ctx, self.size, *self._sampling.settings)
-            self._settings = settings
-            if old is not None:
-                old.release()
-        self.renderer.update()
-        self.target.paint(self.renderer, camera or Camera.front())
-        self.target.complete()
-        self._sampling.add_frame(time.perf_counter() - started)
-
-    def release(self) -> None:
-        """Release the graphics memory."""
-        if self._settings:
-            self.target.release()
-        self.renderer.release()
-
-
 class _Window:
     """The runner's callbacks; keeps the first exception, since none may leave a callback."""
 
@@ -188,7 +152,7 @@ class _Window:
         self.frames, self.first, self.last, self._began = 0, 0.0, 0.0, 0.0
         self.failure: BaseException | None = None
         self._ctx: moderngl.Context | None = None
-        self._drawings: dict[str, _Drawing] = {}
+        self._drawings: dict[str, LiveDrawing] = {}
         self._alternating: Alternating | None = None
         self._placing: Placing | None = None
 
@@ -220,11 +184,43 @@ class _Window:
             why = f"the window has no OpenGL 3.1: {error}"
             raise ViewError(why, hint="set LIBGL_ALWAYS_SOFTWARE=1 to draw in software") from error
         ctx.clear_errors()
-        choice = self._quality if isinstance(self._quality, QualityChoice) else None
-        names = LEVELS if choice is not None else (str(self._quality),)
-        self._drawings = {name: _Drawing(self._make_renderer(ctx, quality=name)) for name in names}
-        self._alternating = Alternating(self._drawings, choice) if choice is not None else None
+        self._make(ctx, self._make_renderer, self._quality)
         self._ctx = ctx
+        self._accept_files()
+
+    def _make(self, ctx: moderngl.Context, make: Callable[..., Renderer], quality: str | QualityChoice) -> None:
+        """Make what draws the head."""
+        choice = quality if isinstance(quality, QualityChoice) else None
+        names = LEVELS if choice is not None else (str(quality),)
+        self._drawings = {name: LiveDrawing(make(ctx, quality=name)) for name in names}
+        self._alternating = Alternating(self._drawings, choice) if choice is not None else None
+
+    def _remake(self, ctx: moderngl.Context, wanted: Remake) -> None:
+        """Draw another head or look; the picture stays as it was where that fails."""
+        before = (self._alternating, *self._drawings.values())
+        self.area.remake = None
+        try:
+            self._make(ctx, wanted.make, wanted.quality)
+        except Exception as error:  # noqa: BLE001  the caller tells it
+            wanted.done(error)
+            return
+        for thing in before:
+            if thing is not None:
+                thing.release()
+        wanted.done(None)
+
+    def _accept_files(self) -> None:
+        """Hand files that are dropped on the window to the caller."""
+        if self.area.dropped is None:
+            return
+        window, glfw = glfw_window()
+        if window is not None:
+            glfw.set_drop_callback(window, lambda _, names: self.drop(names))
+
+    def drop(self, names: Sequence[str]) -> None:
+        """Files were dropped on the window."""
+        if self.area.dropped is not None:
+            self.as_callback(partial(self.area.dropped, [Path(name) for name in names]))()
 
     def background(self) -> None:
         """One frame of the head, under the panels."""
@@ -236,6 +232,8 @@ class _Window:
         screen = ctx.detect_framebuffer()
         if min(box[2:]) < 1:
             return
+        if self.area.remake is not None:
+            self._remake(ctx, self.area.remake)
         picture = self._picture(box[2:])
         if self.area.wanted is not None:
             take, self.area.wanted = self.area.wanted, None

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
@@ -42,6 +42,8 @@ class _File(Settings):
     marks: dict[str, _Seconds] = {}
     sound: str | None = None
     steps: Annotated[list[str], Field(max_length=MOST_STEPS)] = []
+    keys: Annotated[list[dict[str, Any]], Field(max_length=1000)] = []
+    """Of the timeline that the steps were made of; see controller.takes.timeline."""
 
 
 @dataclass(frozen=True)

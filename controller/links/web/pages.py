@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import gzip
+import hashlib
 import ipaddress
-from functools import cache
+from functools import cache, lru_cache
 from http import HTTPStatus
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from surface.base import files
 STATIC, LARGEST_FILE = Path(__file__).with_name("static"), 4 << 20
 LARGEST_FACE = 64 << 20
 """Bytes of a face that is served."""
+_LONGEST_TAGS = 2000
 _SCRIPTS = (
     "panel.js", "robot.js", "face.js", "morph.js", "shaders.js", "pose.js", "controls.js", "pads.js", "servos.js",
     "plot.js", "three.min.js",
@@ -48,12 +50,15 @@ def packed(name: str) -> bytes:
     return gzip.compress(files.read_file(STATIC / name, LARGEST_FILE), 6, mtime=0)
 
 
-def page(path: str) -> Response:
-    """The answer to a request for one of the panel's own files; not found for everything else."""
+def page(path: str, known: str | None = None) -> Response:
+    """The answer to a request for one of the panel's own files; not found for everything else.
+
+    known : the request's If-None-Match; a file that it names is not sent again.
+    """
     if path not in FILES:
         return text(HTTPStatus.NOT_FOUND, f"there is no {path[:80]} here; the panel is at /")
     name, kind = FILES[path]
-    return _answer(HTTPStatus.OK, packed(name), kind, zipped=True)
+    return _file(packed(name), kind, known)
 
 
 class Face:
@@ -62,13 +67,16 @@ class Face:
     def __init__(self, path: Path | None) -> None:
         self._path, self._packed = path, b""
 
-    def answer(self) -> Response:
-        """The face; where it is not there yet, when to ask again."""
+    def answer(self, known: str | None = None) -> Response:
+        """The face; where it is not there yet, when to ask again.
+
+        known : the request's If-None-Match; a face that it names is not sent again.
+        """
         if not self._packed and self._path is not None and self._path.is_file():
             raw = files.read_file(self._path, LARGEST_FACE)
             self._packed = raw if raw[:2] == b"\x1f\x8b" else gzip.compress(raw, 6, mtime=0)
         if self._packed:
-            return _answer(HTTPStatus.OK, self._packed, "model/gltf-binary", zipped=True)
+            return _file(self._packed, "model/gltf-binary", known)
         if self._path is None:
             return text(HTTPStatus.NOT_FOUND, 'no face is served here; set face = "head.glb" in the link')
         answer = text(HTTPStatus.SERVICE_UNAVAILABLE, "the face is being prepared")
@@ -91,6 +99,29 @@ def is_local_name(request: Request) -> bool:
     except ValueError:
         return name == "localhost"
     return True
+
+
+@lru_cache(maxsize=64)
+def entity_tag(body: bytes) -> str:
+    """The strong entity tag of a compressed file, from its content (RFC 9110, 8.8.3)."""
+    return f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+
+
+def _file(body: bytes, kind: str, known: str | None) -> Response:
+    """A compressed file with its entity tag; 304 without a body where the browser has it (RFC 9110, 13.1.2)."""
+    tag = entity_tag(body)
+    if known is not None and _names(known, tag):
+        answer = _answer(HTTPStatus.NOT_MODIFIED, b"", kind)
+        del answer.headers["Content-Length"]  # of a 304 it would be that of the file
+    else:
+        answer = _answer(HTTPStatus.OK, body, kind, zipped=True)
+    answer.headers["ETag"] = tag
+    return answer
+
+
+def _names(known: str, tag: str) -> bool:
+    """Whether a list of entity tags, or ``*``, names this one; weak ones compare as strong ones do."""
+    return any(each.strip().removeprefix("W/") in ("*", tag) for each in known[:_LONGEST_TAGS].split(","))
 
 
 def _answer(status: HTTPStatus, body: bytes, kind: str, *, zipped: bool = False) -> Response:

@@ -63,7 +63,7 @@ class WebLink(WebSocketLink):
         if len(self._downloads) >= _DOWNLOADS:
             return text(HTTPStatus.SERVICE_UNAVAILABLE, "too many files are on their way; try again")
         self._downloads.add(connection)
-        return self._face_for(request) if path == "/face.glb" else page(path)
+        return self._face_for(request) if path == "/face.glb" else page(path, _known(request))
 
     def _face_for(self, request: Request) -> Response:
         if self._token is not None:
@@ -71,10 +71,15 @@ class WebLink(WebSocketLink):
             if not same_token(given, self._token):
                 self._turned_away["token"] += 1
                 return text(HTTPStatus.UNAUTHORIZED, "a token is needed: open the address that omote printed")
-        return self._face.answer()
+        return self._face.answer(_known(request))
 
     async def _leave(self) -> None:
         """Give up what is still on its way."""
         for connection in list(self._downloads):
             connection.transport.abort()
         await asyncio.sleep(0)
+
+
+def _known(request: Request) -> str | None:
+    """The entity tags that a browser has; None for a request without."""
+    return ",".join(request.headers.get_all("If-None-Match")) or None

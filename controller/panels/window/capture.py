@@ -10,7 +10,8 @@ import numpy as np
 
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.files import replacing
-from controller.base.parameters import PARAMETERS, Floats
+from controller.base.parameters import PARAMETERS, Floats, Parameters
+from controller.takes.livelink import Take
 from surface.view.docks import PictureArea
 from surface.view.pictures.sheet import write_png
 
@@ -21,19 +22,20 @@ class Capture:
     """Takes pictures and records, into ``folder``.
 
     area : of the window, which gives the next picture. newest : the newest parameters (P,). clock : seconds.
-    names : of the parameters, without those of the base vocabulary.
-    message : what was written last, or why it was not.
+    parameters : without them, those of the base vocabulary.
+    message : what was written last, or why it was not. last : the last recording as a take, which can be edited.
     """
 
     def __init__(
         self, area: PictureArea, newest: Callable[[], Floats], folder: Path,
-        clock: Callable[[], float] = time.monotonic, names: Sequence[str] = (),
+        clock: Callable[[], float] = time.monotonic, parameters: Parameters | None = None,
     ) -> None:  # fmt: skip
         self._area, self._newest, self._folder, self._clock = area, newest, folder, clock
-        self._names = names or PARAMETERS.names
+        self._parameters = parameters or PARAMETERS
         self._rows: list[Floats] | None = None
         self._began = 0.0
         self.message = ""
+        self.last: Take | None = None
 
     @property
     def recording(self) -> bool:
@@ -56,8 +58,9 @@ class Capture:
             return
         rows, self._rows = self._rows, None
         if rows:
+            self.last = _take_of(self._parameters, np.array(rows))
             path = self._free("recording", ".csv")
-            self._write(path, lambda to: _write_table(to, self._names, np.array(rows)))
+            self._write(path, lambda to: _write_table(to, self._parameters.names, np.array(rows)))
 
     def __call__(self) -> None:
         """Add the present face to the recording; called once a frame. It ends by itself after ten minutes."""
@@ -83,6 +86,14 @@ class Capture:
         while (path := self._folder / f"{stem}{number}{suffix}").exists():
             number += 1
         return path
+
+
+def _take_of(parameters: Parameters, rows: Floats) -> Take:
+    values = rows[:, 1:].copy()
+    values.flags.writeable = False
+    return Take(
+        "recording", rows[:, 0] - rows[0, 0], values, np.ones(len(parameters), bool), parameters.low, parameters.high
+    )
 
 
 def _write_table(path: Path, columns: Sequence[str], rows: Floats) -> None:

@@ -8,6 +8,9 @@ Colour = tuple[float, float, float, float]
 
 RED: Colour = (0.75, 0.1, 0.1, 1.0)
 GREEN: Colour = (0.1, 0.5, 0.2, 1.0)
+BRIGHT_GREEN: Colour = (0.35, 0.8, 0.45, 1.0)
+AMBER: Colour = (1.0, 0.72, 0.25, 1.0)
+GREY: Colour = (0.6, 0.6, 0.6, 1.0)
 LAYERS: dict[str, Colour] = {
     "expression": (0.35, 0.6, 0.95, 1.0),
     "idle": (0.55, 0.6, 0.65, 1.0),

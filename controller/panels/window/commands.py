@@ -10,6 +10,9 @@ from dataclasses import dataclass, field, replace
 
 from controller.base.parameters import Floats
 from controller.body.messages import Hold, Live, LookAt, Neutral, PanelRequest, Show
+from controller.panels.window.looks import Look
+from controller.takes.livelink import Take
+from controller.takes.timeline import Timeline
 
 _CALM_S = 0.6
 _NOTHING_SHOWN = Show("neutral", 1.0)
@@ -22,6 +25,8 @@ class Settings:
     held : parameters by index and the values they are held at. expression : the one that is shown.
     gaze : the point that is looked at, see :class:`controller.body.messages.LookAt`. life : amount of idle motion.
     moves : (n, 3) mm that the control points of the face were moved by hand; None for none.
+    look : theme, quality, person and head; None for those of the stage.
+    timeline : keys that become a show. take : the recording that is edited.
     """
 
     held: Mapping[int, float] = field(default_factory=dict)
@@ -29,6 +34,9 @@ class Settings:
     gaze: tuple[float, float, float] | None = None
     life: float = 0.0
     moves: Floats | None = None
+    look: Look | None = None
+    timeline: Timeline = field(default_factory=Timeline)
+    take: Take | None = None
 
 
 class Commands:
@@ -36,6 +44,7 @@ class Commands:
 
     send : sends requests to the body. life : amount of idle motion at first.
     show_moves : draws the control points moved by (n, 3) mm, or where they were for None.
+    show_look : shows a look, or the first one for None; set by who can.
     """
 
     def __init__(
@@ -45,6 +54,7 @@ class Commands:
         show_moves: Callable[[Floats | None], None] = lambda moves: None,
     ) -> None:
         self.send, self.show_moves = send, show_moves
+        self.show_look: Callable[[Look | None], None] = lambda look: None
         self.now = Settings(life=life)
         self._past: list[Settings] = []
         self._future: list[Settings] = []
@@ -81,10 +91,23 @@ class Commands:
         """Move control points."""
         self.change(replace(self.now, moves=moves), step)
 
+    def appear(self, look: Look | None) -> None:
+        """Change the look."""
+        self.change(replace(self.now, look=look))
+
+    def arrange(self, timeline: Timeline, step: Hashable = None) -> None:
+        """Change the timeline."""
+        self.change(replace(self.now, timeline=timeline), step)
+
+    def retake(self, take: Take | None) -> None:
+        """Edit a recording, or another version of it."""
+        self.change(replace(self.now, take=take))
+
     def neutral(self) -> None:
-        """Give everything back and return to the neutral face; idle motion and moved control points stay."""
+        """Give everything back and return to the neutral face; idle motion, moved control points and the look stay."""
         self._remember()
-        self.now = Settings(life=self.now.life, moves=self.now.moves)
+        kept = {name: getattr(self.now, name) for name in ("life", "moves", "look", "timeline", "take")}
+        self.now = Settings(**kept)
         self.send(Neutral(_CALM_S))
 
     def change(self, to: Settings, step: Hashable = None) -> None:
@@ -123,6 +146,8 @@ class Commands:
             self.send(request)
         if before.moves is not to.moves:
             self.show_moves(to.moves)
+        if before.look != to.look:
+            self.show_look(to.look)
 
 
 def _differences(before: Settings, after: Settings) -> Iterator[PanelRequest]:

@@ -16,12 +16,11 @@ from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.face.point_editing import PointEditor, Screen
 from controller.panels.window.commands import Commands
-from controller.panels.window.sliders import same_sense
 from surface.head import Head
 from surface.view.docks import PictureArea
 from surface.view.scene.camera import Camera
 
-_WHITE = 0xFFFFFFFF
+_WHITE, _PIN = 0xFFFFFFFF, 0xFF3C78E6
 
 
 class MouseEditing:
@@ -35,14 +34,23 @@ class MouseEditing:
         self, head: Head, copy: Callable[[], Head], newest: Callable[[], Floats], commands: Commands, area: PictureArea,
         parameters: Parameters | None = None,
     ) -> None:  # fmt: skip
-        parameters = self._parameters = parameters or PARAMETERS
-        self.editor = PointEditor(head, copy, parameters)
-        self._newest, self._commands, self._area = newest, commands, area
-        self._eyes = head.data.eyes.mean(axis=0)
-        self._symmetric, self._name, self._message = False, "mine", ""
-        self._mirror = parameters.mirror()
+        self._parameters = parameters or PARAMETERS
+        self._newest, self._commands, self._area, self._copy = newest, commands, area, copy
+        self._symmetric, self._pinning, self._name, self._message = False, False, "mine", ""
         self._grabs, self._pixel = 0, (0.0, 0.0)
-        commands.show_moves = self.editor.set_moves
+        commands.show_moves = self._show_moves
+        self.change(head)
+
+    def change(self, head: Head) -> None:
+        """Drag points of another head from now on; control points stay moved where it has as many."""
+        self.editor = PointEditor(head, self._copy, self._parameters)
+        self._eyes = head.data.eyes.mean(axis=0)
+        if self._commands.now.moves is not None:
+            self._show_moves(self._commands.now.moves)
+
+    def _show_moves(self, moves: Floats | None) -> None:
+        fits = moves is not None and moves.shape == self.editor.moves.shape
+        self.editor.set_moves(moves if fits else None)
 
     def __call__(self, camera: Camera) -> None:
         """Handle this frame's mouse and keys."""
@@ -53,6 +61,7 @@ class MouseEditing:
         pixel = (io.mouse_pos.x - area.left, io.mouse_pos.y - area.top)
         outside = imgui.is_window_hovered(imgui.HoveredFlags_.any_window)
         self._drag(imgui, io, pixel, screen, outside)
+        self._draw_pins(imgui, screen)
         if io.key_alt and imgui.is_mouse_down(imgui.MouseButton_.left) and not outside:
             self.look(pixel, camera, screen)
         if self.editor.dragging or io.key_ctrl or io.key_alt:
@@ -69,7 +78,7 @@ class MouseEditing:
         if io.key_ctrl:
             editor.prepare()
         if io.key_ctrl and imgui.is_mouse_clicked(imgui.MouseButton_.left) and not outside:
-            editor.take(pixel, screen, self._newest(), sculpt=io.key_shift)
+            editor.take(pixel, screen, self._newest(), sculpt=io.key_shift, tied=self._symmetric)
             self._grabs += 1
         if not editor.dragging:
             return
@@ -79,26 +88,33 @@ class MouseEditing:
         self._pixel = pixel if down else self._pixel  # a mouse let go while points get ready has gone on since
         moved = editor.drag(self._pixel, screen, self._newest())
         if moved:
-            self._commands.hold(self._both_sides(moved), ("drag", self._grabs))
+            self._commands.hold(moved, ("drag", self._grabs))
         imgui.get_foreground_draw_list().add_circle(io.mouse_pos, 6.0, _WHITE)
         if not down and editor.settled:
             self._release()
 
     def _release(self) -> None:
         before = self._commands.now.moves
+        if self._pinning:
+            self.editor.pin(self._face_wanted())
         self.editor.release()
         moves = self.editor.moves
         if moves is not before and (before is not None or moves.any()):
             self._commands.move(moves)
 
-    def _both_sides(self, moved: dict[int, float]) -> dict[int, float | None]:
-        """What a drag moves, on both sides where that is wanted."""
-        both: dict[int, float | None] = dict(moved)
-        if self._symmetric:
-            both.update(
-                {j: x for i, x in moved.items() if same_sense((i, j := int(self._mirror[i])), self._parameters)}
-            )
-        return both
+    def _face_wanted(self) -> Floats:
+        """(P,) the face with what is held by hand, which it may still be on its way to."""
+        values = self._newest().copy()
+        for index, value in self._commands.now.held.items():
+            values[index] = value
+        return values
+
+    def _draw_pins(self, imgui: Any, screen: Screen) -> None:
+        draw, area = imgui.get_foreground_draw_list(), self._area
+        for x, y in self.editor.pin_pixels(screen, self._newest()):
+            at = imgui.ImVec2(area.left + x, area.top + y)
+            draw.add_circle_filled(at, 4.0, _PIN)
+            draw.add_circle(at, 4.0, _WHITE)
 
     def draw_panel(self) -> None:
         """The part of the panel about dragging, and about control points that were moved."""
@@ -106,6 +122,9 @@ class MouseEditing:
 
         imgui.text_wrapped("Ctrl and drag a point of the face: sliders follow. With Shift: the skin itself.")
         _, self._symmetric = imgui.checkbox("move both sides", self._symmetric)
+        _, self._pinning = imgui.checkbox("pin points where they are let go", self._pinning)
+        if self.editor.pinned and imgui.button(f"unpin all {self.editor.pinned}"):
+            self.editor.unpin()
         if not self.editor.sculpted:
             return
         imgui.set_next_item_width(imgui.get_font_size() * 8)

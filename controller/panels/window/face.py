@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.parameters import PARAMETERS
-from controller.body.messages import PanelRequest
+from controller.body.messages import Details, PanelRequest
 from controller.body.panel_state import PanelState
 from controller.face.controls import Controls
 from controller.face.devices import Devices
 from controller.face.face import FrameLog, HeadValues, qualities
 from controller.panels.window.editing import MouseEditing
+from controller.panels.window.looks import Looks
 from controller.panels.window.panel import Panel, PanelOptions
-from controller.stage.stage import FaceSettings
+from controller.stage.stage import FaceSettings, Stage
 from controller.vocabulary.controls import ControlsFile
 from surface.head import Head
 from surface.head.model.parameters import head_angles
-from surface.view.docks import PictureArea
+from surface.view.docks import PictureArea, Remake
+from surface.view.draw.renderer import Renderer
 from surface.view.scene.choice import QualityChoice
 from surface.view.scene.framing import framed, framing_of
 from surface.view.scene.viewpoint import Viewpoint
@@ -35,7 +39,12 @@ class WindowFace:
     head : the head to draw. settings : size, quality and camera. values : returns the head's newest values.
     send : sends the panel's requests to the body. panel_state, options : see :class:`Panel`.
     copy : loads the head again, for dragging points with the mouse; without, none can be dragged.
-    controls : what gamepad and keys do.
+    controls : what gamepad and keys do. stage : whose look can be changed; without, it stays as it is.
+    details : the newest answer of the body to the panel.
+
+    Attributes
+    ----------
+    next_stage : the file of a stage that was dropped on the window, with which the run goes on.
     """
 
     def __init__(
@@ -48,19 +57,28 @@ class WindowFace:
         copy: Callable[[], Head] | None = None,
         options: PanelOptions | None = None,
         controls: Collection[ControlsFile] = (),
+        *,
+        stage: Stage | None = None,
+        details: Callable[[], Details | None] | None = None,
     ) -> None:
         self._head, self._settings, self._values = head, settings, values
         self._viewpoint = Viewpoint(framed(settings.make_camera(), head), framing_of(head))
         self._area = PictureArea()
         newest = lambda: values.full  # noqa: E731
         parameters = PARAMETERS if options is None else options.parameters
-        self._panel = Panel(newest, send, panel_state, options, self._viewpoint, self._area)
+        self._panel = Panel(newest, send, panel_state, options, self._viewpoint, self._area, details=details)
+        self.next_stage: Path | None = None
         self._mouse = None
+        if stage is not None and not settings.kiosk:
+            looks = Looks(stage, self._swap, self._panel.jobs)
+            copy = looks.load
+            self._panel.add_looks(looks, self._restart)
         if copy is not None and not settings.kiosk:
             self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area, parameters)
             self._panel.more.append(self._mouse.draw_panel)
         self._devices = Devices(Controls(controls, parameters), send) if controls else None
         self._log = FrameLog()
+        self._ended = False
         self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
 
     def run(self, keep_going: Callable[[], bool]) -> None:
@@ -83,7 +101,7 @@ class WindowFace:
             size=self._settings.size,
             title=_TITLE,
             gui=None if kiosk and self._devices is None else self._gui,
-            keep_going=keep_going,
+            keep_going=lambda: keep_going() and not self._ended,
             camera=self._viewpoint,
             quality=self._choice or self._settings.still_quality,
             theme=self._settings.make_theme(),
@@ -93,6 +111,33 @@ class WindowFace:
             docks=() if kiosk else self._panel.docks(),
             area=self._area,
         )
+
+    def _swap(self, head: Head | None, settings: FaceSettings) -> None:
+        """Draw another head, or the same in another look, from the next frame on."""
+        shown = head or self._head
+        choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
+        make = partial(Renderer, head=shown, theme=settings.make_theme(), evaluator=settings.evaluator)
+
+        def done(error: Exception | None) -> None:
+            if error is not None:
+                self._panel.problems.add(error)
+                return
+            self._settings, self._choice = settings, choice
+            if head is not None:
+                self._take_over(head)
+
+        self._area.remake = Remake(make, choice or settings.still_quality, done)
+
+    def _take_over(self, head: Head) -> None:
+        """Pose, drag and look at another head from now on."""
+        self._head = head
+        self._values.follow(head.parameters)
+        self._viewpoint.reframe(framing_of(head))
+        if self._mouse is not None:
+            self._mouse.change(head)
+
+    def _restart(self, stage: Path) -> None:
+        self.next_stage, self._ended = stage, True
 
     def _gui(self) -> None:
         if not self._settings.kiosk:

@@ -12,7 +12,7 @@ HELP = {
     "P": "write a picture of the face",
     "N": "neutral: give everything back",
     "Esc": "stop: servos off until START",
-    "F": "the face alone, and back",
+    "F": "the face alone on the whole screen, and back",
     "Ctrl-Z, Ctrl-Y": "undo, redo",
     "1 to 5, 0": "camera, and back to the first",
     "Ctrl and drag": "move a point of the face",

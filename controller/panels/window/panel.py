@@ -7,19 +7,29 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import PARAMETERS, Floats, Parameters
-from controller.body.messages import PanelRequest, StartServos, StopServos
+from controller.body.messages import Details, PanelRequest, StartServos, StopServos
 from controller.body.panel_state import PanelState
 from controller.panels.window.capture import Capture
 from controller.panels.window.colours import GREEN, RED
 from controller.panels.window.commands import Commands
+from controller.panels.window.drops import Drops
 from controller.panels.window.expressions import ExpressionButtons
+from controller.panels.window.feed import Feed
+from controller.panels.window.jobs import Jobs, draw_jobs
 from controller.panels.window.keys import Keys
-from controller.panels.window.links import Links
+from controller.panels.window.link_list import LinkList
+from controller.panels.window.looks import Look, LookControls, Looks
+from controller.panels.window.playback import Playback
+from controller.panels.window.problems import Problems, draw_problems
+from controller.panels.window.servos import ServoBars
 from controller.panels.window.sliders import Sliders
+from controller.panels.window.timeline_panel import TimelinePanel
 from controller.panels.window.view import View
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.view.docks import Dock, PictureArea
+from surface.view.fullscreen import FullScreen
 from surface.view.scene.viewpoint import Viewpoint
 
 _STOP_LINES = 2.0
@@ -47,25 +57,35 @@ class Panel:
     """Draws the panel.
 
     newest : the newest parameters (P,). send : sends requests to the body.
-    state : without it, neither the layer that holds a parameter nor what the servos show of it nor a link is drawn.
+    state : without it, neither the layer that holds a parameter nor what the servos show of it is drawn.
+    details : the newest answer of the body about servos and links; without it neither is shown.
     """
 
     def __init__(
         self, newest: Callable[[], Floats], send: Callable[[PanelRequest], None], state: PanelState | None = None,
         options: PanelOptions | None = None, viewpoint: Viewpoint | None = None, area: PictureArea | None = None,
+        details: Callable[[], Details | None] | None = None,
     ) -> None:  # fmt: skip
         options = options or PanelOptions()
         self.area = area or PictureArea()
         self._send, self._state = send, state
+        self._options, self.problems = options, Problems()
+        self.jobs, self.full_screen = Jobs(self.problems), FullScreen()
+        self.feed = Feed(send, details, self.problems) if details is not None else None
         self.commands = Commands(send, options.life)
-        self.capture = Capture(self.area, newest, options.folder, names=options.parameters.names)
+        self.capture = Capture(self.area, newest, options.folder, parameters=options.parameters)
         own = options.files[-1] if options.files else options.folder / _OWN
         self.sliders = Sliders(newest, self.commands, state, options.parameters)
         self.expressions = ExpressionButtons(
             options.vocabulary, self.commands, newest, send, own, tuple(options.files[:-1]), options.parameters
         )
         self.view = View(self.commands, viewpoint or Viewpoint(), self.capture, options.shows, send)
-        self.links = Links(state)
+        self.playback = Playback(self.commands, newest, send, parameters=options.parameters)
+        self.timeline = TimelinePanel(
+            self.playback, self.commands, self.capture, options.vocabulary, self.problems, options.folder
+        )
+        if self.feed is not None:
+            self.servos, self.links = ServoBars(self.feed), LinkList(self.feed)
         self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
         self.more: list[Callable[[], None]] = []
 
@@ -75,8 +95,10 @@ class Panel:
             "Expressions": self.expressions,
             "Sliders": self._sliders,
             "View": self.view,
-            "Links": self.links,
+            "Timeline": self.timeline,
         }
+        if self.feed is not None:
+            parts |= {"Servos": self.servos, "Links": self.links}
         return [Dock(title, "left", self._below_top(part)) for title, part in parts.items()]
 
     def __call__(self) -> None:
@@ -89,6 +111,29 @@ class Panel:
             self.commands.end_step()
         self.keys()
         self.capture()
+        self.jobs()
+        self.playback()
+        if self.feed is not None:
+            self.feed()
+        if self.area.bare:
+            self._stop_over_the_picture(imgui)
+
+    def add_looks(self, looks: Looks, restart: Callable[[Path], None]) -> None:
+        """Let the user change how the face looks, and drop files on the window.
+
+        restart : called with the file of a stage that was dropped.
+        """
+        commands, folder = self.commands, self._options.folder
+
+        def show(look: Look | None) -> None:
+            try:
+                looks.show(look)
+            except OMOTE_ERRORS as error:
+                self.problems.add(error)
+
+        commands.show_look = show
+        self.view.look = LookControls(looks, commands)
+        self.area.dropped = Drops(looks, commands, self.jobs, self.problems, self._send, folder, restart)
 
     def _actions(self) -> dict[str, Callable[[], None]]:
         return {
@@ -104,7 +149,22 @@ class Panel:
         self._send(StopServos())
 
     def _toggle_bare(self) -> None:
+        """The face alone on the whole screen, and back."""
         self.area.bare = not self.area.bare
+        if self.area.bare != self.full_screen.on:
+            self.full_screen.toggle()
+
+    def _stop_over_the_picture(self, imgui: Any) -> None:
+        """The stop in a corner of a picture that is alone: it stays in reach."""
+        size, line = imgui.get_io().display_size, imgui.get_font_size()
+        corner = imgui.ImVec2(size.x - line, size.y - line)
+        imgui.set_next_window_pos(corner, imgui.Cond_.always, imgui.ImVec2(1.0, 1.0))
+        imgui.set_next_window_size(imgui.ImVec2(line * 9, 0.0))
+        flags = imgui.WindowFlags_
+        hidden = flags.no_decoration | flags.no_docking | flags.no_background | flags.no_saved_settings | flags.no_move
+        imgui.begin("##stop", None, hidden)
+        self._stop_or_start(imgui)
+        imgui.end()
 
     def _below_top(self, part: Callable[[], None]) -> Callable[[], None]:
         """A part below what every tab has on top."""
@@ -114,6 +174,8 @@ class Panel:
 
             self._stop_or_start(imgui)
             self._top(imgui)
+            draw_problems(imgui, self.problems)
+            draw_jobs(imgui, self.jobs)
             imgui.begin_child("##part")
             part()
             imgui.end_child()

@@ -15,7 +15,10 @@ RED_DOT = (0.9, 0.15, 0.15, 1.0)
 
 
 class View:
-    """Draws them; ``shows`` : names of the shows that the stage can play."""
+    """Draws them; ``shows`` : names of the shows that the stage can play.
+
+    look : draws what changes the look of the face, where that can be changed.
+    """
 
     def __init__(
         self, commands: Commands, viewpoint: Viewpoint, capture: Capture, shows: Sequence[str],
@@ -23,6 +26,7 @@ class View:
     ) -> None:  # fmt: skip
         self._commands, self._viewpoint, self._capture, self._send = commands, viewpoint, capture, send
         self._shows, self._show, self._paused = shows, "", False
+        self.look: Callable[[], None] | None = None
 
     def __call__(self) -> None:
         """Draw; called once a frame."""
@@ -33,6 +37,9 @@ class View:
         for key, name in {**KEYS, "0": "reset"}.items():
             if flow.button(name):
                 self._viewpoint.press(key)
+        if self.look is not None:
+            imgui.separator_text("picture")
+            self.look()
         imgui.separator_text("idle motion and gaze")
         self._life(imgui)
         if self._shows:

@@ -24,6 +24,11 @@ class Viewpoint:
         self.home = camera or framing.camera(Camera.front())
         self.camera = self.home
 
+    def reframe(self, framing: Framing) -> None:
+        """Look at another head; the view is the front of it."""
+        self._framing = framing
+        self.home = self.camera = framing.camera(Camera.front())
+
     def turn(self, right: float, down: float) -> None:
         """Orbit for a drag of so many pixels; the head follows the mouse."""
         self.camera = self.camera.orbit(-right * _DEGREES_PER_PIXEL, down * _DEGREES_PER_PIXEL)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import multiprocessing
 import threading
 import time
@@ -172,6 +173,39 @@ def test_requests_of_the_panel_reach_the_layers(tmp_path: Path, pipe: tuple[Conn
         assert not ask(messages.Stop())
         main.close()
         assert not _handle(body, end)  # main is gone
+
+
+def test_the_panel_is_told_of_servos_links_and_warnings_and_plays_a_take(
+    tmp_path: Path, pipe: tuple[Connection, Connection]
+) -> None:
+    main, end = pipe
+    (tmp_path / "a.tsv").write_text(TAKE)
+    stage = stage_of(tmp_path, 'robots = ["head24"]\n[[links]]\nport = "simulated"\nscript = "tour"\n')
+    with running(stage) as (body, _):
+        logging.getLogger().addHandler(body.notes)
+
+        def ask() -> messages.Details:
+            main.send(messages.AskDetails())
+            assert _handle(body, end) and main.poll(10.0)
+            answer = main.recv()
+            assert isinstance(answer, messages.Details)
+            return answer
+
+        body.begin()
+        until(lambda: ask().servos[0].get("measured_deg") is not None)
+        found = ask()
+        assert len(found.servos) == 24 and found.servos[0]["low_deg"] < found.servos[0]["high_deg"]
+        assert found.links[0]["name"].startswith("line") and found.links[0]["error"] == ""
+        assert found.buses == [{"name": "head", "running": True, "fault": ""}] and found.notes == []
+        main.send(messages.PlayTake(tmp_path / "none.tsv"))
+        assert _handle(body, end)
+        assert any("none.tsv" in note for note in ask().notes) and ask().notes == []
+        main.send(messages.PlayTake(tmp_path / "a.tsv"))
+        assert _handle(body, end)
+        until(lambda: body.newest()[0][JAW] > 0.1)
+        until(lambda: body.sources._player is not None and body.sources._player.finished)
+        assert not body.finished
+        logging.getLogger().removeHandler(body.notes)
 
 
 def test_main_hears_once_that_nothing_is_left_and_sees_the_panel_state(

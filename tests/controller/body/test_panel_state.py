@@ -65,30 +65,6 @@ def test_who_stopped_the_servos_reaches_the_other_side() -> None:
             assert panel.stopped_by == ""
 
 
-def test_links_reach_the_other_side_with_their_figures_and_faults() -> None:
-    state = CommandState(P)
-    heard = {"rate_hz": 59.94, "jitter_ms": 1.25, "lost": 3, "age_s": 0.016, "error": ""}
-    state.link_records = lambda: [
-        {"port": "udp:127.0.0.1:11111", **heard},
-        {"port": "tcp:127.0.0.1:9400", **heard, "age_s": None, "error": "no\tclient\nthere"},
-        {"port": "udp:10.0.0.1:39539 (out)", "sent": 5, "send_error": "Network is unreachable"},
-    ]
-    with Mailbox.create(PanelState.size(P)) as mailbox:
-        body, panel = (PanelState(mailbox, state.layer_names(), P) for _ in range(2))
-        assert panel.links == []
-        body.publish(state, None)
-        panel.refresh()
-        assert panel.links == [
-            ["udp:127.0.0.1:11111", "60 /s", "1.2 ms", "3", "0.0 s", "good"],
-            ["tcp:127.0.0.1:9400", "60 /s", "1.2 ms", "3", "never", "no client there"],
-            ["udp:10.0.0.1:39539 (out)", "", "", "", "", "Network is unreachable"],
-        ]
-        state.link_records = lambda: [{"port": "x" * 5000}]
-        body.publish(state, None)
-        panel.refresh()
-        assert panel.links == [] and panel.stopped_by == ""
-
-
 def test_without_servos_only_holders_are_known() -> None:
     state, out = CommandState(P), P.neutral()
     state.tick(10_000_000, 0.01, out)

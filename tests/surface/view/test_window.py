@@ -364,7 +364,7 @@ def test_a_window_without_opengl_says_how_to_draw_in_software(monkeypatch: pytes
 def test_only_in_software_a_window_hurries(
     gl: None, monkeypatch: pytest.MonkeyPatch, software: bool, simplified: bool
 ) -> None:
-    monkeypatch.setattr("surface.view.window.is_software", lambda ctx: software)
+    monkeypatch.setattr("surface.view.live.is_software", lambda ctx: software)
     opened = Opened(monkeypatch, "full")
     opened.window.start()
     assert opened.window._drawings["full"].renderer._simplified == simplified

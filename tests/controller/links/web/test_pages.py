@@ -53,6 +53,21 @@ def test_a_face_may_appear_later(tmp_path: Path) -> None:
     assert Face(None).answer().status_code == 404
 
 
+def test_what_a_browser_has_is_not_sent_again_until_it_changes(tmp_path: Path) -> None:
+    (tmp_path / "face.glb").write_bytes(b"glTF, the first")
+    face = Face(tmp_path / "face.glb")
+    for answer in (face.answer, lambda known=None: page("/three.min.js", known)):
+        tag = answer().headers["ETag"]
+        assert re.fullmatch(r'"[0-9a-f]{32}"', tag)
+        for known in (tag, f'"other", W/{tag}', "*"):
+            again = answer(known)
+            assert (again.status_code, again.body, again.headers["ETag"]) == (304, b"", tag)
+            assert "Content-Length" not in again.headers and "Content-Security-Policy" in again.headers
+        assert answer('"other"').status_code == 200 and answer(tag.strip('"')).status_code == 200
+    (tmp_path / "face.glb").write_bytes(b"glTF, the second")
+    assert Face(tmp_path / "face.glb").answer(face.answer().headers["ETag"]).status_code == 200
+
+
 @pytest.mark.parametrize(
     ("host", "good"),
     [("127.0.0.1:8080", True), ("localhost", True), ("[::1]:8080", True), ("192.168.1.4", True),

@@ -52,7 +52,10 @@ def test_page_and_api_at_one_address(tmp_path: Path) -> None:
     with panel(face=str(face)) as (state, link):
         status, body, headers = get(link, "/")
         assert status == 200 and body[:2] == b"\x1f\x8b" and headers["X-Content-Type-Options"] == "nosniff"
-        assert get(link, "/face.glb")[0] == 200
+        status, _, told = get(link, "/face.glb")
+        assert status == 200
+        status, body, _ = get(link, "/face.glb", **{"If-None-Match": told["ETag"]})
+        assert (status, body) == (304, b"")
         assert get(link, "/nothing")[0] == 404
         with connect(f"ws://127.0.0.1:{link.port}/ws") as client:
             client.send('{"type": "set", "parameters": {"jawOpen": 0.5}, "id": 1}')

@@ -7,9 +7,8 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -32,6 +31,7 @@ from controller.stage.stage import load_stage
 from controller.vocabulary.vocabulary import Vocabulary
 from drivers.base.bus import BusState
 from surface.view.docks import PictureArea
+from tests.controller.panels.window.screen import Places, Screen, drawn
 
 on_a_display = pytest.mark.skipif(
     shutil.which("xvfb-run") is None, reason="needs xvfb-run (apt-get install xvfb): a display to open a window on"
@@ -130,102 +130,11 @@ def test_points_are_dragged_with_the_mouse() -> None:
     assert told["reshaped"] is True
 
 
-class Screen:
-    """A real imgui context without a window: frames are laid out, and the mouse clicks where labels stand."""
-
-    def __init__(self) -> None:
-        self.imgui = pytest.importorskip("imgui_bundle").imgui
-        self.context = self.imgui.create_context()
-        self.io = self.imgui.get_io()
-        self.io.display_size = self.imgui.ImVec2(900, 3000)
-        self.io.backend_flags |= self.imgui.BackendFlags_.renderer_has_textures
-        self.io.delta_time = 1 / 60
-        self.io.set_ini_filename("")
-
-    def frame(self, draw: Callable[[], None]) -> None:
-        self.imgui.new_frame()
-        draw()
-        self.imgui.render()
-
-    def click(self, draw: Callable[[], None], x: float, y: float) -> None:
-        """Move there, press and release, a frame each."""
-        self.io.add_mouse_pos_event(x, y)
-        self.frame(draw)
-        for down in (True, False):
-            self.io.add_mouse_button_event(0, down)
-            self.frame(draw)
-
-
 @pytest.fixture
 def screen() -> Iterator[Screen]:
     found = Screen()
     yield found
     found.imgui.destroy_context(found.context)
-
-
-class Places:
-    """Where the panel's widgets stand: imgui's own functions, each noting the place of what it drew."""
-
-    def __init__(self, imgui: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
-        self.at: dict[str, tuple[float, float]] = {}
-        self.boxes: dict[str, tuple[float, float]] = {}
-        self.formats: dict[str, object] = {}
-        self.texts: list[str] = []
-        for name in ("checkbox", "button", "slider_float", "collapsing_header"):
-            monkeypatch.setattr(imgui, name, self._noting(imgui, getattr(imgui, name)))
-        for name in ("text", "text_disabled"):
-            monkeypatch.setattr(imgui, name, self._telling(getattr(imgui, name)))
-
-    def _noting(self, imgui: ModuleType, real: Callable[..., Any]) -> Callable[..., Any]:
-        def widget(label: str, *words: Any) -> Any:
-            found = real(label, *words)
-            low, high = imgui.get_item_rect_min(), imgui.get_item_rect_max()
-            self.boxes[label], self.formats[label] = (low.x, high.x), words[-1] if words else None
-            self.at[label] = (low.x + 0.25 * (high.x - low.x), (low.y + high.y) / 2)
-            return found
-
-        return widget
-
-    def _telling(self, real: Callable[[str], None]) -> Callable[[str], None]:
-        def text(words: str) -> None:
-            self.texts.append(words)
-            real(words)
-
-        return text
-
-
-def drawn(panel: Panel, *titles: str) -> Callable[[], None]:
-    """Draws some tabs of a panel, all or those of ``titles``, each in a window beside the others."""
-
-    def draw() -> None:
-        from imgui_bundle import imgui
-
-        panel()
-        for i, dock in enumerate(each for each in panel.docks() if not titles or each.title in titles):
-            imgui.set_next_window_pos(imgui.ImVec2(340.0 * i, 0.0))
-            imgui.set_next_window_size(imgui.ImVec2(336, 2900))
-            imgui.begin(dock.title)
-            dock.draw()
-            imgui.end()
-
-    return draw
-
-
-def test_the_panel_shows_what_arrives_at_links(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
-    texts: list[str] = []
-    real = screen.imgui.text_wrapped
-    monkeypatch.setattr(screen.imgui, "text_wrapped", lambda text: (texts.append(text), real(text)))
-    state = CommandState(PARAMETERS)
-    figures = {"rate_hz": 60.0, "jitter_ms": 2.0, "lost": 4, "age_s": 0.5, "error": "no client"}
-    state.link_records = lambda: [{"port": "udp:127.0.0.1:11111", **figures}]
-    with Mailbox.create(PanelState.size(PARAMETERS)) as mailbox:
-        there = PanelState(mailbox, state.layer_names(), PARAMETERS)
-        draw = drawn(Panel(PARAMETERS.neutral, [].append, there), "Links")
-        screen.frame(draw)
-        assert "no links" in texts[-1]
-        there.publish(state, None)
-        screen.frame(draw)
-        assert texts[-6:] == ["udp:127.0.0.1:11111", "60 /s", "2.0 ms", "4", "0.5 s", "no client"]
 
 
 def test_the_panel_sends_what_its_widgets_ask_for(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:

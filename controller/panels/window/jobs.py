@@ -1,0 +1,132 @@
+"""What takes long beside the picture: each job has a bar and can be cancelled, and its result is taken by the window.
+
+Independent of the window library, but for :func:`draw_jobs`.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from controller.base.errors import ControllerError
+from controller.panels.window.problems import Problems
+
+_LOOK_S = 0.05
+_END_S = 5.0
+
+
+class Cancelled(Exception):
+    """A job was cancelled."""
+
+
+class Job:
+    """Work in a thread of its own.
+
+    title : for people. done : gets the result, in the window's thread.
+
+    Attributes
+    ----------
+    cancelled : the user does not want it any more. since_s : when it began.
+    """
+
+    def __init__(self, title: str, work: Callable[[Job], Any], done: Callable[[Any], None]) -> None:
+        self.title, self._work, self._done = title, work, done
+        self.cancelled = False
+        self.since_s = time.monotonic()
+        self._result: Any = None
+        self._error: BaseException | None = None
+        self._thread = threading.Thread(target=self._run, name=title, daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            self._result = self._work(self)
+        except BaseException as error:  # noqa: BLE001  finish() tells it
+            self._error = error
+
+    @property
+    def running(self) -> bool:
+        """Whether it goes on."""
+        return self._thread.is_alive()
+
+    def join(self, limit_s: float) -> None:
+        """Wait for its end."""
+        self._thread.join(limit_s)
+
+    def finish(self, problems: Problems) -> None:
+        """Hand over the result, or tell the error; neither of a cancelled one."""
+        if self.cancelled:
+            return
+        try:
+            if self._error is not None:
+                raise self._error
+            self._done(self._result)
+        except Exception as error:  # noqa: BLE001  the window goes on
+            problems.add(error)
+
+
+class Jobs:
+    """The jobs that run now; called once a frame.
+
+    problems : hears of those that fail.
+    """
+
+    def __init__(self, problems: Problems) -> None:
+        self.running: list[Job] = []
+        self._problems = problems
+
+    def start(self, title: str, work: Callable[[Job], Any], done: Callable[[Any], None]) -> Job:
+        """Begin one; one of the same title that still runs is cancelled."""
+        for job in self.running:
+            job.cancelled = job.cancelled or job.title == title
+        job = Job(title, work, done)
+        self.running.append(job)
+        return job
+
+    def __call__(self) -> None:
+        """Take the results of those that have ended."""
+        for job in [job for job in self.running if not job.running]:
+            self.running.remove(job)
+            job.finish(self._problems)
+
+
+def run_program(job: Job, command: Sequence[str]) -> None:
+    """Run a program as a job; it is ended where the job is cancelled.
+
+    Raises ControllerError with the program's last words: it failed. Cancelled: it was ended.
+    """
+    with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as said:
+        process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=said, stderr=said)
+        try:
+            while process.poll() is None:
+                if job.cancelled:
+                    raise Cancelled(job.title)
+                time.sleep(_LOOK_S)
+        finally:
+            _end(process)
+        said.seek(0)
+        words = said.read().strip()
+    if process.returncode:
+        raise ControllerError(f"{job.title} failed: {' '.join(words.split())[-400:]}")
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    if process.poll() is None:
+        process.terminate()
+        try:
+            process.wait(_END_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def draw_jobs(imgui: Any, jobs: Jobs) -> None:
+    """Draw a bar and a button that cancels for each; nothing without any."""
+    for job in [job for job in jobs.running if not job.cancelled]:
+        imgui.progress_bar(-0.5 * (time.monotonic() - job.since_s) - 1e-3, imgui.ImVec2(-1, 0), job.title)
+        if imgui.button(f"cancel##{job.title}"):
+            job.cancelled = True

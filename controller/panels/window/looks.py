@@ -1,0 +1,117 @@
+"""How the face looks, changed while it is shown: theme, quality, person, another head.
+
+A head is loaded in a thread of its own, then the window draws it; the servos notice nothing. Independent of the window
+library, but for drawing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+from controller.base.paths import config_dir
+from controller.panels.window.jobs import Jobs
+from controller.stage.picture import PictureSettings
+from controller.stage.stage import FaceSettings, with_picture
+
+if TYPE_CHECKING:
+    from controller.panels.window.commands import Commands
+    from controller.stage.stage import Stage
+    from surface.head import Head
+
+NOBODY = "nobody"
+_THEMES, _QUALITIES = (get_args(PictureSettings.model_fields[key].annotation) for key in ("theme", "quality"))
+
+
+@dataclass(frozen=True)
+class Look:
+    """What the user chose. person : a name or a file, empty for nobody. head : a folder; the stage's own without."""
+
+    theme: str
+    quality: str
+    person: str
+    head: Path | None = None
+
+
+class Looks:
+    """Changes the look of a stage's face.
+
+    swap : draws a head with settings from now on. jobs : loads it.
+    """
+
+    def __init__(self, stage: Stage, swap: Callable[[Head | None, FaceSettings], None], jobs: Jobs) -> None:
+        self.stage, self._swap, self._jobs = stage, swap, jobs
+        face = stage.settings.face
+        self.first = Look(face.theme, face.quality, face.person if isinstance(face.person, str) else "")
+        self._shown = self.first
+
+    def show(self, look: Look | None) -> None:
+        """Show a look; the first one without. What fails is told, and the face stays."""
+        look = look or self.first
+        before, self._shown = self._shown, look
+        stage = self._stage(look)
+        same_head = (before.person, before.head) == (look.person, look.head)
+        if same_head and stage.settings.face.dressed == self._stage(before).settings.face.dressed:
+            self._swap(None, stage.settings.face)
+            return
+        what = look.person or (look.head.name if look.head else "the head")
+        face = stage.settings.face
+        self._jobs.start(f"loading {what}", lambda _: stage.load_head(), lambda head: self._swap(head, face))
+
+    def load(self) -> Head:
+        """Load the head that is shown again, as it was."""
+        return self._stage(self._shown).load_head()
+
+    def _stage(self, look: Look) -> Stage:
+        """The stage with a look. Raises ConfigError: no such person, or one that does not fit the head."""
+        stage = self.stage
+        if look.head is not None:
+            settings = stage.settings.model_copy(update={"identity": {}})
+            stage = replace(stage, head=look.head, groups=(), settings=settings)
+        wanted: dict[str, object] = {"theme": look.theme, "quality": look.quality}
+        if look.person != self.first.person or look.head is not None:
+            wanted["person"] = look.person
+        return with_picture(stage, wanted)
+
+
+def person_names(beside: Path | None = None) -> list[str]:
+    """Names of the shipped persons."""
+    return sorted(path.stem for path in (config_dir() / "persons").glob("*.toml"))
+
+
+class LookControls:
+    """Draws the choices; ``looks`` : carries them out, through ``commands``, so that they can be taken back."""
+
+    def __init__(self, looks: Looks, commands: Commands) -> None:
+        self._looks, self._commands = looks, commands
+        self._persons = [NOBODY, *person_names()]
+
+    def __call__(self) -> None:
+        """Draw; called once a frame."""
+        from imgui_bundle import imgui  # optional
+
+        look = self._commands.now.look or self._looks.first
+        theme = _choose(imgui, "theme", _THEMES, look.theme)
+        quality = _choose(imgui, "quality", _QUALITIES, look.quality)
+        person = _choose(imgui, "person", self._persons, look.person or NOBODY)
+        chosen = replace(look, theme=theme, quality=quality, person="" if person == NOBODY else person)
+        if chosen != look:
+            self.choose(chosen)
+        if look.head is not None:
+            imgui.text_wrapped(f"head: {look.head}")
+            if imgui.button("the stage's own head"):
+                self.choose(replace(look, head=None))
+
+    def choose(self, look: Look) -> None:
+        """Change to a look."""
+        self._commands.appear(look)
+
+
+def _choose(imgui: Any, label: str, names: Sequence[str], chosen: str) -> str:
+    """One of ``names`` from a list that opens; what was chosen by a file keeps its own line."""
+    listed = list(names) if chosen in names else [chosen, *names]
+    imgui.set_next_item_width(imgui.get_font_size() * 9)
+    changed, at = imgui.combo(label, listed.index(chosen), listed)
+    return listed[at] if changed else chosen

@@ -1,0 +1,153 @@
+"""Where the timeline's line is: plays and scrubs a timeline or a recording by holding the face of the moment.
+
+Independent of the window library.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from controller.base.errors import ParameterError
+from controller.base.parameters import PARAMETERS, Floats, Parameters
+from controller.body.messages import HoldAll, PanelRequest
+from controller.panels.window.commands import Commands
+from controller.takes.edit import cut_out, keep, smooth
+from controller.takes.plain import write_plain
+from controller.takes.timeline import Ease, key_of_face, save_show
+from controller.vocabulary.vocabulary import Vocabulary
+
+_LEAST_S = 1.0
+"""A timeline that is shorter is drawn as long as this."""
+JITTER_S = 0.05
+
+
+class Playback:
+    """Shows moments, and edits the timeline at the line; called once a frame.
+
+    newest : the newest parameters (P,). send : sends requests to the body. clock : seconds.
+    parameters : without them, those of the base vocabulary.
+
+    Attributes
+    ----------
+    position_s : of the line. playing : whether it moves by itself. selected : the number of a key, None for none.
+    range_s : the part of a recording that is marked.
+    """
+
+    def __init__(
+        self, commands: Commands, newest: Callable[[], Floats], send: Callable[[PanelRequest], None],
+        clock: Callable[[], float] = time.monotonic, parameters: Parameters | None = None,
+    ) -> None:  # fmt: skip
+        self._commands, self._newest, self._send, self._clock = commands, newest, send, clock
+        self._parameters = parameters or PARAMETERS
+        self.position_s, self.playing = 0.0, False
+        self.selected: int | None = None
+        self.range_s: tuple[float, float] | None = None
+        self._last_s = clock()
+        self._held: tuple[int, ...] = ()
+
+    @property
+    def length_s(self) -> float:
+        """Length of what is played."""
+        take = self._commands.now.take
+        return take.duration_s if take is not None else self._commands.now.timeline.length_s
+
+    @property
+    def shown_s(self) -> float:
+        """Length of the scale that is drawn."""
+        return max(self.length_s * 1.1, _LEAST_S)
+
+    def __call__(self) -> None:
+        """Let the line go on while it plays; it stops at the end."""
+        now_s = self._clock()
+        step_s, self._last_s = now_s - self._last_s, now_s
+        if not self.playing:
+            return
+        self.position_s = min(self.position_s + step_s, self.length_s)
+        self._show()
+        if self.position_s >= self.length_s:
+            self.stop()
+
+    def toggle(self) -> None:
+        """Play from the line on, or stop there; at the end it begins again."""
+        if self.playing:
+            self.playing = False
+        elif self.length_s > 0.0:
+            self.position_s = 0.0 if self.position_s >= self.length_s else self.position_s
+            self.playing = True
+
+    def scrub(self, position_s: float) -> None:
+        """Put the line somewhere and show the face there."""
+        self.playing = False
+        self.position_s = min(max(position_s, 0.0), self.shown_s)
+        self._show()
+
+    def stop(self) -> None:
+        """Stop, and give back what was held."""
+        self.playing = False
+        if self._held:
+            self._send(HoldAll(self._held, None))
+        self._held = ()
+
+    def _show(self) -> None:
+        now, names = self._commands.now, self._parameters.names
+        if now.take is not None:
+            face, used = now.take.sample(self.position_s, self._parameters.neutral()), np.flatnonzero(now.take.mask)
+        else:
+            face = now.timeline.at(self.position_s, self._parameters)
+            used = np.array([i for i, n in enumerate(names) if any(n in key.values for key in now.timeline.keys)], int)
+        self._held = tuple(map(int, used))
+        if self._held:
+            self._send(HoldAll(self._held, tuple(float(face[i]) for i in used)))
+
+    def add_key(self, ease: Ease, name: str = "", face: Floats | None = None) -> None:
+        """Put a face, the present one without, on the timeline at the line."""
+        timeline = self._commands.now.timeline
+        key = key_of_face(self.position_s, self._newest() if face is None else face, self._parameters, ease, name)
+        self._commands.arrange(timeline.with_key(key))
+        self.selected = next(i for i, each in enumerate(self._commands.now.timeline.keys) if each.at_s == key.at_s)
+
+    def delete_key(self) -> None:
+        """Take the selected key away."""
+        if self.selected is not None:
+            self._commands.arrange(self._commands.now.timeline.without_key(self.selected))
+            self.selected = None
+
+    def move_key(self, number: int, at_s: float) -> None:
+        """Move a key, as one step of a drag; it keeps its place among the others."""
+        keys = self._commands.now.timeline.keys
+        low = keys[number - 1].at_s + 0.01 if number else 0.0
+        high = keys[number + 1].at_s - 0.01 if number + 1 < len(keys) else np.inf
+        at_s = round(min(max(at_s, low), high), 3)
+        self._commands.arrange(self._commands.now.timeline.moved(number, at_s), ("key", number))
+
+    def edit_take(self, how: str) -> None:
+        """``keep`` or ``cut`` the marked range, or ``smooth`` all. Raises ParameterError: nothing is marked."""
+        take = self._commands.now.take
+        if take is None:
+            raise ParameterError("there is no recording to edit", hint="R records")
+        if how == "smooth":
+            self._commands.retake(smooth(take, JITTER_S))
+            return
+        if self.range_s is None:
+            raise ParameterError("no range of the recording is marked", hint="drag over it with the right mouse button")
+        self._commands.retake((keep if how == "keep" else cut_out)(take, *self.range_s))
+        self.range_s, self.position_s = None, 0.0
+
+    def save(self, folder: Path, name: str, vocabulary: Vocabulary, *, loop: bool) -> Path:
+        """Write the recording as a take, or the timeline as a show; returns the file.
+
+        Raises ParameterError, ControllerError: there is nothing to write, or no such folder.
+        """
+        now = self._commands.now
+        stem = Path(name.strip() or "mine").name
+        if now.take is not None:
+            path = folder / f"{stem}.csv"
+            write_plain(path, now.take.times_s, now.take.values, now.take.mask, self._parameters)
+        else:
+            path = folder / f"{stem}.toml"
+            save_show(path, now.timeline, self._parameters, vocabulary, loop=loop)
+        return path

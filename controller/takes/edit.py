@@ -1,0 +1,101 @@
+"""Edits takes: keep or cut out a range, smooth, layer one over another. Pure functions; every result is a new take."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from controller.base.errors import ParameterError
+from controller.base.parameters import Floats
+from controller.takes.livelink import Take
+
+_LEAST_S = 1e-3
+
+
+def keep(take: Take, from_s: float, to_s: float) -> Take:
+    """The range of a take, beginning at 0; its first and last rows are where the range begins and ends.
+
+    Raises ParameterError: the range is empty or not in the take.
+    """
+    from_s, to_s = _range(take, from_s, to_s)
+    inside = (take.times_s > from_s) & (take.times_s < to_s)
+    times = np.concatenate([[from_s], take.times_s[inside], [to_s]])
+    return _made(take, times - from_s, _at(take, times))
+
+
+def cut_out(take: Take, from_s: float, to_s: float, join_s: float = 0.2) -> Take:
+    """A take without a range. What comes after begins ``join_s`` later, so that the face gets there without a jump.
+
+    Raises ParameterError: the range is empty, not in the take, or all of it.
+    """
+    from_s, to_s = _range(take, from_s, to_s)
+    before, after = take.times_s < from_s, take.times_s > to_s
+    if from_s <= 0.0 and to_s >= take.duration_s:
+        raise ParameterError("nothing would be left of the take", hint="choose a shorter range")
+    first = np.append(take.times_s[before], from_s) if from_s > 0.0 else np.zeros(0)
+    second = np.concatenate([[to_s], take.times_s[after]]) if to_s < take.duration_s else np.zeros(0)
+    values = _at(take, np.concatenate([first, second]))
+    pause = join_s if len(first) and len(second) else 0.0
+    start = first[-1] + pause if len(first) else 0.0
+    return _made(take, np.concatenate([first, second - to_s + start]), values)
+
+
+def smooth(take: Take, seconds: float) -> Take:
+    """A take smoothed in time by a Gaussian of standard deviation ``seconds``, which shifts nothing in time.
+
+    Rows may lie at any distances: each is weighted with the time it stands for. First and last rows stay.
+
+    Raises ParameterError: ``seconds`` is not above 0 and at most 5.
+    """
+    if not 0.0 < seconds <= 5.0:
+        raise ParameterError(f"a face is smoothed over 0 to 5 s, not {seconds:g}", hint="0.05 removes jitter")
+    times, values = take.times_s, np.empty_like(take.values)
+    share = np.gradient(times) if len(times) > 1 else np.ones(1)
+    first, last = np.searchsorted(times, times - 4 * seconds), np.searchsorted(times, times + 4 * seconds, "right")
+    for i, (low, high) in enumerate(zip(first, last, strict=True)):
+        near = share[low:high] * np.exp(-0.5 * ((times[low:high] - times[i]) / seconds) ** 2)
+        values[i] = near @ take.values[low:high] / near.sum()
+    values[[0, -1]] = take.values[[0, -1]]
+    return _made(take, times, values)
+
+
+def layered(below: Take, above: Take, offset_s: float = 0.0) -> Take:
+    """One take with the parameters of another over it, from ``offset_s`` on and as long as that lasts.
+
+    Raises ParameterError: ``offset_s`` is below 0 or behind the end of ``below``.
+    """
+    if not 0.0 <= offset_s <= below.duration_s:
+        raise ParameterError(f"a layer begins from 0 to {below.duration_s:g} s, not at {offset_s:g}", hint="0")
+    end_s = offset_s + above.duration_s
+    times = np.union1d(below.times_s, offset_s + above.times_s)
+    times = times[np.append(True, np.diff(times) > _LEAST_S)]
+    values = _at(below, np.minimum(times, below.duration_s))
+    inside = (times >= offset_s) & (times <= end_s + _LEAST_S)
+    over = _at(above, np.clip(times[inside] - offset_s, 0.0, above.duration_s))
+    values[np.ix_(inside, above.mask)] = over[:, above.mask]
+    return replace(_made(below, times, values), mask=_frozen(below.mask | above.mask))
+
+
+def _range(take: Take, from_s: float, to_s: float) -> tuple[float, float]:
+    low, high = max(min(from_s, to_s), 0.0), min(max(from_s, to_s), take.duration_s)
+    if high - low < _LEAST_S:
+        raise ParameterError(f"the range {from_s:g} to {to_s:g} s has no part of the take", hint="drag over the take")
+    return low, high
+
+
+def _at(take: Take, times: Floats) -> Floats:
+    """(n, P) values at times (n,)."""
+    columns = [np.interp(times, take.times_s, column) for column in take.values.T]
+    values: Floats = np.array(columns).T
+    return values
+
+
+def _made(take: Take, times: Floats, values: Floats) -> Take:
+    return replace(take, times_s=_frozen(times), values=_frozen(values))
+
+
+def _frozen(array: Floats) -> Floats:
+    array = np.array(array)
+    array.flags.writeable = False
+    return array

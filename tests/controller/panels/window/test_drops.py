@@ -1,0 +1,112 @@
+"""controller.panels.window.drops and looks"""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from controller.base.parameters import PARAMETERS
+from controller.base.paths import find_config
+from controller.body.messages import PlayTake
+from controller.panels.window.commands import Commands
+from controller.panels.window.drops import Drops
+from controller.panels.window.jobs import Jobs
+from controller.panels.window.looks import Looks
+from controller.panels.window.problems import Problems
+from controller.stage.stage import FaceSettings, load_stage
+from surface.head import Head
+
+
+class Window:
+    """What gets the files of one window, without the window."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        path = folder / "stage.toml"
+        path.write_text('name = "here"\n[face]\nperson = "maple"\n')
+        self.loaded: list[Path] = []
+        monkeypatch.setattr("controller.stage.stage.load_head", self._load)
+        self.sent: list[Any] = []
+        self.problems = Problems()
+        self.jobs, self.swapped, self.restarted = Jobs(self.problems), [], []
+        self.commands = Commands(self.sent.append)
+        self.looks = Looks(load_stage(str(path), PARAMETERS), self._swap, self.jobs)
+        self.commands.show_look = self.looks.show
+        self.drop = Drops(
+            self.looks, self.commands, self.jobs, self.problems, self.sent.append, folder, self.restarted.append
+        )
+
+    def _load(self, folder: Path, *_: Any, **__: Any) -> str:
+        self.loaded.append(folder)
+        return f"the head in {folder.name}"
+
+    def _swap(self, head: Head | None, settings: FaceSettings) -> None:
+        self.swapped.append((head, settings.theme, settings.person))
+
+    def take(self, *paths: Path) -> list[str]:
+        """Drop files, wait for what they begin, and return what is told."""
+        self.problems.dismiss_all()
+        self.drop(paths)
+        for job in list(self.jobs.running):
+            job.join(60.0)
+        self.jobs()
+        return [problem.text for problem in self.problems.unread]
+
+
+@pytest.fixture
+def window(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Window:
+    return Window(tmp_path, monkeypatch)
+
+
+def test_a_take_is_played_and_a_damaged_one_told(window: Window, tmp_path: Path) -> None:
+    take, damaged = tmp_path / "a.tsv", tmp_path / "b.tsv"
+    take.write_text("0.0\taa\n0.3\tsil\n")
+    damaged.write_text("no time\tnothing\n")
+    assert window.take(take) == [] and window.sent == [PlayTake(take)]
+    (told,) = window.take(damaged)
+    assert "b.tsv" in told and len(window.sent) == 1
+
+
+def test_a_head_is_shown_and_taken_back(window: Window, tmp_path: Path) -> None:
+    other = tmp_path / "other"
+    shutil.copytree(find_config("heads", "ict"), other)
+    assert window.take(other) == [] and window.loaded == [other]
+    assert window.swapped == [("the head in other", "skin", "")]
+    window.commands.undo()
+    assert window.take() == [] and window.swapped[-1] == ("the head in ict", "skin", "maple")
+    (told,) = window.take(tmp_path)
+    assert "no head.toml" in told and "drop a head's folder" in told
+
+
+def test_a_person_is_shown_and_a_stage_restarts_the_run(window: Window, tmp_path: Path) -> None:
+    person = find_config("persons", "oak")
+    assert window.take(person) == [] and window.swapped[-1][2] == str(person)
+    stage = tmp_path / "next.toml"
+    stage.write_text('name = "next"\n')
+    assert window.take(stage) == [] and window.restarted == [stage]
+    stage.write_text('name = "next"\nhead = "nobody"\n')
+    (told,) = window.take(stage)
+    assert "nobody" in told and window.restarted == [stage]
+    script = tmp_path / "show.toml"
+    script.write_text('steps = ["0 EXPR joy"]\n')
+    (told,) = window.take(script)
+    assert "copy it to" in told
+
+
+def test_a_mesh_that_is_none_and_other_files_are_told(window: Window, tmp_path: Path) -> None:
+    for name, why in (("x.obj", "fitting x.obj failed"), ("x.doc", "nothing here reads such files")):
+        (tmp_path / name).write_text("nothing")
+        (told,) = window.take(tmp_path / name)
+        assert why in told, told
+    assert window.swapped == []
+
+
+def test_only_what_differs_is_loaded(window: Window) -> None:
+    look = window.looks.first
+    window.commands.appear(type(look)("skin", "fast", "maple"))
+    window.commands.appear(type(look)("robot", "fast", "maple"))  # without hair
+    window.take()
+    assert window.swapped[0][0] is None and window.swapped[1] == ("the head in ict", "robot", "maple")
+    assert len(window.loaded) == 1

@@ -1,0 +1,147 @@
+"""controller.panels.window.playback and timeline_panel"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from controller.base.parameters import PARAMETERS
+from controller.body.messages import HoldAll, Show
+from controller.panels.window.panel import Panel, PanelOptions
+from controller.panels.window.playback import Playback
+from controller.takes.livelink import Take
+from controller.takes.plain import plain_take
+from controller.takes.timeline import Key, Timeline, load_timeline
+from tests.controller.panels.window.screen import Places, Screen, drawn
+
+JAW = PARAMETERS.index("jawOpen")
+
+
+@pytest.fixture
+def screen() -> Iterator[Screen]:
+    found = Screen()
+    yield found
+    found.imgui.destroy_context(found.context)
+
+
+class Desk:
+    """A panel in a folder; the playback's clock is the test's."""
+
+    def __init__(self, folder: Path) -> None:
+        self.sent: list[Any] = []
+        self.values, self.now_s = PARAMETERS.neutral(), 0.0
+        self.panel = Panel(lambda: self.values, self.sent.append, options=PanelOptions(folder=folder))
+        self.commands, playback = self.panel.commands, self.panel.playback
+        playback._clock, playback._last_s = lambda: self.now_s, 0.0
+        self.playback: Playback = playback
+
+    def key(self, at_s: float, jaw: float) -> None:
+        self.values[JAW] = jaw
+        self.playback.position_s = at_s
+        self.playback.add_key("linear")
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    return Desk(tmp_path)
+
+
+def test_keys_are_played_scrubbed_and_given_back(desk: Desk) -> None:
+    desk.key(0.0, 0.0)
+    desk.key(2.0, 1.0)
+    desk.playback.scrub(1.0)
+    assert desk.sent[-1] == HoldAll((JAW,), (0.5,))
+    desk.playback.toggle()
+    desk.now_s += 0.5
+    desk.playback()
+    assert desk.sent[-1] == HoldAll((JAW,), (0.75,)) and desk.playback.playing
+    desk.now_s += 5.0
+    desk.playback()
+    assert desk.sent[-2:] == [HoldAll((JAW,), (1.0,)), HoldAll((JAW,), None)] and not desk.playback.playing
+    desk.playback.toggle()
+    assert desk.playback.position_s == 0.0 and desk.playback.playing
+
+
+def test_every_edit_of_a_timeline_is_undone(desk: Desk) -> None:
+    desk.key(0.0, 0.1)
+    desk.key(1.0, 1.0)
+    two = desk.commands.now.timeline
+    for at_s in (1.1, 1.3, 1.5):
+        desk.playback.move_key(1, at_s)
+    desk.commands.end_step()
+    assert desk.commands.now.timeline.keys[1].at_s == 1.5
+    desk.playback.move_key(0, 9.0)
+    assert desk.commands.now.timeline.keys[0].at_s == 1.49  # it keeps its place
+    desk.playback.selected = 0
+    desk.playback.delete_key()
+    assert len(desk.commands.now.timeline.keys) == 1
+    for _ in range(3):
+        desk.commands.undo()
+    assert desk.commands.now.timeline is two
+    desk.commands.neutral()
+    assert desk.commands.now.timeline is two
+
+
+def test_a_recording_is_cut_smoothed_saved_and_taken_back(desk: Desk, tmp_path: Path) -> None:
+    values = np.zeros((101, len(PARAMETERS)))
+    values[:, JAW] = np.linspace(0.0, 1.0, 101)
+    take = Take("a", np.linspace(0.0, 10.0, 101), values, np.ones(len(PARAMETERS), bool),
+                PARAMETERS.low, PARAMETERS.high)  # fmt: skip
+    desk.commands.retake(take)
+    assert desk.playback.length_s == 10.0
+    desk.playback.range_s = (2.0, 8.0)
+    desk.playback.edit_take("keep")
+    desk.playback.edit_take("smooth")
+    assert desk.playback.length_s == pytest.approx(6.0)
+    path = desk.playback.save(tmp_path, "mine", desk.panel.expressions._vocabulary, loop=False)
+    assert plain_take(path, PARAMETERS).values[0, JAW] == pytest.approx(0.2)
+    desk.commands.undo()
+    desk.commands.undo()
+    assert desk.commands.now.take is take
+
+
+def test_the_window_makes_a_show_of_two_keys(
+    screen: Screen, monkeypatch: pytest.MonkeyPatch, desk: Desk, tmp_path: Path
+) -> None:
+    places, draw = Places(screen.imgui, monkeypatch), drawn(desk.panel, "Timeline")
+
+    def click(label: str) -> None:
+        screen.click(draw, *places.at[label])
+        for _ in range(2):
+            screen.frame(draw)
+
+    for _ in range(3):
+        screen.frame(draw)
+    click("save show")
+    assert "no keys" in desk.panel.problems.unread[-1].text
+    click("all 1##problem") if "all 1##problem" in places.at else click("read##problem")
+    desk.values[JAW] = 0.6
+    click("key: present face")
+    desk.commands.show("happiness", 1.0)
+    screen.frame(draw)
+    x, y = places.at["track"]
+    screen.click(draw, x, y)
+    assert desk.playback.position_s > 0.1
+    click("key: happiness")
+    click("save show")
+    saved = load_timeline(tmp_path / "my_show.toml", PARAMETERS)
+    assert [key.name for key in saved.keys] == ["", "happiness"] and saved.keys[1].values["mouthSmileLeft"] > 0.2
+    assert not any(isinstance(each, HoldAll) for each in desk.sent[:1]) and Show("happiness", 1.0) in desk.sent
+    desk.commands.undo()
+    desk.commands.undo()
+    desk.commands.undo()
+    assert desk.commands.now.timeline == Timeline()
+
+
+def test_a_timeline_without_keys_plays_nothing(desk: Desk) -> None:
+    desk.playback.toggle()
+    desk.playback.scrub(0.5)
+    desk.playback.stop()
+    assert desk.sent == [] and not desk.playback.playing
+    desk.commands.arrange(Timeline((Key(0.0, {}),)))
+    desk.playback.scrub(0.5)
+    assert desk.sent == []

@@ -1,0 +1,146 @@
+"""controller.stage.pulling, measured on the head itself and not on the samples that the solver sees."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from controller.base.parameters import PARAMETERS as P
+from controller.base.paths import find_config
+from controller.robot.anchors import SkinSamples, head_order, sample_skin, skin_points
+from controller.stage.pulling import Pin, PullSolver, lip_pairs
+from surface.head import Head
+from surface.spline.matrix import basis_rows
+
+AHEAD = np.array([0.0, 0.0, 1.0])
+LIPS_SEALED_MM, OTHER_SIDE_MM = 0.6, 1.0
+
+
+@dataclass
+class Bench:
+    """A head, its samples, and where its points really are in a face."""
+
+    head: Head
+    skin: SkinSamples
+    lips: tuple[SkinSamples, int]
+
+    def __post_init__(self) -> None:
+        self.order = head_order(self.head.parameters, P)
+        self._part = self.head.parts.index(self.head.part("face"))
+
+    def near(self, place: tuple[float, float, float]) -> int:
+        return int(np.argmin(np.linalg.norm(self.skin.rest - place, axis=1)))
+
+    def solver(self, start: np.ndarray | None = None, *, tied: bool = False) -> PullSolver:
+        return PullSolver(self.skin, self.lips, self.order, P, P.neutral() if start is None else start, tied=tied)
+
+    def places(self, uv: np.ndarray, values: np.ndarray) -> np.ndarray:
+        basis = basis_rows(self.head.part("face").surface, uv)
+        return np.asarray(basis @ self.head.place_points(values[self.order])[0][self._part])
+
+    def moved(self, point: int, values: np.ndarray) -> np.ndarray:
+        uv = self.skin.uv[point : point + 1]
+        return np.asarray(self.places(uv, values) - self.places(uv, P.neutral()))[0]
+
+    def opened(self, values: np.ndarray) -> float:
+        """How much the lips have parted, mm, where most."""
+        gap = [np.linalg.norm(np.subtract(*np.split(self.places(self.lips[0].uv, v), 2)), axis=1)
+               for v in (values, P.neutral())]  # fmt: skip
+        return float((gap[0] - gap[1]).max())
+
+    def pull(self, point: int, by: tuple[float, float, float], **options: bool) -> np.ndarray:
+        """Pull a point in ten steps, as a mouse does."""
+        solver = self.solver(**options)
+        for share in np.linspace(0.1, 1.0, 10):
+            values = solver.solve([Pin(point, self.skin.rest[point] + share * np.array(by), AHEAD)])
+        return values
+
+
+@pytest.fixture(scope="module")
+def bench() -> Bench:
+    head = Head.load(find_config("heads", "ict"))
+    skin = sample_skin(head, "face", skin_points(head, "face", 900, 11))
+    return Bench(head, skin, lip_pairs(head, "face"))
+
+
+LEFT, RIGHT, BROW, CHEEK, CHIN, LID = (
+    (28.6, -34.0, 102.0), (-28.6, -34.0, 102.0), (25.0, 53.0, 103.0), (46.0, -17.0, 91.0), (4.0, -71.0, 108.0),
+    (32.0, 40.0, 97.0),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("at", "by", "does"),
+    [
+        (LEFT, (0.0, 8.0, 0.0), "mouthSmileLeft"),
+        (RIGHT, (0.0, 8.0, 0.0), "mouthSmileRight"),
+        (LEFT, (0.0, -6.0, 0.0), "mouthFrownLeft"),
+        (RIGHT, (0.0, -6.0, 0.0), "mouthFrownRight"),
+        (BROW, (0.0, 6.0, 0.0), "browOuterUpLeft"),
+        (CHEEK, (0.0, 4.0, 0.0), "cheekSquintLeft"),
+        (CHIN, (0.0, -12.0, 0.0), "jawOpen"),
+        (LID, (0.0, -6.0, 0.0), "eyeBlinkLeft"),
+    ],
+)
+def test_a_pulled_point_arrives_and_the_rest_stays(
+    bench: Bench, at: tuple[float, float, float], by: tuple[float, float, float], does: str
+) -> None:
+    point = bench.near(at)
+    values = bench.pull(point, by)
+    away = bench.moved(point, values)[:2] - by[:2]
+    assert np.linalg.norm(away) < 1.0
+    assert values[P.index(does)] > 0.2 and (np.abs(values) > 0.02).sum() <= 8
+    assert np.all((values >= P.low) & (values <= P.high)) and not values[P.index("headYaw")]
+    if at is not CHIN:
+        assert bench.opened(values) < LIPS_SEALED_MM
+    if at in (LEFT, RIGHT):
+        across = bench.near((-at[0], at[1], at[2]))
+        assert np.linalg.norm(bench.moved(across, values)) < OTHER_SIDE_MM
+
+
+def test_both_sides_change_alike_where_they_are_tied(bench: Bench) -> None:
+    values = bench.pull(bench.near(LEFT), (3.0, 6.0, 0.0), tied=True)
+    mirrored = values[P.mirror()]
+    aside = [P.index(name) for name in ("jawLeft", "mouthLeft")]
+    assert np.allclose(np.delete(values, aside), np.delete(mirrored, aside)) and not values[aside].any()
+    assert values[P.index("mouthSmileRight")] > 0.3
+
+
+def test_pinned_points_stay_while_another_is_pulled(bench: Bench) -> None:
+    left, right = bench.near(LEFT), bench.near(RIGHT)
+    first = bench.pull(left, (4.0, 6.0, 0.0))
+    solver, pinned = bench.solver(first), bench.skin.rest[left] + bench.moved(left, first)
+    for share in np.linspace(0.1, 1.0, 10):
+        goal = bench.skin.rest[right] + share * np.array([-2.0, -5.0, 0.0])
+        values = solver.solve([Pin(left, pinned), Pin(right, goal, AHEAD)])
+    assert np.linalg.norm(bench.moved(right, values)[:2] - [-2.0, -5.0]) < 1.2
+    assert np.linalg.norm(bench.moved(left, values) - bench.moved(left, first)) < 1.2
+    assert values[P.index("mouthFrownRight")] > 0.2 and values[P.index("mouthSmileLeft")] > 0.3
+
+
+def test_what_no_face_reaches_changes_little_and_is_told(bench: Bench) -> None:
+    point, solver = bench.near((0.0, 20.0, 115.0)), bench.solver()
+    values = solver.solve([Pin(point, bench.skin.rest[point] + [0.0, 40.0, 0.0], AHEAD)])
+    assert solver.missed_mm > 20.0 and (np.abs(values) > 0.02).sum() <= 6
+    assert solver.solve([Pin(point, bench.skin.rest[point], AHEAD)]) == pytest.approx(P.neutral(), abs=0.02)
+
+
+def test_lips_that_are_open_may_go_where_they_like(bench: Bench) -> None:
+    open_ = P.neutral()
+    open_[P.index("jawOpen")] = 0.5
+    assert bench.solver(open_)._lips is None and bench.solver()._lips is not None
+
+
+def test_a_head_without_contacts_has_no_lips_to_keep_closed(small: Callable[[], Head]) -> None:
+    samples, pairs = lip_pairs(small(), small().parts[0].name)
+    assert pairs == 0 and len(samples.rest) == 0
+
+
+@pytest.fixture
+def small() -> Callable[[], Head]:
+    from tests.surface.small_head import small_head
+
+    return lambda: Head(small_head())
