@@ -199,8 +199,8 @@ def align(template: Template, samples: Samples, up: Floats | None, forward: Floa
     found = Aligner(template, samples).search(up, forward)
     if found.score > POOR:
         hint = (
-            f"say where it is: omote landmarks {where} -o landmarks.toml draws a picture to take nose_tip, chin and the "
-            "corners of eyes and mouth from, for --landmarks landmarks.toml"
+            f"say where it is: omote landmarks {where} -o landmarks.toml draws a picture to take nose_tip, chin and "
+            "the corners of eyes and mouth from, for --landmarks landmarks.toml"
         )
         raise NoFaceFound(f"{where}: no face was found in it", hint=hint)
     return found

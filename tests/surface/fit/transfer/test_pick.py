@@ -9,8 +9,8 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from surface.base.errors import FitError
-from surface.fit.transfer import pick
 from surface.fit.source.load import LoadOptions
+from surface.fit.transfer import pick
 from surface.fit.transfer.align import NoFaceFound, Similarity
 from surface.fit.transfer.register import Mark, Registered
 from surface.fit.transfer.scan import make_scan, read_scan
