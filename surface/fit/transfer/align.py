@@ -31,6 +31,10 @@ GOOD, POOR = 0.085, 0.135  # scores: so good that nothing else is tried; so poor
 SHARE = 0.75  # of the closest pairs count
 
 
+class NoFaceFound(FitError):
+    """Nothing in a scan is like the face that was looked for."""
+
+
 @dataclass(frozen=True)
 class Similarity:
     """Map p -> scale * turn @ p + shift. ``score``: mean distance both ways in heights of the face."""
@@ -190,10 +194,13 @@ def _agrees(turn: Floats, up: Floats | None, forward: Floats | None) -> bool:
 def align(template: Template, samples: Samples, up: Floats | None, forward: Floats | None, where: str) -> Similarity:
     """The similarity from a scan to the template's frame.
 
-    Raises FitError: nothing in the scan is like a face.
+    Raises NoFaceFound: nothing in the scan is like a face.
     """
     found = Aligner(template, samples).search(up, forward)
     if found.score > POOR:
-        hint = "say where it is: --landmarks FILE, with nose_tip, chin and the corners of eyes and mouth"
-        raise FitError(f"{where}: no face was found in it", hint=hint)
+        hint = (
+            f"say where it is: omote landmarks {where} -o landmarks.toml draws a picture to take nose_tip, chin and "
+            "the corners of eyes and mouth from, for --landmarks landmarks.toml"
+        )
+        raise NoFaceFound(f"{where}: no face was found in it", hint=hint)
     return found

@@ -128,7 +128,8 @@ def find_face(
 
     Raises FitError: no face is there, or the landmarks or options are wrong.
     """
-    up, forward = (_direction(f"--{n}", w) for n, w in (("up", options.up), ("forward", options.forward)))
+    up, forward = (None if w is None else direction(f"--{n}", w)
+                   for n, w in (("up", options.up), ("forward", options.forward)))  # fmt: skip
     if up is not None and forward is not None and abs(float(up @ forward)) > 0.5:
         raise FitError(f"--up {options.up} --forward {options.forward}: are one axis", hint="--up y --forward z")
     if options.unit is not None and options.unit not in UNITS:
@@ -153,10 +154,11 @@ def _by_landmarks(picked: dict[str, Floats], template: Template) -> tuple[Simila
     return found, float(np.sqrt((off**2).mean())) / template.height
 
 
-def _direction(option: str, word: str | None) -> Floats | None:
-    """The unit vector (3,) of an axis; None where none is given."""
-    if word is None:
-        return None
+def direction(option: str, word: str) -> Floats:
+    """The unit vector (3,) of an axis.
+
+    Raises FitError: ``option`` names none.
+    """
     if word not in AXES:
         raise FitError(f"{option} {word}: is not one of {', '.join(AXES)}", hint=f"{option} y")
     axis, sign = AXES[word]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,17 +12,23 @@ from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
 from surface.fit.source.load import LoadOptions
-from surface.fit.transfer.align import Similarity
-from surface.fit.transfer.api import find_face, in_frame
+from surface.fit.transfer.align import NoFaceFound, Similarity
+from surface.fit.transfer.api import direction, find_face, in_frame
 from surface.fit.transfer.register import Mark, register
 from surface.fit.transfer.scan import Scan, read_scan, sample
 from surface.fit.transfer.telling.landmarkfile import read_landmarks
-from surface.fit.transfer.telling.picture import Frontal, draw_landmarks
+from surface.fit.transfer.telling.picture import Frontal, draw_landmarks, frontal
 from surface.fit.transfer.telling.reportfile import view_of
 from surface.fit.transfer.template import NAMES, make_template
 from surface.head import Head
 
 MANY = 250_000  # samples of the head once it is found
+SLENDER, TOP = (
+    3.0,
+    0.35,
+)  # heights by depths of what has more than a bust; share of it, from the top, that is drawn then
+BY_HAND = ("nose_tip", "chin", "left_eye_inner", "left_eye_outer", "right_eye_inner", "right_eye_outer",
+           "mouth_left", "mouth_right")  # fmt: skip
 
 
 def pick_landmarks(
@@ -36,8 +42,9 @@ def pick_landmarks(
 
     Returns the landmarks in the mesh's own coordinates, and the picture's path.
 
-    Raises FitError: the mesh cannot be read, no face was found in it, ``out`` is there and not to be kept, or it or the
-    picture cannot be written. MissingPackage: Pillow is not installed. Nothing is written then.
+    Raises NoFaceFound: no face was found in the mesh; the picture shows it as it stands then, and ``out`` has lines to
+    be filled in. FitError: the mesh cannot be read, ``out`` is there and not to be kept, or it or the picture cannot be
+    written; MissingPackage: Pillow is not installed. Nothing is written then.
     """
     if out.suffix.lower() != ".toml":
         raise FitError(f"{out}: landmarks are written as TOML", hint=f"-o {out.with_suffix('.toml')}")
@@ -48,7 +55,13 @@ def pick_landmarks(
     given = read_landmarks(out, scan) if out.exists() else {}
     template = make_template(Head.load(source), str(source))
     report("face", 0.05)
-    found = find_face(scan, template, given, options, str(mesh_path))
+    try:
+        found = find_face(scan, template, given, options, str(mesh_path))
+    except NoFaceFound as e:
+        view = as_it_stands(scan, options)
+        picture = _write(Path(mesh_path), out, scan, view, {n: Mark(p, "given") for n, p in given.items()}, BY_HAND)
+        hint = f"look at {picture}, give their pixels in {out}, and then omote landmarks {mesh_path} -o {out} --keep"
+        raise NoFaceFound(f"{e}; {out} has lines for landmarks by hand", hint=hint) from e
     report("face", 0.25)
     samples, held = sample(in_frame(scan, template, found), MANY), {n: found.points(p) for n, p in given.items()}
     done = register(template, samples, held, lambda share: report("landmarks", 0.25 + 0.7 * share))
@@ -62,13 +75,29 @@ def _in_file(found: Similarity, mark: Mark) -> Floats:
     return place
 
 
-def _write(mesh: Path, out: Path, scan: Scan, view: Frontal, marks: Mapping[str, Mark]) -> Path:
+def as_it_stands(scan: Scan, options: LoadOptions) -> Frontal:
+    """The front view of a scan by the axes that are given, else y up and z forward; of a body its upper part."""
+    up = direction("--up", options.up or "y")
+    forward = direction("--forward", options.forward or ("z" if abs(up[2]) < 0.5 else "-y"))
+    turn = np.array([np.cross(up, forward), up, forward])
+    at = scan.vertices[np.unique(scan.triangles)] @ turn.T
+    low, high = at.min(axis=0), at.max(axis=0)
+    if high[1] - low[1] > SLENDER * (high[2] - low[2]):
+        low[1] = high[1] - TOP * (high[1] - low[1])
+        above = at[at[:, 1] > low[1]]
+        low[0], high[0] = above[:, 0].min(), above[:, 0].max()
+    return frontal(Similarity(turn, 1.0, np.zeros(3)), low, high)
+
+
+def _write(
+    mesh: Path, out: Path, scan: Scan, view: Frontal, marks: Mapping[str, Mark], wanted: Sequence[str] = ()
+) -> Path:  # fmt: skip
     """Write file and picture, both or none."""
     picture = out.with_suffix(".png")
     new = {path: path.with_name(f".{path.name}.new") for path in (picture, out)}
     try:
         draw_landmarks(scan, view, {n: (m.place, m.how) for n, m in marks.items()}, new[picture])
-        new[out].write_text(as_toml(mesh, out, view, marks), encoding="utf-8")
+        new[out].write_text(as_toml(mesh, out, view, marks, wanted), encoding="utf-8")
         for path, made in new.items():
             os.replace(made, path)
     except OSError as e:
@@ -79,8 +108,8 @@ def _write(mesh: Path, out: Path, scan: Scan, view: Frontal, marks: Mapping[str,
     return picture
 
 
-def as_toml(mesh: Path, out: Path, view: Frontal, marks: Mapping[str, Mark]) -> str:
-    """The text of a file of landmarks, with what to do with it."""
+def as_toml(mesh: Path, out: Path, view: Frontal, marks: Mapping[str, Mark], wanted: Sequence[str] = ()) -> str:
+    """The text of a file of landmarks, with what to do with it; ``wanted`` get lines to be filled in."""
     digits = max(0, 2 - int(np.floor(np.log10(1.0 / view.scale))))  # a hundredth of a pixel
     lines = [
         f"# Landmarks of {mesh.name}; the numbers are those in {out.with_suffix('.png').name}.",
@@ -94,6 +123,9 @@ def as_toml(mesh: Path, out: Path, view: Frontal, marks: Mapping[str, Mark]) -> 
         place = ", ".join(f"{x:.{digits}f}" for x in mark.place)
         sure = f", {mark.sure:.2f} sure" if mark.how == "found" else ""
         lines.append(f"{name} = [{place}]  # {NAMES.index(name) + 1}, {mark.how}{sure}")
+    if missing := [n for n in wanted if n not in marks]:
+        lines += ["# Fill in column and row, and delete the #; left is the subject's left, on the picture's right."]
+        lines += [f"# {name} = {{ pixel = [0, 0] }}" for name in missing]
     turn, shift = (", ".join(f"{x:.9g}" for x in values) for values in (view.turn.ravel(), view.shift))
     lines += ["", "[picture]  # how a place becomes a pixel; leave it as it is"]
     return "\n".join([*lines, f"turn = [{turn}]", f"scale = {view.scale:.9g}", f"shift = [{shift}]", ""])

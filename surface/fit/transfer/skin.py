@@ -9,7 +9,7 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 from scipy.spatial import cKDTree
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.features.rigging import lid_share
 from surface.fit.points.net import Net
@@ -21,6 +21,8 @@ from surface.head.model.parameters import smoothstep
 
 DETAIL_MM, PASSES = 5.0, 3  # of the scan, which the skin is moved by at most in one pass
 SMOOTH = 0.6  # of detail, against how closely it is followed
+FOLDED = 0.3  # cosine between a triangle that follows detail and the same one as the map has it: less is a fold
+UNFOLDINGS, STILL = 4, 0.1  # times that a pass lets go of folds; weight of skin there, which stays where the map has it
 RIM_MM = (1.5, 4.0)  # from the rim of an opening: nearer than the first the scan shows no skin, further all of it
 CLOSINGS = 12  # each leaves a share of the gap, for points farther away move less
 LIP_FADE_MM = (3.0, 16.0)  # from where lips meet: skin moves with them, does not move
@@ -54,14 +56,38 @@ class Skin:
         self._matrix = _laplacian(part.mesh.triangles, n)
 
     def follow(self, matcher: Matcher, scale: float) -> None:
-        """Move along normals to the scan where it has data; in between as smoothly as the map did."""
+        """Move along normals to the scan where it has data; in between, and where that would fold the skin, as under
+        hair that hides an ear, as smoothly as the map did."""
+        mapped = self._facing(self.at)
+        folds = np.zeros(len(self.at), bool)
         for _ in range(PASSES):
             normals = self.normals()
             match = matcher.find(self.at, normals, DETAIL_MM * scale, 0.0)
             off = ((match.goals - self.at) * normals).sum(axis=1)
-            weight = self._seen * match.found
-            system = (diags(weight + 1e-6) + SMOOTH * self._matrix).tocsc()
-            self.at = self.at + spsolve(system, weight * off)[:, None] * normals
+            for _ in range(UNFOLDINGS):
+                weight = np.where(folds, STILL, self._seen * match.found)
+                system = (diags(weight + 1e-6) + SMOOTH * self._matrix).tocsc()
+                at = self.at + spsolve(system, weight * np.where(folds, 0.0, off))[:, None] * normals
+                if not (more := self._folded(at, mapped) & ~folds).any():
+                    break
+                folds |= more
+            self.at = at
+
+    def _facing(self, at: Floats) -> Floats:
+        """(t, 3) unit normals of the skin's triangles over vertices (n, 3)."""
+        a, b, c = (at[self.mesh.triangles[:, k]] for k in range(3))
+        cross = np.cross(b - a, c - a)
+        unit: Floats = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-12)[:, None]
+        return unit
+
+    def _folded(self, at: Floats, mapped: Floats) -> Bools:
+        """(n,) vertices (n, 3) of triangles that are turned far from how the map has them, and their neighbours."""
+        tri = self.mesh.triangles
+        folded = np.zeros(len(at), bool)
+        folded[tri[(self._facing(at) * mapped).sum(axis=1) < FOLDED]] = True
+        out = folded.copy()
+        out[tri[folded[tri].any(axis=1)]] = True
+        return out
 
     def normals(self) -> Floats:
         """(n, 3) unit normals of the skin as it lies."""

@@ -88,7 +88,7 @@ def draw_landmarks(scan: Scan, view: Frontal, marks: Mapping[str, tuple[Floats, 
 
     width = round(ASPECT * HEIGHT)
     pictures, places = [], {n: view.pixels(p) for n, (p, _) in marks.items()}
-    nose = places.get("nose_tip", view.pixels(scan.vertices).mean(axis=0))
+    nose = places["nose_tip"] if "nose_tip" in places else _foremost(view.pixels(scan.vertices), width)
     for side in (False, True):
         at = _from_the_left(view.pixels(scan.vertices), nose, width) if side else view.pixels(scan.vertices)
         pictures.append(_relief(at, scan.triangles, width, np.ones((len(scan.triangles), 3))))
@@ -115,6 +115,14 @@ def draw_distances(scan: Scan, view: Frontal, distance: Floats, path: Path) -> N
     colour[distance > FAR_MM] = 0.5
     picture = _relief(view.pixels(scan.vertices), scan.triangles, round(ASPECT * HEIGHT), colour)
     Pillow.fromarray(picture).save(path, format="PNG")
+
+
+def _foremost(pixels: Floats, width: int) -> Floats:
+    """(3,) the nearest of pixels (m, 3) that the picture shows; the nearest of all if it shows none."""
+    shown = (pixels[:, :2] > 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < HEIGHT)
+    own = pixels[shown] if shown.any() else pixels
+    nearest: Floats = own[own[:, 2].argmax()]
+    return nearest
 
 
 def _from_the_left(pixels: Floats, nose: Floats, width: int) -> Floats:

@@ -9,8 +9,9 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from surface.base.errors import FitError
+from surface.fit.source.load import LoadOptions
 from surface.fit.transfer import pick
-from surface.fit.transfer.align import Similarity
+from surface.fit.transfer.align import NoFaceFound, Similarity
 from surface.fit.transfer.register import Mark, Registered
 from surface.fit.transfer.scan import make_scan, read_scan
 from surface.fit.transfer.telling.landmarkfile import read_landmarks
@@ -108,3 +109,40 @@ def test_a_scan_shows_nothing_beside_it(face):
     for point in np.vstack([inside, face.points[face.triangles[500]].mean(axis=0)]):
         np.testing.assert_allclose(view.place(scan, *view.pixels(point)[:2]), point, atol=1e-6)
     assert view.place(scan, -500.0, 10.0) is None
+
+
+@pytest.mark.parametrize("body", [False, True])
+def test_where_no_face_is_found_a_picture_shows_the_mesh_and_its_pixels_are_landmarks(
+    face, scan_file, known, tmp_path, monkeypatch, body
+):
+    def none(*_):
+        raise NoFaceFound("scan.obj: no face was found in it")
+
+    monkeypatch.setattr(pick, "find_face", none)
+    if body:  # the lowest third of a body of 1.7 m, far below the face
+        with scan_file.open("a") as f:
+            below = np.array([[0, -1600.0, 0], [90, -1600, 0], [0, -1500, 60]]) @ (0.001 * TURN.T) + SHIFT
+            f.write("".join(f"v {x} {y} {z}\n" for x, y, z in below) + "f -1 -2 -3\n")
+    out = tmp_path / "marks.toml"
+    up, forward = ("xyz"[k] if s > 0 else "-" + "xyz"[k] for k, s in (_axis(TURN[:, 1]), _axis(TURN[:, 2])))
+    options = LoadOptions(up=up, forward=forward)
+    with pytest.raises(NoFaceFound, match="by hand") as caught:
+        pick.pick_landmarks(scan_file, "ict", out, options=options)
+    assert "--keep" in caught.value.hint and str(out.with_suffix(".png")) in caught.value.hint
+    text = out.read_text()
+    assert text.count("# ") >= len(pick.BY_HAND) and "# mouth_left = { pixel = [0, 0] }" in text
+    view = pick.read_landmarks.__globals__["_read_toml"](out)[1]
+    places = view.pixels(np.array([in_file(face, n) for n in pick.BY_HAND]))
+    assert ((places[:, :2] > 0) & (places[:, :2] < [810, 900])).all()
+    assert np.ptp(places[:, 1]) > 100  # the face is large enough to be clicked on
+    for name, (column, row, _) in zip(pick.BY_HAND, places, strict=True):
+        line = f"{name} = {{ pixel = [{column:.0f}, {row:.0f}] }}"
+        text = text.replace(f"# {name} = {{ pixel = [0, 0] }}", line)
+    out.write_text(text)
+    read = read_landmarks(out, read_scan(scan_file))
+    assert max(np.linalg.norm(read[n] - in_file(face, n)) for n in pick.BY_HAND) < 0.004
+
+
+def _axis(way: np.ndarray) -> tuple[int, float]:
+    k = int(np.abs(way).argmax())
+    return k, float(way[k])

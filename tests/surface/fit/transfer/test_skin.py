@@ -240,3 +240,18 @@ def test_detail_of_a_scan_is_followed_along_normals() -> None:
     )
     made.follow(Matcher(samples), 1.0)
     np.testing.assert_allclose(made.at[:, 2], 0.8 + 0.02 * made.at[:, 0], atol=0.08)
+
+
+@pytest.mark.parametrize("mended", [True, False])
+def test_skin_that_detail_would_fold_stays_where_the_map_has_it(mended, monkeypatch) -> None:
+    if not mended:
+        monkeypatch.setattr(module, "FOLDED", -2.0)  # nothing counts as a fold: this detail does turn skin over
+    part = grid(41)
+    part.vertices = np.column_stack([40 * part.mesh.uv, 0 * part.mesh.uv[:, 0]])
+    made = Skin(part, np.zeros((0, 3)), lambda p: p, FAR)
+    flat, height = made._facing(made.rest), np.zeros((41 * 41, 3))
+    rough = part.vertices[:, 0] < 15  # as curls over an ear
+    height[:, 2] = np.where(rough, np.random.default_rng(0).uniform(-12, 12, len(rough)), 2.0)
+    made.follow(Lifted(made.rest, height, np.ones(len(rough), bool)), 1.0)
+    assert ((made._facing(made.at) * flat).sum(axis=1).min() > 0.0) == mended
+    np.testing.assert_allclose(made.at[part.vertices[:, 0] > 22, 2], 2.0, atol=0.2)
