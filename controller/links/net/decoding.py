@@ -28,7 +28,7 @@ class Arrived:
 class Decoding:
     """Decodes what arrives at one receiver.
 
-    newest : of what has waited, read only the newest messages of each sender; nothing is left out without.
+    newest : decode only the newest of the messages that waited for each sender; without it, all of them.
     streams : pieces of streams arrive, not datagrams.
 
     Attributes
@@ -56,11 +56,13 @@ class Decoding:
     def _by_sender(self, received: Received) -> dict[str, list[bytes]]:
         found: dict[str, list[bytes]] = {}
         for sender, data in received:
-            if not data:  # its stream ended: the next one begins anew
+            if not data:  # its stream ended: the next one starts from its beginning
                 self._senders.pop(sender, None)
                 found.pop(sender, None)
                 continue
-            if sender not in self._senders:
+            if sender in self._senders:
+                self._senders[sender] = self._senders.pop(sender)  # the last of them is the one that sent last
+            else:
                 self._add(sender)
             messages = self._messages(sender, data)
             self.messages += len(messages)

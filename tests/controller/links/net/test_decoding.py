@@ -44,6 +44,15 @@ def test_senders_without_end_take_bounded_memory() -> None:
     assert len(decoding._senders) == MOST_SENDERS
 
 
+def test_strangers_do_not_displace_a_sender_that_goes_on() -> None:
+    decoding = Decoding(FORMATS.get("json"), P, streams=False)
+    decoding.feed([("phone", b'{"jawOpen": 1}')])
+    for n in range(100):
+        decoding.feed([(f"10.0.0.{n}", b'{"jawOpen": 1}')])
+        ((found, *_),) = [decoding.feed([("phone", b'{"cheekPuff": 1}')])]
+        assert found.frame.mask.sum() == 2, "it still knows the jaw"
+
+
 def test_a_datagram_that_is_too_long_is_refused() -> None:
     decoding = Decoding(FORMATS.get("binary"), P, streams=False)
     assert decoding.feed([("a", b"x" * 5000)]) == [] and decoding.refused == Counter({"message too long": 1})
