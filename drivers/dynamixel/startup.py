@@ -110,7 +110,10 @@ class Startup(startup.Startup[StatusPacket]):
         return list(bad)
 
     def _write_settings(self, servo: int, held: bool) -> None:
-        """Operating mode, drive mode and return delay: read, and written only where they differ."""
+        """Operating mode, drive mode, startup configuration and return delay: read, and written only where they differ.
+
+        ``held`` : its torque is on, so nothing may be written; raises ServoRefused where something differs.
+        """
         registers, table = self.registers, self.registers.tables[servo]
         wanted: dict[str, int] = {"mode": 2 if table.model == "xl320" else 3}
         keep = {"drive_mode": ~(REVERSE | TIME_PROFILE | TORQUE_BY_GOAL)}
