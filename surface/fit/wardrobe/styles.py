@@ -93,7 +93,8 @@ def lock_patches(
     s, t = (x[None] for x in np.meshgrid(np.linspace(-1, 1, gu), np.linspace(0, 1, gv), indexing="ij"))
     start = random.uniform(0.0, 1.0, (n, 2))[:, :, None, None]
     across = start[:, 0] + 0.5 * (s + 1.0) * locks.widths[:, None, None] * ACROSS * (1.0 - 0.35 * t)
-    ends = 1.2 - (1.2 - tip_cover) * step(t, fall_from, 1.0) - root_fade * (1.0 - step(t, 0.0, max(0.12 * root_fade, 0.01)))
+    roots = root_fade * (1.0 - step(t, 0.0, max(0.12 * root_fade, 0.01)))
+    ends = 1.2 - (1.2 - tip_cover) * step(t, fall_from, 1.0) - roots
     cover = ends - (1.0 - edge_cover) * s * s * (0.6 + 0.4 * t)
     layer = locks.layers[:, None, None]
     openness = (below + (1.0 - below) * step(t, 0.0, 0.45)) * (0.68 + 0.32 * layer) * (1.0 - 0.12 * s * s)

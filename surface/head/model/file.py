@@ -279,7 +279,7 @@ def check_writable(folder: str | Path) -> None:
 
 
 def save_data(folder: str | Path, head: HeadData) -> None:
-    """Write head.toml and head.npz: both are written beside the old ones first, then each replaces its old one as a whole.
+    """Write head.toml and head.npz beside the old ones; when both are written, each replaces its old one as a whole.
 
     Raises HeadFileError: the folder cannot be written to, or the disk is full; the files that were there are unchanged.
     """
