@@ -82,7 +82,7 @@ class AuCsvEncoder:
         time_s = self._sent / 60.0 if frame.time_s is None else frame.time_s
         names = [self._header] if self._sent % _REPEAT == 0 else []
         self._sent += 1
-        cells = (f"{_FULL * min(max(level, 0.0), 1.0):.4g}" for level in levels.tolist())
+        cells = (f"{_FULL * level:.4g}" for level in levels.tolist())
         return [*names, ",".join([f"{time_s:.6f}", *cells]).encode()]
 
 

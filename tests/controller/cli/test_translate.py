@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -14,9 +15,9 @@ def test_a_take_is_translated_and_counted(tmp_path: Path, root: Path) -> None:
     take.write_text("Timecode,JawOpen\n0:0:0:0,0.1\n0:0:0:6,0.4\n")
     done = subprocess.run(
         [*OMOTE, "translate", str(take), "vmc:127.0.0.1:27391"],
-        cwd=root, capture_output=True, text=True, timeout=60,
+        cwd=root, capture_output=True, text=True, timeout=60, env={**os.environ, "FORCE_COLOR": "1"},
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 0, done.stderr  # and figures have no colours of their own
     assert done.stdout == "" and "2 frames came" in done.stderr and "2 messages went out" in done.stderr
 
 

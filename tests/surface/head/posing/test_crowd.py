@@ -36,6 +36,7 @@ def check(crowd: Crowd, alone: Head) -> None:
             assert np.mean(np.sum(own.normals[k] * part.normals, axis=1)) > 1.0 - 1e-5, part.name
 
 
+@pytest.mark.slow
 def test_each_head_is_as_one_alone(crowd: Crowd, alone: Head) -> None:
     count = len(alone.parameters)
     for seed in range(2):

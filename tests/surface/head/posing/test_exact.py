@@ -62,6 +62,7 @@ def test_random_sequences_end_where_a_fresh_evaluation_does(head: Head, seed: in
                     assert_exact(head, part)
 
 
+@pytest.mark.slow
 def test_control_points_do_not_depend_on_the_poses_before(head: Head) -> None:
     sequence = poses(2)
     for values in sequence:

@@ -41,6 +41,7 @@ def test_the_tongue_pierces_neither_lips_nor_teeth(
     assert max(crossings.depths().values()) < 0.5
 
 
+@pytest.mark.slow
 def test_the_tongue_comes_out_without_a_jump(head: Head) -> None:
     tongue, tips = head.part("tongue"), []
     for amount in np.linspace(0.0, 1.0, 101):
