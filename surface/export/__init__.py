@@ -91,8 +91,9 @@ def export_head(
             try:
                 return _writer(one, frame, animation, web)(head, path, pose or {})
             except OSError as e:
-                hint = "choose a folder that can be written to"
-                raise ExportError(f"{path}: cannot be written ({e})", hint=hint) from e
+                there = path.parent.is_dir()
+                hint = "choose a folder that can be written to" if there else f"mkdir -p {path.parent}"
+                raise ExportError(f"{path}: cannot be written ({e.strerror or e})", hint=hint) from e
     *most, last = (suffix for one in known for suffix in one.suffixes)
     why = "".join(f"; {note}" for note in _own()[1])
     raise ExportError(

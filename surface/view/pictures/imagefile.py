@@ -44,6 +44,7 @@ def replacing(path: Path) -> Iterator[Path]:
         temporary.chmod(0o644)
         temporary.replace(path)
     except OSError as error:
-        raise ViewError(f"cannot write {path}: {error}", hint="check the free space and the folder's rights") from error
+        hint = "check the free space and the folder's rights"
+        raise ViewError(f"cannot write {path}: {error.strerror or error}", hint=hint) from error
     finally:
         temporary.unlink(missing_ok=True)
