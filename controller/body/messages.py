@@ -33,6 +33,7 @@ class RunOptions:
     mirror : leave the servos' torque off; the face follows a head that is moved by hand.
     record : file for every command and tick. web : a web panel. show : a script to play instead of the stage's show.
     events : file for the lines and marks of shows. lsl : send those marks as LSL markers.
+    standard_input : a link listens there: the body gets what comes in at main's.
     """
 
     take: Path | None = None
@@ -43,6 +44,7 @@ class RunOptions:
     show: Path | None = None
     events: Path | None = None
     lsl: bool = False
+    standard_input: bool = False
 
 
 @dataclass(frozen=True)
