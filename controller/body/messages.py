@@ -34,6 +34,7 @@ class RunOptions:
     record : file for every command and tick. web : a web panel. show : a script to play instead of the stage's show.
     events : file for the lines and marks of shows. lsl : send those marks as LSL markers.
     role, heads : replace those of the stage's ``[zenoh]``.
+    standard_input : a link listens there: the body gets what comes in at main's.
     """
 
     take: Path | None = None
@@ -46,6 +47,7 @@ class RunOptions:
     lsl: bool = False
     role: str | None = None
     heads: tuple[str, ...] = ()
+    standard_input: bool = False
 
 
 @dataclass(frozen=True)

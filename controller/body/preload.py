@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import multiprocessing
+import os
 import signal
 import sys
 from collections.abc import Iterator
@@ -30,7 +31,7 @@ class PreloadedBody:
     """A process that waits for :class:`controller.body.messages.BodyOrders`.
 
     A context manager: the process ends with the block unless :meth:`send` has given it orders.
-    ``pipe`` leads to it; ``voice`` carries a voice from standard input, which a child process does not have.
+    ``pipe`` leads to it; ``voice`` carries standard input, which a child process does not have, for a voice or a link.
     """
 
     def __init__(self) -> None:
@@ -99,6 +100,8 @@ def _wait(pipe: Connection, voice: Connection) -> None:
     except (EOFError, OSError):
         return
     options = orders.options
+    if options.standard_input:
+        os.dup2(voice.fileno(), sys.stdin.fileno())
     if options.voice is not None and options.voice.path == "-":
         orders = replace(orders, options=replace(options, voice=replace(options.voice, pipe=voice)))
     body_main(orders, pipe)

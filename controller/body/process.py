@@ -5,9 +5,10 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 
-from controller.base.errors import ControllerError
+from controller.base.errors import ConfigError, ControllerError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import Parameters
 from controller.body import messages
@@ -42,10 +43,7 @@ class BodyProcess:
         preloaded: PreloadedBody | None = None,
     ) -> None:
         preloaded = preloaded or PreloadedBody()
-        if options.voice is not None and options.voice.path == "-":
-            pump(preloaded.voice)
-        else:
-            preloaded.voice.close()
+        options = self._with_input(stage, options, preloaded)
         stages = heads_of(stage)
         self.mailboxes = [Mailbox.create(len(parameters.names)) for _ in stages]
         self._panel_mailboxes = [Mailbox.create(PanelState.size(parameters)) for _ in stages]
@@ -61,6 +59,23 @@ class BodyProcess:
         pairs = zip(self.mailboxes, self._panel_mailboxes, strict=True)
         boxes = [mailbox for pair in pairs for mailbox in pair]
         preloaded.send(messages.BodyOrders(str(stage.path), options), *boxes)
+
+    @staticmethod
+    def _with_input(stage: Stage, options: messages.RunOptions, preloaded: PreloadedBody) -> messages.RunOptions:
+        """Give the body what comes in at standard input, where a voice or a link wants it."""
+        voice = options.voice is not None and options.voice.path == "-"
+        links = 0 if options.take is not None else sum(
+            link.takes_input for each in heads_of(stage) for link in each.settings.links
+        )
+        link = links > 0
+        if voice + links > 1:
+            hint = "give the voice as a file or a pipe, or a link another address"
+            raise ConfigError(f"{stage.path}: only one voice or link can have standard input", hint=hint)
+        if voice or link:
+            pump(preloaded.voice, raw=link)
+        else:
+            preloaded.voice.close()
+        return replace(options, standard_input=link)
 
     def wait_ready(self) -> messages.Ready:
         """Wait until the servos are up; raises ControllerError with the body's message when they do not come up."""

@@ -102,8 +102,10 @@ def standard_input() -> TextIO:
     return sys.stdin
 
 
-def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
+def pump(pipe: Connection, stream: IO[bytes] | None = None, *, raw: bool = False) -> threading.Thread:
     """Copy a stream, by default standard input, to a pipe in a thread, and close the pipe at the end.
+
+    raw : as bytes without their counts, for a far end that reads the pipe as a file.
 
     Raises TakeError when standard input is closed.
     """
@@ -112,12 +114,20 @@ def pump(pipe: Connection, stream: IO[bytes] | None = None) -> threading.Thread:
     def run() -> None:
         with suppress(OSError):  # the body has ended, or the stream was closed
             while data := os.read(source, _CHUNK):
-                pipe.send_bytes(data)
+                if raw:
+                    _write_all(pipe.fileno(), data)
+                else:
+                    pipe.send_bytes(data)
         pipe.close()
 
     thread = threading.Thread(target=run, name="standard input", daemon=True)
     thread.start()
     return thread
+
+
+def _write_all(file: int, data: bytes) -> None:
+    while data:
+        data = data[os.write(file, data) :]
 
 
 class Sources:

@@ -35,6 +35,11 @@ class LinkSettings(Settings):
         """The script that a simulated far end plays; None where there is none."""
         return getattr(self.own, "simulated", None)
 
+    @property
+    def takes_input(self) -> bool:
+        """Whether it listens at standard input."""
+        return bool(getattr(self.own, "takes_input", False))
+
     def __str__(self) -> str:
         address = getattr(self.own, "address", "")
         return f"{self.kind} on {address}" if address else self.kind

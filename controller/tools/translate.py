@@ -19,7 +19,8 @@ from controller.formats.frame import Frame
 from controller.links.net.address import LOOPBACK, Address, has_token, is_called, parse_address
 from controller.links.net.decoding import Decoding
 from controller.links.net.meter import Meter
-from controller.links.net.receivers import Gate, InputReceiver, greeting_of, open_receiver
+from controller.links.net.opening import greeting_of, open_receiver
+from controller.links.net.receivers import Gate, InputReceiver
 from controller.links.net.senders import Sender, open_sender
 from controller.takes.reader import load_take, suffixes
 from drivers.base.errors import PluginError

@@ -11,8 +11,9 @@ from controller.links.kind import LinkContext
 from controller.links.net.address import has_token
 from controller.links.net.incoming import Incoming
 from controller.links.net.neutral import state_file
+from controller.links.net.opening import greeting_of, open_receiver
 from controller.links.net.outgoing import Outgoing
-from controller.links.net.receivers import Gate, greeting_of, open_receiver
+from controller.links.net.receivers import Gate
 from controller.links.net.senders import open_sender
 from controller.links.net.settings import NetSettings
 

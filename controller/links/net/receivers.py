@@ -12,7 +12,6 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from controller.base.errors import LinkError
-from controller.formats.format import Format
 from controller.formats.frame import Refusals
 from controller.links.access import WebRequests
 from controller.links.net.address import Address
@@ -82,36 +81,6 @@ class Gate:
 def auth_message(token: str) -> bytes:
     """What says a token at the beginning of a stream."""
     return f"AUTH {token}".encode()
-
-
-def greeting_of(form: Format, token: str | None) -> bytes:
-    """What a program is told that is called: the token, where there is one, and what its format wants."""
-    return (b"" if token is None else auth_message(token) + form.delimiter) + form.greeting
-
-
-def open_receiver(
-    address: Address, *, connect: bool = False, baud: int = 115_200, gate: Gate | None = None, greeting: bytes = b""
-) -> Receiver:
-    """What an address gives.
-
-    connect : call the address instead of waiting for calls, or ask it by UDP. baud : rate of a serial port. gate : what
-    streams of callers and datagrams must begin with; None for nothing. greeting : what a program hears that is called.
-
-    Raises LinkError: the address is taken or not of this machine. PortError: the serial port cannot be opened.
-    """
-    if address.transport == "udp" and connect:
-        from controller.links.net.udp_caller import UdpCaller  # it takes the receiver below
-
-        return UdpCaller(address, greeting)
-    if address.transport == "udp":
-        return UdpReceiver(address, gate)
-    if address.transport == "tcp":
-        return TcpCaller(address, greeting) if connect else TcpListener(address, gate)
-    if address.transport == "midi":
-        from controller.links.net.midi import MidiReceiver  # few links need it
-
-        return MidiReceiver(address.device)
-    return SerialReceiver(address.device, baud) if address.transport == "serial" else InputReceiver()
 
 
 class UdpReceiver:

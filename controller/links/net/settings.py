@@ -102,6 +102,11 @@ class NetSettings:
         return None if text is None else parse_address(text, self.form)
 
     @property
+    def takes_input(self) -> bool:
+        """Whether faces come from standard input."""
+        return self.incoming is not None and self.incoming.transport == "lines"
+
+    @property
     def outgoing(self) -> Address | None:
         """Where the present face goes; None for a link that only takes."""
         return None if self.send is None else parse_address(self.send, self.form)

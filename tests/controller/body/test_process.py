@@ -15,10 +15,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from controller.base.errors import ControllerError
+from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS
 from controller.body import messages
 from controller.body.messages import Hold, Neutral, Show
+from controller.body.preload import PreloadedBody
 from controller.body.process import BodyProcess, deadline
 from controller.stage.stage import Stage, load_stage
 from drivers.sim import SimulatedBus
@@ -279,3 +280,32 @@ def test_a_body_that_a_signal_ended_has_left_its_report() -> None:
     assert body.report == {"a": 1}
     with pytest.raises(ControllerError, match="ended by itself"):
         body_of(Gone(1, EOFError())).stop()
+
+
+def with_links(folder: Path, *kinds: str) -> Stage:
+    """A stage without servos whose links listen at standard input, each with a layer of its own."""
+    text = "".join(
+        f'[layers.in_{kind}]\npriority = {55 + n}\n[[links]]\nkind = "{kind}"\nlisten = "-"\nlayer = "in_{kind}"\n'
+        for n, kind in enumerate(kinds)
+    )
+    (folder / "stage.toml").write_text(text)
+    return load_stage(str(folder / "stage.toml"), PARAMETERS)
+
+
+def test_lines_at_standard_input_move_the_face(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    read, write = os.pipe()
+    with os.fdopen(read) as stdin, os.fdopen(write, "w") as there:
+        monkeypatch.setattr(sys, "stdin", stdin)
+        with BodyProcess(with_links(tmp_path, "json"), PARAMETERS) as body:
+            body.wait_ready()
+            body.begin()
+            print('{"jawOpen": 0.6}', file=there, flush=True)
+            assert until(lambda: body.alive() and newest(body, "jawOpen") > 0.55)
+            there.close()
+    (link,) = cast(list[dict[str, Any]], body.report["links"])
+    assert link["accepted"] == 1
+
+
+def test_only_one_link_can_have_standard_input(tmp_path: Path) -> None:
+    with PreloadedBody() as waiting, pytest.raises(ConfigError, match="only one voice or link"):
+        BodyProcess(with_links(tmp_path, "json", "csv"), PARAMETERS, preloaded=waiting)

@@ -13,7 +13,7 @@ import pytest
 from controller.base.errors import LinkError
 from controller.formats.format import FORMATS
 from controller.links.net.address import parse_address
-from controller.links.net.receivers import open_receiver
+from controller.links.net.opening import open_receiver
 from controller.links.net.senders import open_sender
 
 mido = pytest.importorskip("mido")

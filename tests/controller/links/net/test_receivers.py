@@ -16,7 +16,8 @@ from controller.formats.format import FORMATS
 from controller.links.line.hostport import HostPort
 from controller.links.net import receivers
 from controller.links.net.address import parse_address
-from controller.links.net.receivers import MOST_CONNECTIONS, Gate, InputReceiver, Receiver, open_receiver
+from controller.links.net.opening import open_receiver
+from controller.links.net.receivers import MOST_CONNECTIONS, Gate, InputReceiver, Receiver
 from drivers.base.errors import PortMissing
 from tests.controller.links.net.sockets import free_port
 
