@@ -16,6 +16,7 @@ import numpy as np
 from surface.base import files
 from surface.base.arrays import Bools
 from surface.fit.source.mesh import FitMesh
+from surface.readers.meshdata import MeshData
 
 WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|[^\W\d_a-zA-Z]+")
 LONGEST = 4  # words of one entry of the table
@@ -95,6 +96,18 @@ def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
     if not kept.any():
         return np.ones(len(mesh.faces), bool), []
     return kept, notes + [f"{kind} left out: {listed(names)}" for kind, names in out.items()]
+
+
+def bare(mesh: FitMesh | MeshData, kept: Bools) -> tuple[Bools, list[str]]:
+    """Which of the faces ``kept`` (f,) show a person's skin or eyes: what is worn, grows on the skin or lies in the
+    mouth does not; and what the others are, in words. Names are not believed where nothing would be left."""
+    own, out = kept.copy(), dict[str, list[str]]()
+    for k, name in enumerate(mesh.pieces):
+        kind, there = kind_of(name), kept & (mesh.piece == k)
+        if kind.rule in ("out", "part") and there.any():
+            own &= ~there
+            out.setdefault(kind.name, []).append(name)
+    return (own, [f"{kind} left out: {listed(names)}" for kind, names in out.items()]) if own.any() else (kept, [])
 
 
 def listed(names: list[str]) -> str:

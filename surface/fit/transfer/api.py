@@ -101,7 +101,7 @@ def transfer(
     changed = reseated(carried, data)
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
-    notes += lid_notes
+    notes += [*scan.notes, *lid_notes]
     if scan.colours is not None:
         data, told = with_colours(data, scan.colours)
         notes += told

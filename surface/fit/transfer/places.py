@@ -13,6 +13,7 @@ from surface.head import Group, Head, HeadData, Jaw, Neck, PartData
 
 EYE_RADII = 1.5  # around an eyeball: skin that shows where it is
 TEETH = ("teeth", "gums", "tongue")
+FRONT_MM = 4.0  # behind the foremost teeth: how fast those further back count less for where all are placed
 
 
 @dataclass(frozen=True)
@@ -58,12 +59,16 @@ def place_eyes(template: Template, warp: Warp) -> tuple[Floats, float]:
 
 
 def place_teeth(head: Head, warp: Warp) -> Placing:
-    """How teeth, gums and tongue move: as one, by where the map puts the teeth."""
+    """How teeth, gums and tongue move: as one, in size by where the map puts all of them, in place by where it puts
+    their front: lips that are pressed together lie close before it."""
     points = [p.vertices for p in head.parts if p.material in TEETH]
     if not points:
         points = [p.vertices for p in head.parts if p.material == "mouth"] or [head.parts[0].vertices]
     at = np.concatenate(points).astype(float)[::7]
-    return placing(at, warp(at))
+    goals = warp(at)
+    scale = placing(at, goals).scale
+    front = np.exp((at[:, 2] - at[:, 2].max()) / FRONT_MM)
+    return Placing(scale, (front / front.sum()) @ (goals - scale * at))
 
 
 def place_jaw(data: HeadData, warp: Warp) -> Jaw:

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.base.extras import require
+from surface.fit.source.kinds import bare
 from surface.fit.source.load import wanted_faces
 from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
 from surface.fit.source.textures import Samples as Colours
@@ -35,13 +36,14 @@ class Scan:
     """Triangles of a bare mesh, in any unit and axes.
 
     vertices : (n, 3); triangles : (t, 3); original : (m,) int64, for each vertex of the file its place in ``vertices``.
-    colours : samples of its colours; None where it has none.
+    colours : samples of its colours; None where it has none. notes : what of the file is not in it, in words.
     """
 
     vertices: Floats
     triangles: Ints
     original: Ints
     colours: Colours | None = None
+    notes: tuple[str, ...] = ()
 
     def turned(self, turn: Floats, scale: float, shift: Floats) -> Scan:
         """The scan with every vertex p at scale * turn @ p + shift."""
@@ -63,7 +65,8 @@ class Samples:
 
 
 def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
-    """Read a mesh of which only the form is wanted.
+    """Read a mesh of which only the form of the skin is wanted: pieces with the names of clothes, hair, teeth and the
+    like are left out.
 
     without : objects or materials to leave out; a part of the name will do.
 
@@ -73,9 +76,9 @@ def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
     kind = path.suffix.lower()
     if kind in OWN:
         raw = OWN[kind](path)
-        kept = wanted_faces(raw, without, str(path))
+        kept, notes = bare(raw, wanted_faces(raw, without, str(path)))
         scan = make_scan(raw.vertices, triangles(raw.faces[kept]), str(path))
-        return replace(scan, colours=scan_colours(raw, kept))
+        return replace(scan, colours=scan_colours(raw, kept), notes=tuple(notes))
     if kind not in OTHERS:
         raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
                        hint=f"export it as {', '.join([*OWN, *OTHERS])}")  # fmt: skip

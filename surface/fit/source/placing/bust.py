@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
+from surface.fit.source.kinds import SKIN, is_known, kind_of
 from surface.fit.source.mesh import FitMesh, face_areas, renumbered, triangles
 
 BODY_BELOW = 300.0  # a mesh that reaches further below the eyes, mm at usual size, has a body; a bust has not
 BASE, DOWN, ASIDE = -131.0, 98.0, 150.0  # the bust's outline: from this height, so far down and so far to the sides
 ROUND = 4.0  # exponent of the outline, a superellipse: 2 would be an ellipse
 MOSTLY = 0.5  # an object with less of its area than this inside the outline belongs to the body
+NECK = -125.0  # below the eyes, mm at usual size: between chin and shoulders
 NEAR = 0.12  # of an edge: a vertex as near to the outline as that is on it; no slivers are cut
 
 
@@ -25,7 +27,7 @@ def cut_bust(mesh: FitMesh, eyes_at: Floats, scale: float) -> tuple[FitMesh, lis
     if low > -BODY_BELOW * scale:
         return mesh, []
     outside = outline(mesh.vertices, eyes_at, scale)
-    gone = _body_objects(mesh, outside)
+    gone = _body_objects(mesh, outside) & ~_necks(mesh, outside, eyes_at[1] + NECK * scale)
     notes = _notes(mesh, gone, -low)
     return _compact(cut(_subset(mesh, _kept_faces(mesh, gone)), outside)), notes
 
@@ -53,6 +55,16 @@ def _body_objects(mesh: FitMesh, outside: Floats) -> Bools:
     np.maximum.at(moving, mesh.piece, most[first])
     gone: Bools = (inside < MOSTLY * whole) & (moving < 1.0)
     return gone if not gone[np.unique(mesh.piece)].all() else np.zeros(len(mesh.pieces), bool)
+
+
+def _necks(mesh: FitMesh, outside: Floats, height: float) -> Bools:
+    """(objects,) which objects are skin, by name, and reach up to a height inside the outline: they hold the neck of a
+    head that ends at the chin, and are cut like a body of one piece with its head."""
+    skin = np.array([is_known(n) and kind_of(n).name == SKIN for n in mesh.pieces], bool)
+    first = mesh.faces[:, 0]
+    most = np.full(len(mesh.pieces), -np.inf)
+    np.maximum.at(most, mesh.piece, np.where(outside[first] < 0, mesh.vertices[first, 1], -np.inf))
+    return skin & (most > height)
 
 
 def _kept_faces(mesh: FitMesh, gone: Bools) -> Bools:

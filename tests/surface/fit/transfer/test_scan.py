@@ -43,10 +43,10 @@ def test_a_ply_file_is_read(tmp_path):
 
 
 def test_an_obj_file_needs_no_texture_coordinates_and_objects_can_be_left_out(tmp_path):
-    path = write_obj(tmp_path / "scan.obj", SQUARE, TWO, ["skin", "hair"])
+    path = write_obj(tmp_path / "scan.obj", SQUARE, TWO, ["skin", "nose"])
     assert len(read_scan(path).triangles) == 2
-    assert len(read_scan(path, ("HAIR",)).triangles) == 1
-    with pytest.raises(FitError, match=r"--without hat.*skin, hair"):
+    assert len(read_scan(path, ("NOSE",)).triangles) == 1
+    with pytest.raises(FitError, match=r"--without hat.*skin, nose"):
         read_scan(path, ("hat",))
 
 
@@ -85,3 +85,17 @@ def test_normals_that_are_no_numbers_are_passed_over_in_silence(tmp_path, caplog
         except FitError as error:
             assert "STL" in str(error)
     assert "Traceback" not in caplog.text and "normals" not in caplog.text
+
+
+def test_what_a_person_wears_and_what_grows_on_the_skin_is_no_scan_and_is_said(tmp_path):
+    names = ("body", "helper-hair", "joint-neck", "Wolf3D_Headwear", "Glasses", "Teeth", "Hair_cards", "EyeLeft")
+    at = np.vstack([SQUARE[:3] + np.array([0, 0, k]) for k in range(len(names))])
+    faces = np.arange(3 * len(names)).reshape(-1, 3)
+    scan = read_scan(write_obj(tmp_path / "a.obj", at, faces, names))
+    assert sorted(scan.vertices[scan.triangles][:, 0, 2]) == [0, 7]  # skin and eye
+    told = " ".join(scan.notes)
+    assert all(f"'{n}'" in told for n in names[1:-1]) and "hat left out: 'Wolf3D_Headwear'" in scan.notes
+    every = read_scan(write_obj(tmp_path / "b.obj", at[:3], faces[:1], ["Hat"]))
+    assert len(every.triangles) == 1 and not every.notes  # a name alone leaves nothing: it is not believed
+    named = read_scan(tmp_path / "a.obj", ("body",))
+    assert len(named.triangles) == 1

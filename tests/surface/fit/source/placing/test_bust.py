@@ -1,7 +1,8 @@
 """A head is cut from its body."""
 
 import numpy as np
-from traps import good_head, on_body, transformed
+import pytest
+from traps import _tube, good_head, joined, on_body, transformed
 
 from surface.fit.source.mesh import FitMesh, check_manifold, check_mesh, triangles
 from surface.fit.source.placing.bust import cut, cut_bust, outline
@@ -66,6 +67,21 @@ def test_a_body_is_left_out_and_the_head_stays_as_it_is():
     before = HEAD.vertices[HEAD.vertices[:, 1] > -80]
     assert kept.sum() == len(before) and np.abs(mesh.deltas).max() > 13
     assert outline(mesh.vertices, EYES_AT, 1.0).max() < 2.0  # a vertex near the outline may stay outside
+
+
+@pytest.mark.parametrize(("name", "top", "kept"), [
+    ("Wolf3D_Body", -75.0, True), ("Wolf3D_Body", -190.0, False), ("Dress", -75.0, False), ("Object7", -75.0, False),
+])  # fmt: skip
+def test_skin_that_reaches_up_to_the_neck_is_cut_like_the_head_and_not_left_out(name, top, kept):
+    neck = _tube((0, top + 36.1, -10), (0, -820, -10), 60, name)
+    legs = [_tube((s * 80, -760, -10), (s * 80, -1500, -10), 80, name) for s in (1, -1)]
+    whole = joined(HEAD, neck, *legs)
+    mesh, notes = cut_bust(whole, EYES_AT, 1.0)
+    own = [k for k, n in enumerate(mesh.pieces) if n == name]
+    at = mesh.vertices[np.unique(mesh.faces[np.isin(mesh.piece, own)])]
+    assert (len(at) > 0) == kept and (f"'{name}'" in notes[0]) == (not kept or len(own) > 1)
+    if kept:
+        assert at[:, 1].max() > top + 36.0 and at[:, 1].min() > -196
 
 
 def test_a_bust_is_no_body():
