@@ -24,6 +24,7 @@ SERVOS = [ServoSpec(1, "jaw", "xm430-w350", -1, 1, 1, 1), ServoSpec(2, "brow", "
 @pytest.fixture(autouse=True)
 def wide_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(console, "width", 250)
+    monkeypatch.setattr("drivers.port.latency.LATE_S", 0.5)  # the servos are simulated beside busy programs
 
 
 @pytest.fixture
@@ -35,7 +36,7 @@ def head(tmp_path: Path) -> Iterator[tuple[SimulatedBus, Path]]:
              "max_accel_deg_s2": 2000}
             for spec in SERVOS
         ]  # fmt: skip
-        buses = [{"name": "main", "kind": "dynamixel", "port": bus.path}]
+        buses = [{"name": "main", "kind": "dynamixel", "port": bus.path, "margin_s": 0.5}]
         path = tmp_path / "head.toml"
         path.write_text(tomli_w.dumps({"name": "head", "buses": buses, "channels": rows}), encoding="utf-8")
         yield bus, path
