@@ -24,6 +24,7 @@ SERVOS = [ServoSpec(1, "jaw", "xm430-w350", -1, 1, 1, 1), ServoSpec(2, "brow", "
 @pytest.fixture(autouse=True)
 def wide_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(console, "width", 250)
+    monkeypatch.setattr("controller.hardware.moving.STALE_S", 5.0)
     monkeypatch.setattr("drivers.port.latency.LATE_S", 0.5)  # the servos are simulated beside busy programs
 
 

@@ -73,6 +73,12 @@ class Head:
         return found
 
 
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A busy machine may stop the simulated servos for a while."""
+    monkeypatch.setattr(moving, "STALE_S", 5.0)
+
+
 @pytest.fixture
 def head(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Head]:
     monkeypatch.setattr("drivers.port.latency.LATE_S", 0.5)  # the servos are simulated beside busy programs
