@@ -25,6 +25,7 @@ SERVOS = [ServoSpec(1, "jaw", "xm430-w350", -1, 1, 1, 1), ServoSpec(2, "brow", "
 def wide_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(console, "width", 250)
     monkeypatch.setattr("controller.hardware.moving.STALE_S", 5.0)
+    monkeypatch.setattr("controller.hardware.preflight.SPEED_DEG_S", 40.0)
     monkeypatch.setattr("drivers.port.latency.LATE_S", 0.5)  # the servos are simulated beside busy programs
 
 
@@ -87,6 +88,7 @@ def test_a_preflight_with_a_fault_ends_with_one(head: tuple[SimulatedBus, Path],
     assert report.exists()
 
 
+@pytest.mark.slow
 def test_stops_are_shown_beside_the_file_with_limits_that_fit(head: tuple[SimulatedBus, Path]) -> None:
     bus, path = head
     bus.fault(f"stops:1:{2048 - 170}..{2048 + 200}")

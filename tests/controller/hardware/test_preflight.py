@@ -75,8 +75,9 @@ class Head:
 
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A busy machine may stop the simulated servos for a while."""
+    """A busy machine may stop the simulated servos for a while; the movements are quicker than those of real ones."""
     monkeypatch.setattr(moving, "STALE_S", 5.0)
+    monkeypatch.setattr("controller.hardware.preflight.SPEED_DEG_S", 40.0)
 
 
 @pytest.fixture
