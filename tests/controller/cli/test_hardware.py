@@ -82,7 +82,7 @@ def test_a_preflight_with_a_fault_ends_with_one(head: tuple[SimulatedBus, Path],
     report = tmp_path / "report.json"
     result = omote("preflight", str(path), "--yes", "-c", "jaw", "-o", str(report))
     assert result.exit_code != 0
-    assert "1 faults" in str(result.exception)
+    assert "head: 1 fault" in str(result.exception)
     assert "nobody has signed" in result.output
     bus.clear()
     assert report.exists()
