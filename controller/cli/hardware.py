@@ -51,7 +51,7 @@ def preflight(
         check_report_path(out)
     path, settings, channels = _robot(robot, channel)
     _ask_first(
-        f"{len(channels)} servos of {settings.name} move one after the other, {by:g} degrees to either side.", yes
+        f"{_count(len(channels), 'servo')} of {settings.name}, one after the other: {by:g} degrees to either side.", yes
     )
     found = run_preflight(
         settings,
@@ -83,7 +83,8 @@ def look_for_stops(
     """``omote calibrate --find-stops``; raises ControllerError where something does not fit."""
     from controller.hardware.stops import find_robot_stops, stops_table  # start-up: --help does without it
 
-    what = f"{_count(len(channels), 'servo')} of {robot.name} feel for their end stops with {100 * torque:.0f} % of their torque."
+    servos = f"{_count(len(channels), 'servo')} of {robot.name}"
+    what = f"{servos}, one after the other: looking for end stops with {100 * torque:.0f} % of the torque."
     _ask_first(what, yes)
     found = find_robot_stops(
         robot, channels, torque=torque, progress=lambda text: console.print(f"[dim]{text}[/]", soft_wrap=True)
