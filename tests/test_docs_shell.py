@@ -52,7 +52,7 @@ MORE = {
     "scan": ["--baud", "1000000"], "render": ["--size", "32x32"],
 }  # fmt: skip
 """Options that end a command soon; the last one counts where a line has the same."""
-PARSED = {"simulate", "calibrate", "fit", "landmarks", "bench", "webcam", "study"}
+PARSED = {"simulate", "calibrate", "preflight", "fit", "landmarks", "bench", "webcam", "study"}
 """Commands that serve until they are interrupted, wait for keys, or work for minutes: their options are parsed only."""
 MESSAGES = {"omote needs Python 3.11 or newer": MAKEFILE}
 """Messages that begin like a command, and the file that prints them."""
@@ -254,6 +254,7 @@ RULES: tuple[tuple[str, Callable[[str], object]], ...] = (
     ("python ", has_program),
     ("sudo apt-get install", lambda line: None),  # changes the system of whoever reads it
     ("sudo usermod", lambda line: None),  # the same
+    ("sudo setserial", lambda line: None),  # the same
     ("export NUMBA_CACHE_DIR=/", lambda line: None),  # a variable of numba
     ("fuser -v ", lambda line: None),  # a program of the system
 )

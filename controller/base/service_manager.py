@@ -29,6 +29,11 @@ class ServiceManager:
         self._period_s = int(given) / 1e6 / PINGS if given.isdigit() else 0.0
         self._clock, self._next_s, self._seen = clock, 0.0, -1
 
+    @property
+    def watches(self) -> bool:
+        """Whether a service manager waits for signs of life."""
+        return bool(self._address and self._period_s)
+
     def ready(self) -> None:
         """The servos are up."""
         self._send("READY=1")
@@ -39,7 +44,7 @@ class ServiceManager:
 
     def alive(self, sequence: int) -> None:
         """Ping where that is due, and only if ``sequence`` moved on since the last ping: work is still being done."""
-        if not self._address or not self._period_s or self._clock() < self._next_s or sequence == self._seen:
+        if not self.watches or self._clock() < self._next_s or sequence == self._seen:
             return
         self._next_s, self._seen = self._clock() + self._period_s, sequence
         self._send("WATCHDOG=1")

@@ -51,7 +51,7 @@ def preflight(
         check_report_path(out)
     path, settings, channels = _robot(robot, channel)
     _ask_first(
-        f"{len(channels)} servos of {settings.name} move one after the other, {by:g} degrees to either side.", yes
+        f"{_count(len(channels), 'servo')} of {settings.name}, one after the other: {by:g} degrees to either side.", yes
     )
     found = run_preflight(
         settings,
@@ -70,11 +70,10 @@ def preflight(
         write_preflight(found, out)
         console.print(f"wrote {out}" + ("" if found.signed_by else ", which nobody has signed"), soft_wrap=True)
     if not found.passed:
-        raise ControllerError(
-            f"{settings.name}: {len(found.faults)} faults"
-            + "".join(f"; {row.name} was not moved: {row.skipped}" for row in found.channels if row.skipped),
-            hint="mend them and run omote preflight again",
-        )
+        skipped = [row.name for row in found.channels if row.skipped]
+        parts = [_count(len(found.faults), "fault")] if found.faults else []
+        parts += [f"not moved: {', '.join(skipped)}"] if skipped else []
+        raise ControllerError(f"{settings.name}: {'; '.join(parts)}", hint="mend that and run omote preflight again")
     console.print(f"{settings.name} is as its file says.")
 
 
@@ -84,7 +83,8 @@ def look_for_stops(
     """``omote calibrate --find-stops``; raises ControllerError where something does not fit."""
     from controller.hardware.stops import find_robot_stops, stops_table  # start-up: --help does without it
 
-    what = f"{len(channels)} servos of {robot.name} feel for their end stops with {100 * torque:.0f} % of their torque."
+    servos = f"{_count(len(channels), 'servo')} of {robot.name}"
+    what = f"{servos}, one after the other: looking for end stops with {100 * torque:.0f} % of the torque."
     _ask_first(what, yes)
     found = find_robot_stops(
         robot, channels, torque=torque, progress=lambda text: console.print(f"[dim]{text}[/]", soft_wrap=True)
@@ -146,6 +146,10 @@ def _ask_first(what: str, yes: bool) -> None:
     console.print(f"{what} Keep hands away, and a hand at the power switch.", soft_wrap=True)
     if not typer.confirm("Go on?"):
         raise ControllerError("nothing was moved")
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}" + ("" if number == 1 else "s")
 
 
 def _is_asked() -> bool:

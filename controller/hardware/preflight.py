@@ -38,6 +38,8 @@ LIMIT_SLACK_DEG = 0.5
 RANGE = 0.75
 """Least share of a small way that a servo must go."""
 LAG_S = 0.25
+TRIES = 3
+"""How often a servo is asked before it counts as silent: one answer may be lost."""
 ANSWERS = 8
 """Servos are asked at least so often to judge their delays."""
 
@@ -134,7 +136,7 @@ class _ChannelCheck:
 
     def _look(self, bus: Bus, spec: ServoSpec) -> bool:
         """Compare what the servo says of itself; whether it is known well enough to be moved."""
-        found = {info.id: info for info in bus.discover([spec.id])}.get(spec.id)
+        found = next((info for _ in range(TRIES) for info in bus.discover([spec.id])), None)
         if found is None:
             self._fault("does not answer")
             return False

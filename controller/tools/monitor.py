@@ -25,9 +25,8 @@ from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
 from drivers.core.trafficlog import Wire
 from drivers.port.serialport import SerialPort, tapped
-from drivers.tables.tables import ControlTable, load_table
+from drivers.tables.tables import FEETECH, ControlTable, load_table
 
-FEETECH = ("sts", "scs")
 SHOWN = ("Present Position", "Goal Position")
 WAIT_S = 0.1
 Rows = Callable[[], Iterable[Mapping[str, Any]]]

@@ -184,7 +184,8 @@ class StageRun:
         self._manager.ready()
 
         def goes_on() -> bool:
-            self._manager.alive(body.mailbox.sequence)
+            if self._manager.watches:
+                self._manager.alive(body.mailbox.sequence)
             return not flag.is_set() and in_time() and body.alive()
 
         return goes_on

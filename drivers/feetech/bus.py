@@ -7,7 +7,7 @@ from typing import Any
 
 from drivers.base.bus import ServoSpec
 from drivers.protocol1.bus import Protocol1Bus
-from drivers.tables.tables import check_feetech
+from drivers.tables.models import check_feetech
 
 
 class FeetechBus(Protocol1Bus):

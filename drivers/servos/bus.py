@@ -21,7 +21,8 @@ from drivers.servos.port import Port
 from drivers.servos.registers import Registers
 from drivers.servos.startup import Policy, Started, Startup
 from drivers.servos.telemetry import Telemetry
-from drivers.tables.tables import ControlTable, check_driven, load_table
+from drivers.tables.models import check_driven
+from drivers.tables.tables import ControlTable, load_table
 
 log = logging.getLogger(__name__)
 

@@ -263,37 +263,6 @@ def _some_models(numbers: dict[str, int], name: str) -> str:
     return "use one of " + ", ".join(sorted(near))
 
 
-def check_dynamixel(model: str) -> None:
-    """Check that a name is a Dynamixel of either protocol that omote drives; raises DriverError for any other."""
-    table = load_table(model)
-    check_driven(table)
-    if table.model.startswith(FEETECH):
-        raise DriverError(
-            f"servo model {model!r} is no Dynamixel",
-            hint='set the kind of its bus to the family it is of, as "feetech"; omote plugins lists them',
-        )
-
-
-def check_driven(table: ControlTable) -> None:
-    """Raises DriverError for a model whose registers are known, but which omote does not drive."""
-    if not table.driven:
-        hint = "omote scan and omote monitor --listen know its registers; docs/drivers.md says what it lacks"
-        raise DriverError(f"{table.model} is not driven by omote yet", hint=hint)
-
-
-def check_feetech(model: str) -> None:
-    """Check that a name is a Feetech model; raises DriverError for any other."""
-    known = known_models()
-    try:
-        name = known[model_number(model)]
-    except DriverError:
-        name = ""
-    if not name.startswith(FEETECH):
-        hint = f"use one of {', '.join(sorted(name for name in known.values() if name.startswith(FEETECH)))}"
-        raise DriverError(f"servo model {model!r} is no Feetech known here", hint=hint)
-    check_driven(load_table(name))
-
-
 def load_table(model: str | int, firmware: int | None = None) -> ControlTable:
     """Control table of a model (name or number), for a firmware version (None: a current one).
 

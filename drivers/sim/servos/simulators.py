@@ -13,7 +13,7 @@ from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.wire.line import Line
 from drivers.sim.wire.simulator import Servos, Setting, Simulator
-from drivers.tables.tables import check_dynamixel, check_feetech
+from drivers.tables.models import check_dynamixel, check_feetech
 
 
 def ids_and_models(servos: Iterable[Any], model: str | int) -> list[tuple[int, str | int]]:

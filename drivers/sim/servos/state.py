@@ -16,7 +16,8 @@ from drivers.sim.servos.drive_word import FeetechDrive, WordDrive
 from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM, XDrive
 from drivers.sim.servos.plant import NO_STOPS, Plant, Skin
 from drivers.sim.servos.registers import Change, Registers
-from drivers.tables.tables import check_driven, load_table
+from drivers.tables.models import check_driven
+from drivers.tables.tables import load_table
 
 TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""

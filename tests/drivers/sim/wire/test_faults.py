@@ -48,6 +48,8 @@ def test_specs(spec: str, expected: dict):
         ("mute:7:8", "'8' is one word too many"),
         ("late:7:soon", "'soon' is not a value for late"),
         ("volts:7", "volts needs a value"),
+        ("stops:7", "stops needs a value"),
+        ("stops:7:900..800", "'900..800' is not a value for stops"),
         ("crc:7:evry=3", "there is no option 'evry'"),
         ("crc:7:every=x", "'x' is not a value for every"),
         ("crc:7:every=0", "out of range"),
