@@ -21,7 +21,7 @@ import pytest
 from controller.base.parameters import PARAMETERS, Parameters
 from controller.robot.channels import build_table
 from controller.robot.linkages.rods import Rods
-from controller.robot.pairs import fit_servo
+from controller.robot.pairs.fit import fit_servo
 from controller.robot.settings import ChannelSettings
 
 _US_PER_DEG = 10.0

@@ -15,7 +15,7 @@ from controller.base.errors import ConfigError
 from controller.base.files import replacing
 from controller.base.parameters import Floats, Parameters
 from controller.base.plain_numbers import plain_number
-from controller.robot.pairs import LEAST_PAIRS, FittedServo, FittedTerm, fit_servo
+from controller.robot.pairs.fit import LEAST_PAIRS, FittedServo, FittedTerm, fit_servo
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings, RobotSettings
 from surface.base.files import read_text, reading
