@@ -37,6 +37,7 @@ SINGLE = {
     "controller.layers.commands": ("CommandSink",),
     "controller.links.kind": ("API", "LinkContext", "Link", "LinkKind"),
     "controller.links.net.kinds": ("link_of",),
+    "controller.robot.linkages.kind": ("API", "LinkageKind", "LinkageSettings"),
     "controller.takes.livelink": ("Take",),
     "controller.testing.head": ("RobotHead",),
     "controller.testing.host": ("ScriptedHost",),

@@ -12,6 +12,7 @@ import pytest
 import drivers
 from controller.links.kind import LINKS
 from controller.robot.buses import BusSettings, families_by_option
+from controller.robot.linkages.kind import LINKAGES, LinkageSettings
 from controller.takes.reader import TAKES, suffixes
 from drivers.base.options import entries
 from drivers.base.plugins import Registry
@@ -130,3 +131,12 @@ def test_every_kind_of_take_is_listed_with_its_layer(page: Page) -> None:
 def test_every_kind_of_exported_file_is_listed(page: Page) -> None:
     section = page("docs/heads.md").partition("## For other programs\n")[2].partition("\n## ")[0]
     assert sorted(re.findall(r"`omote export head(\.\w+)`", section)) == sorted(SUFFIXES)
+
+
+def test_the_table_of_linkages_has_every_kind_and_its_keys(page: Page) -> None:
+    table = list(rows(page("docs/robots.md"), "kind | what it is | keys"))
+    assert sorted(words(row[0])[0] for row in table) == sorted(own(LINKAGES))
+    for row in table:
+        settings = LINKAGES.get(words(row[0])[0]).settings
+        keys = set(settings.model_fields) - set(LinkageSettings.model_fields)
+        assert keys <= set(words(row[2])) or row[2].startswith("the same"), row[0]

@@ -113,7 +113,7 @@ def test_the_examples_are_short(page: str) -> None:
         folder = name.partition("/")[0]
         lines[folder] = lines.get(folder, 0) + sum(bool(line.strip()) for line in text.splitlines())
     folders = {folder for folder in lines if folder != "pyproject.toml"}
-    assert folders == {"omote_puppet8", "omote_jsonudp", "omote_pairs", "omote_track", "omote_xyz"}
+    assert folders == {"omote_puppet8", "omote_jsonudp", "omote_lever", "omote_pairs", "omote_track", "omote_xyz"}
     assert all(count < MOST_LINES for count in lines.values()), lines
 
 
@@ -133,7 +133,7 @@ def test_the_driver_passes_what_every_driver_must_pass(page: str, site: Path, ro
 @pytest.mark.slow
 def test_every_list_has_them(omote: Omote) -> None:
     plugins, simulators, simulator = omote("plugins", "simulate --help", "simulate puppet8 --help")
-    for word in ("puppet8", "Puppet8 boards", "jsonudp", "pairs", "track", "xyz", "omote-example 0.1.0"):
+    for word in ("puppet8", "Puppet8 boards", "jsonudp", "lever", "pairs", "track", "xyz", "omote-example 0.1.0"):
         assert word in plugins.stdout
     assert "puppet8" in simulators.stdout
     assert "57600" in simulator.stdout and "Example: omote simulate puppet8" in simulator.stdout
@@ -187,6 +187,37 @@ def test_a_stage_runs_with_both(site: Path, root: Path, tmp_path: Path) -> None:
     assert link["accepted"] > 0 and link["refused"]["JSONDecodeError"] > 0
     (bus,) = report["buses"]
     assert bus["bus"]["writes"] > 0 and bus["bus"]["errors"] == {}
+
+
+@pytest.mark.slow
+def test_a_linkage_is_checked_and_moves_its_servo(omote: Omote, tmp_path: Path) -> None:
+    text = """
+name = "lever"
+buses = [{ name = "b", kind = "simulated" }]
+[[linkages]]
+name = "jaw"
+kind = "lever"
+channels = ["jaw"]
+inputs.way = { jawOpen = 10 }
+horn_mm = 20
+[[channels]]
+name = "jaw"
+bus = "b"
+id = 1
+model = "xl330-m288"
+map = { at = [-90, 90], deg = [-90, 90] }
+limit_deg = [-90, 90]
+max_speed_deg_s = 300
+max_accel_deg_s2 = 3000
+"""
+    (tmp_path / "lever.toml").write_text(text)
+    (tmp_path / "wrong.toml").write_text(text.replace("inputs.way", "inputs.wey"))
+    (tmp_path / "stage.toml").write_text('name = "s"\nrobots = ["lever.toml"]\n')
+    (tmp_path / "open.csv").write_text("time,jawOpen\n0,1\n1,1\n")
+    good, wrong, played = omote("check lever.toml", "check wrong.toml", "play open.csv --stage stage.toml --dry-run")
+    assert good.returncode == 0, good.stderr
+    assert "a lever has one channel, the input way (mm)" in wrong.stderr
+    assert "30.0" in played.stdout  # asin of 10 mm in 20
 
 
 @pytest.mark.slow

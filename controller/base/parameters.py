@@ -48,7 +48,7 @@ class Parameters:
     full_scale_rad : angle (rad) of the value 1; NaN where the parameter is not an angle.
     max_speed : largest speed (units/s). max_acceleration : largest acceleration (units/s^2).
     max_jerk : largest jerk (units/s^3); infinity for none. response_s : time constant (s) of the approach to a target.
-    rest : value of the neutral face; 0 for all of the base vocabulary.
+    rest : value of the neutral face; 0 without, as for all of the base vocabulary.
     aliases : other spellings, folded, to canonical names.
     base : how many of them, the first, are of the base vocabulary; those after them are somebody's own.
     descriptions : what people are told of some, by name. own_regions : regions that own vocabularies add.
@@ -64,19 +64,24 @@ class Parameters:
     max_acceleration: Floats
     max_jerk: Floats
     response_s: Floats
-    rest: Floats
     aliases: dict[str, str] = field(default_factory=dict)
-    base: int = 0
+    rest: Floats = field(default_factory=lambda: np.zeros(0))
+    base: int = -1
     descriptions: dict[str, str] = field(default_factory=dict)
     own_regions: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not len(self.rest):
+            object.__setattr__(self, "rest", np.zeros(len(self.names)))
+        if self.base < 0:
+            object.__setattr__(self, "base", len(self.names))
 
     @classmethod
     def load(cls, path: Path | None = None) -> Parameters:
         """Read a base vocabulary; the shipped one without ``path``. Raises ConfigError with every fault."""
         path = path or config_dir() / "vocabularies" / "arkit.toml"
-        found = _build(load(path, _File, lambda file: [*_unknown_regions(file), *_unknown_aliases(file)]))
-        return replace(found, base=len(found.names))
+        return _build(load(path, _File, lambda file: [*_unknown_regions(file), *_unknown_aliases(file)]))
 
     def with_files(self, paths: Iterable[Path]) -> Parameters:
         """These, and behind them the parameters of their own that vocabularies add.

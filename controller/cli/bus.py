@@ -209,8 +209,8 @@ def _fit_pairs(path: Path, pairs: Path, target: Path) -> None:
     """Fit the channels of the robot in ``path`` to pairs, write them to ``target`` and say how well they fit."""
     # start-up: --help does without any of these
     from controller.base.parameters import PARAMETERS
+    from controller.robot.pairs.files import fit_channels, read_pairs, report_rows, write_robot
     from controller.robot.robot import load_robot, robot_parameters
-    from controller.tools.pairs import fit_channels, read_pairs, report_rows, write_robot
 
     robot = load_robot(path, PARAMETERS)
     parameters = robot_parameters(robot, path, PARAMETERS)

@@ -132,12 +132,12 @@ def servo_field(anchors: Sequence[AnchorSettings], at: SkinSamples, points: Skin
             continue
         for side in (1.0, -1.0) if anchor.both else (1.0,):
             mirror = np.array([side, 1.0, 1.0])
-            share = _falloff(points, at.rest[j] * mirror, at.jaw[j], anchor.reach_mm)
+            share = falloff(points, at.rest[j] * mirror, at.jaw[j], anchor.reach_mm)
             field[:, :, j] += share[:, None] * direction * mirror
     return field.reshape(-1, len(anchors))
 
 
-def _falloff(points: SkinSamples, centre: Floats, jaw: float, reach_mm: float) -> Floats:
+def falloff(points: SkinSamples, centre: Floats, jaw: float, reach_mm: float) -> Floats:
     """(m,) share of a pull, 1 at the anchor; skin on the other jaw does not move along."""
     squared = ((points.rest - centre) ** 2).sum(axis=1) / reach_mm**2
     share: Floats = np.clip(1.0 - squared, 0.0, None) ** 2 * (1.0 - np.abs(points.jaw - jaw)).clip(0.0, 1.0)
@@ -158,7 +158,7 @@ class PullRows:
     @classmethod
     def near(cls, anchors: Sequence[AnchorSettings], at: SkinSamples, points: SkinSamples, reach_mm: float) -> PullRows:
         """Points within ``reach_mm`` of each anchor, on its side of the mouth."""
-        near = [_falloff(points, at.rest[j], at.jaw[j], reach_mm) > 0.0 for j in range(len(anchors))]
+        near = [falloff(points, at.rest[j], at.jaw[j], reach_mm) > 0.0 for j in range(len(anchors))]
         anchor, point = np.nonzero(near)
         return cls(point, anchor, np.array([each.unit_direction for each in anchors])[anchor])
 

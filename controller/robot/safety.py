@@ -10,16 +10,16 @@ differences.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from controller.base.parameters import Flags, Floats, Indices, Parameters
+from controller.base.parameters import Flags, Floats, Parameters
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.filters import SlowStart, TargetFilter
 from controller.robot.linkages.kind import LinkageSettings
 from controller.robot.linkages.linked import LinkedChannels
+from controller.robot.rules import AllowedRange, HeatRules, RuleCounter, RuleInput
 from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
 
@@ -27,60 +27,6 @@ if TYPE_CHECKING:
     from controller.robot.anchors import AnchorSolver  # start-up: loads the head
 
 _NEAR_RAD = 1e-3
-
-
-@dataclass
-class RuleInput:
-    """Inputs of the rules in one cycle, the last of ``dt`` s.
-
-    target, position, rest : (n,) rad: the targets, the last goals, and where the servos would come to rest if they
-    braked from the next step on. state : the newest measurement.
-    """
-
-    target: Floats
-    position: Floats
-    rest: Floats
-    state: BusState | None
-    dt: float
-
-
-@dataclass
-class AllowedRange:
-    """Positions that each servo may be sent, low and high (n,) rad; ``narrow`` only makes the range smaller."""
-
-    low: Floats
-    high: Floats
-
-    def narrow(self, at: Indices, sign: Floats, bound: Floats, where: Flags) -> None:
-        """Bound servos ``at`` : (k,) from above by ``bound`` : (k,) where ``sign`` : (k,) is +1, else from below."""
-        if not where.any():
-            return
-        up, down = where & (sign > 0), where & (sign < 0)
-        np.minimum.at(self.high, at[up], bound[up])
-        np.maximum.at(self.low, at[down], bound[down])
-
-
-class RuleCounter:
-    """How many times each of k rules began to act, and for how many seconds it acted."""
-
-    def __init__(self, labels: list[str]) -> None:
-        self.labels = labels
-        self._times, self._seconds = np.zeros(len(labels), np.int64), np.zeros(len(labels))
-        self._acting = np.zeros(len(labels), bool)
-
-    def count(self, acting: Flags, dt: float) -> None:
-        """Count one cycle of the rules that act now."""
-        self._times += acting & ~self._acting
-        self._seconds += acting * dt
-        self._acting = acting
-
-    def report(self) -> list[dict[str, object]]:
-        """The rules that acted, with their counts."""
-        return [
-            {"rule": label, "times": int(times), "seconds": round(float(seconds), 3)}
-            for label, times, seconds in zip(self.labels, self._times, self._seconds, strict=True)
-            if times
-        ]
 
 
 class _Thresholds:
@@ -240,8 +186,6 @@ class Guard:
     """Dead band, slack and all safety rules for the channels of one bus."""
 
     def __init__(self, rules: RuleSettings, table: ChannelTable) -> None:
-        from controller.robot.heat import HeatRules  # it uses the classes above
-
         neutral = table.neutral_rad
         rules = rules.within(table.names)
         self._heat = HeatRules(rules.heat, table, neutral) if rules.heat else None

@@ -14,7 +14,8 @@ API = 1
 """Version of the interface: this module, ``drivers.core.wirebus`` and ``drivers.sim.wire.simulator``."""
 
 RESERVED = (
-    "name", "kind", "port", "baud", "rate_hz", "simulates", "transport", "faults", "wire", "latency_s", "seed",
+    "name", "kind", "port", "baud", "rate_hz", "let_go_s", "let_go_below_a", "simulates", "transport", "faults", "wire",
+    "latency_s", "seed",
 )  # fmt: skip
 """Keys of every bus in a robot file, which no family's settings may use."""
 

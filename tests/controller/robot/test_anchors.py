@@ -27,6 +27,7 @@ from controller.robot.channels import build_table
 from controller.robot.following import Mirror
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
+from controller.robot.suggest import suggest
 from controller.tools.check import check_anything
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
@@ -182,7 +183,64 @@ def test_what_a_head_cannot_show_is_told_by_region(solved: AnchorSolver) -> None
     found = {region: (wanted, left) for region, wanted, left in
              residual_rows(solved, {"happiness": vocabulary["happiness"].weights}, P)}  # fmt: skip
     assert found["mouth"][1] < 0.6 * found["mouth"][0]
-    assert any("mouth: emotions move it" in line for line in check_anything("head24-anchors"))
+    told = check_anything("head24-anchors")
+    assert any("mouth: emotions move it" in line for line in told)
+    assert sum("a further servo would help most in the region" in line for line in told) == 2
+
+
+def emotions() -> dict[str, np.ndarray]:
+    vocabulary = Vocabulary.load(P)
+    return {n: vocabulary[n].weights for n in vocabulary.names if vocabulary[n].kind == "emotion"}
+
+
+def test_no_other_place_or_direction_would_help_more(solved: AnchorSolver) -> None:
+    """Against every sampled point in many directions, tried one by one."""
+    best = next(suggest(solved, emotions(), P))
+    left = np.array([solved.left_over(solved.shape_values(face)) for face in emotions().values()])
+    rng = np.random.default_rng(1)
+    tried = []
+    for j in rng.choice(len(solved.skin.rest), 120, replace=False):
+        away = np.linalg.norm(solved.skin.rest - solved.skin.rest[j], axis=1)
+        share = np.clip(1 - (away / 15.0) ** 2, 0, None) ** 2 * (1 - np.abs(solved.skin.jaw - solved.skin.jaw[j]))
+        for direction in rng.normal(size=(12, 3)):
+            field = (share[:, None] * direction / np.linalg.norm(direction)).ravel()
+            after = [each.ravel() - field * (each.ravel() @ field) / (field @ field) for each in left]
+            tried.append(np.sqrt((np.array(after) ** 2).sum(axis=1).mean() / len(share)))
+    assert best.skin_after_mm <= min(tried) + 1e-9
+    assert best.skin_before_mm == pytest.approx(np.sqrt((left**2).sum(axis=2).mean()))
+
+
+@pytest.mark.slow
+def test_the_suggested_servo_leaves_no_more_than_was_said(
+    tmp_path: Path, head: Head, solved: AnchorSolver, root: Path
+) -> None:
+    """Written into the robot's file and solved together with the others, within its travel."""
+    best = next(suggest(solved, emotions(), P))
+    pull = best.pull_mm + 0.1
+    channel = f"""
+[[channels]]
+name = "further"
+bus = "{solved_bus(root)}"
+id = 200
+model = "xl330-m288"
+anchor = {{ point = {best.point.tolist()}, direction = {best.direction.tolist()} }}
+map = {{ at = [{-pull}, {pull}], deg = [-40, 40] }}
+limit_deg = [-45, 45]
+max_speed_deg_s = 300
+max_accel_deg_s2 = 3000
+"""
+    text = (root / "configs/robots/head24-anchors.toml").read_text(encoding="utf-8")
+    (tmp_path / "robot.toml").write_text(text + channel)
+    more = load_anchors(load_robot(tmp_path / "robot.toml", P), head, P)
+    assert more is not None
+    left = np.array([more.left_over(more.shape_values(face)) for face in emotions().values()])
+    near = np.linalg.norm(more.skin.rest - best.point, axis=1) < 15.0
+    assert np.sqrt((left[:, near] ** 2).sum(axis=2).mean()) < 0.5 * (best.before_mm + best.after_mm)
+
+
+def solved_bus(root: Path) -> str:
+    """Of the last channel of the shipped example."""
+    return load_robot(root / "configs/robots/head24-anchors.toml", P).channels[-1].bus
 
 
 def test_both_pulls_on_either_side(tmp_path: Path, head: Head) -> None:

@@ -11,7 +11,8 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.robot import load_robot
-from controller.robot.safety import AllowedRange, DeadBandAndSlack, Guard, RuleCounter
+from controller.robot.rules import AllowedRange, RuleCounter
+from controller.robot.safety import DeadBandAndSlack, Guard
 from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
 

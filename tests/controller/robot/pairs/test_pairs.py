@@ -13,9 +13,9 @@ from controller.base.config import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.cli.app import make_app
 from controller.robot.channels import build_table
-from controller.robot.pairs import fit_servo
+from controller.robot.pairs.files import fit_channels, read_pairs, write_robot
+from controller.robot.pairs.fit import fit_servo
 from controller.robot.robot import load_robot
-from controller.tools.pairs import fit_channels, read_pairs, write_robot
 
 JAW, SMILE, FROWN, BLINK = (P.index(n) for n in ("jawOpen", "mouthSmileLeft", "mouthFrownLeft", "eyeBlinkLeft"))
 ROBOT = """

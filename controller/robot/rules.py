@@ -1,17 +1,72 @@
-"""Limits that follow the temperature: a warm servo moves less far and less fast, long before it switches itself off."""
+"""What safety rules have in common, and the rule of temperature: a warm servo moves less far and less fast."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from controller.base.parameters import Floats
+from controller.base.parameters import Flags, Floats, Indices
 from controller.robot.channels import ChannelTable
-from controller.robot.safety import AllowedRange, RuleCounter, RuleInput
 from controller.robot.settings import HeatRule
+from drivers.base.bus import BusState
 
 _SETTLE_S = 2.0  # in which a reading, which comes in whole degrees, takes effect
+
+
+@dataclass
+class RuleInput:
+    """Inputs of the rules in one cycle, the last of ``dt`` s.
+
+    target, position, rest : (n,) rad: the targets, the last goals, and where the servos would come to rest if they
+    braked from the next step on. state : the newest measurement.
+    """
+
+    target: Floats
+    position: Floats
+    rest: Floats
+    state: BusState | None
+    dt: float
+
+
+@dataclass
+class AllowedRange:
+    """Positions that each servo may be sent, low and high (n,) rad; ``narrow`` only makes the range smaller."""
+
+    low: Floats
+    high: Floats
+
+    def narrow(self, at: Indices, sign: Floats, bound: Floats, where: Flags) -> None:
+        """Bound servos ``at`` : (k,) from above by ``bound`` : (k,) where ``sign`` : (k,) is +1, else from below."""
+        if not where.any():
+            return
+        up, down = where & (sign > 0), where & (sign < 0)
+        np.minimum.at(self.high, at[up], bound[up])
+        np.maximum.at(self.low, at[down], bound[down])
+
+
+class RuleCounter:
+    """How many times each of k rules began to act, and for how many seconds it acted."""
+
+    def __init__(self, labels: list[str]) -> None:
+        self.labels = labels
+        self._times, self._seconds = np.zeros(len(labels), np.int64), np.zeros(len(labels))
+        self._acting = np.zeros(len(labels), bool)
+
+    def count(self, acting: Flags, dt: float) -> None:
+        """Count one cycle of the rules that act now."""
+        self._times += acting & ~self._acting
+        self._seconds += acting * dt
+        self._acting = acting
+
+    def report(self) -> list[dict[str, object]]:
+        """The rules that acted, with their counts."""
+        return [
+            {"rule": label, "times": int(times), "seconds": round(float(seconds), 3)}
+            for label, times, seconds in zip(self.labels, self._times, self._seconds, strict=True)
+            if times
+        ]
 
 
 class HeatRules:

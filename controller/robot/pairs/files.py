@@ -15,10 +15,10 @@ from controller.base.errors import ConfigError
 from controller.base.files import replacing
 from controller.base.parameters import Floats, Parameters
 from controller.base.plain_numbers import plain_number
-from controller.robot.pairs import LEAST_PAIRS, FittedServo, FittedTerm, fit_servo
+from controller.robot.pairs.fit import LEAST_PAIRS, FittedServo, FittedTerm, fit_servo
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings, RobotSettings
-from surface.base.files import read_text, reading
+from surface.base.files import read_file, read_text, reading
 
 PREFIX = "servos:"
 """What the name of a column of angles begins with; the channel's name follows."""
@@ -117,7 +117,7 @@ def write_robot(path: Path, target: Path, fitted: list[FittedChannel], parameter
         check.unlink(missing_ok=True)
     if kept is not None:
         with replacing(kept) as temporary:
-            temporary.write_bytes(target.read_bytes())
+            temporary.write_bytes(read_file(target, _MOST_BYTES))
     with replacing(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
     return kept

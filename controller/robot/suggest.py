@@ -1,0 +1,103 @@
+"""Where a further servo would help a robot most: the place and direction on the skin that take up most of what is left.
+
+What a servo adds to the skin is its direction times the share that falls off around its point, as for anchors
+(:func:`controller.robot.anchors.servo_field`). Let the servos that there are leave displacements L over some faces: the
+best pull a servo adds to one face is the least-squares one, and of all directions at a point the best is the first
+eigenvector of sum v v^T over the faces, with v the sum of L weighed by the shares. Every sampled point is tried.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.base.parameters import Floats, Parameters
+from controller.robot.anchors import AnchorSolver, falloff
+from surface.head.model.parameters import SHAPES
+
+REACH_MM = 15.0
+"""Reach of the servos that are tried, that of an anchor which names none."""
+_LEAST_MM = 0.05  # by which the skin it reaches must come closer
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A further servo.
+
+    point : (3,) mm. direction : (3,) of length 1. pull_mm : most it has to pull, either way. region : of the face.
+    before_mm, after_mm : what is left of the motion of the skin within its reach, rms over the faces.
+    skin_before_mm, skin_after_mm : the same of the whole skin.
+    """
+
+    point: Floats
+    direction: Floats
+    pull_mm: float
+    region: str
+    before_mm: float
+    after_mm: float
+    skin_before_mm: float
+    skin_after_mm: float
+
+
+def suggest(
+    solver: AnchorSolver, faces: Mapping[str, Floats], parameters: Parameters, count: int = 2
+) -> Iterator[Suggestion]:
+    """Further servos, the best first, each beside those before it, for faces (p,); none that would hardly help."""
+    left = np.array([solver.left_over(solver.shape_values(face)) for face in faces.values()])  # (f, m, 3)
+    shares = np.array(
+        [falloff(solver.skin, at, jaw, REACH_MM) for at, jaw in zip(solver.skin.rest, solver.skin.jaw, strict=True)]
+    )  # fmt: skip  (m, m)
+    regions = _regions(solver, parameters)
+    for _ in range(count):
+        j, direction = _best(shares, left)
+        pulls = _pulls(shares[j], direction, left)
+        after = left - pulls[:, None, None] * shares[j][None, :, None] * direction
+        near = shares[j] > 0.0
+        found = Suggestion(
+            solver.skin.rest[j], direction, float(np.abs(pulls).max()), regions[j],
+            _rms(left[:, near]), _rms(after[:, near]), _rms(left), _rms(after),
+        )  # fmt: skip
+        if found.before_mm - found.after_mm < _LEAST_MM:
+            return
+        yield found
+        left = after
+
+
+def _best(shares: Floats, left: Floats) -> tuple[int, Floats]:
+    """The point and the direction that take up most: the largest eigenvalue over the squares of the shares."""
+    weighed = np.einsum("jm,fmc->jfc", shares, left)
+    matrices = np.einsum("jfc,jfd->jcd", weighed, weighed)
+    values, vectors = np.linalg.eigh(matrices)
+    gain = values[:, -1] / np.maximum((shares**2).sum(axis=1), 1e-9)
+    j = int(np.argmax(gain))
+    direction: Floats = vectors[j, :, -1]
+    return j, direction * (1.0 if (weighed[j] @ direction).sum() >= 0.0 else -1.0)
+
+
+def _pulls(share: Floats, direction: Floats, left: Floats) -> Floats:
+    """(f,) mm: the pull that takes up most of what is left of each face."""
+    pulls: Floats = np.einsum("m,fmc,c->f", share, left, direction) / max(float((share**2).sum()), 1e-9)
+    return pulls
+
+
+def _rms(moves: Floats) -> float:
+    return float(np.sqrt((moves**2).sum(axis=-1).mean()))
+
+
+def _regions(solver: AnchorSolver, parameters: Parameters) -> list[str]:
+    """The region of each point: of the shape that moves it most."""
+    most = np.linalg.norm(solver.skin.moves.sum(axis=3), axis=1).argmax(axis=1)
+    return [parameters.regions[parameters.index(SHAPES[s])] for s in most]
+
+
+def described(found: Suggestion) -> str:
+    """A suggestion in one line, with the keys of an anchor."""
+    point, direction = ([round(float(x), digits) for x in each] for each, digits in
+                        ((found.point, 1), (found.direction, 2)))  # fmt: skip
+    return (
+        f"a further servo would help most in the region {found.region}, at point = {point}, direction = {direction}, "
+        f"up to {found.pull_mm:.1f} mm: there {found.before_mm:.1f} mm left would become {found.after_mm:.1f}, of the "
+        f"whole skin {found.skin_before_mm:.2f} -> {found.skin_after_mm:.2f} mm (rms)"
+    )
