@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+from controller.base.parameters import PARAMETERS
 from controller.body.body import Body
 from controller.stage.stage import Stage
 
@@ -22,7 +23,6 @@ def open_node(stage: Stage, bodies: Sequence[Body]) -> Node | None:
     settings = stage.settings.zenoh
     if settings is None:
         return None
-    from controller.base.parameters import PARAMETERS
     from controller.fleet.node import Node  # optional: most stages need no network
 
     heads = {head_key(body.state.name or stage.settings.name): body for body in bodies}

@@ -1,4 +1,4 @@
-"""controller.stage.zenoh: which part of a stage each role runs."""
+"""controller.stage.roles and controller.stage.zenoh: which part of a stage each role runs."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
+from controller.stage.roles import for_role
 from controller.stage.stage import Stage, heads_of, load_stage
-from controller.stage.zenoh import for_role
 
 TEXT = """
 name = "split"
