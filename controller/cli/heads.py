@@ -369,8 +369,10 @@ def export(
         added = added_exporters()
         kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
         with EXPORTERS.blaming(kind):
-            write = partial(export_head, extra=added, frame=frame, animation=_animation(take, rate_hz), web=web)
-            written = write(loaded, out, pose) if robot is None else _with_limits(robot, loaded, out, pose)
+            if robot is None:
+                written = export_head(loaded, out, pose, added, frame, _animation(take, rate_hz), web)
+            else:
+                written = _with_limits(robot, loaded, out, pose)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
 
