@@ -82,8 +82,10 @@ def conduct(pipe: Connection, endpoint: str, names: list[str], hz: float) -> Non
             spent["layers"] += second - first
             spent["publish"] += time.thread_time() - second
     pipe.recv()
-    report = {"published": node.published, "skipped": clock.skipped, "seconds": time.monotonic() - began_s,
-              "processor_s": time.process_time() - begin, **spent}  # fmt: skip
+    report = {
+        "ticks": clock.ticks * len(states), "published": node.published, "skipped": clock.skipped,
+        "seconds": time.monotonic() - began_s, "processor_s": time.process_time() - begin, **spent,
+    }  # fmt: skip
     node.close()
     pipe.send(report)
 
@@ -102,7 +104,8 @@ def follow(pipe: Connection, endpoint: str, names: list[str], hz: float) -> None
     while order != "end":
         for now in clock.run(lambda: not pipe.poll()):
             for name, state in states.items():
-                node.relay(name, now, clock.step_s, values, state.tick(now, clock.step_s, values))
+                stamp = 0 if node.rests(name) else state.tick(now, clock.step_s, values)
+                node.relay(name, now, clock.step_s, values, stamp)
         order = pipe.recv()
         if order == "begin":
             begin = time.process_time()
@@ -190,8 +193,8 @@ def summary(
         "delivered %": 100.0 * count / wanted,
         "age p50, p99, max (ms)": np.percentile(ages, [50, 99, 100]).round(2).tolist(),
         "processor of a head's process, us a face": 1e6 * sum(r["processor_s"] for r in reports) / count,
-        "conductor: layers, us a face": 1e6 * standby["layers"] / max(standby["published"], 1),
-        "conductor: publishing, us a face": 1e6 * standby["publish"] / max(standby["published"], 1),
+        "conductor: layers, us a face": 1e6 * standby["layers"] / standby["ticks"],
+        "conductor: sending or following, us a face": 1e6 * standby["publish"] / standby["ticks"],
         "loopback bytes a face, both hops": sent / count,
         "wait for the standby (ms)": [round(gap * 1e3) for gap in gaps],
     }
