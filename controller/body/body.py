@@ -55,6 +55,7 @@ class Body:
     Attributes
     ----------
     relay : passes on what was mixed to other processes, or replaces it by what they want; None where there are none.
+    rests : whether the layers are not needed, because another process decides what is shown.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class Body:
     ) -> None:
         self.stage, self._member = stage, member
         self.relay: Relay | None = None
+        self.rests: Callable[[], bool] = lambda: False
         self._closers, self.notes = Closers(), Notes()
         self.state = stage.state(parameters)
         if member is not None:
@@ -280,9 +282,10 @@ class Body:
         """One step of the face: its sources, the layers, and what of it the buses and the picture get."""
         begun, values = self._begun.is_set(), self._newest[0].copy()
         self.sources.tick(now_ns, begun)
-        stamp = self._tick(now_ns, step_s, values, begun)
+        stamp = 0 if self.rests() else self._tick(now_ns, step_s, values, begun)
         if self.relay is not None:
             stamp = self.relay(now_ns, step_s, values, stamp)
+            self.state.show(values)
         is_new, self._newest = stamp > self._newest[1], (values, stamp)
         for bus in self.buses:
             bus.feed(step_s, urgent=is_new)

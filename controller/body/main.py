@@ -22,8 +22,8 @@ from controller.body.nodes import open_node
 from controller.body.panel_requests import carry_out
 from controller.body.panel_state import PanelState
 from controller.layers.mixer import by_priority
+from controller.stage.roles import for_role
 from controller.stage.stage import heads_of, load_stage
-from controller.stage.zenoh import for_role
 from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.base.shutdown import combine_with_context
 

@@ -28,7 +28,7 @@ def open_node(stage: Stage, bodies: Sequence[Body]) -> Node | None:
     states = {name: body.state for name, body in heads.items()}
     node = Node(settings, stage.parameters, states, stage.path, bodies[0].clock.hurry)
     for name, body in heads.items():
-        body.relay = partial(node.relay, name)
+        body.relay, body.rests = partial(node.relay, name), partial(node.rests, name)
     return node
 
 

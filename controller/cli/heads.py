@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from surface.export.animation import Animation  # start-up: --help does without it
     from surface.fit.points.report import FitReport  # start-up: --help does without it
     from surface.fit.source.load import LoadOptions  # start-up: --help does without it
+    from surface.head import Head  # start-up: --help does without it
 
 _NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
 _NO_SHAPES = "the mesh has no shapes: --expressions-from ict gives it those of another head"
@@ -320,7 +321,9 @@ def _error_table(report: FitReport) -> Table:
 
 
 def export(
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="File to write: .glb, .obj or what a plug-in adds.")],
+    out: Annotated[
+        Path, typer.Argument(metavar="OUT", help="File to write: .glb, .obj, .urdf or what a plug-in adds.")
+    ],
     head: Annotated[str, typer.Option("--head", help=HEAD, autocompletion=names_of("heads"))] = "ict",
     settings: Setting = None,
     expression: Expression = None,
@@ -339,8 +342,14 @@ def export(
         ),
     ] = None,
     web: Annotated[bool, typer.Option("--web", help="A small .glb for pages of browsers: fewer triangles.")] = False,
+    robot: Annotated[
+        str | None,
+        typer.Option(
+            help="Robot whose servos limit the joints of a .urdf: a name or a file.", autocompletion=names_of("robots")
+        ),
+    ] = None,
 ) -> None:
-    """Write a head for other programs: .glb with morph targets, or .obj with a folder of shapes.
+    """Write a head for other programs: .glb with morph targets, .obj with a folder of shapes, .urdf for robots.
 
     Example: omote export head.glb; with an animation: omote export head.glb --take alex_rom_3.csv
     """
@@ -359,9 +368,28 @@ def export(
         added = added_exporters()
         kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
         with EXPORTERS.blaming(kind):
-            written = export_head(loaded, out, pose, added, frame, _animation(take, rate_hz), web)
+            if robot is None:
+                written = export_head(loaded, out, pose, added, frame, _animation(take, rate_hz), web)
+            else:
+                written = _with_limits(robot, loaded, out, pose)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
+
+
+def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> list[Path]:
+    """Write a .urdf with the limits of a robot's servos. Raises ConfigError: another kind of file, or no such robot."""
+    # start-up: --help does without any of these
+    from controller.base.parameters import PARAMETERS
+    from controller.base.paths import find_config
+    from controller.robot.joint_limits import joint_limits
+    from controller.robot.robot import load_robot
+    from surface.export.urdf import joints_of, write_urdf
+
+    if out.suffix.lower() != ".urdf":
+        hint = "omote export head.urdf --robot head24"
+        raise ConfigError("--robot: its servos limit the joints of a .urdf", hint=hint)
+    found = load_robot(find_config("robots", robot), PARAMETERS)
+    return write_urdf(head, out, pose, joint_limits(found, PARAMETERS, joints_of(head)))
 
 
 def _animation(take: Path | None, rate_hz: float | None) -> Animation | None:

@@ -20,6 +20,8 @@ _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
 """Of the minimum-jerk curve over one second."""
 _NEAR = 1e-4
 """From so near on, in units of a parameter, what is shown is exactly what was sent: half a step of a servo or less."""
+_GAP_NS = 45_000_000
+"""What comes after a longer gap is not shown at once: a face can have moved far meanwhile."""
 _WAITING = 128
 
 
@@ -92,8 +94,11 @@ class Follower:
         now_s = now_ns * 1e-9
         leads, self._leads = self._leads, False
         if newest is not None:
-            changed = self.header is None or newest[0].token != self.header.token
+            before = self.header
+            changed = before is None or newest[0].token != before.token
             self.header, self._sent = newest
+            if before is not None and newest[0].time_ns - before.time_ns > _GAP_NS:
+                self._catch_up()
             self._heard_s = now_s
             if not self.conducted or changed:
                 self._pass_to(self._sent, first=not self._begun)
@@ -117,6 +122,11 @@ class Follower:
                     break
                 found = self._waiting.popleft()
         return found
+
+    def _catch_up(self) -> None:
+        """Go on within the limits to what a conductor sent after a gap."""
+        if self.exact:
+            self.exact, self._whole_s, self._blend_before = False, 0.0, self._sent.copy()
 
     def _pass_to(self, source: Floats, *, first: bool = False) -> None:
         """Begin to pass to another source: the gap to it closes along a minimum-jerk curve."""

@@ -103,6 +103,11 @@ class Node:
         self._obey_stop(head, follower)
         return theirs if follower.conducted else stamp_ns
 
+    def rests(self, head: str) -> bool:
+        """Whether a head's own layers are not needed: it shows what a conductor sends, and would not conduct itself."""
+        follower = self.followers[head]
+        return not self.conducts and follower.conducted and follower.exact
+
     def close(self) -> None:
         """Leave the others: a conductor's lease ends by itself."""
         self._stopping.set()

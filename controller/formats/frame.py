@@ -26,6 +26,7 @@ class Frame:
     sequence : number of the frame, which rises; None where the format has none.
     face : False where the source says that it sees no face; ``values`` mean nothing then.
     subject : name of who is seen, or of the device; empty where the format has none.
+    to : the head or the group of heads that shall show it; empty for whom the link belongs to.
     measured : (P,) float64, what the servos show of the face; None where that is not known, or nobody asked for it.
     """
 
@@ -36,6 +37,7 @@ class Frame:
     face: bool = True
     subject: str = ""
     measured: Floats | None = None
+    to: str = ""
 
 
 class Decoder(Protocol):

@@ -127,6 +127,11 @@ class CommandState:
             out[:] = self._present
             return self._stamp_ns
 
+    def show(self, values: Floats) -> None:
+        """Let the present parameters be ``values`` : (P,), which another process decided."""
+        with self._lock:
+            self._present[:] = values
+
     def record(self, journal: Journal | None) -> None:
         """Call ``journal`` for every tick and every command from now on; None ends it."""
         with self._lock:

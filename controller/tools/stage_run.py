@@ -30,8 +30,8 @@ from controller.body.sources import Voice
 from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.links.line.script import script_names
 from controller.panels.web_face import face_in_the_making
+from controller.stage.roles import for_role
 from controller.stage.stage import Stage, check_identity, heads_of, load_stage, with_picture
-from controller.stage.zenoh import for_role
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
 from drivers.base.priority import lower_process_priority

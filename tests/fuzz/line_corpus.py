@@ -27,6 +27,7 @@ class Lines:
             "EXPR": self._expression, "GAZE": self._gaze, "NEUTRAL": lambda: [self._pick("0", "0", "0.05", "1", "61")],
             "LIFE": lambda: [self._pick("0", "1", "0.5", "2"), *self._draw.choice(([], ["LISTEN"], ["auto"], ["x"]))],
             "SHOW": self._show, "READ": self._reading,
+            "TO": lambda: [self._pick("maple", "ALL", "x" * 40)], "TURN": lambda: [self._pick("OFF", "maple", "@x")],
             "VISEME": lambda: self._draw.choice((["aa"], ["PP", "0.5"], ["oh", "1", "I", "0.2"], ["aa", "2"], ["x"])),
             "AUTH": lambda: self._draw.choice((["x"], ["a-token-of-some-length"], [])),
             "HELP": lambda: self._draw.choice(([], ["SET"], ["x"])),

@@ -1,7 +1,8 @@
 """JSON: an object for each message, with parameters by name.
 
 ``{"type": "set", "parameters": {"jawOpen": 0.5}}`` and plain ``{"jawOpen": 0.5}`` are the same; ``null`` releases a
-parameter, and what is not named stays as it was. Blend shapes as MediaPipe's face landmarker gives them are read, too:
+parameter, and what is not named stays as it was; ``"to"`` names the head or group of heads that is meant.
+Blend shapes as MediaPipe's face landmarker gives them are read, too:
 ``[{"categoryName": "jawOpen", "score": 0.5}, ...]``, and so are its landmarks, by :mod:`controller.formats.landmarks`;
 of a result with both, the shapes count and the landmarks turn the head. The encoder adds ``"measured"``, what the
 servos show, where it is given.
@@ -22,7 +23,9 @@ from controller.formats.frame import Frame, Held, Refusals
 from controller.formats.landmarks import COUNTS, face_of
 
 _KINDS = ("set", "state")
-_SKIPPED = {"_neutral", "time", "type", "face", "subject"}
+_SKIPPED = {"_neutral", "time", "type", "face", "subject", "to"}
+_MOST_HEADS = 512
+"""Heads and groups whose values are kept; a stranger cannot name more."""
 _LISTS = ("blendshapes", "categories", "faceBlendshapes", "face_blendshapes")
 _POINTS = ("faceLandmarks", "face_landmarks", "multiFaceLandmarks", "multi_face_landmarks", "landmarks", "landmark")
 _ANGLES = ("headYaw", "headPitch", "headRoll")
@@ -36,6 +39,7 @@ class JsonDecoder:
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
         self._parameters, self._held = parameters, Held(parameters)
+        self._heads = {"": self._held}
 
     def feed(self, message: bytes) -> list[Frame]:
         """One frame for each object that gives or releases something."""
@@ -52,8 +56,11 @@ class JsonDecoder:
         if not isinstance(table, dict) or table.get("type", "set") not in _KINDS:
             self.refused.add("no object that sets parameters")
             return []
+        to = table["to"][:64] if isinstance(table.get("to"), str) else ""
         if table.get("face") is False or (isinstance(found, dict) and _is_empty(table)):
-            return [Frame(self._parameters.neutral(), np.zeros(len(self._parameters), dtype=bool), face=False)]
+            return [Frame(self._parameters.neutral(), np.zeros(len(self._parameters), dtype=bool), face=False, to=to)]
+        if not self._choose(to):
+            return []
         shapes = [name for name, value in self._given(table) if self._take(name, value)]
         if not shapes + self._take_points(table, angles_only=bool(shapes)):
             return []
@@ -62,8 +69,19 @@ class JsonDecoder:
             self._held.frame(
                 time_s=float(time_s) if is_number(time_s) else None,
                 subject=subject[:200] if isinstance(subject, str) else "",
+                to=to,
             )
         ]
+
+    def _choose(self, to: str) -> bool:
+        """Let the next values be those of a head; False where too many were named."""
+        if to not in self._heads:
+            if len(self._heads) >= _MOST_HEADS:
+                self.refused.add("too many heads")
+                return False
+            self._heads[to] = Held(self._parameters)
+        self._held = self._heads[to]
+        return True
 
     def _given(self, table: dict[str, Any]) -> Iterator[tuple[str, Any]]:
         """Names and values, wherever in the object they stand."""

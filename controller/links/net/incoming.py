@@ -5,39 +5,23 @@ from __future__ import annotations
 import threading
 import time
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
-from controller.base.parameters import Flags, Floats, Parameters
-from controller.base.stop_latch import StopLatch
-from controller.formats.frame import Refusals
-from controller.links.net.conditioning import Conditioning
+from controller.base.errors import ParameterError
+from controller.formats.frame import Frame, Refusals
+from controller.layers.sink import Directory
 from controller.links.net.decoding import Arrived, Decoding
 from controller.links.net.meter import Meter
 from controller.links.net.receivers import Gate, Receiver
 from controller.links.net.settings import NetSettings
+from controller.links.net.shown import LayerSink, Shown
 
 PASS_S = 0.004
 """Shortest time from one look at what has arrived to the next."""
 REST = 3.0
 """How long a link rests after it has read, in multiples of that time: a flood costs about a quarter of a core."""
 _WAIT_S = 0.1
-_RENEW_S = 0.3
-"""How often a face that holds is written again, so that its layer's own time-out does not release it."""
-
-
-class LayerSink(Protocol):
-    """Where values go; see :class:`controller.layers.commands.CommandSink`."""
-
-    parameters: Parameters
-    stop_latch: StopLatch
-
-    def write_layer(self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
-        """Give a layer values where the mask is set, and release the rest."""
-
-    def release_layer(self, name: str) -> None:
-        """Let a layer fade out."""
 
 
 class Incoming:
@@ -57,13 +41,11 @@ class Incoming:
         address = settings.incoming
         streams = address is not None and address.transport != "udp"
         self._decoding = Decoding(settings.form, sink.parameters, streams=streams, newest=True)
-        self._conditioning = Conditioning(settings, sink.parameters, path)
+        self._home = Shown(settings, sink, name, path)
+        self._others: dict[str, Shown] = {}  # of heads and groups that messages named
         self._meter = Meter()
         self._turned_away = gate.turned_away if gate is not None else Refusals()
-        self._sender, self._heard_s, self._face_s = "", -np.inf, -np.inf
-        self._lost = True  # nothing came yet: nothing to give back
-        self._values, self._mask = sink.parameters.neutral(), np.zeros(len(sink.parameters), dtype=bool)
-        self._written_s = -np.inf
+        self._sender, self._heard_s = "", -np.inf
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"link {name}", daemon=True)
 
@@ -81,7 +63,7 @@ class Incoming:
             self._thread.join()
         self._receiver.close()
         if self._settings.ranges:
-            self._conditioning.save()
+            self._home.conditioning.save()
 
     def report(self) -> dict[str, object]:
         """Counts, rate, jitter, loss, age, who sends, and the last error."""
@@ -91,8 +73,8 @@ class Incoming:
             "refused": {**self._decoding.refused, **self._turned_away},
             **self._meter.report(now_s),
             "sender": self._sender,
-            "face": not self._lost,
-            "neutral_known": self._conditioning.neutral_known,
+            "face": not self._home.lost or any(not shown.lost for shown in self._others.values()),
+            "neutral_known": self._home.conditioning.neutral_known,
             "error": self._receiver.error,
         }
 
@@ -102,20 +84,21 @@ class Incoming:
             self._stopping.wait(max(0.0, next_s - time.monotonic()))
             received = self._receiver.receive(_WAIT_S)
             now_s = time.monotonic()
-            newest = self._newest(self._decoding.feed(received), now_s)
-            if newest is not None:
-                self._show(newest, now_s)
-            self._watch(now_s)
+            for newest in self._newest(self._decoding.feed(received), now_s).values():
+                self._show(newest.frame, now_s)
+            for shown in (self._home, *self._others.values()):
+                shown.watch(now_s, self._heard_s)
             next_s = now_s + max(PASS_S, (1.0 + REST) * (time.monotonic() - now_s))
 
-    def _newest(self, arrived: list[Arrived], now_s: float) -> Arrived | None:
-        """The newest frame of the one source that counts; others are heard only when that one is silent."""
-        newest = None
+    def _newest(self, arrived: list[Arrived], now_s: float) -> dict[str, Arrived]:
+        """The newest frame of the one source that counts, for each face that it names; others are heard only when that
+        one is silent."""
+        newest = {}
         for each in arrived:
             if not self._counts(each, now_s):
                 continue
             self._meter.note(now_s, each.frame.sequence, each.skipped)
-            newest = each
+            newest[each.frame.to] = each
         return newest
 
     def _counts(self, arrived: Arrived, now_s: float) -> bool:
@@ -130,34 +113,21 @@ class Incoming:
         self._sender, self._heard_s = who, now_s
         return True
 
-    def _show(self, arrived: Arrived, now_s: float) -> None:
-        if not arrived.frame.face or not arrived.frame.mask.any():
-            return
-        self._face_s, self._lost = now_s, False
-        self._values, self._mask = self._conditioning.apply(arrived.frame, now_s)
-        self._write(now_s)
+    def _show(self, frame: Frame, now_s: float) -> None:
+        shown = self._home if not frame.to else self._shown_by(frame.to)
+        if shown is not None:
+            shown.show(frame, now_s)
 
-    def _write(self, now_s: float) -> None:
-        stamp_ns = int(now_s * 1e9)
-        self._sink.write_layer(self._settings.layer, self._values, self._mask, stamp_ns, stamp_ns)
-        self._written_s = now_s
-
-    def _watch(self, now_s: float) -> None:
-        """Keep the face of a slow source, and do what is to be done when it is lost."""
-        if not self._lost and now_s - self._face_s > self._settings.silence_s:
-            self._lost = True
-            self._conditioning.reset()
-            self._lose(now_s)
-        holds = self._settings.lost in ("hold", "neutral") or not self._lost
-        if self._mask.any() and holds and now_s - self._written_s > _RENEW_S:
-            self._write(now_s)
-
-    def _lose(self, now_s: float) -> None:
-        what = self._settings.lost
-        if what == "neutral":
-            self._values = np.zeros_like(self._values)
-            self._write(now_s)
-        elif what in ("fade", "stop"):
-            self._sink.release_layer(self._settings.layer)
-        if what == "stop" and now_s - self._heard_s > self._settings.silence_s:  # the wire is lost, not only the face
-            self._sink.stop_latch.stop(self.name, int(now_s * 1e9))
+    def _shown_by(self, name: str) -> Shown | None:
+        """What a head or a group shows; None where there is no such head here."""
+        heads: Directory | None = getattr(self._sink, "heads", None)
+        key = name.removeprefix("@").lower()
+        if key not in self._others:
+            try:
+                if heads is None:
+                    raise ParameterError(f"{name}: there are no heads here")
+                self._others[key] = Shown(self._settings, heads.find(name), self.name)
+            except ParameterError:
+                self._decoding.refused.add("for a head that is not here")
+                return None
+        return self._others[key]

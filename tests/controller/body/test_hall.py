@@ -114,6 +114,36 @@ def test_servos_links_and_reports_belong_to_their_heads(tmp_path: Path) -> None:
     assert [head["head"] for head in report["heads"]] == ["maple", "oak"]
 
 
+def test_json_faces_go_to_whom_they_name(tmp_path: Path) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    text = TWO.replace('["head24"]', "[]").replace("liveliness = 1.0", "liveliness = 0.0")
+    stage = stage_of(tmp_path, text + f'[[links]]\nkind = "json"\nlisten = "udp:127.0.0.1:{port}"\n')
+    smile = P.index("mouthSmileLeft")
+    with hall_of(stage) as (hall, _):
+        hall.start()
+        try:
+            hall.begin()
+            with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+                sender.connect(("127.0.0.1", port))
+                for message in (
+                    {"to": "oak", "jawOpen": 0.5},
+                    {"mouthSmileLeft": 0.6},
+                    {"to": "nobody", "jawOpen": 1.0},
+                ):
+                    sender.send(json.dumps(message).encode())
+                maple, oak = (body.newest for body in hall.bodies)
+                until(lambda: oak()[0][JAW] > 0.45 and maple()[0][smile] > 0.55)
+                assert maple()[0][JAW] == 0.0 and oak()[0][smile] == 0.0
+                sender.send(b'{"to": "both", "jawOpen": 0.9}')
+                until(lambda: min(maple()[0][JAW], oak()[0][JAW]) > 0.85)
+            (link,) = hall.report()["links"]  # type: ignore[misc]
+            until(lambda: link["refused"] == {"for a head that is not here": 1})
+        finally:
+            hall.stop()
+
+
 def test_what_stands_at_the_top_of_a_stage_is_the_first_heads_who_can_pass_it_on(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text('name = "s"\nsteps = ["0.0 @oak SET jawOpen 1", "0.0 SET jawOpen 0.4"]\n')
     stage = stage_of(tmp_path, TWO.replace('name = "two"', 'name = "two"\nshow = "s.toml"'))

@@ -108,6 +108,49 @@ def test_faces_wait_until_they_are_due_by_the_conductors_clock() -> None:
     assert follower.conducted
 
 
+@pytest.mark.parametrize("delay_ms", [0.0, 120.0])
+def test_faces_that_are_late_or_lost_bend_the_motion_and_no_more(delay_ms: float) -> None:
+    rng, follower, faces = np.random.default_rng(5), Follower(P, delay_ns=round(delay_ms * 1e6)), Faces(1, FIRST)
+    waiting: list[tuple[int, Header, np.ndarray]] = []
+    shown, sent, own, last = [], [], P.neutral(), 0
+    for k in range(1, 700):
+        now_ns, out = 10**9 + k * STEP_NS, P.neutral()
+        header, values = faces.next(now_ns)
+        sent.append(values)
+        if k >= 600 or rng.random() > 0.05:
+            due = now_ns + round(rng.uniform(30e6, 70e6) if k < 600 else 50e6)
+            last = max(due, last)  # Zenoh keeps the order of what it sends
+            waiting.append((last, header, values))
+        for each in sorted((each for each in waiting if each[0] <= now_ns), key=lambda each: each[0]):
+            follower.take(*each[1:])
+            waiting.remove(each)
+        follower.step(now_ns, DT, own, out)
+        shown.append(out)
+    speed = np.abs(np.diff(np.array(shown), axis=0)) / DT
+    assert (speed <= 5.0 * P.max_speed).all()  # of as many ticks as were late or lost at once
+    late = round((delay_ms or 50.0) / 10.0)
+    assert follower.exact and np.array_equal(shown[-1], sent[-1 - late])
+    if delay_ms:  # nothing but what was lost is missing: all else is shown in its turn
+        same = [np.array_equal(a, b) for a, b in zip(shown[late:], sent[:-late], strict=True)]
+        assert np.mean(same[100:]) > 0.9  # it has joined by then
+
+
+def test_after_a_gap_the_face_goes_on_within_its_limits() -> None:
+    follower, faces = Follower(P), Faces(1, FIRST)
+    shown, _ = play(follower, [(faces, 1.0)])
+    for k in range(40):  # 0.4 s that nobody hears of
+        faces.next(10**9 + (101 + k) * STEP_NS)
+    now, own, rows = 10**9 + 141 * STEP_NS, P.neutral(), [shown[-2], shown[-1]]
+    for k in range(200):
+        header, values = faces.next(now + k * STEP_NS)
+        follower.take(header, values)
+        out = P.neutral()
+        follower.step(now + k * STEP_NS, DT, own, out)
+        rows.append(out)
+    check_limits(np.array(rows))
+    assert follower.exact
+
+
 def test_who_conducts_itself_shows_its_own_face_from_where_it_was() -> None:
     follower, faces = Follower(P), Faces(1, FIRST)
     own, out = P.neutral(), P.neutral()

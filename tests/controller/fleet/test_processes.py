@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -36,7 +38,8 @@ class Process:
 
     def __init__(self, folder: Path, name: str, *options: str) -> None:
         self.report_path, self._log = folder / f"{name}.json", (folder / f"{name}.log").open("w")
-        command = [sys.executable, "-m", "controller.cli", "run", str(folder / "stage.toml"), "--no-face"]
+        program = [sys.executable, "-c", "import sys; from controller.cli import main; sys.exit(main())"]
+        command = [*program, "run", str(folder / "stage.toml"), "--no-face"]
         command += ["--report", str(self.report_path), *options]
         self._process = subprocess.Popen(command, stdout=self._log, stderr=self._log, start_new_session=True)
 
@@ -47,7 +50,7 @@ class Process:
 
     def signal(self, which: int) -> None:
         for process in self.children():
-            __import__("os").kill(process, which)
+            os.kill(process, which)
 
     def end(self) -> None:
         if self._process.poll() is None:
@@ -74,7 +77,7 @@ def test_a_stopped_conductor_is_replaced_and_does_not_come_back_while_servos_go_
         session = stack.enter_context(client(hub))
         tokens: list[tuple[float, tuple[int, int]]] = []
         session.declare_subscriber("omote/maple/parameters", lambda s: tokens.append(
-            (time.monotonic(), __import__("struct").unpack_from("<QQ", s.attachment.to_bytes(), 4))
+            (time.monotonic(), struct.unpack_from("<QQ", s.attachment.to_bytes(), 4))
         ))  # fmt: skip
 
         def start(name: str, *options: str) -> Process:

@@ -1,0 +1,58 @@
+"""The part of a stage that a process with a role runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from controller.base.errors import ConfigError
+from controller.base.parameters import did_you_mean
+from controller.stage.heads import HeadSettings
+from controller.stage.stage import Stage
+from controller.stage.zenoh import ROLES, ZenohSettings
+
+
+def with_role(settings: ZenohSettings, role: str | None, heads: Sequence[str]) -> ZenohSettings:
+    """The table with the options of a command line over it. Raises ConfigError: no such role."""
+    if role is not None and role not in ROLES:
+        raise ConfigError(f"--role {role}: no such role{did_you_mean(role, ROLES)}", hint=f"roles: {', '.join(ROLES)}")
+    wanted: dict[str, object] = {"role": role} if role is not None else {}
+    return settings.model_copy(update=wanted | ({"heads": list(heads)} if heads else {}))
+
+
+def for_role(stage: Stage, role: str | None = None, heads: Sequence[str] = ()) -> Stage:
+    """A stage as the process of its role runs it: only a conductor has links and plays things, only a ``head`` drives
+    servos, and of the heads those that are its own.
+
+    Raises ConfigError: no such role or head, or the stage has no ``[zenoh]``.
+    """
+    table = stage.settings.zenoh
+    if table is None:
+        if role is not None:
+            raise ConfigError("--role: the stage has no [zenoh]", hint='[zenoh]\nlisten = ["tcp/127.0.0.1:7447"]')
+        return stage
+    table = with_role(table, role, heads)
+    kept = _chosen(stage, table)
+    settings = stage.settings.model_copy(update={"zenoh": table, "heads": kept})
+    chosen = {head.name for head in kept}
+    own = tuple(replace(head, stage=_stripped(head.stage, table.role)) for head in stage.heads if head.name in chosen)
+    return replace(_stripped(replace(stage, settings=settings), table.role), heads=own)
+
+
+def _chosen(stage: Stage, table: ZenohSettings) -> list[HeadSettings]:
+    """The tables of the heads that this process has. Raises ConfigError."""
+    known = {head.name.lower(): head for head in stage.settings.heads}
+    unknown = [name for name in table.heads if name.lower() not in known]
+    if unknown:
+        raise ConfigError(f"zenoh.heads: no head called {unknown[0]!r}{did_you_mean(unknown[0], known)}",
+                          hint=f"heads of this stage: {', '.join(known) or 'one, without a name'}")  # fmt: skip
+    wanted = {name.lower() for name in table.heads}
+    return [head for head in stage.settings.heads if not wanted or head.name.lower() in wanted]
+
+
+def _stripped(stage: Stage, role: str) -> Stage:
+    update: dict[str, object] = {}
+    if role != "conductor":
+        update = {"links": [], "show": None, "take": None, "voice": None, "turns": "manual"}
+    robots = stage.robots if role == "head" else ()
+    return replace(stage, robots=robots, settings=stage.settings.model_copy(update=update))

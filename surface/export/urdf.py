@@ -1,0 +1,199 @@
+"""Exporter of heads as URDF: the rigid parts of a head as links, with joints of neck, jaw and eyes, and their meshes.
+
+Axes are those of ROS (REP 103): x forward, y left, z up, metres; joints turn about them by the right-hand rule, so that
+yaw is positive to the head's own left and pitch downwards. The joints are called as the parameters, and the link
+``NAME`` is what the joint of that name carries. What bends is cut: skin belongs to the link that moves it most.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import xml.etree.ElementTree as ET
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from surface.base.arrays import Floats, Floats32, Ints
+from surface.export.exporter import Exporter
+from surface.export.shapes import ExportPart, export_parts, unit
+from surface.export.textures import materials
+from surface.head import Head
+from surface.head.model.parameters import EYE_RAD, HEAD_RAD
+from surface.head.posing.part import HeadPart
+
+BASE, SKULL, JAW = "base_link", "headRoll", "jawOpen"
+_EYES = {"left_eye": "leftEyePitch", "right_eye": "rightEyePitch"}
+_AXES = {"Yaw": (0, 0, 1), "Pitch": (0, 1, 0), "Roll": (1, 0, 0), JAW: (0, 1, 0)}
+_ROS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""Head space (x left, y up, z forward) in the axes of ROS."""
+_MOST = 0.5  # share of a motion from which on skin belongs to what moves
+_EFFORT_NM, _SPEED_RAD_S = 1.0, 6.0
+_STL_HEADER = b"written by omote; metres, x forward, y left, z up".ljust(80)
+_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
+
+
+Piece = tuple[str, ExportPart, Ints]
+"""A link, a part, and the triangles (t, 3) of the part that belong to the link."""
+
+
+@dataclass(frozen=True)
+class JointLimit:
+    """Limits of a joint. low_rad, high_rad : its range. speed_rad_s : its top speed."""
+
+    low_rad: float
+    high_rad: float
+    speed_rad_s: float = _SPEED_RAD_S
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint, called as its parameter. parent : the link that carries it. origin : (3,) mm, in head space."""
+
+    name: str
+    parent: str
+    origin: Floats
+    limit: JointLimit
+
+
+def joints_of(head: Head, limits: Mapping[str, JointLimit] | None = None) -> list[Joint]:
+    """The joints of a head, parents first.
+
+    limits : by parameter, such as those of a robot's servos; elsewhere the joint turns as far as the parameter does.
+    """
+    pivot, jaw = np.array(head.data.neck.pivot), head.data.jaw
+    angles = dict(zip(("headYaw", "headPitch", "headRoll"), HEAD_RAD.tolist(), strict=True))
+    found = [("headYaw", BASE, pivot), ("headPitch", "headYaw", pivot), (SKULL, "headPitch", pivot)]
+    found.append((JAW, SKULL, np.array(jaw.centre)))
+    for side, centre in zip(("left", "right"), head.data.eyes, strict=False):
+        found += [(f"{side}EyeYaw", SKULL, centre), (f"{side}EyePitch", f"{side}EyeYaw", centre)]
+        angles |= dict(zip((f"{side}EyeYaw", f"{side}EyePitch"), EYE_RAD.tolist(), strict=True))
+    own = {name: JointLimit(-angle, angle) for name, angle in angles.items()}
+    own[JAW] = JointLimit(0.0, jaw.angle_rad)
+    chosen = {**own, **(limits or {})}
+    return [Joint(name, parent, origin, chosen[name]) for name, parent, origin in found]
+
+
+def write_urdf(
+    head: Head, path: Path, pose: Mapping[str, float], limits: Mapping[str, JointLimit] | None = None
+) -> list[Path]:
+    """Write ``path`` and a folder of meshes beside it, complete or not at all; see :func:`joints_of`.
+
+    The head is written at rest with its hair and clothes as ``pose`` leaves them; angles of ``pose`` are left out,
+    because the joints turn.
+    """
+    joints = joints_of(head, limits)
+    still = {name: value for name, value in pose.items() if name not in {joint.name for joint in joints}}
+    pieces = _pieces(head, still)
+    folder = path.with_name(f"{path.stem}_meshes")
+    with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as temporary:
+        made = Path(temporary)
+        folder.mkdir(exist_ok=True)
+        (made / path.name).write_text(_document(head.name, joints, pieces, folder.name), encoding="utf-8")
+        origins = {BASE: np.zeros(3)} | {joint.name: joint.origin for joint in joints}
+        names = []
+        for link, part, triangles in pieces:
+            names.append(f"{link}-{part.name}.stl")
+            corners = (part.vertices[triangles] - origins[link]) @ _ROS.T * 1e-3
+            (made / names[-1]).write_bytes(_stl(corners.astype(np.float32)))
+        meshes = [(made / name).replace(folder / name) for name in names]
+        return [(made / path.name).replace(path), *meshes]
+
+
+def _pieces(head: Head, pose: Mapping[str, float]) -> list[Piece]:
+    """The triangles (t, 3) of each part that each link carries."""
+    exported, found = export_parts(head, pose, shapes=False), list[Piece]()
+    opened = [part.vertices.copy() for part in _posed(head, {**pose, JAW: 1.0})]
+    for part, own, wide in zip(exported, head.parts, opened, strict=True):
+        links = [BASE, SKULL, JAW, *_EYES.values()]
+        carrier = _carriers(head, own, part.vertices, wide)
+        of_triangle = np.sort(carrier[part.triangles], axis=1)[:, 1]  # as two of its corners or the middle one
+        for number in np.unique(of_triangle).tolist():
+            found.append((links[number], part, part.triangles[of_triangle == number]))
+    head.pose(head.values({}))
+    return found
+
+
+def _posed(head: Head, pose: Mapping[str, float]) -> tuple[HeadPart, ...]:
+    head.pose(head.values(dict(pose)))
+    return tuple(head.parts)
+
+
+def _carriers(head: Head, part: HeadPart, rest: Floats32, opened: Floats32) -> Ints:
+    """(m,) the link of each vertex: 0 the base, 1 the skull, 2 the jaw, 3 and 4 the eyes."""
+    if part.follows in _EYES:
+        return np.full(len(rest), 3 + list(_EYES).index(part.follows))
+    if part.follows in ("jaw", "skull"):
+        return np.full(len(rest), 2 if part.follows == "jaw" else 1)
+    whole = _swing(head, rest)
+    share = (np.asarray(opened - rest, float) * whole).sum(axis=1) / np.maximum((whole * whole).sum(axis=1), 1e-9)
+    still = head.data.neck.share(rest.astype(float)) < _MOST
+    return np.where(still, 0, np.where(share > _MOST, 2, 1))
+
+
+def _swing(head: Head, points: Floats32) -> Floats:
+    """(m, 3) how far the whole motion of the jaw moves points that are fixed to it, mm."""
+    jaw = head.data.jaw
+    sine, cosine = np.sin(jaw.angle_rad), np.cos(jaw.angle_rad)
+    turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
+    away: Floats = points - np.array(jaw.centre)
+    moved: Floats = away @ turn.T - away + np.array(jaw.glide)
+    return moved
+
+
+def _document(name: str, joints: list[Joint], pieces: list[Piece], folder: str) -> str:
+    robot = ET.Element("robot", name=name)
+    parts = dict.fromkeys(part.material for _, part, _ in pieces)
+    for material in parts:
+        colour = materials().get(material, materials()["skin"])["colour"]
+        rgba = " ".join(f"{c ** (1 / 2.2):.4f}" for c in colour) + " 1"
+        ET.SubElement(ET.SubElement(robot, "material", name=material), "color", rgba=rgba)
+    for link in (BASE, *(joint.name for joint in joints)):
+        element = ET.SubElement(robot, "link", name=link)
+        for carrier, part, _ in pieces:
+            if carrier == link:
+                _add_mesh(element, f"{folder}/{link}-{part.name}.stl", part.material)
+    origins = {BASE: np.zeros(3)} | {joint.name: joint.origin for joint in joints}
+    for joint in joints:
+        _add_joint(robot, joint, origins[joint.parent])
+    ET.indent(robot)
+    return '<?xml version="1.0"?>\n' + ET.tostring(robot, encoding="unicode") + "\n"
+
+
+def _add_mesh(link: ET.Element, file: str, material: str) -> None:
+    visual = ET.SubElement(link, "visual")
+    ET.SubElement(ET.SubElement(visual, "geometry"), "mesh", filename=file)
+    ET.SubElement(visual, "material", name=material)
+
+
+def _add_joint(robot: ET.Element, joint: Joint, parent: Floats) -> None:
+    element = ET.SubElement(robot, "joint", name=joint.name, type="revolute")
+    ET.SubElement(element, "parent", link=joint.parent)
+    ET.SubElement(element, "child", link=joint.name)
+    x, y, z = _ROS @ (joint.origin - parent) * 1e-3
+    ET.SubElement(element, "origin", xyz=f"{x:.6f} {y:.6f} {z:.6f}", rpy="0 0 0")
+    axis = next(axis for ending, axis in _AXES.items() if joint.name.endswith(ending))
+    ET.SubElement(element, "axis", xyz=" ".join(map(str, axis)))
+    limit = joint.limit
+    ET.SubElement(
+        element, "limit", lower=f"{limit.low_rad:.6f}", upper=f"{limit.high_rad:.6f}",
+        velocity=f"{limit.speed_rad_s:.4f}", effort=f"{_EFFORT_NM:g}",
+    )  # fmt: skip
+
+
+def _stl(corners: Floats32) -> bytes:
+    """Triangles (t, 3, 3) as a binary STL."""
+    facets = np.zeros(len(corners), _FACET)
+    facets["corners"] = corners
+    facets["normal"] = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    return _STL_HEADER + np.uint32(len(corners)).tobytes() + facets.tobytes()
+
+
+EXPORTER = Exporter(
+    api=1,
+    kind="urdf",
+    title="the rigid parts of the head as links with joints of neck, jaw and eyes, for robot programs; metres",
+    suffixes=(".urdf",),
+    write=write_urdf,
+)
