@@ -23,7 +23,7 @@ from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.base.parts import Part
 from controller.base.signals import termination_signals
 from controller.body import messages
-from controller.body.details import Notes, details_of
+from controller.body.details import Notes
 from controller.body.event_log import EventLog
 from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.body.messages import RunOptions
@@ -226,6 +226,17 @@ class Body:
         except OMOTE_ERRORS as error:
             log.warning("%s", error)
 
+    def details(self) -> messages.Details:
+        """What servos, links, buses and parts report now, and what was logged since the last time."""
+        overview = self.state.overview()
+        return messages.Details(
+            servos=overview["servos"],
+            links=[{"name": link.name.removeprefix("link "), **link.report()} for link in self.links],
+            buses=[loop.condition() for loop in self.buses],
+            parts=self.state.parts.report(),
+            notes=self.notes.take(),
+        )
+
     def publish(self, panel_state: PanelState) -> None:
         """Write the state for the panel."""
         self._panel.run(lambda: panel_state.publish(self.state, self.measured_face), time.monotonic())
@@ -360,7 +371,7 @@ def _handle(body: Body, pipe: Connection) -> bool:
         body.begin()
         return True
     if isinstance(request, messages.AskDetails):
-        _send(pipe, details_of(body))
+        _send(pipe, body.details())
         return True
     if isinstance(request, messages.PlayTake):
         body.play_take(request.path)

@@ -7,12 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from controller.base.errors import OMOTE_ERRORS
-from controller.panels.window.capture import Capture
+from controller.panels.session.capture import Capture
+from controller.panels.session.commands import Commands
+from controller.panels.session.playback import Playback
+from controller.panels.session.problems import Problems
 from controller.panels.window.colours import AMBER, GREY, LAYERS, RED, packed
-from controller.panels.window.commands import Commands
 from controller.panels.window.flow import Flow
-from controller.panels.window.playback import Playback
-from controller.panels.window.problems import Problems
 from controller.takes.timeline import EASES
 from controller.vocabulary.vocabulary import Vocabulary
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from controller.body.messages import ControlShow, PanelRequest, PlayShow
-from controller.panels.window.capture import Capture
-from controller.panels.window.commands import Commands
+from controller.panels.session.capture import Capture
+from controller.panels.session.commands import Commands
 from controller.panels.window.flow import Flow
 from surface.view.scene.viewpoint import KEYS, Viewpoint
 

@@ -1,4 +1,4 @@
-"""controller.panels.window.playback and timeline_panel"""
+"""controller.panels.session.playback and timeline_panel"""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import pytest
 
 from controller.base.parameters import PARAMETERS
 from controller.body.messages import HoldAll, Show
+from controller.panels.session.playback import Playback
 from controller.panels.window.panel import Panel, PanelOptions
-from controller.panels.window.playback import Playback
 from controller.takes.livelink import Take
 from controller.takes.plain import plain_take
 from controller.takes.timeline import Key, Timeline, load_timeline
