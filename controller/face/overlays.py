@@ -1,5 +1,5 @@
-"""What can be drawn over the picture: control points, the influence of one, the quad tree's triangles, the vertices that
-the last update touched, servo anchors, and the face that the servos show.
+"""What can be drawn over the picture: control points, the influence of one, the quad tree's triangles, vertices that the
+last update moved, servo anchors, and the face that the servos show.
 
 A second copy of the head is posed for them, so that they are of the whole tessellation whatever the picture draws.
 Independent of any window library.
@@ -24,7 +24,7 @@ KINDS: tuple[Kind, ...] = ("control points", "influence", "quad tree", "touched"
 MOST = 1500
 """Points, or lines, that are drawn of one kind."""
 _LEAST_WEIGHT = 0.01
-_LEAST_MM = 0.005  # a vertex that moved by less was not touched to the eye
+_LEAST_MM = 0.05  # a vertex that moved by less has not moved to the eye
 
 
 @dataclass(frozen=True)
