@@ -1,5 +1,5 @@
-"""What can be drawn over the picture: control points, the influence of one, the quad tree's triangles, vertices that the
-last update moved, servo anchors, and the face that the servos show.
+"""What can be drawn over the picture: control points, the influence of one, the quad tree's triangles, vertices that
+the last update moved, servo anchors, and the face that the servos show.
 
 A second copy of the head is posed for them, so that they are of the whole tessellation whatever the picture draws.
 Independent of any window library.
@@ -88,7 +88,8 @@ class Overlays:
         """(n, 3) mm: the control points, with the head's rotation."""
         turn, pivot = rotation(*read_pose(self._values).head), np.array(self._head.data.neck.pivot)
         local = np.asarray(self._head.place_points(self._values)[0][self._index], np.float64)
-        return pivot + (local - pivot) @ turn.T
+        places: Floats = pivot + (local - pivot) @ turn.T
+        return places
 
     def _control_points(self) -> Marks:
         places = self._places()
