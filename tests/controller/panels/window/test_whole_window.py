@@ -1,4 +1,4 @@
-"""The window with all of its panel under a virtual display: what is clicked, pressed and dropped changes the picture."""
+"""The window with all of its panel under a virtual display: clicks, keys and dropped files change the picture."""
 
 from __future__ import annotations
 
