@@ -36,9 +36,9 @@ needs_chromium = pytest.mark.skipif(
 
 
 @contextmanager
-def robot(tmp_path: Path) -> Iterator[tuple[Body, Any, str]]:
-    """A body with 24 simulated servos and a panel, the panel's link and its address."""
-    (tmp_path / "face.glb").write_bytes(web_glb(Head(small_head())))
+def robot(tmp_path: Path, head: Head | None = None) -> Iterator[tuple[Body, Any, str]]:
+    """A body with 24 simulated servos and a panel, the panel's link and its address; a small head without ``head``."""
+    (tmp_path / "face.glb").write_bytes(web_glb(head or Head(small_head())))
     path = tmp_path / "stage.toml"
     path.write_text(
         'name = "panel"\nrobots = ["head24"]\n[[links]]\nkind = "web"\nlisten = "127.0.0.1:0"\nface = "face.glb"\n'

@@ -238,6 +238,17 @@ class Body:
         except OMOTE_ERRORS as error:
             log.warning("%s", error)
 
+    def details(self) -> messages.Details:
+        """What servos, links, buses and parts report now, and what was logged since the last time."""
+        overview = self.state.overview()
+        return messages.Details(
+            servos=overview["servos"],
+            links=[{"name": link.name.removeprefix("link "), **link.report()} for link in self.links],
+            buses=[loop.condition() for loop in self.buses],
+            parts=self.state.parts.report(),
+            notes=self.notes.take(),
+        )
+
     def publish(self, panel_state: PanelState) -> None:
         """Write the state for the panel."""
         self._panel.run(lambda: panel_state.publish(self.state, self.measured_face), time.monotonic())

@@ -1,16 +1,10 @@
-"""What the window's panel shows besides the face: servos, links, buses, failed parts, and what was logged."""
+"""Keeps what was logged for the window's panel."""
 
 from __future__ import annotations
 
 import logging
 import threading
 from collections import deque
-from typing import TYPE_CHECKING
-
-from controller.body.messages import Details
-
-if TYPE_CHECKING:
-    from controller.body.body import Body
 
 _MOST = 50
 
@@ -34,15 +28,3 @@ class Notes(logging.Handler):
             taken = list(self._kept)
             self._kept.clear()
         return taken
-
-
-def details_of(body: Body) -> Details:
-    """What a body's servos, links and parts report now."""
-    overview = body.state.overview()
-    return Details(
-        servos=overview["servos"],
-        links=[{"name": link.name.removeprefix("link "), **link.report()} for link in body.links],
-        buses=[loop.condition() for loop in body.buses],
-        parts=body.state.parts.report(),
-        notes=body.notes.take(),
-    )

@@ -16,7 +16,6 @@ from controller.base.parameters import PARAMETERS
 from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.body import Body
-from controller.body.details import details_of
 from controller.body.hall import Hall
 from controller.body.nodes import open_node
 from controller.body.panel_requests import carry_out
@@ -106,7 +105,7 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
         return True
     first = body.bodies[0] if isinstance(body, Hall) else body
     if isinstance(request, messages.AskDetails):
-        _send(pipe, details_of(first))
+        _send(pipe, first.details())
         return True
     if isinstance(request, messages.PlayTake):
         first.play_take(request.path)

@@ -64,8 +64,10 @@ class BodyProcess:
     def _with_input(stage: Stage, options: messages.RunOptions, preloaded: PreloadedBody) -> messages.RunOptions:
         """Give the body what comes in at standard input, where a voice or a link wants it."""
         voice = options.voice is not None and options.voice.path == "-"
-        links = 0 if options.take is not None else sum(
-            link.takes_input for each in heads_of(stage) for link in each.settings.links
+        links = (
+            0
+            if options.take is not None
+            else sum(link.takes_input for each in heads_of(stage) for link in each.settings.links)
         )
         link = links > 0
         if voice + links > 1:

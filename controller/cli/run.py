@@ -211,7 +211,7 @@ def _run(
             require("a window (--headless runs without one)", "imgui_bundle")
             measured = session.run_window(seconds)
             while session.next_stage is not None:  # dropped on the window
-                session = StageRun(str(session.next_stage), RunOptions(record=None), None, look, status.update, web=web)
+                session = StageRun(str(session.next_stage), RunOptions(), None, look, status.update, web=web)
                 measured = session.run_window(seconds)
         if report is not None:
             write_report(measured, report)

@@ -260,6 +260,17 @@ def load_anchors(
     return AnchorSolver(channels, skin, head_order(head.parameters, parameters), parameters)
 
 
+def anchor_places(robot: RobotSettings, head: Head, part: str) -> list[tuple[Floats, str]]:
+    """(2,) point (u, v) and name of every servo of a robot that has an anchor on a part of the head."""
+    surface = head.part(part)
+    vertices = surface.surface.evaluate(surface.mesh.uv)
+    return [
+        (_place(channel.anchor, robot.landmarks, surface, vertices), channel.name)
+        for channel in robot.anchored_channels
+        if channel.anchor is not None and channel.anchor.part == part
+    ]
+
+
 def _close_to(own: Floats, part: HeadPart, vertices: Floats) -> Floats:
     """(j, 2) the vertices closest to each of the points ``own`` : (k, 2)."""
     away = [np.linalg.norm(vertices - at, axis=1) for at in part.surface.evaluate(own)]

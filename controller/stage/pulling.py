@@ -104,7 +104,8 @@ class PullSolver:
         self._ties = _ties(parameters, self.moved) if tied else np.eye(count)
         self._low, self._high = self._bounds()
         self._lips = lips[0] if self._sealed(*lips) else None
-        self._tied, self._prepared = tied, ()
+        self._tied = tied
+        self._prepared: tuple[int, ...] = ()
         self.missed_mm = 0.0
 
     def _bounds(self) -> tuple[Floats, Floats]:
@@ -166,7 +167,8 @@ class PullSolver:
         rest = self._skin.rest
         across = np.linalg.norm(rest[:, None] - (rest[chosen] * [-1.0, 1.0, 1.0])[None], axis=2).argmin(axis=0)
         away = np.linalg.norm(rest[across][:, None] - rest[chosen][None], axis=2).min(axis=1)
-        return across[away > _FAR_MM]
+        found: NDArray[np.intp] = across[away > _FAR_MM]
+        return found
 
     def _miss(self, pins: Sequence[Pin], x: Floats) -> float:
         places = self._held.rest + self._held.displacement(x)

@@ -74,7 +74,9 @@ def layered(below: Take, above: Take, offset_s: float = 0.0) -> Take:
     inside = (times >= offset_s) & (times <= end_s + _LEAST_S)
     over = _at(above, np.clip(times[inside] - offset_s, 0.0, above.duration_s))
     values[np.ix_(inside, above.mask)] = over[:, above.mask]
-    return replace(_made(below, times, values), mask=_frozen(below.mask | above.mask))
+    mask = below.mask | above.mask
+    mask.flags.writeable = False
+    return replace(_made(below, times, values), mask=mask)
 
 
 def _range(take: Take, from_s: float, to_s: float) -> tuple[float, float]:

@@ -14,16 +14,17 @@ from typing import TYPE_CHECKING, Any
 from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS
 from controller.body.messages import PanelRequest, PlayTake
-from controller.panels.window.jobs import Job, Jobs, run_program
-from controller.panels.window.looks import Look, Looks
-from controller.panels.window.problems import Problems
+from controller.panels.session.jobs import Job, Jobs, run_program
+from controller.panels.session.look import Look
+from controller.panels.session.problems import Problems
+from controller.panels.window.looks import Looks
 from controller.stage.persons import PersonSettings, load_person
 from controller.stage.stage import load_stage
 from controller.takes.reader import load_take, suffixes
 from surface.base.files import read_toml, reading
 
 if TYPE_CHECKING:
-    from controller.panels.window.commands import Commands
+    from controller.panels.session.commands import Commands
 
 MESHES = (".glb", ".gltf", ".vrm", ".obj")
 _HEAD = "head.toml"

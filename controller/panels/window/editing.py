@@ -15,7 +15,7 @@ import numpy as np
 from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.face.point_editing import PointEditor, Screen
-from controller.panels.window.commands import Commands
+from controller.panels.session.commands import Commands
 from surface.head import Head
 from surface.view.docks import PictureArea
 from surface.view.scene.camera import Camera

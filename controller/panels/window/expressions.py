@@ -9,10 +9,10 @@ from typing import Any
 from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import Learn, PanelRequest
+from controller.panels.session.commands import Commands
+from controller.panels.session.own_expressions import save_expression
 from controller.panels.window.colours import LAYERS, packed
-from controller.panels.window.commands import Commands
 from controller.panels.window.flow import Flow
-from controller.panels.window.own_expressions import save_expression
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.expression import Expression
 from controller.vocabulary.vocabulary import Vocabulary

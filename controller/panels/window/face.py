@@ -18,6 +18,7 @@ from controller.face.devices import Devices
 from controller.face.face import FrameLog, HeadValues, qualities
 from controller.panels.window.editing import MouseEditing
 from controller.panels.window.looks import Looks
+from controller.panels.window.overlay_view import OverlayView
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.stage.stage import FaceSettings, Stage
 from controller.vocabulary.controls import ControlsFile
@@ -68,11 +69,14 @@ class WindowFace:
         parameters = PARAMETERS if options is None else options.parameters
         self._panel = Panel(newest, send, panel_state, options, self._viewpoint, self._area, details=details)
         self.next_stage: Path | None = None
+        self._overlays: OverlayView | None = None
         self._mouse = None
         if stage is not None and not settings.kiosk:
             looks = Looks(stage, self._swap, self._panel.jobs)
             copy = looks.load
             self._panel.add_looks(looks, self._restart)
+            self._overlays = OverlayView(looks.load, newest, self._area, self._panel.jobs, stage.robots, panel_state)
+            self._panel.view.overlays = self._overlays.draw_choice
         if copy is not None and not settings.kiosk:
             self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area, parameters)
             self._panel.more.append(self._mouse.draw_panel)
@@ -135,6 +139,8 @@ class WindowFace:
         self._viewpoint.reframe(framing_of(head))
         if self._mouse is not None:
             self._mouse.change(head)
+        if self._overlays is not None:
+            self._overlays.forget()
 
     def _restart(self, stage: Path) -> None:
         self.next_stage, self._ended = stage, True
@@ -146,6 +152,8 @@ class WindowFace:
             self._devices()
         if self._mouse is not None:
             self._mouse(self._viewpoint.camera)
+        if self._overlays is not None:
+            self._overlays(self._viewpoint.camera)
 
     def report(self) -> dict[str, object]:
         """Frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""

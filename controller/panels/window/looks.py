@@ -7,32 +7,23 @@ library, but for drawing.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from controller.base.paths import config_dir
-from controller.panels.window.jobs import Jobs
+from controller.panels.session.jobs import Jobs
+from controller.panels.session.look import Look
 from controller.stage.picture import PictureSettings
 from controller.stage.stage import FaceSettings, with_picture
 
 if TYPE_CHECKING:
-    from controller.panels.window.commands import Commands
+    from controller.panels.session.commands import Commands
     from controller.stage.stage import Stage
     from surface.head import Head
 
 NOBODY = "nobody"
 _THEMES, _QUALITIES = (get_args(PictureSettings.model_fields[key].annotation) for key in ("theme", "quality"))
-
-
-@dataclass(frozen=True)
-class Look:
-    """What the user chose. person : a name or a file, empty for nobody. head : a folder; the stage's own without."""
-
-    theme: str
-    quality: str
-    person: str
-    head: Path | None = None
 
 
 class Looks:

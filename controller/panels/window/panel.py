@@ -11,18 +11,20 @@ from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import Details, PanelRequest, StartServos, StopServos
 from controller.body.panel_state import PanelState
-from controller.panels.window.capture import Capture
+from controller.panels.session.capture import Capture
+from controller.panels.session.commands import Commands
+from controller.panels.session.feed import Feed
+from controller.panels.session.jobs import Jobs
+from controller.panels.session.look import Look
+from controller.panels.session.playback import Playback
+from controller.panels.session.problems import Problems
 from controller.panels.window.colours import GREEN, RED
-from controller.panels.window.commands import Commands
 from controller.panels.window.drops import Drops
 from controller.panels.window.expressions import ExpressionButtons
-from controller.panels.window.feed import Feed
-from controller.panels.window.jobs import Jobs, draw_jobs
 from controller.panels.window.keys import Keys
 from controller.panels.window.link_list import LinkList
-from controller.panels.window.looks import Look, LookControls, Looks
-from controller.panels.window.playback import Playback
-from controller.panels.window.problems import Problems, draw_problems
+from controller.panels.window.looks import LookControls, Looks
+from controller.panels.window.notices import draw_jobs, draw_problems
 from controller.panels.window.servos import ServoBars
 from controller.panels.window.sliders import Sliders
 from controller.panels.window.timeline_panel import TimelinePanel

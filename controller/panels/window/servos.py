@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from controller.panels.session.feed import KEPT_S, Feed, servo_key
 from controller.panels.window.colours import AMBER, BRIGHT_GREEN, GREY, LAYERS, packed
-from controller.panels.window.feed import KEPT_S, Feed, servo_key
 
 _PLOT_LINES = 11.0
 _HOT_C = 60.0
@@ -32,6 +32,7 @@ class ServoBars:
         if not details.servos:
             imgui.text_wrapped("asking the servos" if self._feed.waiting else "this stage has no servos")
             return
+        self._plots(imgui, details.servos)
         flags = imgui.TableFlags_.sizing_stretch_prop | imgui.TableFlags_.row_bg
         if imgui.begin_table("##servos", 3, flags):
             self._columns(imgui, [servo["name"] for servo in details.servos])
@@ -39,7 +40,6 @@ class ServoBars:
                 self._row(imgui, servo)
             imgui.end_table()
         imgui.text_wrapped("bar: limits; mark: wanted; line: measured. Click one to plot it.")
-        self._plots(imgui, details.servos)
 
     def _columns(self, imgui: Any, names: list[str]) -> None:
         fixed, height = imgui.TableColumnFlags_.width_fixed, imgui.get_font_size()

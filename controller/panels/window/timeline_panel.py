@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from controller.base.errors import OMOTE_ERRORS
-from controller.panels.window.capture import Capture
+from controller.panels.session.capture import Capture
+from controller.panels.session.commands import Commands
+from controller.panels.session.playback import Playback
+from controller.panels.session.problems import Problems
 from controller.panels.window.colours import AMBER, GREY, LAYERS, RED, packed
-from controller.panels.window.commands import Commands
 from controller.panels.window.flow import Flow
-from controller.panels.window.playback import Playback
-from controller.panels.window.problems import Problems
 from controller.takes.timeline import EASES
 from controller.vocabulary.vocabulary import Vocabulary
 
 _TRACK_LINES, _NEAR = 3.2, 0.45
-_TICKS = 10
+_TICK_LINES = 3.0  # least distance of two ticks, in heights of a line
 
 
 class TimelinePanel:
@@ -99,10 +100,11 @@ class TimelinePanel:
         draw, line, now = imgui.get_window_draw_list(), imgui.get_font_size(), self._commands.now
         grey, vec = packed(imgui, GREY), imgui.ImVec2
         draw.add_rect_filled(corner, vec(corner.x + width, corner.y + height), packed(imgui, GREY, 0.15), 3.0)
-        for i in range(_TICKS):
-            x = corner.x + width * i / _TICKS
+        step_s = tick_s(self.playback.shown_s * _TICK_LINES * line / width)
+        for i in range(int(self.playback.shown_s / step_s) + 1):
+            x = corner.x + scale * i * step_s
             draw.add_line(vec(x, corner.y), vec(x, corner.y + line * 0.4), grey)
-            draw.add_text(vec(x + 2, corner.y), grey, f"{self.playback.shown_s * i / _TICKS:.3g}")
+            draw.add_text(vec(x + 2, corner.y), grey, f"{i * step_s:g}")
         if self.playback.range_s is not None and now.take is not None:
             low, high = (corner.x + scale * x for x in sorted(self.playback.range_s))
             draw.add_rect_filled(vec(low, corner.y), vec(high, corner.y + height), packed(imgui, AMBER, 0.25))
@@ -123,7 +125,7 @@ class TimelinePanel:
             colour = packed(imgui, AMBER if i == self.playback.selected else LAYERS["expression"])
             draw.add_quad_filled(vec(x - half, y), vec(x, y - half), vec(x + half, y), vec(x, y + half), colour)
             if key.name:
-                draw.add_text(vec(x - half, y + half), packed(imgui, (1.0, 1.0, 1.0, 1.0)), key.name)
+                draw.add_text(vec(max(x - half, corner.x), y + half), packed(imgui, (1.0, 1.0, 1.0, 1.0)), key.name)
 
     def _key_buttons(self, imgui: Any) -> None:
         playback, flow = self.playback, Flow(imgui)
@@ -144,7 +146,6 @@ class TimelinePanel:
         changed, self._ease = imgui.combo("easing", self._ease, list(EASES))
         if changed and playback.selected is not None:
             self._commands.arrange(self._commands.now.timeline.eased(playback.selected, EASES[self._ease]))
-        imgui.same_line()
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         _, self._mark = imgui.input_text_with_hint("##mark", "name of a mark", self._mark)
         imgui.same_line()
@@ -170,7 +171,7 @@ class TimelinePanel:
             self._try(self.save)
         if not is_take:
             imgui.same_line()
-            _, self._loop = imgui.checkbox("again and again", self._loop)
+            _, self._loop = imgui.checkbox("loop", self._loop)
         if self._message:
             imgui.text_wrapped(self._message)
 
@@ -178,3 +179,9 @@ class TimelinePanel:
         """Write the show or take. Raises ParameterError, ControllerError: it cannot be written."""
         path = self.playback.save(self._folder, self._name, self._vocabulary, loop=self._loop)
         self._message = f"wrote {path}"
+
+
+def tick_s(least_s: float) -> float:
+    """The least of 1, 2, 5, 10 and so on, and their tenths, that is ``least_s`` or more."""
+    power = 10.0 ** math.floor(math.log10(max(least_s, 1e-3)))
+    return next((power * factor for factor in (1.0, 2.0, 5.0) if power * factor >= least_s), power * 10.0)

@@ -6,8 +6,8 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from controller.body.messages import ControlShow, PanelRequest, PlayShow
-from controller.panels.window.capture import Capture
-from controller.panels.window.commands import Commands
+from controller.panels.session.capture import Capture
+from controller.panels.session.commands import Commands
 from controller.panels.window.flow import Flow
 from surface.view.scene.viewpoint import KEYS, Viewpoint
 
@@ -17,7 +17,7 @@ RED_DOT = (0.9, 0.15, 0.15, 1.0)
 class View:
     """Draws them; ``shows`` : names of the shows that the stage can play.
 
-    look : draws what changes the look of the face, where that can be changed.
+    look : draws what changes the look of the face, where that can be changed. overlays : what chooses overlays.
     """
 
     def __init__(
@@ -27,6 +27,7 @@ class View:
         self._commands, self._viewpoint, self._capture, self._send = commands, viewpoint, capture, send
         self._shows, self._show, self._paused = shows, "", False
         self.look: Callable[[], None] | None = None
+        self.overlays: Callable[[], None] | None = None
 
     def __call__(self) -> None:
         """Draw; called once a frame."""
@@ -47,6 +48,9 @@ class View:
             self._draw_shows(imgui)
         imgui.separator_text("pictures and recordings")
         self._captures(imgui)
+        if self.overlays is not None:
+            imgui.separator_text("over the picture")
+            self.overlays()
 
     def toggle_show(self) -> None:
         """Pause the show that plays, or let it go on; the first one begins where none was begun."""

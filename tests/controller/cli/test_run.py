@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from contextlib import nullcontext
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 from typer.testing import CliRunner, Result
@@ -177,15 +177,18 @@ class Session:
     """Stands in for a run: keeps what it is started with, and reports nothing."""
 
     def __init__(
-        self, stage: str, options: RunOptions, identity: Any, look: Any, status: Any, preloaded: Any, web: Any
+        self, stage: str, options: RunOptions, identity: Any, look: Any, status: Any, preloaded: Any = None,
+        web: Any = None,
     ) -> None:  # fmt: skip
         self.web = web
         self.given = {"stage": stage, "options": options, "identity": identity, "look": look}
         self.how: tuple[Any, ...] = ()
+        self.next_stage = Session.dropped.pop() if Session.dropped else None
         Session.last = self
         status("starting")
 
     last: Session
+    dropped: ClassVar[list[Path]] = []
 
     def _run(self, *how: Any) -> dict[str, Any]:
         self.how = how
@@ -218,6 +221,13 @@ def noted(*words: str) -> Session:
 
 
 LOOK = dict.fromkeys(("kiosk", "monitor", "quality", "fps", "theme", "camera", "evaluator", "person"))
+
+
+def test_a_stage_that_is_dropped_on_the_window_goes_on(display: dict[str, bool]) -> None:
+    Session.dropped.append(Path("next.toml"))
+    session = noted("run", "mine", "--theme", "mask")
+    assert session.given["stage"] == "next.toml" and session.given["look"]["theme"] == "mask"
+    assert session.how == ("window", None) and session.given["options"] == RunOptions()
 
 
 def test_a_run_without_options_opens_a_window_where_there_is_a_display(display: dict[str, bool]) -> None:

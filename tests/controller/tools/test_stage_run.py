@@ -184,8 +184,10 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
     given: list[Any] = []
 
     class Window:
-        def __init__(self, *words: Any) -> None:
-            given.extend(words)
+        next_stage = Path("next.toml")
+
+        def __init__(self, *words: Any, **more: Any) -> None:
+            given.extend([*words, more])
 
         def run(self, keep_going: Any) -> None:
             while keep_going():
@@ -195,6 +197,7 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
             return {"frames": 2}
 
     body: Any = FakeBody(told, 2)
+    body.details = object()
     body.send, body.panel_state, body.mailbox = object(), object(), object()
     monkeypatch.setattr(module, "BodyProcess", body)
     monkeypatch.setattr(module, "HeadValues", lambda mailbox, parameters, names: (mailbox, len(names)))
@@ -202,7 +205,9 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
     monkeypatch.setattr(window, "WindowFace", Window)
     session = StageRun(stage, status=told.append)
     report = session.run_window(None)
-    head, settings, values, send, panel_state, copy, options, controls = given
+    head, settings, values, send, panel_state, copy, options, controls, more = given
+    assert more["stage"] is session.stage and more["details"]() is body.details
+    assert session.next_stage == Path("next.toml")
     assert controls == session.stage.controls
     assert options.vocabulary is session.stage.vocabulary and "tour" in options.shows
     assert settings is session.stage.settings.face and (send, panel_state) == (body.send, body.panel_state)

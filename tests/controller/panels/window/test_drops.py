@@ -11,11 +11,11 @@ import pytest
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.body.messages import PlayTake
-from controller.panels.window.commands import Commands
+from controller.panels.session.commands import Commands
+from controller.panels.session.jobs import Jobs
+from controller.panels.session.problems import Problems
 from controller.panels.window.drops import Drops
-from controller.panels.window.jobs import Jobs
 from controller.panels.window.looks import Looks
-from controller.panels.window.problems import Problems
 from controller.stage.stage import FaceSettings, load_stage
 from surface.head import Head
 

@@ -20,7 +20,7 @@ from controller.base.paths import find_config
 from controller.body.messages import ControlShow, Hold, Neutral, PlayShow, Show, StartServos, StopServos
 from controller.body.panel_state import PanelState
 from controller.layers.commands import CommandState
-from controller.panels.window.commands import Commands
+from controller.panels.session.commands import Commands
 from controller.panels.window.editing import MouseEditing
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.robot.channels import build_table

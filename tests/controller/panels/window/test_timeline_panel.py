@@ -1,4 +1,4 @@
-"""controller.panels.window.playback and timeline_panel"""
+"""controller.panels.session.playback and timeline_panel"""
 
 from __future__ import annotations
 
@@ -11,8 +11,9 @@ import pytest
 
 from controller.base.parameters import PARAMETERS
 from controller.body.messages import HoldAll, Show
+from controller.panels.session.playback import Playback
 from controller.panels.window.panel import Panel, PanelOptions
-from controller.panels.window.playback import Playback
+from controller.panels.window.timeline_panel import tick_s
 from controller.takes.livelink import Take
 from controller.takes.plain import plain_take
 from controller.takes.timeline import Key, Timeline, load_timeline
@@ -135,6 +136,10 @@ def test_the_window_makes_a_show_of_two_keys(
     desk.commands.undo()
     desk.commands.undo()
     assert desk.commands.now.timeline == Timeline()
+
+
+def test_ticks_are_round_and_far_enough_apart() -> None:
+    assert [tick_s(least) for least in (0.03, 0.1, 0.6, 3.0, 7.0)] == pytest.approx([0.05, 0.1, 1.0, 5.0, 10.0])
 
 
 def test_a_timeline_without_keys_plays_nothing(desk: Desk) -> None:

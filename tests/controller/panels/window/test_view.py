@@ -9,8 +9,8 @@ import pytest
 
 from controller.base.parameters import PARAMETERS
 from controller.body.messages import ControlShow, PanelRequest, PlayShow
-from controller.panels.window.capture import Capture
-from controller.panels.window.commands import Commands
+from controller.panels.session.capture import Capture
+from controller.panels.session.commands import Commands
 from controller.panels.window.view import View
 from surface.view.docks import PictureArea
 from surface.view.scene.viewpoint import Viewpoint

@@ -14,7 +14,7 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import HoldAll, PanelRequest
-from controller.panels.window.commands import Commands
+from controller.panels.session.commands import Commands
 from controller.takes.edit import cut_out, keep, smooth
 from controller.takes.plain import write_plain
 from controller.takes.timeline import Ease, key_of_face, save_show

@@ -1,4 +1,4 @@
-"""controller.panels.window.own_expressions"""
+"""controller.panels.session.own_expressions"""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import pytest
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS
-from controller.panels.window.own_expressions import save_expression
+from controller.panels.session.own_expressions import save_expression
 from controller.vocabulary.vocabulary import Vocabulary
 
 

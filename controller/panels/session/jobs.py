@@ -1,7 +1,4 @@
-"""What takes long beside the picture: each job has a bar and can be cancelled, and its result is taken by the window.
-
-Independent of the window library, but for :func:`draw_jobs`.
-"""
+"""What takes long beside the picture: each job can be cancelled, and its result is taken by the window."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from controller.base.errors import ControllerError
-from controller.panels.window.problems import Problems
+from controller.panels.session.problems import Problems
 
 _LOOK_S = 0.05
 _END_S = 5.0
@@ -122,11 +119,3 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-
-
-def draw_jobs(imgui: Any, jobs: Jobs) -> None:
-    """Draw a bar and a button that cancels for each; nothing without any."""
-    for job in [job for job in jobs.running if not job.cancelled]:
-        imgui.progress_bar(-0.5 * (time.monotonic() - job.since_s) - 1e-3, imgui.ImVec2(-1, 0), job.title)
-        if imgui.button(f"cancel##{job.title}"):
-            job.cancelled = True

@@ -1,4 +1,4 @@
-"""controller.panels.window.capture"""
+"""controller.panels.session.capture"""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS
-from controller.panels.window.capture import LONGEST_S, Capture
+from controller.panels.session.capture import LONGEST_S, Capture
 from controller.takes.plain import plain_take
 from surface.view.docks import PictureArea
 

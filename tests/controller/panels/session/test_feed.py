@@ -1,4 +1,4 @@
-"""controller.panels.window.feed and problems"""
+"""controller.panels.session.feed and problems"""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.body.messages import AskDetails, Details
-from controller.panels.window.feed import KEPT_S, PERIOD_S, Feed
-from controller.panels.window.problems import Problems
+from controller.panels.session.feed import KEPT_S, PERIOD_S, Feed
+from controller.panels.session.problems import Problems
 
 SERVO = {"bus": "head", "id": 7, "name": "jawOpen", "wanted_deg": 3.0, "measured_deg": None, "low_deg": 0.0}
 

@@ -1,4 +1,4 @@
-"""controller.panels.window.jobs"""
+"""controller.panels.session.jobs"""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from controller.base.errors import ConfigError, ControllerError
-from controller.panels.window.jobs import Cancelled, Job, Jobs, run_program
-from controller.panels.window.problems import Problems
+from controller.panels.session.jobs import Cancelled, Job, Jobs, run_program
+from controller.panels.session.problems import Problems
 
 
 def finished(jobs: Jobs) -> None:

@@ -13,7 +13,7 @@ import numpy as np
 
 from controller.base.parameters import Floats
 from controller.body.messages import AskDetails, Details, PanelRequest
-from controller.panels.window.problems import Problems
+from controller.panels.session.problems import Problems
 
 PERIOD_S = 0.2
 KEPT_S = 30.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 
 from controller.base.parameters import Floats
 from controller.body.messages import Hold, Live, LookAt, Neutral, PanelRequest, Show
-from controller.panels.window.looks import Look
+from controller.panels.session.look import Look
 from controller.takes.livelink import Take
 from controller.takes.timeline import Timeline
 

@@ -1,11 +1,11 @@
-"""controller.panels.window.commands"""
+"""controller.panels.session.commands"""
 
 from __future__ import annotations
 
 import numpy as np
 
 from controller.body.messages import Hold, Live, LookAt, Neutral, Show
-from controller.panels.window.commands import Commands, Settings
+from controller.panels.session.commands import Commands, Settings
 
 
 def made(life: float = 0.0) -> tuple[Commands, list[object]]:

@@ -1,15 +1,10 @@
-"""What went wrong, for the panel: each message once, with its next step, until the user has read it.
-
-Independent of the window library, but for :func:`draw_problems`.
-"""
+"""What went wrong, for the panel: each message once, with its next step, until the user has read it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from controller.base.parts import describe
-from controller.panels.window.colours import AMBER
 
 _MOST = 100
 
@@ -46,20 +41,3 @@ class Problems:
     def dismiss_all(self) -> None:
         """All were read."""
         self.unread.clear()
-
-
-def draw_problems(imgui: Any, problems: Problems) -> None:
-    """Draw the newest with a button that dismisses it; nothing without any."""
-    if not problems.unread:
-        return
-    newest, more = problems.unread[-1], len(problems.unread) - 1
-    imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*AMBER))
-    imgui.text_wrapped(newest.text + (f" ({newest.times} times)" if newest.times > 1 else ""))
-    imgui.pop_style_color()
-    if imgui.button("read##problem"):
-        problems.dismiss()
-    if more:
-        imgui.same_line()
-        if imgui.button(f"all {more + 1}##problem"):
-            problems.dismiss_all()
-    imgui.separator()
