@@ -22,7 +22,7 @@ from controller.body.details import Notes
 from controller.body.event_log import EventLog
 from controller.body.link_part import LinkPart, link_status, thread_errors
 from controller.body.member import Member
-from controller.body.messages import RunOptions
+from controller.body.messages import Details, RunOptions
 from controller.body.panel_state import PanelState
 from controller.body.sources import Sources, Voice, show_part
 from controller.links.kind import LinkContext
@@ -238,10 +238,10 @@ class Body:
         except OMOTE_ERRORS as error:
             log.warning("%s", error)
 
-    def details(self) -> messages.Details:
+    def details(self) -> Details:
         """What servos, links, buses and parts report now, and what was logged since the last time."""
         overview = self.state.overview()
-        return messages.Details(
+        return Details(
             servos=overview["servos"],
             links=[{"name": link.name.removeprefix("link "), **link.report()} for link in self.links],
             buses=[loop.condition() for loop in self.buses],
