@@ -33,5 +33,5 @@ def check_feetech(model: str) -> None:
 def check_driven(table: ControlTable) -> None:
     """Raises DriverError for a model whose registers are known, but which omote does not drive."""
     if not table.driven:
-        hint = "omote scan and omote monitor --listen know its registers; docs/drivers.md says what it lacks"
+        hint = "omote scan and omote monitor --listen know its registers"
         raise DriverError(f"{table.model} is not driven by omote yet", hint=hint)
