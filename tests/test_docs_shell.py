@@ -100,7 +100,11 @@ LINES = sorted({line for page in PAGES for line in shell_lines(page.read_text(en
 PIPED = re.compile(r"^(?:arecord|ffmpeg) .*\| (omote .*)$")
 """A program that records a voice: what follows the pipe hears a file."""
 OMOTE = {line: (found[1] if (found := PIPED.match(line)) else line) for line in LINES if "omote " in line}
-RUN = [line for line, own in OMOTE.items() if line not in MESSAGES and own.split()[1] not in PARSED and " " in own[6:]]
+RUN = [
+    line for line, own in OMOTE.items()
+    if line not in MESSAGES and own.split()[1] not in PARSED and "--role" not in own and " " in own[6:]
+]  # fmt: skip
+"""Processes of one stage wait for each other: those with a role are run together by tests/controller/fleet."""
 
 
 def words_of(line: str, port: str = "PORT") -> list[str]:
@@ -115,6 +119,12 @@ def words_of(line: str, port: str = "PORT") -> list[str]:
     elif (words[1] == "export" or {"--sheet", "--take"} & set(words)) and not {"--head", "--person"} & set(words):
         words += ["--head", "small"]
     return [*words, *([] if "--dry-run" in words else MORE.get(words[1], []))]
+
+
+def example(page: str, line: str) -> str:
+    """The first example of a TOML file on a page that has a line."""
+    blocks = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / page).read_text(encoding="utf-8"), re.DOTALL)
+    return next(block for block in blocks if line in block)
 
 
 @pytest.fixture(scope="module")
@@ -140,6 +150,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (here / "voice.raw").write_bytes((here / "voice.wav").read_bytes()[44:])
     (here / "bad-minute.toml").write_bytes((ROOT / "examples" / "bad-minute.toml").read_bytes())
     (here / "bus.log").write_text("# omote traffic = 1\n# servos = 1:xl330-m288\n0 > ff ff fd 00 01 03 00 01 19 4e\n")
+    (here / "phone.toml").write_text(example("links.md", 'kind = "livelink"'))
+    (here / "ears.toml").write_text(example("expression.md", "[parameters.earLeft]"))
     (here / "out").mkdir()
     save_data(here / "small", small_head())
     return here

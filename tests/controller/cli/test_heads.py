@@ -68,7 +68,7 @@ def test_export_writes_what_fit_wrote(sheet, tmp_path):
 @pytest.mark.parametrize(
     ("words", "kind", "message"),
     [
-        (["export", "x.fbx"], ExportError, "is neither .glb nor .obj"),
+        (["export", "x.fbx"], ExportError, "is neither .glb, .obj nor .urdf"),
         (["export", "x.glb", "--set", "jawOpn=1"], ParameterError, "jawOpn"),
         (["fit", "none.glb", "-o", "h"], FitError, "no such mesh file"),
         (["fit", "none.glb", "-o", "h", "--unit", "ell"], FitError, "no such mesh file"),

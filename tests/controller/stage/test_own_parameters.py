@@ -267,7 +267,7 @@ def test_panels_show_them(stage: Stage) -> None:
 
 def test_sliders_of_the_window_have_their_region(stage: Stage) -> None:
     pytest.importorskip("imgui_bundle")
-    from controller.panels.window.commands import Commands
+    from controller.panels.session.commands import Commands
     from controller.panels.window.sliders import Sliders
 
     sliders = Sliders(stage.parameters.neutral, Commands(lambda _: None), None, stage.parameters)

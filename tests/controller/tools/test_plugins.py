@@ -82,7 +82,7 @@ def test_an_exporter_takes_no_suffix_of_ours(install: Install) -> None:
     install("exporters", "aaa", EXPORTER.format(kind="aaa", suffix=".glb"))
     with pytest.raises(PluginError, match=r"\.glb is written by the built-in kind 'glb'"):
         EXPORTERS.get("aaa")
-    assert [one.kind for one in EXPORTERS.all()] == ["glb", "obj"]
+    assert [one.kind for one in EXPORTERS.all()] == ["glb", "obj", "urdf"]
 
 
 def test_added_exporters_are_those_of_other_packages_one_a_suffix(install: Install) -> None:

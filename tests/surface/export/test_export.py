@@ -179,9 +179,9 @@ def test_a_module_dropped_into_the_folder_is_found_and_one_that_lacks_a_package_
         [sys.executable, "-c", USE], cwd=tmp_path, env=env, capture_output=True, text=True, check=True
     )
     suffixes, name, error = done.stdout.splitlines()
-    assert suffixes == "('.glb', '.obj', '.txt')"
+    assert suffixes == "('.glb', '.obj', '.txt', '.urdf')"
     assert name == "small"
-    assert error == "h.fbx: is neither .glb, .obj nor .txt; fbx needs no_such_package"
+    assert error == "h.fbx: is neither .glb, .obj, .txt nor .urdf; fbx needs no_such_package"
 
 
 def test_exporters_from_outside_are_used_and_refused_where_they_cannot_be(tmp_path, head):

@@ -27,7 +27,7 @@ def test_every_part_has_its_baked_shade(head: Head, folder: Path) -> None:
     sizes = {part.name: len(part.vertices) for part in head.parts}
     assert {name: len(share) for name, share in shares.items() if "/" not in name} == sizes
     assert all(len(share) == sizes[name.split("/")[0]] for name, share in shares.items())
-    skins = {part.name for part in head.parts if materials.of(part.material).program == "skin"}
+    skins = {part.name for part in head.parts if materials.material_of(part.material).program == "skin"}
     assert skins <= {name.split("/")[0] for name in shares if name.endswith("/visible")}
 
 

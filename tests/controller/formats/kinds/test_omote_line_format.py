@@ -96,10 +96,11 @@ def test_a_client_drives_an_omote_and_another_reads_it(token: str | None) -> Non
         assert ready.wait(10)
         sender = closers.enter_context(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
         (message,) = FORMATS.get("json").encoder(P).encode(part(jawOpen=0.5, headYaw=-0.25))
+        opening = f"AUTH {token}\n".encode() if token else b""  # a token is asked for over UDP, too
         out = P.neutral()
 
         def came() -> bool:
-            sender.sendto(message, ("127.0.0.1", port))
+            sender.sendto(opening + message, ("127.0.0.1", port))
             far.state.tick(time.monotonic_ns(), 0.01, out)
             layer = near.mixer["capture"]
             return bool(layer.held[JAW] and np.abs(layer.values[[JAW, YAW]] - (0.5, -0.25)).max() < 1e-3)
