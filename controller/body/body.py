@@ -94,29 +94,11 @@ class Body:
             )
         self.state.servo_monitor = self.measured_face
         self.state.servo_records = lambda: [record for bus in self.buses for record in servo_states(bus)]
-        events = None
-        if options.events is not None:
-            events = EventLog(options.events, lsl=options.lsl)
-            self._closers.callback(events.close)
-        shows = Shows(self._find_show, self.state, self._show_names, events.note if events is not None else None)
-        self.state.shows = shows
-        show = stage.settings.show if options.show is None else str(options.show)
-        if show is not None:
-            script = load_script(show, parameters, stage.vocabulary, beside=stage.path)
-            shows.play(self._as_part(script))
+        self._make_shows(options, parameters)
         self._web = options.web
         self.follows_servos = options.mirror and self.measured_face is not None
         self.live = path is None
-        voice, settings = options.voice, stage.settings
-        if self.live:  # the stage's own take and voice play beside the links
-            path = stage.file(settings.take) if settings.take is not None else None
-            if voice is None and settings.voice is not None:
-                voice = Voice(str(stage.file(settings.voice)), settings.voice_hz)
-        player = None
-        if path is not None and self.replay is None:
-            player = TakePlayer(load_take(path, parameters), self.state, reader_of(path).layer)
-        follow = self.measured_face if self.follows_servos else None
-        self.sources = Sources(self.state, player, follow, voice, beside=self.live)
+        self.sources = self._make_sources(options, parameters)
         self._mailbox = mailbox
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping, self._begun = threading.Event(), threading.Event()
@@ -124,6 +106,32 @@ class Body:
         self._lost = False  # nothing is left to follow
         self._panel = self.state.parts.add(Part("panel state", effect="the panel shows what it knew last"))
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
+
+    def _make_shows(self, options: RunOptions, parameters: Parameters) -> None:
+        """What plays scripts and keeps their events; the show that the options or the stage name begins."""
+        events = None
+        if options.events is not None:
+            events = EventLog(options.events, lsl=options.lsl)
+            self._closers.callback(events.close)
+        shows = Shows(self._find_show, self.state, self._show_names, events.note if events is not None else None)
+        self.state.shows = shows
+        show = self.stage.settings.show if options.show is None else str(options.show)
+        if show is not None:
+            script = load_script(show, parameters, self.stage.vocabulary, beside=self.stage.path)
+            shows.play(self._as_part(script))
+
+    def _make_sources(self, options: RunOptions, parameters: Parameters) -> Sources:
+        """A take, a voice or the servos that the face follows; those of a live stage play beside its links."""
+        path, voice, settings = options.take, options.voice, self.stage.settings
+        if self.live:
+            path = self.stage.file(settings.take) if settings.take is not None else None
+            if voice is None and settings.voice is not None:
+                voice = Voice(str(self.stage.file(settings.voice)), settings.voice_hz)
+        player = None
+        if path is not None and self.replay is None:
+            player = TakePlayer(load_take(path, parameters), self.state, reader_of(path).layer)
+        follow = self.measured_face if self.follows_servos else None
+        return Sources(self.state, player, follow, voice, beside=self.live)
 
     def _bus_loops(self, robot: RobotSettings, parameters: Parameters, limp: bool) -> list[BusLoop]:
         anchors = None

@@ -24,6 +24,7 @@ from controller.takes.recording import recorded, replay
 from controller.tools.check import check_anything
 from controller.tools.motion_file import convert, load_motion
 from controller.vocabulary.vocabulary import Vocabulary
+from tests.controller.robot.small_robot import robot_text
 
 SECOND = 10**9
 EARS = """
@@ -54,18 +55,9 @@ redNose = "noseGlow"
 [alert]
 weights = { ear = 0.75, browInnerUp = 0.5 }
 """
-ROBOT = """
-name = "ears"
-buses = [{ name = "head", kind = "simulated", transport = "memory" }]
-
-[profiles.servo]
-bus = "head"
-model = "xl330-m288"
-map = { at = [-1, 1], deg = [-40, 40] }
-limit_deg = [-45, 45]
-max_speed_deg_s = 200
-max_accel_deg_s2 = 2000
-
+ROBOT = (
+    robot_text("ears")
+    + """
 [[channels]]
 name = "left"
 id = 1
@@ -78,6 +70,7 @@ id = 2
 profile = "servo"
 mix = { earRight = 1 }
 """
+)
 
 
 @pytest.fixture

@@ -16,20 +16,12 @@ from controller.robot.channels import build_table
 from controller.robot.pairs.files import fit_channels, read_pairs, write_robot
 from controller.robot.pairs.fit import fit_servo
 from controller.robot.robot import load_robot
+from tests.controller.robot.small_robot import robot_text
 
 JAW, SMILE, FROWN, BLINK = (P.index(n) for n in ("jawOpen", "mouthSmileLeft", "mouthFrownLeft", "eyeBlinkLeft"))
-ROBOT = """
-name = "one"
-buses = [{ name = "head", kind = "simulated", transport = "memory" }]
-
-[profiles.servo]
-bus = "head"
-model = "xl330-m288"
-map = { at = [-1, 1], deg = [-40, 40] }
-limit_deg = [-45, 45]
-max_speed_deg_s = 200
-max_accel_deg_s2 = 2000
-
+ROBOT = (
+    robot_text("one")
+    + """
 # the jaw's own servo
 [[channels]]
 name = "jaw"
@@ -49,6 +41,7 @@ id = 3
 profile = "servo"
 mix = { eyeBlinkLeft = 1 }
 """
+)
 
 
 def faces(count: int = 240, seed: int = 1) -> np.ndarray:
