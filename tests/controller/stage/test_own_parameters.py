@@ -270,3 +270,12 @@ def test_sliders_of_the_window_have_their_region(stage: Stage) -> None:
 def test_a_vocabulary_of_a_stage_without_them_cannot_name_them(files: Path) -> None:
     with pytest.raises(ConfigError, match=r"alert\.weights\.ear: unknown parameter"):
         Vocabulary.load(PARAMETERS, more=[files / "ears.toml"])
+
+
+def test_all_heads_of_a_stage_have_the_parameters_of_each_ones_robots(files: Path) -> None:
+    (files / "eared.toml").write_text('vocabularies = ["ears.toml"]\n' + ROBOT)
+    heads = '[[heads]]\nname = "maple"\n[[heads]]\nname = "oak"\nrobots = ["eared.toml"]\n'
+    (files / "hall.toml").write_text('name = "hall"\n' + heads)
+    stage = load_stage(str(files / "hall.toml"), PARAMETERS)
+    assert [head.stage.parameters.own for head in stage.heads] == [("earLeft", "earRight", "noseGlow")] * 2
+    assert stage.parameters.names == stage.heads[1].stage.parameters.names  # one mailbox's width serves every head
