@@ -19,7 +19,8 @@ def heights(settle: float) -> Floats:
     """(steps + 1,) mm above the skin of a lock through hair of 10 mm."""
     paths, _ = grow(
         Plane(), np.zeros((1, 3)), np.array([60.0]), lambda at: np.full(len(at), 10.0),  # type: ignore[arg-type]
-        lambda at, normals, share: np.tile([1.0, 0.0, 0.0], (len(at), 1)), lift=np.array([1.2]), slack=0.0, settle=settle,
+        lambda at, normals, share: np.tile([1.0, 0.0, 0.0], (len(at), 1)),
+        lift=np.array([1.2]), slack=0.0, settle=settle,
     )  # fmt: skip
     return np.asarray(paths[0, :, 1])
 
