@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from controller.links.line.protocol import (
@@ -54,11 +54,12 @@ def test_checksum_sees_swapped_neighbours_and_short_bursts(data: bytes, draw: st
 
 
 @settings(deadline=None)
-@given(st.lists(WORD, min_size=1, max_size=8), TAG, st.booleans())
-def test_words_round_trip(words: list[str], tag: int | None, checked: bool) -> None:
-    line = format_words(words, tag=tag, checked=checked)
+@given(st.lists(WORD, min_size=1, max_size=8), TAG, st.booleans(), st.sampled_from(["", "maple", "all"]))
+def test_words_round_trip(words: list[str], tag: int | None, checked: bool, to: str) -> None:
+    assume(not words[0].startswith("@"))  # that is whom a line is for
+    line = format_words([f"@{to}", *words] if to else words, tag=tag, checked=checked)
     assert line.endswith(b"\n")
-    assert parse_words(line[:-1]) == Words(tuple(words), tag, checked)
+    assert parse_words(line[:-1]) == Words(tuple(words), tag, checked, to)
 
 
 @settings(deadline=None)
