@@ -3,6 +3,8 @@
 # mypy: disable-error-code="call-arg, var-annotated"
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
@@ -96,6 +98,30 @@ def move_rigid(
         move_tile(own[0], own[1], linear, shift, turn, 0, own[2], own[3], 0)
         for k in range(left):
             out[whole + k], out_directions[whole + k] = own[2, k], own[3, k]
+
+
+@lean
+def place_vertices(
+    start: Ints, ids: Ints, weights: Floats, points: Floats32, share: Floats32,
+    turn: Floats, pivot: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """Write to ``out (k, 3)`` vertices as sums of ``weights`` of ``points (n, 4)``, the entries of the k-th from
+    ``start[k]`` to ``start[k + 1]``, each rotated about ``pivot (3,)`` by its ``share`` of the rotation vector
+    ``turn (3,)``, by Rodrigues' formula."""
+    angle = math.sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2])
+    small = 1.0 / max(angle, 1e-12)
+    x, y, z = turn[0] * small, turn[1] * small, turn[2] * small
+    for k in range(out.shape[0]):
+        a, b, c = -pivot[0], -pivot[1], -pivot[2]
+        for i in range(start[k], start[k + 1]):
+            a += weights[i] * points[ids[i], 0]
+            b += weights[i] * points[ids[i], 1]
+            c += weights[i] * points[ids[i], 2]
+        cosine, sine = math.cos(share[k] * angle), math.sin(share[k] * angle)
+        along = (1.0 - cosine) * (a * x + b * y + c * z)
+        out[k, 0] = pivot[0] + cosine * a + sine * (y * c - z * b) + along * x
+        out[k, 1] = pivot[1] + cosine * b + sine * (z * a - x * c) + along * y
+        out[k, 2] = pivot[2] + cosine * c + sine * (x * b - y * a) + along * z
 
 
 @lean

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.base.errors import ViewError
-from surface.base.extras import require
 from surface.view.draw.programs import build, set_uniforms
 from surface.view.scene.parts import ViewHead, ViewPart
 from surface.view.scene.sampling import is_software
@@ -75,8 +74,9 @@ class GpuEvaluator(Evaluator):
 
     def __init__(self, ctx: moderngl.Context, head: Head, reason: str) -> None:
         from surface.head.posing.influence import Influence  # compiled: loaded when first used
+        from surface.head.posing.kernels import place_vertices
 
-        self._own, self.reason, self._ctx = head, reason, ctx
+        self._own, self.reason, self._ctx, self._place = head, reason, ctx, place_vertices
         self._sums = Influence(head)
         starts = self._sums.part_start.tolist()
         self._ranges = {part.name: ends for part, ends in zip(head.parts, pairwise(starts), strict=True)}
@@ -89,7 +89,7 @@ class GpuEvaluator(Evaluator):
         self._points = _float_texture(ctx, self._sums.points)
         self._packed = _padded(np.zeros((self._sums.points, 4), np.float32), self._points.height)
         self._passes: dict[str, tuple[moderngl.Buffer, moderngl.VertexArray]] = {}
-        self._read: dict[tuple[str, int], tuple[np.ndarray, Any, np.ndarray]] = {}
+        self._read: dict[tuple[str, int], tuple[np.ndarray, ...]] = {}
         # A context without a window has no framebuffer of its own, and without one transform feedback does nothing.
         self._frame = ctx.framebuffer([ctx.renderbuffer((1, 1), 4)])
         self._turn: Turn | None = None
@@ -135,22 +135,20 @@ class GpuEvaluator(Evaluator):
     def positions(self, part: ViewPart, ids: np.ndarray) -> np.ndarray:
         key = part.name, id(ids)
         if key not in self._read:
-            self._read[key] = ids, *self._sparse(part, ids)  # keeps ids, so that their id stays theirs
-        _, matrix, share = self._read[key]
-        at = matrix @ self._packed[: self._sums.points, :3]
-        return at if self._turn is None else rotate_by_share(at, share, self._turn.vector, self._turn.pivot)
+            self._read[key] = ids, *self._sums_of(part, ids)  # keeps ids, so that their id stays theirs
+        _, start, own, weights, share = self._read[key]
+        at = np.empty((len(ids), 3))
+        vector, pivot = (np.zeros(3), np.zeros(3)) if self._turn is None else (self._turn.vector, self._turn.pivot)
+        self._place(start, own, weights, self._packed, share, vector, pivot, at)
+        return at
 
-    def _sparse(self, part: ViewPart, ids: np.ndarray) -> tuple[Any, np.ndarray]:
-        """Matrix (k, points) that gives vertices `ids` of a part before the head turns, and their shares (k,)."""
-        require("vertices from the graphics processor", "scipy")
-        from scipy.sparse import csr_matrix  # takes a moment to import
-
+    def _sums_of(self, part: ViewPart, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Start, points and weights of the sums of vertices `ids` of a part before the head turns, and shares."""
         vertices = self._ranges[part.name][0] + np.asarray(ids)
         low, high = self._sums.start[vertices], self._sums.start[vertices + 1]
-        entries = np.concatenate([np.arange(a, b) for a, b in zip(low, high, strict=True)])
-        ends = np.cumsum([0, *(high - low)])
-        content = self._sums.weights[entries, 0].astype(np.float32), self._sums.ids[entries], ends
-        return csr_matrix(content, shape=(len(ids), self._sums.points)), self._sums.share[vertices]
+        entries = np.concatenate([np.zeros(0, np.int64), *map(np.arange, low, high)])
+        start = np.concatenate([[0], np.cumsum(high - low)])
+        return start, self._sums.ids[entries], self._sums.weights[entries, 0], self._sums.share[vertices]
 
     def rotation(self) -> np.ndarray:
         return _IDENTITY if self._turn is None else self._turn.matrix
@@ -160,19 +158,6 @@ class GpuEvaluator(Evaluator):
         frame = (*self._frame.color_attachments, self._frame)
         for thing in (*passes, *frame, self._points, self._weights, self._program):
             thing.release()
-
-
-def rotate_by_share(points: np.ndarray, share: np.ndarray, vector: np.ndarray, pivot: np.ndarray) -> np.ndarray:
-    """`points` (k, 3), each rotated about `pivot` (3,) by its `share` (k,) of a rotation `vector` (3,).
-
-    By Rodrigues' formula.
-    """
-    angle = float(np.linalg.norm(vector))
-    axis = vector / max(angle, 1e-12)
-    c, s = np.cos(share * angle)[:, None], np.sin(share * angle)[:, None]
-    own = points - pivot
-    rotated: np.ndarray = pivot + c * own + s * np.cross(axis, own) + (1.0 - c) * (own @ axis)[:, None] * axis
-    return rotated
 
 
 def choose(ctx: moderngl.Context, head: ViewHead, name: str) -> Evaluator:

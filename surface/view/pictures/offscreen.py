@@ -11,6 +11,7 @@ import numpy as np
 from surface.base.errors import ViewError
 from surface.base.extras import importing
 from surface.view.draw.alternating import Alternating
+from surface.view.draw.fences import FrameFence
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target, read_pixels
 from surface.view.scene.camera import Camera
@@ -79,7 +80,9 @@ class Offscreen:
             raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
         self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme, evaluator=evaluator)
         self._front = framed(Camera.front(), head)
-        self._sampling = AdaptiveSampling(quality, samples, software=is_software(self.ctx))
+        software = is_software(self.ctx)
+        self._sampling = AdaptiveSampling(quality, samples, software=software)
+        self._fence = None if software else FrameFence(self.ctx)
         self._settings = self._sampling.settings
         self.target = Target(self.ctx, size, *self._settings)
 
@@ -92,8 +95,9 @@ class Offscreen:
     def draw(self, values: np.ndarray, camera: Camera | None = None) -> None:
         """Pose the head with `values` (P,) and draw it, without reading the picture back.
 
-        The frame before is waited for after the pose, so a software renderer fills the last frame while the head is
-        posed, and there is never more than one frame in flight. :meth:`read` and :meth:`finish` wait for this one.
+        A software renderer fills the last frame while the head is posed for this one, and is waited for then. On a
+        graphics processor the frame before is waited for when this one has been given to it, so that it always has
+        work, and there are never more than two frames in flight. :meth:`read` and :meth:`finish` wait for this one.
         """
         self._sampling.start_live()
         self._frame(values, camera)
@@ -121,11 +125,13 @@ class Offscreen:
         started = time.perf_counter()
         self._make_current()
         self.target.complete()
-        if not self._sampling.simplified:  # there, smoothing has just waited for all that was painted
+        if self._fence is None and not self._sampling.simplified:  # there, smoothing has just waited for everything
             self.ctx.finish()
         self._apply_sampling()
         self.renderer.update()
         self.target.paint(self.renderer, camera or self._front)
+        if self._fence is not None:
+            self._fence.end_frame()
         if self._sampling.live:
             self._sampling.add_frame(time.perf_counter() - started)
 
@@ -159,6 +165,8 @@ class Offscreen:
         self._make_current()
         self.renderer.release()
         self.target.release()
+        if self._fence is not None:
+            self._fence.release()
         if self._owner:
             self.ctx.release()
 
