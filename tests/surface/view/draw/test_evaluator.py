@@ -12,8 +12,8 @@ from ball_head import BallHead
 
 from surface.base.errors import ViewError
 from surface.head import Head
-from surface.view import Camera, Offscreen
 from surface.head.posing.kernels import place_vertices
+from surface.view import Camera, Offscreen
 from surface.view.draw.evaluator import EVALUATORS, why_not_gpu
 from surface.view.pictures.offscreen import open_context
 
