@@ -69,14 +69,18 @@ def conduct(pipe: Connection, endpoint: str, names: list[str], hz: float) -> Non
     """A conductor's process: says when it conducts, and at the end what it published."""
     node, states = make_node(endpoint, "conductor", names)
     pipe.send("ready")
-    begin, spent, clock, values = 0.0, {"layers": 0.0, "publish": 0.0}, Clock(hz), P.neutral()
+    begin, spent, clock = 0.0, {"layers": 0.0, "publish": 0.0}, Clock(hz)
+    rested = dict.fromkeys(names, 0.0)
+    shown = {name: P.neutral() for name in names}
     for now in clock.run(lambda: not pipe.poll()):
         if not begin and node.lease.active:
             begin, began_s = time.process_time(), time.monotonic()
             pipe.send("conducting")
         for name, state in states.items():
-            first = time.thread_time()
-            stamp = state.tick(now, clock.step_s, values)
+            first, stamp, values = time.thread_time(), 0, shown[name]
+            rested[name] += clock.step_s
+            if not node.rests(name):
+                stamp, rested[name] = state.tick(now, rested[name], values), 0.0
             second = time.thread_time()
             node.relay(name, now, clock.step_s, values, stamp)
             spent["layers"] += second - first
@@ -195,6 +199,7 @@ def summary(
         "processor of a head's process, us a face": 1e6 * sum(r["processor_s"] for r in reports) / count,
         "conductor: layers, us a face": 1e6 * standby["layers"] / standby["ticks"],
         "conductor: sending or following, us a face": 1e6 * standby["publish"] / standby["ticks"],
+        "router, us a face": 1e6 * router_s / count,
         "loopback bytes a face, both hops": sent / count,
         "wait for the standby (ms)": [round(gap * 1e3) for gap in gaps],
     }

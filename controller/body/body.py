@@ -45,6 +45,8 @@ log = logging.getLogger(__name__)
 Relay = Callable[[int, float, Floats, int], int]
 """Gets the time of a tick (ns), its length (s), the values (P,), which it may change, and the time of the newest
 command in them; returns the time of the newest command in what it left."""
+_LONGEST_STEP_S = 0.1
+"""Layers that rested for longer go on as after a step of this length."""
 
 
 class Body:
@@ -68,6 +70,7 @@ class Body:
     ) -> None:
         self.stage, self._member = stage, member
         self.relay: Relay | None = None
+        self._unmixed_s = 0.0  # since the layers ticked last
         self.rests: Callable[[], bool] = lambda: False
         self._closers, self.notes = Closers(), Notes()
         self.state = stage.state(parameters)
@@ -301,7 +304,11 @@ class Body:
         """One step of the face: its sources, the layers, and what of it the buses and the picture get."""
         begun, values = self._begun.is_set(), self._newest[0].copy()
         self.sources.tick(now_ns, begun)
-        stamp = 0 if self.rests() else self._tick(now_ns, step_s, values, begun)
+        self._unmixed_s = min(self._unmixed_s + step_s, _LONGEST_STEP_S)
+        stamp = 0
+        if not self.rests():
+            stamp = self._tick(now_ns, self._unmixed_s, values, begun)
+            self._unmixed_s = 0.0
         if self.relay is not None:
             stamp = self.relay(now_ns, step_s, values, stamp)
             self.state.show(values)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+_STANDBY_TICKS = 5
 _BEATS = 5
 """Signs of life in the length of a lease."""
 _STATE_S, _CLOCK_S = 0.2, 1.0
@@ -66,6 +67,7 @@ class Node:
         self.refused: Counter[str] = Counter()
         self.published = 0
         self._sequences = dict.fromkeys(heads, 0)
+        self._rests = {name: i for i, name in enumerate(heads)}  # those who stand by take turns
         self._beat_s, self._stop_time = -1.0, ""
         self._restored: Token | None = None
         self._closers, self._stopping = ExitStack(), threading.Event()
@@ -104,9 +106,13 @@ class Node:
         return theirs if follower.conducted else stamp_ns
 
     def rests(self, head: str) -> bool:
-        """Whether a head's own layers are not needed: it shows what a conductor sends, and would not conduct itself."""
+        """Whether a head's own layers are not needed at this tick: it shows exactly what a conductor sends. One that
+        stands by keeps them up to date at every fifth tick, to go on from there. Called once a tick."""
         follower = self.followers[head]
-        return not self.conducts and follower.conducted and follower.exact
+        if not (follower.conducted and follower.exact):
+            return False
+        self._rests[head] += 1
+        return not self.conducts or self._rests[head] % _STANDBY_TICKS != 0
 
     def close(self) -> None:
         """Leave the others: a conductor's lease ends by itself."""
@@ -136,7 +142,7 @@ class Node:
     def _declare(self) -> None:
         session, here = self.session, f"{self.settings.role}/{self.session.zid()}"
         for name in self._heads:
-            self._keep(session.declare_subscriber(self.key(name, "parameters"), self._face_of(name)))
+            self._keep(session.declare_subscriber(self.key(name, "parameters"), self._directly(self._face_of(name))))
             about = self._answer(lambda: self.settings.model_dump(mode="json", exclude={"tls"}))
             tail = "" if self.conducts else f"/{self.settings.role}"  # equal keys would be one answer
             for what, answer in (("state", self._answer(partial(self.state, name))), ("configuration", about)):
@@ -152,6 +158,12 @@ class Node:
             self._keep(session.declare_queryable(self.key("_", "clock"), self._clock))
             for name, state in self._heads.items():
                 state.on_event = self._tell(name)
+
+    def _directly(self, act: Callable[[zenoh.Sample], None]) -> zenoh.handlers.Callback[zenoh.Sample]:
+        """A callback in Zenoh's receiving thread; others have a thread each, and waking that costs more than a face."""
+        from zenoh.handlers import Callback  # optional
+
+        return Callback(act, indirect=False)
 
     def _keep(self, declared: Any) -> None:
         self._closers.callback(declared.undeclare)
@@ -251,7 +263,7 @@ class Node:
         header = self._header(self._sequences[head], now_ns, stamp_ns)
         self.session.put(
             self.key(head, "parameters"), self._payloads.encode(values), encoding=self._payloads.encoding,
-            attachment=header.encode(), express=True,
+            attachment=header.encode(),
         )  # fmt: skip
 
     def _beat(self, now_ns: int) -> None:

@@ -22,6 +22,7 @@ from controller.formats.kinds.binary_format import BinaryDecoder, BinaryEncoder
 VERSION = 1
 """Of header and payloads; another one is refused."""
 ENCODINGS = {"exact": "omote/exact;1", "binary": "omote/binary;1", "json": "application/json"}
+_KINDS = {encoded: kind for kind, encoded in ENCODINGS.items()}
 _HEADER = struct.Struct("<BBHQQQqq")
 _COUNT = struct.Struct("<H")
 _STOPPED = 1
@@ -82,8 +83,7 @@ class Payloads:
         """(P,) values in their ranges. Raises LinkError: damaged, not finite, or of an encoding that is not known."""
         if len(data) > _MOST_BYTES:
             raise LinkError(f"a face of {len(data)} bytes")
-        kinds = {encoded: kind for kind, encoded in ENCODINGS.items()}
-        kind = kinds.get(encoding)
+        kind = _KINDS.get(encoding)
         if kind == "exact":
             values = self._exact(data)
         elif kind == "json":

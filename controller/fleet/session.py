@@ -14,6 +14,10 @@ from surface.base.extras import importing
 if TYPE_CHECKING:
     import zenoh  # optional: the extra zenoh
 
+_CONNECT_MS = 20_000
+"""A client waits so long for its router; afterwards whoever started it hears what is missing."""
+_NO_ROUTER_HINT = "start a router there, as zenohd -l tcp/0.0.0.0:7447, or correct [zenoh] connect"
+
 
 def open_session(settings: ZenohSettings, beside: Path) -> zenoh.Session:
     """A session by a stage's ``[zenoh]``; ``beside`` : the stage's file, from whose folder other files are named.
@@ -29,9 +33,8 @@ def open_session(settings: ZenohSettings, beside: Path) -> zenoh.Session:
         return zenoh.open(_configuration(settings, beside.parent))
     except zenoh.ZError as error:
         why = str(error).partition(" at ")[0]
-        raise LinkError(
-            f"zenoh at {where}: {why}", hint="look whether another program has the port: ss -ltnp"
-        ) from error
+        hint = _NO_ROUTER_HINT if "connect" in why else "look whether another program has the port: ss -ltnp"
+        raise LinkError(f"zenoh at {where}: {why}", hint=hint) from error
 
 
 def _configuration(settings: ZenohSettings, folder: Path) -> zenoh.Config:
@@ -56,7 +59,7 @@ def _entries(settings: ZenohSettings, folder: Path) -> dict[str, object]:
     if settings.connect or settings.listen:
         found |= {"connect/endpoints": settings.connect, "listen/endpoints": settings.listen}
     if settings.connect:
-        found |= {"connect/timeout_ms": -1, "connect/exit_on_failure": False}
+        found |= {"connect/timeout_ms": _CONNECT_MS, "connect/exit_on_failure": False}
     return found | (_tls(settings.tls, folder) if settings.tls is not None else {})
 
 

@@ -382,6 +382,17 @@ def test_every_tick_feeds_the_buses_and_a_command_brings_it_forward(tmp_path: Pa
     assert min(early) >= 0.05 and min(early) < 0.099, "half a period lies between two ticks at least"
 
 
+def test_layers_that_rested_go_on_with_the_time_that_passed(tmp_path: Path) -> None:
+    with Mailbox.create(len(P)) as mailbox:
+        body = Body(stage_of(tmp_path, ""), P, mailbox)
+        steps: list[float] = []
+        body.state.tick = lambda now_ns, dt, out: steps.append(dt) or 0  # type: ignore[func-returns-value, method-assign]
+        for rests in (False, True, True, False, *[True] * 30, False, False):
+            body.rests = lambda rests=rests: rests  # type: ignore[misc]
+            body.tick(0, 0.01)
+    assert steps == pytest.approx([0.01, 0.03, 0.1, 0.01])
+
+
 def ticks_on(body: Body) -> bool:
     """Whether the control loop goes on."""
     ticks = body.clock.ticks

@@ -51,9 +51,10 @@ def router(config: dict[str, Any] | None = None, endpoint: str | None = None) ->
 
 
 class Running:
-    """A node whose heads are ticked 100 times a second in a thread.
+    """A node whose heads are ticked 100 times a second in a thread, as a body does.
 
     rows : for each head, what was shown, in order, with the time. paused : ticks nothing, as a stopped process.
+    mixed : how often the layers of each head ticked.
     """
 
     def __init__(self, endpoint: str, role: str, *, folder: Path, seed: int = 1, heads: tuple[str, ...] = ("maple",),
@@ -64,12 +65,13 @@ class Running:
             state.live(1.0, 0)
         self.node = Node(ZenohSettings.model_validate(settings), P, self.states, folder / "stage.toml")
         self.rows: dict[str, list[np.ndarray]] = {name: [P.neutral()] for name in heads}
+        self.mixed = dict.fromkeys(heads, 0)
         self.paused, self._stopping = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def _run(self) -> None:
-        due = time.monotonic()
+        due, rested = time.monotonic(), dict.fromkeys(self.states, 0.0)
         while not self._stopping.is_set():
             while self.paused.is_set() and not self._stopping.is_set():
                 time.sleep(0.001)
@@ -77,8 +79,11 @@ class Running:
             time.sleep(max(0.0, due - time.monotonic()))
             now = time.monotonic_ns()
             for name, state in self.states.items():
-                values = P.neutral()
-                stamp = state.tick(now, 0.01, values)
+                values, stamp = self.rows[name][-1].copy(), 0
+                rested[name] += 0.01
+                if not self.node.rests(name):
+                    stamp, rested[name] = state.tick(now, rested[name], values), 0.0
+                    self.mixed[name] += 1
                 self.node.relay(name, now, 0.01, values, stamp)
                 self.rows[name].append(values)
 

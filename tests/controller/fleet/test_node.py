@@ -150,6 +150,23 @@ def test_a_conductor_that_dies_or_is_stopped_is_replaced_and_nobody_obeys_it_aga
 
 
 @pytest.mark.slow
+def test_layers_rest_while_another_process_decides_and_who_stands_by_keeps_up(hub: str, tmp_path: Path) -> None:
+    more = {"folder": tmp_path, "prefix": "rests", "heads": ("maple", "oak")}
+    with Running(hub, "conductor", **more) as first:
+        until(lambda: first.node.lease.active)
+        with Running(hub, "conductor", seed=9, **more) as second, Running(hub, "head", seed=5, **more) as head:
+            nodes = (first, second, head)
+            until(lambda: all(f.exact and f.conducted for n in (second, head) for f in n.node.followers.values()))
+            before = [(len(n.rows[name]), n.mixed[name]) for n in nodes for name in n.rows]
+            until(lambda: len(head.rows["maple"]) > before[4][0] + 200)
+            after = [(len(n.rows[name]), n.mixed[name]) for n in nodes for name in n.rows]
+            shares = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(before, after, strict=True)]
+    assert min(shares[:2]) > 0.97, shares  # it conducts
+    assert max(shares[2:4]) < 0.6 and min(shares[2:4]) > 0.15, shares  # a fifth, and after gaps on a busy machine more
+    assert max(shares[4:]) < 0.5, shares
+
+
+@pytest.mark.slow
 def test_a_head_without_a_conductor_lives_on_and_joins_again(hub: str, tmp_path: Path) -> None:
     more = {"folder": tmp_path, "prefix": "alone"}
     with Running(hub, "head", seed=5, **more) as head:
@@ -163,8 +180,15 @@ def test_a_head_without_a_conductor_lives_on_and_joins_again(hub: str, tmp_path:
             until(lambda: follower.conducted and follower.exact)
 
 
-def test_endpoints_and_files_that_cannot_be_used_are_named(hub: str, tmp_path: Path) -> None:
+def test_endpoints_and_files_that_cannot_be_used_are_named(
+    hub: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with pytest.raises(LinkError, match=r"zenoh at tcp/127\.0\.0\.1"):
         Running("", "head", folder=tmp_path, connect=[], listen=[hub]).node.close()
+    monkeypatch.setattr("controller.fleet.session._CONNECT_MS", 200)
+    nowhere = f"tcp/127.0.0.1:{free_port()}"
+    with pytest.raises(LinkError, match=f"zenoh at {nowhere}: Unable to connect") as caught:
+        Running(nowhere, "head", folder=tmp_path).node.close()
+    assert "start a router there" in str(caught.value.hint)
     with pytest.raises(LinkError, match=r"zenoh\.tls\.ca: .*none\.pem cannot be read"):
         Running(f"tls/127.0.0.1:{free_port()}", "head", folder=tmp_path, tls={"ca": "none.pem"})
