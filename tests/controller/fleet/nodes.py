@@ -54,7 +54,7 @@ class Running:
     """A node whose heads are ticked 100 times a second in a thread, as a body does.
 
     rows : for each head, what was shown, in order, with the time. paused : ticks nothing, as a stopped process.
-    mixed : how often the layers of each head ticked.
+    mixed : how often the layers of each head ticked. exact : for each row, whether it is exactly what a conductor sent.
     """
 
     def __init__(self, endpoint: str, role: str, *, folder: Path, seed: int = 1, heads: tuple[str, ...] = ("maple",),
@@ -66,6 +66,7 @@ class Running:
         self.node = Node(ZenohSettings.model_validate(settings), P, self.states, folder / "stage.toml")
         self.rows: dict[str, list[np.ndarray]] = {name: [P.neutral()] for name in heads}
         self.mixed = dict.fromkeys(heads, 0)
+        self.exact: dict[str, list[bool]] = {name: [False] for name in heads}
         self.paused, self._stopping = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
@@ -86,6 +87,7 @@ class Running:
                     self.mixed[name] += 1
                 self.node.relay(name, now, 0.01, values, stamp)
                 self.rows[name].append(values)
+                self.exact[name].append(self.node.followers[name].exact)
 
     def __enter__(self) -> Running:
         return self

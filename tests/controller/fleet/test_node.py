@@ -55,8 +55,9 @@ def test_heads_show_bit_for_bit_what_is_conducted_and_say_so(hub: str, tmp_path:
         until(lambda: follower.exact and follower.taken > 20)
         begin = len(head.rows["maple"])
         conductor.states["maple"].expression("happiness", 1.0, None, time.monotonic_ns())
-        until(lambda: follower.taken > 120)
-        shown = {row.tobytes() for row in head.rows["maple"][begin:]}
+        until(lambda: follower.taken > 120 and sum(head.exact["maple"][begin:]) > 60)
+        exact = zip(head.rows["maple"][begin:], head.exact["maple"][begin:], strict=False)  # rows go on coming
+        shown = {row.tobytes() for row, own in exact if own}  # after a gap, on a busy machine, it catches up
         sent = [row.tobytes() for row in conductor.rows["maple"]]
         assert shown <= set(sent) and len(shown) > 50
         assert not follower.refused and not head.node.refused
