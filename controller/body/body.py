@@ -223,7 +223,7 @@ class Body:
         stage, state = self.stage, self.state
 
         def context(closers: Closers) -> LinkContext:
-            return LinkContext(state, closers, stage.vocabularies, stage.path)
+            return LinkContext(state, closers, stage.vocabularies, stage.path, stage.head)
 
         links = [*stage.settings.links, *([self._web.link()] if self._web is not None else [])]
         choices = [link for link in links if not self.follows_servos or link.simulated is None]

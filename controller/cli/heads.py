@@ -383,13 +383,14 @@ def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> l
     from controller.base.paths import find_config
     from controller.robot.joint_limits import joint_limits
     from controller.robot.robot import load_robot
-    from surface.export.urdf import joints_of, write_urdf
+    from surface.export.urdf import write_urdf
+    from surface.head.model.joints import joints_of
 
     if out.suffix.lower() != ".urdf":
         hint = "omote export head.urdf --robot head24"
         raise ConfigError("--robot: its servos limit the joints of a .urdf", hint=hint)
     found = load_robot(find_config("robots", robot), PARAMETERS)
-    return write_urdf(head, out, pose, joint_limits(found, PARAMETERS, joints_of(head)))
+    return write_urdf(head, out, pose, joint_limits(found, PARAMETERS, joints_of(head.data)))
 
 
 def _animation(take: Path | None, rate_hz: float | None) -> Animation | None:

@@ -27,13 +27,15 @@ class LinkContext:
 
     sink : where accepted commands go, with the time they arrived.
     closers : gets what closes the link and all that was started with it; called in reverse order.
-    vocabularies : files of further expressions that the stage names. beside : the stage's file.
+    vocabularies : files of further expressions that the stage names. beside : the stage's file. head : the folder of
+        the head that is moved.
     """
 
     sink: CommandSink
     closers: ExitStack
     vocabularies: tuple[Path, ...] = ()
     beside: Path | None = None
+    head: Path | None = None
 
 
 class Link(Protocol):

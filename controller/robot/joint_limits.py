@@ -9,7 +9,7 @@ import numpy as np
 from controller.base.parameters import Parameters
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.settings import RobotSettings
-from surface.export.urdf import Joint, JointLimit
+from surface.head.model.joints import Joint, JointLimit
 
 _STEPS = 401
 

@@ -20,6 +20,7 @@ EXTRAS = {
     "cv2": ("opencv-python-headless", "webcam"),
     "mcap": ("mcap", "mcap"),
     "zenoh": ("eclipse-zenoh", "zenoh"),
+    "rosbags": ("rosbags", "ros2"),
     "onnxruntime": ("onnxruntime", "onnx"),
     "pylsl": ("pylsl", "lsl"),
     "websockets": ("websockets", "web"),

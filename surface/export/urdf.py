@@ -10,7 +10,6 @@ from __future__ import annotations
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,59 +19,18 @@ from surface.export.exporter import Exporter
 from surface.export.shapes import ExportPart, export_parts, unit
 from surface.export.textures import materials
 from surface.head import Head
-from surface.head.model.parameters import EYE_RAD, HEAD_RAD
+from surface.head.model.joints import BASE, JAW, ROS_AXES, SKULL, Joint, JointLimit, joints_of
 from surface.head.posing.part import HeadPart
 
-BASE, SKULL, JAW = "base_link", "headRoll", "jawOpen"
 _EYES = {"left_eye": "leftEyePitch", "right_eye": "rightEyePitch"}
-_AXES = {"Yaw": (0, 0, 1), "Pitch": (0, 1, 0), "Roll": (1, 0, 0), JAW: (0, 1, 0)}
-_ROS = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""Head space (x left, y up, z forward) in the axes of ROS."""
 _MOST = 0.5  # share of a motion from which on skin belongs to what moves
-_EFFORT_NM, _SPEED_RAD_S = 1.0, 6.0
+_EFFORT_NM = 1.0
 _STL_HEADER = b"written by omote; metres, x forward, y left, z up".ljust(80)
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
 
 
 Piece = tuple[str, ExportPart, Ints]
 """A link, a part, and the triangles (t, 3) of the part that belong to the link."""
-
-
-@dataclass(frozen=True)
-class JointLimit:
-    """Limits of a joint. low_rad, high_rad : its range. speed_rad_s : its top speed."""
-
-    low_rad: float
-    high_rad: float
-    speed_rad_s: float = _SPEED_RAD_S
-
-
-@dataclass(frozen=True)
-class Joint:
-    """A joint, called as its parameter. parent : the link that carries it. origin : (3,) mm, in head space."""
-
-    name: str
-    parent: str
-    origin: Floats
-    limit: JointLimit
-
-
-def joints_of(head: Head, limits: Mapping[str, JointLimit] | None = None) -> list[Joint]:
-    """The joints of a head, parents first.
-
-    limits : by parameter, such as those of a robot's servos; elsewhere the joint turns as far as the parameter does.
-    """
-    pivot, jaw = np.array(head.data.neck.pivot), head.data.jaw
-    angles = dict(zip(("headYaw", "headPitch", "headRoll"), HEAD_RAD.tolist(), strict=True))
-    found = [("headYaw", BASE, pivot), ("headPitch", "headYaw", pivot), (SKULL, "headPitch", pivot)]
-    found.append((JAW, SKULL, np.array(jaw.centre)))
-    for side, centre in zip(("left", "right"), head.data.eyes, strict=False):
-        found += [(f"{side}EyeYaw", SKULL, centre), (f"{side}EyePitch", f"{side}EyeYaw", centre)]
-        angles |= dict(zip((f"{side}EyeYaw", f"{side}EyePitch"), EYE_RAD.tolist(), strict=True))
-    own = {name: JointLimit(-angle, angle) for name, angle in angles.items()}
-    own[JAW] = JointLimit(0.0, jaw.angle_rad)
-    chosen = {**own, **(limits or {})}
-    return [Joint(name, parent, origin, chosen[name]) for name, parent, origin in found]
 
 
 def write_urdf(
@@ -83,7 +41,7 @@ def write_urdf(
     The head is written at rest with its hair and clothes as ``pose`` leaves them; angles of ``pose`` are left out,
     because the joints turn.
     """
-    joints = joints_of(head, limits)
+    joints = joints_of(head.data, limits)
     still = {name: value for name, value in pose.items() if name not in {joint.name for joint in joints}}
     pieces = _pieces(head, still)
     folder = path.with_name(f"{path.stem}_meshes")
@@ -95,7 +53,7 @@ def write_urdf(
         names = []
         for link, part, triangles in pieces:
             names.append(f"{link}-{part.name}.stl")
-            corners = (part.vertices[triangles] - origins[link]) @ _ROS.T * 1e-3
+            corners = (part.vertices[triangles] - origins[link]) @ ROS_AXES.T * 1e-3
             (made / names[-1]).write_bytes(_stl(corners.astype(np.float32)))
         meshes = [(made / name).replace(folder / name) for name in names]
         return [(made / path.name).replace(path), *meshes]
@@ -171,10 +129,9 @@ def _add_joint(robot: ET.Element, joint: Joint, parent: Floats) -> None:
     element = ET.SubElement(robot, "joint", name=joint.name, type="revolute")
     ET.SubElement(element, "parent", link=joint.parent)
     ET.SubElement(element, "child", link=joint.name)
-    x, y, z = _ROS @ (joint.origin - parent) * 1e-3
+    x, y, z = ROS_AXES @ (joint.origin - parent) * 1e-3
     ET.SubElement(element, "origin", xyz=f"{x:.6f} {y:.6f} {z:.6f}", rpy="0 0 0")
-    axis = next(axis for ending, axis in _AXES.items() if joint.name.endswith(ending))
-    ET.SubElement(element, "axis", xyz=" ".join(map(str, axis)))
+    ET.SubElement(element, "axis", xyz=" ".join(map(str, joint.axis)))
     limit = joint.limit
     ET.SubElement(
         element, "limit", lower=f"{limit.low_rad:.6f}", upper=f"{limit.high_rad:.6f}",

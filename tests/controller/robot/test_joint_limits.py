@@ -11,7 +11,7 @@ import pytest
 from controller.base.parameters import PARAMETERS as P
 from controller.robot.joint_limits import joint_limits
 from controller.robot.robot import load_robot
-from surface.export.urdf import Joint, JointLimit
+from surface.head.model.joints import Joint, JointLimit
 
 FULL = math.radians(60.0)
 JOINTS = [Joint(name, "base_link", np.zeros(3), JointLimit(-FULL, FULL)) for name in ("headYaw", "headPitch")]

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from surface.export.urdf import JointLimit, joints_of, write_urdf
+from surface.export.urdf import write_urdf
 from surface.head import Head
+from surface.head.model.joints import JointLimit, joints_of
 from surface.head.model.parameters import EYE_RAD, HEAD_RAD
 
 yourdfpy = pytest.importorskip("yourdfpy", reason="pip install yourdfpy")
@@ -61,7 +62,7 @@ def test_limits_are_those_that_were_given_and_every_triangle_belongs_to_one_link
     yaw, jaw = robot.joint_map["headYaw"], robot.joint_map["jawOpen"]
     assert (yaw.limit.lower, yaw.limit.upper, yaw.limit.velocity) == (-0.5, 0.25, 1.5)
     assert jaw.limit.upper == pytest.approx(head.data.jaw.angle_rad, abs=1e-6) and jaw.limit.lower == 0.0
-    assert [joint.name for joint in joints_of(head)] == [joint.name for joint in robot.robot.joints]
+    assert [joint.name for joint in joints_of(head.data)] == [joint.name for joint in robot.robot.joints]
     count = sum(len(yourdfpy.urdf.trimesh.load(path).faces) for path in written[1:])
     head.pose(head.values({}))
     assert count > 0.99 * sum(len(part.triangles) for part in head.parts)

@@ -1,0 +1,142 @@
+"""Publishes the face, and how its servos and links are, at a steady rate."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from controller.base.parameters import Floats
+from controller.layers.commands import CommandSink
+from controller.links.ros2.faces import ActionUnits, HeadJoints, ros_expression
+from controller.links.ros2.session import RosNode, RosPublisher
+from controller.vocabulary.reading import Readings
+
+_SLOW_S = 1.0
+"""Period of diagnostics."""
+_FRAME_ID = "base_link"
+_OK, _WARN, _ERROR = 0, 1, 2
+
+
+class Publishing:
+    """Publishes in its own thread until it is stopped.
+
+    joints : of the head; None where there is none, and then no joints and frames are published. prefix : of the names
+    of frames, as ``maple/``.
+    """
+
+    def __init__(
+        self, node: RosNode, sink: CommandSink, joints: HeadJoints | None, rate_hz: float, prefix: str, *, frames: bool
+    ) -> None:
+        self._node, self._sink, self._joints, self._prefix = node, sink, joints, prefix
+        self._units, self._readings = ActionUnits(sink.parameters), Readings(sink.parameters, sink.vocabulary)
+        self._period_s = 1.0 / rate_hz
+        self._make = node.types.make
+        kinds = {
+            "parameters": "std_msgs/msg/Float64MultiArray", "action_units": "hri_msgs/msg/FacialActionUnits",
+            "expression": "hri_msgs/msg/Expression", "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
+        }  # fmt: skip
+        if joints is not None:
+            kinds["joint_states"] = "sensor_msgs/msg/JointState"
+            kinds |= {"/tf": "tf2_msgs/msg/TFMessage"} if frames else {}
+        self._topics: dict[str, RosPublisher] = {name: node.publisher(name, kind) for name, kind in kinds.items()}
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._run, name="ros2, out", daemon=True)
+
+    @property
+    def sent(self) -> int:
+        """Messages published."""
+        return sum(topic.sent for topic in self._topics.values())
+
+    def start(self) -> None:
+        """Begin to publish."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """Stop publishing."""
+        self._stopping.set()
+        if self._thread.ident is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        values, slow_s, due_s = self._sink.parameters.neutral(), -np.inf, time.monotonic()
+        while not self._stopping.wait(max(0.0, due_s - time.monotonic())):
+            now_s = time.monotonic()
+            self._sink.snapshot(values)
+            self._publish(values)
+            if now_s - slow_s >= _SLOW_S:
+                slow_s = now_s
+                self._diagnose()
+            due_s = max(due_s + self._period_s, now_s)  # late ones are skipped
+
+    def _publish(self, values: Floats) -> None:
+        header = self._header()
+        count = len(values)
+        label = self._make("std_msgs/msg/MultiArrayDimension", label="parameters", size=count, stride=count)
+        layout = self._make("std_msgs/msg/MultiArrayLayout", dim=[label], data_offset=0)
+        self._topics["parameters"].publish(layout=layout, data=values.copy())
+        units = self._units.read(values).astype(np.float32)
+        self._topics["action_units"].publish(header=header, intensity=units, confidence=np.ones_like(units))
+        self._topics["expression"].publish(header=header, **self._expression(values))
+        if self._joints is not None:
+            self._publish_joints(self._joints, header, values)
+
+    def _expression(self, values: Floats) -> dict[str, Any]:
+        ((name, level),) = self._readings.read("EMOTION", values)
+        mood = dict(self._readings.read("MOOD", values))
+        return {
+            "expression": ros_expression(name), "confidence": level, "valence": mood["valence"],
+            "arousal": mood["arousal"],
+        }  # fmt: skip
+
+    def _publish_joints(self, joints: HeadJoints, header: Any, values: Floats) -> None:
+        none = np.zeros(0)
+        names = [self._prefix + name for name in joints.names]
+        self._topics["joint_states"].publish(
+            header=header, name=names, position=joints.angles(values), velocity=none, effort=none
+        )
+        if "/tf" in self._topics:
+            frames = [self._transform(frame, header) for frame in joints.frames(values)]
+            self._topics["/tf"].publish(transforms=frames)
+
+    def _transform(self, frame: Any, header: Any) -> Any:
+        x, y, z = frame.at_m.tolist()
+        qx, qy, qz, qw = frame.turn.tolist()
+        moved = self._make(
+            "geometry_msgs/msg/Transform",
+            translation=self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
+            rotation=self._make("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
+        )
+        parent = self._make("std_msgs/msg/Header", stamp=header.stamp, frame_id=self._prefix + frame.parent)
+        kind = "geometry_msgs/msg/TransformStamped"
+        return self._make(kind, header=parent, child_frame_id=self._prefix + frame.name, transform=moved)
+
+    def _header(self) -> Any:
+        seconds, rest = divmod(time.time_ns(), 1_000_000_000)
+        stamp = self._make("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
+        return self._make("std_msgs/msg/Header", stamp=stamp, frame_id=self._prefix + _FRAME_ID)
+
+    def _diagnose(self) -> None:
+        """One status for the face, and one for each servo and link."""
+        state, found = self._sink.status(), self._sink.overview()
+        stopped = self._sink.stop_latch.stopped
+        face = self._status("face", _WARN if stopped else _OK, f"stopped by {stopped.who}" if stopped else "", state)
+        servos = [self._status_of("servo", each) for each in found.get("servos", [])]
+        links = [self._status_of("link", each) for each in found.get("links", [])]
+        self._topics["/diagnostics"].publish(header=self._header(), status=[face, *servos, *links])
+
+    def _status_of(self, what: str, record: Mapping[str, Any]) -> Any:
+        name = record.get("name") or record.get("channel") or record.get("port") or record.get("kind") or ""
+        error = str(record.get("error") or "")
+        return self._status(f"{what} {name}", _ERROR if error and what == "servo" else _OK, error, record)
+
+    def _status(self, name: str, level: int, message: str, record: Mapping[str, Any]) -> Any:
+        flat = {key: value for key, value in record.items() if isinstance(value, str | int | float | bool)}
+        pairs = [self._make("diagnostic_msgs/msg/KeyValue", key=key, value=str(value)) for key, value in flat.items()]
+        return self._make(
+            "diagnostic_msgs/msg/DiagnosticStatus", level=level, name=f"{self._node.name('omote')}: {name}",
+            message=message or "OK", hardware_id="", values=pairs,
+        )  # fmt: skip
