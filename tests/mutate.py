@@ -55,7 +55,7 @@ OPERATORS = (
 by a TypeError, and the removal of decorators that compile or cache, which no test should notice."""
 TIMES = 4
 """So many times as long as without the mutant may the tests take before they are ended."""
-FLOOR_S = 60.0
+FLOOR_S = 120.0
 """So long they may take in any case; how long they take without the mutant is only measured where that is not enough,
 which is then, so that a busy machine delays both."""
 LONGEST_S = 1200.0
