@@ -63,7 +63,7 @@ class Result:
     wrong : fresh positions that were not the servo's. unnoticed : the same of Protocol 1.0 under faults that change
         bytes: one such reply in 256 has a right checksum, for it has 8 bits. jumps : goals beyond the speed limit.
     driven, healthy : cycles times servos. left_on : servos with torque after the end.
-    told : the first wrong values and jumps.
+    findings : the first wrong values and jumps.
     """
 
     cycles: int = 0
@@ -78,7 +78,7 @@ class Result:
     driven: int = 0
     healthy: int = 0
     left_on: int = 0
-    told: list[str] = field(default_factory=list)
+    findings: list[str] = field(default_factory=list)
 
     @property
     def share(self) -> float:
@@ -95,7 +95,7 @@ class Result:
             f"healthy servos were driven {self.share:.2%} of the time": self.share < DRIVEN,
             f"only {len(self.pairs)} of {self.wanted} pairs came": len(self.pairs) < self.wanted,
         }
-        return [text for text, is_so in found.items() if is_so] + self.told
+        return [text for text, is_so in found.items() if is_so] + self.findings
 
 
 class Head:
@@ -237,8 +237,8 @@ class Head:
                 )
 
     def _tell(self, what: str) -> None:
-        if len(self.result.told) < 10:
-            self.result.told.append(f"{self.name}, {self.clock():.2f} s: {what}")
+        if len(self.result.findings) < 10:
+            self.result.findings.append(f"{self.name}, {self.clock():.2f} s: {what}")
 
     def finish(self) -> None:
         """Stop, and look which servos are on."""

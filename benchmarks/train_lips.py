@@ -29,7 +29,7 @@ MOST_S = 3600
 """Seconds of a recording that are read."""
 BATCH = 512
 RENEW = 4
-"""Rounds after which recordings are changed anew."""
+"""Rounds after which recordings are changed again."""
 CLOSED = 1.8
 """How much more closed lips count."""
 LOUD_PERCENTILE = 95

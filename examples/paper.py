@@ -1,4 +1,4 @@
-"""The figures and numbers of the paper, made anew and beside omote's own, on one HTML page.
+"""The figures and numbers of the paper, made again and beside omote's own, on one HTML page.
 
     python examples/paper.py paper.html            # minutes: the meshes are compared as in docs/surface.md
     python examples/paper.py paper.html --short    # seconds: coarser meshes, shorter measurements
@@ -94,7 +94,7 @@ def summary(saved: dict[str, list[Variant]], frames: dict[str, float]) -> str:
     rows: list[tuple[str, ...]] = [("", "the paper", "omote")]
     for name, variants in saved.items():
         for way in ("by control points", "by chord error"):
-            found = [told(v.saving) for v in variants if v.name == way]
+            found = [in_words(v.saving) for v in variants if v.name == way]
             paper = f"{100 * PAPER_SAVED:.1f} %" if name == "greatest deviation" and "points" in way else ""
             rows.append((f"data saved {way}, at equal {name}", paper, found[0] if found else "none found"))
     rows += [
@@ -104,7 +104,7 @@ def summary(saved: dict[str, list[Variant]], frames: dict[str, float]) -> str:
     return table(rows)
 
 
-def told(saving: float) -> str:
+def in_words(saving: float) -> str:
     """A part that is saved, or, below 0, how much more is needed."""
     return f"{100 * saving:.1f} %" if saving >= 0.0 else f"none: {-100 * saving:.1f} % more"
 
@@ -189,7 +189,7 @@ def update(moving: Deformation, domain: Domain, seconds: float) -> str:
     steps = cycle(np.array([[[0.0, 0.0, 0.1]], [[0.0, 0.0, -0.1]]]))
     single, whole = rate(lambda: moving.move(one, next(steps)), seconds), rate(moving.refresh, seconds)
     touched = set(map(int, moving.lists.entries_of(int(one[0]))[0]))
-    text = f"One point moved: {1e6 / single:.0f} µs. All vertices computed anew: {1e6 / whole:.0f} µs."
+    text = f"One point moved: {1e6 / single:.0f} µs. All vertices computed again: {1e6 / whole:.0f} µs."
     return f"<p>{text}</p>" + cells(moving.mesh, domain, touched)
 
 

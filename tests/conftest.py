@@ -42,6 +42,7 @@ LONGEST = (
     "tests/controller/tools/test_simulate.py",
     "tests/test_fuzz_files.py",
     "tests/surface/fit/surfaces/test_groupfile.py",
+    "tests/surface/fit/wardrobe/test_main.py",
     "tests/test_extending.py",
     "tests/test_extras.py",
     "tests/controller/robot/test_anchors.py",

@@ -2,9 +2,9 @@
 
 Mutants come from cosmic-ray. A sample of places is drawn with a fixed seed, each place once, and each mutant runs in a
 copy of the checkout against the tests mapped to its module: the test file of its name, the test files that import it,
-and those of its folder, the quick tests first. A mutant is killed when a test fails that passes without it, or when the
-tests use much more processor time than they need or do not end at all. Outside of CI, because 50 mutants take ten
-minutes and more.
+and those of its folder, the quick tests first. A mutant is killed when a test fails that passes without it, or by
+time-out: when the tests take several times as long as without it. Outside of CI, because 50 mutants take ten minutes
+and more.
 """
 # ruff: noqa: T201 (a program that prints for people)
 
@@ -18,14 +18,15 @@ import itertools
 import os
 import random
 import re
-import resource
 import shutil
 import signal
 import subprocess
 import sys
 import tempfile
+import threading
+import time
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,10 +53,14 @@ OPERATORS = (
 )
 """Changes that leave a program which still runs. cosmic-ray has more, such as ``*`` to ``>>``, which any test notices
 by a TypeError, and the removal of decorators that compile or cache, which no test should notice."""
-TIMEOUT_S = 200
-"""Of processor time, so that tests that only wait for their turn on a busy machine count as running."""
+TIMES = 4
+"""So many times as long as without the mutant may the tests take before they are ended."""
+FLOOR_S = 120.0
+"""So long they may take in any case; how long they take without the mutant is only measured where that is not enough,
+which is then, so that a busy machine delays both."""
 LONGEST_S = 1200.0
-"""Of time on the clock, for mutants that wait for ever: on a busy machine, the tests of a module may take minutes."""
+"""Tests that take longer without any mutant are refused."""
+TIMED_OUT = "time-out"
 
 
 @dataclass(frozen=True)
@@ -87,11 +92,13 @@ def main() -> int:
         copies: SimpleQueue[Path] = SimpleQueue()
         for job in range(given.jobs):
             copies.put(_copy(Path(folder) / str(job) / "omote"))
+        original = Original(_copy(Path(folder) / "original" / "omote"))
         with ThreadPoolExecutor(given.jobs) as pool:
-            noticed = list(pool.map(lambda mutant: _killed_by(mutant, copies), mutants))
-        _refuse_red_tests(copies, {test for test in noticed if test and test.startswith("tests/")})
+            noticed = list(pool.map(lambda mutant: _killed_by(mutant, copies, original), mutants))
+        original.seconds(sorted({test for test in noticed if test and test.startswith("tests/")}))
     killed = sum(test is not None for test in noticed)
     print(f"\n{' '.join([given.room, *given.under])}, seed {given.seed}: {_share(killed, len(mutants))}")
+    print(f"{noticed.count(TIMED_OUT)} of them were killed by time-out")
     if equivalent:
         print(f"with {equivalent} listed as equivalent: {_share(killed, len(mutants) + equivalent)}")
     for mutant, test in zip(mutants, noticed, strict=True):
@@ -258,16 +265,26 @@ def _copy(target: Path) -> Path:
     return target
 
 
-def _refuse_red_tests(copies: SimpleQueue[Path], tests: set[str]) -> None:
-    """Run the tests that noticed a mutant once without any: what they said holds only where they pass."""
-    copy = copies.get()
-    ended, output = _pytest(copy, sorted(tests), 10 * TIMEOUT_S) if tests else (0, "")
-    copies.put(copy)
-    if ended != 0:
-        raise SystemExit(f"these tests must be green before a mutant says anything about them:\n{output}")
+class Original:
+    """The checkout without a mutant, in which tests must pass before a mutant says anything about them."""
+
+    def __init__(self, copy: Path) -> None:
+        self._copy, self._one_at_a_time = copy, threading.Lock()
+        self._seconds: dict[tuple[str, ...], float] = {}
+
+    def seconds(self, words: list[str]) -> float:
+        """How long pytest takes with these words; ends the program where a test fails."""
+        with self._one_at_a_time:
+            if words and tuple(words) not in self._seconds:
+                started_s = time.monotonic()
+                ended, output = _pytest(self._copy, words, lambda: LONGEST_S)
+                if ended not in (0, 5):  # 5: pytest found no test
+                    raise SystemExit(f"these tests must be green before a mutant says anything about them:\n{output}")
+                self._seconds[tuple(words)] = time.monotonic() - started_s
+            return self._seconds.get(tuple(words), 0.0)
 
 
-def _killed_by(mutant: Mutant, copies: SimpleQueue[Path]) -> str | None:
+def _killed_by(mutant: Mutant, copies: SimpleQueue[Path], original: Original) -> str | None:
     """The test that failed first, or what else ended the tests; None where they passed."""
     copy = copies.get()
     noticed = None
@@ -276,7 +293,7 @@ def _killed_by(mutant: Mutant, copies: SimpleQueue[Path]) -> str | None:
         # a time that no other file or mutant of it has: Python keeps bytecode by time and size
         os.utime(copy / mutant.module, (0, next(_times)))
         for some in _rounds(tests_of(mutant.module)):
-            ended, output = _pytest(copy, some, TIMEOUT_S)
+            ended, output = _pytest(copy, some, lambda some=some: TIMES * original.seconds(some))
             if ended not in (0, 5):  # 5: pytest found no test
                 noticed = _noticed_by(ended, output)
                 break
@@ -299,29 +316,48 @@ def _rounds(tests: list[str]) -> Iterator[list[str]]:
 def _noticed_by(ended: int | None, output: str) -> str:
     """The test that failed first, without its parameters, or what else ended the tests."""
     found = re.search(r"^(?:FAILED|ERROR) ([^\s\[]+)", output, re.MULTILINE)
-    if found:
+    if found:  # also where pytest waits after it for a process that the mutant left
         return found[1]
-    return "time" if ended in (None, -signal.SIGXCPU, -signal.SIGKILL) else f"exit code {ended}"
+    return TIMED_OUT if ended is None else f"exit code {ended}"
 
 
-def _pytest(copy: Path, words: list[str], timeout_s: int) -> tuple[int | None, str]:
-    """Exit code of pytest, None where it did not end in time, and the end of what it printed."""
+def _pytest(copy: Path, words: list[str], longest_s: Callable[[], float]) -> tuple[int | None, str]:
+    """Exit code of pytest, None where it had to be ended, and the end of what it printed.
+
+    `longest_s`: how long it may take; only asked where it takes longer than :data:`FLOOR_S`.
+    """
     environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": ""}
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--tb=line", *words]
+    started_s = time.monotonic()
     with tempfile.TemporaryFile("w+") as output:
         process = subprocess.Popen(
             command, cwd=copy, env=environment, stdout=output, stderr=output, start_new_session=True
         )
-        resource.prlimit(process.pid, resource.RLIMIT_CPU, (timeout_s, timeout_s + 5))
-        try:
-            ended: int | None = process.wait(LONGEST_S * timeout_s / TIMEOUT_S)
-        except subprocess.TimeoutExpired:
-            ended = None
-        with contextlib.suppress(ProcessLookupError):  # a mutant may leave processes behind, which hold their ports
-            os.killpg(process.pid, signal.SIGKILL)
-        process.wait()
+        ended = _wait(process, FLOOR_S)
+        if ended is None:
+            ended = _wait(process, started_s + longest_s() - time.monotonic())
+        _end(process, copy)
         output.seek(0)
         return ended, output.read()[-2000:]
+
+
+def _wait(process: subprocess.Popen[bytes], seconds: float) -> int | None:
+    """The exit code, None where the process did not end in time."""
+    with contextlib.suppress(subprocess.TimeoutExpired):
+        return process.wait(max(0.0, seconds))
+    return None
+
+
+def _end(process: subprocess.Popen[bytes], copy: Path) -> None:
+    """End the group of pytest, and what its tests started in groups of their own (they know the copy): a mutant may
+    leave processes behind, which hold their ports."""
+    with contextlib.suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+    for environment in Path("/proc").glob("[0-9]*/environ"):
+        with contextlib.suppress(OSError):
+            if f"PYTHONPATH={copy}\0".encode() in environment.read_bytes():
+                os.kill(int(environment.parent.name), signal.SIGKILL)
 
 
 if __name__ == "__main__":

@@ -51,7 +51,7 @@ class Parameters:
     rest : value of the neutral face; 0 without, as for all of the base vocabulary.
     aliases : other spellings, folded, to canonical names.
     base : how many of them, the first, are of the base vocabulary; those after them are somebody's own.
-    descriptions : what people are told of some, by name. own_regions : regions that own vocabularies add.
+    descriptions : texts about some of them for people, by name. own_regions : regions that own vocabularies add.
     files : the vocabularies that were added.
     """
 

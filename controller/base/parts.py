@@ -48,7 +48,7 @@ class Part:
         self.failures = 0
         self.why = ""
         self._remedy, self._effect, self._ended, self._keep_trying = remedy, effect, ended, keep_trying
-        self._in_a_row, self._told = 0, ""
+        self._in_a_row, self._reported = 0, ""
         self._failed_s = self._due_s = 0.0
 
     def run(self, do: Callable[[], object], now_s: float) -> None:
@@ -72,8 +72,8 @@ class Part:
         self.off = self._in_a_row > len(PAUSES_S) and not self._keep_trying
         self._failed_s, self._due_s = now_s, now_s if self._remedy else now_s + self.pause_s
         self.failed, self.failures, self.why = True, self.failures + 1, describe(error)
-        if self.off or self.why != self._told:
-            self._told = self.why
+        if self.off or self.why != self._reported:
+            self._reported = self.why
             log.error("%s", self._message(), exc_info=error if os.environ.get("OMOTE_DEBUG") else None)
         try:
             self._ended()
@@ -93,7 +93,7 @@ class Part:
     def recover(self) -> None:
         """Say that a part that failed is at work again; does nothing for one that is."""
         if self.failed:
-            self.failed, self._told = False, ""
+            self.failed, self._reported = False, ""
             log.warning("%s works again", self.name)
 
     def report(self) -> dict[str, object]:

@@ -49,7 +49,7 @@ class Voice:
 
     @property
     def reopens(self) -> bool:
-        """Whether it can be opened again after a failure: a named pipe or a device; a file would begin anew."""
+        """Whether it can be opened again after a failure: a named pipe or a device; a file would begin again."""
         return self.path != "-" and not Path(self.path).is_file()
 
     def check(self) -> None:

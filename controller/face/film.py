@@ -29,7 +29,7 @@ def draw_film(
     """Draw the head of ``still`` with each row of values, and write the clip, whole or not at all.
 
     rows : (n, P) float64, one for each frame. out : .mp4, .webp or .gif. sound : file with what is heard (.mp4).
-    progress : told (done, total).
+    progress : called with (done, total).
 
     Returns how many frames were written.
 

@@ -102,7 +102,7 @@ class Node:
         if conducting:
             self._publish(head, now_ns, values, stamp_ns)
             return stamp_ns
-        self._obey_stop(head, follower)
+        self._handle_stop(head, follower)
         return theirs if follower.conducted else stamp_ns
 
     def rests(self, head: str) -> bool:
@@ -234,12 +234,12 @@ class Node:
         def act(sample: zenoh.Sample) -> None:
             header = _header_of(sample)
             if header.token.holder != self.lease.holder and header.token >= self.lease.highest:
-                state, told = self._heads[head], self._heads[head].on_event
+                state, on_event = self._heads[head], self._heads[head].on_event
                 state.on_event = None  # what another conductor said is not said again
                 try:
                     journal.apply(sample.payload.to_bytes(), state, time.monotonic_ns())
                 finally:
-                    state.on_event = told
+                    state.on_event = on_event
 
         return self._heard(act)
 
@@ -271,7 +271,7 @@ class Node:
             self._beat_s = now_ns * 1e-9
             self.session.put(self.key("_", "lease"), b"", attachment=self._header(now_ns=now_ns).encode(), express=True)
 
-    def _obey_stop(self, head: str, follower: Follower) -> None:
+    def _handle_stop(self, head: str, follower: Follower) -> None:
         """Stop where the conductor says so, and go on where it no longer does and nobody here has stopped."""
         latch, header = self._heads[head].stop_latch, follower.header
         if header is None or not follower.conducted:

@@ -32,6 +32,6 @@ class ClockOffset:
         self.error_ns = trip // 2
 
     def forget(self) -> None:
-        """Begin anew, with another clock."""
+        """Start again, with another clock."""
         self._answers.clear()
         self.offset_ns, self.error_ns = 0, None

@@ -57,7 +57,7 @@ class Format:
     timeout_s : a source that is silent for so long is usually lost; infinity where messages are sent on changes only.
     takes_token : whether a TCP stream that other machines may open, and each datagram that they may send, must begin
         with a token: not where programs that know nothing of tokens send them.
-    greeting : what a program is told that is called for faces, before it is read; a whole message with its end.
+    greeting : what is sent to a program that is called for faces, before it is read; a whole message with its end.
     measured : whether its messages have room for what the servos show, beside the face.
     note : one sentence on what the format cannot carry, for people.
     install : what ``pip install`` takes where a package is missing.

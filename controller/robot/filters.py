@@ -92,7 +92,7 @@ class SlowStart:
         self._passed = np.zeros(len(channels))
 
     def restart(self, where: Flags) -> None:
-        """Channels ``where`` : (n,) start anew."""
+        """Channels ``where`` : (n,) start again."""
         self._passed[where] = 0.0
 
     def step(self, dt: float) -> Floats:

@@ -68,7 +68,7 @@ def mcap_take(path: Path, parameters: Parameters) -> Take:
 
 
 def _plain(messages: Iterator[tuple[str, int, bytes]], path: Path) -> Iterator[tuple[str, int, bytes]]:
-    """The same messages; a text that the package cannot read is told in plain words. Raises TakeError."""
+    """The same messages; a text that the package cannot read is reported in plain words. Raises TakeError."""
     try:
         yield from messages
     except UnicodeDecodeError as error:

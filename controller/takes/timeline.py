@@ -124,14 +124,14 @@ def steps_of(timeline: Timeline, parameters: Parameters, rate_hz: float = RATE_H
     count = int(np.floor(timeline.length_s * rate_hz + 1e-9))
     times = np.union1d(np.round(np.arange(count + 1) / rate_hz, 3), np.round([k.at_s for k in timeline.keys], 3))
     steps: list[str] = []
-    told = np.full(len(parameters), np.nan)
+    written = np.full(len(parameters), np.nan)
     for time_s in times if used else ():
         face = timeline.at(float(time_s), parameters)
         is_key = any(abs(key.at_s - time_s) < 1e-6 for key in timeline.keys)
         least = 1e-4 if is_key else _LEAST
-        changed = [i for i in used if not abs(face[i] - told[i]) < least]
+        changed = [i for i in used if not abs(face[i] - written[i]) < least]
         if changed:
-            told[changed] = face[changed]
+            written[changed] = face[changed]
             words = " ".join(f"{parameters.names[i]} {face[i]:.4g}" for i in changed)
             steps.append(f"{time_s:.3f} SET {words}")
     return steps

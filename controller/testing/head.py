@@ -64,7 +64,7 @@ class RobotHead:
             bus.clear(kind)
 
     def forget(self) -> None:
-        """Begin the records anew."""
+        """Start the records again."""
         for bus in self.buses.values():
             bus.forget()
 

@@ -84,7 +84,7 @@ def translate(source: str, target: str, parameters: Parameters, options: Options
               ready: Callable[[str], None] = lambda text: None) -> Counts:  # fmt: skip
     """Translate until the input ends, the time is up, or Ctrl-C.
 
-    source : ``kind:address``, or the path of a take. target : ``kind:address``. ready : told once both are open.
+    source : ``kind:address``, or the path of a take. target : ``kind:address``. ready : called once both are open.
 
     Raises LinkError, PortError, TakeError, PluginError: one of them is wrong or cannot be opened.
     """

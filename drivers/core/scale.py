@@ -53,7 +53,6 @@ class Scale:
 
     def tick(self, index: int, angle_rad: float) -> int:
         """Nearest step of one servo's angle, not limited."""
-        sign, zero_rad, center, rad_per_tick = self.axes[:, index].tolist()
         sign, zero_rad, center, rad_per_tick = map(float, self.axes[:, index])
         return round(center + (zero_rad + sign * angle_rad) / rad_per_tick)
 

@@ -113,7 +113,7 @@ class Bench(ABC, Generic[AnyRecord]):
         return [write for write in self.writes if write.id == id and register in ("", write.register)]
 
     def forget(self) -> None:
-        """Begin the record anew, from the present state."""
+        """Start the record again, from the present state."""
         self._serving.sync()
         self._begin()
 

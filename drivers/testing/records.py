@@ -41,7 +41,7 @@ class Write(NamedTuple):
 class Piece(NamedTuple):
     """Motion of a shaft from one moment until its next piece begins.
 
-    start_s : time of the line's clock. trajectory : what the motor was told. jammed_at : place where the shaft is
+    start_s : time of the line's clock. trajectory : the motion that was commanded. jammed_at : place where the shaft is
     stuck, or None. powered : torque is on.
     """
 
@@ -93,7 +93,7 @@ class Record:
 
 
 class ServoRecord(Record):
-    """Record of a chain of servos, by what each is told and how each moves.
+    """Record of a chain of servos, by what each is commanded and how each moves.
 
     pieces : motion of each servo, by its place in ``chain.servos``.
     """
@@ -145,7 +145,7 @@ def _piece(servo: SimulatedServo, start_s: float) -> Piece:
 class Output(NamedTuple):
     """One output of a board at a moment.
 
-    id : channel. key : name of its value. target : what it was told, None for off. value : what it puts out.
+    id : channel. key : name of its value. target : the commanded value, None for off. value : what it puts out.
     """
 
     id: int

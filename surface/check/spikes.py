@@ -214,13 +214,13 @@ def _spikes(
         if moved.max() > best:
             best, name, where = float(moved.max()), pose, int(moved.argmax())
 
-    def told(when: str, row: int, high: float) -> tuple[float, str]:
+    def found(when: str, row: int, high: float) -> tuple[float, str]:
         part = subject.parts[samples.part[row]].name
         return high / radius, f"{when}part {part!r} sticks out by {high:.1f} mm or more: {places.name(at[row])}"
 
     return [
-        told("", worst, height[worst]) if height[worst] > steep * radius else None,
-        told(f"with {name} = 1 ", where, best) if best > 0.0 else None,
+        found("", worst, height[worst]) if height[worst] > steep * radius else None,
+        found(f"with {name} = 1 ", where, best) if best > 0.0 else None,
     ]
 
 

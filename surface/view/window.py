@@ -82,7 +82,7 @@ def run_window(
     kiosk : cover a whole monitor, hide the cursor, ignore mouse and keys but for Esc, which closes the window.
     monitor : which one, from 0.
     docks : panels beside the picture, which takes what they leave; none in a kiosk.
-    area : told once per frame where the picture is.
+    area : called once per frame with where the picture is.
 
     Raises ViewError: no display, or no OpenGL. MissingPackage: imgui-bundle is not installed. Exceptions of `source`
     and `gui` are raised again after the window is closed.

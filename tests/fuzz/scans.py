@@ -11,8 +11,8 @@ import numpy as np
 from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.surfaces import SurfaceOptions, head_of
+from surface.fit.transfer.reports.landmarkfile import read_landmarks
 from surface.fit.transfer.scan import Scan, read_scan
-from surface.fit.transfer.telling.landmarkfile import read_landmarks
 from surface.readers.common import NamedSurface
 
 MARKS = b"""[landmarks]

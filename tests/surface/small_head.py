@@ -37,7 +37,7 @@ def all_points(name: str, move: tuple[float, float, float]) -> Group:
 
 
 def small_head(**other) -> HeadData:
-    """Patch "a" (x -40..0) bulges with mouthPucker, "b" (x 0..40) hangs on its border; "tooth" follows the jaw."""
+    """Patch "a" (x -40..0) bulges with mouthPucker, "b" (x 0..40) shares its border; "tooth" follows the jaw."""
     bulge = Group("mouthPucker", np.array([11, 12, 13], np.int32), np.full((3, 3), [0, 0, 6], np.float32))
     border = np.linspace(0, 1, 6)
     seam = Seam("a", "b", np.column_stack([np.ones(6), border]), np.column_stack([np.zeros(6), border]))

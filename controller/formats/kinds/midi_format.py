@@ -1,8 +1,8 @@
 """MIDI: each controller (control change) moves a parameter, by ``configs/controls/midi.toml``.
 
 Source of the bytes: MIDI 1.0 Detailed Specification: status bytes from 0x80 on, data bytes below, running status, and
-real-time messages of one byte that may come between any two bytes. A stream needs no delimiter. Channels are not told
-apart. A controller has 128 steps over the whole range of its parameter; an angle is 0 at 64.
+real-time messages of one byte that may come between any two bytes. A stream needs no delimiter. Channels are not
+distinguished. A controller has 128 steps over the whole range of its parameter; an angle is 0 at 64.
 """
 
 from __future__ import annotations

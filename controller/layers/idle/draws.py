@@ -14,7 +14,7 @@ from controller.motion.motion import minimum_jerk
 Pair = TypeVar("Pair", bound=tuple[float, float])
 
 LONGEST_GAP_S = 60.0
-"""After a pause of the clock longer than this, behaviours begin anew instead of making up for it."""
+"""After a pause of the clock longer than this, behaviours start again instead of making up for it."""
 
 
 def in_order(span: Pair) -> Pair:

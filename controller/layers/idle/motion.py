@@ -1,7 +1,7 @@
 """Joins the behaviours of idle motion into the values that one face adds.
 
-It depends on nothing but the seed, the times it is updated to, and what it is told: gaze shifts, loudness, manners. The
-settings are in ``configs/life``.
+It depends on nothing but the seed, the times it is updated to, and what it is given: gaze shifts, loudness, manners.
+The settings are in ``configs/life``.
 """
 
 from __future__ import annotations
@@ -106,7 +106,7 @@ class IdleMotion:
         return self._settings.manner(self.manner)
 
     def _begin(self, now_s: float) -> None:
-        """Start every behaviour anew; what they draw goes on."""
+        """Start every behaviour again; what they draw goes on."""
         self._hearing.reset()
         self.manner = self.chosen or "alone"
         self._turn.begin()

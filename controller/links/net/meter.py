@@ -8,7 +8,7 @@ _SHARE = 0.05  # of a new interval in the averages
 _LONGEST_S = 1.0  # a longer interval is a pause and none of the rate's
 _LARGEST_STEP = 8
 _MOST_LATE, _MOST_MISSING = 100, 3000
-"""Frames by which one may come late, and that may be missing at once; beyond, the source began anew (RFC 3550, A.1)."""
+"""Frames by which one may come late, and that may be missing at once; beyond, the source restarted (RFC 3550, A.1)."""
 
 
 class Numbers:
@@ -50,7 +50,7 @@ class Numbers:
         return max(0, expected - self._came) if self._came else 0
 
     def _begin(self, number: int) -> None:
-        """The source began anew: at midnight, after the largest number, or as it was started."""
+        """The source restarted: at midnight, after the largest number, or as it was started."""
         self._before += self._missing()
         self._first = self._highest = number
         self._came = 0

@@ -18,7 +18,7 @@ from controller.links.net.udp_caller import UdpCaller
 
 
 def greeting_of(form: Format, token: str | None) -> bytes:
-    """What a program is told that is called: the token, where there is one, and what its format wants."""
+    """What is sent to a program that is called: the token, where there is one, and what its format wants."""
     return (b"" if token is None else auth_message(token) + form.delimiter) + form.greeting
 
 

@@ -47,7 +47,7 @@ class Drops:
         self._send, self._folder, self._restart = send, folder, restart
 
     def __call__(self, paths: Sequence[Path]) -> None:
-        """Take them one after the other; what cannot be used is told, with what could be."""
+        """Take them one after the other; what cannot be used is reported, with what could be."""
         for path in paths:
             try:
                 self._take(path)

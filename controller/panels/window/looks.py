@@ -39,7 +39,7 @@ class Looks:
         self._shown = self.first
 
     def show(self, look: Look | None) -> None:
-        """Show a look; the first one without. What fails is told, and the face stays."""
+        """Show a look; the first one without. What fails is reported, and the face stays."""
         look = look or self.first
         before, self._shown = self._shown, look
         stage = self._stage(look)

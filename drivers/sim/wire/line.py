@@ -104,7 +104,7 @@ class Line(ABC):
     burst_s : replies reach the host in bursts so far apart, seconds; 0: at once.
     on_unplug : called with (fault, begins) when the port disappears or returns.
     packets : packets handled.
-    watcher : told before and after each packet is carried out, or None.
+    watcher : called before and after each packet is carried out, or None.
     lock : held while a packet is handled; hold it to read the devices from another thread.
     """
 

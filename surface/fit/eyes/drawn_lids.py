@@ -58,8 +58,8 @@ def seat_drawn_lids(head: HeadData) -> tuple[HeadData, list[str]]:
     for lids in eyes:
         head, was_open, is_open = lids.shut(head)
         if was_open - is_open > TELL_MM:
-            told = f"{lids.blink} left up to {was_open:.1f} mm of the eye open"
-            notes.append(f"{told}: its displacements were lengthened, to {is_open:.1f} mm")
+            fault = f"{lids.blink} left up to {was_open:.1f} mm of the eye open"
+            notes.append(f"{fault}: its displacements were lengthened, to {is_open:.1f} mm")
     return head, notes
 
 

@@ -2,7 +2,7 @@
 the samples hardly hold.
 
 Such a point is put where its neighbours say, at rest or in one shape. A mend that does not bring the surface nearer to
-the mesh is taken back. What a face is refused for after that is told by :func:`faults_of`.
+the mesh is taken back. What a face is refused for after that is reported by :func:`faults_of`.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def mend_spikes(
                 break
         if not better:
             break
-        notes.append(f"mended: {moved} control points stuck out or were turned over: {_told(wanted)}")
+        notes.append(f"mended: {moved} control points stuck out or were turned over: {_in_words(wanted)}")
         head, dense = trial, after
     return head, dense, notes
 
@@ -69,7 +69,7 @@ def _mended(
     return head, moved
 
 
-def _told(wanted: list[tuple[str, str, str]]) -> str:
+def _in_words(wanted: list[tuple[str, str, str]]) -> str:
     return ", ".join(f"{part} ({shape}: {much})" for part, shape, much in wanted[:3])
 
 

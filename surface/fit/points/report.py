@@ -172,7 +172,7 @@ def face_bounds(report: FitReport) -> str:
     """Errors of the face, which is the first part, and their bounds, which grow with the head.
 
     Where flat faces of the mesh are further from a smooth surface than the bound itself, the mesh has no detail that a
-    fit could follow: both figures are told, and errors may be beyond the bounds there.
+    fit could follow: both figures are reported, and errors may be beyond the bounds there.
     """
     face = report.parts[0]
     own = _bounded(report, face.neutral)

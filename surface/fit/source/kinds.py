@@ -153,8 +153,8 @@ def _said(name: str) -> str | None:
     spans = [(i, j) for i in range(len(words)) for j in range(i + 1, min(i + LONGEST, len(words)) + 1)]
     found = [(i, j, kind) for i, j in spans if (kind := _entry("".join(words[i:j]), j - i > 1)) is not None]
     outer = [(i, j, k) for i, j, k in found if not any(a <= i and j <= b and b - a > j - i for a, b, _ in found)]
-    told = [(k == PROP, k != SKIN, sum(map(len, words[i:j])), i, k) for i, j, k in outer]
-    return max(told)[-1] if told else None
+    ranked = [(k == PROP, k != SKIN, sum(map(len, words[i:j])), i, k) for i, j, k in outer]
+    return max(ranked)[-1] if ranked else None
 
 
 def _entry(word: str, several: bool) -> str | None:

@@ -94,10 +94,10 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
 def _shapes(mesh: FitMesh, named: NameMap) -> dict[str, Floats]:
     """The mesh's displacements by ARKit's names, before left and right are known. Moods of the whole face tell no
     place; vowels that stand in for a shape of the mouth do."""
-    told = {
+    sources = {
         n: [(s.index, s.side) for s in every if not s.region or n in VOWELS] for n, every in named.sources.items()
     }  # fmt: skip
-    return shapes_of_sides(told, mesh.deltas)
+    return shapes_of_sides(sources, mesh.deltas)
 
 
 def _turned(frame: Frame) -> Landmarks:

@@ -22,8 +22,8 @@ from surface.fit.surfaces.pieces import Piece, joined, make_pieces, read_pieces,
 from surface.fit.surfaces.placing import Placed, place
 from surface.fit.surfaces.report import SurfaceReport, SurfaceRow, write_report
 from surface.fit.transfer.api import transfer
+from surface.fit.transfer.reports.landmarkfile import read_landmarks
 from surface.fit.transfer.scan import make_scan
-from surface.fit.transfer.telling.landmarkfile import read_landmarks
 from surface.head import Head
 from surface.head.model.data import HeadData, Jaw, Seam
 from surface.head.model.file import check_writable, save_data
@@ -42,7 +42,7 @@ class SurfaceOptions:
     strict : refuse a file of which anything cannot be read, instead of leaving it out by name.
     groups : files of groups, see :mod:`surface.fit.surfaces.groupfile`.
     expressions_from : folder of a head whose expressions the surfaces get; landmarks : a file for that, see
-        :func:`surface.fit.transfer.telling.landmarkfile.read_landmarks`.
+        :func:`surface.fit.transfer.reports.landmarkfile.read_landmarks`.
     """
 
     unit: str | None = None

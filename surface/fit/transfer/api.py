@@ -23,12 +23,18 @@ from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.places import scaled
 from surface.fit.transfer.refused import HINT, faults_of_transfer
 from surface.fit.transfer.register import STAGES, Matcher, register
+from surface.fit.transfer.reports.errors import face_reports
+from surface.fit.transfer.reports.gaps import measure_gaps
+from surface.fit.transfer.reports.landmarkfile import read_landmarks, swapped
+from surface.fit.transfer.reports.report import (
+    TransferReport,
+    landmarks_of,
+    openings_of,
+    registration_errors,
+    reseated,
+)
+from surface.fit.transfer.reports.reportfile import write_transfer_report
 from surface.fit.transfer.scan import Scan, read_scan, sample
-from surface.fit.transfer.telling.errors import face_reports
-from surface.fit.transfer.telling.gaps import measure_gaps
-from surface.fit.transfer.telling.landmarkfile import read_landmarks, swapped
-from surface.fit.transfer.telling.report import TransferReport, landmarks_of, openings_of, registration_errors, reseated
-from surface.fit.transfer.telling.reportfile import write_transfer_report
 from surface.fit.transfer.template import Template, make_template
 from surface.head import Head, HeadData
 from surface.head.model.file import check_writable
@@ -61,9 +67,9 @@ def transfer_head(
 
     mesh_path : .obj, .glb, .gltf, .vrm, .npz, .ply, .stl or .off; its own shapes and texture coordinates are not used.
     source : folder of the head that the expressions come from. out_dir : folder that gets head.toml and head.npz.
-    landmarks : file of places on the mesh (see :func:`surface.fit.transfer.telling.landmarkfile.read_landmarks`).
+    landmarks : file of places on the mesh (see :func:`surface.fit.transfer.reports.landmarkfile.read_landmarks`).
     options : ``unit``, ``up``, ``forward`` and ``without``; what is not given is found.
-    report_dir : folder that gets the report (see :mod:`surface.fit.transfer.telling.reportfile`).
+    report_dir : folder that gets the report (see :mod:`surface.fit.transfer.reports.reportfile`).
     force : write a head that does not follow the mesh, too.
 
     Raises FitError: the mesh or the landmarks cannot be read, no face was found, or the head has no eyes or openings;
@@ -103,8 +109,8 @@ def transfer(
     factor, notes = _true_size(found, options.unit, picked)
     notes += [*scan.notes, *lid_notes]
     if scan.colours is not None:
-        data, told = with_colours(data, scan.colours)
-        notes += told
+        data, colour_notes = with_colours(data, scan.colours)
+        notes += colour_notes
     parts = face_reports(data, template, done.warp, samples)
     registered = registration_errors(template, done, matcher, STAGES[-1].farthest)
     faults = tuple(faults_of_transfer(parts, registered[1], data, head))

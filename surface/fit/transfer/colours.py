@@ -78,8 +78,8 @@ def with_colours(data: HeadData, samples: Samples) -> tuple[HeadData, list[str]]
             )
         layers += own
     layers, eyes = _with_eyes(layers, data, samples, skin)
-    told = [f"skin {_words(skin)}", *eyes]
-    return replace(data, paint=layers), [f"colours taken from the scan (linear RGB): {'; '.join(told)}"]
+    colours = [f"skin {_words(skin)}", *eyes]
+    return replace(data, paint=layers), [f"colours taken from the scan (linear RGB): {'; '.join(colours)}"]
 
 
 def _is_base(layer: dict[str, Any], part: str) -> bool:
@@ -136,7 +136,7 @@ def _with_eyes(
 ) -> tuple[list[dict[str, Any]], list[str]]:  # fmt: skip
     """Layers with the colours of eyes that the scan shows open; closed ones, as red as skin, tell nothing."""
     usual = USUAL_IRIS * float(np.linalg.norm(data.eyes[0] - data.eyes[1])) / data.eye_radius
-    told = []
+    colours = []
     for side, name in enumerate(("left_eye", "right_eye")):
         local = (samples.points - data.eyes[side]) / data.eye_radius
         off = np.linalg.norm(local, axis=1)
@@ -151,8 +151,8 @@ def _with_eyes(
         values |= {"iris_radius": np.array([found.iris_radius])} if abs(found.iris_radius - IRIS) > 0.01 else {}
         layers = [la for la in layers if not (la["part"] in parts and la["attribute"] in values)]
         layers += [_all_over(part, key, np.clip(v, *EYE_RANGE)) for part in parts for key, v in values.items()]
-        told.append(f"iris of the {name.replace('_', ' ')} {_words(found.iris)}")
-    return layers, told
+        colours.append(f"iris of the {name.replace('_', ' ')} {_words(found.iris)}")
+    return layers, colours
 
 
 def _saturation(colour: Floats) -> float:

@@ -15,10 +15,10 @@ from surface.fit.source.load import LoadOptions
 from surface.fit.transfer.align import NoFaceFound, Similarity
 from surface.fit.transfer.api import direction, find_face, in_frame
 from surface.fit.transfer.register import Mark, register
+from surface.fit.transfer.reports.landmarkfile import read_landmarks
+from surface.fit.transfer.reports.picture import Frontal, draw_landmarks, frontal
+from surface.fit.transfer.reports.reportfile import view_of
 from surface.fit.transfer.scan import Scan, read_scan, sample
-from surface.fit.transfer.telling.landmarkfile import read_landmarks
-from surface.fit.transfer.telling.picture import Frontal, draw_landmarks, frontal
-from surface.fit.transfer.telling.reportfile import view_of
 from surface.fit.transfer.template import NAMES, make_template
 from surface.head import Head
 

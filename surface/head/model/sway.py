@@ -21,9 +21,9 @@ def sway_moves(points: Floats, share: Floats, pivot: tuple[float, float, float])
 
 
 class Sway:
-    """What sways, at the times that :meth:`advance` is told; equal times and angles give equal motion.
+    """What sways, at the times that :meth:`advance` is given; equal times and angles give equal motion.
 
-    lag : (3,) yaw, pitch and roll, rad, by which it lies ahead of the head; 0 at rest and before any time is told.
+    lag : (3,) yaw, pitch and roll, rad, by which it lies ahead of the head; 0 at rest and before any time is given.
     """
 
     def __init__(self) -> None:

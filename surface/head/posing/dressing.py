@@ -25,7 +25,7 @@ def dress(parts: Iterable[HeadPart], garments: Sequence[Garment]) -> None:
     of = {part.name: part for part in parts}
     for garment in garments:
         for worn in garment.parts:
-            if len(of[worn.name].vertices) != len(worn.arrays["strands"]):  # its mesh was made anew: it did not fit
+            if len(of[worn.name].vertices) != len(worn.arrays["strands"]):  # its mesh was made again: it did not fit
                 why = f"{worn.name}/strands belongs to another mesh"
                 raise HeadFileError(f"{garment.worn.path}: is damaged: {why}", hint=HINT)
             _colour(of[worn.name], worn, garment.worn)

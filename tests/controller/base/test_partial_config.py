@@ -85,6 +85,7 @@ class Box(BaseModel, extra="forbid"):
     items: list[Item] = []
     lids: dict[str, Item] = {}
     label: str = ""
+    seal: Item = Item(name="none")
 
 
 def rest_of(table: dict[str, Any]) -> PartialConfig[Box]:
@@ -111,6 +112,12 @@ def test_tables_by_name_are_removed_and_faults_that_name_them_with_them() -> Non
     assert rest.read == Box(lids={"p": Item(name="q"), "s": Item(name="t")})
     told = ["no 'r'", "no 'many'", "no 'p'", "no 'q'"]
     assert rest.relocate(told) == ["no 'p'", "no 'q'"]
+
+
+def test_of_a_table_that_is_removed_as_a_whole_no_key_counts_as_a_name_that_is_gone() -> None:
+    rest = rest_of({"seal": {"size": {"inner": 1}}, "label": "x"})  # its size is wrong, and its name missing
+    assert rest.read == Box(label="x")
+    assert rest.relocate(["no 'size'", "no 'seal'"]) == ["no 'size'"]
 
 
 def test_nothing_is_left_of_a_table_that_lacks_a_key_at_its_top() -> None:

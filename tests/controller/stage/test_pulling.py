@@ -144,3 +144,14 @@ def small() -> Callable[[], Head]:
     from tests.surface.small_head import small_head
 
     return lambda: Head(small_head())
+
+
+def test_where_the_chin_is_pulled_only_what_the_jaw_carries_is_let_go(bench: Bench) -> None:
+    solver = bench.solver()
+    solver.solve([Pin(bench.near(CHIN), bench.skin.rest[bench.near(CHIN)], AHEAD)])
+    jaw, weights = solver._staying.jaw, solver._stay_weights[::3, 0]
+    share = np.clip(jaw / 0.68, 0.0, 1.0)
+    assert (share < 0.01).any() and (share > 0.5).any()
+    assert set(np.round(weights / (1.0 - share), 9)) <= {0.25, 0.8}
+    solver.solve([Pin(bench.near(BROW), bench.skin.rest[bench.near(BROW)], AHEAD)])
+    assert set(solver._stay_weights.ravel()) <= {0.25, 0.8}

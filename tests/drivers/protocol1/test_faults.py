@@ -235,7 +235,7 @@ def test_7_data_that_come_with_an_alert_are_used(head: Head, bus: Bus) -> None:
 
 
 def test_8_torque_that_goes_without_a_word_is_told_and_not_given_back(head: Head, bus: Bus) -> None:
-    """A dip of the supply: the servo begins anew, limp and with none of its limits."""
+    """A dip of the supply: the servo starts again, limp and with none of its limits."""
     pose(bus)
     head.wire.chain.servo(2).reboot(head.wire.clock())
     read_until(bus, lambda state: not state.torque[1] and bool(state.fresh[1]), timeout_s=60.0)

@@ -10,6 +10,7 @@ from surface import DCPSurface
 from surface.bench.bench import sheet
 from surface.deform import factors
 from surface.deform.deformation import Deformation
+from surface.deform.factors import HEAD, STEP, _put_windows
 from surface.deform.lists import LANES, Basis, Lists, build_lists
 from surface.deform.storage import Storage, compress, expand
 from surface.mesh.domain import Domain, Slit
@@ -50,6 +51,18 @@ def test_factors_give_the_weights_of_the_surface() -> None:
             )
             mine, whole = mine[:, np.argsort(lists.ids[order])], whole[:, np.argsort(plain.ids[order])]
             assert np.abs(mine - whole).max() <= 4e-7 * np.abs(whole).max(), (c, name)
+
+
+def test_windows_hold_the_places_of_their_own_eight_lanes() -> None:
+    picks = np.full(HEAD + 2 * STEP, -1, np.int64)
+    assert _put_windows(np.arange(13), 13, 20, 1, 2, picks)  # each eight lanes take eight places in a row
+    assert picks[1] == 20 and picks[HEAD + 16 + 1] == 0 and picks[HEAD + STEP + 16 + 1] == 8
+    assert picks[HEAD + 8 : HEAD + 16].tolist() == [0, 1, 2, 3, 4, 5, 6, 7]
+    assert picks[HEAD + STEP + 8 : HEAD + STEP + 16].tolist() == [0, 1, 2, 3, 4, 0, 0, 0]
+    assert _put_windows(np.array([0, 7, 3]), 3, 12, 0, 1, picks) and picks[0] == 12 and picks[HEAD + 16] == 0
+    assert not _put_windows(np.array([0, 8, 3]), 3, 12, 0, 1, picks)  # nine places are too many
+    assert _put_windows(np.array([9, 11]), 2, 12, 0, 1, picks) and picks[HEAD + 16] == 4  # no window ends beyond
+    assert picks[HEAD : HEAD + 8].tolist() == [5, 7, 0, 0, 0, 0, 0, 0]
 
 
 def test_factors_take_less_memory_and_neighbours_share_them() -> None:

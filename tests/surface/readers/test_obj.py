@@ -50,6 +50,11 @@ def test_corners_of_every_kind(tmp_path):
     assert mesh.pieces == ("cheek", "cheek/lip") and mesh.piece.tolist() == [0, 1, 1]
 
 
+def test_faces_without_texture_coordinates_have_none_though_others_do(tmp_path):
+    mesh = read_obj(written(tmp_path, CUBE_FACE + "f 1 2 3\nf 1//1 2//1 3//1\nf 1/4 2/3 3/2\nf 1/1 2 3/3\n"))
+    assert mesh.face_uv[:, :3].tolist() == [[-1, -1, -1], [-1, -1, -1], [3, 2, 1], [-1, -1, -1]]
+
+
 def test_polygons_become_fans(tmp_path):
     mesh = read_obj(written(tmp_path, CUBE_FACE + "v 1 3 0\nvt 0.5 1\nf 1/1 2/2 3/3 5/5 4/4\n"))
     assert mesh.faces.tolist() == [[0, 1, 2, -1], [0, 2, 4, -1], [0, 4, 3, -1]]

@@ -96,6 +96,8 @@ GOOD = text_ply(POINTS, FACES)
         (b"ply\nformat ascii 1.0\n", "no end_header"),
         (b"ply\nelement vertex 1\nend_header\n", "names no format"),
         (GOOD.replace("float z", "real z").encode(), "'property real z' is no line"),
+        (GOOD.replace("uchar int", "float int").encode(), "'property list float int vertex_indices' is no line"),
+        (GOOD.replace("uchar int", "uchar long").encode(), "'property list uchar long vertex_indices' is no line"),
         (GOOD.replace("float z", "float y").encode(), "'y' is out of place"),
         (GOOD.replace("float z", "float w").encode(), "no x, y and z"),
         (GOOD.replace("vertex 5", "vertex 99999999999").encode(), "cut short: it says 99999999999 rows"),

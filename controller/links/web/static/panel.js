@@ -8,14 +8,14 @@ import { Links, Servos } from "/servos.js";
 const GAZE_DEG = [35, 25];
 const secret = token();
 const robot = new Robot(secret), sliders = new Sliders(robot), servos = new Servos(), links = new Links();
-let latest = null, told = 0, shown = "", face = null;
+let latest = null, noteTimer = 0, shown = "", face = null;
 
 tabs({ express: "Express", sliders: "Sliders", shows: "Shows", servos: "Servos", links: "Links" });
 
 function note(text, seconds = 4) {
   $("note").textContent = text;
-  clearTimeout(told);
-  if (text && seconds) told = setTimeout(() => { $("note").textContent = ""; }, 1000 * seconds);
+  clearTimeout(noteTimer);
+  if (text && seconds) noteTimer = setTimeout(() => { $("note").textContent = ""; }, 1000 * seconds);
 }
 
 function stopped(by) {

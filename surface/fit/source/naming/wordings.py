@@ -147,7 +147,7 @@ def _parameter(words: list[str]) -> Meaning | None:
 
 
 def _looking(words: list[str]) -> Meaning | None:
-    """Gaze that is told by two sides, the eye's and the direction's: ``Eye_L_Look_R``, ``eyeLookLeftL``."""
+    """Gaze that is named by two sides, the eye's and the direction's: ``Eye_L_Look_R``, ``eyeLookLeftL``."""
     sides = [(k, SIDES[w]) for k, w in enumerate(words) if w in SIDES]
     if len(sides) != 2 or "".join(w for w in words if w not in SIDES) not in LOOK:
         return None

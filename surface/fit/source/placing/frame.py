@@ -18,7 +18,7 @@ UNITS = {"mm": 1.0, "cm": 10.0, "dm": 100.0, "m": 1000.0, "in": 25.4, "ft": 304.
 AXES = {f"{sign}{'xyz'[i]}": (i, -1.0 if sign else 1.0) for i in range(3) for sign in ("", "-")}
 HEAD_HEIGHT_MM = 250.0  # a head with neck; enough to distinguish units by the height
 EYES_MM = 65.4  # between the middles of what blinks, on the head that the bounds were set for
-HEIGHT_MM = 338.0  # of that head
+HEIGHT_MM = 338.0  # of the whole head that the bounds were set for
 HUMAN = 1.6  # a head of a guessed unit is at most so much larger or smaller than usual
 EYES_AT = np.array([0.0, 36.1, 84.2])  # middle between the eyeballs' centres of the shipped head, mm
 HALF_APART = np.array([[31.8, 0.0, 0.0], [-31.8, 0.0, 0.0]])  # from there to each
@@ -97,7 +97,7 @@ def head_scale(vertices: Floats, shapes: dict[str, Floats]) -> float:
 
 
 def _scale(
-    eyes: Eyes | None, height: float, told: str | None, convention: Convention, notes: list[str]
+    eyes: Eyes | None, height: float, by_user: str | None, convention: Convention, notes: list[str]
 ) -> tuple[float, str]:  # fmt: skip
     """mm per unit, and the unit's name; ``height`` is that of the whole mesh, in the file's unit."""
     measure, usual = (eyes.apart, EYES_MM) if eyes else (height, HEAD_HEIGHT_MM)
@@ -109,9 +109,9 @@ def _scale(
     def off(scale: float) -> float:
         return float(np.exp(abs(np.log(max(scale * measure, 1e-12) / usual))))
 
-    given = told or convention.unit
-    if given and (told or off(UNITS[given]) <= (DEFINED if eyes else 12.0)):
-        if told and eyes and off(UNITS[given]) > DEFINED:
+    given = by_user or convention.unit
+    if given and (by_user or off(UNITS[given]) <= (DEFINED if eyes else 12.0)):
+        if by_user and eyes and off(UNITS[given]) > DEFINED:
             notes.append(f"with --unit {given} {words(UNITS[given])}, a human's {EYES_MM:.0f}")
         return UNITS[given], given
     why = f"although {convention.by} defines {convention.unit}, since then {words(UNITS[given])}" if given else ""
@@ -128,17 +128,17 @@ def _turn(
     vertices: Floats, shapes: dict[str, Floats], marks: Landmarks, up: str | None, forward: str | None,
     convention: Convention, notes: list[str],
 ) -> Floats:  # fmt: skip
-    """The rotation to head space, (3, 3): as told, as defined, as found, or as is usual, in this order."""
+    """The rotation to head space, (3, 3): as the user says, as defined, as found, or as is usual, in this order."""
     found = orient(vertices, marks)
     usual = _square(convention.up or "y", convention.forward or "z")
     if up or forward:
-        turn = _told(up, forward, found, usual)
+        turn = _by_options(up, forward, found, usual)
     elif found is None:
         turn = _partly(vertices, shapes, marks, usual, sure=bool(convention.by))
     else:
         turn = found.turn if _differ(found, usual) else usual
         notes += found.notes
-    _say(turn, convention, found, told=bool(up or forward), notes=notes)
+    _say(turn, convention, found, by_user=bool(up or forward), notes=notes)
     return turn
 
 
@@ -147,14 +147,14 @@ def _differ(found: Orientation, usual: Floats) -> bool:
     return not found.upright or not np.allclose(found.turn, usual)
 
 
-def _say(turn: Floats, convention: Convention, found: Orientation | None, *, told: bool, notes: list[str]) -> None:
+def _say(turn: Floats, convention: Convention, found: Orientation | None, *, by_user: bool, notes: list[str]) -> None:
     """Note a rotation that a user would not expect."""
     square = bool(np.isclose(np.abs(turn).max(axis=1), 1.0).all())
     said = convention.by and np.allclose(turn, _square(convention.up, convention.forward))
     if said or (np.array_equal(turn, np.eye(3)) and not convention.by):
         return
     but = f", although {convention.by} defines {convention.up} and {convention.forward}" if convention.by else ""
-    why = "" if told or found is None else " by eyes and mouth (say --up and --forward otherwise)"
+    why = "" if by_user or found is None else " by eyes and mouth (say --up and --forward otherwise)"
     if square:
         up, forward = axis_names(turn)
         notes.append(f"turned: up is {up}, forward is {forward} in the file{but}{why}")
@@ -163,7 +163,7 @@ def _say(turn: Floats, convention: Convention, found: Orientation | None, *, tol
     notes.append(f"levelled: the head stands askew in the file, by {angle:.0f} degrees{but}{why}")
 
 
-def _told(up: str | None, forward: str | None, found: Orientation | None, usual: Floats) -> Floats:
+def _by_options(up: str | None, forward: str | None, found: Orientation | None, usual: Floats) -> Floats:
     """The rotation with the axes given; the one that is not given is as found, else the usual one."""
     guess = usual if found is None else snapped(found.turn).turn
     if not np.isclose(np.abs(guess).max(axis=1), 1.0).all():

@@ -122,6 +122,10 @@ def test_numbers_go_on_rising_where_sixteen_bits_begin_again() -> None:
     decoder = BinaryDecoder(P)
     found = [decoder.feed(stuff(frame({0: 1}, sequence=n)))[0].sequence for n in (65534, 65535, 0, 1)]
     assert found == [65534, 65535, 65536, 65537]
+    turns = {(9, 7, 10): [9, 7, 10], (40_000, 7_232): [40_000, 7_232], (40_000, 7_231): [40_000, 65_536 + 7_231]}
+    for sent, wanted in turns.items():  # frames out of order are no new turn
+        late = BinaryDecoder(P)
+        assert [late.feed(stuff(frame({0: 1}, sequence=n)))[0].sequence for n in sent] == wanted
 
 
 def test_values_beyond_two_are_cut_off() -> None:

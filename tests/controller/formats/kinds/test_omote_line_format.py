@@ -16,6 +16,7 @@ from controller.formats.frame import Frame
 from controller.formats.kinds.omote_line_format import LineDecoder, LineEncoder
 from controller.layers.commands import CommandState
 from controller.links.kind import LinkContext
+from controller.links.line.kind import PORT
 from controller.links.line.protocol import MAX_LINE, checksum
 from controller.links.links import open_links, read_link
 from controller.tools.translate import Options, translate
@@ -110,3 +111,7 @@ def test_a_client_drives_an_omote_and_another_reads_it(token: str | None) -> Non
         finally:
             stop.set()
             thread.join(10)
+
+
+def test_its_port_is_that_of_the_link_of_a_robot_that_omote_runs() -> None:
+    assert FORMATS.get("omote-line").port == PORT

@@ -29,7 +29,9 @@ def test_every_file_of_the_folder_is_served_whole() -> None:
     "path", ["/server.py", "/../server.py", "//", "/static/panel.js", "/%2e%2e/kind.py", "/" + "a" * 1999]
 )
 def test_nothing_else_is_served(path: str) -> None:
-    assert page(path).status_code == 404
+    answer = page(path)
+    assert answer.status_code == 404
+    assert answer.body == f"there is no {path[:80]} here; the panel is at /\n".encode()
 
 
 def test_scripts_import_only_what_is_served_and_pages_have_nothing_inline() -> None:

@@ -165,6 +165,12 @@ def test_the_pupil_and_the_rim_do_not_colour_an_iris() -> None:
     flat = Samples(np.column_stack([9 + 5 * r * np.cos(b), 5 * r * np.sin(b), 0 * r]),
                    np.column_stack([shade, shade, shade, np.ones(len(r))]), r)  # fmt: skip
     np.testing.assert_allclose(eye_colours._of_iris_piece(flat), 0.3)
+    fine = np.sqrt((np.arange(4000) + 0.5) / 4000)  # places evenly over a disc whose shade is their radius
+    turn = np.arange(4000) * np.pi * (3.0 - np.sqrt(5.0))
+    rising = Samples(np.column_stack([9 + 5 * fine * np.cos(turn), 5 * fine * np.sin(turn), 0 * fine]),
+                     np.column_stack([fine, fine, fine, np.ones(4000)]), np.ones(4000))  # fmt: skip
+    half = np.sqrt(0.5 * (0.42**2 + 0.85**2))  # as much of the ring inside as outside
+    np.testing.assert_allclose(eye_colours._of_iris_piece(rising), half, atol=0.003)
     assert eye_colours._of_iris_piece(None) is None
     clear = replace(flat, colour=flat.colour * np.array([1, 1, 1, 0.4]))
     assert eye_colours._of_iris_piece(clear) is None

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, disc, face, joined, looking, pair, shell, with_sockets
 
+from surface.base.arrays import Bools, Floats, Ints
+from surface.fit.eyes import search
 from surface.fit.eyes.search import ADDED, MISSING
 from surface.fit.features.generic import make_plan
 from surface.fit.source.mesh import FitMesh, check_manifold
@@ -176,6 +178,26 @@ def test_a_socket_behind_an_eye_is_left_out() -> None:
     assert plan.parts[0][0].name == "face"
     kept = np.unique(np.concatenate([island.vertex for _, islands in plan.parts for island in islands]))
     assert len(kept) < len(skin.vertices) - 0.4 * (len(skin.vertices) - len(face().vertices))
+
+
+def test_linings_are_searched_in_the_skin_that_no_socket_hides(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, asked = face(), []
+    count = len(mesh.faces)
+    skin, eyeballs = np.arange(count) >= 5, np.arange(count) < 5
+    monkeypatch.setattr(search, "hidden_faces", lambda mesh, skin, centre, radius: np.array([7, 8]))
+    monkeypatch.setattr(search, "find_openings", lambda mesh, skin, middle, near: ["left", "right"])
+
+    def linings(mesh: FitMesh, skin: Bools, centre: Floats, radius: float, side: str) -> Ints:
+        asked.append((side, radius, np.flatnonzero(~skin).tolist()))
+        return np.array([9 if side == "Left" else 10])
+
+    monkeypatch.setattr(search, "linings", linings)
+    eyes = search.Eyes(CENTRES, 12.0, eyeballs, eyeballs, skin)
+    found = search._without_sockets(mesh, eyes, skin, 0.0, None)
+    assert asked == [("Left", 12.0, [0, 1, 2, 3, 4, 7, 8]), ("Right", 12.0, [0, 1, 2, 3, 4, 7, 8, 9])]
+    assert np.flatnonzero(found.faces).tolist() == [0, 1, 2, 3, 4, 7, 8, 9, 10]
+    assert np.flatnonzero(~found.skin).tolist() == [0, 1, 2, 3, 4, 7, 8, 9, 10]
+    assert found.openings == ["left", "right"] and found.notes == ["4 faces of sockets behind the eyes are left out"]
 
 
 @pytest.mark.slow

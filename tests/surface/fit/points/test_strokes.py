@@ -1,5 +1,7 @@
 """Paint given by vertices becomes lines in (u, v)."""
 
+from dataclasses import replace
+
 import numpy as np
 from slit_sheet import N, slit_sheet
 
@@ -35,6 +37,8 @@ def test_points_on_the_mesh_are_found_in_uv():
 
 def test_the_mirror_image_of_a_vertex():
     assert mirrored(CHART, MESH, np.array([at(3, 5)])).tolist() == [at(N - 3, 5)]
+    steep = replace(MESH, vertices=MESH.vertices + [0, 0, 5] * MESH.vertices[:, [1]])  # depth counts as height does
+    assert mirrored(CHART, steep, np.array([at(3, 5)])).tolist() == [at(N - 3, 5)]
 
 
 def test_smooth_lines_pass_through_their_points():

@@ -132,7 +132,7 @@ def test_a_face_whose_texture_is_squeezed_in_places_gets_evener_charts():
     (given,) = usable_islands(mild, every(mild), 1.0, notes, "face", face=True)
     assert notes == [] and given.uv[:, 1].max() == pytest.approx(mild.uv[:, 1].max())
     before = unevenness(strong, usable_islands(strong, every(strong), 1.0, notes, "nose"))
-    assert notes == [] and before > 2.5  # only a face is charted anew for that
+    assert notes == [] and before > 2.5  # only a face is charted again for that
     (made,) = usable_islands(strong, every(strong), 1.0, notes, "face", face=True)
     assert unevenness(strong, [made]) < 0.7 * before
     assert one_to_one(made) and len(boundary_loops(made)) == 2

@@ -12,8 +12,8 @@ from surface.base.errors import FitError
 from surface.fit.source.load import LoadOptions
 from surface.fit.transfer import api
 from surface.fit.transfer.align import Similarity
+from surface.fit.transfer.reports.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.scan import make_scan
-from surface.fit.transfer.telling.landmarkfile import read_landmarks, swapped
 
 TURN = Rotation.from_euler("x", 90, degrees=True).as_matrix()
 SHIFT = np.array([0.5, -1.0, 2.0])

@@ -13,9 +13,9 @@ from surface.fit.source.load import LoadOptions
 from surface.fit.transfer import pick
 from surface.fit.transfer.align import NoFaceFound, Similarity
 from surface.fit.transfer.register import Mark, Registered
+from surface.fit.transfer.reports.landmarkfile import read_landmarks
+from surface.fit.transfer.reports.picture import COLOURS
 from surface.fit.transfer.scan import make_scan, read_scan
-from surface.fit.transfer.telling.landmarkfile import read_landmarks
-from surface.fit.transfer.telling.picture import COLOURS
 
 TURN, SHIFT = Rotation.from_euler("xyz", [80, 10, 20], degrees=True).as_matrix(), np.array([0.5, -1.0, 2.0])
 

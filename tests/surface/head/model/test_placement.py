@@ -31,6 +31,17 @@ def test_head_toml_keeps_it(tmp_path):
     assert (got.scale, got.unit) == (10.0, "cm")
 
 
+@pytest.mark.parametrize(("off", "is_rotation"), [(5e-5, True), (2e-4, False)])
+def test_a_rotation_may_be_rounded_to_four_decimals(tmp_path, off, is_rotation):
+    turn = np.array([[np.cos(0.3), -np.sin(0.3), 0.0], [np.sin(0.3), np.cos(0.3), 0.0], [0.0, 0.0, 1.0 + 0.5 * off]])
+    save_data(tmp_path / "h", replace(small_head(), placement=Placement(turn)))
+    if is_rotation:
+        np.testing.assert_allclose(load_data(tmp_path / "h").placement.turn, turn)
+    else:
+        with pytest.raises(HeadFileError, match=r"placement\.turn: is no rotation"):
+            load_data(tmp_path / "h")
+
+
 def test_an_older_folder_has_none(tmp_path):
     save_data(tmp_path / "h", small_head())
     assert "placement" not in (tmp_path / "h" / "head.toml").read_text()

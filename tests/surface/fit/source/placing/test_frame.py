@@ -121,11 +121,11 @@ def test_a_shape_without_its_other_side_says_nothing_of_left_and_right(unit):
 GLTF = Convention("glTF", "m", "y", "z")
 
 
-def scaled(measure, told=None, convention=NONE, *, eyes=True):
+def scaled(measure, by_user=None, convention=NONE, *, eyes=True):
     """mm per unit, its name and the notes for eyes so far apart, or a mesh so high."""
     notes: list[str] = []
     found = Eyes(np.array([[measure / 2, 0, 0], [-measure / 2, 0, 0]]), True, True, "") if eyes else None
-    return (*frame._scale(found, measure, told, convention, notes), notes)
+    return (*frame._scale(found, measure, by_user, convention, notes), notes)
 
 
 @pytest.mark.parametrize(
@@ -170,29 +170,29 @@ def test_a_unit_that_the_format_defines_is_taken_unless_eyes_contradict():
 
 
 def test_axes_that_are_told_are_taken_and_the_other_one_gives_way():
-    def told(up, forward, found=None, usual=np.eye(3)):
-        turn = frame._told(up, forward, found, usual)
+    def by_options(up, forward, found=None, usual=np.eye(3)):
+        turn = frame._by_options(up, forward, found, usual)
         assert np.linalg.det(turn) == pytest.approx(1)
         return [f"{'-' if row.min() < 0 else ''}{'xyz'[int(np.abs(row).argmax())]}" for row in turn[1:]]
 
-    assert told("z", "-y") == ["z", "-y"] and told("y", None) == ["y", "z"]
-    assert told("z", None) == ["z", "-y"] and told("-x", None) == ["-x", "z"]
-    assert told(None, "y") == ["z", "y"] and told(None, "x") == ["y", "x"]
+    assert by_options("z", "-y") == ["z", "-y"] and by_options("y", None) == ["y", "z"]
+    assert by_options("z", None) == ["z", "-y"] and by_options("-x", None) == ["-x", "z"]
+    assert by_options(None, "y") == ["z", "y"] and by_options(None, "x") == ["y", "x"]
     blender = TURNS["blender"].T
     found = Orientation(blender, True)
-    assert told("z", None, found) == ["z", "-y"] and told(None, "-y", found) == ["z", "-y"]
+    assert by_options("z", None, found) == ["z", "-y"] and by_options(None, "-y", found) == ["z", "-y"]
     tilted = Orientation(blender @ rotation(0.2, 0.1), False)
-    assert told(None, "-y", tilted) == ["z", "-y"]
-    assert told(None, "z", found) == ["y", "z"]
+    assert by_options(None, "-y", tilted) == ["z", "-y"]
+    assert by_options(None, "z", found) == ["y", "z"]
     with pytest.raises(FitError, match="along one axis") as caught:
-        told("y", "-y")
+        by_options("y", "-y")
     assert "--up z --forward -y" in caught.value.hint
 
 
 def test_what_a_user_would_not_expect_is_said():
-    def said(turn, convention=NONE, found=None, told=False):
+    def said(turn, convention=NONE, found=None, by_user=False):
         notes: list[str] = []
-        frame._say(np.asarray(turn, float), convention, found, told=told, notes=notes)
+        frame._say(np.asarray(turn, float), convention, found, by_user=by_user, notes=notes)
         return notes
 
     blender, upright = TURNS["blender"].T, Orientation(np.eye(3), True)
@@ -201,7 +201,7 @@ def test_what_a_user_would_not_expect_is_said():
     assert said(blender, found=upright) == [
         "turned: up is z, forward is -y in the file by eyes and mouth (say --up and --forward otherwise)"
     ]
-    assert said(blender, found=upright, told=True) == ["turned: up is z, forward is -y in the file"]
+    assert said(blender, found=upright, by_user=True) == ["turned: up is z, forward is -y in the file"]
     assert said(blender, GLTF) == ["turned: up is z, forward is -y in the file, although glTF defines y and z"]
     assert said(rotation(np.radians(20), 0.0)) == ["levelled: the head stands askew in the file, by 20 degrees"]
 

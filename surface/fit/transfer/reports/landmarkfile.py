@@ -17,8 +17,8 @@ from surface.base import files
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.fit.transfer.relief import mirrored
+from surface.fit.transfer.reports.picture import Frontal
 from surface.fit.transfer.scan import Scan
-from surface.fit.transfer.telling.picture import Frontal
 from surface.fit.transfer.template import NAMES
 
 FAR = 0.05  # of a mesh's size: a landmark further from it was picked on another mesh, or in another unit

@@ -6,9 +6,9 @@ import made_face
 import numpy as np
 import pytest
 
+from surface.fit.transfer.reports import errors as module
+from surface.fit.transfer.reports.errors import distances, face_reports
 from surface.fit.transfer.scan import Samples
-from surface.fit.transfer.telling import errors as module
-from surface.fit.transfer.telling.errors import distances, face_reports
 
 Z = np.array([0.0, 0.0, 1.0])
 FRONT = np.array([[x, y, -5.0 + 65 * ((x + y) % 20 > 0)] for x in range(-40, 41, 5) for y in range(-50, 51, 5)])

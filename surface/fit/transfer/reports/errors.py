@@ -25,7 +25,7 @@ def face_reports(data: HeadData, template: Template, warp: Warp, samples: Sample
     control points are counted together; and those of eyes and lids by themselves.
 
     Eyeballs of the head are balls of its own size, and lids lie on them, whatever a scan has there: flat, carved,
-    closed or noisy eyes. Their distances are told, and are no errors of the face's skin.
+    closed or noisy eyes. Their distances are reported, and are no errors of the face's skin.
     """
     at, own = distances(Head(data), warp(template.points[face_region(template)]), samples)
     off = np.linalg.norm(at[:, None, :2] - data.eyes[:, :2], axis=2).min(axis=1)

@@ -11,8 +11,8 @@ from surface.base.arrays import Floats
 from surface.fit.points.report import Errors, FitReport, errors_of
 from surface.fit.transfer.align import Similarity, face_region
 from surface.fit.transfer.register import Mark, Matcher, Registered
+from surface.fit.transfer.reports.gaps import Gap
 from surface.fit.transfer.scan import Samples
-from surface.fit.transfer.telling.gaps import Gap
 from surface.fit.transfer.template import Template, find_landmarks
 from surface.head import Contact, Group, Head, HeadData
 

@@ -16,9 +16,9 @@ from surface.base.arrays import Floats
 from surface.base.errors import FitError, MissingPackage
 from surface.fit.points.report import face_bounds
 from surface.fit.transfer.align import Similarity
+from surface.fit.transfer.reports.picture import Frontal, draw_distances, draw_landmarks, frontal
+from surface.fit.transfer.reports.report import TransferReport
 from surface.fit.transfer.scan import Scan, make_scan, sample
-from surface.fit.transfer.telling.picture import Frontal, draw_distances, draw_landmarks, frontal
-from surface.fit.transfer.telling.report import TransferReport
 from surface.head import Head, HeadData
 
 FORMAT, VERSION = "omote transfer report", 1

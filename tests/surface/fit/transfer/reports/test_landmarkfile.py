@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from surface.base.errors import FitError
+from surface.fit.transfer.reports.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.scan import make_scan
-from surface.fit.transfer.telling.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.template import NAMES
 
 ROOT = Path(__file__).parents[5]

@@ -1,0 +1,103 @@
+"""What is worn: its colours and strands, the colour and shade of the skin below, and what is hidden there."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from small_head import small_head
+
+from surface.base.errors import HeadFileError
+from surface.head import Head
+from surface.head.posing.dressing import SCALP, dress, sampled
+
+
+@pytest.fixture
+def head() -> Head:
+    return Head(small_head())
+
+
+def garment(head: Head, fields: dict[str, np.ndarray] | None = None, **look: Any) -> Any:
+    """A garment drawn as the part "b" of a small head, red at its roots and blue at its tips."""
+    n = len(head.part("b").vertices)
+    arrays = {
+        "strands": np.arange(4.0 * n).reshape(n, 4), "fast": np.array([[0, 1, 2]]),
+        "tint": np.linspace(0, 255, n).astype(np.uint8), "shade": np.full(n, 64, np.uint8),
+    }  # fmt: skip
+    worn = {"path": "w.npz", "colour": (0.8, 0.0, 0.0), "tips": (0.0, 0.0, 0.8), "gloss": 0.25, **look}
+    part = SimpleNamespace(name="b", arrays=arrays)
+    return SimpleNamespace(parts=[part], worn=SimpleNamespace(**worn), fields=fields or {})
+
+
+def test_hair_goes_from_the_colour_of_its_roots_to_that_of_its_tips(head: Head) -> None:
+    part = head.part("b")
+    dress(head.parts, [garment(head)])
+    tint = np.linspace(0, 255, len(part.vertices)).astype(np.uint8) / 255
+    wanted = 0.4 * np.column_stack([1 - tint, 0 * tint, tint])  # at half brightness
+    np.testing.assert_allclose(part.attributes["albedo"], wanted, atol=1e-6)
+    assert part.attributes["strands"].tolist() == np.arange(4.0 * len(tint)).reshape(-1, 4).tolist()
+    assert (part.attributes["gloss"] == 0.25).all() and part.attributes["gloss"].shape == (len(tint), 1)
+    assert part.decimated["fast"].tolist() == part.decimated["full"].tolist() == [[0, 1, 2]]
+    step = 1e-4  # along v, on the surface itself
+    uv = part.mesh.uv.copy()
+    down, up = np.clip(uv[:, 1] - step, 0, 1), np.clip(uv[:, 1] + step, 0, 1)
+    inside = (down > 0) & (up < 1)
+    ends = [part.surface.evaluate(np.column_stack([uv[inside, 0], v[inside]])) for v in (down, up)]
+    along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0], axis=1, keepdims=True)
+    np.testing.assert_allclose(part.attributes["along"][inside], along, atol=1e-3)
+    np.testing.assert_allclose(np.linalg.norm(part.attributes["along"], axis=1), 1.0, atol=1e-5)
+
+
+def test_hair_without_tips_has_one_colour_and_bright_hair_stays_in_range(head: Head) -> None:
+    worn = garment(head, tips=None)
+    worn.parts[0].arrays["shade"][:] = 255
+    dress(head.parts, [worn])
+    wanted = [min(0.8 * 255 / 128, 1.0), 0.0, 0.0]
+    np.testing.assert_allclose(head.part("b").attributes["albedo"], [wanted] * len(head.part("b").vertices), atol=1e-6)
+
+
+def test_colours_of_another_mesh_are_refused(head: Head) -> None:
+    worn = garment(head)
+    worn.parts[0].arrays["strands"] = worn.parts[0].arrays["strands"][1:]
+    with pytest.raises(HeadFileError, match=r"w\.npz: is damaged: b/strands belongs to another mesh") as caught:
+        dress(head.parts, [worn])
+    assert caught.value.hint
+
+
+def test_skin_below_has_the_colour_of_hair_and_lies_in_its_shade(head: Head) -> None:
+    skin = head.part("a")
+    skin.attributes["occlusion"] = np.full((len(skin.vertices), 1), 0.8, np.float32)
+    before = skin.attributes["albedo"].copy()
+    across = np.tile(np.linspace(0, 1, 3)[:, None], (1, 4))  # a picture that rises with u
+    dress(head.parts, [garment(head, {"cover/a": across, "shadow/a": 0.5 * across, "cover/tooth": across})])
+    u = skin.uv[:, :1]
+    np.testing.assert_allclose(
+        skin.attributes["albedo"], before + u * (SCALP * np.array([0.8, 0, 0]) - before), atol=1e-5
+    )
+    np.testing.assert_allclose(skin.attributes["occlusion"], 0.8 * (1 - 0.5 * u), atol=1e-5)
+    assert skin.attributes["albedo"].dtype == np.float32
+
+
+def test_triangles_that_lie_all_below_are_left_out_of_every_mesh(head: Head) -> None:
+    skin = head.part("a")
+    skin.decimated = {"far": skin.triangles[::2]}
+    triangles, u = skin.triangles.copy(), skin.uv[:, 0]
+    dress(head.parts, [garment(head, {"hidden/a": np.array([[0.0, 0.0], [1.0, 1.0]])})])
+    seen = ~(u > 0.5)[triangles].all(axis=1)
+    assert 0 < seen.sum() < len(triangles)
+    np.testing.assert_array_equal(skin.triangles, triangles[seen])
+    np.testing.assert_array_equal(skin.decimated["far"], triangles[::2][seen[::2]])
+    assert len(head.part("tooth").triangles) == len(Head(small_head()).part("tooth").triangles)
+
+
+def test_pictures_are_linear_between_their_pixels(head: Head) -> None:
+    picture = np.random.default_rng(3).uniform(size=(4, 5))
+    skin = SimpleNamespace(name="a", uv=np.array([[0, 0], [1, 1], [1 / 3, 0.25], [0.5, 0.625], [-2, 0.5], [3, -1]]))
+    found = sampled(garment(head, {"cover/a": picture}), "cover", skin)  # type: ignore[arg-type]
+    assert found is not None and found.shape == (6, 1) and found.dtype == np.float32
+    middle = 0.25 * (picture[1, 2] + picture[1, 3] + picture[2, 2] + picture[2, 3])
+    wanted = [picture[0, 0], picture[3, 4], picture[1, 1], middle, picture[0, 2], picture[3, 0]]
+    np.testing.assert_allclose(found[:, 0], wanted, atol=1e-6)
+    assert sampled(garment(head), "cover", skin) is None  # type: ignore[arg-type]
