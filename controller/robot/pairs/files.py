@@ -130,19 +130,14 @@ def write_robot(path: Path, target: Path, fitted: list[FittedChannel], parameter
         {**{k: v for k, v in old.items() if k not in _REPLACED}, **new[old["name"]]} if old["name"] in new else old
         for old in table["channels"]
     ]
-    kept = _keep(target) if target.exists() else None
     text = "# Mixes fitted to recorded pairs by omote calibrate --pairs.\n" + tomli_w.dumps(table)
-    check = target.with_name(f".{target.stem}.check.toml")
-    try:
-        check.write_text(text, encoding="utf-8")
-        load_robot(check, parameters)
-    finally:
-        check.unlink(missing_ok=True)
-    if kept is not None:
-        with replacing(kept) as temporary:
-            temporary.write_bytes(read_file(target, _MOST_BYTES))
+    kept = _keep(target) if target.exists() else None
     with replacing(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
+        load_robot(temporary, parameters)
+        if kept is not None:
+            with replacing(kept) as copy:
+                copy.write_bytes(read_file(target, _MOST_BYTES))
     return kept
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from controller.base.config import ConfigError
+from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS as P
 from controller.cli.app import make_app
 from controller.robot.channels import build_table
@@ -120,6 +120,19 @@ def test_the_command_writes_the_channels_and_keeps_the_old_file(files: tuple[Pat
     assert load_robot(robot, P).channels[2].mix == load_robot(robot.with_name("robot.before1.toml"), P).channels[2].mix
     CliRunner().invoke(make_app(), ["calibrate", str(robot), "--pairs", str(pairs)])
     assert robot.with_name("robot.before2.toml").exists()
+
+
+def test_a_place_that_cannot_be_written_is_one_message_and_leaves_nothing(
+    files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    robot, pairs = files
+    before = sorted(tmp_path.iterdir())
+    words = ["calibrate", str(robot), "--pairs", str(pairs), "-o"]
+    error = CliRunner().invoke(make_app(), [*words, str(pairs / "o.toml")]).exception
+    assert isinstance(error, ControllerError) and "pairs.csv/o.toml: cannot be written" in str(error)
+    robot.write_text(ROBOT.replace("limit_deg", "limits_deg"))
+    assert CliRunner().invoke(make_app(), [*words, str(tmp_path / "o.toml")]).exit_code == 1
+    assert sorted(tmp_path.iterdir()) == before
 
 
 def test_limits_of_the_file_stay(files: tuple[Path, Path]) -> None:
