@@ -70,14 +70,14 @@ def check(table: dict[str, Any], model: type[Model], path: Path,
     return read
 
 
-def config_error(path: Path, faults: list[str]) -> ConfigError:
-    """One error that lists all ``faults`` of ``path``."""
+def config_error(path: Path, faults: list[str], retry: str = "") -> ConfigError:
+    """One error that lists all ``faults`` of ``path``; ``retry`` : the command to try again with."""
     listing = "\n".join(f"  {fault}" for fault in faults[:_MOST_FAULTS])
     if len(faults) > _MOST_FAULTS:
         listing += f"\n  and {len(faults) - _MOST_FAULTS} more"
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     newer = any(NEWER in fault for fault in faults)
-    hint = "pip install --upgrade omote" if newer else f"correct the file, then: omote check {path}"
+    hint = "pip install --upgrade omote" if newer else f"correct the file, then: {retry or f'omote check {path}'}"
     return ConfigError(f"{path}: {count}\n{listing}", hint=hint)
 
 

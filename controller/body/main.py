@@ -7,7 +7,8 @@ import os
 import signal
 import threading
 import time
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing.connection import Connection
 
 from controller.base.errors import OMOTE_ERRORS
@@ -39,18 +40,20 @@ def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
     for ending in termination_signals():
         signal.signal(ending, lambda *_: stop.set())
+    measured: dict[str, object] = {}
     try:
-        _serve(orders, pipe, stop)
+        _serve(orders, pipe, stop, measured)
     except OMOTE_ERRORS as error:
         with_earlier = combine_with_context(error)
-        _send(pipe, messages.Failed(str(with_earlier), getattr(with_earlier, "hint", "")))
+        _send(pipe, messages.Failed(str(with_earlier), getattr(with_earlier, "hint", ""), measured))
     except Exception as error:
         if os.environ.get("OMOTE_DEBUG"):
             raise
-        _send(pipe, messages.Failed(f"the body process failed: {type(error).__name__}: {error}"))
+        _send(pipe, messages.Failed(f"the body process failed: {type(error).__name__}: {error}", "", measured))
 
 
-def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event) -> None:
+def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event, measured: dict[str, object]) -> None:
+    """Run the body until it is asked to stop; ``measured`` takes its report, also where a servo does not stop."""
     stage = for_role(load_stage(orders.stage, PARAMETERS), orders.options.role, orders.options.heads)
     parameters, mailboxes, panels = stage.parameters, [], []
     for each in heads_of(stage):
@@ -64,18 +67,29 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event)
         body = Body(stage, parameters, mailboxes[0], orders.options)
     bodies = body.bodies if isinstance(body, Hall) else [body]
     node = open_node(stage, bodies)
-    logging.getLogger().addHandler(bodies[0].notes)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
-    try:
+    with _logged(bodies[0].notes), ExitStack() as ending:
+        if node is not None:
+            ending.callback(node.close)
+        ending.callback(lambda: measured.update(body.report()))  # comes after the stop, also one that fails
+        ending.callback(body.stop)
         body.start()
         _send(pipe, messages.Ready())
         _wait(body, pipe, stop, panels[0])
+    _send(pipe, messages.Report({**measured, **({"zenoh": node.report()} if node is not None else {})}))
+
+
+@contextmanager
+def _logged(notes: logging.Handler) -> Iterator[None]:
+    """Keep warnings for who watches the body, and print them: with a handler of its own, logging prints nothing."""
+    root, handlers = logging.getLogger(), [notes, *filter(None, [logging.lastResort])]
+    for handler in handlers:
+        root.addHandler(handler)
+    try:
+        yield
     finally:
-        logging.getLogger().removeHandler(bodies[0].notes)
-        body.stop()
-        if node is not None:
-            node.close()
-    _send(pipe, messages.Report({**body.report(), **({"zenoh": node.report()} if node is not None else {})}))
+        for handler in handlers:
+            root.removeHandler(handler)
 
 
 def _wait(body: Body | Hall, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:

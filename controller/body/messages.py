@@ -192,10 +192,11 @@ class Ready:
 
 @dataclass(frozen=True)
 class Failed:
-    """Body to main: it could not start, or gave up; the error's message and hint."""
+    """Body to main: it could not start, or gave up; the error's message and hint, and what was measured before."""
 
     message: str
     hint: str = ""
+    measured: dict[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -130,7 +130,7 @@ class BodyProcess:
         if message is None:
             raise ControllerError(f"the body did not answer within {timeout_s:g} s")
         if isinstance(message, messages.Failed):
-            self.report = self.report or {"failed": message.message}
+            self.report = self.report or {**message.measured, "failed": message.message}
             raise ControllerError(message.message, hint=message.hint)
         return message
 

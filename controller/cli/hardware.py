@@ -46,6 +46,7 @@ def preflight(
     from controller.base.parameters import PARAMETERS
     from controller.hardware.preflight import Options, new_preflight, run_preflight
     from controller.hardware.preflight_report import check_report_path, preflight_table, write_preflight
+    from controller.robot.robot import robot_parameters
 
     if out is not None:
         check_report_path(out)
@@ -57,7 +58,7 @@ def preflight(
         settings,
         channels,
         new_preflight(settings, path),
-        PARAMETERS,
+        robot_parameters(settings, path, PARAMETERS),
         _say_seen if not yes else lambda each, text: None,
         Options(by, load),
         lambda name: console.print(f"[dim]{name}[/]", soft_wrap=True),

@@ -382,15 +382,17 @@ def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> l
     from controller.base.parameters import PARAMETERS
     from controller.base.paths import find_config
     from controller.robot.joint_limits import joint_limits
-    from controller.robot.robot import load_robot
+    from controller.robot.robot import load_robot, robot_parameters
     from surface.export.urdf import write_urdf
     from surface.head.model.joints import joints_of
 
     if out.suffix.lower() != ".urdf":
         hint = "omote export head.urdf --robot head24"
         raise ConfigError("--robot: its servos limit the joints of a .urdf", hint=hint)
-    found = load_robot(find_config("robots", robot), PARAMETERS)
-    return write_urdf(head, out, pose, joint_limits(found, PARAMETERS, joints_of(head.data)))
+    path = find_config("robots", robot)
+    found = load_robot(path, PARAMETERS)
+    parameters = robot_parameters(found, path, PARAMETERS)
+    return write_urdf(head, out, pose, joint_limits(found, parameters, joints_of(head.data)))
 
 
 def _animation(take: Path | None, rate_hz: float | None) -> Animation | None:

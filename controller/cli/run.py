@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
+from controller.base.errors import OMOTE_ERRORS
 from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
 from controller.cli.heads import Identity, Person
@@ -203,16 +204,21 @@ def _run(
         heard = None if voice is None else Voice(voice, voice_hz, alone)
         options = RunOptions(take, mirror, heard, record, role=role, heads=own)
         session = StageRun(stage, options, parse_identity(identity), look, status.update, preloaded, web)
-        if no_face:
-            measured = session.run_without_face(seconds)
-        elif headless or not has_display():
-            measured = session.run_headless(seconds, pictures)
-        else:
-            require("a window (--headless runs without one)", "imgui_bundle")
-            measured = session.run_window(seconds)
-            while session.next_stage is not None:  # dropped on the window
-                session = StageRun(str(session.next_stage), RunOptions(), None, look, status.update, web=web)
+        try:
+            if no_face:
+                measured = session.run_without_face(seconds)
+            elif headless or not has_display():
+                measured = session.run_headless(seconds, pictures)
+            else:
+                require("a window (--headless runs without one)", "imgui_bundle")
                 measured = session.run_window(seconds)
+                while session.next_stage is not None:  # dropped on the window
+                    session = StageRun(str(session.next_stage), RunOptions(), None, look, status.update, web=web)
+                    measured = session.run_window(seconds)
+        except OMOTE_ERRORS:
+            if report is not None and session.measured:
+                write_report(session.measured, report)
+            raise
         if report is not None:
             write_report(measured, report)
             measured["written"].append(str(report))

@@ -285,51 +285,58 @@ def _gather_all(path: Path, settings: StageSettings, parameters: Parameters, fau
     faults += head_faults(settings.heads, settings.head_groups)
     if settings.head_groups and not settings.heads:
         faults.append("groups: groups of heads need [[heads]]")
+    known: _Known = {}
     if not settings.heads:
-        return _gather(path, settings, parameters, faults)
+        return _gather(path, settings, parameters, _Faults(faults, known))
     common: list[str] = []
     shared = settings.model_copy(update={"heads": [], "robots": [], "links": []})
-    parameters = _gather(path, shared, parameters, common).parameters
+    parameters = _gather(path, shared, parameters, _Faults(common, known)).parameters
     alone = [settings.model_copy(update=own_settings(dict(settings), head, i)) for i, head in enumerate(settings.heads)]
     for each in alone:
-        parameters = _gather(path, each, parameters, []).parameters
+        parameters = _gather(path, each, parameters, _Faults([], known)).parameters
     heads = []
     for i, (head, each) in enumerate(zip(settings.heads, alone, strict=True)):
         own: list[str] = []
-        stage = _gather(path, each, parameters, own)
+        stage = _gather(path, each, parameters, _Faults(own, known))
         heads.append(StageHead(head.name, stage, head.placement(i, len(settings.heads))))
         faults += [f"heads[{i}].{fault.removeprefix('face.')}" for fault in own if fault not in common]
     faults += common
     return replace(heads[0].stage, settings=settings, heads=tuple(heads))
 
 
-def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
+def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: _Faults) -> Stage:
     """All that a stage refers to; faults are added to ``faults``, and leave the stage unfit for use."""
-    head = _collect(faults, "head", lambda: find_config("heads", settings.head, beside=path))
+    read = faults.read
+    head = read("head", (settings.head,), lambda: find_config("heads", settings.head, beside=path))
     if head is not None and settings.identity:
-        _collect(faults, "identity", lambda: check_identity(head, settings.identity))
-    persons = _collect(faults, "face.person", lambda: find_persons(settings.face.person, head, path)) if head else ()
+        read("identity", (head, settings.identity), lambda: check_identity(head, settings.identity))
+    person = settings.face.person
+    persons = read("face.person", (head, person), lambda: find_persons(person, head, path)) if head else ()
     more = _files(faults, "vocabularies", settings.vocabularies, path)
-    parameters = _collect(faults, "vocabularies", lambda: parameters.with_files(more)) or parameters
+    files = parameters.files
+    parameters = read("vocabularies", ("parameters", files, more), lambda: parameters.with_files(more)) or parameters
     robots: list[Any] = []
     for i, name in enumerate(settings.robots):
-        found = _collect(faults, f"robots[{i}]", lambda n=name, p=parameters: _robot(n, path, p))
+        found = read(f"robots[{i}]", (name, parameters.files), lambda n=name, p=parameters: _robot(n, path, p))
         robot, parameters = found or (None, parameters)
         robots.append(robot)
     groups = _files(faults, "groups", list(settings.point_groups), path)
-    vocabulary = _collect(faults, "vocabularies", lambda: Vocabulary.load(parameters, more=more))
+    files = parameters.files
+    vocabulary = read("vocabularies", (files, more), lambda: Vocabulary.load(parameters, more=more))
     regions = parameters.region_names
-    layers = _collect(faults, "layers", lambda: load_layers(settings.layers, where=path, regions=regions))
-    life = _collect(faults, "life", lambda: IdleSettings.named(settings.life, parameters))
-    faults += _layer_faults(settings.links, layers or ()) + _gain_faults(settings.links, regions)
+    own = settings.layers
+    layers = read("layers", (own, regions), lambda: load_layers(own, where=path, regions=regions))
+    life = read("life", (settings.life, files), lambda: IdleSettings.named(settings.life, parameters))
+    faults.found.extend(_layer_faults(settings.links, layers or ()) + _gain_faults(settings.links, regions))
     scripts = [("show", settings.show)] + [
         (f"links[{i}].script", link.simulated) for i, link in enumerate(settings.links)
     ]
     for key, script in scripts:
         if script is not None:
-            _collect(faults, key, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
+            what = ("script", script, files, more)
+            read(key, what, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
     controls = tuple(
-        _collect(faults, f"face.controls[{i}]", lambda file=file: load_controls(file, parameters, vocabulary))
+        read(f"face.controls[{i}]", (file, files, more), lambda f=file: load_controls(f, parameters, vocabulary))
         for i, file in enumerate(_files(faults, "controls", settings.face.controls, path) if vocabulary else ())
     )
     amounts = tuple(zip(groups, settings.point_groups.values(), strict=False))
@@ -338,24 +345,50 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
         path, settings, parameters, head, tuple(robots), more, vocabulary, layers, life, amounts, shown, controls
     )
     if settings.take is not None:
-        _collect(faults, "take", lambda: load_take(stage.file(str(settings.take)), parameters))
+        take = stage.file(str(settings.take))
+        read("take", (take, files), lambda: load_take(take, parameters))
     return stage
 
 
-def _files(faults: list[str], kind: str, names: list[str], path: Path) -> tuple[Path, ...]:
+def _files(faults: _Faults, kind: str, names: list[str], path: Path) -> tuple[Path, ...]:
     """The files of one kind that a stage names, those that exist."""
     found = [
-        _collect(faults, f"{kind}[{i}]", lambda name=name: find_config(kind, name, beside=path))
+        faults.read(f"{kind}[{i}]", (kind, name), lambda name=name: find_config(kind, name, beside=path))
         for i, name in enumerate(names)
     ]
     return tuple(file for file in found if file is not None)
 
 
-def _collect(faults: list[str], key: str, read: Callable[..., object]) -> Any:
-    """Run ``read``; a configuration error becomes a fault of ``key``, so that all are reported at once."""
-    try:
-        return read()
-    except (ConfigError, TakeError) as error:
-        hint = f" ({error.hint})" if error.hint and "\n" not in str(error) else ""
-        faults.append(f"{key}: {error}{hint}".replace("\n", "\n  "))
-        return None
+_Known = dict[str, tuple[Any, str]]
+"""What was read, by what it is: itself and, where it is wrong, its fault."""
+
+
+@dataclass(frozen=True)
+class _Faults:
+    """Reads what a stage names and collects what is wrong with it; what many heads name is read once.
+
+    found : the faults. known : what was read for this head and those before it.
+    """
+
+    found: list[str]
+    known: _Known
+
+    def read(self, key: str, what: tuple[Any, ...], read: Callable[..., object]) -> Any:
+        """Run ``read``; a configuration error becomes a fault of ``key``, so that all are reported at once.
+
+        what : all that the result depends on.
+        """
+        name = repr((key.partition("[")[0], *what))
+        if name not in self.known:
+            self.known[name] = self._run(read)
+        value, fault = self.known[name]
+        if fault:
+            self.found.append(f"{key}: {fault}")
+        return value
+
+    def _run(self, read: Callable[..., object]) -> tuple[Any, str]:
+        try:
+            return read(), ""
+        except (ConfigError, TakeError) as error:
+            hint = f" ({error.hint})" if error.hint and "\n" not in str(error) else ""
+            return None, f"{error}{hint}".replace("\n", "\n  ")

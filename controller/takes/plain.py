@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from controller.base.errors import TakeError
+from controller.base.files import replacing
 from controller.base.parameters import Flags, Floats, Parameters, did_you_mean
 from controller.formats.kinds.csv_format import MEASURED
 from controller.takes.csvtable import CsvTable, read_csv
@@ -53,18 +54,10 @@ def plain_take(path: Path, parameters: Parameters) -> Take:
 def write_plain(path: Path, times: Floats, values: Floats, mask: Flags, parameters: Parameters) -> None:
     """Write times (n,) s and values (n, P) of the parameters in ``mask`` : (P,); six decimals.
 
-    Raises TakeError: the file cannot be written; what was there before stays.
+    Raises ControllerError: the file cannot be written; what was there before stays.
     """
-    new = path.with_name(path.name + ".new")
-    try:
-        new.write_text("".join(_lines(times, values, mask, parameters)), encoding="ascii")
-        new.replace(path)
-    except OSError as error:
-        raise TakeError(f"{path}: cannot be written: {error.strerror}", hint="choose a folder that can be written to"
-                        ) from error  # fmt: skip
-    finally:
-        if path.parent.is_dir():
-            new.unlink(missing_ok=True)
+    with replacing(path) as temporary:
+        temporary.write_text("".join(_lines(times, values, mask, parameters)), encoding="ascii")
 
 
 def _lines(times: Floats, values: Floats, mask: Flags, parameters: Parameters) -> Iterator[str]:

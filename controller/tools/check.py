@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 from controller.base.config import load, read_toml
@@ -181,7 +181,8 @@ def _describe_person(path: Path) -> Iterator[str]:
 
 def _describe_parameters(path: Path) -> Iterator[str]:
     """A base vocabulary, which has the shipped names, or one that adds parameters to it, perhaps with expressions."""
-    if set(PARAMETERS.names) & set(read_toml(path).get("parameters", {})):
+    named = read_toml(path).get("parameters")
+    if isinstance(named, Mapping) and set(PARAMETERS.names) & set(named):
         yield f"parameters {path.name}: {len(Parameters.load(path))}"
     else:
         yield from _describe_expressions(path)

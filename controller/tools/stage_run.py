@@ -65,6 +65,7 @@ class StageRun:
     web : HOST:PORT of a web panel.
     status : called with what is being done, in a few words. preloaded : the body's process, if it was started already.
     next_stage : after a run, the file of a stage that the user dropped on the window.
+    measured : after a run, also one that ended with an error, what the body measured, and ``failed`` with that error.
     """
 
     def __init__(
@@ -95,6 +96,7 @@ class StageRun:
         self._web, self._web_look, self._identity = web, look or {}, identity
         self._manager = ServiceManager()
         self.next_stage: Path | None = None
+        self.measured: dict[str, Any] = {}
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.
@@ -151,12 +153,13 @@ class StageRun:
         """The body's process and a flag that Ctrl-C sets."""
         self._status("starting")
         preloaded, self._preloaded = self._preloaded, None
-        with (
-            stop_flag() as flag,
-            self._with_web() as options,
-            BodyProcess(self.stage, self.stage.parameters, options, preloaded=preloaded) as body,
-        ):
-            yield body, flag
+        with stop_flag() as flag, self._with_web() as options:
+            body = BodyProcess(self.stage, self.stage.parameters, options, preloaded=preloaded)
+            try:
+                with body:
+                    yield body, flag
+            finally:
+                self.measured = {"stage": self.stage.settings.name, **body.report}
 
     @contextmanager
     def _with_web(self) -> Iterator[RunOptions]:

@@ -9,6 +9,7 @@ from drivers.core.pcapng import file_head, packet
 from drivers.core.trafficlog import read_log
 from tests.fuzz.head_corpus import head_kinds
 from tests.fuzz.kind import Kind
+from tests.fuzz.robot_corpus import robot_kinds
 from tests.fuzz.shape_corpus import shape_kinds
 from tests.fuzz.take_corpus import take_kinds
 
@@ -96,6 +97,7 @@ def kinds() -> list[Kind]:
     with tempfile.TemporaryDirectory(prefix="corpus-") as folder:
         return [
             *_configs(),
+            *robot_kinds(),
             *take_kinds(Path(folder)),
             *shape_kinds(Path(folder)),
             *head_kinds(Path(folder)),

@@ -23,6 +23,8 @@ from surface.base.files import read_file, read_text, reading
 PREFIX = "servos:"
 """What the name of a column of angles begins with; the channel's name follows."""
 _MOST_BYTES, _MOST_ROWS = 1 << 26, 100_000
+_MOST_DEG = 36_000.0
+_BEYOND = 0.05  # share of its range by which a parameter may lie beyond it; such values count as the end of the range
 
 
 @dataclass(frozen=True)
@@ -45,21 +47,24 @@ class FittedChannel:
 def read_pairs(path: Path, robot: RobotSettings, parameters: Parameters) -> Pairs:
     """Pairs of a CSV file: columns of parameters by name, and ``servos:NAME`` with the angles (deg) of channels.
 
-    A column ``time`` is left out. Raises ConfigError: it cannot be read, a column is unknown, a number is missing.
+    A column ``time`` is left out. Raises ConfigError: it cannot be read, a column is unknown, a number is missing or
+    beyond what its column may hold.
     """
     with reading(path, ConfigError):
         lines = [line for line in read_text(path, _MOST_BYTES).splitlines() if line.strip()]
     head = [cell.strip() for cell in lines[0].split(",")] if lines else []
     known = {channel.name for channel in robot.channels}
     if faults := list(_column_faults(head, known, parameters)):
-        raise config_error(path, faults)
+        raise _wrong(path, faults)
     if not LEAST_PAIRS < len(lines) <= _MOST_ROWS:
-        raise config_error(path, [f"has {max(len(lines) - 1, 0)} pairs; it takes {LEAST_PAIRS} to {_MOST_ROWS}"])
+        raise _wrong(path, [f"has {max(len(lines) - 1, 0)} pairs; it takes {LEAST_PAIRS} to {_MOST_ROWS}"])
     table = np.array([_numbers(path, number, line, len(head)) for number, line in enumerate(lines[1:], 2)])
+    if faults := list(_number_faults(head, table, parameters)):
+        raise _wrong(path, faults)
     values = np.tile(parameters.rest, (len(table), 1))
     for column, name in enumerate(head):
         if (at := parameters.find(name)) is not None:
-            values[:, at] = table[:, column]
+            values[:, at] = np.clip(table[:, column], parameters.low[at], parameters.high[at])
     angles = {name.removeprefix(PREFIX): table[:, i] for i, name in enumerate(head) if name.startswith(PREFIX)}
     return Pairs(values, angles)
 
@@ -76,12 +81,30 @@ def _column_faults(head: list[str], channels: set[str], parameters: Parameters) 
         yield f"there is no column {PREFIX}NAME with the angles of a channel (degrees)"
 
 
+def _wrong(path: Path, faults: list[str]) -> ConfigError:
+    return config_error(path, faults, f"omote calibrate ROBOT --pairs {path}")
+
+
 def _numbers(path: Path, number: int, line: str, count: int) -> list[float]:
     found = [plain_number(cell.strip()) for cell in line.split(",")]
     numbers = [each for each in found if each is not None]
     if len(found) != count or len(numbers) != count:
-        raise config_error(path, [f"row {number}: has {len(numbers)} numbers for {count} columns"])
+        raise _wrong(path, [f"row {number}: has {len(numbers)} numbers for {count} columns"])
     return numbers
+
+
+def _number_faults(head: list[str], table: Floats, parameters: Parameters) -> Iterator[str]:
+    """Of each column with numbers that no face or servo has, the first one."""
+    for column, name in enumerate(head):
+        low, high, unit = -_MOST_DEG, _MOST_DEG, "degrees"
+        if (at := parameters.find(name)) is not None:
+            low, high, unit = float(parameters.low[at]), float(parameters.high[at]), "its range"
+        elif not name.startswith(PREFIX):
+            continue
+        spare = _BEYOND * (high - low)
+        beyond = np.flatnonzero((table[:, column] < low - spare) | (table[:, column] > high + spare))
+        if len(beyond):
+            yield f"row {beyond[0] + 2}: {name} is {table[beyond[0], column]:g}, beyond {low:g} to {high:g}, {unit}"
 
 
 def fit_channels(robot: RobotSettings, pairs: Pairs) -> list[FittedChannel]:
@@ -107,19 +130,14 @@ def write_robot(path: Path, target: Path, fitted: list[FittedChannel], parameter
         {**{k: v for k, v in old.items() if k not in _REPLACED}, **new[old["name"]]} if old["name"] in new else old
         for old in table["channels"]
     ]
-    kept = _keep(target) if target.exists() else None
     text = "# Mixes fitted to recorded pairs by omote calibrate --pairs.\n" + tomli_w.dumps(table)
-    check = target.with_name(f".{target.stem}.check.toml")
-    try:
-        check.write_text(text, encoding="utf-8")
-        load_robot(check, parameters)
-    finally:
-        check.unlink(missing_ok=True)
-    if kept is not None:
-        with replacing(kept) as temporary:
-            temporary.write_bytes(read_file(target, _MOST_BYTES))
+    kept = _keep(target) if target.exists() else None
     with replacing(target) as temporary:
         temporary.write_text(text, encoding="utf-8")
+        load_robot(temporary, parameters)
+        if kept is not None:
+            with replacing(kept) as copy:
+                copy.write_bytes(read_file(target, _MOST_BYTES))
     return kept
 
 

@@ -163,6 +163,31 @@ def test_a_servo_that_does_not_answer_is_named_and_nothing_moves(tmp_path: Path,
     assert powered(servos) == []
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("stage")
+def test_a_servo_that_fails_later_is_said_at_once_and_does_not_take_the_report_along(
+    tmp_path: Path, servos: SimulatedBus, capfd: pytest.CaptureFixture[str]
+) -> None:
+    robot = tmp_path / "robot.toml"
+    robot.write_text(robot.read_text().replace("margin_s = 2.0", "margin_s = 0.1"))
+    said = ""
+
+    def stopped_answering() -> bool:
+        nonlocal said
+        said += capfd.readouterr().err
+        return "(id 7) stopped answering" in said
+
+    stage = load_stage(str(tmp_path / "stage.toml"), PARAMETERS)
+    with pytest.raises(ControllerError, match="not confirmed off") as caught, BodyProcess(stage, PARAMETERS) as body:
+        body.wait_ready()
+        body.begin()
+        servos.fault("silent:7")
+        assert until(stopped_answering)
+        body.stop()
+    assert body.report["failed"] == str(caught.value)
+    assert body.report["buses"][0]["servos"] == 24  # type: ignore[index]
+
+
 class Ended:
     """What a body's process and its pipe are asked for, in order; it is alive for so many questions."""
 

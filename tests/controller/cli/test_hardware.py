@@ -77,6 +77,31 @@ def test_a_preflight_on_a_terminal_asks_first_and_for_every_direction(
     assert [row["seen"] for row in table["channels"]] == ["right", "not asked"]
 
 
+EARS = """
+[profile.ear]
+region = "head"
+range = [0, 1]
+max_speed = 6.0
+max_acceleration = 80.0
+response_s = 0.02
+[parameters.ear]
+profile = "ear"
+"""
+
+
+@pytest.mark.slow
+def test_a_preflight_and_a_description_take_the_parameters_of_the_robots_own(
+    head: tuple[SimulatedBus, Path], tmp_path: Path
+) -> None:
+    _, path = head
+    (tmp_path / "ears.toml").write_text(EARS)
+    path.write_text('vocabularies = ["ears.toml"]\n' + path.read_text().replace("jawOpen", "ear", 1))
+    result = omote("preflight", str(path), "--yes", "-c", "jaw")
+    assert result.exit_code == 0, result.output + str(result.exception)
+    result = omote("export", str(tmp_path / "head.urdf"), "--robot", str(path))
+    assert result.exit_code == 0, result.output + str(result.exception)
+
+
 def test_a_preflight_with_a_fault_ends_with_one(head: tuple[SimulatedBus, Path], tmp_path: Path) -> None:
     bus, path = head
     bus.fault("stall:1")

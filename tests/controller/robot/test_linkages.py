@@ -201,6 +201,16 @@ def test_a_wrong_table_says_what_is_wrong(tmp_path: Path, content: str, fault: s
     assert fault in str(caught.value)
 
 
+def test_few_rows_cannot_ask_for_a_large_grid(tmp_path: Path) -> None:
+    """1900 rows along a diagonal span 6.9 billion combinations, for which there would be no room."""
+    rows = [f"{k},{k},{k},0,0" for k in range(1900)]
+    (tmp_path / "neck.csv").write_text("pitch,roll,yaw,left,right\n" + "\n".join(rows))
+    text = '[[linkages]]\nname = "neck"\nkind = "table"\nchannels = ["left", "right"]\nfile = "neck.csv"\n'
+    inputs = "inputs = { pitch = 'headPitch', roll = 'headRoll', yaw = 'headYaw' }\n"
+    with pytest.raises(ConfigError, match="no row for pitch = 0, roll = 0, yaw = 1, and 6858998099 more"):
+        load_robot(robot_file(tmp_path, ROBOT + text + inputs), P)
+
+
 def test_the_mirror_turns_measured_servos_into_the_head(tmp_path: Path) -> None:
     robot = load_robot(robot_file(tmp_path, ROBOT + NECK), P)
     table = build_table(robot.channels, P, linkages=robot.linkages)

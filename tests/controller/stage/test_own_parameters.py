@@ -18,6 +18,8 @@ from controller.links.line.session import LineSession
 from controller.links.websocket.conversation import _parameter
 from controller.robot.channels import build_table
 from controller.robot.following import Mirror
+from controller.robot.settings import RobotSettings
+from controller.stage import stage as stages
 from controller.stage.stage import Stage, load_stage
 from controller.takes.reader import load_take
 from controller.takes.recording import recorded, replay
@@ -279,3 +281,34 @@ def test_all_heads_of_a_stage_have_the_parameters_of_each_ones_robots(files: Pat
     stage = load_stage(str(files / "hall.toml"), PARAMETERS)
     assert [head.stage.parameters.own for head in stage.heads] == [("earLeft", "earRight", "noseGlow")] * 2
     assert stage.parameters.names == stage.heads[1].stage.parameters.names  # one mailbox's width serves every head
+
+
+def test_what_many_heads_name_is_read_once_and_its_fault_is_that_of_each(
+    files: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A stage of 200 heads took half a minute."""
+    (files / "eared.toml").write_text('vocabularies = ["ears.toml"]\n' + ROBOT)
+    (files / "wrong.toml").write_text('name = "wrong"\n')
+    heads = "".join(f'[[heads]]\nname = "h{k}"\nrobots = ["eared.toml"]\n' for k in range(200))
+    (files / "hall.toml").write_text(heads)
+    read, load = list[Path](), stages.load_robot
+
+    def counted(path: Path, parameters: Parameters) -> RobotSettings:
+        read.append(path)
+        return load(path, parameters)
+
+    monkeypatch.setattr(stages, "load_robot", counted)
+    assert len(load_stage(str(files / "hall.toml"), PARAMETERS).heads) == 200
+    assert len(read) == 2  # before the parameters of its own are known, and with them
+    (files / "hall.toml").write_text(heads.replace("eared.toml", "wrong.toml"))
+    with pytest.raises(ConfigError) as caught:
+        load_stage(str(files / "hall.toml"), PARAMETERS)
+    assert "heads[0].robots[0]: " in str(caught.value) and "heads[7].robots[0]: " in str(caught.value)
+
+
+@pytest.mark.parametrize("value", ["1e12", "[1]", '"x"', "true"])
+def test_parameters_that_are_no_table_are_a_fault_of_the_file(files: Path, value: str) -> None:
+    text = (files / "ears.toml").read_text()
+    (files / "odd.toml").write_text(f"parameters = {value}\n" + text[text.index("[profile") : text.index("[param")])
+    with pytest.raises(ConfigError, match="parameters: must be a table"):
+        check_anything(str(files / "odd.toml"))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.base.errors import TakeError
+from controller.base.errors import ControllerError, TakeError
 from controller.base.parameters import PARAMETERS as P
 from controller.takes.plain import write_plain
 from controller.takes.reader import load_take, reader_of
@@ -43,9 +43,9 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
     np.testing.assert_allclose(take.times_s, times, atol=1e-6)
     np.testing.assert_array_equal(take.mask, mask)
     np.testing.assert_allclose(take.values[:, mask], values[:, mask], atol=1e-6)
-    assert not (tmp_path / "a.csv.new").exists()
-    with pytest.raises(TakeError, match="cannot be written"):
-        write_plain(tmp_path / "none" / "a.csv", times, values, mask, P)
+    assert list(tmp_path.iterdir()) == [path]
+    with pytest.raises(ControllerError, match=r"a\.csv/b\.csv: cannot be written"):
+        write_plain(path / "b.csv", times, values, mask, P)
 
 
 @pytest.mark.parametrize(

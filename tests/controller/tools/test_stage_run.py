@@ -13,10 +13,12 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from typer.testing import CliRunner
 
 from controller.base.errors import ConfigError, ControllerError, TakeError
 from controller.body.messages import RunOptions
 from controller.body.sources import Voice
+from controller.cli.app import make_app
 from controller.tools import stage_run as module
 from controller.tools.stage_run import REPORT_FORMAT, StageRun, has_display, write_report
 
@@ -144,6 +146,21 @@ def test_a_run_without_a_face_goes_on_while_the_body_plays(
     assert gc.get_freeze_count() > 0
     assert body.preloaded is preloaded
     assert report == {"stage": "mine", "face": None, "control": {"ticks": 3}, "written": []}
+
+
+def test_what_was_measured_is_kept_where_the_run_ends_with_an_error(
+    stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    class Failing(FakeBody):
+        def stop(self) -> None:
+            self.report = {"control": {"ticks": 3}, "failed": "servo 7 is on"}
+            raise ControllerError("servo 7 is on")
+
+    monkeypatch.setattr(module, "BodyProcess", Failing(told, 1))
+    words = ["run", stage, "--no-face", "--report", str(tmp_path / "r.json")]
+    assert isinstance(CliRunner().invoke(make_app(), words).exception, ControllerError)
+    kept = json.loads((tmp_path / "r.json").read_text())
+    assert kept == {"format": 1, "stage": "mine", "control": {"ticks": 3}, "failed": "servo 7 is on"}
 
 
 def test_a_limp_head_is_not_brought_to_rest(told: list[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,6 +6,8 @@ the grid, in any order. The points of the grid may lie at any distances; each co
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -58,21 +60,19 @@ def _make(settings: TableSettings) -> GridTable:
     axes = tuple(np.unique(rows[:, i]) for i in range(k))
     if any(len(axis) < 2 for axis in axes):
         raise config_error(path, [f"{names[i]}: needs two values or more" for i in range(k) if len(axes[i]) < 2])
-    values = np.full((*map(len, axes), len(settings.channels)), np.nan)
+    found: dict[tuple[float, ...], Floats] = {}
     for row in rows:
-        at = tuple(int(np.searchsorted(axis, x)) for axis, x in zip(axes, row, strict=False))
-        if np.isfinite(values[at]).any():
+        if found.setdefault(tuple(row[:k]), row) is not row:
             raise config_error(path, [f"{_place(names[:k], row)} stands there twice"])
-        values[at] = row[k:]
-    missing = np.argwhere(~np.isfinite(values[..., 0]))
-    if len(missing):
-        point = [axis[i] for axis, i in zip(axes, missing[0], strict=True)]
-        more = f", and {len(missing) - 1} more" if len(missing) > 1 else ""
+    if missing := math.prod(map(len, axes)) - len(found):  # before room is made for a grid that few rows may span
+        point = next(place for place in product(*axes) if place not in found)
+        more = f", and {missing - 1} more" if missing > 1 else ""
         raise config_error(path, [f"there is no row for {_place(names, point)}{more}: every combination needs one"])
-    return GridTable(axes, values)
+    values = np.array([found[place][k:] for place in product(*axes)])
+    return GridTable(axes, values.reshape(*map(len, axes), len(settings.channels)))
 
 
-def _place(names: list[str], values: Floats | list[float]) -> str:
+def _place(names: list[str], values: Iterable[float]) -> str:
     return ", ".join(f"{name} = {value:g}" for name, value in zip(names, values, strict=False))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from controller.base.config import ConfigError
+from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS as P
 from controller.cli.app import make_app
 from controller.robot.channels import build_table
@@ -121,6 +122,19 @@ def test_the_command_writes_the_channels_and_keeps_the_old_file(files: tuple[Pat
     assert robot.with_name("robot.before2.toml").exists()
 
 
+def test_a_place_that_cannot_be_written_is_one_message_and_leaves_nothing(
+    files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    robot, pairs = files
+    before = sorted(tmp_path.iterdir())
+    words = ["calibrate", str(robot), "--pairs", str(pairs), "-o"]
+    error = CliRunner().invoke(make_app(), [*words, str(pairs / "o.toml")]).exception
+    assert isinstance(error, ControllerError) and "pairs.csv/o.toml: cannot be written" in str(error)
+    robot.write_text(ROBOT.replace("limit_deg", "limits_deg"))
+    assert CliRunner().invoke(make_app(), [*words, str(tmp_path / "o.toml")]).exit_code == 1
+    assert sorted(tmp_path.iterdir()) == before
+
+
 def test_limits_of_the_file_stay(files: tuple[Path, Path]) -> None:
     robot, pairs = files
     robot.write_text(ROBOT.replace("limit_deg = [-45, 45]", "limit_deg = [-20, 20]").replace("[-40, 40]", "[-20, 20]"))
@@ -140,6 +154,8 @@ def test_limits_of_the_file_stay(files: tuple[Path, Path]) -> None:
         (lambda text: "\n".join(text.splitlines()[:9]), "has 8 pairs; it takes 20"),
         (lambda text: text.replace("0.03333", "x", 1), "row 3: has 7 numbers for 8 columns"),
         (lambda text: "jawOpen\n" + "0.5\n" * 30, "there is no column servos:NAME"),
+        (lambda text: re.sub("0.03333,[^,]*", "0.03333,1e308", text), "row 3: jawOpen is 1e+308, beyond 0 to 1"),
+        (lambda text: text[:-8] + "1e300\n", "row 241: servos:still is 1e+300, beyond -36000 to 36000, degrees"),
     ],
 )
 def test_a_wrong_table_says_what_is_wrong(files: tuple[Path, Path], change: Any, fault: str) -> None:
