@@ -37,9 +37,11 @@ def _repeated(knots: Floats, degrees: Ints) -> Floats:
     for degree in np.unique(degrees):
         rows = knots[degrees == degree, : degree + 2]
         last = max(int(degree) - 1, 0)  # further on in the row
-        found.append(rows[:, : degree + 2 - last][rows[:, : degree + 2 - last] == rows[:, last:]])
+        first = rows[:, : degree + 2 - last]
+        found.append(first[first == rows[:, last:]])
     lines = np.unique(np.concatenate(found))
-    return lines[(lines > knots.min()) & (lines < knots.max())]
+    inner: Floats = lines[(lines > knots.min()) & (lines < knots.max())]
+    return inner
 
 
 def sample_places(rect: Floats, creases: tuple[Floats, Floats] | None = None) -> Floats:
