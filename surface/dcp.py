@@ -142,8 +142,8 @@ class DCPSurface(ControlPoints):
         max_points : quarter cells until at most so many control points reach each
         chord_error : quarter cells until the surface is this near to their triangles, in units of the points;
             if neither limit is given, a thousandth of the size of the control net. The distance is measured at 25
-            samples a cell and holds between them by a margin; it may be exceeded where ``max_depth`` ends, and in the
-            triangles that a loop cuts
+            samples a cell, and on creases in it, and holds between them by a margin; it may be exceeded where
+            ``max_depth`` ends, and in the triangles that a loop cuts
         max_depth, min_depth : levels below the roots, at most 20
         domain : where to draw; the rectangle of all subdomains if left out
         loop_error : how near the mesh's border follows the loops; ``chord_error`` if left out

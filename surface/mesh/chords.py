@@ -1,7 +1,8 @@
 """How far a surface is from the triangles of a quad tree's cells: densely sampled, as distances in space.
 
 Nine samples a cell decide where a tree surely goes on; they miss what happens between them, and which diagonals the
-triangles take. So the leaves are sampled again, in steps of a quarter, against the very triangles they are drawn with.
+triangles take. So the leaves are sampled again, in steps of a quarter, against the very triangles they are drawn with;
+also on creases, where the surface is furthest away between those steps.
 """
 
 # mypy: allow-untyped-defs
@@ -18,23 +19,61 @@ from .quadtree import TEMPLATES
 STEPS = 4  # into which each side of a cell is cut
 MARGIN = 1.15  # the greatest distance over the greatest at samples: a parabola's is 1.07, of two together 1.14
 AT_ONCE = 20_000  # cells
+FIRST = np.array([(i, j) for i in range(STEPS + 1) for j in range(STEPS + 1)])  # samples in steps
+ORDER = np.array(sorted(np.ndindex(STEPS + 3, STEPS + 3), key=lambda ij: max(ij) > STEPS))  # and then those on creases
 NODES = np.array([0, 20, 24, 4, 10, 22, 14, 2])  # samples at the corners 0-3 and the middles 4-7 of a leaf's edges
 
 
-def sample_places(rect: Floats) -> Floats:
-    """(n, 25, 2) places in cells ``rect (n, 4)``, u0 u1 v0 v1, in steps of a quarter; v runs fastest."""
+def crease_lines(surface: ControlPoints) -> tuple[Floats, Floats]:
+    """Rising coordinates in u, and in v, at which a blending function may have a bend or a jump: knots that it has as
+    often as its degree, or more often; those at the ends of all knots are left out."""
+    knots_u, knots_v, degrees_u, degrees_v = surface.arrays()[:4]
+    return _repeated(knots_u, degrees_u), _repeated(knots_v, degrees_v)
+
+
+def _repeated(knots: Floats, degrees: Ints) -> Floats:
+    """The knots (n, w) that rows have at least as often as their degree (n,) says, each once, rising."""
+    found = [np.zeros(0)]
+    for degree in np.unique(degrees):
+        rows = knots[degrees == degree, : degree + 2]
+        last = max(int(degree) - 1, 0)  # further on in the row
+        first = rows[:, : degree + 2 - last]
+        found.append(first[first == rows[:, last:]])
+    lines = np.unique(np.concatenate(found))
+    inner: Floats = lines[(lines > knots.min()) & (lines < knots.max())]
+    return inner
+
+
+def sample_places(rect: Floats, creases: tuple[Floats, Floats] | None = None) -> Floats:
+    """(n, 25, 2) places in cells ``rect (n, 4)``, u0 u1 v0 v1, in steps of a quarter; v runs fastest.
+
+    creases : as :func:`crease_lines` gives them; where there are any, 24 places on those in the cells follow. Of
+        several in one half of a cell that nearest to its middle is taken.
+    """
     steps = np.arange(STEPS + 1) / STEPS
-    s, t = (x.ravel() for x in np.meshgrid(steps, steps, indexing="ij"))
-    u = (1.0 - s) * rect[:, :1] + s * rect[:, 1:2]
-    v = (1.0 - t) * rect[:, 2:3] + t * rect[:, 3:]
-    return np.stack([u, v], axis=-1)
+    along = [(1.0 - steps) * rect[:, k : k + 1] + steps * rect[:, k + 1 : k + 2] for k in (0, 2)]
+    order = FIRST
+    if creases is not None and any(len(lines) for lines in creases):
+        along = [np.hstack([at, _bends(at, lines)]) for at, lines in zip(along, creases, strict=True)]
+        order = ORDER
+    return np.stack([along[0][:, order[:, 0]], along[1][:, order[:, 1]]], axis=-1)
+
+
+def _bends(along: Floats, lines: Floats) -> Floats:
+    """(n, 2) the coordinate of a crease in either half of cells with samples at ``along (n, 5)``; that of the half's
+    middle where there is none."""
+    middles, ends = along[:, 1::2], np.concatenate([[-np.inf], lines, [np.inf]])
+    after = np.searchsorted(lines, middles) + 1
+    below, above = ends[after - 1], ends[after]
+    near = np.where(middles - below < above - middles, below, above)
+    return np.where((near > along[:, :-1:2]) & (near < along[:, 2::2]), near, middles)
 
 
 def measured_errors(surface: ControlPoints, uv: Floats, side: Ints, pattern: Ints) -> Floats:
     """(n,) greatest distance of the surface from the triangles of each leaf, in units of the points, with a margin for
     what lies between samples; 0 where nothing is covered.
 
-    uv, side : (n, 25, 2) and (n, 25), the samples of :func:`sample_places` and the limits they take.
+    uv, side : (n, k, 2) and (n, k), the samples of :func:`sample_places` and the limits they take.
     pattern : (n,) which triangles each leaf has, see :func:`surface.mesh.quadtree.patterns`.
     """
     worst = np.zeros(len(uv))
@@ -77,7 +116,7 @@ def triangle_square(p, a, b, c):
 
 @kernel
 def _worst_distances(points, pattern, templates, nodes, out):
-    """The greatest distance of ``points (n, 25, 3)`` from the nearest of their leaf's triangles; NaN is left out."""
+    """The greatest distance of ``points (n, k, 3)`` from the nearest of their leaf's triangles; NaN is left out."""
     for i in range(points.shape[0]):
         worst = 0.0
         for k in range(points.shape[1]):

@@ -130,12 +130,12 @@ class SplitTests:
     def tighten(self, leaves: Leaves, inner: list[Ints], error: float) -> tuple[Leaves, list[Ints]]:
         """Quarter leaves until the surface is nowhere further than ``error`` from their triangles, or the tree
         has no more levels; ``inner`` and what is returned are as of :func:`.quadtree.grow`."""
-        passed = np.zeros(0, dtype=np.int64)
+        passed, creases = np.zeros(0, dtype=np.int64), chords.crease_lines(self.surface)
         while True:
             pattern = quadtree.patterns(self.lattice, leaves, inner)
             key = self._keys(leaves) * len(quadtree.TEMPLATES) + pattern
             left = np.flatnonzero((leaves.level < self.lattice.depth) & ~np.isin(key, passed))
-            far = self._too_far(leaves, pattern, left, error)
+            far = self._too_far(leaves, pattern, left, error, creases)
             passed = np.concatenate([passed, key[left[~far]]])
             if not far.any():
                 return leaves, inner
@@ -147,7 +147,9 @@ class SplitTests:
         corner = self.lattice.key(leaves.cell[:, 0] << shift, leaves.cell[:, 1] << shift)
         return corner * (self.lattice.depth + 1) + leaves.level
 
-    def _too_far(self, leaves: Leaves, pattern: Ints, which: Ints, error: float) -> Bools:
+    def _too_far(
+        self, leaves: Leaves, pattern: Ints, which: Ints, error: float, creases: tuple[Floats, Floats]
+    ) -> Bools:
         """(k,) bool: from the triangles of which of the leaves ``which (k,)`` the surface is too far."""
         far = np.zeros(len(which), dtype=bool)
         for level in np.unique(leaves.level[which]):
@@ -155,7 +157,7 @@ class SplitTests:
             cells = leaves.cell[which[at]]
             rect = self._rects(int(level), cells)
             at = at[active := self._active(rect, cells, int(level))[0]]
-            uv = chords.sample_places(rect[active])
+            uv = chords.sample_places(rect[active], creases)
             side = inner_side(uv, uv[:, 12], self.domain)
             far[at] = chords.measured_errors(self.surface, uv, side, pattern[which[at]]) > error
         return far

@@ -138,8 +138,8 @@ def test_a_surface_keeps_its_digits_while_it_shrinks_slowly_and_when_it_comes_fr
     assert off(surface.deformation(other.tessellate(roots=(2, 2), max_depth=3))) < 1e-6
 
 
-@settings(max_examples=12, deadline=None, derandomize=True)
-@given(st.integers(0, 10_000))
+@settings(max_examples=12, deadline=None)
+@given(st.integers(0, 2**32 - 1))
 @example(66)  # everything is put back from far away at once
 @example(5597)  # weights of 5 at 1e38 were beyond float32
 def test_no_history_of_moves_leaves_a_trace(sheet: tuple[DCPSurface, Mesh], seed: int) -> None:

@@ -12,13 +12,14 @@ from surface.mesh import chords, quadtree
 from tests.surface import shapes
 
 trimesh = pytest.importorskip("trimesh", reason="trimesh measures distances from the mesh: pip install omote[fit]")
+FURTHEST = 60  # samples that are compared with all triangles
 Net = tuple[tuple[int, int], list[np.ndarray], np.ndarray, np.ndarray]
 
 
-def net(seed: int, bend: float) -> Net:
+def net(seed: int, bend: float, degrees: tuple[int, int] | None = None) -> Net:
     """Degrees, knot vectors, control points and weights of a bent sheet that no two directions of agree in."""
-    rng = np.random.default_rng(seed)
-    degrees, counts = ((2, 3), (3, 3), (4, 2), (3, 5))[seed % 4], (9, 7)
+    rng, counts = np.random.default_rng(seed), (9, 7)
+    degrees = degrees or ((2, 3), (3, 3), (4, 2), (3, 5))[seed % 4]
     knots = [
         np.concatenate([[0.0] * (p + 1), np.sort(rng.uniform(0.1, 0.9, n - p - 1)), [1.0] * (p + 1)])
         for p, n in zip(degrees, counts, strict=True)
@@ -37,11 +38,15 @@ def oracle(given: Net, at: np.ndarray) -> np.ndarray:
 
 
 def distances(mesh: Mesh, points: np.ndarray) -> np.ndarray:
-    """True distances of points from the nearest of the triangles around."""
+    """Distances of points from the nearest of the twelve triangles around, and, where those are furthest, of all."""
     corners = mesh.vertices[mesh.triangles]
     _, near = cKDTree(corners.mean(axis=1)).query(points, k=12)
     feet = trimesh.triangles.closest_point(corners[near.ravel()], np.repeat(points, 12, axis=0))
-    return np.linalg.norm(feet.reshape(len(points), 12, 3) - points[:, None], axis=2).min(axis=1)
+    found = np.linalg.norm(feet.reshape(len(points), 12, 3) - points[:, None], axis=2).min(axis=1)
+    for k in np.argsort(found)[-FURTHEST:]:
+        feet = trimesh.triangles.closest_point(corners, np.repeat(points[k : k + 1], len(corners), axis=0))
+        found[k] = np.linalg.norm(feet - points[k], axis=1).min()
+    return found
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -57,12 +62,33 @@ def test_no_sample_of_a_surface_is_further_away_than_the_chord_error(seed: int) 
     assert worst < distances(estimated, dense).max() < 0.025
 
 
+@pytest.mark.parametrize(("seed", "degrees"), [(1, (1, 3)), (7, (2, 1)), (5, (3, 1))])
+def test_the_chord_error_holds_between_the_samples_at_creases(seed: int, degrees: tuple[int, int]) -> None:
+    given = net(seed, 0.15, degrees)
+    surface = DCPSurface.from_nurbs(*given[0], *given[1], *given[2:])
+    line = np.linspace(0, 1, 61)
+    lines = [np.unique(np.concatenate([line, t])) if p == 1 else line for p, t in zip(degrees, given[1], strict=True)]
+    dense = oracle(given, np.stack(np.meshgrid(*lines, indexing="ij"), axis=-1).reshape(-1, 2))
+    assert 0.003 < distances(surface.tessellate(chord_error=0.01, max_depth=12), dense).max() <= 0.01
+
+
 def test_samples_lie_in_steps_of_a_quarter() -> None:
     uv = chords.sample_places(np.array([[0.0, 4.0, 10.0, 14.0], [1.0, 2.0, 0.0, 8.0]]))
     lattice = {(a, b) for a in range(5) for b in range(5)}
     assert uv.shape == (2, 25, 2)
     assert {tuple(p) for p in uv[0]} == {(a, 10.0 + b) for a, b in lattice}
     assert {tuple(p) for p in uv[1]} == {(1 + a / 4, 2.0 * b) for a, b in lattice}
+
+
+def test_creases_are_knots_as_many_as_the_degree_and_samples_lie_on_them() -> None:
+    knots = [0, 0, 0, 0, 0.2, 0.45, 0.45, 0.45, 0.8, 0.8, 1, 1, 1, 1]
+    surface = DCPSurface.from_nurbs(3, 1, knots, [0, 0, 0.3, 1, 1], np.random.default_rng(0).normal(size=(10, 3, 3)))
+    creases = chords.crease_lines(surface)
+    assert [lines.tolist() for lines in creases] == [[0.45], [0.3]]
+    (uv,) = chords.sample_places(np.array([[0.0, 1.0, 0.0, 0.5]]), creases)
+    assert len(uv) == 49 and set(uv[25:, 0]) == {0.0, 0.25, 0.45, 0.5, 0.75, 1.0}
+    assert {tuple(p) for p in uv} >= {(0.45, 0.3), (0.45, 0.5), (0.25, 0.3)}
+    assert np.array_equal(uv[:25], chords.sample_places(np.array([[0.0, 1.0, 0.0, 0.5]]))[0])
 
 
 def test_distances_from_triangles_are_those_of_trimesh() -> None:
