@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import pytest
@@ -11,7 +12,7 @@ from controller.formats.format import FORMATS
 from controller.formats.frame import Frame, Refusals
 from tests.controller.formats.faces import KINDS
 from tests.fuzz import requests
-from tests.fuzz.messages import attack
+from tests.fuzz.messages import LONGEST_S, attack
 
 
 @pytest.mark.slow
@@ -38,6 +39,28 @@ class Fragile:
 def test_what_raises_is_found() -> None:
     found = attack(replace(FORMATS.get("livelink"), decoder=Fragile), 300, seed=1)
     assert found.faults["livelink: ValueError: what is this?"] > 50 and "what is this" in str(found)
+
+
+class Slow(Fragile):
+    """A decoder that is slow for some messages, each time, or the first time only."""
+
+    first_only, seen = False, 0
+
+    def feed(self, message: bytes) -> list[Frame]:
+        Slow.seen += 1
+        end_s = time.thread_time() + 0.06
+        while Slow.seen % 50 == 0 or (Slow.seen > 50 and not Slow.first_only):
+            if time.thread_time() > end_s:
+                break
+        return self._inner.feed(message)
+
+
+@pytest.mark.parametrize("first_only", [False, True])
+def test_what_is_slow_is_found_where_it_is_slow_each_time(first_only: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Slow, "first_only", first_only)
+    monkeypatch.setattr(Slow, "seen", 0)
+    found = attack(replace(FORMATS.get("livelink"), decoder=Slow), 60, seed=1)
+    assert (found.slowest_s > LONGEST_S) is not first_only
 
 
 def test_a_short_run_of_websocket_requests_finds_no_fault() -> None:

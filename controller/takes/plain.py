@@ -1,7 +1,8 @@
 """Reads and writes plain tables of parameters: ``time,jawOpen,mouthSmileLeft,...``, the time in seconds.
 
 Columns may have any spelling of a parameter; a name without a side means both, ``headYaw_deg`` is in degrees. Columns
-that mean no parameter are left out, unless their name is nearly that of one; so are those of what servos showed.
+that mean no parameter are left out, unless their name is nearly that of one; so are those of what servos showed. An
+empty cell leaves a value as it was in the row before; a column of nothing else gives nothing.
 """
 
 from __future__ import annotations
@@ -43,11 +44,20 @@ def plain_take(path: Path, parameters: Parameters) -> Take:
     for column, positions, unit in _parameter_columns(table, at, parameters):
         if mask[positions].any():
             raise TakeError(f"{path}, line 1, column {table.header[column]}: is there twice", hint="remove one of them")
-        values[:, positions] = unit * table.numbers([column])
-        mask[positions] = True
+        cells = table.numbers([column], blanks=True)[:, 0]
+        if np.isfinite(cells).any():
+            values[:, positions] = unit * _filled(cells)[:, None]
+            mask[positions] = True
     if not mask.any():
-        raise TakeError(f"{path}, line 1: no column is a parameter", hint=_HINT)
+        raise TakeError(f"{path}, line 1: no column is a parameter, or none has a value", hint=_HINT)
     return Take(path.name, times - times[0], values, mask, parameters.low, parameters.high)
+
+
+def _filled(cells: Floats) -> Floats:
+    """Cells (n,) of which some are NaN, each of those as the last one before it, or else the first one, that is not."""
+    given = np.flatnonzero(np.isfinite(cells))
+    filled: Floats = cells[given[np.maximum(np.searchsorted(given, np.arange(len(cells)), side="right") - 1, 0)]]
+    return filled
 
 
 def write_plain(path: Path, times: Floats, values: Floats, mask: Flags, parameters: Parameters) -> None:
