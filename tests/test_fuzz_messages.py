@@ -42,25 +42,23 @@ def test_what_raises_is_found() -> None:
 
 
 class Slow(Fragile):
-    """A decoder that is slow for some messages, each time, or the first time only."""
+    """A decoder that is slow for the first ``left`` messages."""
 
-    first_only, seen = False, 0
+    left = 0
 
     def feed(self, message: bytes) -> list[Frame]:
-        Slow.seen += 1
-        end_s = time.thread_time() + 0.06
-        while Slow.seen % 50 == 0 or (Slow.seen > 50 and not Slow.first_only):
-            if time.thread_time() > end_s:
-                break
+        end_s = time.thread_time() + 1.2 * LONGEST_S * (Slow.left > 0)
+        Slow.left -= 1
+        while time.thread_time() < end_s:
+            pass
         return self._inner.feed(message)
 
 
-@pytest.mark.parametrize("first_only", [False, True])
-def test_what_is_slow_is_found_where_it_is_slow_each_time(first_only: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(Slow, "first_only", first_only)
-    monkeypatch.setattr(Slow, "seen", 0)
-    found = attack(replace(FORMATS.get("livelink"), decoder=Slow), 60, seed=1)
-    assert (found.slowest_s > LONGEST_S) is not first_only
+@pytest.mark.parametrize(("times", "is_found"), [(1, False), (4, True)])
+def test_a_message_is_slow_that_is_so_each_time(times: int, is_found: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Slow, "left", times)
+    found = attack(replace(FORMATS.get("livelink"), decoder=Slow), 1, seed=1)
+    assert (found.slowest_s > LONGEST_S) is is_found
 
 
 def test_a_short_run_of_websocket_requests_finds_no_fault() -> None:
