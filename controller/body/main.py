@@ -64,18 +64,28 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event)
         body = Body(stage, parameters, mailboxes[0], orders.options)
     bodies = body.bodies if isinstance(body, Hall) else [body]
     node = open_node(stage, bodies)
-    logging.getLogger().addHandler(bodies[0].notes)
+    handlers = bodies[0].notes, _to_terminal()
+    for handler in handlers:
+        logging.getLogger().addHandler(handler)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
     try:
         body.start()
         _send(pipe, messages.Ready())
         _wait(body, pipe, stop, panels[0])
     finally:
-        logging.getLogger().removeHandler(bodies[0].notes)
+        for handler in handlers:
+            logging.getLogger().removeHandler(handler)
         body.stop()
         if node is not None:
             node.close()
     _send(pipe, messages.Report({**body.report(), **({"zenoh": node.report()} if node is not None else {})}))
+
+
+def _to_terminal() -> logging.Handler:
+    """Shows warnings and errors on standard error; without it they would only reach the window's panel."""
+    handler = logging.StreamHandler()
+    handler.setLevel(logging.WARNING)
+    return handler
 
 
 def _wait(body: Body | Hall, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
