@@ -4,7 +4,7 @@
 //   [[links]]
 //   kind = "binary"
 //   port = "/dev/ttyACM0"
-//   send = "/dev/ttyACM1"     # another board that shows the face
+//   send = "/dev/ttyACM0"     # the same board shows the face; leave this out where none does
 
 #include "omote_frame.h"
 

@@ -29,6 +29,10 @@ class Incoming:
 
     name : of the link, for STOP and the thread. path : file in which a neutral face is kept. gate : the receiver's.
 
+    Attributes
+    ----------
+    receiver : what it listens to.
+
     Raises LinkError: that file is damaged.
     """
 
@@ -37,7 +41,7 @@ class Incoming:
         gate: Gate | None = None,
     ) -> None:  # fmt: skip
         self.name = name
-        self._settings, self._receiver, self._sink = settings, receiver, sink
+        self._settings, self.receiver, self._sink = settings, receiver, sink
         address = settings.incoming
         streams = address is not None and address.transport != "udp"
         self._decoding = Decoding(settings.form, sink.parameters, streams=streams, newest=True)
@@ -62,7 +66,7 @@ class Incoming:
         self._stopping.set()
         if self._thread.ident is not None and self._thread is not threading.current_thread():
             self._thread.join()
-        self._receiver.close()
+        self.receiver.close()
         if self._settings.ranges:
             self._home.conditioning.save()
 
@@ -76,14 +80,14 @@ class Incoming:
             "sender": self._sender,
             "face": not self._home.lost or any(not shown.lost for shown in self._others.values()),
             "neutral_known": self._home.conditioning.neutral_known,
-            "error": self._receiver.error,
+            "error": self.receiver.error,
         }
 
     def _run(self) -> None:
         next_s = 0.0
         while not self._stopping.is_set():
             self._stopping.wait(max(0.0, next_s - time.monotonic()))
-            received = self._receiver.receive(_WAIT_S)
+            received = self.receiver.receive(_WAIT_S)
             now_s = time.monotonic()
             for newest in self._newest(self._decoding.feed(received), now_s).values():
                 self._show(newest.frame, now_s)

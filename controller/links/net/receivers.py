@@ -273,34 +273,37 @@ class TcpCaller:
 
 
 class SerialReceiver:
-    """The stream of a serial port, which is opened again where it vanishes."""
+    """The stream of a serial port, which is opened again where it vanishes.
+
+    port : the serial port; another thread may write to it meanwhile.
+    """
 
     def __init__(self, device: str, baud: int) -> None:
         self.error = ""
-        self._port = SerialPort(device, baud)
-        self._port.open()
+        self.port = SerialPort(device, baud)
+        self.port.open()
         self._next_s = 0.0
 
     def receive(self, timeout_s: float) -> Received:
         try:
-            if not self._port.is_open and not self._reopen(timeout_s):
+            if not self.port.is_open and not self._reopen(timeout_s):
                 return []
-            data = self._port.read(time.monotonic() + timeout_s)
+            data = self.port.read(time.monotonic() + timeout_s)
         except PortError as error:
-            self._port.close()
+            self.port.close()
             self.error, self._next_s = str(error), time.monotonic() + _RETRY_S
-            return [(self._port.path, b"")]
-        return [(self._port.path, data)] if data else []
+            return [(self.port.path, b"")]
+        return [(self.port.path, data)] if data else []
 
     def close(self) -> None:
-        self._port.close()
+        self.port.close()
 
     def _reopen(self, timeout_s: float) -> bool:
         wait_s = self._next_s - time.monotonic()
         if wait_s > 0.0:
             time.sleep(min(wait_s, timeout_s))
             return False
-        self._port.open()
+        self.port.open()
         self.error = ""
         return True
 
