@@ -22,6 +22,9 @@ from controller.takes.livelink import Take
 from controller.vocabulary.sides import sides
 
 _HINT = "a plain take begins with the line time,jawOpen,mouthSmileLeft,..., and the time is in seconds"
+_UNKNOWN = (
+    "correct it, or remove the column; one's own parameter needs its vocabulary: --vocabulary FILE or --stage STAGE"
+)
 _TIMES = {"time": 1.0, "t": 1.0, "seconds": 1.0, "timestamp": 1.0, "ms": 1e-3, "milliseconds": 1e-3}
 _TIMES |= {f"{name}_{unit}": scale for name in ("time", "t", "timestamp")
            for unit, scale in (("s", 1.0), ("sec", 1.0), ("seconds", 1.0), ("ms", 1e-3))}  # fmt: skip
@@ -107,4 +110,4 @@ def _parameter_columns(table: CsvTable, but: int, parameters: Parameters) -> Ite
             yield column, positions, unit
         elif column != but and (meant := did_you_mean(name, parameters.names)):
             why = f"{table.path}, line 1: unknown column {name!r}{meant}"
-            raise TakeError(why, hint="correct it, or remove the column")
+            raise TakeError(why, hint=_UNKNOWN)
