@@ -8,13 +8,24 @@ with what this program writes, and sends faces through every pair.
 from __future__ import annotations
 
 import sys
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-from controller.base.parameters import PARAMETERS, Flags
+from controller.base.parameters import PARAMETERS, Flags, Parameters
 from controller.formats.format import FORMATS, Format
 
 PAGE = Path(__file__).resolve().parent / "links.md"
 BEGIN, END = "<!-- {}: written by docs/make_links_matrix.py -->", "<!-- end -->"
+
+
+@cache
+def with_own() -> Parameters:
+    """The parameters, and behind them one of somebody's own."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "own.toml"
+        path.write_text('[parameters.ownGlow]\nprofile = "mouth"\nregion = "nose"\n', encoding="ascii")
+        return PARAMETERS.with_files([path])
 
 
 def own() -> list[Format]:
@@ -26,7 +37,7 @@ def formats_table() -> str:
     """The formats: what they are, how they travel, what they carry."""
     rows = ["| kind | what it is | travels by | port | parameters | rounded to | |", "|---" * 7 + "|"]
     for form in own():
-        count = amount(form.carries(PARAMETERS), form.about(PARAMETERS))
+        count = amount(form.carries(PARAMETERS), form.about(PARAMETERS), more=names_any(form))
         port, exact = str(form.port or ""), f"{2 * form.quantum:g}" if form.quantum else "not"
         travels = ", ".join(form.transports)
         rows.append(f"| `{form.kind}` | {form.title} | {travels} | {port} | {count} | {exact} | {form.note} |")
@@ -45,14 +56,20 @@ def pair(one: Format, other: Format) -> str:
     """One cell."""
     exact = one.carries(PARAMETERS) & other.carries(PARAMETERS)
     known = [form.carries(PARAMETERS) | form.about(PARAMETERS) for form in (one, other)]
-    count, rounded = amount(exact, known[0] & known[1] & ~exact), max(one.quantum, other.quantum)
+    more = names_any(one) and names_any(other)
+    count, rounded = amount(exact, known[0] & known[1] & ~exact, more=more), max(one.quantum, other.quantum)
     return f"{count}, ±{rounded:g}" if rounded and exact.any() else count
 
 
-def amount(exact: Flags, about: Flags) -> str:
-    """How many parameters go through, and how many more in effect only."""
-    more = f"~{about.sum()}" if about.any() else ""
-    return " + ".join([*([str(exact.sum())] if exact.any() else []), *([more] if more else [])]) or "0"
+def names_any(form: Format) -> bool:
+    """Whether a format has a name for parameters of somebody's own."""
+    return bool(form.carries(with_own())[-1])
+
+
+def amount(exact: Flags, about: Flags, *, more: bool) -> str:
+    """How many parameters go through, a plus where all of somebody's own do, too, and how many in effect only."""
+    counts = [f"{exact.sum()}{'+' if more else ''}"] if exact.any() else []
+    return " + ".join([*counts, *([f"~{about.sum()}"] if about.any() else [])]) or "0"
 
 
 def with_tables(text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 import tomllib
 from importlib import util
@@ -58,6 +59,12 @@ def test_every_key_is_explained_with_its_default() -> None:
             continue
         shown = f'"{default}"' if isinstance(default, str) else f"{default:g}" if type(default) is not bool else "false"
         assert written[entry.name].strip("`") == shown, entry.name
+
+
+def test_the_formats_that_may_be_silent_for_ever_are_named() -> None:
+    (row,) = [line for line in TEXT.splitlines() if line.startswith("| `timeout_s`")]
+    silent = {kind for kind in FORMATS.kinds() if math.isinf(FORMATS.get(kind).timeout_s)}
+    assert {*re.findall(r"`([\w-]+)`", row)} - {"timeout_s"} == silent
 
 
 @pytest.mark.parametrize("block", re.findall(r"```toml\n(.*?)```", TEXT, re.S))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import pytest
@@ -11,7 +12,7 @@ from controller.formats.format import FORMATS
 from controller.formats.frame import Frame, Refusals
 from tests.controller.formats.faces import KINDS
 from tests.fuzz import requests
-from tests.fuzz.messages import attack
+from tests.fuzz.messages import LONGEST_S, attack
 
 
 @pytest.mark.slow
@@ -38,6 +39,26 @@ class Fragile:
 def test_what_raises_is_found() -> None:
     found = attack(replace(FORMATS.get("livelink"), decoder=Fragile), 300, seed=1)
     assert found.faults["livelink: ValueError: what is this?"] > 50 and "what is this" in str(found)
+
+
+class Slow(Fragile):
+    """A decoder that is slow for the first ``left`` messages."""
+
+    left = 0
+
+    def feed(self, message: bytes) -> list[Frame]:
+        end_s = time.thread_time() + 1.2 * LONGEST_S * (Slow.left > 0)
+        Slow.left -= 1
+        while time.thread_time() < end_s:
+            pass
+        return self._inner.feed(message)
+
+
+@pytest.mark.parametrize(("times", "is_found"), [(1, False), (4, True)])
+def test_a_message_is_slow_that_is_so_each_time(times: int, is_found: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Slow, "left", times)
+    found = attack(replace(FORMATS.get("livelink"), decoder=Slow), 1, seed=1)
+    assert (found.slowest_s > LONGEST_S) is is_found
 
 
 def test_a_short_run_of_websocket_requests_finds_no_fault() -> None:

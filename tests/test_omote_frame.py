@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -73,6 +74,13 @@ def test_faces_go_into_the_header_and_out_again(echo: Path) -> None:
         np.testing.assert_allclose(after.values[before.mask], before.values[before.mask], atol=1e-4)
         assert (after.mask == before.mask).all()
     assert [frame.sequence for frame in found] == list(range(41)) and found[-1].time_s == 9.5
+
+
+def test_the_header_names_every_parameter_in_its_place() -> None:
+    names = re.search(r"enum \{([A-Z_,\s]+)\};", (FOLDER / "omote_frame.h").read_text())
+    assert names is not None
+    spelt = [name.strip().removeprefix("OMOTE_").replace("_", "").lower() for name in names[1].split(",")]
+    assert spelt == [name.lower() for name in P.names]
 
 
 def test_rubbish_is_refused_and_the_next_frame_is_read(echo: Path) -> None:

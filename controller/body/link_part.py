@@ -14,7 +14,8 @@ from controller.links.links import LinkSettings, open_links
 from drivers.base.shutdown import Closers
 
 _CLOSE_S = 3.0
-_LONGEST_STATUS = 400
+_LONGEST_STATUS, _LONGEST_FAULT = 1200, 80
+"""Characters of all links in an answer to STATUS, which has at most 2048, and of what is wrong with one."""
 _PLAIN_HOOK = threading.excepthook
 
 
@@ -111,17 +112,24 @@ class LinkPart:
 
 
 def link_status(links: Sequence[LinkPart]) -> dict[str, str]:
-    """Rate, jitter, loss, age and last error of each link that takes anything, as one word; nothing without any."""
-    words = []
-    for link in links:
-        report = link.report()
-        if "rate_hz" in report:
-            age = "never" if report["age_s"] is None else f"{report['age_s']}s"
-            figures = f"{report['rate_hz']}Hz,{report['jitter_ms']}ms,lost={report['lost']},age={age}"
-            words.append(
-                f"{link.name.removeprefix('link ')}:{figures},{report.get('fault') or report['error'] or 'good'}"
-            )
-    return {"links": "_".join(";".join(words).split())[:_LONGEST_STATUS]} if words else {}
+    """Rate, jitter, loss, age and last error of each link that takes anything, as one word; nothing without any.
+
+    Where there is no room for all of them, the last entry says how many more there are.
+    """
+    words = [_figures(link.name, report) for link in links if "rate_hz" in (report := link.report())]
+    kept = [*words]
+    while sum(len(word) + 1 for word in kept) > _LONGEST_STATUS:
+        kept.pop()
+    more = [f"and_{len(words) - len(kept)}_more"] if len(kept) < len(words) else []
+    return {"links": ";".join([*kept, *more])} if words else {}
+
+
+def _figures(name: str, report: dict[str, Any]) -> str:
+    """One link as a word."""
+    age = "never" if report["age_s"] is None else f"{report['age_s']}s"
+    fault = str(report.get("fault") or report["error"] or "good")[:_LONGEST_FAULT]
+    figures = f"{report['rate_hz']}Hz,{report['jitter_ms']}ms,lost={report['lost']},age={age},{fault}"
+    return "_".join(f"{name.removeprefix('link ')}:{figures}".replace(";", ",").split())
 
 
 @contextmanager

@@ -1,7 +1,8 @@
-"""Reads the action units of OpenFace 2 and of py-feat from CSV files.
+"""Reads the action units of OpenFace 2, of the format ``au-csv``, and of py-feat from CSV files.
 
 OpenFace (its wiki, "Output Format"): header names with a blank after each comma; ``AU01_r`` is an intensity 0..5,
-``AU01_c`` a presence 0 or 1, and AU28 has a presence only; rows with ``success`` 0 hold nothing. Head and gaze are
+``AU01_c`` a presence 0 or 1, and AU28 has a presence only; rows with ``success`` 0 hold nothing. ``au-csv`` has times,
+intensities and those of one side (``AUL12_r``) alone. Head and gaze are
 angles in the camera's frame: x to the right of its picture, y down, z away from it.
 py-feat: ``AU01`` 0..1; a row for every face of every frame, cells of faces that were not found empty; times as frames.
 """
@@ -21,7 +22,7 @@ from controller.vocabulary.facs import Facs
 
 _OPENFACE = "an OpenFace 2 file has the columns timestamp, success, AU01_r, AU01_c and so on: FeatureExtraction -aus"
 _PYFEAT = "a py-feat file has the columns frame, AU01, AU02 and so on: Detector().detect_video(...).to_csv(...)"
-_UNIT = re.compile(r"au0*(\d+)(_r|_c)?")
+_UNIT = re.compile(r"au([lr]?)0*(\d+)(_r|_c)?")
 _MOST_INTENSITY = 5.0
 _PRESENT = 0.6  # a presence without an intensity: letter C
 _LEAST_CONFIDENCE = 0.5
@@ -31,7 +32,8 @@ _RATE_HZ = 30.0
 def is_openface(start: bytes) -> bool:
     """Whether a file begins as OpenFace's do."""
     names = header_of(start)
-    return "confidence" in names and any(re.fullmatch(r"au\d+_[rc]", name) for name in names)
+    of_units = any(re.fullmatch(r"au[lr]?\d+_[rc]", name) for name in names)
+    return of_units and ("confidence" in names or "timestamp" in names)
 
 
 def is_pyfeat(start: bytes) -> bool:
@@ -56,7 +58,8 @@ def pyfeat_take(path: Path, parameters: Parameters) -> Take:
     """A take from py-feat's action units; 30 frames a second unless ``approx_time`` says more. Raises TakeError."""
     table = read_csv(path, _PYFEAT)
     at = {name.lower(): i for i, name in enumerate(table.header)}
-    units = {match[1]: i for name, i in at.items() if (match := _UNIT.fullmatch(name)) and not match[2]}
+    units = {match[2]: i for name, i in at.items()
+             if (match := _UNIT.fullmatch(name)) and not match[1] and not match[3]}  # fmt: skip
     cells = table.numbers([*units.values()], gaps=True)
     frames = _column(table, at, "frame", _PYFEAT) if "frame" in at else np.arange(float(len(table.rows)))
     times = frames / _rate(table, at, frames)
@@ -119,10 +122,10 @@ def _openface_levels(table: CsvTable, at: dict[str, int]) -> dict[str, Floats]:
     found: dict[str, Floats] = {}
     for name, i in at.items():
         match = _UNIT.fullmatch(name)
-        if match and match[2] == "_r":
-            found[match[1]] = np.clip(table.numbers([i])[:, 0] / _MOST_INTENSITY, 0.0, 1.0)
-        elif match and match[2] == "_c" and f"au{int(match[1]):02}_r" not in at:
-            found[match[1]] = np.where(table.numbers([i])[:, 0] > 0.5, _PRESENT, 0.0)
+        if match and match[3] == "_r":
+            found[match[1].upper() + match[2]] = np.clip(table.numbers([i])[:, 0] / _MOST_INTENSITY, 0.0, 1.0)
+        elif match and match[3] == "_c" and f"au{match[1]}{int(match[2]):02}_r" not in at:
+            found[match[1].upper() + match[2]] = np.where(table.numbers([i])[:, 0] > 0.5, _PRESENT, 0.0)
     return found
 
 

@@ -28,6 +28,8 @@ _TICKS_PER_S = 1e7
 _RATE_HZ = 60.0
 _MOST_FRAMES = 60 * 3600
 _LAST_S = 0.1
+_SHORTEST_S = 1e-3
+"""Visemes that follow each other faster on the average are those of another unit of time."""
 _ARKIT = 52
 _SHAPES = 55
 _HINT = "save every viseme event as {audio_offset, viseme_id}, or its animation: a list, or one a line"
@@ -59,6 +61,10 @@ def viseme_take(path: Path, parameters: Parameters) -> Take:
         if isinstance(number, bool) or not isinstance(number, int) or number not in visemes.sapi:
             raise _fault(path, where, f"viseme {number!r}: must be 0 to {max(visemes.sapi, default=0)}")
         cues.append(Cue(offset / _TICKS_PER_S, visemes.sapi[number]))
+    span_s = cues[-1].start_s - cues[0].start_s if cues else 0.0
+    if 0.0 < span_s < _SHORTEST_S * (len(cues) - 1):
+        why = f"{path}: {len(cues)} visemes within {1e3 * span_s:.3g} ms: offsets are ticks of 100 ns"
+        raise TakeError(why, hint="multiply milliseconds by 10,000, seconds by 10,000,000")
     end_s = cues[-1].start_s + _LAST_S if cues else 0.0
     return speech_take(path.name, cues, end_s, parameters, visemes)
 

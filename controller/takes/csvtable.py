@@ -37,12 +37,17 @@ class CsvTable:
         """The cells of a column."""
         return [row[column] for _, row in self.rows]
 
-    def numbers(self, columns: Sequence[int], *, gaps: bool = False) -> Floats:
+    def numbers(self, columns: Sequence[int], *, gaps: bool = False, blanks: bool = False) -> Floats:
         """(n, k) float64 cells of columns.
 
-        gaps : cells that hold no number are NaN. Raises TakeError, with line and column, for such a cell otherwise.
+        gaps : cells that hold no number are NaN. blanks : empty ones are. Raises TakeError, with line and column, for
+        such a cell otherwise.
         """
-        found = [[self._number(line, column, row[column], gaps) for column in columns] for line, row in self.rows]
+        found = [
+            [math.nan if blanks and not row[column].strip() else self._number(line, column, row[column], gaps)
+             for column in columns]
+            for line, row in self.rows
+        ]  # fmt: skip
         return np.array(found, dtype=np.float64).reshape(len(self.rows), len(columns))
 
     def fault(self, line: int, column: int, why: str) -> TakeError:
@@ -64,6 +69,8 @@ class CsvTable:
 def read_csv(path: Path, hint: str) -> CsvTable:
     """Read a table of a file in UTF-8 whose cells are separated by commas, semicolons or tabs.
 
+    A header that comes again, as in a stream that is saved, is passed over.
+
     ``hint`` : what such a file should be. Raises TakeError: it cannot be read, is empty, has no rows, or a row has
     another number of cells than the header.
     """
@@ -79,6 +86,7 @@ def read_csv(path: Path, hint: str) -> CsvTable:
     if not filled:
         raise TakeError(f"{path}: the file is empty", hint=hint)
     (_, names), *lines = filled
+    lines = [(number, row) for number, row in lines if row != names]
     if not lines:
         raise TakeError(f"{path}: a header but no rows", hint="record the take again, or export it again")
     for number, row in lines:

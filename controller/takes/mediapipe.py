@@ -1,4 +1,5 @@
-"""Reads results of MediaPipe's face landmarker as takes: blend shapes, landmarks or both, a frame for each.
+"""Reads results of MediaPipe's face landmarker as takes: blend shapes, landmarks or both, a frame for each; and the
+messages of the link ``json``.
 
 A file is a list of results, ``{"frames": [...]}``, or one result a line. Each is as the link ``json`` reads it. Its
 time is ``"time"`` (s), or ``"timestamp"``, ``"timestampMs"`` or ``"timestamp_ms"`` (ms), of all or of none: without,
@@ -22,11 +23,13 @@ from surface.base import files
 _RATE_HZ = 30.0
 _TIMES = {"time": 1.0, "timestamp": 1e-3, "timestampMs": 1e-3, "timestamp_ms": 1e-3}
 _HINT = "save the results of the face landmarker as a list of JSON, or one a line, each with a time"
-_KEYS = re.compile(rb'"(?:(?:multi_?)?face_?landmarks|landmarks|face_?blendshapes)"|"category_?name"', re.IGNORECASE)
+_KEYS = re.compile(
+    rb'"(?:(?:multi_?)?face_?landmarks|landmarks|face_?blendshapes)"|"category_?name"|"parameters"\s*:', re.IGNORECASE
+)
 
 
 def is_mediapipe(start: bytes) -> bool:
-    """Whether a file begins as results of the face landmarker do."""
+    """Whether a file begins as results of the face landmarker do, or messages of the link ``json``."""
     return _KEYS.search(start) is not None
 
 

@@ -1,7 +1,8 @@
 """Reads and writes plain tables of parameters: ``time,jawOpen,mouthSmileLeft,...``, the time in seconds.
 
 Columns may have any spelling of a parameter; a name without a side means both, ``headYaw_deg`` is in degrees. Columns
-that mean no parameter are left out, unless their name is nearly that of one; so are those of what servos showed.
+that mean no parameter are left out, unless their name is nearly that of one; so are those of what servos showed. An
+empty cell leaves a value as it was in the row before; a column of nothing else gives nothing.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ from controller.takes.livelink import Take
 from controller.vocabulary.sides import sides
 
 _HINT = "a plain take begins with the line time,jawOpen,mouthSmileLeft,..., and the time is in seconds"
+_UNKNOWN = (
+    "correct it, or remove the column; one's own parameter needs its vocabulary: --vocabulary FILE or --stage STAGE"
+)
 _TIMES = {"time": 1.0, "t": 1.0, "seconds": 1.0, "timestamp": 1.0, "ms": 1e-3, "milliseconds": 1e-3}
 _TIMES |= {f"{name}_{unit}": scale for name in ("time", "t", "timestamp")
            for unit, scale in (("s", 1.0), ("sec", 1.0), ("seconds", 1.0), ("ms", 1e-3))}  # fmt: skip
@@ -44,11 +48,20 @@ def plain_take(path: Path, parameters: Parameters) -> Take:
     for column, positions, unit in _parameter_columns(table, at, parameters):
         if mask[positions].any():
             raise TakeError(f"{path}, line 1, column {table.header[column]}: is there twice", hint="remove one of them")
-        values[:, positions] = unit * table.numbers([column])
-        mask[positions] = True
+        cells = table.numbers([column], blanks=True)[:, 0]
+        if np.isfinite(cells).any():
+            values[:, positions] = unit * _filled(cells)[:, None]
+            mask[positions] = True
     if not mask.any():
-        raise TakeError(f"{path}, line 1: no column is a parameter", hint=_HINT)
+        raise TakeError(f"{path}, line 1: no column is a parameter, or none has a value", hint=_HINT)
     return Take(path.name, times - times[0], values, mask, parameters.low, parameters.high)
+
+
+def _filled(cells: Floats) -> Floats:
+    """Cells (n,) of which some are NaN, each of those as the last one before it, or else the first one, that is not."""
+    given = np.flatnonzero(np.isfinite(cells))
+    filled: Floats = cells[given[np.maximum(np.searchsorted(given, np.arange(len(cells)), side="right") - 1, 0)]]
+    return filled
 
 
 def write_plain(path: Path, times: Floats, values: Floats, mask: Flags, parameters: Parameters) -> None:
@@ -90,4 +103,4 @@ def _parameter_columns(table: CsvTable, but: int, parameters: Parameters) -> Ite
             yield column, positions, unit
         elif column != but and (meant := did_you_mean(name, parameters.names)):
             why = f"{table.path}, line 1: unknown column {name!r}{meant}"
-            raise TakeError(why, hint="correct it, or remove the column")
+            raise TakeError(why, hint=_UNKNOWN)

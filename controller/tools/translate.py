@@ -95,7 +95,7 @@ def translate(source: str, target: str, parameters: Parameters, options: Options
         token = options.token if has_token(form, address) else None
         sender = open_sender(address, form.delimiter, options.baud, token)
         closers.callback(sender.close)
-        ready(f"translating {source} to {form.kind} at {address}")
+        ready(f"translating {source} to {form.kind} at {address}{_opened(source, options)}")
         with suppress(KeyboardInterrupt):
             _pass_on(given, form, sender, parameters, options, counts)
     return counts
@@ -116,8 +116,24 @@ def parse_end(text: str) -> tuple[Format, Address]:
         raise LinkError(f"{text}: {error}", hint=_HINT) from error
 
 
+def _opened(source: str, options: Options) -> str:
+    """What a live input opens to other machines, in words; nothing for what they do not reach."""
+    if not options.open_to_network or _is_take(source):
+        return ""
+    form, address = parse_end(source)
+    if address.is_local:
+        return ""
+    who = "with the token" if has_token(form, address) and options.token else "without a password"
+    return f"; every machine that reaches {address} can send faces there, {who}"
+
+
+def _is_take(source: str) -> bool:
+    """Whether an input is the path of a take."""
+    return Path(source).suffix.lower() in suffixes() and source.partition(":")[0] not in FORMATS.kinds()
+
+
 def _open_input(source: str, parameters: Parameters, options: Options, closers: ExitStack) -> Input:
-    if Path(source).suffix.lower() in suffixes() and source.partition(":")[0] not in FORMATS.kinds():
+    if _is_take(source):
         return TakeInput(Path(source), parameters)
     form, address = parse_end(source)
     if not (options.connect or address.is_local or options.open_to_network):

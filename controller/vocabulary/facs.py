@@ -148,8 +148,12 @@ class Facs:
         return levels
 
     def columns_of(self, unit: str) -> list[int]:
-        """Positions of a unit's columns, one or one for each side, by its number, as "12"; none for an unknown one."""
-        return list(self._of_unit.get(self._aliases.get(unit, unit), []))
+        """Positions of a unit's columns, one or one for each side, by its number, as "12", or of one side alone, as
+        "L12"; none for an unknown one."""
+        side = unit[:1] if unit[:1] in ("L", "R") else ""
+        number = unit.removeprefix(side)
+        number = self._aliases.get(number, number)
+        return [i for i in self._of_unit.get(number, []) if not side or self.names[i] == side + number]
 
     def expand(self, formula: str, intensity: float = 1.0) -> Floats:
         """(P,) parameters of a formula, clipped to -1..1. Raises ParameterError."""

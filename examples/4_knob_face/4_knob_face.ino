@@ -4,11 +4,9 @@
 //   [[links]]
 //   kind = "binary"
 //   port = "/dev/ttyACM0"
-//   send = "/dev/ttyACM1"     # another board that shows the face
+//   send = "/dev/ttyACM0"     # the same board shows the face; leave this out where none does
 
 #include "omote_frame.h"
-
-const uint8_t JAW_OPEN = 17, MOUTH_SMILE_LEFT = 23;
 
 float values[OMOTE_PARAMETERS];
 uint8_t given[OMOTE_PARAMETERS], frame[OMOTE_LONGEST];
@@ -19,15 +17,15 @@ omote_receiver receiver = {};
 void setup() {
   Serial.begin(115200);
   pinMode(LED_BUILTIN, OUTPUT);
-  given[JAW_OPEN] = 1;
+  given[OMOTE_JAW_OPEN] = 1;
 }
 
 void loop() {
   while (Serial.available())
     if (omote_read(&receiver, Serial.read()))
-      analogWrite(LED_BUILTIN, (int)(255 * receiver.values[MOUTH_SMILE_LEFT]));
+      analogWrite(LED_BUILTIN, (int)(255 * receiver.values[OMOTE_MOUTH_SMILE_LEFT]));
   if (millis() - due < 17) return;
   due = millis();
-  values[JAW_OPEN] = analogRead(A0) / 1023.0f;
+  values[OMOTE_JAW_OPEN] = analogRead(A0) / 1023.0f;
   Serial.write(frame, omote_write(values, given, sequence++, due, frame));
 }

@@ -1,7 +1,8 @@
 """Action units as numbers between commas, named as OpenFace names them: ``timestamp,AU01_r,AU12_r``, 0 to 5.
 
-A line of names, then a line of numbers for each frame. Units and sides that ``configs/vocabularies/facs.toml`` has are
-read in any spelling (``AU1``, ``AU01_r``, ``AUL12``); other columns are left out. An empty cell is 0.
+A line of names, then a line of numbers for each frame; one in which ``success`` is 0 says that no face is seen. Units
+and sides that ``configs/vocabularies/facs.toml`` has are read in any spelling (``AU1``, ``AU01_r``, ``AUL12``); other
+columns are left out. An empty cell is 0.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from controller.formats.kinds.au_json_format import about, unit_columns
 from controller.vocabulary.facs import Facs
 
 _TIMES = ("timestamp", "time")
+_SUCCESS = "success"
 _FULL = 5.0
 _REPEAT = 120
 _MOST_COLUMNS, _LONGEST_CELL = 1024, 32
@@ -35,10 +37,14 @@ class AuCsvDecoder:
         self._facs, self._mask = _facs(parameters), about(parameters)
         self._columns: list[np.ndarray | None] = []
         self._time: int | None = None
+        self._success: int | None = None
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame for a line of numbers."""
-        cells = [cell.strip() for cell in message.decode("utf-8", "replace").strip().split(",", _MOST_COLUMNS)]
+        """One frame for each line of numbers; a datagram may hold the names, too."""
+        return [frame for line in message.strip().split(b"\n") for frame in self._read(line)]
+
+    def _read(self, line: bytes) -> list[Frame]:
+        cells = [cell.strip() for cell in line.decode("utf-8", "replace").strip().split(",", _MOST_COLUMNS)]
         numbers = [_number(cell) for cell in cells]
         if not any(math.isfinite(number) for number in numbers):
             self._name(cells)
@@ -56,6 +62,7 @@ class AuCsvDecoder:
         folded = [cell.lower() for cell in cells]
         self._columns = columns
         self._time = next((folded.index(name) for name in _TIMES if name in folded), None)
+        self._success = folded.index(_SUCCESS) if _SUCCESS in folded else None
 
     def _frame(self, numbers: list[float]) -> Frame:
         levels = np.zeros(len(self._facs.names))
@@ -64,7 +71,8 @@ class AuCsvDecoder:
                 levels[column] = min(max(number, 0.0) / _FULL, 1.0)
         time_s = numbers[self._time] if self._time is not None else math.nan
         values = np.minimum(self._facs.matrix @ levels, 1.0)
-        return Frame(values, self._mask.copy(), time_s if math.isfinite(time_s) else None)
+        face = self._success is None or numbers[self._success] != 0.0
+        return Frame(values, self._mask.copy(), time_s if math.isfinite(time_s) else None, face=face)
 
 
 class AuCsvEncoder:

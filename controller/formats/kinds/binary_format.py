@@ -28,7 +28,7 @@ _MILLISECONDS = 1 << 32
 
 
 class BinaryDecoder:
-    """Reads frames without the zero that ends them."""
+    """Reads frames with or without the zero that ends them: a program may send it in a datagram, too."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
@@ -36,9 +36,12 @@ class BinaryDecoder:
         self._turns, self._last = 0, 0
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame, or none for one that is damaged."""
+        """The frames of a message, without those that are damaged."""
+        return [frame for stuffed in message.strip(b"\0").split(b"\0") for frame in self._read(stuffed)]
+
+    def _read(self, stuffed: bytes) -> list[Frame]:
         try:
-            return [self._frame(unstuff(message))]
+            return [self._frame(unstuff(stuffed))]
         except (ValueError, struct.error) as error:
             self.refused.add(str(error) if isinstance(error, ValueError) else "too short")
             return []

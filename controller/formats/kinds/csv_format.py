@@ -34,8 +34,11 @@ class CsvDecoder:
         self._time: int | None = None
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame for a line of numbers."""
-        cells = [cell.strip() for cell in message.decode("utf-8", "replace").strip().split(",", _MOST_COLUMNS)]
+        """One frame for each line of numbers; a datagram may hold the names, too."""
+        return [frame for line in message.strip().split(b"\n") for frame in self._read(line)]
+
+    def _read(self, line: bytes) -> list[Frame]:
+        cells = [cell.strip() for cell in line.decode("utf-8", "replace").strip().split(",", _MOST_COLUMNS)]
         numbers = [_number(cell) for cell in cells]
         if not any(number is not None for number in numbers):
             self._name(cells)

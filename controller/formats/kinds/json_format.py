@@ -67,6 +67,7 @@ class JsonDecoder:
         subject, time_s = table.get("subject"), table.get("time")
         return [
             self._held.frame(
+                face=bool(self._held.mask.any()),
                 time_s=float(time_s) if is_number(time_s) else None,
                 subject=subject[:200] if isinstance(subject, str) else "",
                 to=to,
@@ -132,10 +133,11 @@ class JsonDecoder:
 
 
 class JsonEncoder:
-    """Writes one object for each frame, without blanks."""
+    """Writes one object for each frame, without blanks; what was given before and is not any more is ``null``."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._names = parameters.names
+        self._once = np.zeros(len(parameters), dtype=bool)
 
     def encode(self, frame: Frame) -> list[bytes]:
         """One message; values have six digits after the point."""
@@ -144,7 +146,9 @@ class JsonEncoder:
             table["time"] = round(frame.time_s, 6)
         if not frame.face:
             table["face"] = False
-        table["parameters"] = self._named(frame.values, frame.mask)
+        gone = np.flatnonzero(self._once & ~frame.mask)
+        self._once |= frame.mask
+        table["parameters"] = self._named(frame.values, frame.mask) | {self._names[i]: None for i in gone}
         if frame.measured is not None:
             table["measured"] = self._named(frame.measured, frame.mask)
         return [json.dumps(table, separators=(",", ":")).encode()]

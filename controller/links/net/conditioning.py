@@ -30,7 +30,7 @@ class Conditioning:
 
     def __init__(self, settings: NetSettings, parameters: Parameters, path: Path | None = None) -> None:
         self._settings, self._parameters, self._path = settings, parameters, path
-        self._low, self._high = parameters.low, parameters.high
+        self._low, self._high, self._rest = parameters.low, parameters.high, parameters.rest
         self._mirrored = _mirror(parameters) if settings.mirror else None
         self._looks = np.array([i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")])
         self._angles = np.array([i for i, name in enumerate(parameters.names) if _is_eye_angle(name)])
@@ -45,7 +45,7 @@ class Conditioning:
 
     def apply(self, frame: Frame, now_s: float) -> tuple[Floats, Flags]:
         """Values (P,) in range, and which of them the layer gets."""
-        values, mask = np.where(frame.mask, frame.values, 0.0), frame.mask
+        values, mask = np.where(frame.mask, frame.values - self._rest, 0.0), frame.mask
         if self._mirrored is not None:
             swap, sign = self._mirrored
             values, mask = values[swap] * sign, mask[swap]
@@ -56,7 +56,7 @@ class Conditioning:
             values = self._ranges.apply(values, now_s)
         if self._filter is not None:
             values = self._filter(values, now_s)
-        return np.clip(values * self._gain, self._low, self._high), mask
+        return np.clip(self._rest + values * self._gain, self._low, self._high), mask
 
     def reset(self) -> None:
         """The source fell silent: do not smooth across the gap."""

@@ -13,7 +13,7 @@ from controller.formats.frame import Frame, Refusals
 from controller.layers.sink import Directory
 from controller.links.net.decoding import Arrived, Decoding
 from controller.links.net.meter import Meter
-from controller.links.net.receivers import Gate, Receiver
+from controller.links.net.receivers import Gate, Received, Receiver
 from controller.links.net.settings import NetSettings
 from controller.links.net.shown import LayerSink, Shown
 
@@ -29,6 +29,10 @@ class Incoming:
 
     name : of the link, for STOP and the thread. path : file in which a neutral face is kept. gate : the receiver's.
 
+    Attributes
+    ----------
+    receiver : what it listens to.
+
     Raises LinkError: that file is damaged.
     """
 
@@ -37,7 +41,7 @@ class Incoming:
         gate: Gate | None = None,
     ) -> None:  # fmt: skip
         self.name = name
-        self._settings, self._receiver, self._sink = settings, receiver, sink
+        self._settings, self.receiver, self._sink = settings, receiver, sink
         address = settings.incoming
         streams = address is not None and address.transport != "udp"
         self._decoding = Decoding(settings.form, sink.parameters, streams=streams, newest=True)
@@ -46,6 +50,7 @@ class Incoming:
         self._meter = Meter()
         self._turned_away = gate.turned_away if gate is not None else Refusals()
         self._sender, self._heard_s = "", -np.inf
+        self._from, self._ended = "", False
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"link {name}", daemon=True)
 
@@ -61,7 +66,7 @@ class Incoming:
         self._stopping.set()
         if self._thread.ident is not None and self._thread is not threading.current_thread():
             self._thread.join()
-        self._receiver.close()
+        self.receiver.close()
         if self._settings.ranges:
             self._home.conditioning.save()
 
@@ -75,20 +80,26 @@ class Incoming:
             "sender": self._sender,
             "face": not self._home.lost or any(not shown.lost for shown in self._others.values()),
             "neutral_known": self._home.conditioning.neutral_known,
-            "error": self._receiver.error,
+            "error": self.receiver.error,
         }
 
     def _run(self) -> None:
         next_s = 0.0
         while not self._stopping.is_set():
             self._stopping.wait(max(0.0, next_s - time.monotonic()))
-            received = self._receiver.receive(_WAIT_S)
+            received = self.receiver.receive(_WAIT_S)
             now_s = time.monotonic()
             for newest in self._newest(self._decoding.feed(received), now_s).values():
                 self._show(newest.frame, now_s)
+            self._ended = self._has_ended(received)
             for shown in (self._home, *self._others.values()):
-                shown.watch(now_s, self._heard_s)
+                shown.watch(now_s, self._heard_s, ended=self._ended)
             next_s = now_s + max(PASS_S, (1.0 + REST) * (time.monotonic() - now_s))
+
+    def _has_ended(self, received: Received) -> bool:
+        """Whether the stream of the source that counts has ended, and no other one counts yet."""
+        of_it = [data for sender, data in received if sender == self._from]
+        return not of_it[-1] if of_it else self._ended
 
     def _newest(self, arrived: list[Arrived], now_s: float) -> dict[str, Arrived]:
         """The newest frame of the one source that counts, for each face that it names; others are heard only when that
@@ -107,10 +118,11 @@ class Incoming:
             self._decoding.refused.add("another source than the one to take")
             return False
         who = f"{arrived.sender} {arrived.frame.subject}".strip()
-        if who != self._sender and now_s - self._heard_s <= min(self._settings.silence_s, 1.0):
+        is_heard = not self._ended and now_s - self._heard_s <= min(self._settings.silence_s, 1.0)
+        if who != self._sender and is_heard:
             self._decoding.refused.add("a second source while the first one sends")
             return False
-        self._sender, self._heard_s = who, now_s
+        self._sender, self._from, self._heard_s, self._ended = who, arrived.sender, now_s, False
         return True
 
     def _show(self, frame: Frame, now_s: float) -> None:

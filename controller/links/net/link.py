@@ -13,8 +13,8 @@ from controller.links.net.incoming import Incoming
 from controller.links.net.neutral import state_file
 from controller.links.net.opening import greeting_of, open_receiver
 from controller.links.net.outgoing import Outgoing
-from controller.links.net.receivers import Gate
-from controller.links.net.senders import open_sender
+from controller.links.net.receivers import Gate, SerialReceiver
+from controller.links.net.senders import Sender, SerialAnswerer, open_sender
 from controller.links.net.settings import NetSettings
 
 log = logging.getLogger(__name__)
@@ -42,7 +42,7 @@ def open_net(settings: NetSettings, context: LinkContext) -> NetLink:
     """
     name = f"{settings.form.kind} {settings.address}"
     incoming = _open_incoming(settings, context, name) if settings.incoming is not None else None
-    outgoing = _open_outgoing(settings, context, name) if settings.outgoing is not None else None
+    outgoing = _open_outgoing(settings, context, name, incoming) if settings.outgoing is not None else None
     for part in (incoming, outgoing):
         if part is not None:
             part.start()
@@ -78,10 +78,17 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
     return incoming
 
 
-def _open_outgoing(settings: NetSettings, context: LinkContext, name: str) -> Outgoing:
+def _open_outgoing(
+    settings: NetSettings, context: LinkContext, name: str, incoming: Incoming | None = None
+) -> Outgoing:
     assert settings.outgoing is not None
-    token = settings.token if has_token(settings.form, settings.outgoing) else None
-    sender = open_sender(settings.outgoing, settings.form.delimiter, settings.baud, token)
+    receiver = None if incoming is None else incoming.receiver
+    sender: Sender
+    if isinstance(receiver, SerialReceiver) and settings.is_one_port:
+        sender = SerialAnswerer(receiver.port, settings.form.delimiter)
+    else:
+        token = settings.token if has_token(settings.form, settings.outgoing) else None
+        sender = open_sender(settings.outgoing, settings.form.delimiter, settings.baud, token)
     outgoing = Outgoing(settings, sender, context.sink, name)
     context.closers.callback(outgoing.stop)
     return outgoing

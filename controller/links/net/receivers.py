@@ -29,6 +29,8 @@ AUTH_S = 10.0
 _BUFFER = 1 << 21
 _CHUNK = 65_536
 _RETRY_S = 0.5
+_KEEP_ALIVE = {"TCP_KEEPIDLE": 4, "TCP_KEEPINTVL": 2, "TCP_KEEPCNT": 3}
+"""Seconds of silence until the first question, between two, and how many may stay without an answer."""
 
 
 class Receiver(Protocol):
@@ -196,7 +198,7 @@ class TcpListener:
             self.error = f"more than {MOST_CONNECTIONS} connections"
             return
         call.setblocking(False)
-        call.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+        notice_loss(call)
         self._calls[call] = _Call(f"{sender[0]}:{sender[1]}", self._gate)
         self._selector.register(call, selectors.EVENT_READ, self._calls[call])
 
@@ -259,6 +261,7 @@ class TcpCaller:
         self._next_s = time.monotonic() + _RETRY_S
         try:
             self._socket = socket.create_connection((self._address.host, self._address.port), _RETRY_S)
+            notice_loss(self._socket)
             self._socket.sendall(self._greeting)
         except OSError as error:
             self._hang_up(error.strerror or type(error).__name__)
@@ -273,34 +276,37 @@ class TcpCaller:
 
 
 class SerialReceiver:
-    """The stream of a serial port, which is opened again where it vanishes."""
+    """The stream of a serial port, which is opened again where it vanishes.
+
+    port : the serial port; another thread may write to it meanwhile.
+    """
 
     def __init__(self, device: str, baud: int) -> None:
         self.error = ""
-        self._port = SerialPort(device, baud)
-        self._port.open()
+        self.port = SerialPort(device, baud)
+        self.port.open()
         self._next_s = 0.0
 
     def receive(self, timeout_s: float) -> Received:
         try:
-            if not self._port.is_open and not self._reopen(timeout_s):
+            if not self.port.is_open and not self._reopen(timeout_s):
                 return []
-            data = self._port.read(time.monotonic() + timeout_s)
+            data = self.port.read(time.monotonic() + timeout_s)
         except PortError as error:
-            self._port.close()
+            self.port.close()
             self.error, self._next_s = str(error), time.monotonic() + _RETRY_S
-            return [(self._port.path, b"")]
-        return [(self._port.path, data)] if data else []
+            return [(self.port.path, b"")]
+        return [(self.port.path, data)] if data else []
 
     def close(self) -> None:
-        self._port.close()
+        self.port.close()
 
     def _reopen(self, timeout_s: float) -> bool:
         wait_s = self._next_s - time.monotonic()
         if wait_s > 0.0:
             time.sleep(min(wait_s, timeout_s))
             return False
-        self._port.open()
+        self.port.open()
         self.error = ""
         return True
 
@@ -334,6 +340,14 @@ class InputReceiver:
         if self._selector is not None:
             self._selector.close()
         os.close(self._file)
+
+
+def notice_loss(call: socket.socket) -> None:
+    """Let a connection end about ten seconds after its far end went without a word, as where a cable is pulled."""
+    call.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
+    for name, value in _KEEP_ALIVE.items():
+        if hasattr(socket, name):  # not every system has all of them
+            call.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
 
 def bound(address: Address, kind: socket.SocketKind) -> socket.socket:

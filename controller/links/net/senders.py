@@ -186,6 +186,26 @@ class SerialSender(_Stream):
             self._port.close()
 
 
+class SerialAnswerer(_Stream):
+    """A stream to a serial port that a receiver holds, and opens again where it vanishes."""
+
+    def __init__(self, port: SerialPort, delimiter: bytes) -> None:
+        super().__init__(delimiter)
+        self._port = port
+
+    def close(self) -> None:
+        pass  # the receiver does
+
+    def _ready(self) -> bool:
+        return self._port.is_open
+
+    def _push(self) -> None:
+        try:
+            self._rest, self.error = self._rest[self._port.put(self._rest) :], ""
+        except PortError as error:
+            self.error, self._rest = str(error), b""
+
+
 class OutputSender:
     """Standard output; a reader that does not read loses messages."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -110,6 +111,12 @@ class NetSettings:
     def outgoing(self) -> Address | None:
         """Where the present face goes; None for a link that only takes."""
         return None if self.send is None else parse_address(self.send, self.form)
+
+    @property
+    def is_one_port(self) -> bool:
+        """Whether faces come from the serial port to which the present face is sent."""
+        ends = [end.device for end in (self.incoming, self.outgoing) if end is not None and end.transport == "serial"]
+        return len(ends) == 2 and os.path.realpath(ends[0]) == os.path.realpath(ends[1])
 
     @property
     def address(self) -> str:

@@ -16,13 +16,11 @@ from controller.base.parameters import Indices, Parameters
 from controller.base.version import package_version
 from controller.layers.commands import CommandSink
 from controller.links.websocket import messages as m
+from controller.links.websocket.faults import id_of, what_is_wrong
 
 log = logging.getLogger(__name__)
 
 AnyGaze = m.Gaze | m.GazeAt | m.GazeRoom | m.GazeHead | m.GazeOff
-
-_SHOWN = 3
-"""Faults of a message that its answer names."""
 
 
 class Conversation:
@@ -54,7 +52,7 @@ class Conversation:
         try:
             request = m.REQUESTS.validate_json(text)
         except ValidationError as error:
-            return self._refuse(None, "message", _faults(error))
+            return self._refuse(id_of(text), "message", *what_is_wrong(error))
         try:
             self._sink = self._home if request.address is None else self._home.heads.find(request.address)
             reply = self._answer(request, now_ns)
@@ -292,13 +290,6 @@ def _play(sink: CommandSink, request: m.Show) -> None:
         sink.shows.start(request.name)
     elif request.action is not None:
         sink.shows.control(request.action.upper(), 0.0 if request.to is None else request.to)
-
-
-def _faults(error: ValidationError) -> str:
-    """What is wrong with a message, in one line."""
-    found = error.errors(include_url=False, include_input=False, include_context=False)
-    shown = [": ".join(filter(None, [".".join(map(str, each["loc"]))[:80], each["msg"]])) for each in found[:_SHOWN]]
-    return "; ".join(shown)[:400] + (f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else "")
 
 
 def _debug(error: Exception) -> Exception | None:

@@ -187,3 +187,11 @@ def test_status_has_the_figures_of_links_that_take_faces_as_one_word() -> None:
         "vmc_on_udp:127.0.0.1:5:60.0Hz,0.4ms,lost=2,age=never,the_far_end_hung_up"
     }
     assert link_status(cast(Any, links[1:2])) == {}
+
+
+def test_status_says_how_many_links_it_has_no_room_for() -> None:
+    figures = {"rate_hz": 60.0, "jitter_ms": 0.4, "lost": 0, "age_s": 0.012, "error": "an; error " * 50}
+    (word,) = link_status(cast(Any, [Told(f"link vmc on udp:127.0.0.1:{n}", figures) for n in range(40)])).values()
+    *kept, more = word.split(";")
+    assert len(word) < 1300 and len(kept) >= 5 and more == f"and_{40 - len(kept)}_more"
+    assert all(each.startswith(f"vmc_on_udp:127.0.0.1:{n}:60.0Hz") for n, each in enumerate(kept))

@@ -23,6 +23,7 @@ from controller.body.preload import PreloadedBody
 from controller.body.process import BodyProcess, deadline
 from controller.stage.stage import Stage, load_stage
 from drivers.sim import SimulatedBus
+from tests.controller.links.net.sockets import free_port
 
 JAW_ID = 4
 
@@ -60,6 +61,24 @@ def newest(body: BodyProcess, name: str) -> float:
     values = np.zeros(len(PARAMETERS.names))
     body.mailbox.read(values)
     return float(values[PARAMETERS.index(name)])
+
+
+@pytest.mark.slow
+def test_what_is_open_to_others_is_said_on_the_terminal(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    (tmp_path / "open.toml").write_text("".join(
+        f'[[links]]\nkind = "{kind}"\nlisten = "udp:0.0.0.0:{free_port()}"\nopen_to_network = true\nlayer = "{layer}"\n'
+        for kind, layer in (("livelink", "capture"), ("json", "speech"))
+    ))  # fmt: skip
+    with BodyProcess(load_stage(str(tmp_path / "open.toml"), PARAMETERS), PARAMETERS) as body:
+        body.wait_ready()
+        body.begin()
+        body.stop()
+    told = capfd.readouterr().err
+    assert "can move this face and its servos, without a password" in told
+    assert (tmp_path / "omote" / "token").read_text().strip() in told
 
 
 @pytest.mark.slow

@@ -250,6 +250,16 @@ def test_takes_carry_them(own: Parameters, tmp_path: Path, suffix: str) -> None:
         load_take(tmp_path / "a.csv", PARAMETERS)
 
 
+@pytest.mark.parametrize("kind", ["csv", "json"])
+def test_streams_that_were_saved_carry_them(own: Parameters, tmp_path: Path, kind: str) -> None:
+    encoder, values = FORMATS.get(kind).encoder(own), own.neutral()
+    values[own.index("earLeft")], path = -0.5, tmp_path / f"a.{kind}"
+    frames = [Frame(values, np.ones(len(own), dtype=bool), n / 10) for n in range(3)]
+    path.write_bytes(b"\n".join(each for frame in frames for each in encoder.encode(frame)))
+    take = load_take(path, own)
+    assert take.values[:, own.index("earLeft")].tolist() == [-0.5] * 3 and take.mask.all()
+
+
 def test_panels_show_them(stage: Stage) -> None:
     told = _parameter(stage.parameters, stage.parameters.index("earLeft"))
     assert (told.region, told.rest, told.description) == ("ears", 0.25, "how far the left ear stands up")

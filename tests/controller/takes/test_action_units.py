@@ -9,7 +9,10 @@ import pytest
 
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
+from controller.formats.format import FORMATS
+from controller.formats.frame import Frame
 from controller.takes.reader import load_take, reader_of
+from controller.vocabulary.facs import Facs
 
 HEAD = "frame, face_id, timestamp, confidence, success, gaze_angle_x, gaze_angle_y, pose_Rx, pose_Ry, pose_Rz"
 UNITS = "AU01_r, AU12_r, AU26_r, AU45_r, AU12_c, AU28_c"
@@ -55,6 +58,19 @@ def test_rows_without_a_face_are_left_out_and_one_face_is_followed(tmp_path: Pat
     take = load_take(openface(tmp_path / "a.csv", *rows), P)
     np.testing.assert_allclose(take.times_s, [0.0, 1 / 30, 0.1])
     assert at(take, "browInnerUp") == [1.0] * 3
+
+
+def test_a_stream_of_the_format_au_csv_that_was_saved_is_a_take(tmp_path: Path) -> None:
+    encoder, facs = FORMATS.get("au-csv").encoder(P), Facs.load(P)
+    mask, lines = np.ones(len(P), dtype=bool), []
+    for n in range(130):
+        lines += encoder.encode(Frame(facs.expand("L12:0.6+26:0.4"), mask, n / 30))
+    (tmp_path / "a.csv").write_bytes(b"\n".join(lines))
+    take = load_take(tmp_path / "a.csv", P)
+    assert reader_of(tmp_path / "a.csv").kind == "openface" and take.frames == 130
+    assert take.duration_s == pytest.approx(129 / 30, abs=1e-5)
+    assert at(take, "mouthSmileLeft")[5] > 0.4 and at(take, "mouthSmileRight")[5] < 0.05
+    np.testing.assert_allclose(take.values[7], facs.expand("L12:0.6+26:0.4"), atol=0.1)
 
 
 def test_pyfeat_rows_of_faces_and_its_clock(tmp_path: Path) -> None:

@@ -80,6 +80,7 @@ def test_blend_shapes_are_arkits_at_60_frames_a_second(tmp_path: Path, form: Any
         ('[{"viseme_id": [1], "audio_offset": 0}]', r"viseme \[1\]"),
         ('[{"viseme_id": true, "audio_offset": 0}]', "viseme True"),
         ('[{"viseme_id": 1, "audio_offset": 9}, {"viseme_id": 1, "audio_offset": 5}]', "times that rise"),
+        ('[{"viseme_id": 1, "audio_offset": 0}, {"viseme_id": 2, "audio_offset": 90}]', "2 visemes within 0.009 ms"),
         ('[{"viseme_id": 1, "audio_offset": 1e300}]', "3600 s are read"),
         ('[{"viseme_id": 1, "audio_offset": 0}, 5]', r"\[1\]: must be an object"),
         ('{"FrameIndex": 0, "BlendShapes": 5}', "BlendShapes must be a list"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +10,10 @@ import pytest
 
 from controller.base.errors import ControllerError, TakeError
 from controller.base.parameters import PARAMETERS as P
+from controller.formats.format import FORMATS
 from controller.takes.plain import write_plain
 from controller.takes.reader import load_take, reader_of
+from tests.controller.formats.faces import face
 
 
 def read(path: Path, text: str) -> dict[str, list[float]]:
@@ -48,6 +51,24 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
         write_plain(path / "b.csv", times, values, mask, P)
 
 
+def test_a_stream_of_the_format_csv_that_was_saved_is_a_take(tmp_path: Path) -> None:
+    """Its names come again, and what is not given is empty."""
+    encoder, sent = FORMATS.get("csv").encoder(P), [face(seed, seed / 60) for seed in range(130)]
+    given = np.arange(len(P)) % 3 > 0
+    text = b"\n".join(each for frame in sent for each in encoder.encode(replace(frame, mask=given)))
+    (tmp_path / "a.csv").write_bytes(text)
+    take = load_take(tmp_path / "a.csv", P)
+    np.testing.assert_array_equal(take.mask, given)
+    np.testing.assert_allclose(take.times_s, np.arange(130) / 60, atol=1e-6)
+    np.testing.assert_allclose(take.values[:, given], [frame.values[given] for frame in sent], atol=1e-5)
+
+
+def test_an_empty_cell_leaves_a_value_as_it_was(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("time,jawOpen,cheekPuff\n0,,\n1,0.5,\n2,,\n3,0.25,\n")
+    take = load_take(tmp_path / "a.csv", P)
+    assert take.values[:, P.index("jawOpen")].tolist() == [0.5, 0.5, 0.5, 0.25] and take.mask.sum() == 1
+
+
 @pytest.mark.parametrize(
     ("text", "why"),
     [
@@ -57,7 +78,8 @@ def test_what_is_written_is_read_back(tmp_path: Path) -> None:
         ("time,jawOpen,JawOpen\n0,1,1\n", "column JawOpen: is there twice"),
         ("time,jawOpen\n0,1\n0,1\n", "line 3, column time: the time is not later"),
         ("time,jawOpen\n1,1\n0,1\n", "line 3, column time: the time is not later"),
-        ("time,jawOpen\n0,\n", "column jawOpen: '' is not a finite number"),
+        ("time,jawOpen\n0,\n", "no column is a parameter, or none has a value"),
+        ("time,jawOpen\n,1\n", "column time: '' is not a finite number"),
         ("time,jawOpen\n0,inf\n", "is not a finite number"),
         ("time,jawOpen\n", "a header but no rows"),
         ("", "the file is empty"),

@@ -72,6 +72,20 @@ def test_an_end_that_is_wrong_is_told_with_what_to_type(source: str, target: str
     assert told in str(error.value) and error.value.hint
 
 
+@pytest.mark.parametrize(
+    ("source", "token", "said"),
+    [("livelink", None, "without a password"), ("json:tcp", "abcdefghijkl", "with the token")],
+)
+def test_what_is_opened_to_others_is_said(source: str, token: str | None, said: str) -> None:
+    told: list[str] = []
+    options = Options(open_to_network=True, token=token, seconds=0.1)
+    kind = socket.SOCK_STREAM if "tcp" in source else socket.SOCK_DGRAM
+    translate(f"{source}:0.0.0.0:{free_port(kind)}", "vmc", P, options, told.append)
+    assert "every machine that reaches" in told[0] and said in told[0]
+    translate(f"{source}:127.0.0.1:{free_port(kind)}", "vmc", P, options, told.append)
+    assert "every machine" not in told[1]
+
+
 def test_an_address_may_be_left_out() -> None:
     form, address = parse_end("vmc")
     assert (form.kind, str(address)) == ("vmc", "udp:127.0.0.1:39539")

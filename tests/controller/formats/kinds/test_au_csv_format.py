@@ -29,6 +29,12 @@ def test_columns_of_openface_are_read_and_others_left_out() -> None:
     assert frame.time_s == 0.033
 
 
+def test_a_row_without_success_says_that_no_face_is_seen() -> None:
+    names = "frame, timestamp, confidence, success, AU12_r"
+    seen = [frame.face for frame in shown(f"{names}\n1, 0, 0.98, 1, 2", "2, 0.03, 0, 0, 0", "3, 0.07, 0.9, 1, 1")]
+    assert seen == [True, False, True]
+
+
 @pytest.mark.parametrize("name", ["AU12", "au12", "AU12_r", "AU012"])
 def test_units_in_other_spellings(name: str) -> None:
     (frame,) = shown(f"time,{name}", "0,5")

@@ -91,7 +91,8 @@ def test_stuffing_is_that_of_the_paper(data: str, stuffed: str) -> None:
         (b"", "a wrong checksum"),
         (b"\1", "a wrong checksum"),
         (b"\5ab", "not stuffed"),
-        (b"\0", "not stuffed"),
+        (b"\0", "a wrong checksum"),
+        (b"\5a\3b", "not stuffed"),
         (stuff(frame({0: 1})[:-1] + b"?"), "a wrong checksum"),
         (stuff(frame({0: 1}, more=b"xy")), "a wrong length"),
         (stuff(frame({0: 1}, version=2)), "version 2; this omote reads version 1"),
@@ -101,6 +102,16 @@ def test_stuffing_is_that_of_the_paper(data: str, stuffed: str) -> None:
 def test_what_is_wrong_is_refused_with_a_reason(data: bytes, why: str) -> None:
     decoder = BinaryDecoder(P)
     assert decoder.feed(data) == [] and decoder.refused == {why: 1}
+
+
+def test_a_datagram_may_hold_the_zero_that_ends_a_frame_and_more_than_one_frame() -> None:
+    encoder = BinaryEncoder(P)
+    first, second = (message for seed in (1, 2) for message in encoder.encode(face(seed)))
+    for datagram in (first, first + b"\0", b"\0" + first + b"\0", first + b"\0" + second + b"\0"):
+        decoder = BinaryDecoder(P)
+        found = decoder.feed(datagram)
+        assert [frame.sequence for frame in found] == [0, 1][: len(found)] and not decoder.refused
+        assert len(found) == 1 + (second in datagram)
 
 
 def test_any_bit_that_changes_is_found() -> None:

@@ -26,6 +26,10 @@ def test_columns_are_known_by_their_names_in_any_order() -> None:
     assert frame.time_s == 2.5
 
 
+def test_a_datagram_may_hold_names_and_numbers() -> None:
+    assert feed(CsvDecoder(P), "jawOpen,time\r\n0.5,1\r\n0.75,2\r\n") == [{"jawOpen": 0.5}, {"jawOpen": 0.75}]
+
+
 def test_the_standard_library_writes_what_is_read_and_reads_what_is_written() -> None:
     text = io.StringIO()
     table = csv.writer(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -38,7 +39,19 @@ def test_what_is_not_named_stays_and_null_releases() -> None:
     assert given(frame) == {"jawOpen": 0.5, "cheekPuff": 1.0}
     assert (frame.time_s, frame.subject) == (2.5, "Ann")
     (frame,) = decoder.feed(b'{"jawOpen": null}')
-    assert given(frame) == {"cheekPuff": 1.0}
+    assert given(frame) == {"cheekPuff": 1.0} and frame.face
+    (frame,) = decoder.feed(b'{"cheekPuff": null}')
+    assert not frame.face
+
+
+def test_what_is_not_given_any_more_is_written_as_null() -> None:
+    encoder, decoder, sent = JsonEncoder(P), JsonDecoder(P), face(3)
+    mask = np.zeros(len(P), dtype=bool)
+    mask[4] = True
+    assert b"null" not in encoder.encode(replace(sent, mask=mask))[0]
+    for part in (sent.mask, mask):
+        (frame,) = (found for each in encoder.encode(replace(sent, mask=part)) for found in decoder.feed(each))
+        np.testing.assert_array_equal(frame.mask, part)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from controller.layers.commands import CommandState
 from controller.links.net.incoming import Incoming
 from controller.links.net.kinds import link_of
 from controller.links.net.receivers import Received
+from controller.links.net.shown import GONE_S
 from tests.controller.formats.faces import face
 from tests.controller.links.net.sockets import wait_for
 
@@ -36,10 +37,11 @@ class Fed:
         self.closed = True
 
 
-def opened(**keys: object) -> tuple[Fed, CommandState, Incoming]:
+def opened(kind: str = "livelink", **keys: object) -> tuple[Fed, CommandState, Incoming]:
     fed, state = Fed(), CommandState(P)
-    settings = link_of(FORMATS.get("livelink")).settings(listen="127.0.0.1", **keys)
-    incoming = Incoming(settings, fed, state, "livelink here")
+    by = "tcp:" if "tcp" in FORMATS.get(kind).transports else ""
+    settings = link_of(FORMATS.get(kind)).settings(listen=f"{by}127.0.0.1", **keys)
+    incoming = Incoming(settings, fed, state, f"{kind} here")
     incoming.start()
     return fed, state, incoming
 
@@ -87,5 +89,24 @@ def test_a_clock_that_differs_delays_nothing() -> None:
             fed.waiting = [("10.0.0.1", message) for message in encoder.encode(sent)]
             wait_for(lambda n=n: abs(state.mixer["capture"].values[jaw] - 0.01 * (n + 1)) < 1e-4)
         assert incoming.report()["accepted"] == len(times_s)
+    finally:
+        incoming.stop()
+
+
+def test_a_stream_that_ends_gives_its_layer_back_and_the_next_one_counts_at_once() -> None:
+    fed, state, incoming = opened("json")
+    jaw, capture = P.index("jawOpen"), state.mixer["capture"]
+    try:
+        fed.waiting = [("127.0.0.1:1", b'{"jawOpen": 0.5}\n')]
+        wait_for(lambda: capture.values[jaw] == 0.5)
+        fed.waiting = [("127.0.0.1:1", b"")]
+        wait_for(lambda: not fed.waiting)
+        fed.waiting = [("127.0.0.1:2", b'{"jawOpen": 0.75}\n')]
+        wait_for(lambda: capture.values[jaw] == 0.75)
+        assert incoming.report()["refused"] == {}
+        time.sleep(2 * GONE_S)
+        assert capture.holding == 1
+        fed.waiting = [("127.0.0.1:2", b"")]
+        wait_for(lambda: not capture.holding)
     finally:
         incoming.stop()

@@ -17,6 +17,7 @@ from controller.formats.format import FORMATS
 from controller.formats.frame import Frame
 from controller.layers.commands import CommandState
 from controller.links.kind import LINKS, LinkContext
+from controller.links.line.hostport import HostPort
 from controller.links.links import open_links, read_link
 from tests.controller.formats.faces import face
 from tests.controller.links.net.sockets import free_port, wait_for
@@ -169,6 +170,24 @@ def test_the_present_face_is_sent(far: Open) -> None:
         (frame,) = decoder.feed(receiver.recv(65536))
         assert frame.values[JAW] == pytest.approx(0.5, abs=1e-3)
         wait_for(lambda: link.report()["sent"] >= 3)
+
+
+def test_one_serial_port_carries_both_ways(tmp_path: Path) -> None:
+    with HostPort() as board, ExitStack() as closers:
+        other_name = tmp_path / "board"
+        other_name.symlink_to(board.path)
+        state, form = CommandState(P), FORMATS.get("binary")
+        keys = {"kind": "binary", "port": board.path, "send": str(other_name), "rate_hz": 200.0}
+        (link,) = open_links([read_link(keys)], LinkContext(state, closers))
+        sent, decoder, heard = face(5), form.decoder(P), b""
+        board.write(form.encoder(P).encode(sent)[0] + b"\0")
+        wait_for(lambda: state.mixer["capture"].holding == len(P), "the face of the board")
+        end_s = time.monotonic() + 60
+        while heard.count(b"\0") < 3 and time.monotonic() < end_s:
+            heard += board.read(0.1)
+        assert len([frame for each in heard.split(b"\0")[1:-1] for frame in decoder.feed(each)]) >= 2
+        report = link.report()
+        assert report["sent"] >= 2 and report["error"] == report["send_error"] == ""
 
 
 def test_an_address_that_is_taken_is_told_with_what_to_do(far: Open) -> None:

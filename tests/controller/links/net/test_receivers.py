@@ -17,7 +17,7 @@ from controller.links.line.hostport import HostPort
 from controller.links.net import receivers
 from controller.links.net.address import parse_address
 from controller.links.net.opening import open_receiver
-from controller.links.net.receivers import MOST_CONNECTIONS, Gate, InputReceiver, Receiver
+from controller.links.net.receivers import MOST_CONNECTIONS, Gate, InputReceiver, Receiver, notice_loss
 from drivers.base.errors import PortMissing
 from tests.controller.links.net.sockets import free_port
 
@@ -155,6 +155,15 @@ def test_a_program_that_is_called_is_called_again(opened: Open) -> None:
         while not receiver.error:
             receiver.receive(0.05)
         assert receiver.error == "the far end hung up"
+
+
+@pytest.mark.skipif(not hasattr(socket, "TCP_KEEPIDLE"), reason="needs Linux's options")
+def test_a_far_end_that_goes_without_a_word_is_asked_after() -> None:
+    with socket.socket() as call:
+        notice_loss(call)
+        options = [socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT]
+        idle_s, between_s, count = (call.getsockopt(socket.IPPROTO_TCP, option) for option in options)
+        assert call.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) and idle_s + between_s * count <= 10
 
 
 def test_a_serial_port_is_read(opened: Open) -> None:

@@ -152,18 +152,19 @@ def test_only_who_asks_is_answered(client: Client) -> None:
         ("", "message", "JSON"),
         ("{", "message", "JSON"),
         (b"\xff\xfe", "message", "JSON"),
-        ("[1]", "message", "object"),
-        ("null", "message", ""),
-        ({"no": "type"}, "message", "discriminator"),
-        ({"type": "dance"}, "message", "dance"),
-        ({"type": "set"}, "message", "parameters"),
+        ("[1]", "message", "a message must be an object"),
+        ("null", "message", "a message must be an object"),
+        ({"no": "type"}, "message", "type: missing"),
+        ({"type": "dance"}, "message", "unknown message 'dance', there are hello, set"),
+        ({"type": "sett"}, "message", "unknown message 'sett', did you mean 'set'"),
+        ({"type": "set"}, "message", "set.parameters: missing"),
         ({"type": "set", "parameters": {}}, "message", "parameters"),
         ({"type": "set", "parameters": {"jawOpn": 1}}, "name", "did you mean"),
         ({"type": "set", "parameters": {"jawOpen": 1.5}}, "name", "must be 0 to 1"),
         ({"type": "set", "parameters": {"jawOpen": 0.1, "JawOpen": 0.2}}, "name", "named twice"),
         ('{"type": "set", "parameters": {"jawOpen": NaN}}', "message", "finite"),
         ('{"type": "set", "parameters": {"jawOpen": 1e999}}', "message", "finite"),
-        ({"type": "set", "parameters": {"jawOpen": 0.5}, "layer": "x"}, "message", "layer"),
+        ({"type": "set", "parameters": {"jawOpen": 0.5}, "layer": "x"}, "message", "set.layer: unknown key"),
         ({"type": "expression", "name": "smug", "intensity": 2}, "message", "intensity"),
         ({"type": "expression", "name": "smyle"}, "name", "did you mean"),
         ({"type": "gaze", "yaw_deg": 120, "pitch_deg": 0}, "message", "yaw_deg"),
@@ -184,3 +185,11 @@ def test_what_is_wrong_is_refused_with_its_reason_and_changes_nothing(
     client.settle(0.5)
     assert abs(client.out).max() < 1e-6
     assert client.talk.refused == {code: 1} and client.talk.accepted == 0
+
+
+@pytest.mark.parametrize("given", [7, "seven"])
+def test_a_message_that_is_wrong_is_answered_with_its_id(client: Client, given: int | str) -> None:
+    assert client.send({"type": "sett", "id": given})["id"] == given
+    assert client.send({"type": "set", "id": given, "parameters": {"jawOpn": 1}})["id"] == given
+    assert client.send({"type": "sett", "id": "x" * 65})["id"] is None
+    assert client.send({"type": "sett", "id": True})["id"] is None

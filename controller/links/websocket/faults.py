@@ -1,0 +1,55 @@
+"""Says what is wrong with a message of the WebSocket API, in words for people."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import Any
+
+from pydantic import ValidationError
+
+from controller.base.parameters import did_you_mean
+
+_SHOWN = 3
+"""Faults of a message that its answer names."""
+_MOST_ID = 64
+_EXAMPLE = '{"type": "set", "parameters": {"jawOpen": 0.5}}'
+
+
+def what_is_wrong(error: ValidationError) -> tuple[str, str]:
+    """What is wrong, in one line, and what to do."""
+    found = error.errors(include_url=False, include_input=False)
+    shown = "; ".join(map(_fault, found[:_SHOWN]))[:400]
+    more = f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+    return shown + more, f"write it as {_EXAMPLE}; docs/websocket.md lists all messages"
+
+
+def id_of(text: str | bytes) -> int | str | None:
+    """The ``id`` of a message that is wrong otherwise; None where it has none that can be answered with."""
+    try:
+        found = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    given = found.get("id") if isinstance(found, dict) else None
+    fits = (isinstance(given, str) and len(given) <= _MOST_ID) or (isinstance(given, int) and abs(given) < 1 << 53)
+    return given if fits and not isinstance(given, bool) else None
+
+
+def _fault(fault: Any) -> str:
+    where, context = ".".join(map(str, fault["loc"]))[:80], fault.get("ctx", {})
+    match fault["type"]:
+        case "union_tag_invalid":
+            given, known = str(context["tag"])[:80], re.findall(r"'([^']+)'", str(context["expected_tags"]))
+            return f"type: unknown message {given!r}{did_you_mean(given, known) or ', there are ' + ', '.join(known)}"
+        case "union_tag_not_found":
+            return "type: missing, it says what a message is"
+        case "model_type" | "model_attributes_type" | "dict_type" if not where:
+            return "a message must be an object"
+        case "extra_forbidden":
+            return f"{where}: unknown key"
+        case "missing":
+            return f"{where}: missing"
+        case "json_invalid":
+            return f"not JSON: {context.get('error', '')}"
+    reason = str(fault["msg"]).replace("Input should be", "must be").removeprefix("Value error, ")
+    return f"{where}: {reason}" if where else reason
