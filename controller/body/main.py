@@ -12,7 +12,6 @@ from multiprocessing.connection import Connection
 
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
-from controller.base.parameters import PARAMETERS
 from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.body import Body
@@ -21,8 +20,7 @@ from controller.body.nodes import open_node
 from controller.body.panel_requests import carry_out
 from controller.body.panel_state import PanelState
 from controller.layers.mixer import by_priority
-from controller.stage.roles import for_role
-from controller.stage.stage import heads_of, load_stage
+from controller.stage.stage import heads_of
 from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.base.shutdown import combine_with_context
 
@@ -51,7 +49,7 @@ def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
 
 
 def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event) -> None:
-    stage = for_role(load_stage(orders.stage, PARAMETERS), orders.options.role, orders.options.heads)
+    stage = orders.options.load_stage(orders.stage)
     parameters, mailboxes, panels = stage.parameters, [], []
     for each in heads_of(stage):
         mailboxes.append(Mailbox.receive(pipe, len(parameters)))

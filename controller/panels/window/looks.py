@@ -60,7 +60,7 @@ class Looks:
         stage = self.stage
         if look.head is not None:
             settings = stage.settings.model_copy(update={"identity": {}})
-            stage = replace(stage, head=look.head, groups=(), settings=settings)
+            stage = replace(stage, head=look.head, groups=(), own_groups={}, settings=settings)
         wanted: dict[str, object] = {"theme": look.theme, "quality": look.quality}
         if look.person != self.first.person or look.head is not None:
             wanted["person"] = look.person

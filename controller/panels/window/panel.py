@@ -25,6 +25,7 @@ from controller.panels.window.keys import Keys
 from controller.panels.window.link_list import LinkList
 from controller.panels.window.looks import LookControls, Looks
 from controller.panels.window.notices import draw_jobs, draw_problems
+from controller.panels.window.saving import Saving, Words
 from controller.panels.window.servos import ServoBars
 from controller.panels.window.sliders import Sliders
 from controller.panels.window.timeline_panel import TimelinePanel
@@ -54,6 +55,11 @@ class PanelOptions:
     folder: Path = field(default_factory=Path.cwd)
     parameters: Parameters = field(default_factory=lambda: PARAMETERS)
 
+    @property
+    def own_file(self) -> Path:
+        """The vocabulary that everything is saved to."""
+        return self.files[-1] if self.files else self.folder / _OWN
+
 
 class Panel:
     """Draws the panel.
@@ -76,11 +82,11 @@ class Panel:
         self.feed = Feed(send, details, self.problems) if details is not None else None
         self.commands = Commands(send, options.life)
         self.capture = Capture(self.area, newest, options.folder, parameters=options.parameters)
-        own = options.files[-1] if options.files else options.folder / _OWN
+        own = options.own_file
         self.sliders = Sliders(newest, self.commands, state, options.parameters)
-        self.expressions = ExpressionButtons(
-            options.vocabulary, self.commands, newest, send, own, tuple(options.files[:-1]), options.parameters
-        )
+        words = Words(options.vocabulary, own, tuple(options.files[:-1]), options.parameters)
+        self.saving = Saving(words, self.commands, newest, send)
+        self.expressions = ExpressionButtons(options.vocabulary, self.commands, self.saving)
         self.view = View(self.commands, viewpoint or Viewpoint(), self.capture, options.shows, send)
         self.playback = Playback(self.commands, newest, send, parameters=options.parameters)
         self.timeline = TimelinePanel(
