@@ -108,22 +108,25 @@ class WindowFace:
             return values
 
         kiosk = self._settings.kiosk
-        run_window(
-            self._head,
-            source,
-            size=self._settings.size,
-            title=_TITLE,
-            gui=None if kiosk and self._devices is None else self._gui,
-            keep_going=lambda: keep_going() and not self._ended,
-            camera=self._viewpoint,
-            quality=self._choice or self._settings.still_quality,
-            theme=self._settings.make_theme(),
-            evaluator=self._settings.evaluator,
-            kiosk=kiosk,
-            monitor=self._settings.monitor,
-            docks=() if kiosk else self._panel.docks(),
-            area=self._area,
-        )
+        try:
+            run_window(
+                self._head,
+                source,
+                size=self._settings.size,
+                title=_TITLE,
+                gui=None if kiosk and self._devices is None else self._gui,
+                keep_going=lambda: keep_going() and not self._ended,
+                camera=self._viewpoint,
+                quality=self._choice or self._settings.still_quality,
+                theme=self._settings.make_theme(),
+                evaluator=self._settings.evaluator,
+                kiosk=kiosk,
+                monitor=self._settings.monitor,
+                docks=() if kiosk else self._panel.docks(),
+                area=self._area,
+            )
+        finally:
+            self._panel.playback.close()
 
     def _swap(self, head: Head | None, settings: FaceSettings) -> None:
         """Draw another head, or the same in another look, from the next frame on."""

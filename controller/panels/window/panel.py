@@ -81,7 +81,7 @@ class Panel:
         self.jobs, self.full_screen = Jobs(self.problems), FullScreen()
         self.feed = Feed(send, details, self.problems) if details is not None else None
         self.commands = Commands(send, options.life)
-        self.capture = Capture(self.area, newest, options.folder, parameters=options.parameters)
+        self.capture = Capture(self.area, newest, options.folder, parameters=options.parameters, jobs=self.jobs)
         own = options.own_file
         self.sliders = Sliders(newest, self.commands, state, options.parameters)
         words = Words(options.vocabulary, own, tuple(options.files[:-1]), options.parameters)
@@ -148,6 +148,7 @@ class Panel:
             "space": self.view.toggle_show,
             "r": self.capture.toggle,
             "p": self.capture.take_picture,
+            "c": self.capture.toggle_clip,
             "n": self.commands.neutral,
             "escape": self._stop,
             "f": self._toggle_bare,

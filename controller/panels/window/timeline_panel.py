@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from controller.base.errors import OMOTE_ERRORS
+from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.panels.session.capture import Capture
 from controller.panels.session.commands import Commands
 from controller.panels.session.playback import Playback
@@ -17,6 +17,7 @@ from controller.panels.window.flow import Flow
 from controller.takes.timeline import EASES
 from controller.vocabulary.vocabulary import Vocabulary
 
+_LOADED = (".toml", ".csv", ".wav")
 _TRACK_LINES, _NEAR = 3.2, 0.45
 _TICK_LINES = 3.0  # least distance of two ticks, in heights of a line
 
@@ -34,6 +35,7 @@ class TimelinePanel:
         self.playback, self._commands, self._capture = playback, commands, capture
         self._vocabulary, self._problems, self._folder = vocabulary, problems, folder
         self._name, self._mark, self._ease, self._loop, self._message = "my_show", "", 1, False, ""
+        self._sound = ""
         self._dragged: int | None = None
 
     def __call__(self) -> None:
@@ -57,7 +59,7 @@ class TimelinePanel:
     def _controls(self, imgui: Any) -> None:
         playback = self.playback
         if imgui.button("stop##timeline" if playback.playing else "play##timeline"):
-            playback.toggle()
+            self._try(playback.toggle)
         imgui.same_line()
         if imgui.button("give back##timeline"):
             playback.stop()
@@ -158,6 +160,9 @@ class TimelinePanel:
         for label, how in {"keep range": "keep", "cut range out": "cut", "smooth": "smooth"}.items():
             if flow.button(label):
                 self._try(lambda how=how: self.playback.edit_take(how))  # type: ignore[misc]
+        above = self._capture.last
+        if above is not None and flow.button("lay the last recording over it"):
+            self._try(lambda: self.playback.layer(above))
         if flow.button("back to the keys"):
             self._commands.retake(None)
         imgui.text_disabled("drag with the right button: mark a range")
@@ -169,11 +174,38 @@ class TimelinePanel:
         imgui.same_line()
         if imgui.button("save take" if is_take else "save show"):
             self._try(self.save)
+        imgui.same_line()
+        if imgui.button("load"):
+            self._try(self.load)
         if not is_take:
             imgui.same_line()
             _, self._loop = imgui.checkbox("loop", self._loop)
+            self._hearing(imgui)
         if self._message:
             imgui.text_wrapped(self._message)
+
+    def _hearing(self, imgui: Any) -> None:
+        """The sound that plays with the timeline."""
+        sound = self._commands.now.timeline.sound
+        if sound is not None:
+            imgui.text_wrapped(f"sound: {sound.name}")
+            if imgui.button("no sound"):
+                self._try(lambda: self.playback.hear(None))
+            return
+        imgui.set_next_item_width(imgui.get_font_size() * 9)
+        _, self._sound = imgui.input_text_with_hint("##sound", "sound, as hello.wav", self._sound)
+        imgui.same_line()
+        if imgui.button("play with it"):
+            self._try(lambda: self.playback.hear(self._folder / self._sound.strip()))
+
+    def load(self) -> None:
+        """Edit the show or take of the name. Raises ParameterError, ControllerError: there is none, or it is wrong."""
+        path = self._folder / self._name.strip()
+        found = next((each for suffix in ("", *_LOADED) if (each := Path(f"{path}{suffix}")).is_file()), None)
+        if found is None:
+            raise ParameterError(f"{path}: no show or take of this name", hint=f"NAME with {', '.join(_LOADED)}")
+        self.playback.load(found)
+        self._message = f"loaded {found}"
 
     def save(self) -> None:
         """Write the show or take. Raises ParameterError, ControllerError: it cannot be written."""

@@ -99,8 +99,12 @@ class View:
         imgui.same_line()
         if imgui.button("end recording" if capture.recording else "record"):
             capture.toggle()
-        if capture.recording:
+        if imgui.button("end clip" if capture.filming else "clip"):
+            capture.toggle_clip()
+        if capture.filming:
             imgui.same_line()
+            imgui.text_colored(imgui.ImVec4(*RED_DOT), "filming")
+        if capture.recording:
             imgui.text_colored(imgui.ImVec4(*RED_DOT), f"recording {capture.seconds:.0f} s")
         if capture.message:
             imgui.text_wrapped(capture.message)
