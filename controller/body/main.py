@@ -101,17 +101,16 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
         request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
         body.begin()
         return True
-    first = body.bodies[0] if isinstance(body, Hall) else body
+    to = request.head if isinstance(request, messages.ToHead) else ""
+    request = request.request if isinstance(request, messages.ToHead) else request
+    who = body.body_of(to) if isinstance(body, Hall) else body
     if isinstance(request, messages.AskDetails):
-        _send(pipe, first.details())
+        _send(pipe, who.details())
         return True
     if isinstance(request, messages.PlayTake):
-        first.play_take(request.path)
+        who.play_take(request.path)
         return True
-    state = body.state
-    if isinstance(request, messages.ToHead) and isinstance(body, Hall):
-        state, request = body.state_of(request.head), request.request
-    return carry_out(request, state, time.monotonic_ns())
+    return carry_out(request, who.state, time.monotonic_ns())
 
 
 def _send(pipe: Connection, message: object) -> None:

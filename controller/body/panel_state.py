@@ -50,6 +50,11 @@ class PanelState:
         _write(self._stopped, stopped.who if stopped is not None else "")
         self._mailbox.publish(self._all)
 
+    def turn_to(self, other: PanelState) -> None:
+        """Read what another one reads, of the same parameters."""
+        self._mailbox, self._layers = other._mailbox, other._layers
+        self._all[:] = np.nan
+
     def refresh(self) -> None:
         """Read what was written last; nothing is known before the first time."""
         if self._mailbox.sequence:

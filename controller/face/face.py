@@ -55,6 +55,10 @@ class HeadValues:
         """Select for another head, whose parameters ``wanted`` are."""
         self._indices, self.values = head_indices(self._parameters, wanted), np.zeros(len(wanted))
 
+    def listen(self, mailbox: Mailbox) -> None:
+        """Read another mailbox of the same parameters."""
+        self._mailbox = mailbox
+
     def __call__(self) -> Floats:
         """The newest values in the head's order, (h,) float64; the same array each time."""
         _, self.stamp_ns = self._mailbox.read(self.full)

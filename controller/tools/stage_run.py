@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from controller.face.wall import WallFace  # start-up: the body gets its orders first
     from controller.panels.session.next_run import NextRun  # start-up: the body gets its orders first
     from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
+    from controller.panels.window.heads import HeadSource  # start-up: the same
     from controller.panels.window.panel import PanelOptions  # start-up: the same
     from surface.head import Head  # start-up: the same
 
@@ -136,12 +137,20 @@ class StageRun:
             face = WindowFace(
                 head, stage.settings.face, values, body.send, body.panel_state, stage.load_head, _panel_options(stage),
                 stage.controls, stage=stage, details=lambda: body.details, carried=self._carried,
+                heads=self._sources(body),
             )  # fmt: skip
             if self._options.take is None:
                 remember(stage.path, self._options.vocabularies)
             failed = self._show(face, self._begin(body, flag, seconds))
             self.next_run = face.next_run
             return self._end(body, None if failed else face.report(), failed)
+
+    def _sources(self, body: BodyProcess) -> list[HeadSource]:
+        """The heads that the window can show; none where there is one."""
+        from controller.panels.window.heads import HeadSource  # start-up: the body gets its orders first
+
+        boxes = zip(self.stage.heads, body.mailboxes, body.panel_states, strict=True) if self.stage.heads else ()
+        return [HeadSource(head.name, head.stage, mailbox, state) for head, mailbox, state in boxes]
 
     def run_without_face(self, seconds: float | None) -> dict[str, Any]:
         """Run links and servos only, as on a robot without OpenGL."""

@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 _MINIMISED_S = 0.02
 _LINE = 16.0  # height of a line of the runner's text, points
+_LEAST_TAB = 20.0  # width of a tab at least, points
 HEADLESS_HINT = "add --headless, or start it under: xvfb-run -a"
 
 
@@ -289,6 +290,7 @@ class _Window:
         if self.docked:
             show_docks(self.params, shown=not self.area.bare)
             style = self._imgui.get_style()
+            style.tab_min_width_shrink = _LEAST_TAB  # in a small window titles are cut, and none is away
             style.font_scale_main = text_scale(self._imgui.get_io().display_size.y, style.font_scale_dpi)
         if self.kiosk:
             self._imgui.set_mouse_cursor(self._imgui.MouseCursor_.none)

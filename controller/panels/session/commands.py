@@ -68,6 +68,7 @@ class Commands:
         self._past: list[Settings] = []
         self._future: list[Settings] = []
         self._step: Hashable = None
+        self._others: dict[str, History] = {}
 
     @property
     def undoable(self) -> bool:
@@ -88,6 +89,16 @@ class Commands:
         """Go on with what was set in another window: tell the body, and take back and do again as there."""
         self._past, self._future = list(history.past), list(history.future)
         self._apply(history.now)
+        self.end_step()
+
+    def turn_to(self, before: str, name: str, life: float) -> None:
+        """Go on with what was set of another head, which the body has kept; ``before`` is kept for later.
+
+        ``life`` : its amount of idle motion, where nothing was set of it yet.
+        """
+        self._others[before] = self.history
+        history = self._others.get(name, History(Settings(life=life)))
+        self._past, self._future, self.now = list(history.past), list(history.future), history.now
         self.end_step()
 
     def hold(self, values: Mapping[int, float | None], step: Hashable = None) -> None:

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import PARAMETERS
-from controller.body.messages import Details, PanelRequest
+from controller.body.messages import Details, PanelRequest, ToHead
 from controller.body.panel_state import PanelState
 from controller.face.controls import Controls
 from controller.face.devices import Devices
@@ -19,6 +20,7 @@ from controller.face.face import FrameLog, HeadValues, qualities
 from controller.panels.session.commands import History
 from controller.panels.session.next_run import NextRun, carried_to
 from controller.panels.window.editing import MouseEditing
+from controller.panels.window.heads import HeadChoice, HeadSource
 from controller.panels.window.looks import Looks
 from controller.panels.window.overlay_view import OverlayView
 from controller.panels.window.panel import Panel, PanelOptions
@@ -44,6 +46,7 @@ class WindowFace:
     copy : loads the head again, for dragging points with the mouse; without, none can be dragged.
     controls : what gamepad and keys do. stage : whose look can be changed; without, it stays as it is.
     details : the newest answer of the body to the panel. carried : what was set in the window before this one.
+    heads : of a stage that has several, the first of which is shown first.
 
     Attributes
     ----------
@@ -55,7 +58,7 @@ class WindowFace:
         head: Head,
         settings: FaceSettings,
         values: HeadValues,
-        send: Callable[[PanelRequest], None],
+        send: Callable[[PanelRequest | ToHead], None],
         panel_state: PanelState | None = None,
         copy: Callable[[], Head] | None = None,
         options: PanelOptions | None = None,
@@ -64,13 +67,17 @@ class WindowFace:
         stage: Stage | None = None,
         details: Callable[[], Details | None] | None = None,
         carried: NextRun | None = None,
+        heads: Sequence[HeadSource] = (),
     ) -> None:
+        choice = HeadChoice(heads, values, panel_state, send)
+        ask = choice.send
         self._head, self._settings, self._values = head, settings, values
         self._viewpoint = Viewpoint(framed(settings.make_camera(), head), framing_of(head))
         self._area = PictureArea()
         newest = lambda: values.full  # noqa: E731
         parameters = PARAMETERS if options is None else options.parameters
-        self._panel = Panel(newest, send, panel_state, options, self._viewpoint, self._area, details=details)
+        self._panel = Panel(newest, ask, panel_state, options, self._viewpoint, self._area, details=details)
+        self._panel.heads = choice
         self.next_run: NextRun | None = None
         self._overlays: OverlayView | None = None
         self._mouse = None
@@ -83,11 +90,12 @@ class WindowFace:
                 looks.load, newest, self._area, self._panel.jobs, stage.robots, panel_state, parameters
             )
             self._panel.view.overlays = self._overlays.draw_choice
+            choice.show = partial(self._turn_to, looks)
         if copy is not None and not settings.kiosk:
             self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area, parameters)
             self._panel.more.append(self._mouse.draw_panel)
             self._panel.saving.editor = self._mouse.find_editor
-        self._devices = Devices(Controls(controls, parameters), send) if controls else None
+        self._devices = Devices(Controls(controls, parameters), ask) if controls else None
         self._log = FrameLog()
         self._ended = False
         self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
@@ -153,6 +161,15 @@ class WindowFace:
             self._mouse.change(head)
         if self._overlays is not None:
             self._overlays.forget()
+
+    def _turn_to(self, looks: Looks, stage: Stage) -> None:
+        """Show another head of the stage."""
+        if self._overlays is not None:
+            self._overlays.robots = stage.robots
+        try:
+            looks.turn_to(stage, self._panel.commands.now.look)
+        except OMOTE_ERRORS as error:
+            self._panel.problems.add(error)
 
     def _restart(self, stage: Path) -> None:
         self.next_run, self._ended = NextRun(stage), True

@@ -41,7 +41,7 @@ class OverlayView:
     ) -> None:  # fmt: skip
         self._parameters = parameters or PARAMETERS
         self._load, self._newest, self._area, self._jobs = load, newest, area, jobs
-        self._robots, self._state = robots, state
+        self.robots, self._state = robots, state
         self.on: set[Kind] = set()
         self._overlays: Overlays | None = None
         self._order = np.zeros(0, np.intp)
@@ -73,7 +73,7 @@ class OverlayView:
 
     def _make(self) -> Overlays:
         head = self._load()
-        anchors = [place for robot in self._robots for place in anchor_places(robot, head, PART)]
+        anchors = [place for robot in self.robots for place in anchor_places(robot, head, PART)]
         self._order = head_indices(self._parameters, head.parameters)
         return Overlays(head, anchors)
 

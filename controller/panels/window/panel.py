@@ -21,6 +21,7 @@ from controller.panels.session.problems import Problems
 from controller.panels.window.colours import GREEN, RED
 from controller.panels.window.drops import Drops
 from controller.panels.window.expressions import ExpressionButtons
+from controller.panels.window.heads import HeadChoice
 from controller.panels.window.keys import Keys
 from controller.panels.window.link_list import LinkList
 from controller.panels.window.looks import LookControls, Looks
@@ -67,6 +68,10 @@ class Panel:
     newest : the newest parameters (P,). send : sends requests to the body.
     state : without it, neither the layer that holds a parameter nor what the servos show of it is drawn.
     details : the newest answer of the body about servos and links; without it neither is shown.
+
+    Attributes
+    ----------
+    heads : the choice between several heads; None for one.
     """
 
     def __init__(
@@ -96,6 +101,7 @@ class Panel:
             self.servos, self.links = ServoBars(self.feed), LinkList(self.feed)
         self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
         self.more: list[Callable[[], None]] = []
+        self.heads: HeadChoice | None = None
 
     def docks(self) -> list[Dock]:
         """The parts, as tabs beside the picture."""
@@ -182,6 +188,8 @@ class Panel:
             from imgui_bundle import imgui  # optional
 
             self._stop_or_start(imgui)
+            if self.heads is not None:
+                self.heads.draw(self.commands)
             self._top(imgui)
             draw_problems(imgui, self.problems)
             draw_jobs(imgui, self.jobs)

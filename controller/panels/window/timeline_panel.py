@@ -178,7 +178,6 @@ class TimelinePanel:
         if imgui.button("load"):
             self._try(self.load)
         if not is_take:
-            imgui.same_line()
             _, self._loop = imgui.checkbox("loop", self._loop)
             self._hearing(imgui)
         if self._message:
