@@ -155,6 +155,12 @@ class Playback:
         at_s = round(min(max(at_s, low), high), 3)
         self._commands.arrange(self._commands.now.timeline.moved(number, at_s), ("key", number))
 
+    def edit(self, take: Take | None) -> None:
+        """Edit a recording; the keys of the timeline for None."""
+        self._pause()
+        self._commands.retake(take)
+        self.position_s, self.range_s, self.selected = 0.0, None, None
+
     def edit_take(self, how: str) -> None:
         """``keep`` or ``cut`` the marked range, or ``smooth`` all. Raises ParameterError: nothing is marked."""
         take = self._commands.now.take
@@ -192,7 +198,7 @@ class Playback:
                 raise ParameterError(f"{path}: is a show without keys", hint="load one that was saved here")
             self._commands.change(replace(self._commands.now, timeline=timeline, take=None))
         else:
-            self._commands.retake(load_take(path, self._parameters))
+            self.edit(load_take(path, self._parameters))
         self.position_s, self.selected, self.range_s = 0.0, None, None
 
     def save(self, folder: Path, name: str, vocabulary: Vocabulary, *, loop: bool) -> Path:

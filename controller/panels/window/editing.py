@@ -131,4 +131,4 @@ class MouseEditing:
             return
         if imgui.button("smooth it out"):
             self._commands.move(None)
-        imgui.text_disabled("save it as a group or corrective: tab Expressions")
+        imgui.text_disabled("save it as a group or corrective: tab Faces")

@@ -41,10 +41,10 @@ class ExpressionButtons:
             if names:
                 imgui.separator_text(title)
                 self._buttons(imgui, names)
-        imgui.separator_text("mood")
-        self._pad(imgui)
         imgui.separator_text("the present face")
         self._saving()
+        imgui.separator_text("mood")
+        self._pad(imgui)
 
     def _buttons(self, imgui: Any, names: list[str]) -> None:
         """Buttons of one kind, the shown one in the colour of its layer."""

@@ -106,7 +106,7 @@ class Panel:
     def docks(self) -> list[Dock]:
         """The parts, as tabs beside the picture."""
         parts: dict[str, Callable[[], None]] = {
-            "Expressions": self.expressions,
+            "Faces": self.expressions,
             "Sliders": self._sliders,
             "View": self.view,
             "Timeline": self.timeline,

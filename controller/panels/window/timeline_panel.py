@@ -19,6 +19,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 _LOADED = (".toml", ".csv", ".wav")
 _TRACK_LINES, _NEAR = 3.2, 0.45
+_KEY_LINES = 0.35  # half the width of a key
 _TICK_LINES = 3.0  # least distance of two ticks, in heights of a line
 
 
@@ -71,8 +72,9 @@ class TimelinePanel:
         width, height = max(imgui.get_content_region_avail().x, line), line * _TRACK_LINES
         both = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
         imgui.invisible_button("track", imgui.ImVec2(width, height), both)
-        scale = width / self.playback.shown_s
-        self._mouse(imgui, corner.x, scale, line)
+        inset = line * _KEY_LINES  # so that a key at 0 is seen whole
+        scale = (width - 2.0 * inset) / self.playback.shown_s
+        self._mouse(imgui, corner.x + inset, scale, line)
         self._draw_track(imgui, corner, width, height, scale)
 
     def _mouse(self, imgui: Any, left: float, scale: float, line: float) -> None:
@@ -102,6 +104,7 @@ class TimelinePanel:
         draw, line, now = imgui.get_window_draw_list(), imgui.get_font_size(), self._commands.now
         grey, vec = packed(imgui, GREY), imgui.ImVec2
         draw.add_rect_filled(corner, vec(corner.x + width, corner.y + height), packed(imgui, GREY, 0.15), 3.0)
+        corner = vec(corner.x + line * _KEY_LINES, corner.y)
         step_s = tick_s(self.playback.shown_s * _TICK_LINES * line / width)
         for i in range(int(self.playback.shown_s / step_s) + 1):
             x = corner.x + scale * i * step_s
@@ -121,7 +124,7 @@ class TimelinePanel:
 
     def _draw_keys(self, imgui: Any, corner: Any, scale: float) -> None:
         draw, line, vec = imgui.get_window_draw_list(), imgui.get_font_size(), imgui.ImVec2
-        y, half = corner.y + line * 1.7, line * 0.35
+        y, half = corner.y + line * 1.7, line * _KEY_LINES
         for i, key in enumerate(self._commands.now.timeline.keys):
             x = corner.x + scale * key.at_s
             colour = packed(imgui, AMBER if i == self.playback.selected else LAYERS["expression"])
@@ -143,7 +146,7 @@ class TimelinePanel:
         if playback.selected is not None and flow.button("delete key"):
             playback.delete_key()
         if self._capture.last is not None and flow.button("edit the recording"):
-            self._commands.retake(self._capture.last)
+            playback.edit(self._capture.last)
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         changed, self._ease = imgui.combo("easing", self._ease, list(EASES))
         if changed and playback.selected is not None:
@@ -164,7 +167,7 @@ class TimelinePanel:
         if above is not None and flow.button("lay the last recording over it"):
             self._try(lambda: self.playback.layer(above))
         if flow.button("back to the keys"):
-            self._commands.retake(None)
+            self.playback.edit(None)
         imgui.text_disabled("drag with the right button: mark a range")
 
     def _saving(self, imgui: Any) -> None:

@@ -139,7 +139,7 @@ def screen() -> Iterator[Screen]:
 def test_the_panel_sends_what_its_widgets_ask_for(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
     places, sent, values = Places(screen.imgui, monkeypatch), [], PARAMETERS.neutral()
     panel = Panel(lambda: values, sent.append)
-    draw = drawn(panel, "Expressions")
+    draw = drawn(panel, "Faces")
     for _ in range(3):
         screen.frame(draw)
     assert sent == []
@@ -186,7 +186,7 @@ def test_all_expressions_of_the_stage_have_buttons_that_show_their_names_whole(
     values, sent = PARAMETERS.neutral(), []
     values[PARAMETERS.index("jawOpen")] = 0.5
     panel = Panel(lambda: values, sent.append, options=PanelOptions(vocabulary, [own], folder=tmp_path))
-    places, draw = Places(screen.imgui, monkeypatch), drawn(panel, "Expressions")
+    places, draw = Places(screen.imgui, monkeypatch), drawn(panel, "Faces")
     for _ in range(3):
         screen.frame(draw)
     assert set(vocabulary.names) <= set(places.at)
