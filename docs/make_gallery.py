@@ -52,28 +52,28 @@ def themes(size: tuple[int, int] = SIZE) -> np.ndarray:
 
 
 def own_shapes(size: tuple[int, int] = SIZE) -> np.ndarray:
-    """A dimple that was pulled into the cheek: as a group, and as a corrective of the smile."""
+    """A sweet that was put into the cheek: as a group, and as a corrective of the smile."""
     with tempfile.TemporaryDirectory() as folder:
-        own = save_dimple(Path(folder))
+        own = save_sweet(Path(folder))
         head = load_stage("demo", PARAMETERS, [own]).load_head()
-        faces = ({}, {"dimple": 1.0}, SMILE, SMILE | {"smile_dimple": 1.0})
+        faces = ({}, {"sweet": 1.0}, SMILE, SMILE | {"smile_sweet": 1.0})
         with Offscreen(head, size) as screen:
             pictures = [screen.render(head.values(face), _CLOSE) for face in faces]
-    return np.asarray(compose(pictures, ["at rest", "dimple 1", "a smile", "with smile_dimple"], columns=4))
+    return np.asarray(compose(pictures, ["at rest", "sweet 1", "a smile", "with smile_sweet"], columns=4))
 
 
-def save_dimple(folder: Path) -> Path:
-    """Save a dimple as a group and as a corrective, as the window does; the vocabulary they are in."""
+def save_sweet(folder: Path) -> Path:
+    """Save a sweet in the cheek as a group and as a corrective, as the window does; the vocabulary they are in."""
     stage, own = load_stage("demo", PARAMETERS), folder / "mine.toml"
     head = stage.load_head()
     face = head.part("face")
     at = int(np.argmin(np.linalg.norm(face.vertices[: len(face.mesh.uv)] - CHEEK_MM, axis=1)))
-    solver = SculptSolver(head, fairness=0.3)
-    group = solver.solve(face.mesh.uv[at : at + 1].astype(float), -9.0 * face.normals[at : at + 1].astype(float))
+    solver = SculptSolver(head, fairness=1.0)
+    group = solver.solve(face.mesh.uv[at : at + 1].astype(float), 9.0 * face.normals[at : at + 1].astype(float))
     place, smile = place_of(head, group), PARAMETERS.neutral()
     smile[PARAMETERS.indices(list(SMILE))] = list(SMILE.values())
-    save_own_group(own, "dimple", group, place, stage.vocabulary, PARAMETERS)
-    save_corrective(own, "smile_dimple", group, smile, place, stage.vocabulary, PARAMETERS)
+    save_own_group(own, "sweet", group, place, stage.vocabulary, PARAMETERS)
+    save_corrective(own, "smile_sweet", group, smile, place, stage.vocabulary, PARAMETERS)
     return own
 
 

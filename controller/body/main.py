@@ -110,6 +110,11 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
     if isinstance(request, messages.PlayTake):
         who.play_take(request.path)
         return True
+    if isinstance(request, messages.Jog):
+        who.jog(request.bus, request.servo, request.angle_deg)
+        return True
+    if isinstance(request, messages.Neutral):
+        who.end_jogs()
     return carry_out(request, who.state, time.monotonic_ns())
 
 

@@ -161,6 +161,16 @@ class StartServos:
 
 
 @dataclass(frozen=True)
+class Jog:
+    """Main to body, from the panel: turn one servo to an angle, within its limits, whatever the face wants; None gives
+    it back to the face, as :class:`Neutral` does with all. Servos that are stopped stay off."""
+
+    bus: str
+    servo: str
+    angle_deg: float | None
+
+
+@dataclass(frozen=True)
 class AskDetails:
     """Main to body, from the panel: answer with :class:`Details`. One at a time, so that none pile up."""
 
@@ -184,6 +194,7 @@ PanelRequest = (
     | Neutral
     | StopServos
     | StartServos
+    | Jog
     | AskDetails
     | PlayTake
 )

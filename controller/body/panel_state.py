@@ -74,6 +74,10 @@ class PanelState:
         """What the servos show of a parameter; None where that is not known."""
         return float(self._measured[index]) if np.isfinite(self._measured[index]) else None
 
+    def show_measured(self, values: Floats) -> None:
+        """Replace parameters (P,) by what the servos show of them, where that is known."""
+        np.copyto(values, self._measured, where=np.isfinite(self._measured))
+
     def away_deg(self, region: str) -> float | None:
         """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""
         value = self._away[self._regions.index(region)]

@@ -250,8 +250,9 @@ def _panel_options(stage: Stage) -> PanelOptions:
 
     own = [file for file in stage.vocabularies if not file.resolve().is_relative_to(config_dir().resolve())]
     return PanelOptions(
-        stage.vocabulary, own, script_names(beside=stage.path), stage.settings.liveliness, parameters=stage.parameters
-    )
+        stage.vocabulary, own, script_names(beside=stage.path), stage.settings.liveliness, parameters=stage.parameters,
+        robots=[robot for each in heads_of(stage) for robot in each.robots],
+    )  # fmt: skip
 
 
 class _Asked:

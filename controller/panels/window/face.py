@@ -78,6 +78,8 @@ class WindowFace:
         parameters = PARAMETERS if options is None else options.parameters
         self._panel = Panel(newest, ask, panel_state, options, self._viewpoint, self._area, details=details)
         self._panel.heads = choice
+        if details is not None and panel_state is not None:
+            self._panel.calibrating.mirror = partial(self._mirror, panel_state)
         self.next_run: NextRun | None = None
         self._overlays: OverlayView | None = None
         self._mouse = None
@@ -161,6 +163,10 @@ class WindowFace:
             self._mouse.change(head)
         if self._overlays is not None:
             self._overlays.forget()
+
+    def _mirror(self, state: PanelState, on: bool) -> None:
+        """Let the face show what the servos show, where they are known to, or what is wanted."""
+        self._values.replaced = state.show_measured if on else None
 
     def _turn_to(self, looks: Looks, stage: Stage) -> None:
         """Show another head of the stage."""

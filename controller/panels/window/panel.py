@@ -18,6 +18,8 @@ from controller.panels.session.jobs import Jobs
 from controller.panels.session.look import Look
 from controller.panels.session.playback import Playback
 from controller.panels.session.problems import Problems
+from controller.panels.session.servo_captures import ServoCaptures
+from controller.panels.window.calibrating import Calibrating
 from controller.panels.window.colours import GREEN, RED
 from controller.panels.window.drops import Drops
 from controller.panels.window.expressions import ExpressionButtons
@@ -31,6 +33,7 @@ from controller.panels.window.servos import ServoBars
 from controller.panels.window.sliders import Sliders
 from controller.panels.window.timeline_panel import TimelinePanel
 from controller.panels.window.view import View
+from controller.robot.settings import RobotSettings
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.view.docks import Dock, PictureArea
 from surface.view.fullscreen import FullScreen
@@ -46,7 +49,7 @@ class PanelOptions:
 
     vocabulary : its expressions. files : the vocabularies it names; saved expressions go into the last one, or into
     ``mine.toml`` in ``folder``. shows : names of its shows. life : its amount of idle motion.
-    folder : for all that is saved. parameters : those of the stage.
+    folder : for all that is saved. parameters : those of the stage. robots : those of the stage.
     """
 
     vocabulary: Vocabulary = field(default_factory=lambda: Vocabulary.load(PARAMETERS))
@@ -55,6 +58,7 @@ class PanelOptions:
     life: float = 0.0
     folder: Path = field(default_factory=Path.cwd)
     parameters: Parameters = field(default_factory=lambda: PARAMETERS)
+    robots: Sequence[RobotSettings] = ()
 
     @property
     def own_file(self) -> Path:
@@ -98,7 +102,8 @@ class Panel:
             self.playback, self.commands, self.capture, options.vocabulary, self.problems, options.folder
         )
         if self.feed is not None:
-            self.servos, self.links = ServoBars(self.feed), LinkList(self.feed)
+            self.calibrating = Calibrating(ServoCaptures(options.robots, options.folder), send, self.problems)
+            self.servos, self.links = ServoBars(self.feed, self.calibrating), LinkList(self.feed)
         self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
         self.more: list[Callable[[], None]] = []
         self.heads: HeadChoice | None = None
@@ -155,10 +160,16 @@ class Panel:
             "r": self.capture.toggle,
             "p": self.capture.take_picture,
             "c": self.capture.toggle_clip,
-            "n": self.commands.neutral,
+            "n": self._neutral,
             "escape": self._stop,
             "f": self._toggle_bare,
         }
+
+    def _neutral(self) -> None:
+        """Give everything back, servos that were turned by hand too."""
+        self.commands.neutral()
+        if self.feed is not None:
+            self.calibrating.forget()
 
     def _stop(self) -> None:
         self._send(StopServos())
@@ -218,7 +229,7 @@ class Panel:
     def _top(self, imgui: Any) -> None:
         commands = self.commands
         actions = {"undo": (commands.undo, commands.undoable), "redo": (commands.redo, commands.redoable),
-                   "neutral": (commands.neutral, True)}  # fmt: skip
+                   "neutral": (self._neutral, True)}  # fmt: skip
         for name, (action, possible) in actions.items():
             imgui.begin_disabled(not possible)
             if imgui.button(f"{name}##top"):
