@@ -12,14 +12,15 @@ import multiprocessing
 import sys
 import tempfile
 import time
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
 from websockets.sync.client import connect
 
 from controller.base.parameters import PARAMETERS
+from controller.body.body import Body
 from controller.face.still import Still, for_head
 from controller.layers.commands import CommandState
 from controller.links.kind import LinkContext
@@ -30,8 +31,8 @@ from surface.head import Head
 from surface.view.pictures.offscreen import Offscreen
 from surface.view.scene.camera import Camera
 from surface.view.scene.framing import framed
-from tests.browser import find_chromium, page
-from tests.test_web_panel import flood_panel, robot
+from tests.browser import Page, find_chromium, page
+from tests.test_web_panel import flood_panel, open_panel, robot
 
 SIZE, FRAMES = (1280, 720), 40
 TRIES = 10
@@ -66,11 +67,16 @@ def values(i: int) -> np.ndarray:
     return row
 
 
+def _chromium() -> str:
+    found = find_chromium()
+    if found is None:
+        raise SystemExit("no Chromium here; Debian, Ubuntu: sudo apt-get install chromium")
+    return found
+
+
 def browser_fps(face: Path) -> float:
     """Frames a second of the panel's face in Chromium's SwiftShader."""
-    chromium = find_chromium()
-    if chromium is None:
-        raise SystemExit("no Chromium here; Debian, Ubuntu: sudo apt-get install chromium")
+    chromium = _chromium()
     closers = Closers()
     table = {"kind": "web", "listen": "127.0.0.1:0", "face": str(face)}
     try:
@@ -114,10 +120,13 @@ def say(what: str) -> None:
     sys.stderr.flush()
 
 
-def stop_ms(folder: Path, *, flooded: bool) -> float:
-    """The longest time from a client's STOP to the torque of all 24 simulated servos off, of some tries."""
+def stop_ms(folder: Path, *, flooded: bool, browser: Page | None = None) -> float:
+    """The longest time from a STOP to the torque of all 24 simulated servos off, of some tries.
+
+    browser : whose button is pressed; without it a program's message.
+    """
     took = []
-    with robot(folder) as (body, _, where), connect(f"ws://{where}/ws") as client:
+    with robot(folder) as (body, _, where), _hand(where, browser) as press:
         processes = multiprocessing.get_context("spawn")  # a client is another program
         ending = processes.Event()
         flood = processes.Process(target=flood_panel, args=(where, ending))
@@ -126,15 +135,33 @@ def stop_ms(folder: Path, *, flooded: bool) -> float:
         for _ in range(TRIES):
             time.sleep(0.5)
             began = time.monotonic()
-            client.send('{"type": "stop"}')
+            press("stop")
             _until(lambda: not any(loop.bus.running for loop in body.buses))
             took.append(time.monotonic() - began)
-            client.send('{"type": "start"}')
-            _until(lambda: all(loop.bus.running for loop in body.buses))
+            _until(lambda: _started(press, body))
         ending.set()
         if flooded:
             flood.join()
     return round(1000 * max(took), 1)
+
+
+@contextmanager
+def _hand(where: str, browser: Page | None) -> Iterator[Callable[[str], object]]:
+    """What presses ``stop`` and ``start``: a button in a browser, or a program that sends messages."""
+    if browser is None:
+        with connect(f"ws://{where}/ws") as client:
+            yield lambda what: client.send(json.dumps({"type": what}))
+        return
+    open_panel(browser, where, 390, 844)
+    yield lambda what: browser.evaluate(f"document.getElementById('{what}').click()")
+
+
+def _started(press: Callable[[str], object], body: Body) -> bool:
+    if all(loop.bus.running for loop in body.buses):
+        return True
+    press("start")
+    time.sleep(0.3)
+    return False
 
 
 def _until(true: Callable[[], bool]) -> None:
@@ -150,6 +177,10 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         say("servos are stopped and started")
         stops = {f"stop_ms{end}": stop_ms(Path(folder), flooded=bool(end)) for end in ("", "_flooded")}
+        say("a button in the browser stops them")
+        with page(_chromium()) as browser:
+            for end in ("", "_flooded"):
+                stops[f"browser_stop_ms{end}"] = stop_ms(Path(folder), flooded=bool(end), browser=browser)
     still = Still.parse([], [], look={"person": "maple"})
     with tempfile.TemporaryDirectory() as folder:
         face = Path(folder) / "face.glb"

@@ -7,6 +7,7 @@ import importlib.util
 import os
 import signal
 import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
@@ -62,6 +63,7 @@ def pytest_configure() -> None:
     for name in SETTINGS:
         os.environ.pop(name, None)
     os.environ["TERM"] = "xterm-256color"
+    os.environ["OMOTE_STATE"] = tempfile.mkdtemp(prefix="omote-state-")  # not the user's own
     gc.disable()  # until all tests are collected: nothing of that is garbage, and there is much of it to look through
     if hasattr(os, "setpriority"):
         os.setpriority = keeping_priority(os.setpriority)

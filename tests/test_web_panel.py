@@ -20,6 +20,7 @@ from websockets.sync.client import connect
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.body.body import Body
+from controller.body.hall import Hall
 from controller.stage.stage import load_stage
 from surface.export.glb_web import web_glb
 from surface.head import Head
@@ -52,6 +53,25 @@ def robot(tmp_path: Path, head: Head | None = None) -> Iterator[tuple[Body, Any,
             yield body, link, f"127.0.0.1:{link.port}"  # type: ignore[union-attr]
         finally:
             body.stop()
+
+
+@contextmanager
+def choir(tmp_path: Path) -> Iterator[tuple[Hall, str]]:
+    """Two heads behind one panel, and its address."""
+    (tmp_path / "face.glb").write_bytes(web_glb(Head(small_head())))
+    path = tmp_path / "choir.toml"
+    path.write_text(
+        'name = "choir"\n[[links]]\nkind = "web"\nlisten = "127.0.0.1:0"\nface = "face.glb"\n'
+        '[[heads]]\nname = "maple"\n[[heads]]\nname = "oak"\n'
+    )
+    with Mailbox.create(len(P)) as one, Mailbox.create(len(P)) as two:
+        hall = Hall(load_stage(str(path), P), P, [one, two])
+        hall.start()
+        try:
+            hall.begin()
+            yield hall, f"127.0.0.1:{hall.bodies[0].links[0]._link.port}"  # type: ignore[union-attr]
+        finally:
+            hall.stop()
 
 
 def moved(body: Body, name: str) -> float:
@@ -119,6 +139,28 @@ def flood_panel(where: str, ending: threading.Event | synchronize.Event) -> None
                 ending.wait(0.01)
     except ConnectionClosed:
         pass
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_of_several_heads_one_is_chosen_and_a_stop_is_for_all(tmp_path: Path) -> None:
+    with choir(tmp_path) as (hall, where), page(CHROMIUM or "") as browser:
+        open_panel(browser, where, 390, 844)
+        first, second = (body.state for body in hall.bodies)
+        browser.evaluate("document.getElementById('tab-sliders').click()")
+        slide(browser, "jawOpen", 0.4)
+        wait_for(lambda: first.held().get(JAW) == 0.4)
+        browser.evaluate("{const s = document.getElementById('head'); s.value = 'oak';"
+                         "s.dispatchEvent(new Event('change'));}")  # fmt: skip
+        browser.wait("Math.abs(document.getElementById('p-jawOpen').value) < 0.01")
+        slide(browser, "jawOpen", 0.8)
+        wait_for(lambda: second.held().get(JAW) == 0.8)
+        assert first.held().get(JAW) == 0.4
+        browser.evaluate("globalThis.heard = null; omote.robot.on('frame', (f) => { globalThis.heard = f.values; })")
+        browser.wait("Boolean(heard) && heard[omote.robot.names.indexOf('jawOpen')] > 0.7")
+        browser.evaluate("document.getElementById('stop').click()")
+        wait_for(lambda: first.stop_latch.stopped is not None and second.stop_latch.stopped is not None)
+        assert browser.errors == []
 
 
 @pytest.mark.slow

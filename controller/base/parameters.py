@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -38,6 +39,14 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
 _TAKEN = frozenset({"all", "time", "type", "face", "subject", "measured", "neutral"})  # words of formats and links
 
 
+@dataclass(frozen=True)
+class PointGroup:
+    """Control points that a parameter moves: their file, and parameters by whose values the amount is multiplied."""
+
+    file: Path
+    times: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True, eq=False)
 class Parameters:
     """The registry of parameters; all arrays are (P,) float64 and read-only.
@@ -52,7 +61,7 @@ class Parameters:
     aliases : other spellings, folded, to canonical names.
     base : how many of them, the first, are of the base vocabulary; those after them are somebody's own.
     descriptions : texts about some of them for people, by name. own_regions : regions that own vocabularies add.
-    files : the vocabularies that were added.
+    files : the vocabularies that were added. point_groups : control points that own ones move, by name.
     """
 
     names: tuple[str, ...]
@@ -70,6 +79,7 @@ class Parameters:
     descriptions: dict[str, str] = field(default_factory=dict)
     own_regions: tuple[str, ...] = ()
     files: tuple[Path, ...] = ()
+    point_groups: Mapping[str, PointGroup] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not len(self.rest):
@@ -103,7 +113,8 @@ class Parameters:
         own = {key: table[key] for key in TABLE_KEYS if key in table}
         if isinstance(own.get("profile", {}), Mapping):
             own["profile"] = {**_shipped_profiles(), **own.get("profile", {})}
-        more = _build(check(own, _File, path, partial(_own_faults, self)))
+        file = check(own, _File, path, partial(_own_faults, self, path.parent))
+        more = _build(file)
         arrays: dict[str, Any] = {name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in _ARRAYS}
         for array in arrays.values():
             array.flags.writeable = False
@@ -115,6 +126,7 @@ class Parameters:
             descriptions=self.descriptions | more.descriptions,
             own_regions=(*self.own_regions, *(r for r in more.own_regions if r not in self.region_names)),
             files=(*self.files, path),
+            point_groups={**self.point_groups, **_point_groups(file, path.parent)},
             **arrays,
         )
 
@@ -234,6 +246,8 @@ class _Entry(Settings, validate_default=True):
     max_jerk_deg_s3: Positive | None = None
     rest: Number = 0.0
     description: Annotated[str, Field(max_length=400)] = ""
+    group: str = ""
+    times: Annotated[list[str], Field(max_length=4)] = []
 
     @field_validator("rest")
     @classmethod
@@ -311,11 +325,30 @@ def _shipped_profiles() -> dict[str, Any]:
     return profiles
 
 
-def _own_faults(known: Parameters, file: _File) -> list[str]:
-    """Names that cannot be used, or are taken, regions that there are not, aliases of nothing."""
+def _point_groups(file: _File, folder: Path) -> dict[str, PointGroup]:
+    entries = {name: entry for name, entry in file.parameters.items() if entry.group}
+    return {name: PointGroup(folder / entry.group, tuple(entry.times)) for name, entry in entries.items()}
+
+
+def _group_faults(known: Parameters, folder: Path, file: _File) -> Iterator[str]:
+    """Groups of control points whose file is not there, or that multiply with what is no parameter."""
+    names = (*known.names, *file.parameters)
+    for name, entry in file.parameters.items():
+        if entry.group and not os.path.isfile(folder / entry.group):
+            yield f"parameters.{name}.group: no file {entry.group!r} beside this one"
+        if entry.times and not entry.group:
+            yield f"parameters.{name}.times: needs group, the file of the control points"
+        for each in entry.times:
+            if each not in names:
+                yield f"parameters.{name}.times: unknown parameter {each!r}{did_you_mean(each, names)}"
+
+
+def _own_faults(known: Parameters, folder: Path, file: _File) -> list[str]:
+    """Names that cannot be used, or are taken, regions that there are not, aliases of nothing, groups without files."""
     faults = [f"regions: {name!r} must be a letter, then letters, digits or _" for name in file.regions
               if not _NAME.fullmatch(name)]  # fmt: skip
     faults += [*_unknown_aliases(file), *_unknown_regions(file, known.region_names)]
+    faults += _group_faults(known, folder, file)
     seen: dict[str, str] = {}
     for where, name in _spellings(file):
         key = fold(name)

@@ -8,6 +8,7 @@ main process, SIGTERM, or an error in this process.
 from __future__ import annotations
 
 import logging
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -248,6 +249,17 @@ class Body:
             self.sources.play(TakePlayer(load_take(path, self.state.parameters), self.state, reader_of(path).layer))
         except OMOTE_ERRORS as error:
             log.warning("%s", error)
+
+    def jog(self, bus: str, servo: str, angle_deg: float | None) -> None:
+        """Turn a servo by hand, see :class:`controller.body.messages.Jog`."""
+        for loop in self.buses:
+            if loop.settings.name == bus:
+                loop.jog(servo, None if angle_deg is None else math.radians(angle_deg))
+
+    def end_jogs(self) -> None:
+        """Let all servos follow the face again."""
+        for loop in self.buses:
+            loop.end_jogs()
 
     def details(self) -> Details:
         """What servos, links, buses and parts report now, and what was logged since the last time."""

@@ -55,6 +55,10 @@ class Hall:
         """The layers of the first head, who hears what is meant for nobody else."""
         return self.bodies[0].state
 
+    def body_of(self, name: str) -> Body:
+        """The body of the head of a name; that of the first one where there is none."""
+        return next((body for body in self.bodies if body.state.name == name), self.bodies[0])
+
     def state_of(self, name: str) -> CommandState:
         """The layers of the head of a name; those of the first one where there is none."""
         return next((body.state for body in self.bodies if body.state.name == name), self.state)

@@ -13,7 +13,6 @@ from multiprocessing.connection import Connection
 
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
-from controller.base.parameters import PARAMETERS
 from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.body import Body
@@ -22,8 +21,7 @@ from controller.body.nodes import open_node
 from controller.body.panel_requests import carry_out
 from controller.body.panel_state import PanelState
 from controller.layers.mixer import by_priority
-from controller.stage.roles import for_role
-from controller.stage.stage import heads_of, load_stage
+from controller.stage.stage import heads_of
 from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.base.shutdown import combine_with_context
 
@@ -54,7 +52,7 @@ def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
 
 def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event, measured: dict[str, object]) -> None:
     """Run the body until it is asked to stop; ``measured`` takes its report, also where a servo does not stop."""
-    stage = for_role(load_stage(orders.stage, PARAMETERS), orders.options.role, orders.options.heads)
+    stage = orders.options.load_stage(orders.stage)
     parameters, mailboxes, panels = stage.parameters, [], []
     for each in heads_of(stage):
         mailboxes.append(Mailbox.receive(pipe, len(parameters)))
@@ -117,17 +115,21 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
         request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
         body.begin()
         return True
-    first = body.bodies[0] if isinstance(body, Hall) else body
+    to = request.head if isinstance(request, messages.ToHead) else ""
+    request = request.request if isinstance(request, messages.ToHead) else request
+    who = body.body_of(to) if isinstance(body, Hall) else body
     if isinstance(request, messages.AskDetails):
-        _send(pipe, first.details())
+        _send(pipe, who.details())
         return True
     if isinstance(request, messages.PlayTake):
-        first.play_take(request.path)
+        who.play_take(request.path)
         return True
-    state = body.state
-    if isinstance(request, messages.ToHead) and isinstance(body, Hall):
-        state, request = body.state_of(request.head), request.request
-    return carry_out(request, state, time.monotonic_ns())
+    if isinstance(request, messages.Jog):
+        who.jog(request.bus, request.servo, request.angle_deg)
+        return True
+    if isinstance(request, messages.Neutral):
+        who.end_jogs()
+    return carry_out(request, who.state, time.monotonic_ns())
 
 
 def _send(pipe: Connection, message: object) -> None:

@@ -6,8 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from controller.base.parameters import PARAMETERS
 from controller.body.sources import Voice
 from controller.links.links import LinkSettings, read_link
+from controller.stage.roles import for_role
+from controller.stage.stage import Stage, at_rest, load_stage
 
 
 @dataclass(frozen=True)
@@ -35,6 +38,7 @@ class RunOptions:
     events : file for the lines and marks of shows. lsl : send those marks as LSL markers.
     role, heads : replace those of the stage's ``[zenoh]``.
     standard_input : a link listens there: the body gets what comes in at main's.
+    vocabularies : files that the stage has behind its own ones. at_rest : only the panel moves the face.
     """
 
     take: Path | None = None
@@ -48,6 +52,13 @@ class RunOptions:
     role: str | None = None
     heads: tuple[str, ...] = ()
     standard_input: bool = False
+    vocabularies: tuple[Path, ...] = ()
+    at_rest: bool = False
+
+    def load_stage(self, name: str) -> Stage:
+        """The stage as this run has it. Raises ConfigError."""
+        stage = for_role(load_stage(name, PARAMETERS, self.vocabularies), self.role, self.heads)
+        return at_rest(stage) if self.at_rest else stage
 
 
 @dataclass(frozen=True)
@@ -129,6 +140,7 @@ class Learn:
 
     name: str
     weights: tuple[float, ...]
+    kind: str = "user"
 
 
 @dataclass(frozen=True)
@@ -146,6 +158,16 @@ class StopServos:
 @dataclass(frozen=True)
 class StartServos:
     """Main to body, from the panel: let the servos move again."""
+
+
+@dataclass(frozen=True)
+class Jog:
+    """Main to body, from the panel: turn one servo to an angle, within its limits, whatever the face wants; None gives
+    it back to the face, as :class:`Neutral` does with all. Servos that are stopped stay off."""
+
+    bus: str
+    servo: str
+    angle_deg: float | None
 
 
 @dataclass(frozen=True)
@@ -172,6 +194,7 @@ PanelRequest = (
     | Neutral
     | StopServos
     | StartServos
+    | Jog
     | AskDetails
     | PlayTake
 )

@@ -55,8 +55,8 @@ def _face(request: object, state: CommandState, now: int) -> bool:
             state.live(amount, now, manner)
         case messages.Neutral(seconds):
             state.neutral(seconds, now)
-        case messages.Learn(name, weights):
-            state.vocabulary.add(Expression(name, np.array(weights)))
+        case messages.Learn(name, weights, kind):
+            state.vocabulary.add(Expression(name, np.array(weights), kind))
         case _:
             return False
     return True

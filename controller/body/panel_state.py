@@ -50,6 +50,11 @@ class PanelState:
         _write(self._stopped, stopped.who if stopped is not None else "")
         self._mailbox.publish(self._all)
 
+    def turn_to(self, other: PanelState) -> None:
+        """Read what another one reads, of the same parameters."""
+        self._mailbox, self._layers = other._mailbox, other._layers
+        self._all[:] = np.nan
+
     def refresh(self) -> None:
         """Read what was written last; nothing is known before the first time."""
         if self._mailbox.sequence:
@@ -68,6 +73,10 @@ class PanelState:
     def measured(self, index: int) -> float | None:
         """What the servos show of a parameter; None where that is not known."""
         return float(self._measured[index]) if np.isfinite(self._measured[index]) else None
+
+    def show_measured(self, values: Floats) -> None:
+        """Replace parameters (P,) by what the servos show of them, where that is known."""
+        np.copyto(values, self._measured, where=np.isfinite(self._measured))
 
     def away_deg(self, region: str) -> float | None:
         """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""

@@ -28,7 +28,7 @@ WEB = "127.0.0.1:8080"
 def _runs() -> tuple[Callable[..., None], ...]:
     from controller.cli import run  # start-up: each of these only where it is needed
 
-    return run.demo, run.run, run.play, run.convert
+    return run.demo, run.run, run.edit, run.play, run.convert
 
 
 def _pictures() -> tuple[Callable[..., None], ...]:
@@ -50,7 +50,7 @@ def _others() -> tuple[Callable[..., None], ...]:
 
 
 COMMANDS = (
-    (("demo", "run", "play", "convert"), _runs),
+    (("demo", "run", "edit", "play", "convert"), _runs),
     (("render", "fit", "landmarks", "export"), _pictures),
     (("ports", "scan", "set-id", "monitor", "calibrate", "preflight", "service"), _buses),
     (("check", "plugins", "bench", "translate", "webcam", "study"), _others),

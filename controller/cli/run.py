@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
-from controller.base.errors import OMOTE_ERRORS
+from controller.base.errors import OMOTE_ERRORS, ConfigError
 from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
 from controller.cli.heads import Identity, Person
@@ -33,6 +33,10 @@ VoiceHz = Annotated[
     typer.Option("--voice-rate", min=1000, help="The voice is signed 16 bit mono PCM without a header, at this rate."),
 ]
 Record = Annotated[Path | None, typer.Option("--record", help="Write every command and tick to this file (.rec).")]
+Vocabularies = Annotated[
+    list[str] | None,
+    typer.Option("--vocabulary", metavar="FILE", help="Expressions and parameters of your own; may be repeated."),
+]
 STAGE = "Stage: a name from configs/stages or a file."
 StageName = Annotated[str, typer.Option("--stage", help=STAGE, autocompletion=names_of("stages"))]
 
@@ -58,7 +62,10 @@ def demo(
 
 
 def run(
-    stage: Annotated[str, typer.Argument(help=STAGE, autocompletion=names_of("stages"))],
+    stage: Annotated[
+        str | None,
+        typer.Argument(help=f"{STAGE} Without it, the last one of a window.", autocompletion=names_of("stages")),
+    ] = None,
     seconds: Seconds = None,
     headless: Headless = False,
     report: ReportFile = None,
@@ -90,20 +97,68 @@ def run(
     heads: Annotated[
         str | None, typer.Option("--heads", metavar="NAME[,NAME]", help="Heads of this process, with [zenoh].")
     ] = None,
+    vocabulary: Vocabularies = None,
 ) -> None:
     """Run a stage until it is stopped (Ctrl-C) or its time is up.
 
     Example: omote run everything --headless --seconds 20 --report r.json
     """
+    stage, more = _named_or_last(stage, vocabulary)
     if dry_run:
-        _dry_run(stage, None, seconds, report, voice, voice_hz)
+        _dry_run(stage, None, seconds, report, voice, voice_hz, vocabularies=more)
         return
     from controller.stage.persons import parse_person  # start-up: --help does without it
 
     look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "fps": fps, "theme": theme,
             "camera": camera, "evaluator": evaluator, "person": parse_person(person)}  # fmt: skip
     _run(stage, seconds, headless, no_face, pictures, report, mirror=mirror, voice=voice, voice_hz=voice_hz,
-         record=record, identity=identity, look=look, web=web, role=role, heads=heads)  # fmt: skip
+         record=record, identity=identity, look=look, web=web, role=role, heads=heads, vocabularies=more)  # fmt: skip
+
+
+def edit(
+    stage: Annotated[
+        str | None,
+        typer.Argument(help=f"{STAGE} Without it, the last one of a window.", autocompletion=names_of("stages")),
+    ] = None,
+    seconds: Seconds = None,
+    identity: Identity = None,
+    person: Person = None,
+    vocabulary: Vocabularies = None,
+) -> None:
+    """Make expressions, groups and shows in a window: the face of a stage, without its links and robots.
+
+    Example: omote edit demo --vocabulary mine.toml
+    """
+    from controller.stage.last import last_stage  # start-up: --help does without it
+    from controller.stage.persons import parse_person  # start-up: --help does without it
+    from controller.tools.stage_run import has_display  # start-up: --help does without it
+
+    if not has_display():
+        raise ConfigError("omote edit needs a display to open a window on", hint="omote render draws without one")
+    name, more = ("demo", vocabulary_files(vocabulary)) if stage is None and last_stage() is None else _named_or_last(
+        stage, vocabulary
+    )  # fmt: skip
+    _run(name, seconds, identity=identity, look={"person": parse_person(person)}, vocabularies=more, at_rest=True)
+
+
+def vocabulary_files(names: Sequence[str] | None) -> tuple[Path, ...]:
+    """The files of ``--vocabulary``. Raises ConfigError: there is none of such a name."""
+    from controller.base.paths import find_config  # start-up: --help does without it
+
+    return tuple(find_config("vocabularies", name).resolve() for name in names or ())
+
+
+def _named_or_last(stage: str | None, vocabulary: Sequence[str] | None) -> tuple[str, tuple[Path, ...]]:
+    """The stage that is named, or the last one of a window with its vocabularies. Raises ConfigError: there is none."""
+    more = vocabulary_files(vocabulary)
+    if stage is not None:
+        return stage, more
+    from controller.stage.last import last_stage  # start-up: --help does without it
+
+    if (last := last_stage()) is None:
+        raise ConfigError("no stage is named, and none was shown in a window before", hint="omote run demo")
+    console.print(f"opening the last stage, {last.stage}", soft_wrap=True)
+    return str(last.stage), tuple(dict.fromkeys((*last.vocabularies, *more)))
 
 
 def play(
@@ -188,6 +243,8 @@ def _run(
     web: str | None = None,
     role: str | None = None,
     heads: str | None = None,
+    vocabularies: tuple[Path, ...] = (),
+    at_rest: bool = False,
 ) -> None:
     from controller.body.preload import PreloadedBody, garbage_collection_off  # start-up: --help does without it
 
@@ -202,7 +259,9 @@ def _run(
 
         own = tuple(name.strip() for name in (heads or "").split(",") if name.strip())
         heard = None if voice is None else Voice(voice, voice_hz, alone)
-        options = RunOptions(take, mirror, heard, record, role=role, heads=own)
+        options = RunOptions(
+            take, mirror, heard, record, role=role, heads=own, vocabularies=vocabularies, at_rest=at_rest
+        )
         session = StageRun(stage, options, parse_identity(identity), look, status.update, preloaded, web)
         try:
             if no_face:
@@ -212,8 +271,10 @@ def _run(
             else:
                 require("a window (--headless runs without one)", "imgui_bundle")
                 measured = session.run_window(seconds)
-                while session.next_stage is not None:  # dropped on the window
-                    session = StageRun(str(session.next_stage), RunOptions(), None, look, status.update, web=web)
+                while (then := session.next_run) is not None:  # a stage was dropped on the window, or a group saved
+                    options = RunOptions(vocabularies=then.vocabularies, at_rest=at_rest)
+                    person = parse_identity(identity) if then.carried else None
+                    session = StageRun(str(then.stage), options, person, look, status.update, web=web, carried=then)
                     measured = session.run_window(seconds)
         except OMOTE_ERRORS:
             if report is not None and session.measured:
@@ -239,6 +300,7 @@ def _dry_run(
     voice_hz: int | None = None,
     *,
     alone: bool = False,
+    vocabularies: tuple[Path, ...] = (),
 ) -> None:
     # start-up: --help does without any of these
     from controller.base.parameters import PARAMETERS
@@ -249,7 +311,7 @@ def _dry_run(
     from controller.tools.stage_run import write_report
 
     with console.status("computing what would be sent"), ports_forbidden("a dry run"):
-        heard, loaded = None, load_stage(stage, PARAMETERS)
+        heard, loaded = None, load_stage(stage, PARAMETERS, vocabularies)
         if voice is not None:
             with Voice(voice, voice_hz).open() as stream:
                 heard = voice_take(stream, "voice", loaded.parameters, raw_hz=voice_hz, longest_s=seconds)

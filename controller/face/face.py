@@ -42,6 +42,7 @@ class HeadValues:
 
     full : (p,) float64, the full vector of the last call.
     values : (h,) float64, those of the head. stamp_ns : when the newest command in them came (monotonic clock).
+    replaced : changes the full vector after it was read, as by what servos show.
     """
 
     def __init__(self, mailbox: Mailbox, parameters: Parameters, wanted: Sequence[str]) -> None:
@@ -49,15 +50,22 @@ class HeadValues:
         self._padded = np.zeros(len(parameters.names) + 1)
         self.full = self._padded[:-1]
         self.stamp_ns = 0
+        self.replaced: Callable[[Floats], None] | None = None
         self.follow(wanted)
 
     def follow(self, wanted: Sequence[str]) -> None:
         """Select for another head, whose parameters ``wanted`` are."""
         self._indices, self.values = head_indices(self._parameters, wanted), np.zeros(len(wanted))
 
+    def listen(self, mailbox: Mailbox) -> None:
+        """Read another mailbox of the same parameters."""
+        self._mailbox = mailbox
+
     def __call__(self) -> Floats:
         """The newest values in the head's order, (h,) float64; the same array each time."""
         _, self.stamp_ns = self._mailbox.read(self.full)
+        if self.replaced is not None:
+            self.replaced(self.full)
         return np.take(self._padded, self._indices, out=self.values)
 
 

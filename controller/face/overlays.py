@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from controller.base.parameters import Floats
 from surface.head import Head
-from surface.head.model.parameters import read_pose, rotation
+from surface.head.model.parameters import rotation
 
 PART = "face"
 Kind = Literal["control points", "influence", "quad tree", "touched", "anchors", "measured"]
@@ -86,7 +86,7 @@ class Overlays:
 
     def _places(self) -> Floats:
         """(n, 3) mm: the control points, with the head's rotation."""
-        turn, pivot = rotation(*read_pose(self._values).head), np.array(self._head.data.neck.pivot)
+        turn, pivot = rotation(*self._head.read_pose(self._values).head), np.array(self._head.data.neck.pivot)
         local = np.asarray(self._head.place_points(self._values)[0][self._index], np.float64)
         places: Floats = pivot + (local - pivot) @ turn.T
         return places

@@ -18,7 +18,7 @@ from controller.robot.anchors import head_order, sample_skin, shapes_of, skin_po
 from controller.stage.inverse import GroupMoves, SculptSolver, save_group
 from controller.stage.pulling import Pin, PullSolver, lip_pairs
 from surface.head import Head
-from surface.head.model.parameters import read_pose, rotation
+from surface.head.model.parameters import NAMES, read_pose, rotation
 from surface.view.scene.camera import Camera
 
 PART = "face"
@@ -60,7 +60,8 @@ class _Model:
 
     def __init__(self, head: Head, parameters: Parameters) -> None:
         part = head.part(PART)
-        self.order = head_order(head.parameters, parameters)
+        self.order = head_order(NAMES, parameters)
+        self._head, self._all = head, head_order(head.parameters, parameters)
         self.skin = sample_skin(head, PART, skin_points(head, PART, _POINTS, _SEED))
         self.basis = part.surface.basis_matrix(self.skin.uv)
         along_u, along_v = part.surface.derivatives(self.skin.uv)[1:]
@@ -71,6 +72,15 @@ class _Model:
         self.sculptor = SculptSolver(head, PART)
         self.lips = lip_pairs(head, PART)
         self.pivot = np.array(head.data.neck.pivot)
+        self._own = part.rig.own  # type: ignore[attr-defined]
+
+    def shown(self, values: Floats, moves: Floats) -> Floats:
+        """(m, 3) mm that control points moved by hand, ``moves`` (n, 3), and a user's own groups add to a face (P,)."""
+        amounts, moved = self._head.read_pose(values[self._all]).own, moves
+        for own in self._own:
+            moved = moved.copy()
+            moved[own.ids] += amounts[own.index] * own.moves
+        return np.asarray(self.basis @ moved)
 
 
 class PointEditor:
@@ -82,7 +92,7 @@ class PointEditor:
     """
 
     def __init__(self, head: Head, copy: Callable[[], Head], parameters: Parameters) -> None:
-        self._rig, self._parameters = head.part(PART).rig, parameters  # type: ignore[attr-defined]
+        self.head, self._rig, self._parameters = head, head.part(PART).rig, parameters  # type: ignore[attr-defined]
         self._rest = self._rig.rest.copy()
         self._moves: Floats = np.zeros_like(self._rest)
         self._before = self._moves
@@ -91,6 +101,7 @@ class PointEditor:
         self._asked: tuple[tuple[float, float], Screen, Floats, bool, bool] | None = None
         self._pins: dict[int, Floats] = {}
         self._settled = False
+        self._last: int | None = None
         self._thread = threading.Thread(target=self._prepare, args=(copy,), name="point editor", daemon=True)
 
     @property
@@ -151,9 +162,10 @@ class PointEditor:
         point = int(np.argmin(np.where(shown[:, 2] < first + _HIDDEN_MM, away, np.inf)))
         if away[point] > _PICK_PIXELS:
             return False
+        self._last = point
         offset = places[point] - screen.place(pixel, places[point])
         self._held = _SculptDrag(model, point, places[point], offset) if sculpt else _PointDrag(
-            model, point, places[point], offset, self._parameters, values, self._sculpted_by(model), self._pins,
+            model, point, places[point], offset, self._parameters, values, model.shown(values, self._moves), self._pins,
             tied=tied,
         )  # fmt: skip
         return True
@@ -219,19 +231,27 @@ class PointEditor:
         self._set_moves(np.zeros_like(self._rest) if moves is None else moves)
         self.release()
 
+    def group(self) -> GroupMoves:
+        """The control points that were moved."""
+        ids = np.flatnonzero(np.linalg.norm(self._moves, axis=1) >= _LEAST_MM).astype(np.int32)
+        return GroupMoves(PART, ids, self._moves[ids])
+
+    def last_pull(self, values: Floats) -> tuple[Floats, Floats]:
+        """(3,) mm where the point that was held last lies at rest, and (3,) mm how far the face ``values`` (P,) and
+        moved control points bring it; the head not turned. No pull, where none was held."""
+        if self._model is None or self._last is None:
+            return np.zeros(3), np.zeros(3)
+        place = self._model.skin.rest[self._last]
+        return place, self._local(self._model, values)[self._last] - place
+
     def save(self, path: Path, name: str) -> None:
         """Write the moved control points as a group file; a stage adds it with ``groups``. Raises ControllerError."""
-        ids = np.flatnonzero(np.linalg.norm(self._moves, axis=1) >= _LEAST_MM).astype(np.int32)
-        save_group(path, name, GroupMoves(PART, ids, self._moves[ids]))
+        save_group(path, name, self.group())
 
     def _set_moves(self, moves: Floats) -> None:
         self._moves = moves
         np.add(self._rest, moves, out=self._rig.rest)
         self._rig.invalidate()
-
-    def _sculpted_by(self, model: _Model) -> Floats:
-        """(m, 3) mm that the moved control points move the points by."""
-        return np.asarray(model.basis @ self._moves)
 
     def _places(self, model: _Model, values: Floats) -> tuple[Floats, Floats]:
         """(m, 3) mm where the points are in the picture, and the head's rotation (3, 3)."""
@@ -241,7 +261,7 @@ class PointEditor:
     def _local(self, model: _Model, values: Floats) -> Floats:
         """(m, 3) mm where the points are, head not turned."""
         moved = model.skin.displacement(shapes_of(values, model.order))
-        local: Floats = model.skin.rest + moved + self._sculpted_by(model)
+        local: Floats = model.skin.rest + moved + model.shown(values, self._moves)
         return local
 
     def _prepare(self, copy: Callable[[], Head]) -> None:

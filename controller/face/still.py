@@ -93,7 +93,8 @@ class Still:
     def load_head(self) -> Head:
         """The head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
         dressed = self.look.dressed
-        return load_head(self.head, self.identity, self.groups, self.persons, dressed=dressed)
+        own = self.parameters.point_groups
+        return load_head(self.head, self.identity, self.groups, self.persons, dressed=dressed, own=own)
 
 
 def parse_group(word: str) -> tuple[Path, float]:

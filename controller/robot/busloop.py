@@ -92,6 +92,7 @@ class BusLoop:
         self._letting_go, self._let_go = LettingGo(settings.let_go_s, settings.let_go_below_a), False
         self._state: BusState | None = None
         self._stopping, self._begun = threading.Event(), threading.Event()
+        self._jogs: dict[str, float] = {}
         self._last_reason = ""
         self._thread: threading.Thread | None = None
 
@@ -120,6 +121,22 @@ class BusLoop:
     def feed(self, step_s: float, *, urgent: bool) -> None:
         """Report new parameters, ``step_s`` after the last ones; the next cycle begins with urgent ones."""
         self.clock.feed(step_s, urgent=urgent)
+
+    def jog(self, channel: str, angle_rad: float | None) -> None:
+        """Turn a channel's servo to an angle within its limits, whatever the face wants; None gives it back.
+
+        The limits of speed and acceleration hold, and rules too. May be called from any thread. Nothing happens where
+        there is no such channel.
+        """
+        jogs = {name: angle for name, angle in self._jogs.items() if name != channel}
+        if angle_rad is not None and channel in self.table.names:
+            i = self.table.names.index(channel)
+            jogs[channel] = float(np.clip(angle_rad, self.table.low_rad[i], self.table.high_rad[i]))
+        self._jogs = jogs  # at once: the thread of the bus reads it
+
+    def end_jogs(self) -> None:
+        """Let all servos follow the face again."""
+        self._jogs = {}
 
     def begin(self) -> None:
         """Follow the parameters from now on; until then the servos are held at the positions they started at."""
@@ -227,6 +244,8 @@ class BusLoop:
             return
         values, stamp = self._newest()
         angles, held = self.table.angles(values)
+        for name, angle in self._jogs.items():
+            angles[self.table.names.index(name)] = angle
         if self._let_go and not self._take_again(angles):
             return
         self.held += held

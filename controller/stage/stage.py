@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
@@ -13,7 +14,7 @@ from pydantic import Field
 from controller.base.config import Settings, read_toml
 from controller.base.config import check as check_table
 from controller.base.errors import ConfigError, ParameterError, TakeError
-from controller.base.parameters import Parameters, did_you_mean
+from controller.base.parameters import Parameters, PointGroup, did_you_mean
 from controller.base.paths import find_config
 from controller.base.placement import Placement
 from controller.layers.commands import CommandState
@@ -129,6 +130,7 @@ class Stage:
     layers : the layers. life : settings of idle motion. groups : group files added to the head, each with its amount.
     persons : whom the face shows, each with its share. controls : what gamepad and keys do in the window.
     heads : the heads of a stage with ``[[heads]]``; the rest is that of the first of them. Empty for one head.
+    own_groups : control points that own parameters move, by the parameter's name.
     """
 
     path: Path
@@ -144,6 +146,7 @@ class Stage:
     persons: tuple[tuple[Person, float], ...] = ()
     controls: tuple[ControlsFile, ...] = ()
     heads: tuple[StageHead, ...] = ()
+    own_groups: Mapping[str, PointGroup] = field(default_factory=dict)
 
     def file(self, name: str) -> Path:
         """A file that the stage names: relative to the stage's folder, or a path."""
@@ -158,7 +161,8 @@ class Stage:
     def load_head(self) -> Head:
         """The stage's head with its persons, identity and groups; see :func:`load_head`."""
         dressed = self.settings.face.dressed
-        return load_head(self.head, self.settings.identity, self.groups, self.persons, dressed=dressed)
+        groups, own = self.groups, self.own_groups
+        return load_head(self.head, self.settings.identity, groups, self.persons, dressed=dressed, own=own)
 
     def state(
         self, parameters: Parameters | None = None, seed: int | None = None, period_s: float | None = None
@@ -191,19 +195,22 @@ def heads_of(stage: Stage) -> tuple[Stage, ...]:
 def load_head(
     folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]],
     persons: Sequence[tuple[Person, float]] = (), *, dressed: bool = True,
+    own: Mapping[str, PointGroup] = MappingProxyType({}),
 ) -> Head:  # fmt: skip
     """A head as one of ``persons`` or their mixture, with identities and groups added, each by its amount.
 
-    dressed : with hair and clothes; a mask wears none.
+    dressed : with hair and clothes; a mask wears none. own : control points that own parameters move.
 
     Raises SurfaceError when the head cannot be read, ConfigError when a group does not fit it.
     """
     from controller.stage.inverse import add_group, load_group  # start-up: as Head
-    from surface.head import Head  # start-up: the body reads stages and draws nothing
+    from surface.head import Head, OwnGroup  # start-up: the body reads stages and draws nothing
 
     head = Head.load(folder, mixed_identity(persons, identity), mixed_look(persons, dressed=dressed))
     for path, amount in groups:
         add_group(head, load_group(path, head.data)[1], amount)
+    found = {name: load_group(group.file, head.data)[1] for name, group in own.items()}
+    head.add_groups([OwnGroup(name, g.part, g.ids, g.moves, own[name].times) for name, g in found.items()])
     return head
 
 
@@ -223,10 +230,11 @@ def find_persons(person: PersonName, head: Path, beside: Path | None = None) -> 
     return found
 
 
-def load_stage(name: str, parameters: Parameters) -> Stage:
+def load_stage(name: str, parameters: Parameters, vocabularies: Sequence[Path] = ()) -> Stage:
     """Find, read and cross-check a stage and all it refers to; ``name`` : a path, or a file in ``configs/stages``.
 
     ``parameters`` : of the base vocabulary; those of the stage's own vocabularies are added to them.
+    ``vocabularies`` : files that it has behind its own ones.
 
     Raises ConfigError that lists every fault of the stage and of the files it names.
     """
@@ -235,11 +243,26 @@ def load_stage(name: str, parameters: Parameters) -> Stage:
 
     def check(settings: StageSettings) -> list[str]:
         faults: list[str] = []
+        more = [str(each) for each in vocabularies if not _names(settings, path, each)]
+        settings = settings.model_copy(update={"vocabularies": [*settings.vocabularies, *more]})
         found[:] = [_gather_all(path, settings, parameters, faults)]
         return faults
 
     check_table({"name": path.stem, **read_toml(path)}, StageSettings, path, check)
     return found[0]
+
+
+def _names(settings: StageSettings, path: Path, vocabulary: Path) -> bool:
+    """Whether the settings of the stage ``path`` name a vocabulary themselves."""
+    places = (place for each in settings.vocabularies for place in (path.parent / each, Path(each)))
+    return vocabulary.resolve() in (place.resolve() for place in places)
+
+
+def at_rest(stage: Stage) -> Stage:
+    """The first head of a stage without links, robots and whatever moves it by itself."""
+    first = heads_of(stage)[0]
+    nothing: dict[str, Any] = {"links": [], "robots": [], "heads": [], "show": None, "take": None, "voice": None}
+    return replace(first, robots=(), heads=(), settings=first.settings.model_copy(update=nothing | {"liveliness": 0.0}))
 
 
 def _layer_faults(links: Sequence[LinkSettings], layers: Sequence[LayerSettings]) -> list[str]:
@@ -342,8 +365,9 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     amounts = tuple(zip(groups, settings.point_groups.values(), strict=False))
     shown = tuple(persons or ())
     stage = Stage(
-        path, settings, parameters, head, tuple(robots), more, vocabulary, layers, life, amounts, shown, controls
-    )
+        path, settings, parameters, head, tuple(robots), more, vocabulary, layers, life, amounts, shown, controls,
+        own_groups=parameters.point_groups,
+    )  # fmt: skip
     if settings.take is not None:
         take = stage.file(str(settings.take))
         read("take", (take, files), lambda: load_take(take, parameters))

@@ -68,7 +68,9 @@ def layered(below: Take, above: Take, offset_s: float = 0.0) -> Take:
     if not 0.0 <= offset_s <= below.duration_s:
         raise ParameterError(f"a layer begins from 0 to {below.duration_s:g} s, not at {offset_s:g}", hint="0")
     end_s = offset_s + above.duration_s
-    times = np.union1d(below.times_s, offset_s + above.times_s)
+    edges = np.array([offset_s - 2.0 * _LEAST_S, end_s + 2.0 * _LEAST_S])  # what lies below ends and goes on there
+    edges = edges[(edges > 0.0) & (edges < below.duration_s)]
+    times = np.union1d(np.append(below.times_s, edges), offset_s + above.times_s)
     times = times[np.append(True, np.diff(times) > _LEAST_S)]
     values = _at(below, np.minimum(times, below.duration_s))
     inside = (times >= offset_s) & (times <= end_s + _LEAST_S)

@@ -45,10 +45,11 @@ class Key:
 
 @dataclass(frozen=True)
 class Timeline:
-    """Keys in rising time, and marks: names of moments (s)."""
+    """Keys in rising time, and marks: names of moments (s). sound : a WAV file that plays with it."""
 
     keys: tuple[Key, ...] = ()
     marks: Mapping[str, float] = field(default_factory=dict)
+    sound: Path | None = None
 
     @property
     def length_s(self) -> float:
@@ -148,6 +149,7 @@ class _File(Settings, extra="ignore"):
     """What a timeline needs of a script that it was saved as."""
 
     marks: dict[str, Number] = {}
+    sound: str | None = None
     keys: Annotated[list[_KeyTable], Field(max_length=_MOST_KEYS)] = []
 
 
@@ -156,7 +158,8 @@ def save_show(
 ) -> None:
     """Write a timeline as a script, which plays it, with its keys, which :func:`load_timeline` reads.
 
-    Raises ParameterError: there is no key. ControllerError: the file cannot be written, or could not be read again.
+    Raises ParameterError: there is no key, or its sound is not in the folder. ControllerError: the file cannot be
+    written, or could not be read again.
     """
     steps = steps_of(timeline, parameters)
     if not steps:
@@ -164,6 +167,8 @@ def save_show(
     table: dict[str, Any] = {"name": path.stem, "description": "made on a timeline; edit its keys there"}
     if loop:
         table["loop_s"] = round(timeline.length_s + 1.0 / RATE_HZ, 3)
+    if timeline.sound is not None:
+        table["sound"] = _beside(timeline.sound, path)
     table |= {"steps": steps, "marks": dict(timeline.marks)}
     table["keys"] = [
         {"at_s": key.at_s, "ease": key.ease, "name": key.name, "values": dict(key.values)} for key in timeline.keys
@@ -187,10 +192,18 @@ def load_timeline(path: Path, parameters: Parameters) -> Timeline:
         ]  # fmt: skip
 
     file = load(path, _File, faults)
-    timeline = Timeline(marks=dict(file.marks))
+    timeline = Timeline(marks=dict(file.marks), sound=path.parent / file.sound if file.sound else None)
     for key in file.keys:
         timeline = timeline.with_key(Key(key.at_s, dict(key.values), key.ease, key.name))
     return timeline
+
+
+def _beside(sound: Path, show: Path) -> str:
+    """A sound as a show names it: in its folder or below. Raises ParameterError: it is elsewhere."""
+    folder = show.parent.resolve()
+    if not sound.resolve().is_relative_to(folder):
+        raise ParameterError(f"{sound}: a show's sound lies beside it", hint=f"copy it to {folder}")
+    return sound.resolve().relative_to(folder).as_posix()
 
 
 def _face(key: Key, parameters: Parameters) -> Floats:

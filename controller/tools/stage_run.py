@@ -18,7 +18,6 @@ from pydantic import ValidationError
 
 from controller.base.errors import ConfigError
 from controller.base.files import replacing
-from controller.base.parameters import PARAMETERS
 from controller.base.parts import Part
 from controller.base.paths import config_dir
 from controller.base.service_manager import ServiceManager
@@ -30,8 +29,8 @@ from controller.body.sources import Voice
 from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.links.line.script import script_names
 from controller.panels.web_face import face_in_the_making
-from controller.stage.roles import for_role
-from controller.stage.stage import Stage, check_identity, heads_of, load_stage, with_picture
+from controller.stage.last import remember
+from controller.stage.stage import Stage, check_identity, heads_of, with_picture
 from controller.takes.reader import load_take
 from controller.takes.recording import SUFFIX, replay
 from drivers.base.priority import lower_process_priority
@@ -39,7 +38,9 @@ from surface.base.extras import require
 
 if TYPE_CHECKING:
     from controller.face.wall import WallFace  # start-up: the body gets its orders first
+    from controller.panels.session.next_run import NextRun  # start-up: the body gets its orders first
     from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
+    from controller.panels.window.heads import HeadSource  # start-up: the same
     from controller.panels.window.panel import PanelOptions  # start-up: the same
     from surface.head import Head  # start-up: the same
 
@@ -64,8 +65,9 @@ class StageRun:
     name : of the stage, or its file. identity : replaces the stage's own. look : command-line options over its picture.
     web : HOST:PORT of a web panel.
     status : called with what is being done, in a few words. preloaded : the body's process, if it was started already.
-    next_stage : after a run, the file of a stage that the user dropped on the window.
     measured : after a run, also one that ended with an error, what the body measured, and ``failed`` with that error.
+    carried : what was set in a window before, with which this one goes on.
+    next_run : after a run, what the user wants to go on with.
     """
 
     def __init__(
@@ -77,10 +79,11 @@ class StageRun:
         status: Callable[[str], object] = lambda _: None,
         preloaded: PreloadedBody | None = None,
         web: str | None = None,
+        carried: NextRun | None = None,
     ) -> None:
         if web is not None:
             check_web(web, alone=options.take is not None)
-        stage = for_role(with_picture(load_stage(name, PARAMETERS), look or {}), options.role, options.heads)
+        stage = with_picture(options.load_stage(name), look or {})
         if identity:
             check_identity(stage.head, identity)
             stage = replace(stage, settings=stage.settings.model_copy(update={"identity": dict(identity)}))
@@ -95,8 +98,9 @@ class StageRun:
         self.stage, self._options, self._status, self._preloaded = stage, options, status, preloaded
         self._web, self._web_look, self._identity = web, look or {}, identity
         self._manager = ServiceManager()
-        self.next_stage: Path | None = None
         self.measured: dict[str, Any] = {}
+        self._carried = carried
+        self.next_run: NextRun | None = None
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
         """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.
@@ -134,11 +138,21 @@ class StageRun:
             stage = self.stage
             face = WindowFace(
                 head, stage.settings.face, values, body.send, body.panel_state, stage.load_head, _panel_options(stage),
-                stage.controls, stage=stage, details=lambda: body.details,
+                stage.controls, stage=stage, details=lambda: body.details, carried=self._carried,
+                heads=self._sources(body),
             )  # fmt: skip
+            if self._options.take is None:
+                remember(stage.path, self._options.vocabularies)
             failed = self._show(face, self._begin(body, flag, seconds))
-            self.next_stage = face.next_stage
+            self.next_run = face.next_run
             return self._end(body, None if failed else face.report(), failed)
+
+    def _sources(self, body: BodyProcess) -> list[HeadSource]:
+        """The heads that the window can show; none where there is one."""
+        from controller.panels.window.heads import HeadSource  # start-up: the body gets its orders first
+
+        boxes = zip(self.stage.heads, body.mailboxes, body.panel_states, strict=True) if self.stage.heads else ()
+        return [HeadSource(head.name, head.stage, mailbox, state) for head, mailbox, state in boxes]
 
     def run_without_face(self, seconds: float | None) -> dict[str, Any]:
         """Run links and servos only, as on a robot without OpenGL."""
@@ -237,10 +251,11 @@ def _panel_options(stage: Stage) -> PanelOptions:
     """What the window's panel shows of a stage."""
     from controller.panels.window.panel import PanelOptions  # start-up: the body gets its orders first
 
-    own = [file for file in stage.vocabularies if not file.is_relative_to(config_dir())]
+    own = [file for file in stage.vocabularies if not file.resolve().is_relative_to(config_dir().resolve())]
     return PanelOptions(
-        stage.vocabulary, own, script_names(beside=stage.path), stage.settings.liveliness, parameters=stage.parameters
-    )
+        stage.vocabulary, own, script_names(beside=stage.path), stage.settings.liveliness, parameters=stage.parameters,
+        robots=[robot for each in heads_of(stage) for robot in each.robots],
+    )  # fmt: skip
 
 
 class _Asked:

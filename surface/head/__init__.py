@@ -5,6 +5,7 @@ In: a head's folder and values of parameters. Out: vertices and normals of its p
 
 from surface.head.model.data import Contact, Group, HeadData, Jaw, Neck, PartData, Rule, Seam
 from surface.head.model.file import load_data, save_data
+from surface.head.model.own_groups import OwnGroup
 from surface.head.model.parameters import NAMES
 from surface.head.posing.crowd import Crowd
 from surface.head.posing.head import Head
@@ -20,6 +21,7 @@ __all__ = [
     "HeadPart",
     "Jaw",
     "Neck",
+    "OwnGroup",
     "PartData",
     "Rule",
     "Seam",

@@ -34,6 +34,12 @@ if TYPE_CHECKING:
 
 _MINIMISED_S = 0.02
 _LINE = 16.0  # height of a line of the runner's text, points
+_SIZES = (
+    "window_padding", "frame_padding", "item_spacing", "item_inner_spacing", "cell_padding", "indent_spacing",
+    "scrollbar_size", "grab_min_size", "frame_rounding", "tab_rounding", "separator_text_padding",
+)  # fmt: skip
+"""Of ImGui's style, what grows with the text."""
+_LEAST_TAB = 20.0  # width of a tab at least, points
 HEADLESS_HINT = "add --headless, or start it under: xvfb-run -a"
 
 
@@ -155,6 +161,7 @@ class _Window:
         self._drawings: dict[str, LiveDrawing] = {}
         self._alternating: Alternating | None = None
         self._placing: Placing | None = None
+        self._scaled, self._sizes = 0.0, dict[str, Any]()
 
     def as_callback(self, action: Callable[[], None]) -> Callable[[], None]:
         """`action` as a callback: an exception is kept and closes the window."""
@@ -284,12 +291,25 @@ class _Window:
         drawing.draw(values, camera)
         return drawing.target.picture
 
+    def _scale(self, style: Any) -> None:
+        """Let text, and all distances between and within widgets, grow with the window."""
+        scale = text_scale(self._imgui.get_io().display_size.y, style.font_scale_dpi)
+        if scale == self._scaled:
+            return
+        # from sizes as they were made: those of 4K, made smaller again, would be rounded ones
+        self._sizes = self._sizes or {name: _copied(getattr(style, name)) for name in _SIZES}
+        for name, size in self._sizes.items():
+            setattr(
+                style, name, size * scale if isinstance(size, float) else type(size)(size.x * scale, size.y * scale)
+            )
+        style.tab_min_width_shrink = _LEAST_TAB * scale  # in a small window titles are cut, and none is away
+        style.font_scale_main = self._scaled = scale
+
     def panels(self) -> None:
         """Mouse, keys and the caller's panels."""
         if self.docked:
             show_docks(self.params, shown=not self.area.bare)
-            style = self._imgui.get_style()
-            style.font_scale_main = text_scale(self._imgui.get_io().display_size.y, style.font_scale_dpi)
+            self._scale(self._imgui.get_style())
         if self.kiosk:
             self._imgui.set_mouse_cursor(self._imgui.MouseCursor_.none)
             if self._imgui.is_key_pressed(self._imgui.Key.escape, repeat=False):
@@ -364,3 +384,8 @@ def _parameters(runner: Any, window: _Window, size: tuple[int, int], title: str)
     callbacks.show_gui = window.as_callback(window.panels)
     callbacks.before_exit = window.stop
     return params
+
+
+def _copied(size: Any) -> Any:
+    """A number, or a vector of ImGui's own."""
+    return float(size) if isinstance(size, int | float) else type(size)(size.x, size.y)

@@ -1,4 +1,4 @@
-"""Pictures of the face, and recordings of what it shows as a table that ``omote play`` plays."""
+"""Pictures and clips of the face, and recordings of what it shows as a table that ``omote play`` plays."""
 
 from __future__ import annotations
 
@@ -11,11 +11,16 @@ import numpy as np
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.files import replacing
 from controller.base.parameters import PARAMETERS, Floats, Parameters
+from controller.face.face import Recorder
+from controller.panels.session.jobs import Jobs
+from controller.panels.session.problems import Problems
 from controller.takes.livelink import Take
 from surface.view.docks import PictureArea
+from surface.view.pictures.clip import write_clip
 from surface.view.pictures.sheet import write_png
 
 LONGEST_S = 600.0
+_CLIP_HEIGHT = 480
 
 
 class Capture:
@@ -23,13 +28,16 @@ class Capture:
 
     area : of the window, which gives the next picture. newest : the newest parameters (P,). clock : seconds.
     parameters : without them, those of the base vocabulary.
+    jobs : writes clips beside the picture.
     message : what was written last, or why it was not. last : the last recording as a take, which can be edited.
     """
 
     def __init__(
         self, area: PictureArea, newest: Callable[[], Floats], folder: Path,
-        clock: Callable[[], float] = time.monotonic, parameters: Parameters | None = None,
+        clock: Callable[[], float] = time.monotonic, parameters: Parameters | None = None, jobs: Jobs | None = None,
     ) -> None:  # fmt: skip
+        self._jobs, self._clip_began = jobs or Jobs(Problems()), 0.0
+        self._clip: Recorder | None = None
         self._area, self._newest, self._folder, self._clock = area, newest, folder, clock
         self._parameters = parameters or PARAMETERS
         self._rows: list[Floats] | None = None
@@ -51,6 +59,35 @@ class Capture:
         """Write the next picture of the face, without the panel."""
         self._area.wanted = self._write_picture
 
+    @property
+    def filming(self) -> bool:
+        """Whether it takes a clip."""
+        return self._clip is not None
+
+    def toggle_clip(self) -> None:
+        """Begin a clip of the face, or end it and write it; a longer one has fewer pictures a second."""
+        if self._clip is None:
+            self._clip, self._clip_began = Recorder(height=_CLIP_HEIGHT, whole=True), self._clock()
+            return
+        clip, self._clip = self._clip, None
+        if len(clip.frames) < 2:
+            self.message = "a clip needs two pictures at least"
+            return
+        path = self._free("clip", ".webp")
+        rate_hz = (len(clip.frames) - 1) / (clip.times_s[-1] - clip.times_s[0])
+        self.message = f"writing {path}"
+        self._jobs.start("writing the clip", lambda _: write_clip(clip.frames, path, fps=rate_hz),
+                         lambda count: self._wrote(path, f", {count} pictures"))  # fmt: skip
+
+    def _wrote(self, path: Path, more: str = "") -> None:
+        self.message = f"wrote {path}{more}"
+
+    def _film(self) -> None:
+        """Take the next picture for the clip where one is due, and nobody else wants it."""
+        clip, at_s = self._clip, self._clock() - self._clip_began
+        if clip is not None and clip.wants(at_s) and self._area.wanted is None:
+            self._area.wanted = lambda picture: clip.keep(picture, at_s)
+
     def toggle(self) -> None:
         """Begin a recording, or end it and write it."""
         if self._rows is None:
@@ -64,6 +101,7 @@ class Capture:
 
     def __call__(self) -> None:
         """Add the present face to the recording; called once a frame. It ends by itself after ten minutes."""
+        self._film()
         if self._rows is None:
             return
         self._rows.append(np.append(self.seconds, self._newest()))
@@ -76,7 +114,7 @@ class Capture:
     def _write(self, path: Path, write: Callable[[Path], None]) -> None:
         try:
             write(path)
-            self.message = f"wrote {path}"
+            self._wrote(path)
         except OMOTE_ERRORS as error:
             self.message = str(error)
 

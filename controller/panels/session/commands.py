@@ -39,6 +39,15 @@ class Settings:
     take: Take | None = None
 
 
+@dataclass(frozen=True)
+class History:
+    """What is set, what can be taken back (the newest last), and what can be done again (the next last)."""
+
+    now: Settings
+    past: tuple[Settings, ...] = ()
+    future: tuple[Settings, ...] = ()
+
+
 class Commands:
     """Changes what the user has set, tells the body, and takes changes back without limit.
 
@@ -59,6 +68,7 @@ class Commands:
         self._past: list[Settings] = []
         self._future: list[Settings] = []
         self._step: Hashable = None
+        self._others: dict[str, History] = {}
 
     @property
     def undoable(self) -> bool:
@@ -69,6 +79,27 @@ class Commands:
     def redoable(self) -> bool:
         """Whether there is something taken back to do again."""
         return bool(self._future)
+
+    @property
+    def history(self) -> History:
+        """All that another window needs to go on with what was set here."""
+        return History(self.now, tuple(self._past), tuple(self._future))
+
+    def carry_on(self, history: History) -> None:
+        """Go on with what was set in another window: tell the body, and take back and do again as there."""
+        self._past, self._future = list(history.past), list(history.future)
+        self._apply(history.now)
+        self.end_step()
+
+    def turn_to(self, before: str, name: str, life: float) -> None:
+        """Go on with what was set of another head, which the body has kept; ``before`` is kept for later.
+
+        ``life`` : its amount of idle motion, where nothing was set of it yet.
+        """
+        self._others[before] = self.history
+        history = self._others.get(name, History(Settings(life=life)))
+        self._past, self._future, self.now = list(history.past), list(history.future), history.now
+        self.end_step()
 
     def hold(self, values: Mapping[int, float | None], step: Hashable = None) -> None:
         """Hold parameters at values; None gives one back to the layers. ``step`` : see :meth:`change`."""

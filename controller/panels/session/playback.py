@@ -7,17 +7,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from controller.base.errors import ParameterError
+from controller.base.errors import ControllerError, ParameterError
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import HoldAll, PanelRequest
 from controller.panels.session.commands import Commands
-from controller.takes.edit import cut_out, keep, smooth
+from controller.panels.session.sound import SoundPlayer, sound_length_s
+from controller.takes.edit import cut_out, keep, layered, smooth
+from controller.takes.livelink import Take
 from controller.takes.plain import write_plain
-from controller.takes.timeline import Ease, key_of_face, save_show
+from controller.takes.reader import load_take
+from controller.takes.timeline import Ease, key_of_face, load_timeline, save_show
 from controller.vocabulary.vocabulary import Vocabulary
 
 _LEAST_S = 1.0
@@ -29,7 +33,7 @@ class Playback:
     """Shows moments, and edits the timeline at the line; called once a frame.
 
     newest : the newest parameters (P,). send : sends requests to the body. clock : seconds.
-    parameters : without them, those of the base vocabulary.
+    parameters : without them, those of the base vocabulary. sound : plays the timeline's sound.
 
     Attributes
     ----------
@@ -40,7 +44,9 @@ class Playback:
     def __init__(
         self, commands: Commands, newest: Callable[[], Floats], send: Callable[[PanelRequest], None],
         clock: Callable[[], float] = time.monotonic, parameters: Parameters | None = None,
+        sound: SoundPlayer | None = None,
     ) -> None:  # fmt: skip
+        self._sound = sound or SoundPlayer()
         self._commands, self._newest, self._send, self._clock = commands, newest, send, clock
         self._parameters = parameters or PARAMETERS
         self.position_s, self.playing = 0.0, False
@@ -48,12 +54,23 @@ class Playback:
         self.range_s: tuple[float, float] | None = None
         self._last_s = clock()
         self._held: tuple[int, ...] = ()
+        self._measured: tuple[Path | None, float] = (None, 0.0)
 
     @property
     def length_s(self) -> float:
         """Length of what is played."""
-        take = self._commands.now.take
-        return take.duration_s if take is not None else self._commands.now.timeline.length_s
+        take, timeline = self._commands.now.take, self._commands.now.timeline
+        if take is not None:
+            return take.duration_s
+        return max(timeline.length_s, 0.0 if timeline.sound is None else self._sound_length_s(timeline.sound))
+
+    def _sound_length_s(self, path: Path) -> float:
+        if path != self._measured[0]:
+            try:
+                self._measured = path, sound_length_s(path)
+            except ControllerError:  # telling it again in every frame would help nobody: playing it tells it
+                self._measured = path, 0.0
+        return self._measured[1]
 
     @property
     def shown_s(self) -> float:
@@ -72,25 +89,39 @@ class Playback:
             self.stop()
 
     def toggle(self) -> None:
-        """Play from the line on, or stop there; at the end it begins again."""
+        """Play from the line on, or stop there; at the end it begins again.
+
+        Raises ControllerError: its sound cannot be played; the face is played nevertheless.
+        """
         if self.playing:
-            self.playing = False
+            self._pause()
         elif self.length_s > 0.0:
             self.position_s = 0.0 if self.position_s >= self.length_s else self.position_s
             self.playing = True
+            now = self._commands.now
+            if now.take is None and now.timeline.sound is not None:
+                self._sound.start(now.timeline.sound, self.position_s)
+
+    def _pause(self) -> None:
+        self.playing = False
+        self._sound.stop()
 
     def scrub(self, position_s: float) -> None:
         """Put the line somewhere and show the face there."""
-        self.playing = False
+        self._pause()
         self.position_s = min(max(position_s, 0.0), self.shown_s)
         self._show()
 
     def stop(self) -> None:
         """Stop, and give back what was held."""
-        self.playing = False
+        self._pause()
         if self._held:
             self._send(HoldAll(self._held, None))
         self._held = ()
+
+    def close(self) -> None:
+        """The window is closed: no sound goes on."""
+        self._pause()
 
     def _show(self) -> None:
         now, names = self._commands.now, self._parameters.names
@@ -124,6 +155,12 @@ class Playback:
         at_s = round(min(max(at_s, low), high), 3)
         self._commands.arrange(self._commands.now.timeline.moved(number, at_s), ("key", number))
 
+    def edit(self, take: Take | None) -> None:
+        """Edit a recording; the keys of the timeline for None."""
+        self._pause()
+        self._commands.retake(take)
+        self.position_s, self.range_s, self.selected = 0.0, None, None
+
     def edit_take(self, how: str) -> None:
         """``keep`` or ``cut`` the marked range, or ``smooth`` all. Raises ParameterError: nothing is marked."""
         take = self._commands.now.take
@@ -136,6 +173,33 @@ class Playback:
             raise ParameterError("no range of the recording is marked", hint="drag over it with the right mouse button")
         self._commands.retake((keep if how == "keep" else cut_out)(take, *self.range_s))
         self.range_s, self.position_s = None, 0.0
+
+    def layer(self, above: Take) -> None:
+        """Lay a recording over the one that is edited, from the line on. Raises ParameterError: none is edited."""
+        take = self._commands.now.take
+        if take is None:
+            raise ParameterError("there is no recording to lay another one over", hint="edit the recording first")
+        self._commands.retake(layered(take, above, min(self.position_s, take.duration_s)))
+
+    def hear(self, path: Path | None) -> None:
+        """Play a sound with the timeline, or none. Raises ControllerError: it is none that can be played."""
+        if path is not None:
+            sound_length_s(path)
+        self._commands.arrange(replace(self._commands.now.timeline, sound=path))
+
+    def load(self, path: Path) -> None:
+        """Edit what a file holds: a show that was made here, a take, or the lips of a voice.
+
+        Raises ParameterError: a show that has no keys. ControllerError: the file cannot be read.
+        """
+        if path.suffix == ".toml":
+            timeline = load_timeline(path, self._parameters)
+            if not timeline.keys:
+                raise ParameterError(f"{path}: is a show without keys", hint="load one that was saved here")
+            self._commands.change(replace(self._commands.now, timeline=timeline, take=None))
+        else:
+            self.edit(load_take(path, self._parameters))
+        self.position_s, self.selected, self.range_s = 0.0, None, None
 
     def save(self, folder: Path, name: str, vocabulary: Vocabulary, *, loop: bool) -> Path:
         """Write the recording as a take, or the timeline as a show; returns the file.

@@ -7,12 +7,10 @@ gaze.
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.face.point_editing import PointEditor, Screen
 from controller.panels.session.commands import Commands
@@ -36,7 +34,7 @@ class MouseEditing:
     ) -> None:  # fmt: skip
         self._parameters = parameters or PARAMETERS
         self._newest, self._commands, self._area, self._copy = newest, commands, area, copy
-        self._symmetric, self._pinning, self._name, self._message = False, False, "mine", ""
+        self._symmetric, self._pinning = False, False
         self._grabs, self._pixel = 0, (0.0, 0.0)
         commands.show_moves = self._show_moves
         self.change(head)
@@ -47,6 +45,10 @@ class MouseEditing:
         self._eyes = head.data.eyes.mean(axis=0)
         if self._commands.now.moves is not None:
             self._show_moves(self._commands.now.moves)
+
+    def find_editor(self) -> PointEditor:
+        """What drags the points of the head that is shown now."""
+        return self.editor
 
     def _show_moves(self, moves: Floats | None) -> None:
         fits = moves is not None and moves.shape == self.editor.moves.shape
@@ -127,21 +129,6 @@ class MouseEditing:
             self.editor.unpin()
         if not self.editor.sculpted:
             return
-        imgui.set_next_item_width(imgui.get_font_size() * 8)
-        _, self._name = imgui.input_text("name", self._name)
-        if imgui.button("save group"):
-            self.save(self._name)
-        imgui.same_line()
         if imgui.button("smooth it out"):
             self._commands.move(None)
-        if self._message:
-            imgui.text_wrapped(self._message)
-
-    def save(self, name: str) -> None:
-        """Save the moved control points as a group file in the present folder."""
-        path = Path(f"{name or 'mine'}.json").absolute()
-        try:
-            self.editor.save(path, name or "mine")
-            self._message = f"wrote {path}"
-        except ControllerError as error:
-            self._message = str(error)
+        imgui.text_disabled("save it as a group or corrective: tab Faces")

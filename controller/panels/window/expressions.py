@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
-from controller.base.errors import ControllerError
-from controller.base.parameters import PARAMETERS, Floats, Parameters
-from controller.body.messages import Learn, PanelRequest
 from controller.panels.session.commands import Commands
-from controller.panels.session.own_expressions import save_expression
 from controller.panels.window.colours import LAYERS, packed
 from controller.panels.window.flow import Flow
+from controller.panels.window.saving import Saving
 from controller.vocabulary.affect import Affect
-from controller.vocabulary.expression import Expression
 from controller.vocabulary.vocabulary import Vocabulary
 
 _KINDS = {"emotion": "emotions", "gesture": "gestures", "user": "own"}
@@ -25,20 +19,13 @@ _PAD_LINES = 16.0
 class ExpressionButtons:
     """Draws them.
 
-    vocabulary : of the stage; a saved expression is added. own : the file that expressions are saved to.
-    earlier : the vocabularies before it. parameters : of the stage; those of the base vocabulary without.
-    newest : the newest parameters (P,). send : tells the body of a saved expression.
+    vocabulary : of the stage. saving : saves the present face.
     """
 
-    def __init__(
-        self, vocabulary: Vocabulary, commands: Commands, newest: Callable[[], Floats],
-        send: Callable[[PanelRequest], None], own: Path, earlier: Sequence[Path] = (),
-        parameters: Parameters | None = None,
-    ) -> None:  # fmt: skip
-        self._vocabulary, self._commands, self._newest, self._send = vocabulary, commands, newest, send
-        self._affect, self.own, self._earlier = Affect.load(vocabulary), own, earlier
-        self._parameters = parameters or PARAMETERS
-        self._intensity, self._name, self._message = 1.0, "", ""
+    def __init__(self, vocabulary: Vocabulary, commands: Commands, saving: Saving) -> None:
+        self._vocabulary, self._commands, self._saving = vocabulary, commands, saving
+        self._affect = Affect.load(vocabulary)
+        self._intensity = 1.0
 
     def __call__(self) -> None:
         """Draw; called once a frame."""
@@ -54,10 +41,10 @@ class ExpressionButtons:
             if names:
                 imgui.separator_text(title)
                 self._buttons(imgui, names)
+        imgui.separator_text("the present face")
+        self._saving()
         imgui.separator_text("mood")
         self._pad(imgui)
-        imgui.separator_text("the present face")
-        self._saving(imgui)
 
     def _buttons(self, imgui: Any, names: list[str]) -> None:
         """Buttons of one kind, the shown one in the colour of its layer."""
@@ -109,29 +96,6 @@ class ExpressionButtons:
             dot = imgui.ImVec2(corner.x + half * (1 + valence), corner.y + half * (1 - arousal))
             draw.add_circle_filled(dot, imgui.get_font_size() / 3, packed(imgui, LAYERS["expression"]))
         imgui.text_disabled("right: pleasant, up: excited")
-
-    def _saving(self, imgui: Any) -> None:
-        imgui.set_next_item_width(-imgui.calc_text_size("save expression").x - 2 * imgui.get_font_size())
-        entered, self._name = imgui.input_text_with_hint(
-            "##name", "its name", self._name, imgui.InputTextFlags_.enter_returns_true
-        )
-        imgui.same_line()
-        if imgui.button("save expression") or entered:
-            self.save(self._name)
-        if self._message:
-            imgui.text_wrapped(self._message)
-
-    def save(self, name: str) -> None:
-        """Save the present face as an expression, which every link and this panel then know."""
-        try:
-            face = self._newest().copy()
-            weights = save_expression(self.own, name.strip(), face, self._vocabulary, self._parameters, self._earlier)
-        except ControllerError as error:
-            self._message = f"{error}; {error.hint}" if getattr(error, "hint", "") else str(error)
-            return
-        self._vocabulary.add(Expression(name.strip(), weights))
-        self._send(Learn(name.strip(), tuple(map(float, weights))))
-        self._message = f"wrote {name.strip()} to {self.own}"
 
 
 def _free_height(taken: list[tuple[float, float, float]], x: float, y: float, width: float, height: float) -> float:

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import PARAMETERS
-from controller.body.messages import Details, PanelRequest
+from controller.body.messages import Details, PanelRequest, ToHead
 from controller.body.panel_state import PanelState
 from controller.face.controls import Controls
 from controller.face.devices import Devices
 from controller.face.face import FrameLog, HeadValues, qualities
+from controller.panels.session.commands import History
+from controller.panels.session.next_run import NextRun, carried_to
 from controller.panels.window.editing import MouseEditing
+from controller.panels.window.heads import HeadChoice, HeadSource
 from controller.panels.window.looks import Looks
 from controller.panels.window.overlay_view import OverlayView
 from controller.panels.window.panel import Panel, PanelOptions
@@ -41,11 +45,12 @@ class WindowFace:
     send : sends the panel's requests to the body. panel_state, options : see :class:`Panel`.
     copy : loads the head again, for dragging points with the mouse; without, none can be dragged.
     controls : what gamepad and keys do. stage : whose look can be changed; without, it stays as it is.
-    details : the newest answer of the body to the panel.
+    details : the newest answer of the body to the panel. carried : what was set in the window before this one.
+    heads : of a stage that has several, the first of which is shown first.
 
     Attributes
     ----------
-    next_stage : the file of a stage that was dropped on the window, with which the run goes on.
+    next_run : what the run goes on with: a stage that was dropped on the window, or this one with a saved group.
     """
 
     def __init__(
@@ -53,7 +58,7 @@ class WindowFace:
         head: Head,
         settings: FaceSettings,
         values: HeadValues,
-        send: Callable[[PanelRequest], None],
+        send: Callable[[PanelRequest | ToHead], None],
         panel_state: PanelState | None = None,
         copy: Callable[[], Head] | None = None,
         options: PanelOptions | None = None,
@@ -61,29 +66,43 @@ class WindowFace:
         *,
         stage: Stage | None = None,
         details: Callable[[], Details | None] | None = None,
+        carried: NextRun | None = None,
+        heads: Sequence[HeadSource] = (),
     ) -> None:
+        choice = HeadChoice(heads, values, panel_state, send)
+        ask = choice.send
         self._head, self._settings, self._values = head, settings, values
         self._viewpoint = Viewpoint(framed(settings.make_camera(), head), framing_of(head))
         self._area = PictureArea()
         newest = lambda: values.full  # noqa: E731
         parameters = PARAMETERS if options is None else options.parameters
-        self._panel = Panel(newest, send, panel_state, options, self._viewpoint, self._area, details=details)
-        self.next_stage: Path | None = None
+        self._panel = Panel(newest, ask, panel_state, options, self._viewpoint, self._area, details=details)
+        self._panel.heads = choice
+        if details is not None and panel_state is not None:
+            self._panel.calibrating.mirror = partial(self._mirror, panel_state)
+        self.next_run: NextRun | None = None
         self._overlays: OverlayView | None = None
         self._mouse = None
         if stage is not None and not settings.kiosk:
             looks = Looks(stage, self._swap, self._panel.jobs)
             copy = looks.load
             self._panel.add_looks(looks, self._restart)
-            self._overlays = OverlayView(looks.load, newest, self._area, self._panel.jobs, stage.robots, panel_state)
+            self._panel.saving.reopen = partial(self._open_again, stage, options or PanelOptions())
+            self._overlays = OverlayView(
+                looks.load, newest, self._area, self._panel.jobs, stage.robots, panel_state, parameters
+            )
             self._panel.view.overlays = self._overlays.draw_choice
+            choice.show = partial(self._turn_to, looks)
         if copy is not None and not settings.kiosk:
             self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area, parameters)
             self._panel.more.append(self._mouse.draw_panel)
-        self._devices = Devices(Controls(controls, parameters), send) if controls else None
+            self._panel.saving.editor = self._mouse.find_editor
+        self._devices = Devices(Controls(controls, parameters), ask) if controls else None
         self._log = FrameLog()
         self._ended = False
         self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
+        if carried is not None and (history := carried_to(carried, parameters)) is not None:
+            self._panel.commands.carry_on(history)
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
@@ -99,22 +118,25 @@ class WindowFace:
             return values
 
         kiosk = self._settings.kiosk
-        run_window(
-            self._head,
-            source,
-            size=self._settings.size,
-            title=_TITLE,
-            gui=None if kiosk and self._devices is None else self._gui,
-            keep_going=lambda: keep_going() and not self._ended,
-            camera=self._viewpoint,
-            quality=self._choice or self._settings.still_quality,
-            theme=self._settings.make_theme(),
-            evaluator=self._settings.evaluator,
-            kiosk=kiosk,
-            monitor=self._settings.monitor,
-            docks=() if kiosk else self._panel.docks(),
-            area=self._area,
-        )
+        try:
+            run_window(
+                self._head,
+                source,
+                size=self._settings.size,
+                title=_TITLE,
+                gui=None if kiosk and self._devices is None else self._gui,
+                keep_going=lambda: keep_going() and not self._ended,
+                camera=self._viewpoint,
+                quality=self._choice or self._settings.still_quality,
+                theme=self._settings.make_theme(),
+                evaluator=self._settings.evaluator,
+                kiosk=kiosk,
+                monitor=self._settings.monitor,
+                docks=() if kiosk else self._panel.docks(),
+                area=self._area,
+            )
+        finally:
+            self._panel.playback.close()
 
     def _swap(self, head: Head | None, settings: FaceSettings) -> None:
         """Draw another head, or the same in another look, from the next frame on."""
@@ -142,8 +164,26 @@ class WindowFace:
         if self._overlays is not None:
             self._overlays.forget()
 
+    def _mirror(self, state: PanelState, on: bool) -> None:
+        """Let the face show what the servos show, where they are known to, or what is wanted."""
+        self._values.replaced = state.show_measured if on else None
+
+    def _turn_to(self, looks: Looks, stage: Stage) -> None:
+        """Show another head of the stage."""
+        if self._overlays is not None:
+            self._overlays.robots = stage.robots
+        try:
+            looks.turn_to(stage, self._panel.commands.now.look)
+        except OMOTE_ERRORS as error:
+            self._panel.problems.add(error)
+
     def _restart(self, stage: Path) -> None:
-        self.next_stage, self._ended = stage, True
+        self.next_run, self._ended = NextRun(stage), True
+
+    def _open_again(self, stage: Stage, options: PanelOptions, history: History, held: Mapping[str, float]) -> None:
+        """Open the same stage with the user's vocabulary as it is now, and go on with what was set."""
+        files = tuple(dict.fromkeys(each.resolve() for each in (*options.files, options.own_file)))
+        self.next_run, self._ended = NextRun(stage.path, files, history, options.parameters.names, held), True
 
     def _gui(self) -> None:
         if not self._settings.kiosk:

@@ -10,6 +10,7 @@ HELP = {
     "Space": "play a show, pause it, let it go on",
     "R": "begin or end a recording",
     "P": "write a picture of the face",
+    "C": "begin or end a clip of the face",
     "N": "neutral: give everything back",
     "Esc": "stop: servos off until START",
     "F": "the face alone on the whole screen, and back",

@@ -33,10 +33,24 @@ class Looks:
     """
 
     def __init__(self, stage: Stage, swap: Callable[[Head | None, FaceSettings], None], jobs: Jobs) -> None:
-        self.stage, self._swap, self._jobs = stage, swap, jobs
+        self._swap, self._jobs = swap, jobs
+        self._begin(stage)
+
+    def _begin(self, stage: Stage) -> None:
         face = stage.settings.face
+        self.stage = stage
         self.first = Look(face.theme, face.quality, face.person if isinstance(face.person, str) else "")
         self._shown = self.first
+
+    def turn_to(self, stage: Stage, look: Look | None) -> None:
+        """Show another head of the stage, with a look that was chosen for it."""
+        self._begin(stage)
+        self._load(self._stage(look or self.first), f"loading {stage.head.name}")
+        self._shown = look or self.first
+
+    def _load(self, stage: Stage, title: str) -> None:
+        face = stage.settings.face
+        self._jobs.start(title, lambda _: stage.load_head(), lambda head: self._swap(head, face))
 
     def show(self, look: Look | None) -> None:
         """Show a look; the first one without. What fails is reported, and the face stays."""
@@ -48,8 +62,7 @@ class Looks:
             self._swap(None, stage.settings.face)
             return
         what = look.person or (look.head.name if look.head else "the head")
-        face = stage.settings.face
-        self._jobs.start(f"loading {what}", lambda _: stage.load_head(), lambda head: self._swap(head, face))
+        self._load(stage, f"loading {what}")
 
     def load(self) -> Head:
         """Load the head that is shown again, as it was."""
@@ -60,7 +73,7 @@ class Looks:
         stage = self.stage
         if look.head is not None:
             settings = stage.settings.model_copy(update={"identity": {}})
-            stage = replace(stage, head=look.head, groups=(), settings=settings)
+            stage = replace(stage, head=look.head, groups=(), own_groups={}, settings=settings)
         wanted: dict[str, object] = {"theme": look.theme, "quality": look.quality}
         if look.person != self.first.person or look.head is not None:
             wanted["person"] = look.person

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from controller.base.parameters import PARAMETERS, Floats
+from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.face.face import head_indices
 from controller.face.overlays import KINDS, PART, Kind, Marks, Overlays
 from controller.face.point_editing import Screen
@@ -32,14 +32,16 @@ class OverlayView:
     """Draws the overlays that are switched on; without any nothing is computed.
 
     load : loads a copy of the head, in a job. newest : the newest parameters (P,). state : of what the servos show.
+    parameters : of the stage; those of the base vocabulary without.
     """
 
     def __init__(
         self, load: Callable[[], Head], newest: Callable[[], Floats], area: PictureArea, jobs: Jobs,
-        robots: Sequence[RobotSettings] = (), state: PanelState | None = None,
+        robots: Sequence[RobotSettings] = (), state: PanelState | None = None, parameters: Parameters | None = None,
     ) -> None:  # fmt: skip
+        self._parameters = parameters or PARAMETERS
         self._load, self._newest, self._area, self._jobs = load, newest, area, jobs
-        self._robots, self._state = robots, state
+        self.robots, self._state = robots, state
         self.on: set[Kind] = set()
         self._overlays: Overlays | None = None
         self._order = np.zeros(0, np.intp)
@@ -71,8 +73,8 @@ class OverlayView:
 
     def _make(self) -> Overlays:
         head = self._load()
-        anchors = [place for robot in self._robots for place in anchor_places(robot, head, PART)]
-        self._order = head_indices(PARAMETERS, head.parameters)
+        anchors = [place for robot in self.robots for place in anchor_places(robot, head, PART)]
+        self._order = head_indices(self._parameters, head.parameters)
         return Overlays(head, anchors)
 
     def _take(self, overlays: Overlays) -> None:

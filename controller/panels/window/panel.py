@@ -18,17 +18,22 @@ from controller.panels.session.jobs import Jobs
 from controller.panels.session.look import Look
 from controller.panels.session.playback import Playback
 from controller.panels.session.problems import Problems
+from controller.panels.session.servo_captures import ServoCaptures
+from controller.panels.window.calibrating import Calibrating
 from controller.panels.window.colours import GREEN, RED
 from controller.panels.window.drops import Drops
 from controller.panels.window.expressions import ExpressionButtons
+from controller.panels.window.heads import HeadChoice
 from controller.panels.window.keys import Keys
 from controller.panels.window.link_list import LinkList
 from controller.panels.window.looks import LookControls, Looks
 from controller.panels.window.notices import draw_jobs, draw_problems
+from controller.panels.window.saving import Saving, Words
 from controller.panels.window.servos import ServoBars
 from controller.panels.window.sliders import Sliders
 from controller.panels.window.timeline_panel import TimelinePanel
 from controller.panels.window.view import View
+from controller.robot.settings import RobotSettings
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.view.docks import Dock, PictureArea
 from surface.view.fullscreen import FullScreen
@@ -44,7 +49,7 @@ class PanelOptions:
 
     vocabulary : its expressions. files : the vocabularies it names; saved expressions go into the last one, or into
     ``mine.toml`` in ``folder``. shows : names of its shows. life : its amount of idle motion.
-    folder : for all that is saved. parameters : those of the stage.
+    folder : for all that is saved. parameters : those of the stage. robots : those of the stage.
     """
 
     vocabulary: Vocabulary = field(default_factory=lambda: Vocabulary.load(PARAMETERS))
@@ -53,6 +58,12 @@ class PanelOptions:
     life: float = 0.0
     folder: Path = field(default_factory=Path.cwd)
     parameters: Parameters = field(default_factory=lambda: PARAMETERS)
+    robots: Sequence[RobotSettings] = ()
+
+    @property
+    def own_file(self) -> Path:
+        """The vocabulary that everything is saved to."""
+        return self.files[-1] if self.files else self.folder / _OWN
 
 
 class Panel:
@@ -61,6 +72,10 @@ class Panel:
     newest : the newest parameters (P,). send : sends requests to the body.
     state : without it, neither the layer that holds a parameter nor what the servos show of it is drawn.
     details : the newest answer of the body about servos and links; without it neither is shown.
+
+    Attributes
+    ----------
+    heads : the choice between several heads; None for one.
     """
 
     def __init__(
@@ -75,26 +90,28 @@ class Panel:
         self.jobs, self.full_screen = Jobs(self.problems), FullScreen()
         self.feed = Feed(send, details, self.problems) if details is not None else None
         self.commands = Commands(send, options.life)
-        self.capture = Capture(self.area, newest, options.folder, parameters=options.parameters)
-        own = options.files[-1] if options.files else options.folder / _OWN
+        self.capture = Capture(self.area, newest, options.folder, parameters=options.parameters, jobs=self.jobs)
+        own = options.own_file
         self.sliders = Sliders(newest, self.commands, state, options.parameters)
-        self.expressions = ExpressionButtons(
-            options.vocabulary, self.commands, newest, send, own, tuple(options.files[:-1]), options.parameters
-        )
+        words = Words(options.vocabulary, own, tuple(options.files[:-1]), options.parameters)
+        self.saving = Saving(words, self.commands, newest, send)
+        self.expressions = ExpressionButtons(options.vocabulary, self.commands, self.saving)
         self.view = View(self.commands, viewpoint or Viewpoint(), self.capture, options.shows, send)
         self.playback = Playback(self.commands, newest, send, parameters=options.parameters)
         self.timeline = TimelinePanel(
             self.playback, self.commands, self.capture, options.vocabulary, self.problems, options.folder
         )
         if self.feed is not None:
-            self.servos, self.links = ServoBars(self.feed), LinkList(self.feed)
+            self.calibrating = Calibrating(ServoCaptures(options.robots, options.folder), send, self.problems)
+            self.servos, self.links = ServoBars(self.feed, self.calibrating), LinkList(self.feed)
         self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
         self.more: list[Callable[[], None]] = []
+        self.heads: HeadChoice | None = None
 
     def docks(self) -> list[Dock]:
         """The parts, as tabs beside the picture."""
         parts: dict[str, Callable[[], None]] = {
-            "Expressions": self.expressions,
+            "Faces": self.expressions,
             "Sliders": self._sliders,
             "View": self.view,
             "Timeline": self.timeline,
@@ -142,10 +159,17 @@ class Panel:
             "space": self.view.toggle_show,
             "r": self.capture.toggle,
             "p": self.capture.take_picture,
-            "n": self.commands.neutral,
+            "c": self.capture.toggle_clip,
+            "n": self._neutral,
             "escape": self._stop,
             "f": self._toggle_bare,
         }
+
+    def _neutral(self) -> None:
+        """Give everything back, servos that were turned by hand too."""
+        self.commands.neutral()
+        if self.feed is not None:
+            self.calibrating.forget()
 
     def _stop(self) -> None:
         self._send(StopServos())
@@ -175,6 +199,8 @@ class Panel:
             from imgui_bundle import imgui  # optional
 
             self._stop_or_start(imgui)
+            if self.heads is not None:
+                self.heads.draw(self.commands)
             self._top(imgui)
             draw_problems(imgui, self.problems)
             draw_jobs(imgui, self.jobs)
@@ -203,7 +229,7 @@ class Panel:
     def _top(self, imgui: Any) -> None:
         commands = self.commands
         actions = {"undo": (commands.undo, commands.undoable), "redo": (commands.redo, commands.redoable),
-                   "neutral": (commands.neutral, True)}  # fmt: skip
+                   "neutral": (self._neutral, True)}  # fmt: skip
         for name, (action, possible) in actions.items():
             imgui.begin_disabled(not possible)
             if imgui.button(f"{name}##top"):

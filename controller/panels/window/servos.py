@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,10 +16,13 @@ _HOT_C = 60.0
 
 
 class ServoBars:
-    """Draws them; ``feed`` : what the body tells of them."""
+    """Draws them.
 
-    def __init__(self, feed: Feed) -> None:
-        self._feed = feed
+    feed : what the body tells of them. below : draws more about the servos that were clicked.
+    """
+
+    def __init__(self, feed: Feed, below: Callable[[list[Mapping[str, Any]]], None] = lambda servos: None) -> None:
+        self._feed, self._below = feed, below
         self.plotted: list[str] = []
 
     def __call__(self) -> None:
@@ -39,7 +42,8 @@ class ServoBars:
             for servo in details.servos:
                 self._row(imgui, servo)
             imgui.end_table()
-        imgui.text_wrapped("bar: limits; mark: wanted; line: measured. Click one to plot it.")
+        imgui.text_wrapped("bar: limits; mark: wanted; line: measured. Click one to plot and to calibrate it.")
+        self._below([servo for servo in details.servos if servo_key(servo) in self.plotted])
 
     def _columns(self, imgui: Any, names: list[str]) -> None:
         fixed, height = imgui.TableColumnFlags_.width_fixed, imgui.get_font_size()

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from controller.base.errors import OMOTE_ERRORS
+from controller.base.errors import OMOTE_ERRORS, ParameterError
 from controller.panels.session.capture import Capture
 from controller.panels.session.commands import Commands
 from controller.panels.session.playback import Playback
@@ -17,7 +17,9 @@ from controller.panels.window.flow import Flow
 from controller.takes.timeline import EASES
 from controller.vocabulary.vocabulary import Vocabulary
 
+_LOADED = (".toml", ".csv", ".wav")
 _TRACK_LINES, _NEAR = 3.2, 0.45
+_KEY_LINES = 0.35  # half the width of a key
 _TICK_LINES = 3.0  # least distance of two ticks, in heights of a line
 
 
@@ -34,6 +36,7 @@ class TimelinePanel:
         self.playback, self._commands, self._capture = playback, commands, capture
         self._vocabulary, self._problems, self._folder = vocabulary, problems, folder
         self._name, self._mark, self._ease, self._loop, self._message = "my_show", "", 1, False, ""
+        self._sound = ""
         self._dragged: int | None = None
 
     def __call__(self) -> None:
@@ -57,7 +60,7 @@ class TimelinePanel:
     def _controls(self, imgui: Any) -> None:
         playback = self.playback
         if imgui.button("stop##timeline" if playback.playing else "play##timeline"):
-            playback.toggle()
+            self._try(playback.toggle)
         imgui.same_line()
         if imgui.button("give back##timeline"):
             playback.stop()
@@ -69,8 +72,9 @@ class TimelinePanel:
         width, height = max(imgui.get_content_region_avail().x, line), line * _TRACK_LINES
         both = imgui.ButtonFlags_.mouse_button_left | imgui.ButtonFlags_.mouse_button_right
         imgui.invisible_button("track", imgui.ImVec2(width, height), both)
-        scale = width / self.playback.shown_s
-        self._mouse(imgui, corner.x, scale, line)
+        inset = line * _KEY_LINES  # so that a key at 0 is seen whole
+        scale = (width - 2.0 * inset) / self.playback.shown_s
+        self._mouse(imgui, corner.x + inset, scale, line)
         self._draw_track(imgui, corner, width, height, scale)
 
     def _mouse(self, imgui: Any, left: float, scale: float, line: float) -> None:
@@ -100,6 +104,7 @@ class TimelinePanel:
         draw, line, now = imgui.get_window_draw_list(), imgui.get_font_size(), self._commands.now
         grey, vec = packed(imgui, GREY), imgui.ImVec2
         draw.add_rect_filled(corner, vec(corner.x + width, corner.y + height), packed(imgui, GREY, 0.15), 3.0)
+        corner = vec(corner.x + line * _KEY_LINES, corner.y)
         step_s = tick_s(self.playback.shown_s * _TICK_LINES * line / width)
         for i in range(int(self.playback.shown_s / step_s) + 1):
             x = corner.x + scale * i * step_s
@@ -119,7 +124,7 @@ class TimelinePanel:
 
     def _draw_keys(self, imgui: Any, corner: Any, scale: float) -> None:
         draw, line, vec = imgui.get_window_draw_list(), imgui.get_font_size(), imgui.ImVec2
-        y, half = corner.y + line * 1.7, line * 0.35
+        y, half = corner.y + line * 1.7, line * _KEY_LINES
         for i, key in enumerate(self._commands.now.timeline.keys):
             x = corner.x + scale * key.at_s
             colour = packed(imgui, AMBER if i == self.playback.selected else LAYERS["expression"])
@@ -141,7 +146,7 @@ class TimelinePanel:
         if playback.selected is not None and flow.button("delete key"):
             playback.delete_key()
         if self._capture.last is not None and flow.button("edit the recording"):
-            self._commands.retake(self._capture.last)
+            playback.edit(self._capture.last)
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         changed, self._ease = imgui.combo("easing", self._ease, list(EASES))
         if changed and playback.selected is not None:
@@ -158,8 +163,11 @@ class TimelinePanel:
         for label, how in {"keep range": "keep", "cut range out": "cut", "smooth": "smooth"}.items():
             if flow.button(label):
                 self._try(lambda how=how: self.playback.edit_take(how))  # type: ignore[misc]
+        above = self._capture.last
+        if above is not None and flow.button("lay the last recording over it"):
+            self._try(lambda: self.playback.layer(above))
         if flow.button("back to the keys"):
-            self._commands.retake(None)
+            self.playback.edit(None)
         imgui.text_disabled("drag with the right button: mark a range")
 
     def _saving(self, imgui: Any) -> None:
@@ -169,11 +177,37 @@ class TimelinePanel:
         imgui.same_line()
         if imgui.button("save take" if is_take else "save show"):
             self._try(self.save)
+        imgui.same_line()
+        if imgui.button("load"):
+            self._try(self.load)
         if not is_take:
-            imgui.same_line()
             _, self._loop = imgui.checkbox("loop", self._loop)
+            self._hearing(imgui)
         if self._message:
             imgui.text_wrapped(self._message)
+
+    def _hearing(self, imgui: Any) -> None:
+        """The sound that plays with the timeline."""
+        sound = self._commands.now.timeline.sound
+        if sound is not None:
+            imgui.text_wrapped(f"sound: {sound.name}")
+            if imgui.button("no sound"):
+                self._try(lambda: self.playback.hear(None))
+            return
+        imgui.set_next_item_width(imgui.get_font_size() * 9)
+        _, self._sound = imgui.input_text_with_hint("##sound", "sound, as hello.wav", self._sound)
+        imgui.same_line()
+        if imgui.button("play with it"):
+            self._try(lambda: self.playback.hear(self._folder / self._sound.strip()))
+
+    def load(self) -> None:
+        """Edit the show or take of the name. Raises ParameterError, ControllerError: there is none, or it is wrong."""
+        path = self._folder / self._name.strip()
+        found = next((each for suffix in ("", *_LOADED) if (each := Path(f"{path}{suffix}")).is_file()), None)
+        if found is None:
+            raise ParameterError(f"{path}: no show or take of this name", hint=f"NAME with {', '.join(_LOADED)}")
+        self.playback.load(found)
+        self._message = f"loaded {found}"
 
     def save(self) -> None:
         """Write the show or take. Raises ParameterError, ControllerError: it cannot be written."""

@@ -94,13 +94,15 @@ class View:
 
     def _captures(self, imgui: Any) -> None:
         capture = self._capture
-        if imgui.button("screenshot"):
+        flow = Flow(imgui)
+        if flow.button("screenshot"):
             capture.take_picture()
-        imgui.same_line()
-        if imgui.button("end recording" if capture.recording else "record"):
+        if flow.button("end recording" if capture.recording else "record"):
             capture.toggle()
-        if capture.recording:
-            imgui.same_line()
-            imgui.text_colored(imgui.ImVec4(*RED_DOT), f"recording {capture.seconds:.0f} s")
+        if flow.button("end clip" if capture.filming else "clip"):
+            capture.toggle_clip()
+        if capture.recording or capture.filming:
+            doing = f"recording {capture.seconds:.0f} s" if capture.recording else "filming"
+            imgui.text_colored(imgui.ImVec4(*RED_DOT), doing)
         if capture.message:
             imgui.text_wrapped(capture.message)

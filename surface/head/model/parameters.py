@@ -51,6 +51,7 @@ class Pose:
     head : (3,) yaw, pitch, roll in rad; gaze : (2, 2) rad, left and right eye, yaw and pitch.
     lip : (k, 3) samples of the lower lip where the contact left them, mm, for the tongue, which lies on them.
     lag : (3,) yaw, pitch and roll, rad, by which hair lies ahead of the head (:mod:`surface.head.model.sway`).
+    own : (g,) amounts of a user's own groups.
     pushes : corrections at contacts by their names, mm, from :class:`surface.head.posing.contact.ContactSolver`; the
         part with the opening sets them for parts after it.
     found : what was computed of this pose for one part and serves others, by what it is.
@@ -64,6 +65,7 @@ class Pose:
     pushes: dict[str, Floats] = field(default_factory=dict)
     lip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     lag: Floats = field(default_factory=lambda: np.zeros(3))
+    own: Floats = field(default_factory=lambda: np.zeros(0))
     found: dict[tuple[object, ...], tuple[Floats, ...]] = field(default_factory=dict, init=False, compare=False)
 
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.deform.deformation import Deformation
 from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.own_groups import OwnMoves
 from surface.head.model.parameters import Pose, rotation
 from surface.head.posing.head import Head
 from surface.head.posing.kernels import move_rigid, stitch_border
@@ -114,6 +115,7 @@ class JoinedRig(SkinRig):
         ends = np.cumsum([0, *(len(part.rig.rest) for part in parts)]).tolist()
         self.rows = {part.name: slice(a, b) for part, a, b in zip(parts, ends, ends[1:], strict=False)}
         self._rigs = [(part.rig, self.rows[part.name]) for part in parts]
+        self.own = [OwnMoves(own.index, own.ids + rows.start, own.moves) for rig, rows in self._rigs for own in rig.own]
         self._seen: list[int] = []
 
     def apply(self, pose: Pose, moved: Floats | None = None) -> Floats:

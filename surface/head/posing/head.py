@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from surface.head.model.file import load_data
 from surface.head.model.identity import load_identities, with_identities
 from surface.head.model.look import Look, with_age
 from surface.head.model.meshes import make_surface, tessellate, unpack
+from surface.head.model.own_groups import OwnAmounts, OwnGroup, OwnMoves
 from surface.head.model.parameters import NAMES, SHAPES, Pose, read_pose, rotation
 from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
@@ -49,6 +50,7 @@ class Head:
         for stitch in self._stitches:
             stitch.close()
         self.sway = Sway()
+        self._own = OwnAmounts(())
         self._at = {name: i for i, name in enumerate(self.parameters)}
         self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
 
@@ -121,6 +123,24 @@ class Head:
             raise KeyError(f"no group {name!r}; there are {', '.join(self.groups)}")
         return found
 
+    def add_groups(self, groups: Sequence[OwnGroup]) -> None:
+        """Let parameters of a user's own, which follow the others in :attr:`parameters`, move control points.
+
+        Whoever draws the head begins afterwards; groups that were added before are replaced.
+
+        Raises ValueError: a group names no parameter. KeyError: no such part, or one that is rigid.
+        """
+        amounts = OwnAmounts(groups)
+        rigs = {part.name: part.rig for part in self.parts if isinstance(part, SkinPart)}
+        own: dict[str, list[OwnMoves]] = {name: [] for name in rigs}
+        for i, group in enumerate(groups):
+            own[group.part].append(OwnMoves(i, group.ids, group.moves))
+        for name, rig in rigs.items():
+            rig.own = own[name]
+            rig.invalidate()
+        self._own, self.parameters = amounts, amounts.names
+        self._at = {name: i for i, name in enumerate(self.parameters)}
+
     def values(self, given: Mapping[str, float]) -> Floats:
         """A parameter vector (P,) from names and values, 0 elsewhere; KeyError for an unknown name."""
         out = np.zeros(len(self.parameters))
@@ -142,7 +162,11 @@ class Head:
 
     def read_pose(self, values: Floats) -> Pose:
         """Parameter values (P,) as a pose, with what sways where it is now; errors as :meth:`pose`."""
-        pose = read_pose(values)
+        given = np.asarray(values, float)
+        if given.shape != (len(self.parameters),):
+            raise ValueError(f"values has shape {given.shape}, expected ({len(self.parameters)},)")
+        pose = read_pose(given[: len(NAMES)])
+        pose.own = self._own(given)
         pose.lag = self.sway.lag
         return pose
 

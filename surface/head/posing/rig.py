@@ -9,6 +9,7 @@ import numpy as np
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.head.model.data import Group, HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
+from surface.head.model.own_groups import OwnMoves
 from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers, SealDriver
 from surface.head.model.sway import SWAYS
@@ -88,6 +89,7 @@ class SkinRig:
     Attributes
     ----------
     rest : (n, 3) float64, control points at rest; whoever changes them calls :meth:`invalidate`.
+    own : what groups of a user move of it; set before the first pose.
     points : (n, 3) float64, control points of the last pose; the same array for every pose.
     version : grows whenever ``points`` is computed; invalidations : grows with every :meth:`invalidate`.
     """
@@ -113,13 +115,17 @@ class SkinRig:
         self._amounts = np.zeros(len(self._moves.used))
         self._last_key: tuple[object, ...] = ()
         self._pushes: dict[str, Floats] = {}
+        self.own: Sequence[OwnMoves] = ()
         self.points = np.zeros_like(self.rest)
         self.version = self.invalidations = 0
 
     def move_all(self, poses: Sequence[Pose]) -> Floats:
         """(h, n, 3) control points as groups alone move them in each of the poses: what :meth:`apply` takes."""
         amounts = np.array([self._drivers.amounts(pose.shapes)[self._moves.used] for pose in poses])
-        return self._moves.add_all(amounts.reshape(len(poses), -1), self.rest)
+        moved = self._moves.add_all(amounts.reshape(len(poses), -1), self.rest)
+        for pose, points in zip(poses, moved, strict=True):
+            self._add_own(pose, points)
+        return moved
 
     def apply(self, pose: Pose, moved: Floats | None = None) -> Floats:
         """Positions (n, 3) of all control points before the head turns, overwritten by the next call; corrections at
@@ -167,13 +173,21 @@ class SkinRig:
         rests = self._rest is not None and self._rest.share(pose) > 0.0
         rest = (pose.lip.tobytes(), motion_key("jaw", self._head, pose)) if rests else ()
         lag = pose.lag.tobytes() if len(self._sways.used) else b""
-        return self._amounts.tobytes(), *rest, jaw, gaze, lag, *seals, *pushes
+        own = pose.own.tobytes() if self.own else b""
+        return self._amounts.tobytes(), *rest, jaw, gaze, lag, own, *seals, *pushes
+
+    def _add_own(self, pose: Pose, points: Floats) -> None:
+        """Add what a user's groups move to ``points`` (n, 3)."""
+        for own in self.own:
+            if pose.own[own.index]:
+                points[own.ids] += pose.own[own.index] * own.moves
 
     def _evaluate(self, pose: Pose, moved: Floats | None) -> None:
         """Groups, jaw, lids and contacts, one after the other."""
         np.copyto(self.points, self.rest if moved is None else moved)
         if moved is None:
             self._moves.add(self._amounts, self.points)
+            self._add_own(pose, self.points)
         if len(self._sways.used) and pose.lag.any():
             self._sways.add(pose.lag[self._sways.used], self.points)
         if pose.jaw > 0 and self._swings:

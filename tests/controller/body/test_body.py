@@ -175,6 +175,40 @@ def test_requests_of_the_panel_reach_the_layers(tmp_path: Path, pipe: tuple[Conn
         assert not _handle(body, end)  # main is gone
 
 
+def test_a_servo_turned_in_the_panel_leaves_the_face_alone_keeps_its_limits_and_is_given_back(
+    tmp_path: Path, pipe: tuple[Connection, Connection]
+) -> None:
+    ours, theirs = pipe
+    with running(stage_of(tmp_path, 'robots = ["head24"]\n')) as (body, mailbox):
+        (loop,) = body.buses
+        name, other = loop.table.names[:2]
+        rest, still = np.degrees(loop.goals_rad)[:2]
+        high = float(np.degrees(loop.table.high_rad[0]))
+
+        def ask(request: object) -> None:
+            ours.send(request)
+            assert _handle(body, theirs)
+
+        def measured() -> np.ndarray:
+            state = loop.measured()
+            assert state is not None
+            return np.degrees(state.position_rad)
+
+        ask(messages.Begin())
+        ask(messages.Jog("head", name, 999.0))
+        until(lambda: abs(measured()[0] - high) < 1.0)
+        assert abs(measured()[1] - still) < 0.5 and abs(high - rest) > 2.0
+        assert not published(mailbox).any()
+        ask(messages.Jog("head", name, None))
+        until(lambda: abs(measured()[0] - rest) < 1.0)
+        ask(messages.Jog("head", other, 999.0))
+        until(lambda: abs(measured()[1] - still) > 2.0)
+        ask(messages.Neutral(0.1))
+        until(lambda: abs(measured()[1] - still) < 1.0)
+        ask(messages.Jog("head", "nobody", 1.0))
+        ask(messages.Jog("elsewhere", name, 1.0))
+
+
 def test_the_panel_is_told_of_servos_links_and_warnings_and_plays_a_take(
     tmp_path: Path, pipe: tuple[Connection, Connection]
 ) -> None:

@@ -15,6 +15,9 @@ from controller.body.sources import Voice
 from controller.cli.app import make_app
 from controller.cli.console import console
 from controller.cli.run import _link, report_rows
+from controller.panels.session.commands import History, Settings
+from controller.panels.session.next_run import NextRun
+from controller.stage.last import remember
 
 SPREAD = {"mean": 1.0, "p50": 1.0, "p95": 2.0, "p99": 3.25, "max": 4.0}
 FACE = {
@@ -178,17 +181,17 @@ class Session:
 
     def __init__(
         self, stage: str, options: RunOptions, identity: Any, look: Any, status: Any, preloaded: Any = None,
-        web: Any = None,
+        web: Any = None, carried: Any = None,
     ) -> None:  # fmt: skip
-        self.web = web
+        self.web, self.carried = web, carried
         self.given = {"stage": stage, "options": options, "identity": identity, "look": look}
         self.how: tuple[Any, ...] = ()
-        self.next_stage = Session.dropped.pop() if Session.dropped else None
+        self.next_run = Session.dropped.pop() if Session.dropped else None
         Session.last = self
         status("starting")
 
     last: Session
-    dropped: ClassVar[list[Path]] = []
+    dropped: ClassVar[list[NextRun]] = []
 
     def _run(self, *how: Any) -> dict[str, Any]:
         self.how = how
@@ -224,10 +227,40 @@ LOOK = dict.fromkeys(("kiosk", "monitor", "quality", "fps", "theme", "camera", "
 
 
 def test_a_stage_that_is_dropped_on_the_window_goes_on(display: dict[str, bool]) -> None:
-    Session.dropped.append(Path("next.toml"))
+    Session.dropped.append(NextRun(Path("next.toml")))
     session = noted("run", "mine", "--theme", "mask")
     assert session.given["stage"] == "next.toml" and session.given["look"]["theme"] == "mask"
     assert session.how == ("window", None) and session.given["options"] == RunOptions()
+
+
+def test_a_run_without_a_stage_opens_the_last_one_of_a_window(
+    display: dict[str, bool], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("OMOTE_STATE", str(tmp_path))
+    result = omote("run")
+    assert result.exit_code == 1 and "none was shown in a window" in str(result.exception)
+    assert noted("edit").given["stage"] == "demo" and Session.last.given["options"] == RunOptions(at_rest=True)
+    stage, mine = tmp_path / "a.toml", tmp_path / "mine.toml"
+    stage.touch()
+    mine.touch()
+    remember(stage, (mine,))
+    for command, at_rest in (("run", False), ("edit", True)):
+        session = noted(command)
+        assert session.given["stage"] == str(stage)
+        assert session.given["options"] == RunOptions(vocabularies=(mine,), at_rest=at_rest)
+    assert noted("run", "other", "--vocabulary", str(mine)).given["options"] == RunOptions(vocabularies=(mine,))
+    display["there"] = False
+    result = omote("edit")
+    assert result.exit_code == 1 and "needs a display" in str(result.exception)
+
+
+def test_a_window_that_saved_a_group_opens_again_with_it(display: dict[str, bool]) -> None:
+    carried = History(Settings(held={3: 0.5}))
+    then = NextRun(Path("mine.toml"), (Path("own.toml"),), carried)
+    Session.dropped.append(then)
+    session = noted("edit", "mine", "--identity", "broad=0.5")
+    assert session.given["options"] == RunOptions(vocabularies=(Path("own.toml"),), at_rest=True)
+    assert session.given["identity"] == {"broad": 0.5} and session.carried is then
 
 
 def test_a_run_without_options_opens_a_window_where_there_is_a_display(display: dict[str, bool]) -> None:

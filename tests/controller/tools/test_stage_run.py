@@ -19,6 +19,7 @@ from controller.base.errors import ConfigError, ControllerError, TakeError
 from controller.body.messages import RunOptions
 from controller.body.sources import Voice
 from controller.cli.app import make_app
+from controller.panels.session.next_run import NextRun
 from controller.tools import stage_run as module
 from controller.tools.stage_run import REPORT_FORMAT, StageRun, has_display, write_report
 
@@ -201,7 +202,7 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
     given: list[Any] = []
 
     class Window:
-        next_stage = Path("next.toml")
+        next_run = NextRun(Path("next.toml"))
 
         def __init__(self, *words: Any, **more: Any) -> None:
             given.extend([*words, more])
@@ -224,7 +225,7 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
     report = session.run_window(None)
     head, settings, values, send, panel_state, copy, options, controls, more = given
     assert more["stage"] is session.stage and more["details"]() is body.details
-    assert session.next_stage == Path("next.toml")
+    assert session.next_run == NextRun(Path("next.toml"))
     assert controls == session.stage.controls
     assert options.vocabulary is session.stage.vocabulary and "tour" in options.shows
     assert settings is session.stage.settings.face and (send, panel_state) == (body.send, body.panel_state)

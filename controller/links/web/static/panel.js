@@ -33,6 +33,7 @@ $("stop").addEventListener("click", stop);
 $("start").addEventListener("click", () => { robot.stopping = false; robot.act({ type: "start" }); });
 $("neutral").addEventListener("click", () => { mood.place(0, 0); robot.act({ type: "neutral" }); });
 $("release").addEventListener("click", () => robot.act({ type: "release" }));
+$("head").addEventListener("change", () => robot.turnTo($("head").value));
 $("search").addEventListener("input", () => sliders.search($("search").value));
 $("gaze-off").addEventListener("click", () => robot.act({ type: "gaze_off" }));
 $("intensity").addEventListener("input", () => { $("intensity-value").textContent = percent($("intensity").value); if (shown) express(shown); });
@@ -52,6 +53,10 @@ function pressed(name) {
 }
 
 robot.on("hello", async (welcome) => {
+  const heads = welcome.heads ?? [];
+  $("heads").hidden = heads.length < 2;
+  $("head").replaceChildren(...heads.map((name) => make("option", { value: name, text: name })));
+  $("head").value = robot.head || heads[0] || "";
   sliders.build(welcome.parameters);
   sliders.search($("search").value);
   $("expressions").replaceChildren(...welcome.expressions.map((name) => make("button", { type: "button", "data-name": name, "aria-pressed": "false", text: words(name), onclick: () => { pressed(name); express(name); } })));

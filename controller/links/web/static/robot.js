@@ -1,4 +1,5 @@
 // Talks to omote over the WebSocket API: connects again by itself, and says when it does not hear the robot.
+const EVERYBODY = new Set(["hello", "list", "stop", "start"]);  // these are for all heads of a stage
 const SILENCE_MS = 2500, CHECK_MS = 250, PAUSES_MS = [300, 600, 1200, 2500, 5000];
 
 export function token() {
@@ -17,6 +18,7 @@ export class Robot extends EventTarget {
     super();
     this.secret = secret;
     this.names = [];
+    this.head = "";
     this.connect();
     this.checked = performance.now();
     setInterval(() => this.#watch(), CHECK_MS);
@@ -36,9 +38,25 @@ export class Robot extends EventTarget {
     if (this.stopping) this.stop();
     const welcome = await this.ask({ type: "hello", version: 1 });
     this.names = Object.keys(welcome.parameters);
+    if (!(welcome.heads ?? []).includes(this.head)) this.head = "";
     this.emit("hello", welcome);
+    this.#listen();
+  }
+
+  #listen() {
     this.send({ type: "subscribe", rate_hz: 60, form: "numbers" });
     this.send({ type: "watch", rate_hz: 5 });
+  }
+
+  // From now on what is sent is for a head of this name, and what is heard is of it.
+  turnTo(head) {
+    this.head = head;
+    this.#listen();
+  }
+
+  #addressed(message) {
+    if (!this.head || EVERYBODY.has(message.type)) return message;
+    return message.type === "show" ? { head: this.head, ...message } : { to: this.head, ...message };
   }
 
   #take(message) {
@@ -75,7 +93,7 @@ export class Robot extends EventTarget {
 
   send(message) {
     if (this.#socket?.readyState !== WebSocket.OPEN) return false;
-    this.#socket.send(JSON.stringify(message));
+    this.#socket.send(JSON.stringify(this.#addressed(message)));
     return true;
   }
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from PIL import Image
 
 from controller.base.parameters import PARAMETERS
 from controller.panels.session.capture import LONGEST_S, Capture
@@ -82,3 +83,32 @@ def test_a_folder_that_is_a_file_is_a_message(tmp_path: Path) -> None:
     bench.frame(0.1, 0.3)
     bench.capture.toggle()
     assert "gone" in bench.capture.message and not bench.capture.message.startswith("wrote")
+
+
+def test_a_clip_has_the_pictures_of_its_time_at_the_rate_they_came(bench: Bench, tmp_path: Path) -> None:
+    jobs = bench.capture._jobs
+    bench.capture.toggle_clip()
+    for grey in range(40):
+        bench.frame(0.05, 0.0)
+        if bench.area.wanted is not None:
+            take, bench.area.wanted = bench.area.wanted, None
+            take(np.full((96, 128, 3), 6 * grey, np.uint8))
+    assert bench.capture.filming
+    bench.capture.toggle_clip()
+    assert not bench.capture.filming
+    jobs.running[0].join(60.0)
+    jobs()
+    path = tmp_path / "clip1.webp"
+    with Image.open(path) as clip:
+        frames = getattr(clip, "n_frames", 1)
+        clip.seek(frames - 1)
+        clip.load()
+        assert clip.size == (128, 96) and 15 <= frames <= 27
+        assert abs(frames * clip.info["duration"] / 1000.0 - 2.0) < 0.3
+    assert bench.capture.message == f"wrote {path}, {frames} pictures"
+
+
+def test_a_clip_without_pictures_says_so(bench: Bench, tmp_path: Path) -> None:
+    bench.capture.toggle_clip()
+    bench.capture.toggle_clip()
+    assert "two pictures" in bench.capture.message and not list(tmp_path.iterdir())

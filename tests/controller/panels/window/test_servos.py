@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from controller.base.parameters import PARAMETERS
-from controller.body.messages import AskDetails, Details, StopServos
+from controller.base.paths import find_config
+from controller.body.messages import AskDetails, Details, Jog, StopServos
 from controller.panels.window.link_list import figures, state_of
-from controller.panels.window.panel import Panel
+from controller.panels.window.panel import Panel, PanelOptions
 from controller.panels.window.servos import share, tooltip
+from controller.robot.robot import load_robot
 from tests.controller.panels.window.screen import Places, Screen, drawn
 
 SERVO = {
@@ -45,6 +48,36 @@ def test_servos_are_bars_that_are_plotted_when_clicked(screen: Screen, monkeypat
     screen.click(draw, *places.at["jawOpen##head/3 jawOpen"])
     assert panel.servos.plotted == []
     assert "does not answer" in places.texts and "64 C" in places.texts and "   9.0 deg" in places.texts
+
+
+def test_a_servo_is_turned_by_hand_captured_and_given_back(
+    screen: Screen, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    places, sent, mirrored = Places(screen.imgui, monkeypatch), [], []
+    details = Details([SERVO], [], [])
+    robot = load_robot(find_config("robots", "head24"), PARAMETERS)
+    servo = {**SERVO, "name": robot.channels[0].name}
+    details = Details([servo], [], [])
+    options = PanelOptions(folder=tmp_path, robots=[robot])
+    panel = Panel(PARAMETERS.neutral, sent.append, options=options, details=lambda: details)
+    panel.calibrating.mirror = mirrored.append
+    key = f"head/3 {servo['name']}"
+    panel.servos.toggle(key)
+    draw = drawn(panel, "Servos")
+    for _ in range(3):
+        screen.frame(draw)
+    screen.click(draw, *places.at[f"jog##{key}"])  # a quarter of its way
+    jogs = [each for each in sent if isinstance(each, Jog)]
+    assert jogs[-1].bus == "head" and jogs[-1].servo == servo["name"] and -5.0 < jogs[-1].angle_deg < 10.0
+    screen.frame(draw)
+    screen.click(draw, *places.at[f"neutral###neutral{key}"])
+    assert panel.calibrating._captures.of(servo).neutral == 9.0
+    screen.click(draw, *places.at[f"give back##{key}"])
+    assert sent[-1] == Jog("head", servo["name"], None) or Jog("head", servo["name"], None) in sent
+    screen.click(draw, *places.at["the face mirrors the servos"])
+    assert mirrored == [True]
+    screen.click(draw, *places.at["save calibration"])
+    assert "capture all three" in panel.problems.unread[-1].text
 
 
 def test_a_bar_shows_where_an_angle_is_between_the_limits() -> None:

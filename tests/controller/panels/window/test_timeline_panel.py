@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import sys
+import tempfile
+import time
+import wave
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from controller.base.errors import ControllerError, ParameterError
 from controller.base.parameters import PARAMETERS
 from controller.body.messages import HoldAll, Show
+from controller.links.line.script import load_script
 from controller.panels.session.playback import Playback
+from controller.panels.session.sound import SoundPlayer
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.panels.window.timeline_panel import tick_s
 from controller.takes.livelink import Take
-from controller.takes.plain import plain_take
-from controller.takes.timeline import Key, Timeline, load_timeline
+from controller.takes.plain import plain_take, write_plain
+from controller.takes.timeline import Key, Timeline, load_timeline, save_show
 from tests.controller.panels.window.screen import Places, Screen, drawn
 
 JAW = PARAMETERS.index("jawOpen")
@@ -136,6 +143,93 @@ def test_the_window_makes_a_show_of_two_keys(
     desk.commands.undo()
     desk.commands.undo()
     assert desk.commands.now.timeline == Timeline()
+
+
+def wait_until(done: Callable[[], bool]) -> None:
+    end_s = time.monotonic() + 30.0
+    while not done() and time.monotonic() < end_s:
+        time.sleep(0.02)
+    assert done()
+
+
+def sound(path: Path, seconds: float) -> Path:
+    with wave.open(str(path), "wb") as file:
+        file.setparams((1, 2, 8000, 0, "NONE", ""))
+        file.writeframes(b"\0\0" * round(8000 * seconds))
+    return path
+
+
+def test_the_sound_plays_with_the_timeline_from_where_its_line_is(desk: Desk, tmp_path: Path) -> None:
+    heard = sound(tmp_path / "hello.wav", 3.0)
+    program = "import sys, time, wave; w = wave.open(sys.argv[1]); s = w.getnframes() / w.getframerate()"
+    program += f"; open({str(tmp_path / 'heard')!r}, 'a').write(f'{{s:g}} '); time.sleep(60)"
+    player = desk.playback._sound = SoundPlayer([sys.executable, "-c", program])
+    desk.key(0.0, 0.0)
+    desk.key(1.0, 1.0)
+    desk.playback.hear(heard)
+    assert desk.playback.length_s == 3.0
+    desk.playback.scrub(0.5)
+    desk.playback.toggle()
+    wait_until(lambda: (tmp_path / "heard").exists() and (tmp_path / "heard").read_text() == "2.5 ")
+    assert player.playing
+    desk.playback.scrub(0.0)
+    assert not player.playing and not list(Path(tempfile.gettempdir()).glob("omote-*.wav"))
+    desk.commands.undo()
+    assert desk.commands.now.timeline.sound is None and desk.playback.length_s == 1.0
+
+
+def test_a_sound_that_is_none_is_refused(desk: Desk, tmp_path: Path) -> None:
+    (tmp_path / "no.wav").write_text("no sound")
+    for name in ("no.wav", "nowhere.wav"):
+        with pytest.raises(ControllerError, match=name):
+            desk.playback.hear(tmp_path / name)
+    assert desk.commands.now.timeline.sound is None
+
+
+def test_a_show_is_saved_with_its_sound_and_loaded_again(desk: Desk, tmp_path: Path) -> None:
+    desk.key(0.0, 0.0)
+    desk.key(2.0, 1.0)
+    desk.playback.hear(sound(tmp_path / "hello.wav", 1.0))
+    panel = desk.panel.timeline
+    panel._name = "mine"
+    panel.save()
+    kept = desk.commands.now.timeline
+    assert load_script(str(tmp_path / "mine.toml"), PARAMETERS).sound == tmp_path / "hello.wav"
+    desk.commands.arrange(Timeline())
+    panel.load()
+    assert desk.commands.now.timeline == kept
+    desk.commands.undo()
+    assert desk.commands.now.timeline == Timeline()
+    with pytest.raises(ParameterError, match="lies beside it"):
+        save_show(tmp_path / "below" / "show.toml", kept, PARAMETERS)
+    panel._name = "nothing"
+    with pytest.raises(ParameterError, match="no show or take of this name"):
+        panel.load()
+
+
+def test_a_take_is_loaded_and_another_laid_over_it(desk: Desk, tmp_path: Path) -> None:
+    times, smile = np.array([0.0, 1.0, 2.0]), PARAMETERS.index("mouthSmileLeft")
+    values, mask = np.zeros((3, len(PARAMETERS))), np.zeros(len(PARAMETERS), bool)
+    values[:, JAW], mask[JAW] = 0.5, True
+    write_plain(tmp_path / "a.csv", times, values, mask, PARAMETERS)
+    panel = desk.panel.timeline
+    panel._name = "a"
+    panel.load()
+    above = np.zeros((2, len(PARAMETERS)))
+    above[:, smile] = 0.8
+    over = Take(
+        "over", np.array([0.0, 0.5]), above, np.arange(len(PARAMETERS)) == smile, PARAMETERS.low, PARAMETERS.high
+    )
+    desk.playback.scrub(1.0)
+    desk.playback.layer(over)
+    take = desk.commands.now.take
+    assert take is not None and take.duration_s == 2.0
+    face = take.sample(1.25, PARAMETERS.neutral())
+    assert face[[JAW, smile]] == pytest.approx([0.5, 0.8]) and take.sample(0.5, PARAMETERS.neutral())[smile] == 0.0
+    desk.commands.undo()
+    desk.commands.undo()
+    with pytest.raises(ParameterError, match="no recording to lay"):
+        desk.playback.layer(over)
 
 
 def test_ticks_are_round_and_far_enough_apart() -> None:

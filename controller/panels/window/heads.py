@@ -1,0 +1,78 @@
+"""Whose face the window shows and moves, in a stage with several heads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass
+
+from controller.base.mailboxes import Mailbox
+from controller.body.messages import PanelRequest, StartServos, StopServos, ToHead
+from controller.body.panel_state import PanelState
+from controller.face.face import HeadValues
+from controller.panels.session.commands import Commands
+from controller.stage.stage import Stage
+
+
+@dataclass(frozen=True)
+class HeadSource:
+    """One head of a stage. stage : as if it were the only one. mailbox : its parameters. state : its state."""
+
+    name: str
+    stage: Stage
+    mailbox: Mailbox
+    state: PanelState
+
+
+class HeadChoice:
+    """Chooses between heads; each keeps what was set of it, with its own undo.
+
+    sources : in the order of the stage; empty for a stage of one head. values, state : what the window reads.
+    tell : sends requests to the body; one that is for no head by name is for the first.
+
+    Attributes
+    ----------
+    chosen : the number of the head that is shown. show : shows the head of a stage; set by who can.
+    """
+
+    def __init__(
+        self, sources: Sequence[HeadSource], values: HeadValues, state: PanelState | None,
+        tell: Callable[[PanelRequest | ToHead], None],
+    ) -> None:  # fmt: skip
+        self._sources = [HeadSource(each.name, each.stage, each.mailbox, copy(each.state)) for each in sources]
+        self._values, self._state, self._tell = values, state, tell
+        self.chosen = 0
+        self.show: Callable[[Stage], None] = lambda stage: None
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the heads."""
+        return [each.name for each in self._sources]
+
+    def send(self, request: PanelRequest) -> None:
+        """Send a request for the head that is shown; servos stop and start together."""
+        whole = not self._sources or isinstance(request, StopServos | StartServos)
+        self._tell(request if whole else ToHead(self._sources[self.chosen].name, request))
+
+    def choose(self, number: int, commands: Commands) -> None:
+        """Show another head and move it from now on."""
+        if number == self.chosen:
+            return
+        before, self.chosen = self._sources[self.chosen], number
+        now = self._sources[number]
+        self._values.listen(now.mailbox)
+        if self._state is not None:
+            self._state.turn_to(now.state)
+        commands.turn_to(before.name, now.name, now.stage.settings.liveliness)
+        self.show(now.stage)
+
+    def draw(self, commands: Commands) -> None:
+        """The choice, where there are several; called once a frame."""
+        if len(self._sources) < 2:
+            return
+        from imgui_bundle import imgui  # optional
+
+        imgui.set_next_item_width(imgui.get_font_size() * 9)
+        changed, number = imgui.combo("head", self.chosen, self.names)
+        if changed:
+            self.choose(number, commands)
