@@ -42,7 +42,10 @@ MEASURES: dict[str, float | None] = {"root mean square": None, "99 % of the area
 SIZE, FINE = 360, 4  # pixels of a drawing's side; how much finer cells are drawn first
 SHADES = ("#dfe7ef", "#c9d8e6", "#b3c8dc", "#9db9d1")
 MARKS = ("#f0a257", "#e88f38", "#e07b1a", "#c96a10")
-STYLE = "body{font:15px sans-serif;max-width:60em;margin:2em auto}td,th{padding:.2em .8em;text-align:left}"
+STYLE = (
+    "body{font:15px sans-serif;max-width:60em;margin:2em auto;padding:0 1em}td,th{padding:.2em .8em;text-align:left}"
+    "img,svg{max-width:100%;height:auto}code{white-space:nowrap}"
+)
 
 
 def main() -> None:
@@ -74,7 +77,7 @@ def page(head: Head, short: bool) -> str:
     body = "".join(f"<h2>{escape(title)}</h2>{text}" for title, text in sections)
     about = f"{escape(head.name)}: {surface.n} control points and {len(mesh.vertices)} vertices on its {data.name}."
     note = (
-        " Short form: meshes so coarse save nothing, and times are rough; leave out --short for figures."
+        " Short form: meshes so coarse save nothing, and times are rough; leave out <code>--short</code> for figures."
         if short
         else ""
     )
@@ -189,7 +192,10 @@ def update(moving: Deformation, domain: Domain, seconds: float) -> str:
     steps = cycle(np.array([[[0.0, 0.0, 0.1]], [[0.0, 0.0, -0.1]]]))
     single, whole = rate(lambda: moving.move(one, next(steps)), seconds), rate(moving.refresh, seconds)
     touched = set(map(int, moving.lists.entries_of(int(one[0]))[0]))
-    text = f"One point moved: {1e6 / single:.0f} µs. All vertices computed again: {1e6 / whole:.0f} µs."
+    text = (
+        f"One point moved: {1e6 / single:.0f} µs. All vertices computed again: {1e6 / whole:.0f} µs. "
+        "Neighbouring cells are joined here where one list for both costs less."
+    )
     return f"<p>{text}</p>" + cells(moving.mesh, domain, touched)
 
 
@@ -235,7 +241,7 @@ def picture(pixels: np.ndarray, name: str) -> str:
 
     out = io.BytesIO()
     Image.fromarray(pixels).save(out, "webp", quality=85)
-    shown = image(out.getvalue(), "webp", 220)
+    shown = image(out.getvalue(), "webp", 205)
     return f"<figure style='display:inline-block;margin:4px'>{shown}<figcaption>{name}</figcaption></figure>"
 
 
