@@ -52,8 +52,9 @@ MORE = {
     "scan": ["--baud", "1000000"], "render": ["--size", "32x32"],
 }  # fmt: skip
 """Options that end a command soon; the last one counts where a line has the same."""
-PARSED = {"simulate", "calibrate", "preflight", "fit", "landmarks", "bench", "webcam", "study"}
-"""Commands that serve until they are interrupted, wait for keys, or work for minutes: their options are parsed only."""
+PARSED = {"simulate", "edit", "calibrate", "preflight", "fit", "landmarks", "bench", "webcam", "study"}
+"""Commands that serve until they are interrupted, open a window, wait for keys, or work for minutes: their options are
+parsed only."""
 MESSAGES = {"omote needs Python 3.11 or newer": MAKEFILE}
 """Messages that begin like a command, and the file that prints them."""
 
@@ -143,7 +144,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         file.setparams((1, 2, 16_000, 0, "NONE", ""))
         file.writeframes((9000 * np.sin(np.arange(16_000) * 0.1)).astype("<i2").tobytes())
     (here / "hello.wav").write_bytes((here / "voice.wav").read_bytes())
-    (here / "mine.toml").write_text("[glee]\nweights = { mouthSmile = 1 }\n")
+    (here / "mine.toml").write_text(
+        "[glee]\nweights = { mouthSmile = 1 }\n"
+        '[parameters.dimple]\nregion = "mouth"\nprofile = "mouth"\ngroup = "dimple.json"\n'
+    )
     (here / "me.toml").write_text("[ranges]\njawOpen = [0, 0.6]\n")
     (here / "dimple.json").write_text('{"format": 1, "name": "dimple", "part": "face", "ids": [1], '
                                       '"moves_mm": [[0, 0, 1]]}')  # fmt: skip

@@ -59,10 +59,6 @@ class Hall:
         """The body of the head of a name; that of the first one where there is none."""
         return next((body for body in self.bodies if body.state.name == name), self.bodies[0])
 
-    def state_of(self, name: str) -> CommandState:
-        """The layers of the head of a name; those of the first one where there is none."""
-        return next((body.state for body in self.bodies if body.state.name == name), self.state)
-
     @property
     def live(self) -> bool:
         """Whether links move the faces."""

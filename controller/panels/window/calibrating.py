@@ -9,7 +9,7 @@ from controller.base.errors import OMOTE_ERRORS
 from controller.body.messages import Jog, PanelRequest
 from controller.panels.session.feed import servo_key
 from controller.panels.session.problems import Problems
-from controller.panels.session.servo_captures import MARKS, ServoCaptures
+from controller.panels.session.servo_captures import MARKS, Captured, ServoCaptures
 from controller.panels.window.flow import Flow
 
 
@@ -62,6 +62,8 @@ class Calibrating:
             kept = getattr(captured, mark)
             if flow.button(f"{mark}{'' if kept is None else f' {kept:g}'}###{mark}{key}") and now is not None:
                 self._try(lambda mark=mark: self._captures.capture(servo, mark))  # type: ignore[misc]
+        if captured != Captured() and flow.button(f"clear##{key}"):
+            self._captures.clear(servo)
         if key in self._jogged and flow.button(f"give back##{key}"):
             self.jog(servo, None)
 

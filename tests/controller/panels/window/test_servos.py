@@ -72,8 +72,12 @@ def test_a_servo_is_turned_by_hand_captured_and_given_back(
     screen.frame(draw)
     screen.click(draw, *places.at[f"neutral###neutral{key}"])
     assert panel.calibrating._captures.of(servo).neutral == 9.0
+    screen.frame(draw)
+    screen.click(draw, *places.at[f"clear##{key}"])
+    assert panel.calibrating._captures.of(servo).neutral is None
+    screen.frame(draw)
     screen.click(draw, *places.at[f"give back##{key}"])
-    assert sent[-1] == Jog("head", servo["name"], None) or Jog("head", servo["name"], None) in sent
+    assert Jog("head", servo["name"], None) in sent
     screen.click(draw, *places.at["the face mirrors the servos"])
     assert mirrored == [True]
     screen.click(draw, *places.at["save calibration"])
