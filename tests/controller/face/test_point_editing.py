@@ -97,6 +97,21 @@ def test_a_corner_of_the_mouth_dragged_up_smiles_on_its_side(handles: PointEdito
     assert handles.drag((x, y), screen, values) == {}  # nothing is held any more
 
 
+def test_a_pinned_point_is_shown_where_it_was_and_turns_with_the_head(handles: PointEditor) -> None:
+    screen, values = Screen(Camera.front(), SIZE), P.neutral()
+    assert handles.pin_pixels(screen, values) == []
+    place = pixel(screen, CORNER)
+    assert handles.take(place, screen, values)
+    handles.pin(values)
+    handles.release()
+    ((x, y),) = handles.pin_pixels(screen, values)
+    assert handles.pinned == 1 and np.hypot(x - place[0], y - place[1]) < 16.0
+    values[P.index("headYaw")] = 0.5  # to the subject's left, which is the picture's right
+    assert handles.pin_pixels(screen, values)[0][0] > x + 5.0
+    handles.unpin()
+    assert handles.pinned == 0 and handles.pin_pixels(screen, values) == []
+
+
 def test_the_point_follows_the_mouse_on_a_turned_head_with_an_open_jaw(handles: PointEditor, head: Head) -> None:
     screen, values = Screen(Camera.front(), SIZE), P.neutral()
     values[P.index("headYaw")], values[P.index("jawOpen")] = 0.3, 0.4

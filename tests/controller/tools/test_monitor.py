@@ -86,6 +86,25 @@ def test_listening_says_nothing_and_tells_both_ends_apart(model: str, told: str)
     assert f"<- 3 {told}" in out.getvalue()
 
 
+@pytest.mark.parametrize(
+    ("protocol", "model", "wanted"),
+    [(None, "", 2), (None, "ax-12a", 1), (None, "xl330-m288", 2), (1, "", 1), (2, "", 2)],
+)
+def test_who_names_no_protocol_hears_that_of_the_model(
+    monkeypatch: pytest.MonkeyPatch, protocol: int | None, model: str, wanted: int
+) -> None:
+    asked = []
+
+    def make(protocol: int, tables: dict[int, Any], model: str) -> Any:
+        asked.append((protocol, model))
+        return make_decoder(protocol, tables, model)
+
+    monkeypatch.setattr(module, "make_decoder", make)
+    with pytest.raises(PortMissing):
+        listen_to_bus("/dev/not-there", 1_000_000, protocol, Console(file=io.StringIO()), times(1), model)
+    assert asked == [(wanted, model)]
+
+
 def test_a_missing_port_is_one_error() -> None:
     with pytest.raises(PortMissing):
         listen_to_bus("/dev/not-there", 1_000_000, 2, Console(file=io.StringIO()), times(1))

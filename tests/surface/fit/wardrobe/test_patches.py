@@ -61,6 +61,7 @@ def test_every_vertex_lies_on_the_sheet_of_its_patch(made: dict[str, np.ndarray]
         *([row[: degree + 2] for row, degree in zip(made[f"knots_{x}"], made["degrees"][:, k], strict=True)]
           for k, x in enumerate("uv")),
     )  # fmt: skip
+    assert made["knots_u"].shape[1] == made["knots_v"].shape[1] == 3 + 2  # as wide as the highest degree wants
     uv, inside = made["mesh_uv"], 1e-9
     side = made["mesh_side"]
     at = uv - inside * np.column_stack([side & 1, side >> 1])
