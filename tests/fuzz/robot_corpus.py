@@ -211,7 +211,7 @@ def robot_kinds() -> list[Kind]:
         Kind("linkage-table", "lid.csv", [LID, TABLE], _check_beside("linked.toml"),
              {"linked.toml": LINKED, "ears.toml": EARS}, ("check", "{folder}/linked.toml")),
         Kind("pairs", "pairs.csv", [_pairs()], _fit_pairs, whole,
-             ("calibrate", "{folder}/linked.toml", "--pairs", "{}", "-o", "{out}.toml"), FIT_S),
+             ("calibrate", "{folder}/linked.toml", "--pairs", "{}", "-o", "{folder}/o.toml"), FIT_S),
         Kind("heads", "stage.toml", [HEADS, choir], beside=whole),
         Kind("zenoh", "stage.toml", [HALL], beside=pems),
         Kind("service", "robot.toml", [real, *plain, HEADS], _write_service, whole, ("service", "{}", "-o", "{out}")),
