@@ -134,8 +134,8 @@ def embedded(text: str) -> np.ndarray:
 
 
 def test_a_mesh_that_saves_nothing_tells_how_much_more_it_needs(root: Path) -> None:
-    told = load(root / "examples" / "paper.py").told
-    assert [told(x) for x in (0.502, 0.0, -1.663)] == ["50.2 %", "0.0 %", "none: 166.3 % more"]
+    in_words = load(root / "examples" / "paper.py").in_words
+    assert [in_words(x) for x in (0.502, 0.0, -1.663)] == ["50.2 %", "0.0 %", "none: 166.3 % more"]
 
 
 @pytest.mark.slow

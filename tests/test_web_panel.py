@@ -150,6 +150,7 @@ def test_of_several_heads_one_is_chosen_and_a_stop_is_for_all(tmp_path: Path) ->
         browser.evaluate("document.getElementById('tab-sliders').click()")
         slide(browser, "jawOpen", 0.4)
         wait_for(lambda: first.held().get(JAW) == 0.4)
+        browser.wait("[...document.getElementById('head').options].some((o) => o.value === 'oak')")
         browser.evaluate("{const s = document.getElementById('head'); s.value = 'oak';"
                          "s.dispatchEvent(new Event('change'));}")  # fmt: skip
         browser.wait("Math.abs(document.getElementById('p-jawOpen').value) < 0.01")

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.files import replacing
+from surface.base.files import read_text
 
 VARIABLE = "OMOTE_STATE"
 """Environment variable that names another folder for what omote remembers."""
@@ -49,8 +50,7 @@ def remember(stage: Path, vocabularies: tuple[Path, ...] = ()) -> None:
 def last_stage() -> LastStage | None:
     """The stage that was kept, with those of its vocabularies that are still there; None where there is none."""
     try:
-        text = (state_dir() / "last.json").read_bytes()[:_MOST_BYTES].decode()
-        table = json.loads(text)
+        table = json.loads(read_text(state_dir() / "last.json", _MOST_BYTES))
         stage, more = Path(table["stage"]), [Path(each) for each in table["vocabularies"]]
     except (OSError, RuntimeError, ValueError, KeyError, TypeError):
         return None

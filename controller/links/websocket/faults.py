@@ -13,6 +13,8 @@ from controller.base.parameters import did_you_mean
 _SHOWN = 3
 """Faults of a message that its answer names."""
 _MOST_ID = 64
+_SURROGATE = re.compile(r"[\ud800-\udfff]")
+"""Halves of characters, which JSON can escape and UTF-8 cannot write."""
 _EXAMPLE = '{"type": "set", "parameters": {"jawOpen": 0.5}}'
 
 
@@ -21,7 +23,7 @@ def what_is_wrong(error: ValidationError) -> tuple[str, str]:
     found = error.errors(include_url=False, include_input=False)
     shown = "; ".join(map(_fault, found[:_SHOWN]))[:400]
     more = f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
-    return shown + more, f"write it as {_EXAMPLE}; docs/websocket.md lists all messages"
+    return shown + more, f"write it as {_EXAMPLE}"
 
 
 def id_of(text: str | bytes) -> int | str | None:
@@ -31,7 +33,8 @@ def id_of(text: str | bytes) -> int | str | None:
     except (ValueError, RecursionError):
         return None
     given = found.get("id") if isinstance(found, dict) else None
-    fits = (isinstance(given, str) and len(given) <= _MOST_ID) or (isinstance(given, int) and abs(given) < 1 << 53)
+    text_fits = isinstance(given, str) and len(given) <= _MOST_ID and _SURROGATE.search(given) is None
+    fits = text_fits or (isinstance(given, int) and abs(given) < 1 << 53)
     return given if fits and not isinstance(given, bool) else None
 
 

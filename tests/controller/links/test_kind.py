@@ -48,7 +48,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
 
 
 def test_built_in_kinds_are_folders_and_formats() -> None:
-    assert LINKS.kinds() == sorted(["line", "web", "websocket", *FORMATS.kinds()])
+    assert LINKS.kinds() == sorted(["line", "ros2", "web", "websocket", *FORMATS.kinds()])
     line = LINKS.get("line")
     assert isinstance(line, LinkKind) and line.api == API and line.install == "pyserial"
     assert callable(LINKS.load(line, line.open))
@@ -57,7 +57,10 @@ def test_built_in_kinds_are_folders_and_formats() -> None:
 def test_a_kind_of_another_package_is_found(install: Callable[..., None]) -> None:
     install("udp")
     assert LINKS.get("udp").settings().port == 5
-    assert [kind.kind for kind in LINKS.all()] == [*sorted(["line", "web", "websocket", *FORMATS.kinds()]), "udp"]
+    assert [kind.kind for kind in LINKS.all()] == [
+        *sorted(["line", "ros2", "web", "websocket", *FORMATS.kinds()]),
+        "udp",
+    ]
     assert LINKS.get("udp").install == ""
 
 

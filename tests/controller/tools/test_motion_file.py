@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.base.errors import ConfigError, TakeError
+from controller.base.errors import ConfigError, ControllerError, TakeError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.takes.reader import load_take
@@ -65,8 +65,8 @@ def test_what_cannot_be_converted_is_named(tmp_path: Path) -> None:
         convert(tmp_path / "a.csv", tmp_path / "a.json", P)
     with pytest.raises(TakeError, match="is the file that is read"):
         convert(tmp_path / "a.csv", tmp_path / "a.csv", P)
-    with pytest.raises(TakeError, match="cannot be written"):
-        convert(tmp_path / "a.csv", tmp_path / "none" / "b.csv", P)
+    with pytest.raises(ControllerError, match="cannot be written"):
+        convert(tmp_path / "a.csv", tmp_path / "a.csv" / "b.csv", P)
     with pytest.raises(ConfigError):
         load_motion(tmp_path / "none.toml", P)
     (tmp_path / "s.toml").write_text("steps = [")

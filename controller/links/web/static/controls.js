@@ -77,6 +77,7 @@ export class Sliders {
       this.robot.set(each, value);
       const row = this.#rows.get(each);
       row.until = performance.now() + 400;
+      row.value = NaN;  // what comes then is shown, also where it is what was shown before
       row.input.value = value;
       row.output.textContent = value.toFixed(2);
     }
