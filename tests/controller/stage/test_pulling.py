@@ -80,7 +80,7 @@ LEFT, RIGHT, BROW, CHEEK, CHIN, LID = (
         (LEFT, (0.0, -6.0, 0.0), "mouthFrownLeft"),
         (RIGHT, (0.0, -6.0, 0.0), "mouthFrownRight"),
         (BROW, (0.0, 6.0, 0.0), "browOuterUpLeft"),
-        (CHEEK, (0.0, 4.0, 0.0), "noseSneerLeft"),  # which lifts this place more than cheekSquint does
+        (CHEEK, (0.0, 4.0, 0.0), "cheekSquintLeft"),
         (CHIN, (0.0, -12.0, 0.0), "jawOpen"),
         (LID, (0.0, -6.0, 0.0), "eyeBlinkLeft"),
     ],
