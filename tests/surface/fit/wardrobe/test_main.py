@@ -54,7 +54,7 @@ def places(head: Head, garment: Arrays, part: str) -> np.ndarray:
 def test_hair_and_beards_are_like_the_shipped_ones(
     name: str, made: Callable[[str], tuple[Arrays, Arrays]], head: Head
 ) -> None:
-    """Where strands grow depends on the head's last digits; how many, where on average, how long and how dark does not."""
+    """Where strands grow depends on the head's last digits; how many, how long and how dark on average does not."""
     found, shipped = made(name)
     part = name.partition("-")[0]
     assert found.keys() == shipped.keys()
