@@ -78,7 +78,8 @@ def _channel_stops(
         (servo,) = servo_specs([channel])
         low, high = channel.limit_deg
         reach = math.radians(low - beyond_deg), math.radians(high + beyond_deg)
-        found = find_stops(port.port, port.baud, servo, reach, torque=torque, progress=progress)
+        margin_s = port.options.get("margin_s")
+        found = find_stops(port.port, port.baud, servo, reach, torque=torque, progress=progress, margin_s=margin_s)
     except StillOn:
         raise
     except BusError as error:

@@ -97,13 +97,14 @@ def find_stops(
     *,
     torque: float = TORQUE,
     progress: Callable[[str], object] = lambda text: None,
+    margin_s: float | None = None,
 ) -> Found:
     """Find both stops of a servo whose motor is off, and switch it off again.
 
     port, baud : where it is. servo : its model, zero and direction; its own limits do not count here.
     reach_rad : lowest and highest angle that the search goes to.
     torque : share of the full current that it uses, above 0 and at most 0.5.
-    progress : called with what is being done.
+    progress : called with what is being done. margin_s : longest wait for a reply beyond its time on the wire.
 
     Raises ServoRefused: the model cannot, or the motor is on. ServoFault: a hardware error, or it does not follow.
     StillOn: it could not be confirmed off.
@@ -113,7 +114,7 @@ def find_stops(
         raise ServoRefused(reason, hint="move it by hand: omote calibrate", servo_ids=(servo.id,))
     if not 0.0 < torque <= 0.5:
         raise ValueError(f"torque: above 0 and at most 0.5, got {torque:g}")
-    registers = _registers(port, baud, servo)
+    registers = _registers(port, baud, servo, margin_s)
     registers.port.openPort()
     try:
         return _Search(registers, servo, torque, progress).run(*reach_rad)
@@ -121,8 +122,8 @@ def find_stops(
         registers.port.closePort()
 
 
-def _registers(port: str | SerialPort, baud: int, servo: ServoSpec) -> Registers[Any]:
-    wire = Port(port, baud)
+def _registers(port: str | SerialPort, baud: int, servo: ServoSpec, margin_s: float | None) -> Registers[Any]:
+    wire = Port(port, baud, margin_s)
     if load_table(servo.model).protocol == 2:
         return Registers2(Packets(), wire, (servo,))
     return Registers1(Exchanges(), wire, (servo,))

@@ -16,6 +16,7 @@ from controller.cli.app import make_app
 from controller.cli.console import console
 from drivers.base.bus import ServoSpec
 from drivers.sim import SimulatedBus
+from drivers.tools.find_stops import Found
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
 
@@ -139,3 +140,17 @@ def test_a_service_is_written_with_its_commands(head: tuple[SimulatedBus, Path],
 def test_an_unknown_channel_is_named(head: tuple[SimulatedBus, Path]) -> None:
     _, path = head
     assert "no channel called 'jow'" in str(omote("preflight", str(path), "--yes", "-c", "jow").exception)
+
+
+def test_stops_are_looked_for_with_the_patience_of_the_robots_file(
+    head: tuple[SimulatedBus, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    margins: list[float | None] = []
+
+    def look(*_: object, margin_s: float | None = None, **__: object) -> Found:
+        margins.append(margin_s)
+        return Found(-0.2, 0.4, 0.0, 0.1, 0)
+
+    monkeypatch.setattr("controller.hardware.stops.find_stops", look)
+    omote("calibrate", str(head[1]), "--find-stops", "--yes", "-c", "jaw")
+    assert margins == [0.5]
