@@ -161,7 +161,7 @@ mutual = true
 @cache
 def _joints() -> list[Joint]:
     """The joints of the shipped head."""
-    return joints_of(Head.load(find_config("heads", "ict")))
+    return joints_of(Head.load(find_config("heads", "ict")).data)
 
 
 def _pairs() -> bytes:
