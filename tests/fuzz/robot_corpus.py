@@ -12,8 +12,8 @@ from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.robot.joint_limits import joint_limits
 from controller.robot.robot import load_robot, robot_parameters
-from surface.export.urdf import Joint, joints_of
 from surface.head import Head
+from surface.head.model.joints import Joint, joints_of
 from tests.fuzz.kind import FIT_S, Kind
 from tests.fuzz.reading import check, reports, run_command
 
