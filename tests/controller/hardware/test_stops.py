@@ -83,9 +83,11 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     @contextmanager
     def serve(bus: Any, specs: Any) -> Any:
-        yield SimpleNamespace(family=bus.kind, port=bus.name, baud=1_000_000)
+        yield SimpleNamespace(family=bus.kind, port=bus.name, baud=1_000_000, options={})
 
-    def search(port: str, baud: int, servo: Any, reach: Any, *, torque: float, progress: Any) -> Found:
+    def search(
+        port: str, baud: int, servo: Any, reach: Any, *, torque: float, progress: Any, margin_s: float | None
+    ) -> Found:
         calls.append((servo, tuple(round(math.degrees(each), 6) for each in reach), torque))
         return found(-25.0, 40.0)
 
