@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from typing import Protocol
 
@@ -10,6 +9,7 @@ from controller.base.parameters import Floats, Parameters
 from controller.formats.frame import Frame
 from controller.links.net.senders import Sender
 from controller.links.net.settings import NetSettings
+from controller.links.net.steady import SteadyThread
 
 
 class FaceSource(Protocol):
@@ -28,35 +28,29 @@ class Outgoing:
     """Sends in its own thread until it is stopped."""
 
     def __init__(self, settings: NetSettings, sender: Sender, source: FaceSource, name: str) -> None:
-        self._period_s, self._sender, self._source = 1.0 / settings.rate_hz, sender, source
+        self._sender, self._source = sender, source
         self._encoder = settings.form.encoder(source.parameters)
         form, parameters = settings.form, source.parameters
         self._mask, self._sends = form.carries(parameters) | form.about(parameters), settings.sends
         self.sent = self.dropped = 0
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name=f"link {name}, out", daemon=True)
+        self._start_s = 0.0
+        self._thread = SteadyThread(
+            f"link {name}, out", 1.0 / settings.rate_hz, lambda now_s: self._send(now_s - self._start_s)
+        )
 
     def start(self) -> None:
         """Begin to send."""
+        self._start_s = time.monotonic()
         self._thread.start()
 
     def stop(self) -> None:
         """Stop sending and give back what was opened."""
-        self._stopping.set()
-        if self._thread.ident is not None:
-            self._thread.join()
+        self._thread.stop()
         self._sender.close()
 
     def report(self) -> dict[str, object]:
         """Messages that were sent, and those that found no room or nobody."""
         return {"sent": self.sent, "dropped": self.dropped, "send_error": self._sender.error}
-
-    def _run(self) -> None:
-        start_s = due_s = time.monotonic()
-        while not self._stopping.wait(max(0.0, due_s - time.monotonic())):
-            now_s = time.monotonic()
-            self._send(now_s - start_s)
-            due_s = max(due_s + self._period_s, now_s)  # late ones are skipped
 
     def _send(self, time_s: float) -> None:
         frame = self._frame(time_s)

@@ -37,7 +37,13 @@ class Frame:
 
 
 class HeadJoints:
-    """The joints of a head and the parameters that turn them. names : of the joints, parents first.
+    """The joints of a head and the parameters that turn them.
+
+    parameters : those of the face. head : the head's folder.
+
+    Attributes
+    ----------
+    names : of the joints, parents first. indices : (joints,) int64, their places among the parameters.
 
     Raises HeadFileError: the head cannot be read.
     """

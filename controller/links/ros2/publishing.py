@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 import time
 from collections.abc import Mapping
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 
 from controller.base.parameters import Floats
 from controller.layers.commands import CommandSink
+from controller.links.net.steady import SteadyThread
 from controller.links.ros2.faces import ActionUnits, HeadJoints, ros_expression
 from controller.links.ros2.session import RosNode, RosPublisher
 from controller.vocabulary.reading import Readings
@@ -33,7 +33,6 @@ class Publishing:
     ) -> None:
         self._node, self._sink, self._joints, self._prefix = node, sink, joints, prefix
         self._units, self._readings = ActionUnits(sink.parameters), Readings(sink.parameters, sink.vocabulary)
-        self._period_s = 1.0 / rate_hz
         self._make = node.types.make
         kinds = {
             "parameters": "std_msgs/msg/Float64MultiArray", "action_units": "hri_msgs/msg/FacialActionUnits",
@@ -43,8 +42,8 @@ class Publishing:
             kinds["joint_states"] = "sensor_msgs/msg/JointState"
             kinds |= {"/tf": "tf2_msgs/msg/TFMessage"} if frames else {}
         self._topics: dict[str, RosPublisher] = {name: node.publisher(name, kind) for name, kind in kinds.items()}
-        self._stopping = threading.Event()
-        self._thread = threading.Thread(target=self._run, name="ros2, out", daemon=True)
+        self._values, self._slow_s = sink.parameters.neutral(), -np.inf
+        self._thread = SteadyThread("ros2, out", 1.0 / rate_hz, self._turn)
 
     @property
     def sent(self) -> int:
@@ -57,20 +56,14 @@ class Publishing:
 
     def stop(self) -> None:
         """Stop publishing."""
-        self._stopping.set()
-        if self._thread.ident is not None:
-            self._thread.join()
+        self._thread.stop()
 
-    def _run(self) -> None:
-        values, slow_s, due_s = self._sink.parameters.neutral(), -np.inf, time.monotonic()
-        while not self._stopping.wait(max(0.0, due_s - time.monotonic())):
-            now_s = time.monotonic()
-            self._sink.snapshot(values)
-            self._publish(values)
-            if now_s - slow_s >= _SLOW_S:
-                slow_s = now_s
-                self._diagnose()
-            due_s = max(due_s + self._period_s, now_s)  # late ones are skipped
+    def _turn(self, now_s: float) -> None:
+        self._sink.snapshot(self._values)
+        self._publish(self._values)
+        if now_s - self._slow_s >= _SLOW_S:
+            self._slow_s = now_s
+            self._diagnose()
 
     def _publish(self, values: Floats) -> None:
         header = self._header()
