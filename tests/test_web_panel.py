@@ -148,11 +148,13 @@ def test_of_several_heads_one_is_chosen_and_a_stop_is_for_all(tmp_path: Path) ->
         open_panel(browser, where, 390, 844)
         first, second = (body.state for body in hall.bodies)
         browser.evaluate("document.getElementById('tab-sliders').click()")
-        slide(browser, "jawOpen", 0.4)
-        wait_for(lambda: first.held().get(JAW) == 0.4)
         browser.wait("[...document.getElementById('head').options].some((o) => o.value === 'oak')")
-        browser.evaluate("{const s = document.getElementById('head'); s.value = 'oak';"
-                         "s.dispatchEvent(new Event('change'));}")  # fmt: skip
+        # at once: before the slider has shown what it was moved to, whose place the other head's value takes
+        browser.evaluate(
+            "{const i = document.getElementById('p-jawOpen'), s = document.getElementById('head'); i.value = 0.4;"
+            "i.dispatchEvent(new Event('input')); s.value = 'oak'; s.dispatchEvent(new Event('change'));}"
+        )
+        wait_for(lambda: first.held().get(JAW) == 0.4)
         browser.wait("Math.abs(document.getElementById('p-jawOpen').value) < 0.01")
         slide(browser, "jawOpen", 0.8)
         wait_for(lambda: second.held().get(JAW) == 0.8)

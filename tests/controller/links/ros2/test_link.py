@@ -27,6 +27,8 @@ from controller.links.kind import LinkContext  # noqa: E402
 from controller.links.links import open_links, read_link  # noqa: E402
 from controller.links.ros2 import session as session_module  # noqa: E402
 from controller.links.ros2.definitions import UNITS, message_types  # noqa: E402
+from controller.links.ros2.faces import ActionUnits  # noqa: E402
+from controller.links.ros2.wire import attachment  # noqa: E402
 from tests.controller.fleet.nodes import free_port, router, until  # noqa: E402
 
 JAW, YAW = P.index("jawOpen"), P.index("headYaw")
@@ -282,10 +284,21 @@ def test_the_domain_of_the_environment_counts(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_damaged_intensities_count_as_nothing() -> None:
-    from controller.links.ros2.faces import ActionUnits
-
     units, given = ActionUnits(P), np.full(UNITS, np.nan)
     given[26], given[12] = np.inf, -5.0
     face = units.face(given)
     assert np.isfinite(face).all() and face[JAW] == 0.5 and face[P.index("mouthSmileLeft")] == 0.0
     assert units.read(face)[26] > 0.9
+
+
+def test_the_jaw_goes_to_neither_side_where_no_side_is_said() -> None:
+    units, given = ActionUnits(P), np.zeros(UNITS)
+    given[30] = 1.0
+    assert not units.face(given).any()
+
+
+def test_what_travels_with_a_message_is_read_by_the_other_side() -> None:
+    other = pytest.importorskip("zenoh_ros2_sdk.attachment", reason="pip install zenoh-ros2-sdk", exc_type=ImportError)
+    gid = bytes(range(16))
+    found = other.Attachment.from_bytes(attachment(7, 1_700_000_000_000_000_001, gid))
+    assert (found.sequence_id, found.timestamp_ns, found.gid) == (7, 1_700_000_000_000_000_001, gid)
