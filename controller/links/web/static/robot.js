@@ -50,6 +50,7 @@ export class Robot extends EventTarget {
 
   // From now on what is sent is for a head of this name, and what is heard is of it.
   turnTo(head) {
+    this.#setPending();  // what was moved before is the other head's
     this.head = head;
     this.#listen();
   }
@@ -120,8 +121,13 @@ export class Robot extends EventTarget {
     this.#drawing = true;
     requestAnimationFrame(() => {
       this.#drawing = false;
-      this.act({ type: "set", parameters: Object.fromEntries(this.#pending) });
-      this.#pending.clear();
+      this.#setPending();
     });
+  }
+
+  #setPending() {
+    if (!this.#pending.size) return;
+    this.act({ type: "set", parameters: Object.fromEntries(this.#pending) });
+    this.#pending.clear();
   }
 }
