@@ -27,7 +27,7 @@ from controller.links.kind import LinkContext  # noqa: E402
 from controller.links.links import open_links, read_link  # noqa: E402
 from controller.links.ros2 import session as session_module  # noqa: E402
 from controller.links.ros2.definitions import UNITS, message_types  # noqa: E402
-from controller.links.ros2.faces import ActionUnits  # noqa: E402
+from controller.links.ros2.faces import ActionUnits, HeadJoints  # noqa: E402
 from controller.links.ros2.wire import attachment  # noqa: E402
 from tests.controller.fleet.nodes import free_port, router, until  # noqa: E402
 
@@ -166,6 +166,7 @@ def test_what_topics_ask_shows(ends: tuple[Near, Far]) -> None:
     given[JAW] = 0.8
     far.say_until("/maple/parameters/set", "std_msgs/msg/Float64MultiArray", {"data": given},
                   lambda: near.values[JAW] > 0.7)  # fmt: skip
+    assert near.state.holder(JAW) == "capture" and near.state.holder(P.index("mouthPucker")) != "capture"
     angle = 0.5 * math.radians(60.0)
     joints = {"name": ["maple/headYaw", "jawOpen", "tongueOut", "wheel"], "position": [angle, 0.0, 0.4, 1.0],
               "velocity": [], "effort": []}  # fmt: skip
@@ -289,6 +290,21 @@ def test_damaged_intensities_count_as_nothing() -> None:
     face = units.face(given)
     assert np.isfinite(face).all() and face[JAW] == 0.5 and face[P.index("mouthSmileLeft")] == 0.0
     assert units.read(face)[26] > 0.9
+
+
+def test_angles_of_joints_are_those_of_full_scale(root: Path) -> None:
+    joints = HeadJoints(P, root / "configs" / "heads" / "ict")
+    yaw, jaw = joints.names.index("headYaw"), joints.names.index("jawOpen")
+    ones = joints.angles(np.ones(len(P)))
+    assert np.degrees(ones[yaw]) == pytest.approx(60.0) and 20.0 < np.degrees(ones[jaw]) < 30.0
+    assert joints.values(0.3 * ones) == pytest.approx(0.3)
+    assert joints.values(9.0 * ones) == pytest.approx(1.0) and joints.values(-9.0 * ones)[jaw] == 0.0
+
+
+def test_a_key_names_domain_topic_type_and_hash() -> None:
+    topic = message_types("jazzy").topic("/maple/command", "std_msgs/msg/String")
+    kind = "7/maple/command/std_msgs::msg::dds_::String_/"
+    assert topic.key(7) == kind + topic.type_hash and topic.key(7, any_hash=True) == kind + "*"
 
 
 def test_the_jaw_goes_to_neither_side_where_no_side_is_said() -> None:
