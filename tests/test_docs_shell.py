@@ -163,12 +163,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def said(folder: Path) -> Iterator[dict[str, tuple[int, str]]]:
-    """Exit code and text of every line that is run, by the line; those about recordings in order."""
+    """Exit code and text of every line that is run, by the line, in two processes; those about recordings in order, and
+    those that listen at one port in the same process."""
     recorded = sorted((line for line in RUN if "a.rec" in line), key=lambda line: "--record" not in line)
     once = {tuple(words_of(line)): line for line in RUN if line not in recorded}
-    others = list(once.values())
+    listening = [line for line in once.values() if "--web" in line or "run websocket" in line]
+    others = [line for line in once.values() if line not in listening]
     with SimulatedBus([1, 2]) as bus, SimulatedBus([1, 2]) as other:
-        groups = (recorded + others[::2], bus.path), (others[1::2], other.path)
+        groups = (recorded + others[::2], bus.path), (listening + others[1::2], other.path)
         running = [start(folder, lines, port) for lines, port in groups]
         outputs = [process.communicate(timeout=600) for process in running]
     assert [process.returncode for process in running] == [0, 0], outputs
