@@ -170,8 +170,9 @@ def said(folder: Path) -> Iterator[dict[str, tuple[int, str]]]:
     listening = [line for line in once.values() if "--web" in line or "run websocket" in line]
     others = [line for line in once.values() if line not in listening]
     with SimulatedBus([1, 2]) as bus, SimulatedBus([1, 2]) as other:
-        groups = (recorded + others[::2], bus.path), (listening + others[1::2], other.path)
-        running = [start(folder, lines, port) for lines, port in groups]
+        first = start(folder / "first.json", recorded + others[::2], bus.path)
+        second = start(folder / "second.json", listening + others[1::2], other.path)
+        running = [first, second]
         outputs = [process.communicate(timeout=600) for process in running]
     assert [process.returncode for process in running] == [0, 0], outputs
     lines = [json.loads(line) for out, _ in outputs for line in out.splitlines()]
@@ -179,9 +180,9 @@ def said(folder: Path) -> Iterator[dict[str, tuple[int, str]]]:
     yield {line: found[line if line in recorded else once[tuple(words_of(line))]] for line in RUN}
 
 
-def start(folder: Path, lines: list[str], port: str) -> subprocess.Popen[str]:
-    """A process that runs lines one after the other."""
-    own = folder / f"lines{len(lines)}.json"
+def start(own: Path, lines: list[str], port: str) -> subprocess.Popen[str]:
+    """A process that runs lines one after the other, in the folder of the file that it reads them from."""
+    folder = own.parent
     own.write_text(json.dumps([orders(folder, line, port) for line in lines]))
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path), "COLUMNS": "100"}
     pipe = subprocess.PIPE
