@@ -158,9 +158,10 @@ def _filled(lattice: Floats) -> Floats:
             rows = (k, slice(None)) if axis == 0 else (slice(None), k)
             at = np.flatnonzero(known[rows])
             if len(at) > 1:
-                own = lattice[rows][at]
-                sums[rows] += np.stack([np.interp(t, t[at], own[:, c]) for c in range(own.shape[1])], axis=1)
-                counts[rows] += 1
+                own, between = lattice[rows][at], slice(at[0], at[-1] + 1)  # beyond the last known place is no guess
+                inside = [np.interp(t[between], t[at], own[:, c]) for c in range(own.shape[1])]
+                sums[rows][between] += np.stack(inside, axis=1)
+                counts[rows][between] += 1
     guess = sums / np.maximum(counts, 1)[..., None]
     filled: Floats = np.where(known[..., None], lattice, guess)
     return filled

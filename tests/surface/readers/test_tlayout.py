@@ -1,0 +1,86 @@
+"""Grips seen from a face: turns of their knots, the knots that a ray meets, and what grips of a vertex lie where."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from relief import cube_tsm
+
+from surface.readers.common import Location
+from surface.readers.tlayout import Complex, Copy, Layout, Ray, directions, nearest, overlap
+from surface.readers.tsmfile import parse
+
+KNOTS = Copy(3, (0.0, 1.0, 2.0, 4.0, 5.0), (-2.0, -1.0, 0.0, 3.0, 7.0))
+
+
+@pytest.mark.parametrize("quarter", range(4))
+def test_turned_knots_are_those_of_the_turned_corners(quarter: int) -> None:
+    """The corner of any two knots, turned as a complex number, lies at two knots of the copy."""
+    moved = KNOTS.moved(10.0, -20.0, quarter)
+    wanted = {(u + 1j * v) * 1j**quarter + (10 - 20j) for u in KNOTS.knots_u for v in KNOTS.knots_v}
+    assert {complex(u, v) for u in moved.knots_u for v in moved.knots_v} == wanted
+    assert list(moved.knots_u) == sorted(moved.knots_u)
+    assert moved.rect == (min(moved.knots_u), max(moved.knots_u), min(moved.knots_v), max(moved.knots_v))
+
+
+def test_copies_that_differ_by_rounding_have_one_key() -> None:
+    other = Copy(3, tuple(x + 1e-12 for x in KNOTS.knots_u), KNOTS.knots_v)
+    assert other.key(1e-9) == KNOTS.key(1e-9)
+    assert Copy(4, KNOTS.knots_u, KNOTS.knots_v).key(1e-9) != KNOTS.key(1e-9)
+    assert KNOTS.moved(1e-3, 0.0, 0).key(1e-9) != KNOTS.key(1e-9)
+
+
+def test_grips_of_a_corner_lie_at_two_sides() -> None:
+    """Counts stand in the order north, west, south, east: two grips at one side, and two between it and the next."""
+    assert directions([1, 1, 0, 0]) == [(1,), (1, 2), (2,)]
+    assert directions([0, 0, 0, 1]) == [(0,)]
+    assert directions([0, 0, 0, 0]) == []
+
+
+@pytest.mark.parametrize(("x", "wanted"), [(-9.0, 0), (0.4, 0), (0.5, 0), (0.6, 1), (1.0, 1), (2.2, 3), (99.0, 4)])
+def test_the_nearest_knot_is_the_first_of_equal_ones(x: float, wanted: int) -> None:
+    row = [0.0, 1.0, 1.0, 2.0, 5.0]
+    assert nearest(row, x) == wanted
+    assert abs(row[wanted] - x) == min(abs(k - x) for k in row)
+
+
+def test_rectangles_that_share_a_border_do_not_overlap() -> None:
+    assert not overlap((0, 1, 0, 1), (1, 2, 0, 1), 1e-9)
+    assert not overlap((0, 1, 0, 1), (0, 1, -3, 0), 1e-9)
+    assert overlap((0, 1, 0, 1), (0.5, 2, 0.5, 2), 1e-9)
+    assert overlap((0, 3, 0, 3), (1, 2, 1, 2), 1e-9)
+
+
+def lines(*rows: tuple[float, int]) -> np.ndarray:
+    return np.array([[at, 0.0, 1.0, outside] for at, outside in rows])
+
+
+def test_a_ray_has_four_knots_at_each_outline_and_each_inner_edge_once() -> None:
+    ray = Ray(lines((2.0, 0), (0.0, 1), (1.0, 0), (1.0, 0), (3.0, 2)), 1e-9)
+    assert ray.row(1.5) == ([0.0] * 4 + [1.0, 2.0] + [3.0] * 4, 0.0, 3.0)
+
+
+def test_a_ray_stays_on_its_side_of_a_hole() -> None:
+    ray = Ray(lines((0.0, 1), (1.0, 0), (2.0, 2), (5.0, 1), (6.0, 0), (7.0, 2)), 1e-9)
+    assert ray.row(0.5) == ([0.0] * 4 + [1.0] + [2.0] * 4, 0.0, 2.0)
+    assert ray.row(6.5) == ([5.0] * 4 + [6.0] + [7.0] * 4, 5.0, 7.0)
+
+
+def test_a_ray_that_ends_without_outline_goes_on_in_equal_steps() -> None:
+    row, low, high = Ray(lines((1.0, 0), (2.0, 0), (4.0, 0)), 1e-9).row(2.0)
+    assert row == [-2.0, -1.0, 0.0, 1.0, 2.0, 4.0, 6.0, 8.0, 10.0]
+    assert (low, high) == (-np.inf, np.inf)
+
+
+def test_a_layout_is_flat_around_each_face_and_lays_nothing_twice() -> None:
+    mesh = Complex(parse(Location(Path("cube.tsm")), cube_tsm()))
+    for face in (0, 7, 20):
+        layout = Layout(mesh, face)
+        rects = list(layout.rects.values())
+        assert layout.rects[face][::2] == (0.0, 0.0)
+        assert not any(overlap(a, b, mesh.near) for k, a in enumerate(rects) for b in rects[:k])
+        areas = [(b - a) * (d - c) for a, b, c, d in rects]
+        sizes = [np.prod([side[0] for side in mesh._sides(mesh.loops[f])]) for f in layout.rects]
+        assert areas == pytest.approx(sizes)
