@@ -1,8 +1,6 @@
 """Evaluators of vertices: on the processor by the head's own engine, or on the graphics processor from control points.
 
-On the graphics processor only control points are uploaded each frame. Weights lie in a texture of floats, uploaded
-once, and one pass with transform feedback writes positions and normals into the buffers that are drawn. Textures are
-used like buffer textures, but without their limit of 65,536 texels in OpenGL 3.1.
+On the graphics processor only control points are uploaded each frame; see :mod:`.vertex_sums`.
 """
 
 from __future__ import annotations
@@ -14,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.base.errors import ViewError
-from surface.view.draw.programs import build, set_uniforms
+from surface.view.draw.vertex_sums import SAMPLERS, WIDTH, VertexSums
 from surface.view.scene.parts import ViewHead, ViewPart
 from surface.view.scene.sampling import is_software
 
@@ -25,8 +23,6 @@ if TYPE_CHECKING:
     from surface.head.posing.part import Turn
 
 EVALUATORS = ("auto", "cpu", "gpu")
-_WIDTH = 1024
-_SAMPLERS = 2
 _IDENTITY = np.eye(3)
 
 
@@ -76,30 +72,20 @@ class GpuEvaluator(Evaluator):
         from surface.head.posing.influence import Influence  # compiled: loaded when first used
         from surface.head.posing.kernels import place_vertices
 
-        self._own, self.reason, self._ctx, self._place = head, reason, ctx, place_vertices
+        self._own, self.reason, self._place = head, reason, place_vertices
         self._sums = Influence(head)
         starts = self._sums.part_start.tolist()
         self._ranges = {part.name: ends for part, ends in zip(head.parts, pairwise(starts), strict=True)}
-        self._program = build(
-            ctx, ("place.vert",), (), outputs=("out_position", "out_normal"), defines={"WIDTH": _WIDTH}
-        )
-        entries = np.column_stack([self._sums.weights, self._sums.ids]).astype(np.float32)
-        self._weights = _float_texture(ctx, len(entries))
-        self._weights.write(_padded(entries, self._weights.height).tobytes())
-        self._points = _float_texture(ctx, self._sums.points)
-        self._packed = _padded(np.zeros((self._sums.points, 4), np.float32), self._points.height)
-        self._passes: dict[str, tuple[moderngl.Buffer, moderngl.VertexArray]] = {}
+        self._vertex_sums = VertexSums(ctx, self._sums)
+        self._points = np.zeros((self._sums.points, 4), np.float32)
         self._read: dict[tuple[str, int], tuple[np.ndarray, ...]] = {}
-        # A context without a window has no framebuffer of its own, and without one transform feedback does nothing.
-        self._frame = ctx.framebuffer([ctx.renderbuffer((1, 1), 4)])
         self._turn: Turn | None = None
         self._changed = True
-        set_uniforms(self._program, {"points": 0, "weights": 1})
 
     def pose(self, values: np.ndarray) -> None:
         placed, turn = self._own.place_points(values)
         points = np.concatenate(placed).astype(np.float32)
-        old = self._packed[: len(points), :3]
+        old = self._points[:, :3]
         same = self._turn is not None and np.array_equal(self._turn.matrix, turn.matrix) and np.array_equal(old, points)
         old[:], self._turn = points, turn
         self._changed |= not same
@@ -108,29 +94,10 @@ class GpuEvaluator(Evaluator):
         if not self._changed or self._turn is None:
             return 0
         self._changed = False
-        angle = float(np.linalg.norm(self._turn.vector))
-        axis = self._turn.vector / max(angle, 1e-12)
-        set_uniforms(self._program, {"axis": axis, "angle": angle, "pivot": self._turn.pivot})
-        self._points.write(self._packed.tobytes())
-        self._frame.use()
-        self._points.use(0)
-        self._weights.use(1)
+        self._vertex_sums.update(self._points[:, :3], self._turn)
         for buffers in parts:
-            self._pass(buffers.part).transform(buffers.feedback, vertices=len(buffers.part.vertices))
+            self._vertex_sums.write(buffers.feedback, *self._ranges[buffers.part.name])
         return len(self._sums.share)
-
-    def _pass(self, part: ViewPart) -> moderngl.VertexArray:
-        """The transform feedback that fills a part's buffer."""
-        if part.name not in self._passes:
-            first, last = self._ranges[part.name]
-            rows = np.zeros(last - first, [("first", "i4"), ("count", "i4"), ("share", "f4")])
-            rows["first"] = self._sums.start[first:last]
-            rows["count"] = np.diff(self._sums.start[first : last + 1])
-            rows["share"] = self._sums.share[first:last]
-            content = self._ctx.buffer(rows.tobytes())
-            array = self._ctx.vertex_array(self._program, [(content, "1i 1i 1f", "first", "count", "share")])
-            self._passes[part.name] = content, array
-        return self._passes[part.name][1]
 
     def positions(self, part: ViewPart, ids: np.ndarray) -> np.ndarray:
         key = part.name, id(ids)
@@ -139,7 +106,7 @@ class GpuEvaluator(Evaluator):
         _, start, own, weights, share = self._read[key]
         at = np.empty((len(ids), 3))
         vector, pivot = (np.zeros(3), np.zeros(3)) if self._turn is None else (self._turn.vector, self._turn.pivot)
-        self._place(start, own, weights, self._packed, share, vector, pivot, at)
+        self._place(start, own, weights, self._points, share, vector, pivot, at)
         return at
 
     def _sums_of(self, part: ViewPart, ids: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -154,10 +121,7 @@ class GpuEvaluator(Evaluator):
         return _IDENTITY if self._turn is None else self._turn.matrix
 
     def release(self) -> None:
-        passes = [thing for content, array in self._passes.values() for thing in (array, content)]
-        frame = (*self._frame.color_attachments, self._frame)
-        for thing in (*passes, *frame, self._points, self._weights, self._program):
-            thing.release()
+        self._vertex_sums.release()
 
 
 def choose(ctx: moderngl.Context, head: ViewHead, name: str) -> Evaluator:
@@ -185,21 +149,9 @@ def why_not_gpu(info: Mapping[str, Any], head: ViewHead) -> str | None:
     """Why a head cannot be evaluated on the graphics processor that `info` describes, or None."""
     if not hasattr(head, "place_points"):
         return f"{type(head).__name__} has no control points"
-    if info["GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS"] < _SAMPLERS:
+    if info["GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS"] < SAMPLERS:
         return "vertex shaders here read no textures"
-    most = max((len(part.vertices) for part in head.parts), default=0) * 64 // _WIDTH
-    if info["GL_MAX_TEXTURE_SIZE"] < max(_WIDTH, most):
+    most = max((len(part.vertices) for part in head.parts), default=0) * 64 // WIDTH
+    if info["GL_MAX_TEXTURE_SIZE"] < max(WIDTH, most):
         return f"textures of {info['GL_MAX_TEXTURE_SIZE']} texels are too small for the weights"
     return None
-
-
-def _float_texture(ctx: moderngl.Context, count: int) -> moderngl.Texture:
-    """A texture with room for `count` rows of four floats, `_WIDTH` a line."""
-    texture = ctx.texture((_WIDTH, max(1, -(-count // _WIDTH))), 4, dtype="f4")
-    texture.filter = (ctx.NEAREST, ctx.NEAREST)
-    return texture
-
-
-def _padded(rows: np.ndarray, lines: int) -> np.ndarray:
-    """`rows` (k, 4) float32 padded with zeros to whole lines of a texture."""
-    return np.pad(rows, ((0, lines * _WIDTH - len(rows)), (0, 0)))

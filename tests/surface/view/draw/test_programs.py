@@ -87,7 +87,13 @@ def test_uniforms_of_every_kind(gl: None) -> None:
 def test_a_program_without_fragments_fills_a_buffer(gl: None) -> None:
     ctx = open_context()
     try:
-        made = build(ctx, ("place.vert",), (), outputs=("out_position", "out_normal"), defines={"WIDTH": 64})
+        made = build(
+            ctx,
+            ("sum.glsl", "turn.glsl", "place.vert"),
+            (),
+            outputs=("out_position", "out_normal"),
+            defines={"WIDTH": 64},
+        )
         assert {"first", "count", "share"} <= set(made)
     finally:
         ctx.release()
