@@ -190,7 +190,7 @@ def test_a_table_is_interpolated_and_kept_inside(tmp_path: Path) -> None:
         ("pitch,roll,left,right\n0,0,1,2\n", "pitch: needs two values or more"),
         ("pitch,roll,left,right\n0,0,1,2\n1,1,1,2\n", "there is no row for pitch = 0, roll = 1, and 1 more"),
         ("pitch,roll,left,right\n0,0,1,2\n0,0,1,2\n1,1,2,3\n", "pitch = 0, roll = 0 stands there twice"),
-        ("pitch,roll,left,right\n0,0,1,x\n", "row 2: a number is missing"),
+        ("# by hand\n\npitch,roll,left,right\n0,0,1,x\n", "line 4: a number is missing"),
     ],
 )
 def test_a_wrong_table_says_what_is_wrong(tmp_path: Path, content: str, fault: str) -> None:

@@ -79,19 +79,20 @@ def _place(names: list[str], values: Iterable[float]) -> str:
 def _rows(path: Path, names: list[str]) -> Floats:
     """(r, names) the numbers of a file. Raises ConfigError: it cannot be read, or a column or number is missing."""
     with reading(path, ConfigError):
-        lines = [line for line in read_text(path, _MOST_BYTES).splitlines() if line.strip() and line[0] != "#"]
-    head = [cell.strip() for cell in lines[0].split(",")] if lines else []
+        lines = list(enumerate(read_text(path, _MOST_BYTES).splitlines(), 1))
+    lines = [(number, line) for number, line in lines if line.strip() and line[0] != "#"]
+    head = [cell.strip() for cell in lines[0][1].split(",")] if lines else []
     if lacking := [name for name in names if name not in head]:
         raise config_error(path, [f"there is no column {name!r}" for name in lacking])
     if len(lines) > _MOST_ROWS:
         raise config_error(path, [f"has {len(lines)} rows; {_MOST_ROWS} at most"])
     columns = [head.index(name) for name in names]
     rows = []
-    for number, line in enumerate(lines[1:], 2):
+    for number, line in lines[1:]:
         cells = line.split(",")
         found = [plain_number(cells[i].strip()) if i < len(cells) else None for i in columns]
         if any(each is None for each in found):
-            raise config_error(path, [f"row {number}: a number is missing"])
+            raise config_error(path, [f"line {number}: a number is missing"])
         rows.append(found)
     return np.array(rows, dtype=np.float64).reshape(-1, len(names))
 
