@@ -21,7 +21,6 @@ ALLOWED = {
     "controller/base/steal_time.py": "the kernel's counters",
     "controller/body/sources.py": "a voice may come from a named pipe or a device",
     "controller/face/face.py": "the kernel's counters",
-    "controller/panels/session/sound.py": "a WAV file within files.reading",
     "controller/tools/bench_bus.py": "shipped stages, and reports that it wrote itself",
     "drivers/boards/hobby.py": "omote's own tables",
     "drivers/port/serialport.py": "the kernel's settings of a port",

@@ -7,12 +7,15 @@ import subprocess
 import sys
 import tempfile
 import wave
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+import numpy as np
+
 from controller.base.errors import ControllerError
-from surface.base.files import reading
+from controller.takes.voices.pcm import HINT, Sound, open_sound
+from surface.base.files import open_file, reading
 
 PLAYERS: tuple[tuple[str, ...], ...] = (
     ("pw-play",), ("paplay",), ("aplay", "-q"), ("afplay",), ("ffplay", "-nodisp", "-autoexit", "-loglevel", "error"),
@@ -20,7 +23,7 @@ PLAYERS: tuple[tuple[str, ...], ...] = (
 )  # fmt: skip
 """Programs that play a WAV file, the likeliest first."""
 _WINDOWS = "import sys, winsound; winsound.PlaySound(sys.argv[1], winsound.SND_FILENAME)"
-_HINT = "a WAV of 8 to 32 bit PCM; another: ffmpeg -i FILE sound.wav"
+_BLOCK = 1 << 16  # frames
 
 
 def find_player() -> tuple[str, ...] | None:
@@ -31,9 +34,9 @@ def find_player() -> tuple[str, ...] | None:
 
 
 def sound_length_s(path: Path) -> float:
-    """How long a WAV file is. Raises ControllerError: it cannot be read, or is none."""
-    with reading(path, ControllerError, hint=_HINT), _opened(path) as found:
-        return found.getnframes() / found.getframerate()
+    """How long the samples of a WAV file are. Raises ControllerError: it cannot be read, or is none."""
+    with _opened(path) as sound:
+        return sum(len(block) // sound.format.frame for block in _blocks(sound)) / sound.format.rate_hz
 
 
 class SoundPlayer:
@@ -78,22 +81,32 @@ class SoundPlayer:
         self._process = self._rest = None
 
 
-def _opened(path: Path) -> wave.Wave_read:
-    try:
-        return wave.open(str(path), "rb")
-    except (wave.Error, EOFError) as error:
-        raise ControllerError(f"{path}: is no sound that can be played: {error}", hint=_HINT) from error
+@contextmanager
+def _opened(path: Path) -> Iterator[Sound]:
+    with reading(path, ControllerError, hint=HINT), open_file(path) as stream:
+        yield open_sound(stream, str(path))
+
+
+def _blocks(sound: Sound) -> Iterator[bytes]:
+    """What is left of a sound."""
+    while block := sound.read(_BLOCK):
+        yield block
 
 
 def _from(path: Path, from_s: float) -> Path | None:
-    """A WAV file of what comes after a moment: not every player can begin in the middle. None where nothing does."""
-    with reading(path, ControllerError, hint=_HINT), _opened(path) as whole:
-        first = round(max(from_s, 0.0) * whole.getframerate())
-        if first >= whole.getnframes():
-            return None
-        whole.setpos(first)
-        with tempfile.NamedTemporaryFile(prefix="omote-", suffix=".wav", delete=False) as file:
-            with wave.open(file, "wb") as rest:
-                rest.setparams(whole.getparams())
-                rest.writeframes(whole.readframes(whole.getnframes() - first))
-            return Path(file.name)
+    """A WAV file of what comes after a moment, as 16 bit PCM: not every player can begin in the middle, or reads every
+    kind of WAV. None where nothing comes."""
+    with _opened(path) as sound:
+        form = sound.format
+        skip = round(max(from_s, 0.0) * form.rate_hz)
+        while skip > 0 and (block := sound.read(min(skip, _BLOCK))):
+            skip -= len(block) // form.frame or skip
+        parts = [np.rint(form.frames(block) * 32767.0).astype("<i2") for block in _blocks(sound)]
+    if not any(map(len, parts)):
+        return None
+    with tempfile.NamedTemporaryFile(prefix="omote-", suffix=".wav", delete=False) as file:
+        with wave.open(file, "wb") as rest:
+            rest.setparams((form.channels, 2, form.rate_hz, 0, "NONE", ""))
+            for part in parts:
+                rest.writeframes(part.tobytes())
+        return Path(file.name)

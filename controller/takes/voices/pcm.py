@@ -52,9 +52,13 @@ class SoundFormat:
 
         Samples that are no finite number count as 0; those beyond -1..1, which floating point can hold, are clipped.
         """
-        whole = len(data) // self.frame * self.frame
-        mixed: Floats = self._each(data[:whole]).reshape(-1, self.channels).mean(axis=1, dtype=np.float64)
+        mixed: Floats = self.frames(data).mean(axis=1, dtype=np.float64)
         return mixed
+
+    def frames(self, data: bytes) -> Floats:
+        """(k, channels) float64 samples -1..1, as :meth:`samples` of one channel."""
+        whole = len(data) // self.frame * self.frame
+        return self._each(data[:whole]).reshape(-1, self.channels)
 
     def _each(self, data: bytes) -> Floats:
         if self.kind == _FLOAT:
