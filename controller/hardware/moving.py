@@ -101,7 +101,7 @@ class Sampler:
     def moved(self) -> Moved:
         """What was measured so far."""
         found = Moved(peak_current_a=self.current_a, peak_load=self.share, least_voltage_v=self.voltage_v)
-        if self.goals:
+        if len(self.goals) > 1:  # one sample is no movement
             found.wanted_rad = max(self.goals) - min(self.goals)
             found.moved_rad = max(self.positions) - min(self.positions)
             found.along = _together(self.goals, self.positions)
