@@ -51,6 +51,7 @@ class Material:
     uniforms : uniforms of this frame.
     two_sided : whether back faces are drawn.
     blended : whether the fragment's alpha blends it with the picture behind.
+    covering : whether the fragment's alpha decides how many of a pixel's samples it covers.
     order : lower is drawn earlier; what hides most comes first.
     """
 
@@ -59,6 +60,7 @@ class Material:
     uniforms: Callable[[ViewPart, Theme, Openings], Mapping[str, Any]]
     two_sided: bool = False
     blended: bool = False
+    covering: bool = False
     order: int = 0
 
 
@@ -292,7 +294,10 @@ def _worn_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
 
 def _worn(program: str, order: int, *, two_sided: bool = False) -> Material:
     """Hair or cloth, drawn before the skin, which it hides; of hair all over the skull only the near side is drawn."""
-    return Material(program, _worn_static, lambda part, theme, openings: {}, two_sided=two_sided, order=order)
+    covering = program == "strand"
+    return Material(
+        program, _worn_static, lambda part, theme, openings: {}, two_sided=two_sided, covering=covering, order=order
+    )
 
 
 MATERIALS: dict[str, Material] = {

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from surface.view.draw.decimated_draw import DrawCall
 
 QUALITIES = ("full", "fast")
+_ALPHA_TO_COVERAGE = 0x809E  # GL_SAMPLE_ALPHA_TO_COVERAGE, which moderngl does not name
 _LOW_DEG = -12.0  # from further below, as from behind, the picture shows that the bust is hollow
 
 
@@ -154,7 +155,7 @@ class Renderer:
         self._aim(camera, width / max(height, 1))
         self._detail.use(0)
         for buffers in self._parts:
-            self._draw_part(buffers)
+            self._draw_part(buffers, multisampled=target.samples > 1)
         self.ctx.enable_only(self.ctx.DEPTH_TEST)
         theme = self.theme
         set_uniforms(self._programs["background"], {"top": theme.background_top, "bottom": theme.background_bottom})
@@ -173,16 +174,23 @@ class Renderer:
         """Change the gradient; sRGB colours 0..1."""
         self.theme = replace(self.theme, background_top=top, background_bottom=bottom)
 
-    def _draw_part(self, buffers: PartBuffers | DrawCall) -> None:
+    def _draw_part(self, buffers: PartBuffers | DrawCall, *, multisampled: bool) -> None:
         """One part with its material's uniforms and culling."""
         material = materials.material_of(buffers.part.material)
+        if material.covering:
+            set_uniforms(self._programs[material.program], {"multisampled": int(multisampled)})
         set_uniforms(self._programs[material.program], material.uniforms(buffers.part, self.theme, self.openings))
         hollow = self._into_bust and material.program == "skin"
         flags = self.ctx.DEPTH_TEST
         flags |= 0 if material.two_sided or hollow else self.ctx.CULL_FACE
         flags |= self.ctx.BLEND if material.blended else 0
         self.ctx.enable_only(flags)
+        if not (material.covering and multisampled):
+            buffers.draw()
+            return
+        self.ctx.enable_direct(_ALPHA_TO_COVERAGE)
         buffers.draw()
+        self.ctx.disable_direct(_ALPHA_TO_COVERAGE)
 
     def _apply_theme(self) -> None:
         """Set the uniforms that do not change with camera or pose."""

@@ -1,6 +1,7 @@
 // Strands: locks part and thin out where their cover falls below a strand's height.
 #define STEADY 0.2  // a strand keeps its height along its length, so that no piece of it is left by itself
 uniform sampler2D detail;
+uniform bool multisampled;  // alpha then decides how many samples of a pixel a strand covers
 
 in vec3 v_colour;
 in vec4 v_strand;
@@ -21,7 +22,9 @@ void main() {
     float height = 0.5 + 1.0 * (noise.w - 0.5) + 0.6 * (noise.x - 0.5) + 0.5 * (fine.w - 0.5);
     noise = mix(noise, fine, 0.6);
 #endif
-    if (height > v_strand.z) {
+    float over = v_strand.z - height;
+    float cover = multisampled ? clamp(over / max(fwidth(over), 1e-4) + 0.5, 0.0, 1.0) : step(0.0, over);
+    if (cover <= 0.0) {
         discard;
     }
     vec3 lit = v_colour * (0.45 + 1.1 * noise.y + 0.9 * (noise.w - 0.5));
@@ -30,5 +33,5 @@ void main() {
     lit += v_through * shine(sine, THROUGH) * (0.4 + 1.2 * noise.x);
     lit += key_colour * (v_surface * shine(sine, SURFACE) * (0.2 + 1.6 * noise.y));
 #endif
-    colour = vec4(encode(lit), 1.0);
+    colour = vec4(encode(lit), cover);
 }

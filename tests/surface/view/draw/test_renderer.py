@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from ball_head import RADII, BallHead, BallPart, ball, grid, values
 from surface.base.errors import ViewError
 from surface.head import Head
 from surface.view import Camera, Offscreen, Theme
+from surface.view.draw import materials
 from surface.view.draw.renderer import light_direction
 from surface.view.scene.bounds import Bands
 from surface.view.scene.theme import THEMES, Light, find_theme
@@ -333,3 +335,33 @@ def test_backs_are_drawn_of_two_sided_materials_only(gl: None, quality: str, mat
         with Offscreen(head, SIZE, quality=quality) as screen:
             drawn.append(screen.render(values()).astype(int))
     assert (np.abs(middle(drawn[1], 0.5, 0.5) - middle(drawn[0], 0.5, 0.5)).max() > 20.0) == seen
+
+
+class HairyHead(BallHead):
+    """A ball whose upper half has strands that thin out downwards."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        points, normals, triangles = ball(1.03 * RADII, 61, 81)
+        high = points[:, 1] / RADII[1]
+        uv = np.column_stack([4.0 * np.arctan2(points[:, 0], points[:, 2]), 2.0 * high])
+        strands = np.column_stack([uv, np.clip(0.5 + 1.2 * high, 0.0, 1.0), np.ones(len(points))])
+        cap = BallPart("hair", "strand", triangles, points, normals)
+        cap.attributes = {"strands": strands.astype(np.float32), "albedo": np.full((len(points), 3), 0.02, np.float32)}
+        self.parts = (*self.parts, cap)
+
+
+def test_strands_cover_a_share_of_a_pixel_where_it_has_several_samples(
+    gl: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As much hair as with whole pixels, but without their steps."""
+    pictures = []
+    for covering in (True, False):
+        whole = replace(materials.MATERIALS["strand"], covering=covering)
+        monkeypatch.setitem(materials.MATERIALS, "strand", whole)
+        with Offscreen(HairyHead(), SIZE, samples=4) as screen:
+            pictures.append(screen.render(values()).astype(int))
+    shared, stepped = pictures
+    steps = [int((np.abs(np.diff(picture[60:100], axis=1)).max(axis=2) > 90).sum()) for picture in pictures]
+    assert 0 < steps[0] < 0.75 * steps[1]
+    assert shared.mean() == pytest.approx(stepped.mean(), rel=0.005)
