@@ -1,9 +1,9 @@
 """Clean-up that runs exactly once on every way out of a program: end, exception, exit, SIGINT, SIGTERM and SIGHUP.
 
 A signal handler may interrupt a transaction half way, so it does not touch the bus itself: it raises, the transaction
-unwinds, and the clean-up runs afterwards while further signals are held back. Python drops what is raised while a
-destructor or a callback runs; that is noticed, and raised again. SIGKILL cannot be caught; the servos' own bus watchdog
-covers it.
+unwinds, and the clean-up runs afterwards while further signals are held back. Python drops exceptions that are raised
+in destructors and callbacks; a hook raises those of signals again. SIGKILL cannot be caught; the servos' own bus
+watchdog covers it.
 """
 
 from __future__ import annotations
@@ -30,11 +30,12 @@ def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
     """Context manager that runs ``stop``, as ``bus.close``, exactly once, however the context is left.
 
     Raises KeyboardInterrupt: on SIGINT, after ``stop`` ran. SystemExit: on SIGTERM and SIGHUP with code 128 + signal,
-    after ``stop`` ran.
+    after ``stop`` ran; also where the signal came while ``stop`` ran at the ordinary end of the context.
 
     Notes
     -----
     Only the main thread receives signals; in another thread the handlers stay unchanged, and all else still applies.
+    SIGHUP stays ignored where it is, as under nohup.
     """
     first_call = threading.Lock()  # taken by the first call, never released
 
@@ -48,24 +49,32 @@ def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
         except Exception:
             log.exception("clean-up at exit failed")
 
+    held: list[int] = []
+
+    def hold_back(number: int, frame: FrameType | None) -> None:
+        _hold_back(number, frame)
+        held.append(number)
+
     atexit.register(at_exit)
     previous = _install(_raise_signal)
     try:
         with _raise_dropped_signals_again(previous):
             yield
     finally:
-        _install(_hold_back, previous)
+        _install(hold_back, previous)
         try:
             stop_once()
         finally:
             atexit.unregister(at_exit)
             for number, handler in previous.items():
-                signal.signal(number, handler)
+                signal.signal(number, signal.SIG_DFL if handler is None else handler)  # None: not set from Python
+    if held:  # nothing else ends the program
+        raise _signal_error(held[0])
 
 
 @contextmanager
 def _raise_dropped_signals_again(numbers: Any) -> Iterator[None]:
-    """Raise again what Python dropped of a signal, as in a destructor; does nothing where no handler is installed."""
+    """Raise again the exception of a signal that Python dropped, as in a destructor; does nothing without handlers."""
     if not numbers:
         yield
         return
@@ -104,21 +113,26 @@ def _raise_in(frame: FrameType | None, number: int) -> None:
         sys.settrace(None)
         _raise_signal(number, None)
 
-    sys.settrace(lambda *_: None)  # a frame is traced only while its thread is
+    sys.settrace(lambda *_: None)  # f_trace works only while the thread has a trace function
     frame.f_trace = trace
 
 
-def _install(handler: Callable[[int, FrameType | None], None], only: Any = SIGNALS) -> dict[int, Any]:
+def _install(handler: Callable[[int, FrameType | None], None], signals: Any = SIGNALS) -> dict[int, Any]:
+    """Install a handler; returns those before it. SIGHUP that is ignored stays so."""
     if threading.current_thread() is not threading.main_thread():
         return {}
-    return {number: signal.signal(number, handler) for number in only}
+    ignored = getattr(signal, "SIGHUP", None)
+    ignored = ignored if ignored is not None and signal.getsignal(ignored) is signal.SIG_IGN else None
+    return {number: signal.signal(number, handler) for number in signals if number != ignored}
 
 
 def _raise_signal(number: int, frame: FrameType | None) -> None:
     _install(_hold_back)  # a second signal must not interrupt the way out
-    if number == signal.SIGINT:
-        raise KeyboardInterrupt
-    raise SystemExit(128 + number)
+    raise _signal_error(number)
+
+
+def _signal_error(number: int) -> BaseException:
+    return KeyboardInterrupt() if number == signal.SIGINT else SystemExit(128 + number)
 
 
 def _hold_back(number: int, frame: FrameType | None) -> None:
@@ -126,7 +140,10 @@ def _hold_back(number: int, frame: FrameType | None) -> None:
 
 
 class Closers(ExitStack):
-    """An exit stack that runs every callback and reports all errors, not only the last one."""
+    """An exit stack that runs every callback and reports all errors, not only the last one, in :meth:`close`.
+
+    As a context manager it logs them only: an error that leaves the context counts more.
+    """
 
     def __init__(self) -> None:
         super().__init__()

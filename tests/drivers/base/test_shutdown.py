@@ -62,7 +62,7 @@ def run(root: Path, how: str, send: int | None = None) -> tuple[int, str]:
 @pytest.mark.parametrize(
     ("how", "send", "code"),
     [
-        ("end", None, 0),
+        ("end", None, -signal.SIGINT),  # that of the clean-up, which nothing else ends the program for
         ("exit", None, 5),
         ("raise", None, 1),
         ("sleep", signal.SIGTERM, 143),
@@ -75,6 +75,28 @@ def run(root: Path, how: str, send: int | None = None) -> tuple[int, str]:
 def test_every_way_out_stops_exactly_once(root: Path, how: str, send: int | None, code: int) -> None:
     status, out = run(root, how, send)
     assert (status, out.replace("ready\n", "")) == (code, "stopped 1\n")
+
+
+def test_a_signal_at_the_ordinary_end_is_not_lost() -> None:
+    with pytest.raises(SystemExit) as caught, stop_on_signals(lambda: signal.raise_signal(signal.SIGTERM)):
+        pass
+    assert caught.value.code == 128 + signal.SIGTERM
+
+
+def test_an_error_that_ends_the_program_counts_more_than_a_signal_after_it() -> None:
+    with pytest.raises(OSError, match="no"), stop_on_signals(lambda: signal.raise_signal(signal.SIGTERM)):
+        raise OSError("no")
+
+
+def test_a_hangup_that_is_ignored_stays_ignored() -> None:
+    """As under nohup."""
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    try:
+        with stop_on_signals(lambda: None):
+            signal.raise_signal(signal.SIGHUP)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_handlers_are_put_back() -> None:
