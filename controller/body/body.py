@@ -115,7 +115,9 @@ class Body:
         """What plays scripts and keeps their events; the show that the options or the stage name begins."""
         events = None
         if options.events is not None:
-            events = EventLog(options.events, lsl=options.lsl)
+            remedy = "what came before is in it; start again with -o where there is room"
+            part = self.state.parts.add(Part(f"events {options.events}", remedy=remedy))
+            events = EventLog(options.events, lsl=options.lsl, failed=lambda error: part.fail(error, time.monotonic()))
             self._closers.callback(events.close)
         shows = Shows(self._find_show, self.state, self._show_names, events.note if events is not None else None)
         self.state.shows = shows

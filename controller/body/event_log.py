@@ -2,66 +2,52 @@
 
 from __future__ import annotations
 
-import logging
-import queue
-import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from controller.base.errors import ControllerError
+from controller.takes.line_writer import LineWriter
 from surface.base.extras import importing
 
-log = logging.getLogger(__name__)
-
-HEADER = "time_s,unix_s,event,text\n"
-_STOP_S = 3.0
+HEADER = b"time_s,unix_s,event,text\n"
 
 
 class EventLog:
-    """A table of events: seconds since the first of them, seconds since 1970, ``mark`` or ``line``, and which.
+    """A table of events: seconds since the first of them, seconds since 1970, ``mark`` or ``line``, and its text.
 
     A thread of its own writes, so that a slow disk does not delay the face.
 
-    lsl : send marks as a stream of LSL named ``omote``, too.
+    lsl : send marks as a stream of LSL named ``omote``, too. failed : called once, from any thread, when the file
+    cannot be written any more; it keeps the whole lines that are in it.
 
     Raises ControllerError: the file cannot be written. MissingPackage: pylsl is not installed.
     """
 
-    def __init__(self, path: Path, *, lsl: bool = False) -> None:
+    def __init__(self, path: Path, *, lsl: bool = False, failed: Callable[[Exception], object] | None = None) -> None:
         self._outlet = _outlet() if lsl else None
         try:
-            self._file = path.open("w", encoding="utf-8")
-            self._file.write(HEADER)
+            self._writer = LineWriter(path, failed or (lambda _: None))
         except OSError as error:
             raise ControllerError(
                 f"{path}: cannot be written: {error.strerror}", hint="choose another folder with -o"
             ) from error
+        self._writer.put(HEADER)
         self._begin_ns: int | None = None
-        self._waiting: queue.SimpleQueue[tuple[int, str, str] | None] = queue.SimpleQueue()
-        self._thread = threading.Thread(target=self._run, name=f"events {path}", daemon=True)
-        self._thread.start()
 
     def note(self, now_ns: int, event: str, text: str) -> None:
         """Write an event of the tick at ``now_ns`` (monotonic clock)."""
         if self._outlet is not None and event == "mark":
             self._outlet.push_sample([text])
-        self._waiting.put((now_ns, event, text))
+        self._begin_ns = now_ns if self._begin_ns is None else self._begin_ns
+        unix_s = time.time() - (time.monotonic_ns() - now_ns) * 1e-9
+        quoted = text.replace('"', '""')
+        self._writer.put(f'{(now_ns - self._begin_ns) * 1e-9:.6f},{unix_s:.6f},{event},"{quoted}"\n'.encode())
 
     def close(self) -> None:
-        """Write what waits."""
-        self._waiting.put(None)
-        self._thread.join(_STOP_S)
-
-    def _run(self) -> None:
-        with self._file:
-            while (found := self._waiting.get()) is not None:
-                now_ns, event, text = found
-                self._begin_ns = now_ns if self._begin_ns is None else self._begin_ns
-                unix_s = time.time() - (time.monotonic_ns() - now_ns) * 1e-9
-                quoted = text.replace('"', '""')
-                self._file.write(f'{(now_ns - self._begin_ns) * 1e-9:.6f},{unix_s:.6f},{event},"{quoted}"\n')
-                self._file.flush()
+        """Write the remaining events and close the file."""
+        self._writer.close()
 
 
 def _outlet() -> Any:

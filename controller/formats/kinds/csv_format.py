@@ -1,8 +1,8 @@
-"""Numbers between commas, as tables and plotting programs have them: a line of names, then a line for each frame.
+"""CSV: numbers between commas, as tables and plotting programs have them; a line of names, then one for each frame.
 
-The names are parameters and, if there is one, ``time`` (s). An empty cell gives nothing. The encoder repeats the names
-every two seconds, so that a receiver that begins late understands the rest. Where it is given what the servos show, it
-writes that in columns ``servos:jawOpen`` and so on, which the decoder leaves out.
+The names are parameters and, if there is one, ``time`` (s). An empty cell means that a parameter is not given. The
+encoder repeats the names every 120 frames, so that a receiver that begins late understands the rest. Where it is given
+what the servos show, it writes that in columns ``servos:jawOpen`` and so on, which the decoder leaves out.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from controller.formats.frame import Frame, Refusals
 
 _TIME = "time"
 MEASURED = "servos:"
-"""What the name of a column begins with that says what the servos show."""
+"""Prefix of the names of columns with what the servos show."""
 _REPEAT = 120
 _MOST_COLUMNS = 1024
 _LONGEST_CELL = 32
@@ -25,13 +25,18 @@ _LARGEST = 1e15
 
 
 class CsvDecoder:
-    """Reads lines; a line of which no cell is a number is a new line of names."""
+    """Reads lines; a line of which no cell is a number is a new line of names.
+
+    A new line of names in which some are unknown may be a damaged one of the same stream. It counts once it comes
+    twice, or once numbers follow that fit it and not the names before.
+    """
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
         self._parameters = parameters
         self._columns: list[int | None] = []
         self._time: int | None = None
+        self._offered: list[str] = []  # names of which some are unknown
 
     def feed(self, message: bytes) -> list[Frame]:
         """One frame for each line of numbers; a datagram may hold the names, too."""
@@ -43,6 +48,8 @@ class CsvDecoder:
         if not any(number is not None for number in numbers):
             self._name(cells)
             return []
+        if len(cells) != len(self._columns) and len(cells) == len(self._offered):
+            self._take(self._offered)
         if not self._columns or len(cells) != len(self._columns):
             self.refused.add(
                 "numbers before their names" if not self._columns else "a line with another number of cells"
@@ -56,12 +63,19 @@ class CsvDecoder:
         known = (at is not None or name == _TIME or name.startswith(MEASURED)
                  for at, name in zip(columns, folded, strict=True))  # fmt: skip
         unknown = not all(known)
-        if not any(at is not None for at in columns) or (
-            unknown and self._columns
-        ):  # damaged, of a stream that goes on
+        if not any(at is not None for at in columns):
             self.refused.add("neither names nor numbers")
-            return
-        self._columns, self._time = columns, folded.index(_TIME) if _TIME in folded else None
+        elif unknown and self._columns and folded != self._offered:
+            self.refused.add("unknown names")
+            self._offered = folded
+        else:
+            self._take(folded)
+
+    def _take(self, names: list[str]) -> None:
+        """Read the lines that follow by these names, in lower case."""
+        self._columns = [self._parameters.find(name) for name in names]
+        self._time = names.index(_TIME) if _TIME in names else None
+        self._offered = []
 
     def _frame(self, cells: list[str], numbers: list[float | None]) -> list[Frame]:
         values, mask = self._parameters.neutral(), np.zeros(len(self._parameters), dtype=bool)

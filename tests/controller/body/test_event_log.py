@@ -35,6 +35,16 @@ def test_a_folder_that_is_not_there_is_told(tmp_path: Path) -> None:
         EventLog(tmp_path / "none" / "events.csv")
 
 
+def test_a_full_disk_is_reported_once_and_the_show_goes_on() -> None:
+    failed: list[Exception] = []
+    events = EventLog(Path("/dev/full"), failed=failed.append)
+    for k in range(3):
+        events.note(time.monotonic_ns(), "line", f"SET jawOpen 0.{k}")
+        time.sleep(0.25)
+    events.close()
+    assert [str(error) for error in failed] == ["[Errno 28] No space left on device: '/dev/full'"]
+
+
 def test_marks_are_markers_of_lsl_and_lines_are_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pushed: list[Any] = []
     pylsl: Any = ModuleType("pylsl")

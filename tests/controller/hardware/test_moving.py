@@ -74,7 +74,7 @@ def test_what_a_shaft_did_is_measured(late: int) -> None:
 
 
 def test_a_servo_that_runs_away_from_its_goals_is_stopped_and_said_to_go_the_other_way() -> None:
-    with pytest.raises(NotMoved, match="2.6 degrees behind") as caught:
+    with pytest.raises(NotMoved, match=r"2\.6 degrees behind") as caught:
         moved(FormulaBus(gain=-0.1))
     assert caught.value.moved.along < 0.0
 

@@ -53,11 +53,27 @@ def test_the_standard_library_writes_what_is_read_and_reads_what_is_written() ->
         (["jawOpen,time", "x,1"], "cells that are no numbers"),
         (["jawOpen,time", "nan,1"], "cells that are no numbers"),
         (["jawOpen,cheekPuff", "jawOpn,x"], "neither names nor numbers"),
+        (["jawOpen,cheekPuff", "jawOpen,chxekPuff"], "unknown names"),
     ],
 )
 def test_what_is_wrong_is_refused_with_a_reason(lines: list[str], why: str) -> None:
     decoder = CsvDecoder(P)
     assert [found for found in feed(decoder, *lines) if found] == [] and decoder.refused == {why: 1}
+
+
+def test_a_damaged_line_of_names_leaves_those_before_it() -> None:
+    lines = ["time,jawOpen,cheekPuff", "0,0.1,0.2", "time,jaxOpen,cheekPuff", "1,0.3,0.4", "time,ja", "2,0.5,0.6"]
+    frames = feed(CsvDecoder(P), *lines)
+    assert [face for face in frames if face] == [
+        {"jawOpen": 0.1, "cheekPuff": 0.2}, {"jawOpen": 0.3, "cheekPuff": 0.4}, {"jawOpen": 0.5, "cheekPuff": 0.6},
+    ]  # fmt: skip
+
+
+def test_other_names_count_once_numbers_fit_them_alone_or_they_come_twice() -> None:
+    before = ["time,jawOpen", "0,0.1"]
+    assert feed(CsvDecoder(P), *before, "time,mine,cheekPuff", "1,7,0.4")[-1] == {"cheekPuff": 0.4}
+    assert feed(CsvDecoder(P), *before, "mine,cheekPuff", "7,0.4")[-1] == {"jawOpen": 0.4}
+    assert feed(CsvDecoder(P), *before, "mine,cheekPuff", "7,0.4", "mine,cheekPuff", "7,0.5")[-1] == {"cheekPuff": 0.5}
 
 
 def test_names_come_again_for_those_who_begin_late() -> None:
