@@ -1,7 +1,8 @@
-"""``omote demo``, ``run`` and ``play``: run a stage, or show what it would send."""
+"""``omote demo``, ``run``, ``edit``, ``play`` and ``convert``: run a stage, or show what it would send."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -44,7 +45,7 @@ StageName = Annotated[str, typer.Option("--stage", help=STAGE, autocompletion=na
 def demo(
     seconds: Seconds = None,
     headless: Headless = False,
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures and report.")] = Path("out"),
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures and report (no window).")] = Path("out"),
 ) -> None:
     """Play a demonstration: a simulated robot host sends commands to the CG face and a simulated 24-servo head.
 
@@ -83,7 +84,7 @@ def run(
     ] = False,
     monitor: Annotated[int | None, typer.Option(help="Monitor of the full screen, from 0.")] = None,
     quality: Annotated[str | None, typer.Option(help="full, fast, or auto: whichever holds --fps.")] = None,
-    fps: Annotated[float | None, typer.Option(help="Frames per second wanted, which are not exceeded.")] = None,
+    fps: Annotated[float | None, typer.Option(help="Frames per second: wanted, and the most.")] = None,
     theme: Annotated[str | None, typer.Option(help="skin, mask or robot.")] = None,
     camera: Annotated[str | None, typer.Option(help="front, three-quarter, profile and so on.")] = None,
     evaluator: Annotated[str | None, typer.Option(help="Where vertices are computed: auto, cpu or gpu.")] = None,
@@ -92,10 +93,12 @@ def run(
         typer.Option("--web", metavar="HOST:PORT", help="Serve a web panel; 127.0.0.1:8080 without an address."),
     ] = None,
     role: Annotated[
-        str | None, typer.Option("--role", help="Of this process, with [zenoh]: conductor, head, face or recorder.")
+        str | None,
+        typer.Option("--role", help="Role of this process, with [zenoh]: conductor, head, face or recorder."),
     ] = None,
     heads: Annotated[
-        str | None, typer.Option("--heads", metavar="NAME[,NAME]", help="Heads of this process, with [zenoh].")
+        str | None,
+        typer.Option("--heads", metavar="NAME[,NAME]", help="Heads of this process, with [zenoh]."),
     ] = None,
     vocabulary: Vocabularies = None,
 ) -> None:
@@ -323,7 +326,8 @@ def _dry_run(
             table.add_row(*channel.values())
         show_table(table)
         if found.seconds < found.length_s:
-            console.print(f"The rest was not computed; --seconds {found.length_s:.1f} computes all.", soft_wrap=True)
+            enough = math.ceil(found.length_s)
+            console.print(f"The rest was not computed; --seconds {enough} computes all.", soft_wrap=True)
     else:
         console.print("This stage has no robot; nothing would be sent.", soft_wrap=True)
     if report is not None:

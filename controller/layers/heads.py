@@ -1,4 +1,4 @@
-"""The heads of a run by name, groups of them, and turn-taking: whom a command means.
+"""The heads of a run by name, groups of them, and turn-taking: which heads a command addresses.
 
 Every head is a :class:`controller.layers.commands.CommandSink` of its own. :meth:`Heads.find` gives the sink of a name,
 a group, or everybody; links pass on commands to what it gives.
@@ -33,7 +33,7 @@ class Heads:
         self.turns: Turns | None = None
 
     def add(self, state: HeadSink) -> None:
-        """Know one more head, by its name."""
+        """Register a head by its name."""
         self._members[state.name.lower()] = state
 
     @property
@@ -170,7 +170,7 @@ class Group:
 
     def _refuse(self) -> None:
         names = ", ".join(state.name for state in self.members)
-        raise ParameterError(f"@{self.name} is several heads: a question needs one of {names}",
+        raise ParameterError(f"@{self.name} addresses several heads; a question needs one of {names}",
                              hint=f"ask one: @{self.members[0].name}")  # fmt: skip
 
 
@@ -207,7 +207,7 @@ class _Players:
 
 
 _LOUD = 0.04
-"""How far speech opens the jaw of who is heard."""
+"""How far speech opens the jaw of a head that counts as speaking."""
 _PAUSE_S = 0.7
 """A speaker that is silent for so long can lose its turn: longer than pauses within a sentence."""
 
@@ -227,14 +227,17 @@ class Turns:
         self.speaker: str | None = None
         self._manners: dict[str, str] = {}
         self._heard_ns: dict[str, int] = {}
+        self._passed_over: set[str] = set()  # spoke when the turn was taken from everybody, and have not paused since
 
     def give(self, name: str | None, stamp_ns: int) -> None:
-        """Give the turn to a head; None: to nobody, and everybody behaves and looks as before.
+        """Give the turn to a head; None: to nobody, and everybody behaves and looks as before. A head that is speaking
+        then has to pause before it takes the turn by itself.
 
         Raises ParameterError: no head is called so.
         """
         speaker = None if name is None else self._heads.head(name)
         if speaker is None:
+            self._passed_over = set(self._heard_ns)
             self._end(stamp_ns)
             return
         for state in self._heads.members:
@@ -254,8 +257,10 @@ class Turns:
             if state.loudness > _LOUD:
                 self._heard_ns[state.name] = now_ns
         loud = [name for name, at_ns in self._heard_ns.items() if now_ns - at_ns < _PAUSE_S * 1e9]
+        self._passed_over.intersection_update(loud)
+        loud = [name for name in loud if name not in self._passed_over]
         if self.speaker not in loud and loud:
-            self.give(min(loud, key=lambda name: -self._heard_ns[name]), now_ns)
+            self.give(max(loud, key=lambda name: self._heard_ns[name]), now_ns)
 
     def _end(self, stamp_ns: int) -> None:
         if self.speaker is None:

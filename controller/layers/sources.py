@@ -1,4 +1,4 @@
-"""Sources that the face has of its own: expressions, gaze and idle motion, each of which writes its layer."""
+"""The face's built-in sources: expressions, gaze and idle motion, each of which writes its layer."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 
 class Sources:
-    """Expressions, gaze and idle motion, and what each of them holds back of the others.
+    """Expressions, gaze and idle motion, and how much expressions suppress blinks, gaze and speech.
 
     present : (P,) the parameters shown now, which gaze reads. seed : the same seed gives the same idle motion.
     parts : a source that fails lets its layer fade out, and begins again.
@@ -49,7 +49,8 @@ class Sources:
         self._expression, self._looking = mixer["expression"], mixer["gaze"]
         self._idle, self._speech, self._jaw = mixer["idle"], mixer["speech"], parameters.index("jawOpen")
         self._everything = np.ones(len(parameters), dtype=bool)
-        self._blocks = (0.0, 0.0, 0.0)  # how much the expression holds back blinks, gaze and speech
+        self._blocks = (0.0, 0.0, 0.0)  # how much the expression suppresses blinks, gaze and speech
+        self._suppression = (0.0, 0.0)  # of blinks and gaze, as far as the expression's layer shows
         self._expressions = self._part("expressions", self._expression, self._write_expression, self._renew_expression)
         self._others = (
             self._part("idle motion", self._idle, self._write_idle, self._renew_idle),
@@ -59,9 +60,10 @@ class Sources:
     def write(self, now_s: float) -> None:
         """Let each source write its layer, as it is at a time (s)."""
         self._expressions.update(now_s)
-        _, gaze_block, mouth_block = (block * self._expressions.share for block in self._blocks)
-        self._looking.attenuate(gaze_block)
-        self._speech.attenuate(mouth_block)
+        blink, gaze, mouth = (block * self._expressions.share for block in self._blocks)
+        self._suppression = blink, gaze
+        self._looking.attenuate(gaze)
+        self._speech.attenuate(mouth)
         for source in self._others:
             source.update(now_s)
 
@@ -91,7 +93,7 @@ class Sources:
         self.gaze = Gaze(self._parameters)
 
     def _write_idle(self, now_s: float) -> None:
-        life, (blink_block, gaze_block, _) = self.life, self._blocks
+        life, (blink_block, gaze_block) = self.life, self._suppression
         if life.liveliness > 0.0:
             how = {"blink_block": blink_block, "gaze_block": gaze_block, "loudness": self.loudness}
             life.update(now_s, looking=self.gaze.active, **how)
@@ -113,5 +115,5 @@ class Sources:
 def finite(values: Floats) -> Floats:
     """``values`` unchanged. Raises ParameterError: not all of them are finite."""
     if not np.isfinite(values).all():
-        raise ParameterError("not all of its values are finite numbers")
+        raise ParameterError("it gave values that are no finite numbers")
     return values

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from controller.base.solve import BoundedSolver  # start-up: numba and scipy, only for reading back
 
 LETTERS = "ABCDE"
-"""Intensities of FACS, 0.2 to 1.0."""
+"""Letters of intensities of FACS, from 0.2 to 1.0."""
 
 _PREFIX = r"(?:AU|AD)"
 _TERM = re.compile(rf"([LR]?){_PREFIX}?([LR]?)([0-9]{{1,2}})([LR]?)([A-E]?)(?::(.*))?", re.IGNORECASE)
@@ -41,6 +41,7 @@ def _not_zero(weight: float) -> float:
     return weight
 
 
+_Number = Annotated[str, Field(pattern=r"^[1-9][0-9]?$")]
 _Level = Annotated[Number, Field(ge=-1, le=1), AfterValidator(_not_zero)]
 
 
@@ -57,13 +58,14 @@ class _Unit(Settings):
     @field_validator("weights")
     @classmethod
     def _given(cls, weights: dict[str, float], info: ValidationInfo) -> dict[str, float]:
-        if not (weights or info.data.get("left", True) or info.data.get("right", True)):
-            raise ValueError("missing")
+        halves = bool(info.data.get("left", True) or info.data.get("right", True))
+        if bool(weights) is halves:
+            raise ValueError("the unit has left or right, too: give one or the other" if halves else "missing")
         return weights
 
 
 class _File(Settings):
-    units: Annotated[dict[str, _Unit], Field(min_length=1)]
+    units: Annotated[dict[_Number, _Unit], Field(min_length=1)]
     emotions: dict[str, str] = {}
 
 
@@ -168,6 +170,8 @@ class Facs:
         """The emotion whose units ``values`` : (P,) show most, and its intensity 0..1; neutral when little shows."""
         levels = self.read(values) * self._facial
         names, templates = self._templates
+        if not names:
+            return "neutral", 1.0
         sizes = np.linalg.norm(templates, axis=1)
         likeness = templates @ levels / sizes
         best = int(np.argmax(likeness))
@@ -178,9 +182,10 @@ class Facs:
 
     @cached_property
     def _templates(self) -> tuple[list[str], Floats]:
-        """Emotions that show something, and what a read-out of them gives: (k, n)."""
-        names = [name for name, formula in self.emotions.items() if formula]
-        return names, np.array([self.read(self.expand(self.emotions[name])) for name in names])
+        """Emotions that show something in the face, and what a read-out of them gives: (k, n)."""
+        found = {name: self.read(self.expand(formula)) * self._facial for name, formula in self.emotions.items()}
+        shown = {name: levels for name, levels in found.items() if levels.any()}
+        return list(shown), np.array(list(shown.values())).reshape(len(shown), len(self.names))
 
     @cached_property
     def _solver(self) -> BoundedSolver:

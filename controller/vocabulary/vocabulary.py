@@ -39,7 +39,7 @@ class Vocabulary:
     def load(cls, parameters: Parameters, path: Path | None = None, more: Sequence[Path] = ()) -> Vocabulary:
         """Read a vocabulary of expressions; the shipped one without ``path``.
 
-        ``more`` : further files whose expressions are added, such as a user's own; they may mix those before them.
+        ``more`` : further files whose expressions are added, such as a user's own; they may combine those before them.
 
         Raises ConfigError: a file cannot be read or is wrong; every fault of every file with its key.
         """
@@ -52,9 +52,9 @@ class Vocabulary:
         return tuple(self._expressions)
 
     def add(self, expression: Expression) -> None:
-        """Know one more expression, or another one of the same name; those that name it show it from their next use.
+        """Add an expression, or replace that of its name; it takes effect at the next lookup.
 
-        May be called while others look expressions up. Raises ParameterError: its name is another name of another one.
+        May be called while others look expressions up. Raises ParameterError: its name is an alias of another one.
         """
         known = self._lookup.get(fold(expression.name), expression.name)
         if known != expression.name:
@@ -63,10 +63,13 @@ class Vocabulary:
         self._lookup = {**self._lookup, fold(expression.name): expression.name}
 
     def __getitem__(self, name: str) -> Expression:
-        """The expression called ``name``, any case, or of a formula.
+        """The expression called ``name``, in any case, or that of a formula where no expression is called so.
 
         Raises ParameterError: unknown name, with the nearest ones, or a wrong formula. ConfigError: a file is wrong.
         """
+        own = self._lookup.get(name) or self._lookup.get(fold(name))
+        if own is not None:
+            return self._expressions[own]
         if is_formula(name):
             return Expression(name.upper(), self._facs.expand(name), source="FACS")
         if mood := _MOOD.fullmatch(name):
@@ -78,13 +81,10 @@ class Vocabulary:
             shown = self._visemes.viseme(viseme[1])
             weights = self._visemes.matrix @ self._visemes.weights(shown)
             return Expression(f"VISEME:{shown}", weights, kind="gesture", source="viseme", onset_s=0.08, offset_s=0.12)
-        found = self._lookup.get(name) or self._lookup.get(fold(name))
-        if found is None:
-            raise ParameterError(
-                f"unknown expression {name!r}{did_you_mean(name, self.names)}",
-                hint="list the names: LIST EXPRESSIONS on the link, or configs/vocabularies/expressions.toml",
-            )
-        return self._expressions[found]
+        raise ParameterError(
+            f"unknown expression {name!r}{did_you_mean(name, self.names)}",
+            hint="list the names: LIST EXPRESSIONS on the link, or configs/vocabularies/expressions.toml",
+        )
 
     def expand(self, name: str, intensity: float = 1.0) -> dict[int, float]:
         """Parameter index to value for ``name`` at ``intensity`` 0..1. Raises ParameterError."""

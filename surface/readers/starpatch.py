@@ -1,6 +1,6 @@
 """Faces of a T-mesh at star points as patches, fitted to the limit of Catmull and Clark's subdivision (1978).
 
-The format does not say what the makers' programs draw there. The limit surface of the control mesh is what such a
+The .tsm format does not define the surface there. The limit surface of the control mesh is what such a
 T-spline with equal knot intervals continues to; where intervals differ, and at the outline, it is moved so that it
 meets the exact surface around it (a Coons patch of what is missing along the sides). All is linear in the grips, so
 that patches follow them.
@@ -147,7 +147,8 @@ def _limit(loops: list[list[int]], grips: dict[int, int], corners: dict[int, Flo
 
 
 def _filled(lattice: Floats) -> Floats:
-    """A lattice in which places without samples, as at T-junctions, are interpolated along their row and column."""
+    """A lattice in which places without samples, as at T-junctions, are interpolated along their row and column; where
+    neither has samples on both sides, the nearest sample counts."""
     known = np.isfinite(lattice[..., 0])
     if known.all():
         return lattice
@@ -163,6 +164,10 @@ def _filled(lattice: Floats) -> Floats:
                 sums[rows][between] += np.stack(inside, axis=1)
                 counts[rows][between] += 1
     guess = sums / np.maximum(counts, 1)[..., None]
+    if (alone := ~known & (counts == 0)).any():  # at a corner of the lattice
+        samples = np.argwhere(known)
+        nearest = np.linalg.norm(np.argwhere(alone)[:, None] - samples, axis=2).argmin(axis=1)
+        guess[alone] = lattice[tuple(samples[nearest].T)]
     filled: Floats = np.where(known[..., None], lattice, guess)
     return filled
 

@@ -95,7 +95,7 @@ class ActionUnits:
         return found
 
     def face(self, intensities: Floats) -> Floats:
-        """(P,) the face of intensities (UNITS,); what is no number counts as 0."""
+        """(P,) the face of intensities (UNITS,); NaN counts as 0."""
         levels, given = np.zeros(len(self._facs.names)), np.nan_to_num(np.asarray(intensities, float), posinf=1.0)
         given[_SIDEWAYS] = 0.0
         for column, number in self._columns:
@@ -109,7 +109,8 @@ def named_values(
 ) -> tuple[Floats, Flags, list[str]]:
     """Values (P,), which of them are given, and the names that mean nothing here.
 
-    Names are those of joints, with angles in rad, or of other parameters, with their values.
+    Names are those of joints, with angles in rad, or of other parameters, with their values. A position that is no
+    finite number leaves its joint or parameter alone.
     """
     values, mask, unknown = parameters.neutral(), np.zeros(len(parameters), dtype=bool), []
     own = {} if joints is None else {name: place for place, name in enumerate(joints.names)}
@@ -118,9 +119,9 @@ def named_values(
         index = parameters.find(name)
         if name in own:
             angles[own[name]] = position
-        elif index is None or not math.isfinite(position):
+        elif index is None:
             unknown.append(name)
-        else:
+        elif math.isfinite(position):
             values[index], mask[index] = min(max(position, parameters.low[index]), parameters.high[index]), True
     if joints is not None:
         known = np.isfinite(angles)

@@ -227,7 +227,7 @@ class MaestroOptions:
     """Options of ``omote simulate maestro``."""
 
     channels: int = option("6 (Micro Maestro), 12, 18 or 24.", 24)
-    device: int = option("Device number, for the Pololu guide.", 12, at_least=0, at_most=127)
+    device: int = option("Device number of the Pololu protocol.", 12, at_least=0, at_most=127)
     crc: bool = option("Commands end with a CRC-7.", False)
     baud: int = option("Baud rate of the board.", BOARD_BAUD, at_least=300)
 

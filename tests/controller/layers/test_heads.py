@@ -161,6 +161,22 @@ def test_whoever_begins_to_speak_gets_the_turn_and_keeps_it_through_short_pauses
     assert turns.speaker == "maple" and states[2].manner == "listen"
 
 
+def test_who_speaks_while_the_turn_is_taken_from_everybody_has_to_pause_first() -> None:
+    states = hall(auto=True)
+    turns = states[0].heads.turns
+    assert isinstance(turns, Turns)
+    states[2].viseme(["aa"], [1.0], SECOND)
+    turns.tick(SECOND)
+    turns.give(None, SECOND)
+    turns.tick(SECOND + 10**8)
+    assert turns.speaker is None and states[0].manner == "auto"
+    states[2].release_layer("speech")
+    turns.tick(2 * SECOND)
+    states[2].viseme(["aa"], [1.0], 2 * SECOND)
+    turns.tick(2 * SECOND + 10**7)
+    assert turns.speaker == "willow"
+
+
 def test_groups_look_and_nobody_looks_at_itself() -> None:
     states = hall()
     session = LineSession(states[0], 0)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -64,6 +66,19 @@ def test_idle_motion_hears_speech_by_its_jaw(monkeypatch: pytest.MonkeyPatch) ->
     rig.mixer["speech"].write([JAW], [0.7], rig.now_s)
     rig.run(0.02)
     assert heard == [0.0, pytest.approx(0.7)]
+
+
+def test_blinks_come_back_as_an_expression_that_failed_fades_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig, heard = Rig(), list[float]()
+    rig.sources.life.liveliness = 1.0
+    rig.sources.player.play(replace(VOCABULARY["surprise"], blink="block"), 1.0, None, rig.now_s)
+    monkeypatch.setattr(rig.sources.life, "update", lambda *_, blink_block, **__: heard.append(blink_block))
+    rig.run(2.0)
+    assert heard[-1] == 1.0
+    monkeypatch.setattr(rig.sources.player, "update", lambda now_s: np.full(len(P), np.nan))
+    rig.run(0.4)
+    fading = heard[-10:]
+    assert fading == sorted(fading, reverse=True) and fading[-1] < 0.9
 
 
 def test_values_that_are_no_numbers_are_refused() -> None:

@@ -176,6 +176,16 @@ def test_units_of_ones_own(tmp_path: Path) -> None:
     assert facs.read(facs.expand("L3"))[3] == pytest.approx(1.0, abs=0.01)
 
 
+def test_what_shows_nothing_in_the_face_is_no_emotion(tmp_path: Path) -> None:
+    """None at all, and one of the head alone; units of the head in an emotion do not lessen it."""
+    unit = "units.26 = { weights = { jawOpen = 1.0 } }\nunits.51 = { weights = { headYaw = 1.0 } }\n"
+    shown = np.zeros(len(P))
+    shown[[P.index("jawOpen"), P.index("headYaw")]] = 1.0
+    assert own(tmp_path, unit).read_emotion(shown) == ("neutral", 1.0)
+    assert own(tmp_path, unit + "emotions.away = '51'").read_emotion(shown) == ("neutral", 1.0)
+    assert own(tmp_path, unit + "emotions.awe = '26+51'").read_emotion(shown) == ("awe", pytest.approx(1.0, abs=0.02))
+
+
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
@@ -187,6 +197,11 @@ def test_units_of_ones_own(tmp_path: Path) -> None:
             "units.1.aliases[0]: input should be a valid str",
         ),
         ("units.1 = { weights = { jawOpen = 1 } }\nemotions.joy = '1F'", "emotions.joy: '1F' is not an action unit"),
+        (
+            "units.1 = { weights = { jawOpen = 1 }, left = { jawLeft = 1 } }",
+            "units.1.weights: the unit has left or right, too",
+        ),
+        ("units.X1 = { weights = { jawOpen = 1 } }", "units.X1"),
         ("units = {}", "units: dictionary should have at least 1 item"),
         ("", "units: missing"),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -200,3 +201,11 @@ def test_wrong_formulas_are_refused(vocabulary: Vocabulary, text: str, hint: str
     with pytest.raises(ParameterError) as caught:
         vocabulary[text]
     assert hint in caught.value.hint
+
+
+def test_a_name_that_looks_like_a_formula_is_found_before_the_formula() -> None:
+    vocabulary = Vocabulary.load(P)
+    own = replace(vocabulary["happiness"], name="AU2mine")
+    vocabulary.add(own)
+    assert vocabulary["au2MINE"] is own
+    assert vocabulary["AU2"].source == "FACS"

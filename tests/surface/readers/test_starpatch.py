@@ -81,6 +81,15 @@ def test_places_without_samples_lie_on_the_lines_through_their_neighbours() -> N
     assert_allclose(_filled(gaps), plane)
 
 
+def test_a_corner_without_a_sample_is_the_sample_next_to_it() -> None:
+    lattice = np.ones((COUNT, COUNT, 1))
+    lattice[-1, :] = lattice[:, -1] = np.nan
+    lattice[-1, 0] = 3.0
+    filled = _filled(lattice)
+    assert filled[-1, -1] == 1.0
+    assert np.isfinite(filled).all() and (filled >= 1.0).all()
+
+
 def test_a_patch_of_samples_of_a_spline_is_that_spline() -> None:
     shares = np.random.default_rng(3).normal(size=(SPANS + 3, SPANS + 3, 4))
     basis = _basis(np.linspace(0.0, 1.0, COUNT))

@@ -19,7 +19,7 @@ CORNERS = {a + b for a in "udtb" for b in "lr"} | {
     b + a for a in "udtb" for b in "lr"
 }  # one word for a part and a side
 WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+|左|右|[^\W\d_a-zA-Z左右]+")
-COPY = re.compile(r"(?:\.\d+|_0\d\d|[._ ]copy|[._ ]clone)$", re.IGNORECASE)  # as programs number what they copy
+COPY = re.compile(r"(?:\.\d+|_0\d\d|[._ ]copy|[._ ]clone)$", re.IGNORECASE)  # suffixes of duplicates
 NUMBERED = re.compile(r"(?<![A-Za-z])[A-Z]\d\d(?=_)")  # Character Creator numbers its names of ARKit's shapes
 LOOK = {"eyelook", "eyeslook"}
 
@@ -126,7 +126,7 @@ def _beginnings() -> frozenset[str]:
 
 
 def _words(name: str) -> list[str]:
-    """Words of a name in small letters; everything before the last dot, colon or bar is ignored."""
+    """Words of a name in lower case; everything before the last dot, colon or bar is ignored."""
     bare = re.split(r"[.:|](?=[^.:|]{3})", COPY.sub("", name))[-1]
     words = [w.lower() for w in WORDS.findall(NUMBERED.sub("", bare))]
     return [part for w in words for part in (_halves(w) if w in CORNERS and len(words) > 1 else [w])]
@@ -152,5 +152,6 @@ def _looking(words: list[str]) -> Meaning | None:
     if len(sides) != 2 or "".join(w for w in words if w not in SIDES) not in LOOK:
         return None
     (first, one), (_, two) = sides
-    eye, towards = (one, two) if first < words.index("look") else (two, one)
+    look = next(k for k, word in enumerate(words) if "look" in word)
+    eye, towards = (one, two) if first < look else (two, one)
     return Meaning("eyeLookOut" if eye == towards else "eyeLookIn", eye)

@@ -49,6 +49,7 @@ def test_gaze_by_two_sides_is_out_where_they_agree_and_belongs_to_the_eye() -> N
         assert read_name(f"Eye_{eye}_Look_{towards}") == wanted
         assert read_name(f"eyeLook{word}{eye}") == wanted
         assert read_name(f"eyesLook_{word}_{eye}") == wanted
+        assert read_name(f"eyelook_{towards}_{eye}") == read_name(f"EYELOOK_{towards}_{eye}") == wanted
     assert read_name("Eye_L_Blink_R") is None and read_name("Eye_L_Look_R_L") is None
 
 
