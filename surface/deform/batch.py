@@ -72,11 +72,13 @@ class DeformationBatch:
         return sum(array.nbytes for array in self._arrays.values())
 
     def place(self, copy: int, xyz: Floats) -> bool:
-        """Put the control points of one copy at ``xyz (n, 3)``; whether any of them moved. :meth:`compute` follows.
+        """Put the control points of one copy at ``xyz (n, 3)``; whether any of them moved. Call :meth:`compute` afterwards.
 
         ``ValueError`` for another shape, or a place that is not finite or too far away for 32-bit sums; nothing is
-        changed then. ``IndexError`` for a copy that there is not.
+        changed then. ``IndexError`` for another copy than 0 to count - 1.
         """
+        if not 0 <= copy < len(self._arrays["points"]):
+            raise IndexError(f"copy {copy}: there are {len(self._arrays['points'])}")
         points, most = self._arrays["points"][copy], self._arrays["extent"][copy, 3]
         if xyz.shape != (self._n, 3):
             raise ValueError(f"xyz: shape {xyz.shape}, expected {(self._n, 3)}")

@@ -1,4 +1,4 @@
-"""Asks a program for its face by UDP, again and again while it is silent, and takes what it sends to the same port."""
+"""Receives UDP datagrams from a program that sends them once it is asked, and asks again while nothing arrives."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from controller.links.net.address import Address
 from controller.links.net.receivers import Received, UdpReceiver
 
 ASK_S = 1.0
-"""How often a program is asked that is silent."""
+"""Time between requests while nothing arrives."""
 
 
 class UdpCaller:
     """Datagrams of one host, which is asked for them.
 
-    Listens at the port of the far end's number, where phones send to, on the interface that reaches it.
+    Listens at the same port number as the host's, to which phones send, on the interface that reaches it.
+    greeting : what the host is asked with. error : why nothing arrives, empty while datagrams do.
 
     Raises LinkError: the host is not known or not reached, or the port is taken.
     """
@@ -26,6 +27,7 @@ class UdpCaller:
         self._port, self._greeting = address.port, greeting
         self._receiver = UdpReceiver(Address("udp", own, address.port))
         self._quiet_since_s = -ASK_S
+        self._asked = False  # since the last datagram
         self.error = ""
 
     def receive(self, timeout_s: float) -> Received:
@@ -33,14 +35,15 @@ class UdpCaller:
             self._ask()
         found = [each for each in self._receiver.receive(timeout_s) if each[0] == self._host]
         if found:
-            self._quiet_since_s, self.error = time.monotonic(), self._receiver.error
+            self._quiet_since_s, self._asked, self.error = time.monotonic(), False, self._receiver.error
         return found
 
     def close(self) -> None:
         self._receiver.close()
 
     def _ask(self) -> None:
-        self._quiet_since_s, self.error = time.monotonic(), f"{self._host} was asked and has not answered"
+        self.error = self._receiver.error or (f"{self._host} was asked and has not answered" if self._asked else "")
+        self._quiet_since_s, self._asked = time.monotonic(), True
         try:
             self._receiver.send(self._greeting, self._host, self._port)
         except OSError as error:
@@ -57,5 +60,5 @@ def _hosts(address: Address) -> tuple[str, str]:
     except OSError as error:
         raise LinkError(
             f"{address}: cannot be reached: {error.strerror or error}",
-            hint="give the address that the program shows, as 192.168.1.20, and use the same network",
+            hint="give the address that the program shows, for example 192.168.1.20, and use the same network",
         ) from error

@@ -84,7 +84,7 @@ class MaestroReader(BufferingReader):
         if len(buffer) < start:
             return None
         code = buffer[2] | 0x80 if start == 3 else buffer[0]
-        length = _LENGTHS.get(code, -1)
+        length = -1 if start == 3 and code == guide.MINI_SSC else _LENGTHS.get(code, -1)
         if code == guide.SET_MULTIPLE:
             length = 2 + 2 * buffer[start] if len(buffer) > start else 1
         checked = self._crc and code != guide.MINI_SSC
@@ -185,9 +185,10 @@ class Maestro(Board):
             self._go(data[1] + k, _word(data[2 + 2 * k :]), now_s)
 
     def _mini_ssc(self, data: bytes, now_s: float) -> None:
-        """8-bit target, 0 to 254."""
-        pulse_us = guide.NEUTRAL_US + (data[1] - 127) / 127 * guide.RANGE_US
-        self._go(data[0], pulse_us / guide.TARGET_US, now_s)
+        """8-bit target, 0 to 254; numbers beyond the channels are those of other boards on the same line."""
+        if data[0] < self._count:
+            pulse_us = guide.NEUTRAL_US + (data[1] - 127) / 127 * guide.RANGE_US
+            self._go(data[0], pulse_us / guide.TARGET_US, now_s)
 
     def _limit(self, limits: list[int], data: bytes, now_s: float) -> None:
         if data[0] < self._count:

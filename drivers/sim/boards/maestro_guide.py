@@ -24,7 +24,7 @@ SPEED_UNIT = 100.0
 ACCELERATION_UNIT = 1250.0
 """One step of acceleration in targets per second² (5.e, Set Acceleration: 0.25 us per 10 ms per 80 ms)."""
 NEUTRAL_US, RANGE_US = 1500.0, 476.25
-"""Pulse of the Mini SSC targets 127, and how far 0 and 254 are from it, as a board leaves the factory."""
+"""Pulse of Mini SSC's target 127, and how far those of 0 and 254 are from it, with factory settings."""
 
 
 class MaestroError(IntFlag):

@@ -90,6 +90,14 @@ def test_what_cannot_be_computed_is_refused_and_changes_nothing(
     np.testing.assert_array_equal(batch.points[0], source.points)
 
 
+@pytest.mark.parametrize("copy", [-1, 2])
+def test_a_copy_that_there_is_not_is_refused(source: Deformation[DCPSurface], copy: int) -> None:
+    batch = DeformationBatch(source, 2)
+    with pytest.raises(IndexError, match=f"copy {copy}: there are 2"):
+        batch.place(copy, source.points + 1.0)
+    assert batch.compute() == []
+
+
 def test_no_copies_are_no_batch(source: Deformation[DCPSurface]) -> None:
     with pytest.raises(ValueError, match="at least 1"):
         DeformationBatch(source, 0)

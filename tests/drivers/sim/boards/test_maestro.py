@@ -49,6 +49,21 @@ def test_another_device_is_not_meant():
     assert (pulse(board, 2), send(board, "A1")) == (0, "00 00")
 
 
+def test_mini_ssc_numbers_of_other_boards_are_passed_over():
+    """Several boards on one line share the numbers 0 to 254."""
+    board = Maestro(channels=12)
+    send(board, "84 02 70 2E")
+    assert send(board, "FF 0C 7F") == send(board, "FF FE 7F") == ""
+    assert (pulse(board, 2), send(board, "A1")) == (1500, "00 00")
+
+
+def test_mini_ssc_is_no_command_of_the_pololu_protocol():
+    board = Maestro()
+    send(board, "AA 0C 7F 02 7F")
+    assert pulse(board, 2) == 0
+    assert send(board, "A1") == "10 00"  # a protocol error
+
+
 def test_many_targets_at_once():
     board = Maestro()
     send(board, "9F 02 03 70 2E 00 3F")
