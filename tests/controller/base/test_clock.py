@@ -38,6 +38,17 @@ def test_ticks_stay_on_the_grid_of_deadlines() -> None:
     assert clock.skipped == 0
 
 
+def test_a_step_is_the_time_between_two_deadlines_also_where_some_were_skipped() -> None:
+    time = Time()
+    clock = Clock(100.0, now_ns=time.now, sleep_s=time.sleep)
+    assert clock.step_s == pytest.approx(0.01)
+    steps, work = [], iter([0, 35_000_000, 0])
+    for _ in clock.run(lambda: len(steps) < 3):
+        steps.append(clock.step_s)
+        time.ns += next(work)
+    assert steps == pytest.approx([0.01, 0.01, 0.04])
+
+
 def test_a_late_tick_skips_deadlines_and_does_not_hurry() -> None:
     time = Time()
     clock = Clock(100.0, now_ns=time.now, sleep_s=time.sleep)

@@ -39,6 +39,16 @@ def test_every_kind_is_of_the_posed_face_and_bounded(overlays: Overlays) -> None
     assert np.abs(overlays.marks("control points").points - closed).max() > 5.0
 
 
+def test_the_tree_is_drawn_by_whole_sides_of_triangles(overlays: Overlays) -> None:
+    overlays.pose(values(overlays))
+    part = overlays._part
+    sides = part.vertices[part.triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)].astype(np.float64)
+    known = {tuple(sorted(map(tuple, side.tolist()))) for side in sides}
+    drawn = {tuple(sorted(map(tuple, line.tolist()))) for line in overlays.marks("quad tree").lines}
+    assert drawn <= known and all(one != two for one, two in drawn)
+    assert len(overlays._edges) == len(known)
+
+
 def test_only_what_moved_is_touched(overlays: Overlays) -> None:
     overlays.pose(values(overlays))
     overlays.pose(values(overlays, eyeBlinkLeft=0.5))

@@ -77,6 +77,11 @@ def test_steps_say_only_what_changes() -> None:
     assert steps_of(Timeline(), P) == []
 
 
+def test_a_key_between_two_steps_has_a_step_of_its_own() -> None:
+    timeline = Timeline((Key(0.0, {"jawOpen": 0.0}, "linear"), Key(0.123, {"jawOpen": 1.0}, "linear")))
+    assert steps_of(timeline, P, 10.0)[-1] == "0.123 SET jawOpen 1"
+
+
 def test_what_cannot_be_saved_or_read_is_told(tmp_path: Path) -> None:
     with pytest.raises(ParameterError, match="no keys"):
         save_show(tmp_path / "a.toml", Timeline(), P)

@@ -136,6 +136,14 @@ def test_a_listener_nods_and_smiles(live: Live) -> None:
     assert nods[0] > 2 * nods[1]
 
 
+def test_a_listener_nods_downwards(live: Live) -> None:
+    """A nod is the fastest motion of a listener's head; a positive pitch looks down."""
+    pitch = live(90.0, rate_hz=20.0, manner="listen")[:, HEAD[1]]
+    slow = np.convolve(pitch, np.full(41, 1 / 41), "same")
+    away = (pitch - slow)[40:-40]
+    assert away.max() > 1.5 * -away.min()
+
+
 @pytest.mark.parametrize("manner", ["alone", "listen", "speak"])
 def test_the_rate_of_frames_changes_nothing(live: Live, manner: Manner) -> None:
     fine = live(12.0, manner=manner)

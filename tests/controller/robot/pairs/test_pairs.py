@@ -155,6 +155,7 @@ def test_limits_of_the_file_stay(files: tuple[Path, Path]) -> None:
         (lambda text: text.replace("0.03333", "x", 1), "row 3: has 7 numbers for 8 columns"),
         (lambda text: "jawOpen\n" + "0.5\n" * 30, "there is no column servos:NAME"),
         (lambda text: re.sub("0.03333,[^,]*", "0.03333,1e308", text), "row 3: jawOpen is 1e+308, beyond 0 to 1"),
+        (lambda text: re.sub("0.03333,[^,]*", "0.03333,1.06", text), "row 3: jawOpen is 1.06, beyond 0 to 1"),
         (lambda text: text[:-8] + "1e300\n", "row 241: servos:still is 1e+300, beyond -36000 to 36000, degrees"),
     ],
 )
