@@ -23,12 +23,15 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 _Seconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
 _Name = Annotated[str, Field(pattern=r"^[!-)+-~]{1,64}$")]
-_CALM_S = 0.4
+_CALM_S = 0.4  # of the way back to a neutral face, less where the pause is shorter
 MOST_TRIALS = 2000
 
 
 class Condition(Settings):
-    """One condition: timed lines of the line protocol, as in a script, or the name of a script; and how long it is."""
+    """One condition: timed lines of the line protocol, as in a script, or the name of a script; and how long it is.
+
+    What a script does after ``length_s`` is left out, and so are its marks.
+    """
 
     steps: Annotated[list[str], Field(max_length=1000)] = []
     script: str | None = None
@@ -38,7 +41,7 @@ class Condition(Settings):
 class StudySettings(Settings):
     """A study's file.
 
-    order : ``shuffled``, all trials in one order of chance; ``blocks``, every condition once before any comes again;
+    order : ``shuffled``, all trials shuffled together; ``blocks``, every condition once before any comes again;
     ``given``, as in the file.
     """
 
@@ -78,7 +81,7 @@ class Study:
 
 
 def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> Study:
-    """Read a study. ``seed`` : instead of the file's, such as the number of a participant.
+    """Read a study. ``seed`` : overrides the file's, for example by the number of a participant.
 
     Raises ConfigError: the file, its stage or a script of it cannot be read or is wrong; every fault with its key.
     """
@@ -93,7 +96,8 @@ def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> S
         end_s = at_s + settings.conditions[name].length_s
         trials.append(Trial(number, name, at_s, end_s))
         at_s = end_s + settings.pause_s
-    steps = [step for trial in trials for step in _steps(trial, lines[trial.condition])]
+    calm_s = min(_CALM_S, settings.pause_s)
+    steps = [step for trial in trials for step in _steps(trial, lines[trial.condition], calm_s)]
     marks = {f"{trial.number}:{trial.condition}:{what}": at for trial in trials
              for what, at in (("begin", trial.begin_s), ("end", trial.end_s))}  # fmt: skip
     if len(steps) > MOST_STEPS:
@@ -113,10 +117,10 @@ def write_script(study: Study, path: Path) -> None:
         temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
 
 
-def _steps(trial: Trial, lines: list[tuple[float, str]]) -> list[tuple[float, str]]:
+def _steps(trial: Trial, lines: list[tuple[float, str]], calm_s: float) -> list[tuple[float, str]]:
     """The lines of a trial at their times, and the way back to a neutral face at its end."""
     own = [(trial.begin_s + at_s, line) for at_s, line in lines if trial.begin_s + at_s <= trial.end_s]
-    return [*own, (trial.end_s, f"NEUTRAL {_CALM_S}")]
+    return [*own, (trial.end_s, f"NEUTRAL {calm_s:g}")]
 
 
 def _order(settings: StudySettings, seed: int) -> list[str]:
@@ -146,7 +150,9 @@ def _wrong_lines(settings: StudySettings, grammar: Grammar) -> list[str]:
     for name, condition in settings.conditions.items():
         for i, text in enumerate(condition.steps):
             try:
-                read_step(text, grammar)
+                at_s, _ = read_step(text, grammar)
+                if at_s > condition.length_s:
+                    raise ValueError(f"comes after the condition's length_s = {condition.length_s:g}")
             except (LineError, ValueError) as error:
                 faults.append(f"conditions.{name}.steps[{i}]: {error} (is {text!r})")
     return faults

@@ -140,7 +140,7 @@ def _stop_socket() -> Iterator[socket.socket]:
     finally:
         signal.set_wakeup_fd(wakeup)
         for number, handler in before.items():
-            signal.signal(number, handler)
+            signal.signal(number, signal.SIG_DFL if handler is None else handler)  # None: not set from Python
         reading.close()
         writing.close()
 

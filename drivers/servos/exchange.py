@@ -215,8 +215,8 @@ class _Sorter(Generic[R]):
             if length is None or (len(reply.params) != length and not refused):
                 self.stray += 1
             elif self.replies.setdefault(reply.id, reply) is not reply:
+                self.stray += 1 if reply.id in self.twice else 2  # the one that was kept first is a stray, too
                 self.twice.add(reply.id)
-                self.stray += 2
 
     def unique(self) -> dict[int, R]:
         """Replies that came once."""

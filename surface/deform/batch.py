@@ -72,7 +72,7 @@ class DeformationBatch:
         return sum(array.nbytes for array in self._arrays.values())
 
     def place(self, copy: int, xyz: Floats) -> bool:
-        """Put the control points of one copy at ``xyz (n, 3)``; whether any of them moved. Call :meth:`compute` afterwards.
+        """Put the control points of one copy at ``xyz (n, 3)``; whether any moved. Call :meth:`compute` afterwards.
 
         ``ValueError`` for another shape, or a place that is not finite or too far away for 32-bit sums; nothing is
         changed then. ``IndexError`` for another copy than 0 to count - 1.

@@ -20,7 +20,7 @@ seed = 3
 repeats = 4
 pause_s = 0.5
 [conditions.smile]
-steps = ["0 EXPR smile", "9 EXPR anger"]
+steps = ["0 EXPR smile", "2 EXPR anger"]
 length_s = 2.0
 [conditions.still]
 steps = ["0 NEUTRAL"]
@@ -66,9 +66,15 @@ def test_trials_follow_each_other_with_pauses_and_their_lines_lie_inside(path: P
         assert other.begin_s == pytest.approx(one.end_s + 0.5)
     assert study.length_s == pytest.approx(1.0 + 4 * 4.5 + 12 * 0.5)
     assert [at_s for at_s, _ in study.steps] == sorted(at_s for at_s, _ in study.steps)
-    assert not any("anger" in line for _, line in study.steps)  # after the end of its condition
+    calm = [(at_s, line) for at_s, line in study.steps if line.startswith("NEUTRAL 0.4")]
+    assert [at_s for at_s, _ in calm] == pytest.approx([trial.end_s for trial in study.trials])
     first = study.trials[0]
     assert study.marks[f"1:{first.condition}:begin"] == 1.0 and len(study.marks) == 24
+
+
+def test_the_way_back_to_neutral_ends_before_the_next_trial(path: Path) -> None:
+    path.write_text(STUDY.replace("pause_s = 0.5", "pause_s = 0.25"))
+    assert sum(line == "NEUTRAL 0.25" for _, line in load_study(path, P).steps) == 12
 
 
 def test_omote_check_knows_studies(path: Path) -> None:
@@ -87,6 +93,11 @@ def test_a_study_is_a_script(path: Path, tmp_path: Path) -> None:
     [
         ('steps = ["0 NEUTRAL"]', "", "conditions.still: give one of steps and script"),
         ('steps = ["0 NEUTRAL"]', 'steps = ["NEUTRAL"]', "conditions.still.steps[0]: begins with a time"),
+        (
+            'steps = ["0 NEUTRAL"]',
+            'steps = ["0 NEUTRAL", "1.5 NEUTRAL"]',
+            "conditions.still.steps[1]: comes after the condition's length_s = 1 (is '1.5 NEUTRAL')",
+        ),
         ('steps = ["0 NEUTRAL"]', 'script = "toor"', "did you mean 'tour'"),
         ("length_s = 1.0", "length_s = 0", "conditions.still.length_s"),
         ("repeats = 4", "repeats = 1000", "3000 trials are more than 2000"),

@@ -109,6 +109,12 @@ def test_two_replies_under_one_id_are_both_worth_nothing() -> None:
     assert (list(got.replies), got.missing, got.corrupt, port.stray) == ([1], (2, 3), True, 2)
 
 
+def test_three_replies_under_one_id_are_three_strays() -> None:
+    _, port = wire((0.01, status(1) + 3 * status(2) + b"\0"))
+    assert read(port, 1, 2).missing == (2,)
+    assert port.stray == 3
+
+
 def test_damage_is_only_said_where_a_reply_is_missing() -> None:
     _, port = wire((0.01, b"\xff\xff noise" + status(1)))
     assert not read(port, 1).corrupt
