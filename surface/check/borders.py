@@ -24,13 +24,14 @@ from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import border_edges
 
 SEWN_MM = 0.4  # borders nearer than this are one
-ROUND_MM = 1.2  # of border between two edges: those nearer along it are neighbours, and not sewn to each other
-WIDE_MM = 1.2  # least width of a hole: twice its area by its length
+ALONG_MM = 1.2  # of border between two edges: those nearer along it are neighbours, and not sewn to each other
+WIDE_MM = 1.2  # least width of a hole: the diameter of a round one, twice the height of a slit
 APART_MM = 1.0  # of borders that are sewn at rest: a seam that opens
 SHEETS = ("skin", "mouth", "tongue")  # materials of which sheets are made that have to be closed
 END_MM = 40.0  # width of an opening that is where the mesh ends: a head without scalp under its hair
-SEEN = 0.1  # of a hole's area: one of which less is seen from outside lies under other skin, as the root of an ear does
-FACING = 0.3  # cosine between a hole's way out and the viewer, from which it is looked into from behind
+SEEN = 0.1  # of a hole's area has to be seen from outside: the root of an ear lies under other skin
+FACING = 0.3  # least cosine between a hole's outward normal and a viewer behind the head for it to face that viewer
+_ROWS = 512  # of distances between ends of edges at once
 CAP_STEPS = 60  # pixels over the cap of a hole
 VIEWS = ((0, 0), (60, 0), (-60, 0), (120, 0), (-120, 0), (180, 0), (0, -60), (0, 60))  # yaw and pitch, degrees
 MOUTH_REACH = 0.75  # in widths of the mouth, from its middle
@@ -48,8 +49,10 @@ def _nearest(
         best, found = reach * reach, -1
         p0, p1, p2 = middles[i, 0], middles[i, 1], middles[i, 2]
         for j in range(len(ends)):
-            a = ends[j, 0]
-            if abs(a[0] - p0) > 20.0 * reach or abs(a[1] - p1) > 20.0 * reach:
+            a, b = ends[j, 0], ends[j, 1]
+            if min(a[0], b[0]) - p0 > reach or p0 - max(a[0], b[0]) > reach:
+                continue
+            if min(a[1], b[1]) - p1 > reach or p1 - max(a[1], b[1]) > reach:
                 continue
             if ids[j, 0] == own[i, 0] or ids[j, 0] == own[i, 1] or ids[j, 1] == own[i, 0] or ids[j, 1] == own[i, 1]:
                 continue
@@ -58,7 +61,7 @@ def _nearest(
                 near |= beside[k] == j
             if near:
                 continue
-            d0, d1, d2 = ends[j, 1, 0] - a[0], ends[j, 1, 1] - a[1], ends[j, 1, 2] - a[2]
+            d0, d1, d2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
             length = d0 * d0 + d1 * d1 + d2 * d2
             t = 0.0
             if length > 0.0:
@@ -113,7 +116,7 @@ def find_borders(subject: Subject) -> Borders:
     ids = ends + starts[part][:, None]
     found = Borders(part, ends, ids, np.zeros(len(part), bool), np.full(len(part), -1), *_none(len(part)))
     at = found.at(subject.rest)
-    first, beside = _beside(ids, np.linalg.norm(at[:, 1] - at[:, 0], axis=1), ROUND_MM * subject.scale)
+    first, beside = _beside(ids, np.linalg.norm(at[:, 1] - at[:, 0], axis=1), ALONG_MM * subject.scale)
     distance, mate = np.full(len(part), np.inf), np.full(len(part), -1, np.int64)
     _nearest(at.mean(axis=1), ids, at, ids, first, beside, SEWN_MM * subject.scale, distance, mate)
     return Borders(part, ends, ids, mate >= 0, mate, first, beside)
@@ -144,8 +147,8 @@ def _walk(
     start: int, vertex: int, meet: dict[int, list[int]], ends: list[list[int]], long: list[float], reach: float,
     between: list[set[int]],
 ) -> None:  # fmt: skip
-    """Note all pairs of edges that a short way along the border, which begins with edge ``start`` and leaves it at
-    ``vertex``, lies between."""
+    """Record all pairs of edges that are joined by a short path along the border, which begins with edge ``start`` and
+    leaves it at ``vertex``."""
     before = [j for j in meet[sum(ends[start]) - vertex] if j != start]
     ways = [(vertex, long[start], {start})]
     while ways:
@@ -181,7 +184,7 @@ def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Border
         wide = width >= WIDE_MM * subject.scale and not _in_openings(subject, mouth, middle[None])[0]
         if wide and is_seen(subject, part, at[loop]):
             length = float(np.linalg.norm(at[loop, 1] - at[loop, 0], axis=1).sum())
-            text = f"a hole in part {part.name!r}, {length:.0f} mm round: {places.name(middle)}"
+            text = f"a hole in part {part.name!r}, {length:.0f} mm around: {places.name(middle)}"
             found.append((text, width > END_MM * subject.scale, part is subject.parts[subject.skin[0]]))
     ends = any(large for _, large, _ in found)
     for text, large, main in found:
@@ -232,8 +235,12 @@ def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
     ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
     known = np.unique(ends, return_inverse=True)[1].reshape(-1)
     square = (points**2).sum(axis=1)
-    near = square[:, None] + square - 2.0 * points @ points.T < reach**2
-    links = known[np.argwhere(near)]
+    pairs = [np.zeros((0, 2), np.int64)]
+    for first in range(0, len(points), _ROWS):
+        own = slice(first, first + _ROWS)
+        near = square[own, None] + square - 2.0 * points[own] @ points.T < reach**2
+        pairs.append(np.argwhere(near) + np.array([first, 0]))
+    links = known[np.concatenate(pairs)]
     return _components(links, int(known.max(initial=-1)) + 1)[known].reshape(-1, 2)
 
 
@@ -270,15 +277,16 @@ def _components(links: Ints, count: int) -> Ints:
 
 
 def _form(ends: Floats) -> tuple[Floats, float]:
-    """Middle (3,) and width of a loop, mm: twice its area by its length, for a slit its height."""
+    """Middle (3,) and width of a loop, mm: four times its area by its length, which is the diameter of a circle and
+    twice the height of a slit."""
     middle = ends.reshape(-1, 3).mean(axis=0)
     area = 0.5 * np.linalg.norm(np.cross(ends[:, 0] - middle, ends[:, 1] - middle).sum(axis=0))
     return middle, float(4.0 * area / max(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum(), 1e-9))
 
 
 def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
-    """Would a cap over a loop of a part's border, edges (e, 2, 3), be seen from outside? From behind only one of skin
-    that faces the viewer counts: a head without a scalp, or a mask, shows the inside of all it has."""
+    """Whether a cap over a loop of a part's border, edges (e, 2, 3), is seen from outside. From behind only holes of
+    skin that face the viewer count: heads without a scalp, and masks, show the inside of everything there."""
     middle = ends.reshape(-1, 3).mean(axis=0)
     cap = np.concatenate([ends.reshape(-1, 3), middle[None]]).astype(np.float32)
     rows = np.arange(len(ends), dtype=np.int32)

@@ -68,6 +68,41 @@ def test_a_long_edge_is_found_from_its_far_end() -> None:
         assert other[0] == 0 and distance[0] == pytest.approx(0.5)
 
 
+def test_a_long_edge_counts_where_it_passes_and_not_only_at_its_first_end() -> None:
+    ends = np.array([[[-60.0, 0.0, 0.0], [0.3, 0.0, 0.0]], [[900.0, 0.2, 0.0], [-900.0, 0.2, 0.0]]])
+    middle, own = np.array([[0.0, 0.1, 0.0]]), np.array([[8, 9]])
+    for edge in ends[:, None]:
+        distance, other = np.zeros(1), np.zeros(1, np.int64)
+        borders._nearest(middle, own, edge, np.array([[0, 1]]), *borders._none(1), 0.4, distance, other)
+        assert (distance[0], other[0]) == (pytest.approx(0.1), 0)
+
+
+@pytest.mark.parametrize(("count", "width"), [(400, 20.0), (4, 20.0 / np.sqrt(2.0))])
+def test_the_width_of_a_loop_is_the_diameter_of_a_circle_and_the_side_of_a_square(count: int, width: float) -> None:
+    angle = np.linspace(0.0, 2.0 * np.pi, count + 1)
+    ring = 10.0 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
+    assert borders._form(np.stack([ring[:-1], ring[1:]], axis=1))[1] == pytest.approx(width, rel=1e-3)
+
+
+def test_the_width_of_a_slit_is_twice_its_height() -> None:
+    corners = np.array([[0.0, 0, 0], [1000, 0, 0], [1000, 1, 0], [0, 1, 0]])
+    slit = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    assert borders._form(slit)[1] == pytest.approx(2.0, rel=2e-3)
+
+
+def test_ends_are_joined_in_any_number() -> None:
+    """More than are compared at once: each edge's ends are near one of another edge."""
+    count = 1500
+    at = np.zeros((count, 2, 3))
+    at[:, 0, 0], at[:, 1, 0] = np.arange(count), np.arange(count) + 0.9
+    ids = np.arange(2 * count).reshape(-1, 2)
+    found = borders.Borders(
+        np.zeros(count, int), ids, ids, np.zeros(count, bool), np.full(count, -1), *borders._none(count)
+    )
+    joined = borders._joined(found, at, np.arange(count), 0.2)
+    assert (joined[1:, 0] == joined[:-1, 1]).all() and len(np.unique(joined)) == count + 1
+
+
 @pytest.mark.parametrize(("gap", "scale", "sewn"), [(0.3, 1, True), (0.5, 1, False), (0.7, 2, True), (0.9, 2, False)])
 def test_borders_that_lie_together_are_sewn(gap: float, scale: int, sewn: bool) -> None:
     head = plain.subject(sheet("a", (0, 40)), sheet("b", (40 + gap, 80)), eyes=scale * plain.EYES)
@@ -105,7 +140,7 @@ def test_only_sheets_that_deform_with_the_skin_have_borders() -> None:
 def test_a_hole_is_named_with_its_length_and_place_and_the_outer_border_is_none() -> None:
     assert texts(plain.subject(holed((0, 0), (0, 0)))) == []
     found = texts(plain.subject(holed((8, 28), (40, 52))))
-    assert found == ["a hole in part 'face', 64 mm round: left forehead"]
+    assert found == ["a hole in part 'face', 64 mm around: left forehead"]
 
 
 @pytest.mark.parametrize("height", [4.0, 8.0])
