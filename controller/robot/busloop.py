@@ -257,10 +257,22 @@ class BusLoop:
         self._state = self.bus.read()
         self.following.add(angles, self._state)
         if self._letting_go.may_let_go(self._goals.sent, self._state, self.clock.step_s):
+            self._release(angles, self._state)
+
+    def _release(self, wanted: Floats, state: BusState) -> None:
+        """Let the servos go; where that fails, they are started again as after a STOP."""
+        try:
             self.bus.stop()
-            self._let_go = True
-            self._letting_go.begin(angles, self._state)
-            log.info("bus %s: still, and let go", self.settings.name)
+        except PortLost:
+            self._off = True  # a bus that does not run is only opened again by reconnecting
+            raise
+        except DriverError as error:
+            self._off = True
+            self._try_later(time.monotonic_ns(), "not let go", error)
+            return
+        self._let_go = True
+        self._letting_go.begin(wanted, state)
+        log.info("bus %s: still, and let go", self.settings.name)
 
     def _take_again(self, wanted: Floats) -> bool:
         """Switch servos that were let go on again where they are, once a target or a servo moves; whether they are."""
@@ -272,6 +284,7 @@ class BusLoop:
             self.bus.start(partly=True)
             self._resume()
         except PortLost:
+            self._off = True  # a bus that does not run is only opened again by reconnecting
             raise
         except DriverError as error:
             self._off = True  # as after a STOP: it is tried again

@@ -6,6 +6,7 @@ neutral and highest angle captured for each channel, and a robot file that names
 
 from __future__ import annotations
 
+import bisect
 from pathlib import Path
 from typing import Any, Self
 
@@ -16,7 +17,8 @@ from pydantic import Field, model_validator
 from controller.base.config import Settings, config_error, load
 from controller.base.files import format_fault, replacing
 from controller.base.parameters import did_you_mean
-from controller.robot.settings import ChannelSettings, Degrees, RobotSettings
+from controller.robot.settings import Calibration, ChannelSettings, Degrees, RobotSettings
+from controller.robot.terms import curve_corners
 
 SUFFIX = ".calibration.toml"
 FORMAT = 1
@@ -87,9 +89,10 @@ def fit_to_captured(channel: ChannelSettings, captured: CapturedAngles) -> Chann
     """A channel with its calibrated points moved so that neutral and ends are those captured.
 
     The angle of the mix at rest becomes ``neutral_deg``, the points on either side are stretched so that the outermost
-    ones reach the captured ends, and the limits become the ends.
+    ones reach the captured ends, and the limits become the ends. Where no point is at rest, one is added between those
+    on either side.
     """
-    points = channel.map
+    points = _with_rest(channel)
     ends = {min(points.deg): captured.min_deg, max(points.deg): captured.max_deg}
     stretch = sorted((ends | {rest_deg(channel): captured.neutral_deg}).items())
     deg = np.interp(points.deg, [old for old, _ in stretch], [new for _, new in stretch])
@@ -97,9 +100,20 @@ def fit_to_captured(channel: ChannelSettings, captured: CapturedAngles) -> Chann
     return channel.model_copy(update={"map": moved, "limit_deg": (captured.min_deg, captured.max_deg), "trim_deg": 0.0})
 
 
+def _with_rest(channel: ChannelSettings) -> Calibration:
+    """The points of a channel, with one at rest where the others lie on either side of it."""
+    points = channel.map
+    if 0.0 in points.at or not points.at[0] < 0.0 < points.at[-1]:
+        return points
+    k = bisect.bisect(points.at, 0.0)
+    at, deg = ([*row[:k], rest, *row[k:]] for row, rest in ((points.at, 0.0), (points.deg, rest_deg(channel))))
+    return points.model_copy(update={"at": at, "deg": deg})
+
+
 def rest_deg(channel: ChannelSettings) -> float:
     """The angle that a channel's mix at rest (0, or the end nearest to it) gives before its trim."""
-    return float(np.interp(0.0, channel.map.at, channel.map.deg))
+    points = channel.map
+    return float(np.interp(0.0, *curve_corners(np.array(points.at), np.array(points.deg), points.curve)))
 
 
 def save_calibration(path: Path, name: str, robot: str, channels: dict[str, CapturedAngles]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -19,7 +20,7 @@ from controller.robot import busloop as module
 from controller.robot.buses import read_bus
 from controller.robot.busloop import BusLoop
 from controller.robot.settings import ChannelSettings, RuleSettings, TimingRule
-from drivers.base.errors import NoReply, PortBusy
+from drivers.base.errors import DriverError, NoReply, PortBusy, PortLost
 from drivers.sim import SimulatedBus
 
 JAW, YAW = P.index("jawOpen"), P.index("headYaw")
@@ -497,6 +498,36 @@ def test_still_servos_are_let_go_and_come_back_from_where_they_are(servos: Simul
         until(lambda: abs(degrees(servos, 1) - 15.0) < 0.2)
         assert servos.servo(1).torque
         assert loop.report()["let_go"] == {"times": 1, "sagged": 0}
+
+
+@pytest.mark.parametrize("error", [NoReply("no answer", servo_ids=(2,)), PortLost("unplugged")])
+@pytest.mark.parametrize("call", ["stop", "start"])
+def test_a_failure_while_servos_are_let_go_or_taken_again_is_overcome(
+    servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch, call: str, error: DriverError
+) -> None:
+    """A servo that misses its confirmation, and an adapter that resets as torque goes off or comes on."""
+    monkeypatch.setattr(module, "_RETRY_NS", 50_000_000)
+    face = Face()
+    with running(servos, face, {"let_go_s": 0.2, "let_go_below_a": 5.0}) as loop:
+        once, real = iter([error]), getattr(loop.bus, call)
+        begun = threading.Event()
+
+        def fails_once(**options: Any) -> None:
+            failure = next(once, None) if begun.is_set() else None
+            if failure is None or call == "stop":
+                real(**options)
+            if isinstance(failure, PortLost):
+                loop.bus._note_loss()  # type: ignore[attr-defined]
+            if failure is not None:
+                raise failure
+
+        monkeypatch.setattr(loop.bus, call, fails_once)
+        loop.begin()
+        begun.set()
+        until(lambda: loop._let_go or loop._off)
+        face.values[JAW] = 1.0
+        until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
+        assert loop.error is None and servos.servo(1).torque and servos.servo(2).torque
 
 
 def test_a_servo_that_sags_is_taken_again_and_then_held(servos: SimulatedBus) -> None:

@@ -50,7 +50,8 @@ def test_neutral_and_ends_become_those_captured(tmp_path: Path) -> None:
         ([0, 1], [0, 20], [2, 9]),
         ([0, 1], [0, -20], [2, -5]),
         ([-1, 0, 1], [-30, 0, 30], [-5, 2, 9]),
-        ([-1, 1], [30, -30], [9, -5]),
+        ([-1, 1], [30, -30], [9, 2, -5]),
+        ([-2, -1, 2], [-30, -20, 30], [-5, -2.375, 2, 9]),
         ([-1, 0, 0.5, 1], [-30, 0, 3, 30], [-5, 2, 2.7, 9]),
         ([0.5, 1], [10, 20], [2, 9]),
     ],
@@ -62,6 +63,19 @@ def test_points_are_stretched_on_either_side_of_rest(at: list[float], deg: list[
     out = fit_to_captured(channel, CapturedAngles(min_deg=-5, neutral_deg=2, max_deg=9))
     assert out.map.deg == pytest.approx(gives)
     assert out.trim_deg == 0.0
+    assert rest_deg(out) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("curve", ["straight", "smooth"])
+def test_the_neutral_angle_is_kept_where_no_point_is_at_rest(curve: str) -> None:
+    """Of eyes, whose points are their ends alone, with a servo horn that is mounted askew."""
+    robot = load_robot(HEAD, PARAMETERS)
+    for at, deg in (([-1, 1], [-30, 30]), ([-1, -0.5, 1], [-30, -25, 30])):
+        points = robot.channels[0].map.model_copy(update={"at": at, "deg": deg, "curve": curve})
+        channel = robot.channels[0].model_copy(update={"map": points})
+        out = fit_to_captured(channel, CapturedAngles(min_deg=-30, neutral_deg=8, max_deg=30))
+        assert rest_deg(out) == pytest.approx(8.0, abs=1e-3)
+        assert (out.map.deg[0], out.map.deg[-1]) == (-30, 30)
 
 
 def test_a_robot_file_names_its_calibration(tmp_path: Path) -> None:
