@@ -54,18 +54,24 @@ def preflight(
     _ask_first(
         f"{_count(len(channels), 'servo')} of {settings.name}, one after the other: {by:g} degrees to either side.", yes
     )
-    found = run_preflight(
-        settings,
-        channels,
-        new_preflight(settings, path),
-        robot_parameters(settings, path, PARAMETERS),
-        _say_seen if not yes else lambda each, text: None,
-        Options(by, load),
-        lambda name: console.print(f"[dim]{name}[/]", soft_wrap=True),
-    )
-    show_table(preflight_table(found))
-    for fault in found.faults:
-        console.print(f"[red]{fault.replace('[', chr(92) + '[')}[/]", soft_wrap=True)
+    found = new_preflight(settings, path)
+    try:
+        run_preflight(
+            settings,
+            channels,
+            found,
+            robot_parameters(settings, path, PARAMETERS),
+            _say_seen if not yes else lambda each, text: None,
+            Options(by, load),
+            lambda name: console.print(f"[dim]{name}[/]", soft_wrap=True),
+        )
+    finally:  # also what was found until an error or Ctrl-C
+        if found.channels:
+            show_table(preflight_table(found))
+            for fault in found.faults:
+                console.print(fault, style="red", markup=False, soft_wrap=True)
+            if out is not None:
+                write_preflight(found, out)
     found.signed_by = operator or ("" if yes else typer.prompt("Signed by (name, or empty)", default=""))
     if out is not None:
         write_preflight(found, out)

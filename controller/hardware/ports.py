@@ -10,7 +10,7 @@ from typing import Any
 from controller.robot.buses import SIMULATION, BusSettings
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
-from drivers.core.registry import SIMULATED
+from drivers.core.registry import FAMILIES, SIMULATED
 from drivers.sim import SimulatedBus
 
 
@@ -30,6 +30,14 @@ class BusPort:
     def bus(self, servos: Sequence[ServoSpec], **changes: Any) -> Bus:
         """A driver of some of its servos, closed."""
         return open_bus(self.family, servos, port=self.port, baud=self.baud, **self.options | changes)
+
+    def holding(self, servos: Sequence[ServoSpec]) -> list[str]:
+        """Names of servos that say that their torque is on; none of boards, which say nothing."""
+        if FAMILIES.get(self.family).hobby:
+            return []
+        with self.bus(servos) as bus:
+            on = {found.id for found in bus.discover([servo.id for servo in servos]) if found.torque}
+        return [servo.name for servo in servos if servo.id in on]
 
 
 @contextmanager

@@ -1,8 +1,9 @@
 """``omote preflight``: moves each servo of a head a little by itself and compares it with the robot file.
 
 Before a servo moves, what it says of itself is compared: model, supply, errors, limits, direction, position. A servo
-that does not fit is not moved. One that moves is alone: all others are off. It stops at the first sign of load, error
-or trouble with the port, and is off afterwards, whatever happens.
+that does not fit is not moved, and none of a bus with servos whose torque is on: one that moves is alone. It stops at
+the first sign of load, error or trouble with the port, and is switched off; where it does not confirm that, the
+preflight ends.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from drivers.base.shutdown import stop_on_signals
 from drivers.core.registry import FAMILIES
 from drivers.servos.bus import OwnSettings, ServoBus
 from drivers.tables.tables import ControlTable, load_table
+from drivers.tools.find_stops import StillOn
 
 BY_DEG = 3.0
 """How far a servo is moved to either side."""
@@ -66,18 +68,22 @@ def run_preflight(
 ) -> Preflight:
     """Check channels, bus by bus and servo by servo, and add what was found to ``preflight``.
 
-    Raises PortError where a port cannot be used, and KeyboardInterrupt; the motor that was on is off then.
+    Raises PortError where a port cannot be used, StillOn where a servo was not confirmed off, and KeyboardInterrupt,
+    after which the motor that was on is off. What was found until then is in ``preflight``.
     """
     for settings in robot.buses:
         own = [channel for channel in channels if channel.bus == settings.name]
         if not own:
             continue
-        with serve_bus(settings, servo_specs(robot.on_bus(settings.name))) as port:
+        servos = servo_specs(robot.on_bus(settings.name))
+        with serve_bus(settings, servos) as port:
             bus = BusFindings(settings.name, port.family, settings.port, settings.baud)
             preflight.buses.append(bus)
+            if on := port.holding(servos):
+                bus.faults.append(f"the torque of {', '.join(on)} is on: stop the program that drives them")
             for channel in own:
                 progress(channel.name)
-                check = _ChannelCheck(port, bus, channel, options)
+                check = _ChannelCheck(port, bus, channel, options, moves=not on)
                 preflight.channels.append(check.findings)
                 check.run(lambda c: towards(c, parameters), ask)
     _look_for_swaps(preflight)
@@ -107,8 +113,10 @@ def towards(channel: ChannelSettings, parameters: Parameters) -> str:
 class _ChannelCheck:
     """The check of one channel; fills in its findings."""
 
-    def __init__(self, port: BusPort, bus: BusFindings, channel: ChannelSettings, options: Options) -> None:
-        self._port, self._bus, self._channel, self._options = port, bus, channel, options
+    def __init__(
+        self, port: BusPort, bus: BusFindings, channel: ChannelSettings, options: Options, *, moves: bool
+    ) -> None:
+        self._port, self._bus, self._channel, self._options, self._moves = port, bus, channel, options, moves
         self.findings = ChannelFindings(
             channel.name, channel.bus, channel.id, channel.model, limit_deg=channel.limit_deg
         )
@@ -122,10 +130,12 @@ class _ChannelCheck:
         slow = replace(spec, max_speed_rad_s=min(spec.max_speed_rad_s, math.radians(2.0 * SPEED_DEG_S)))
         try:
             with self._port.bus([slow]) as bus, stop_on_signals(bus.close):
-                if self._look(bus, spec) and not self.findings.faults:
+                if self._look(bus, spec) and not self.findings.faults and self._moves:
                     self._move(bus, describe, ask)
                 elif not self.findings.skipped:
                     self.findings.skipped = "not moved"
+        except StillOn:
+            raise
         except BusError as error:
             self._fault(f"{error}" + (f" ({error.hint})" if error.hint else ""))
 
@@ -163,6 +173,8 @@ class _ChannelCheck:
         findings = self.findings
         if found.torque:
             self._fault("its torque is on: stop the program that drives it")
+        if found.torque is None:
+            self._fault("does not say whether its torque is on")
         if found.hardware_error:
             self._fault(f"reports hardware error 0x{found.hardware_error:02X}")
         findings.temperature_c = math.nan if found.temperature_c is None else found.temperature_c
@@ -223,7 +235,7 @@ class _ChannelCheck:
             self._fault(str(error))
             moved = error.moved
         finally:
-            bus.stop()
+            switch_off(bus)
         findings.wanted_deg, findings.moved_deg = math.degrees(moved.wanted_rad), math.degrees(moved.moved_rad)
         findings.lag_ms, findings.least_voltage_v = 1e3 * moved.lag_s, moved.least_voltage_v
         findings.peak_current_a, findings.peak_load = moved.peak_current_a, moved.peak_load
@@ -247,6 +259,18 @@ class _ChannelCheck:
             self._fault(
                 "moves another part, or the wrong way, says who looked at it: swapped ids, or reverse in the file"
             )
+
+
+def switch_off(bus: Bus) -> None:
+    """Stop a bus, with a second try. Raises StillOn: a servo was not confirmed off."""
+    try:
+        bus.stop()
+    except DriverError:
+        try:
+            bus.stop()
+        except DriverError as error:
+            hint = error.hint or "switch the servos' power off"
+            raise StillOn(str(error), hint=hint, servo_ids=getattr(error, "servo_ids", ())) from error
 
 
 def _full_current_a(table: ControlTable) -> float:

@@ -51,7 +51,8 @@ def find_robot_stops(
     beyond_deg: float = BEYOND_DEG,
     progress: Callable[[str], object] = lambda text: None,
 ) -> list[ChannelStops]:
-    """Find the stops of channels one by one; the motors of all others stay off, and each is off when it is done.
+    """Find the stops of channels one by one; none where the torque of a servo of its bus is on, and each is off when it
+    is done.
 
     torque : share of the full current. beyond_deg : how far past its limits in the file a servo is looked at.
 
@@ -62,7 +63,12 @@ def find_robot_stops(
         own = [channel for channel in channels if channel.bus == bus.name]
         if not own:
             continue
-        with serve_bus(bus, servo_specs(robot.on_bus(bus.name))) as port:
+        servos = servo_specs(robot.on_bus(bus.name))
+        with serve_bus(bus, servos) as port:
+            if on := port.holding(servos):
+                why = f"not looked for: the torque of {', '.join(on)} is on; stop the program that drives them"
+                found += [ChannelStops(channel.name, faults=(why,)) for channel in own]
+                continue
             found += [_channel_stops(port, channel, torque, beyond_deg, progress) for channel in own]
     return found
 

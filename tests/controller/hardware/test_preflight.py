@@ -9,6 +9,7 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -18,13 +19,15 @@ from controller.base.errors import ControllerError
 from controller.base.parameters import PARAMETERS
 from controller.hardware import moving
 from controller.hardware.moving import Sampler, move_a_little
-from controller.hardware.preflight import new_preflight, run_preflight, towards
+from controller.hardware.preflight import new_preflight, run_preflight, switch_off, towards
 from controller.hardware.preflight_report import Preflight, check_report_path, preflight_table, write_preflight
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
 from drivers.base.bus import ServoSpec
+from drivers.base.errors import NoReply
 from drivers.sim import SimulatedBus
 from drivers.sim.serving.virtual import VirtualBus
+from drivers.tools.find_stops import StillOn
 
 MODEL = "xm430-w350"
 
@@ -57,6 +60,7 @@ class Head:
             for row in self.channels
         ]
         with SimulatedBus(servos, self.path.parent / "port", family=self.family, **self.wire) as bus:
+            self.serving = bus
             for number, registers in self.changes.items():
                 for name, value in registers.items():
                     bus.servo(number).put(name, value)
@@ -67,7 +71,8 @@ class Head:
             table = {"name": "test head", "buses": [head], "channels": self.channels}
             self.path.write_text(tomli_w.dumps(table), encoding="utf-8")
             robot = load_robot(self.path, PARAMETERS)
-            found = run_preflight(robot, robot.channels, new_preflight(robot, self.path), PARAMETERS, **options)
+            found = self.preflight = new_preflight(robot, self.path)
+            run_preflight(robot, robot.channels, found, PARAMETERS, **options)
             bus.clear()
             self.on = [servo.id for servo in servos if bus.servo(servo.id).torque]
         return found
@@ -202,6 +207,46 @@ def test_what_else_speaks_against_a_movement(head: Head, faults: list[str], chan
     assert why in of(found, "jaw")
     assert not found.passed
     head.on = []  # one was on before, and is left so
+
+
+def test_nothing_moves_beside_a_servo_that_holds(head: Head) -> None:
+    """As after a program that was killed: the servos before it would move against it."""
+    head.changes = {2: {"Torque Enable": 1}}
+    found = head.check()
+    assert found.buses[0].faults == ["the torque of brow is on: stop the program that drives them"]
+    assert of(found, "jaw") == "" and found.channels[0].skipped == "not moved"
+    assert math.isnan(found.channels[0].moved_deg) and not found.passed
+    head.on = []  # it was on before, and is left so
+
+
+def test_a_servo_that_is_not_confirmed_off_ends_the_preflight(head: Head, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It falls silent as it moves: nothing else moves, and what was found is kept."""
+    plain, steps = Sampler.step, [0]
+
+    def silenced(self: Sampler, goal: float) -> float:
+        steps[0] += 1
+        if steps[0] == 10:
+            head.serving.fault("mute:1")
+        return plain(self, goal)
+
+    monkeypatch.setattr(Sampler, "step", silenced)
+    monkeypatch.setattr(moving, "STALE_S", 0.3)
+    with pytest.raises(StillOn) as caught:
+        head.check()
+    assert caught.value.servo_ids == (1,) and "power off" in caught.value.hint
+    assert [row.name for row in head.preflight.channels] == ["jaw"]
+    assert "no longer says where it is" in of(head.preflight, "jaw")
+
+
+def test_one_lost_confirmation_is_asked_for_again() -> None:
+    answers = iter([NoReply("no answer"), None])
+
+    def stop() -> None:
+        if (error := next(answers)) is not None:
+            raise error
+
+    switch_off(SimpleNamespace(stop=stop))  # type: ignore[arg-type]
+    assert next(answers, "asked twice") == "asked twice"
 
 
 def test_feetech_servos_are_checked_by_their_load(tmp_path: Path) -> None:

@@ -83,7 +83,10 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
     @contextmanager
     def serve(bus: Any, specs: Any) -> Any:
-        yield SimpleNamespace(family=bus.kind, port=bus.name, baud=1_000_000, options={})
+        holding = ["neck"] if bus.name == "held" else []
+        yield SimpleNamespace(
+            family=bus.kind, port=bus.name, baud=1_000_000, options={}, holding=lambda servos: holding
+        )  # fmt: skip
 
     def search(
         port: str, baud: int, servo: Any, reach: Any, *, torque: float, progress: Any, margin_s: float | None
@@ -110,6 +113,14 @@ def test_each_channel_is_searched_beyond_its_limits_on_its_own_bus(asked: list[A
     )
     assert [row.channel for row in rows] == ["a", "b"] and not rows[0].faults
     assert asked == [("a", (-35.0, 45.0), 0.2), ("b", (-15.0, 20.0), 0.2)]
+
+
+def test_nothing_moves_on_a_bus_with_a_servo_that_holds(asked: list[Any]) -> None:
+    rows = find_robot_stops(robot(("held", "dynamixel"), ("b", "dynamixel")), [channel(bus="held"), channel("a")])
+    assert rows[0].faults == (
+        "not looked for: the torque of neck is on; stop the program that drives them",
+    )  # fmt: skip
+    assert [call[0] for call in asked] == ["a"]
 
 
 def test_what_cannot_be_searched_is_said_and_nothing_moved(asked: list[Any]) -> None:
