@@ -19,12 +19,13 @@ import asyncio
 import json
 from abc import ABC, abstractmethod
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from contextlib import suppress
 from typing import Any, Self, TypeVar
 
 try:
     from websockets.asyncio.client import ClientConnection as AsyncConnection
     from websockets.asyncio.client import connect as connect_async
-    from websockets.exceptions import ConnectionClosed, InvalidStatus, InvalidURI
+    from websockets.exceptions import ConnectionClosed, InvalidStatus, WebSocketException
     from websockets.sync.client import ClientConnection, connect
 except ImportError as error:
     raise ImportError(
@@ -169,15 +170,17 @@ class Face(_Requests):
     def states(self, rate_hz: float = 30.0, *names: str) -> Iterator[Message]:
         """The face at a rate, for as long as it is asked for; of all parameters without names."""
         self._ask("subscribe", rate_hz=rate_hz, parameters=list(names) or None)
+        wait_s = _wait_for_state(self._wait_s, rate_hz)
         try:
             while True:
-                message: Message = json.loads(self._connection.recv(self._wait_s))
+                message: Message = json.loads(self._connection.recv(wait_s))
                 if message.get("type") == "state" and message.get("id") is None:
                     yield message
         except (ConnectionClosed, TimeoutError) as error:
             raise _gone(error) from error
         finally:
-            self._connection.send(json.dumps({"type": "unsubscribe"}))
+            with suppress(ConnectionClosed):
+                self._connection.send(json.dumps({"type": "unsubscribe"}))
 
     def close(self) -> None:
         """End the connection; the face keeps what was commanded."""
@@ -206,7 +209,7 @@ class AsyncFace(_Requests):
             self._connection = await connect_async(
                 self._url, additional_headers=headers, open_timeout=self._wait_s, compression=None
             )
-        except (OSError, InvalidStatus, InvalidURI) as error:
+        except (OSError, WebSocketException) as error:
             raise _not_reached(self._url, error) from error
         return self
 
@@ -228,13 +231,17 @@ class AsyncFace(_Requests):
     async def states(self, rate_hz: float = 30.0, *names: str) -> AsyncIterator[Message]:
         """The face at a rate, for as long as it is asked for; of all parameters without names."""
         await self._ask("subscribe", rate_hz=rate_hz, parameters=list(names) or None)
+        wait_s = _wait_for_state(self._wait_s, rate_hz)
         try:
-            async for text in self._open:
-                message: Message = json.loads(text)
+            while True:
+                message: Message = json.loads(await asyncio.wait_for(self._open.recv(), wait_s))
                 if message.get("type") == "state" and message.get("id") is None:
                     yield message
+        except (ConnectionClosed, TimeoutError) as error:
+            raise _gone(error) from error
         finally:
-            await self._open.send(json.dumps({"type": "unsubscribe"}))
+            with suppress(ConnectionClosed):
+                await self._open.send(json.dumps({"type": "unsubscribe"}))
 
     @property
     def _open(self) -> AsyncConnection:
@@ -243,13 +250,18 @@ class AsyncFace(_Requests):
         return self._connection
 
 
+def _wait_for_state(wait_s: float, rate_hz: float) -> float:
+    """How long a state may take at a rate, which may be lower than one in the time of an answer."""
+    return max(wait_s, 2.0 / rate_hz) if rate_hz > 0.0 else wait_s
+
+
 Opened = TypeVar("Opened")
 
 
 def _reached(url: str, call: Callable[[], Opened]) -> Opened:
     try:
         return call()
-    except (OSError, InvalidStatus, InvalidURI) as error:
+    except (OSError, WebSocketException) as error:
         raise _not_reached(url, error) from error
 
 

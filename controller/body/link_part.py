@@ -37,6 +37,9 @@ class LinkPart:
         self._threads: set[threading.Thread] = set()
         self._stopping = threading.Event()
         self._lock = threading.Lock()  # held while it is opened and closed
+        self._guard = threading.Lock()  # of the two below
+        self._reopening = False
+        self._late_error: BaseException | None = None  # of a thread that ended while the link was opened again
 
     @property
     def opened(self) -> bool:
@@ -62,6 +65,11 @@ class LinkPart:
 
     def fail(self, error: BaseException) -> None:
         """Report an error of the link, and open it again after a pause."""
+        with self._guard:
+            if self._reopening:  # another of its threads ended, too
+                self._late_error = error
+                return
+            self._reopening = True
         self._part.fail(error, time.monotonic())
         threading.Thread(target=self._open_again, name=f"{self.name}, again", daemon=True).start()
 
@@ -88,13 +96,20 @@ class LinkPart:
                 if self._stopping.is_set():
                     return
                 self._end(self._closers)
+                with self._guard:
+                    self._late_error = None  # of threads of the link that was ended
                 try:
                     self.open()
                 except Exception as error:  # noqa: BLE001  tried again
                     self._part.fail(error, time.monotonic())
-                else:
+                    continue
+            with self._guard:
+                again = self._late_error
+                if again is None:
+                    self._reopening = False
                     self._part.recover()
                     return
+            self._part.fail(again, time.monotonic())
 
     def _end(self, closers: Closers) -> None:
         """Run what closes the link, in another thread: what hangs there must not keep the servos from stopping."""

@@ -17,7 +17,7 @@ from controller.cli.heads import Identity, Person
 from drivers.base.permission import ports_forbidden
 from surface.base.extras import require
 
-Seconds = Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")]
+Seconds = Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, max=1e8, help="Stop after this long.")]
 ReportFile = Annotated[Path | None, typer.Option("--report", help="Write what was measured to this JSON file.")]
 Headless = Annotated[bool, typer.Option("--headless", help="Open no window even where there is a display.")]
 Pictures = Annotated[

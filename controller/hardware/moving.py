@@ -6,14 +6,17 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from itertools import pairwise
 
+import numpy as np
+
+from controller.base.parameters import Floats
 from drivers.base.bus import Bus, BusState
 
 PERIOD_S = 0.02
 SETTLE_S = 0.4
 """How long a servo may take to arrive after its last goal."""
 STALE_S = 0.3
+LONGEST_LAG_S = 1.0
 LEAD_RAD = math.radians(2.5)
 """A servo that is so far behind its goal is blocked."""
 STARTED_RAD = math.radians(0.25)
@@ -55,7 +58,9 @@ class Sampler:
     full_a: float
     sleep: Callable[[float], object] = time.sleep
     clock: Callable[[], float] = time.monotonic
+    sent_s: list[float] = field(default_factory=list)
     goals: list[float] = field(default_factory=list)
+    read_s: list[float] = field(default_factory=list)
     positions: list[float] = field(default_factory=list)
     current_a: float = math.nan
     share: float = math.nan
@@ -69,8 +74,10 @@ class Sampler:
         self.sleep(max(0.0, begun + PERIOD_S - self.clock()))
         state = self.bus.read()
         position = float(state.position_rad[0])
+        self.sent_s.append(begun)
+        self.goals.append(sent)
         if state.fresh[0]:
-            self.goals.append(sent)
+            self.read_s.append(self.clock())
             self.positions.append(position)
         self._keep(state)
         if why := self._why_stop(state, sent, position):
@@ -101,12 +108,24 @@ class Sampler:
     def moved(self) -> Moved:
         """What was measured so far."""
         found = Moved(peak_current_a=self.current_a, peak_load=self.share, least_voltage_v=self.voltage_v)
-        if len(self.goals) > 1:  # one sample is no movement
+        if len(self.positions) > 1:  # one sample is no movement
             found.wanted_rad = max(self.goals) - min(self.goals)
             found.moved_rad = max(self.positions) - min(self.positions)
-            found.along = _together(self.goals, self.positions)
-            found.lag_s = _lag(self.goals, self.positions) * PERIOD_S
+            found.lag_s = self._lag_s()
+            found.along = float(np.diff(self._goals_before(found.lag_s)) @ np.diff(self.positions))
         return found
+
+    def _goals_before(self, lag_s: float) -> Floats:
+        """(k,) the goal that held some time before each position was read; the first one before all."""
+        at = np.searchsorted(self.sent_s, np.array(self.read_s) - lag_s, side="right") - 1
+        held: Floats = np.array(self.goals)[np.maximum(at, 0)]
+        return held
+
+    def _lag_s(self) -> float:
+        """How long the positions were behind the goals: the middle of the delays with the least mean distance."""
+        lags = np.arange(0.0, min(LONGEST_LAG_S, 0.5 * (self.read_s[-1] - self.sent_s[0])), 0.5 * PERIOD_S)
+        errors = np.array([np.abs(self._goals_before(lag) - self.positions).mean() for lag in lags])
+        return float(lags[errors <= errors.min() + 1e-9].mean()) if len(lags) else 0.0
 
 
 def move_a_little(sampler: Sampler, by_rad: float, speed_rad_s: float, low_rad: float, high_rad: float) -> Moved:
@@ -140,24 +159,3 @@ def _ramp(sampler: Sampler, goal: float, target: float, speed_rad_s: float) -> f
 def _most(one: float, other: float) -> float:
     """The greater of two values; a known one where the other is unknown."""
     return other if math.isnan(one) else one if math.isnan(other) else max(one, other)
-
-
-def _together(goals: list[float], positions: list[float]) -> float:
-    """Sum of the products of steps of goals and positions, the latter some samples later: above 0 along the goals."""
-    late = round(_lag(goals, positions))
-    steps = zip(_steps(goals), _steps(positions[late:]), strict=False)
-    return sum(goal * position for goal, position in steps)
-
-
-def _steps(values: list[float]) -> list[float]:
-    return [after - before for before, after in pairwise(values)]
-
-
-def _lag(goals: list[float], positions: list[float]) -> float:
-    """By how many samples the positions are behind the goals: where their distance is least."""
-    most = min(len(goals) // 2, round(1.0 / PERIOD_S))
-    errors = [
-        sum(abs(g - p) for g, p in zip(goals, positions[late:], strict=False)) / (len(goals) - late)
-        for late in range(most)
-    ]
-    return float(errors.index(min(errors))) if errors else math.nan

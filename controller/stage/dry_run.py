@@ -246,6 +246,8 @@ def _recording_feed(stage: Stage, path: Path, state: CommandState) -> tuple[Feed
     every, first = np.ones(len(state.parameters), dtype=bool), [0]
 
     def feed(now_ns: int) -> None:
+        if not ticks:
+            return
         first[0] = first[0] or now_ns
         at = int(np.searchsorted(times - times[0], now_ns - first[0], side="right")) - 1
         state.write_layer("manual", ticks[at][1], every, now_ns)

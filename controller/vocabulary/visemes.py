@@ -159,14 +159,20 @@ def _faults(parameters: Parameters, file: _File) -> list[str]:
     faults = unknown_names(parameters, "through", file.through)
     for name, viseme in file.visemes.items():
         faults += unknown_names(parameters, f"visemes.{name}.weights", viseme.weights)
-    used = {f"rhubarb.{shape}": name for shape, mix in file.rhubarb.items() for name in mix}
-    used |= {f"phonemes.{phoneme}": name for phoneme, name in file.phonemes.items()}
-    used |= {f"sapi.{number}": name for number, name in file.sapi.items()}
-    used |= {f"{table}.{name}": name for table in ("ipa", "letters") for name in getattr(file, table)}
-    return faults + [
+    used = [(f"rhubarb.{shape}", name) for shape, mix in file.rhubarb.items() for name in mix]
+    used += [(f"phonemes.{phoneme}", name) for phoneme, name in file.phonemes.items()]
+    used += [(f"sapi.{number}", name) for number, name in file.sapi.items()]
+    used += [(f"{table}.{name}", name) for table in ("ipa", "letters") for name in getattr(file, table)]
+    faults += [
         f"{where}: unknown viseme {name!r}{did_you_mean(name, file.visemes)}"
-        for where, name in used.items()
+        for where, name in used
         if name not in file.visemes
+    ]
+    return faults + [
+        f"letters.{name}: {letters!r} has more than {_LONGEST_LETTERS} letters"
+        for name, each in file.letters.items()
+        for letters in each.split()
+        if len(letters) > _LONGEST_LETTERS
     ]
 
 

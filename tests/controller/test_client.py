@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -106,6 +108,61 @@ def test_errors_say_what_to_do(far: tuple[CommandState, Any, str]) -> None:
     assert "websocket" in caught.value.hint
     with pytest.raises(FaceError, match="not connected"):
         asyncio.run(AsyncFace(url).set(jawOpen=0.5))
+
+
+def test_a_face_that_goes_while_its_states_are_read_is_said_to_be_gone(far: tuple[CommandState, Any, str]) -> None:
+    _, link, url = far
+
+    async def program() -> None:
+        async with AsyncFace(url) as face:
+            async for _ in face.states(100):
+                link.stop()
+
+    with Face(url) as face:
+        states = face.states(100)
+        next(states)
+        with pytest.raises(FaceError, match="closed"):
+            asyncio.run(program())
+        with pytest.raises(FaceError, match="closed"):
+            for _ in states:
+                pass
+
+
+def test_states_may_come_more_slowly_than_answers(far: tuple[CommandState, Any, str]) -> None:
+    state, _, url = far
+    with Face(url, wait_s=0.5) as face:
+        states = face.states(1.0, "jawOpen")
+        for value in (0.1, 0.2, 0.3):
+            state.set_parameters([JAW], [value], 1)
+            tick(state)
+            assert list(next(states)["parameters"]) == ["jawOpen"]
+
+
+@pytest.mark.parametrize("answer", [b"", b"ERR line too long\r\n", b"HTTP/1.1 200 OK\r\n\r\n"])
+def test_a_port_of_something_else_is_no_face(answer: bytes) -> None:
+    """Of the line link, which hangs up, and of any other service."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        url = f"ws://127.0.0.1:{server.getsockname()[1]}"
+
+        def serve() -> None:
+            for _ in range(2):
+                call, _ = server.accept()
+                with call:
+                    call.recv(1000)
+                    call.sendall(answer)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        with pytest.raises(FaceError, match=r"ws://127\.0\.0\.1"):
+            Face(url)
+        with pytest.raises(FaceError, match=r"ws://127\.0\.0\.1"):
+            asyncio.run(_enter(AsyncFace(url)))
+        thread.join(10.0)
+
+
+async def _enter(face: AsyncFace) -> None:
+    async with face:
+        pass
 
 
 def test_a_wrong_token_is_told_in_the_words_of_the_face() -> None:

@@ -85,11 +85,20 @@ def _network(form: Format) -> str:
     return next((each for each in form.transports if each in ("udp", "tcp")), "udp")
 
 
+def _is_host(text: str) -> bool:
+    """Whether a host can be looked up: IDNA takes no empty labels and none of more than 63 characters (RFC 3490)."""
+    try:
+        return bool(text.encode("idna"))
+    except UnicodeError:
+        return False
+
+
 def _host_and_port(rest: str, usual: int, text: str) -> tuple[str, int]:
     host, colon, port = rest.rpartition(":")
     if not colon:
         host, port = rest, str(usual)
     host = host.removeprefix("[").removesuffix("]") or LOOPBACK
-    if not (port.isascii() and port.isdigit()) or not 0 < int(port) < 65_536 or re.search(r"[\s/\\]", host):
+    whole = port.isascii() and port.isdigit() and len(port) <= 5 and 0 < int(port) < 65_536
+    if not whole or re.search(r"[\s/\\]", host) or not _is_host(host):
         raise ValueError(f'{text!r} is not HOST:PORT, as "{LOOPBACK}:{usual or 9400}"')
     return host, int(port)

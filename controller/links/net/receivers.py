@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import hmac
 import os
 import selectors
@@ -350,6 +351,12 @@ def notice_loss(call: socket.socket) -> None:
             call.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)
 
 
+_LISTEN_HINTS = {
+    errno.EADDRINUSE: "another program listens there: end it, or choose another port: ss -lunpt | grep {port}",
+    errno.EACCES: "choose a port from 1024 on: those below are for programs with rights",
+}
+
+
 def bound(address: Address, kind: socket.SocketKind) -> socket.socket:
     """A socket at an address that does not block. Raises LinkError."""
     family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
@@ -360,7 +367,9 @@ def bound(address: Address, kind: socket.SocketKind) -> socket.socket:
         made.bind((address.host, address.port))
     except OSError as error:
         made.close()
-        hint = f"another program listens there: end it, or choose another port: ss -lunpt | grep {address.port}"
-        raise LinkError(f"{address}: cannot listen: {error.strerror or error}", hint=hint) from error
+        hint = _LISTEN_HINTS.get(error.errno or 0, "give an address of this machine: ip address shows them")
+        raise LinkError(
+            f"{address}: cannot listen: {error.strerror or error}", hint=hint.format(port=address.port)
+        ) from error
     made.setblocking(False)
     return made

@@ -99,6 +99,37 @@ def test_an_error_that_ends_a_thread_of_a_link_closes_it_and_opens_it_again(
     assert link.report() == made[1].said
 
 
+def test_two_threads_of_one_link_that_end_open_it_again_once(
+    link: LinkPart, made: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("controller.base.parts.PAUSES_S", (0.1,) * 5)
+    link.fail(OSError("receiver"))
+    link.fail(OSError("sender"))
+    until(lambda: link.opened)
+    time.sleep(0.3)
+    assert len(made) == 2 and link.opened and link._part.failures == 1
+    link.fail(OSError("again"))
+    until(lambda: len(made) == 3 and link.opened)
+    assert link._part.failures == 2
+
+
+def test_a_link_that_fails_while_it_is_opened_again_is_opened_once_more(
+    link: LinkPart, made: list[Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("controller.base.parts.PAUSES_S", (0.01,) * 5)
+    real = link.open
+
+    def open_and_fail() -> None:
+        real()
+        if len(made) == 2:
+            link.fail(OSError("at once"))
+
+    monkeypatch.setattr(link, "open", open_and_fail)
+    link.fail(OSError("first"))
+    until(lambda: len(made) == 3 and link.opened)
+    assert link._part.failures == 2 and made[1].ended
+
+
 def test_a_link_that_does_not_come_up_is_tried_again_for_ever(
     link: LinkPart, made: list[Any], caplog: pytest.LogCaptureFixture
 ) -> None:

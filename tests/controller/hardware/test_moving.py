@@ -69,8 +69,36 @@ def test_what_a_shaft_did_is_measured(late: int) -> None:
     assert found.wanted_rad == pytest.approx(10 * DEG)
     assert found.moved_rad == pytest.approx(10 * DEG, abs=0.6 * DEG)
     assert found.along > 0.0
-    assert found.lag_s == pytest.approx(late * PERIOD_S)
+    assert late * PERIOD_S <= found.lag_s <= (late + 1) * PERIOD_S  # it reads a period after it sends
     assert (found.peak_current_a, found.peak_load, found.least_voltage_v) == pytest.approx((0.1, 0.1, 11.0))
+
+
+@pytest.mark.parametrize("delay_s", [0.0, 0.1, 0.3])
+@pytest.mark.parametrize("reading_s", [0.002, 0.016])
+def test_a_delay_is_measured_however_long_reading_takes(delay_s: float, reading_s: float) -> None:
+    """16 ms are the latency timer of a common adapter."""
+    now, bus = SimpleNamespace(s=0.0), FormulaBus()
+    sent: list[tuple[float, float]] = []
+
+    def write(goals: list[float]) -> np.ndarray:
+        goal = FormulaBus.write(bus, goals)
+        sent.append((now.s, float(goal[0])))
+        return goal
+
+    def late(reads: int, state: BusState) -> BusState:
+        now.s += reading_s
+        position = next((goal for at_s, goal in reversed(sent) if at_s <= now.s - delay_s), 0.0)
+        return replace(state, position_rad=np.array([position]))
+
+    bus.change, bus.write = late, write  # type: ignore[method-assign]
+
+    def sleep(span_s: float) -> None:
+        now.s += span_s
+
+    slow = Sampler(bus, 0.5, 1.0, sleep, lambda: now.s)  # type: ignore[arg-type]
+    found = move_a_little(slow, 5 * DEG, 5 * DEG, -1.0, 1.0)
+    assert found.lag_s == pytest.approx(delay_s, abs=PERIOD_S)
+    assert found.along > 0.0
 
 
 def test_a_servo_that_runs_away_from_its_goals_is_stopped_and_said_to_go_the_other_way() -> None:

@@ -286,7 +286,6 @@ def test_a_servo_that_runs_from_its_goals_is_told_apart() -> None:
         moved = move_a_little(Sampler(bus, 0.4, 2.3, wire.clock.sleep, wire.clock), 0.05, 0.2, -0.5, 0.5)
         assert moved.along > 0.0
         assert moved.lag_s < 0.1
-    assert moving._together([0, 1, 2, 1, 0], [0, -1, -2, -1, 0]) < 0.0
 
 
 def test_the_report_says_whose_file_it_was_and_who_signed(head: Head, tmp_path: Path) -> None:

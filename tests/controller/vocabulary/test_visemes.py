@@ -62,9 +62,11 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         loud = 1
         weights = { jawOpn = 0.5, jawOpen = 2 }
         [rhubarb]
-        A = { b = 1.0 }
+        A = { b = 1.0, a = 0.5 }
         [phonemes]
         AA = "c"
+        [letters]
+        a = "sch tsch"
         [through]
         moth = 0.5
         """
@@ -73,7 +75,8 @@ def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:
         Visemes.load(P, path)
     text = str(caught.value)
     for part in ("extra", "visemes.a.hold", "visemes.a.loud", "visemes.a.weights.jawOpn", "visemes.a.weights.jawOpen",
-                 "rhubarb.A: unknown viseme 'b'", "phonemes.AA: unknown viseme 'c'", "through.moth"):  # fmt: skip
+                 "rhubarb.A: unknown viseme 'b'", "letters.a: 'tsch' has more than 3 letters",
+                 "phonemes.AA: unknown viseme 'c'", "through.moth"):  # fmt: skip
         assert part in text
     path.write_text("")
     with pytest.raises(ConfigError, match="visemes: missing"):

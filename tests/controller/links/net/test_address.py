@@ -45,7 +45,24 @@ def test_a_host_travels_as_the_format_does_first() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["a:", "a:0", "a:65536", "a:x", "a:-1", "a:١", "a b:1", "http:\\x:1", "udp:a/b:1", "tcp:a:1.5", "a"]
+    "text",
+    [
+        "a:",
+        "a:0",
+        "a:65536",
+        "a:x",
+        "a:-1",
+        "a:١",
+        "a b:1",
+        "http:\\x:1",
+        "udp:a/b:1",
+        "tcp:a:1.5",
+        "a",
+        "a..b:1",
+        "ä..b:1",
+        "x" * 64 + ":1",
+        "a:" + "9" * 5000,
+    ],
 )
 def test_what_is_no_host_and_port_is_named(text: str) -> None:
     with pytest.raises(ValueError, match=r'is not HOST:PORT, as "127\.0\.0\.1:9400"') as caught:

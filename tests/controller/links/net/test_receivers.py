@@ -194,7 +194,9 @@ def test_standard_input_is_read_until_it_ends(opened: Open, monkeypatch: pytest.
 def test_an_address_that_is_taken_is_told(opened: Open) -> None:
     port = free_port()
     opened(f"udp:127.0.0.1:{port}")
-    with pytest.raises(LinkError, match="cannot listen"):
+    with pytest.raises(LinkError, match="cannot listen") as caught:
         opened(f"udp:127.0.0.1:{port}")
-    with pytest.raises(LinkError, match="cannot listen"):
+    assert "another program" in caught.value.hint and str(port) in caught.value.hint
+    with pytest.raises(LinkError, match="cannot listen") as caught:
         opened("udp:203.0.113.7:5000")  # an address of nobody (RFC 5737)
+    assert "an address of this machine" in caught.value.hint
