@@ -42,6 +42,7 @@ class Capture:
         self._parameters = parameters or PARAMETERS
         self._rows: list[Floats] | None = None
         self._began = 0.0
+        self._promised: set[Path] = set()  # names of clips that are being written
         self.message = ""
         self.last: Take | None = None
 
@@ -74,10 +75,19 @@ class Capture:
             self.message = "a clip needs two pictures at least"
             return
         path = self._free("clip", ".webp")
-        rate_hz = (len(clip.frames) - 1) / (clip.times_s[-1] - clip.times_s[0])
+        self._promised.add(path)
         self.message = f"writing {path}"
-        self._jobs.start("writing the clip", lambda _: write_clip(clip.frames, path, fps=rate_hz),
+        self._jobs.start(f"writing {path.name}", lambda _: self._write_clip(clip, path),
                          lambda count: self._wrote(path, f", {count} pictures"))  # fmt: skip
+
+    def _write_clip(self, clip: Recorder, path: Path) -> int:
+        """Write a clip, in another thread; returns how many pictures it has."""
+        rate_hz = (len(clip.frames) - 1) / (clip.times_s[-1] - clip.times_s[0])
+        try:
+            return write_clip(clip.frames, path, fps=rate_hz)
+        except OMOTE_ERRORS as error:
+            self.message = str(error)
+            raise
 
     def _wrote(self, path: Path, more: str = "") -> None:
         self.message = f"wrote {path}{more}"
@@ -86,7 +96,16 @@ class Capture:
         """Take the next picture for the clip where one is due, and nobody else wants it."""
         clip, at_s = self._clip, self._clock() - self._clip_began
         if clip is not None and clip.wants(at_s) and self._area.wanted is None:
-            self._area.wanted = lambda picture: clip.keep(picture, at_s)
+            self._area.wanted = lambda picture: self._keep(clip, picture, at_s)
+
+    def _keep(self, clip: Recorder, picture: np.ndarray, at_s: float) -> None:
+        """Add a picture to a clip; one of another size ends it, as where the window was resized."""
+        if clip is not self._clip:
+            return
+        clip.keep(picture, at_s)
+        if clip.frames[-1].shape != clip.frames[0].shape:
+            del clip.frames[-1], clip.times_s[-1]
+            self.toggle_clip()
 
     def toggle(self) -> None:
         """Begin a recording, or end it and write it."""
@@ -121,7 +140,7 @@ class Capture:
     def _free(self, stem: str, suffix: str) -> Path:
         """The first name with a number that no file has."""
         number = 1
-        while (path := self._folder / f"{stem}{number}{suffix}").exists():
+        while (path := self._folder / f"{stem}{number}{suffix}").exists() or path in self._promised:
             number += 1
         return path
 

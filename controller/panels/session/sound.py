@@ -12,9 +12,10 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.base.errors import ControllerError
-from controller.takes.voices.pcm import HINT, Sound, open_sound
+from controller.takes.voices.pcm import HINT, Sound, SoundFormat, open_sound
 from surface.base.files import open_file, reading
 
 PLAYERS: tuple[tuple[str, ...], ...] = (
@@ -68,7 +69,11 @@ class SoundPlayer:
         if self._rest is not None:
             words = [*command, str(self._rest)]
             quiet = subprocess.DEVNULL
-            self._process = subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet)
+            try:
+                self._process = subprocess.Popen(words, stdin=quiet, stdout=quiet, stderr=quiet)
+            except OSError as error:
+                self.stop()
+                raise ControllerError(f"{words[0]}: cannot be started: {error.strerror}", hint="install it") from error
 
     def stop(self) -> None:
         """Play nothing."""
@@ -104,9 +109,24 @@ def _from(path: Path, from_s: float) -> Path | None:
         parts = [np.rint(form.frames(block) * 32767.0).astype("<i2") for block in _blocks(sound)]
     if not any(map(len, parts)):
         return None
+    try:
+        return _written(form, parts)
+    except OSError as error:
+        raise ControllerError(
+            f"{path}: cannot be played: no room in {tempfile.gettempdir()}: {error.strerror}", hint="make room there"
+        ) from error
+
+
+def _written(form: SoundFormat, parts: Sequence[NDArray[np.int16]]) -> Path:
+    """A WAV file of samples, 16 bit PCM, that somebody else removes. Raises OSError, and leaves no file then."""
     with tempfile.NamedTemporaryFile(prefix="omote-", suffix=".wav", delete=False) as file:
-        with wave.open(file, "wb") as rest:
-            rest.setparams((form.channels, 2, form.rate_hz, 0, "NONE", ""))
-            for part in parts:
-                rest.writeframes(part.tobytes())
-        return Path(file.name)
+        path = Path(file.name)
+        try:
+            with wave.open(file, "wb") as rest:
+                rest.setparams((form.channels, 2, form.rate_hz, 0, "NONE", ""))
+                for part in parts:
+                    rest.writeframes(part.tobytes())
+        except OSError:
+            path.unlink(missing_ok=True)
+            raise
+    return path

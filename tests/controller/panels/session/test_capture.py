@@ -112,3 +112,44 @@ def test_a_clip_without_pictures_says_so(bench: Bench, tmp_path: Path) -> None:
     bench.capture.toggle_clip()
     bench.capture.toggle_clip()
     assert "two pictures" in bench.capture.message and not list(tmp_path.iterdir())
+
+
+def film(bench: Bench, sizes: list[tuple[int, int]]) -> None:
+    """Begin a clip and take pictures of these heights and widths, one a quarter of a second."""
+    bench.capture.toggle_clip()
+    for size in sizes:
+        bench.frame(0.25, 0.0)
+        if bench.area.wanted is not None:
+            take, bench.area.wanted = bench.area.wanted, None
+            take(np.zeros((*size, 3), np.uint8))
+
+
+def test_two_clips_in_quick_succession_are_two_files(bench: Bench, tmp_path: Path) -> None:
+    for count in (4, 2):
+        film(bench, [(96, 128)] * count)
+        bench.capture.toggle_clip()
+    jobs = bench.capture._jobs
+    for job in list(jobs.running):
+        job.join(60.0)
+    jobs()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["clip1.webp", "clip2.webp"]
+    assert not jobs.running and bench.capture.message.startswith("wrote")
+
+
+def test_a_clip_ends_where_the_window_is_resized(bench: Bench, tmp_path: Path) -> None:
+    film(bench, [(96, 128)] * 3 + [(80, 120)] * 2)
+    assert not bench.capture.filming
+    (job,) = bench.capture._jobs.running
+    job.join(60.0)
+    bench.capture._jobs()
+    assert bench.capture.message == f"wrote {tmp_path / 'clip1.webp'}, 3 pictures"
+
+
+def test_a_clip_that_cannot_be_written_says_why(bench: Bench, tmp_path: Path) -> None:
+    film(bench, [(96, 128)] * 3)
+    bench.capture._folder = tmp_path / "file" / "beside"
+    (tmp_path / "file").write_text("")
+    bench.capture.toggle_clip()
+    (job,) = bench.capture._jobs.running
+    job.join(60.0)
+    assert not bench.capture.message.startswith("writing")

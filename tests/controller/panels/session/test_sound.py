@@ -99,3 +99,17 @@ def test_what_is_no_sound_is_refused_with_its_name(tmp_path: Path, damage: str) 
         with pytest.raises(ControllerError, match=r"a\.wav") as caught:
             read(path)
         assert caught.value.hint
+
+
+def test_a_player_that_went_and_a_full_disk_are_errors_with_a_next_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_wav(tmp_path / "a.wav", bytes(2 * RATE))
+    player = SoundPlayer([str(tmp_path / "gone")])
+    with pytest.raises(ControllerError, match="cannot be started") as caught:
+        player.start(path)
+    assert caught.value.hint and not player.playing
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "none"))
+    with pytest.raises(ControllerError, match="no room in") as caught:
+        player.start(path)
+    assert caught.value.hint
