@@ -27,6 +27,7 @@ from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.tools.calibrate_screen import CalibrationScreen
 from drivers import open_bus
 from drivers.base.bus import Bus
+from drivers.base.errors import DriverError
 
 ARROWS = {"[A": "up", "[B": "down", "[C": "right", "[D": "left", "OA": "up", "OB": "down", "OC": "right", "OD": "left"}
 
@@ -58,7 +59,10 @@ def run_calibration(
         title = f"{robot.name}, calibration {name!r}"
         with Live(screen.picture(title), console=console, auto_refresh=False, screen=True) as live:
             while not (screen.done or ended.is_set()):
-                _cycle(buses, screen)
+                try:
+                    _cycle(buses, screen)
+                except DriverError as error:  # what was captured is still here: s saves it
+                    screen.fail(f"{error}; the motors are to be off; trying again")
                 live.update(screen.picture(title), refresh=True)
                 for key in read_keys(PERIOD_S):
                     screen.handle_key(key)
@@ -79,6 +83,8 @@ def _cycle(buses: Sequence[BusChannels], screen: CalibrationScreen) -> None:
     """Switch the motors as the keys ask, move those that hold, and read where everything is."""
     angles = np.full(len(screen.channels), np.nan)
     for bus, indices in buses:
+        if not bus.is_open:
+            bus.reconnect()
         if screen.holding != bus.running:
             bus.start() if screen.holding else bus.stop()
         if screen.holding:
@@ -100,8 +106,11 @@ def _save(screen: CalibrationScreen, robot: RobotSettings, name: str, target: Pa
     except ControllerError as error:  # what was captured is still here: once there is room, s saves it
         screen.not_saved(f"not saved: {error}")
         return False
-    left_out = [channel.name for channel in screen.channels if channel.name not in captured]
-    screen.saved(f"saved {len(captured)} channels" + (f"; not complete: {', '.join(left_out)}" if left_out else ""))
+    wrong = screen.in_wrong_order()
+    left_out = [each.name for each in screen.channels if each.name not in captured and each.name not in wrong]
+    text = f"saved {len(captured)} channels"
+    text += f"; not complete: {', '.join(left_out)}" if left_out else ""
+    screen.saved(text + (f"; neutral is not between lowest and highest: {', '.join(wrong)}" if wrong else ""))
     return True
 
 

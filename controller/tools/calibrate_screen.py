@@ -18,6 +18,7 @@ from controller.robot.settings import ChannelSettings
 STEP_DEG = 0.5
 """How far an arrow key moves a servo that holds."""
 BAR = 44
+SLACK_DEG = 1.0  # of one angle that is measured twice
 HELP = (
     "up/down channel   n neutral   N neutral of all   [ lowest   ] highest   t follow the extremes\n"
     "h hold / release   left/right move while it holds   c clear   s save   q leave"
@@ -107,15 +108,33 @@ class CalibrationScreen:
         }.get(key, lambda: None)()
 
     def captured(self) -> dict[str, CapturedAngles]:
-        """The channels whose three angles are known, ends moved inwards by the margin."""
+        """The channels whose three angles are known and in order, ends moved inwards by the margin."""
         found = {}
         for channel, mark in zip(self.channels, self.marks, strict=True):
-            if not mark.missing:
+            if not mark.missing and self._in_order(mark):
                 low = min(mark.low + self.margin_deg, mark.neutral)
                 high = max(mark.high - self.margin_deg, mark.neutral)
                 if low < high:
                     found[channel.name] = CapturedAngles(min_deg=low, neutral_deg=mark.neutral, max_deg=high)
         return found
+
+    def in_wrong_order(self) -> list[str]:
+        """Names of channels whose three angles are known, but neutral lies outside of lowest and highest."""
+        return [
+            channel.name
+            for channel, mark in zip(self.channels, self.marks, strict=True)
+            if not mark.missing and not self._in_order(mark)
+        ]
+
+    def _in_order(self, mark: Marks) -> bool:
+        """Whether neutral lies between the ends; an end may be neutral itself, and measured twice."""
+        slack = max(self.margin_deg, SLACK_DEG)
+        return mark.low - slack <= mark.neutral <= mark.high + slack
+
+    def fail(self, message: str) -> None:
+        """Nothing is known of the servos: show why. The motors do not come on again by themselves."""
+        self.angle_deg = np.full(len(self.channels), np.nan)
+        self.holding, self.message = False, message
 
     def saved(self, message: str) -> None:
         """The file was written: show a message."""
@@ -181,7 +200,9 @@ class CalibrationScreen:
     def _save(self) -> None:
         self.saving = bool(self.captured())
         if not self.saving:
-            missing = self.marks[self.selected].missing or ["a way between its ends"]
+            mark = self.marks[self.selected]
+            between = [] if mark.missing or self._in_order(mark) else ["a neutral angle between lowest and highest"]
+            missing = mark.missing or between or ["a way between its ends"]
             self.message = f"nothing to save yet: {self.channels[self.selected].name} lacks {', '.join(missing)}"
 
     def _leave(self) -> None:

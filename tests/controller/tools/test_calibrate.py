@@ -26,6 +26,7 @@ from controller.base.parameters import PARAMETERS
 from controller.robot.robot import load_robot
 from controller.tools import calibrate as module
 from controller.tools.calibrate import keyboard, split_keys
+from drivers.base.errors import PortLost
 from drivers.sim import ServoView, SimulatedBus
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-terminals")
@@ -233,6 +234,7 @@ class Servos:
     """A bus of a calibration: what it is asked, and angles (deg) of some age for every read."""
 
     measures = True
+    is_open = True
 
     def __init__(self, count: int) -> None:
         self.asked: list[object] = []
@@ -331,6 +333,33 @@ def test_angles_of_servos_that_measure_nothing_count_whatever_their_age(
 ) -> None:
     _, servos, _, _ = calibrated(monkeypatch, tmp_path, [["h"], ["right"]], age_s=np.full(2, np.inf), measures=False)
     assert servos.asked == ["start", [5.0, 5.0], [5.5, 5.0], "closed"]  # 5 deg, and a step of the right key
+
+
+def test_a_lost_port_leaves_what_was_captured_and_switches_nothing_on(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """A loose plug after the angles of a channel: the calibration goes on, and can be saved."""
+    angles, once, read = iter([-10.0, -10.0, 3.0, 3.0, 20.0, 20.0]), iter([True]), Servos.read
+
+    def unplugged(servos: Servos) -> SimpleNamespace:
+        if (angle := next(angles, None)) is None and next(once, False):
+            servos.is_open = False
+            raise PortLost("port /dev/none is lost", hint="plug it in again")
+        servos.angle_deg = np.array([5.0 if angle is None else angle, 5.0])
+        return read(servos)
+
+    def reconnect(servos: Servos) -> None:
+        servos.asked.append("reconnect")
+        servos.is_open = True
+
+    monkeypatch.setattr(Servos, "read", unplugged)
+    monkeypatch.setattr(Servos, "reconnect", reconnect, raising=False)
+    keys = [["["], [], ["n"], [], ["]"], ["h"], [], [], ["s"], []]
+    written, servos, _, shown = calibrated(monkeypatch, tmp_path, keys)
+    assert written and "port /dev/none is lost" in shown and "saved 1 channels" in shown
+    assert servos.asked == ["start", [20.0, 5.0], "reconnect", "stop", "closed"]
+    captured = tomllib.loads((tmp_path / "c.toml").read_text())
+    assert captured["channels"] == {"jaw": pytest.approx({"min_deg": -10, "neutral_deg": 3, "max_deg": 20})}
 
 
 def test_keys_of_a_terminal_are_told_apart() -> None:

@@ -203,6 +203,16 @@ def test_a_margin_keeps_neutral_inside_and_a_channel_without_a_way_is_left_out()
     assert state.message == f"nothing to save yet: {CHANNELS[2].name} lacks a way between its ends"
 
 
+def test_a_neutral_angle_outside_of_the_ends_is_named_and_not_made_an_end() -> None:
+    state = CalibrationScreen(CHANNELS, margin_deg=0.5)
+    for key, first, second, third in (("[", 10.0, 30.0, 0.8), ("n", 0.0, 0.0, 0.0), ("]", 30.0, -30.0, 20.0)):
+        pressed(seen(state, first, second, third), key, "down", key, "down", key, "down")
+    assert list(state.captured()) == [CHANNELS[2].name], "measured a little off neutral"
+    assert state.in_wrong_order() == [CHANNELS[0].name, CHANNELS[1].name]
+    pressed(state, "down", "down", "c", "up", "up", "s")
+    assert state.message == f"nothing to save yet: {CHANNELS[0].name} lacks a neutral angle between lowest and highest"
+
+
 def test_answers_in_capitals_count_and_others_keep_the_question() -> None:
     state = pressed(seen(CalibrationScreen(CHANNELS), 0.0, 0.0, 0.0), "n", "q", "t", "N")
     assert not state.done and not state.question and not state.tracking
