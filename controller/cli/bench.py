@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from enum import StrEnum
 from pathlib import Path
@@ -78,12 +78,20 @@ def bench(
 
     Example: omote bench surface --large --growth growth.svg
     """
+    _refuse_what_belongs_elsewhere(
+        what,
+        {
+            "--out": (out is not None, Subject.quadtree), "--growth": (growth is not None, Subject.surface),
+            "--face": (face, Subject.bus), "--real": (bool(real), Subject.bus), "--json": (as_json, Subject.bus),
+            "--buses": (buses > 0, Subject.bus),
+        },
+    )  # fmt: skip
+    if real and buses:
+        raise ControllerError("--real measures one bus, --buses simulates several", hint="leave out one of them")
     require(f"omote bench {what}", *_NEEDS.get(what, ()), *(["moderngl"] if face else []), *(["PIL"] if out else []))
     if what is Subject.bus:
         _bench_bus(seconds, face, as_json, real, baud, buses, servos)
         return
-    if real:
-        raise ControllerError("--real is for a servo bus", hint=f"omote bench bus --real {real}")
     from controller.tools import bench_surface as benches  # start-up: --help does without it
 
     columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
@@ -118,6 +126,13 @@ def bench(
             took = f"{row.milliseconds:.3f}" if row.milliseconds else ""
             table.add_row(row.name, took, _ratio(row), row.against, row.reach, _KEPT[row.kept])
         show_table(table)
+
+
+def _refuse_what_belongs_elsewhere(what: Subject, given: Mapping[str, tuple[bool, Subject]]) -> None:
+    """Raise ControllerError for an option that was given and belongs to another subject."""
+    for option, (is_given, subject) in given.items():
+        if is_given and what is not subject:
+            raise ControllerError(f"{option} is for {subject}, not for {what}", hint=f"omote bench {subject} {option}")
 
 
 def _bench_surface(

@@ -104,7 +104,8 @@ class BusLoop:
         try:
             self.bus.open()
             stopped = self._stop_latch.stopped is not None
-            if not stopped:
+            follows = self.bus.measures or not self.limp  # starting a board moves servos that nobody knows the place of
+            if not stopped and follows:
                 self.bus.start()
                 self._resume()
             self._off = stopped and not self.limp

@@ -29,6 +29,7 @@ from controller.links.line.script import Script, Wave, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
 _ANSWER_LIMIT_S = 1.0
+_GREETING = "HELLO"
 _HELLO_EVERY_S = 0.1
 _POLL_S = 0.02
 _KEPT_REFUSALS = 20
@@ -67,14 +68,13 @@ class RobotHost:
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Greet until there is an answer, then play the script, until ``keep_going()`` is false."""
         while keep_going() and not self._greeted:
-            self._waiting.clear()
-            self.send("HELLO")
+            self.send(_GREETING)
             self._listen(self._now_s() + _HELLO_EVERY_S)
         start_s, frame, steps = self._now_s(), 0, self._steps()
         step_s, line = next(steps, _NO_STEP)
         while keep_going():
             at_s = self._now_s() - start_s
-            while step_s <= at_s:
+            while step_s <= at_s and keep_going():
                 self.send(line)
                 step_s, line = next(steps, _NO_STEP)
             frame = self._send_frame(frame, at_s)
@@ -151,8 +151,8 @@ class RobotHost:
 
     def _forget(self, before_s: float) -> None:
         for tag in [tag for tag, (sent_s, _) in self._waiting.items() if sent_s < before_s]:
-            del self._waiting[tag]
-            self.counts["unanswered"] += self._greeted
+            _, line = self._waiting.pop(tag)
+            self.counts["unanswered"] += line != _GREETING  # of these one answer is enough
 
 
 def main(arguments: list[str] | None = None) -> int:

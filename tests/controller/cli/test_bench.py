@@ -184,3 +184,21 @@ def test_the_bus_is_measured_for_a_second_at_least_and_told_as_a_table_or_json(m
     assert result.stderr.startswith("measuring loops")
     assert [row["name"] for row in json.loads(result.stdout)["24 servos"]] == ["late by", "ticks", "frames"]
     assert calls == [(1.0, False), (2.5, True)]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("surface", "--out", "a.png"), "--out is for quadtree, not for surface"),
+        (("head", "--growth", "a.svg"), "--growth is for surface, not for head"),
+        (("drift", "--face"), "--face is for bus, not for drift"),
+        (("crowd", "--json"), "--json is for bus, not for crowd"),
+        (("head", "--buses", "2"), "--buses is for bus, not for head"),
+        (("surface", "--real", "/dev/x"), "--real is for bus, not for surface"),
+        (("bus", "--real", "/dev/x", "--buses", "2"), "leave out one of them"),
+    ],
+)
+def test_an_option_of_another_subject_is_refused(words: tuple[str, ...], said: str) -> None:
+    found = CliRunner().invoke(make_app(), ["bench", *words])
+    assert isinstance(found.exception, ControllerError)
+    assert said in f"{found.exception} {found.exception.hint}"

@@ -285,13 +285,17 @@ def test_a_limp_bus_is_only_read(servos: SimulatedBus) -> None:
     assert servos.servo(1).position_ticks == pytest.approx(2048 + 15 * TICKS, abs=2)  # nothing led it to rest
 
 
-def test_a_limp_bus_that_measures_nothing_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_limp_bus_that_measures_nothing_is_warned_of_and_not_started(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     table = {"name": "b", "kind": "simulated", "simulates": "text", "template": "{us}\n"}
     loop = BusLoop(read_bus(table), [CHANNELS[0].model_copy(update={"model": "rc-180"})], P, Face(), limp=True)
+    begun: list[bool] = []
+    monkeypatch.setattr(loop.bus, "start", lambda **options: begun.append(True))  # it would move them to rest
     with caplog.at_level(logging.WARNING):
         loop.start()
     loop.stop()
-    assert "does not measure its servos" in caplog.text
+    assert "does not measure its servos" in caplog.text and not begun
 
 
 def test_an_error_of_the_loop_is_kept_and_the_servos_are_switched_off(servos: SimulatedBus) -> None:

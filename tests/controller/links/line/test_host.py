@@ -157,6 +157,42 @@ def test_it_greets_ten_times_a_second_until_it_is_answered_and_steps_count_from_
     assert (host.counts["accepted"], host.counts["unasked"], host.counts["unanswered"]) == (5, 0, 0)
 
 
+def test_a_far_end_that_takes_long_to_answer_is_greeted_too() -> None:
+    """An answer that comes after the next greeting is one all the same."""
+    port = TimedPort(answers_s=99.0)
+    host = RobotHost(port, Script(((0.0, "PING a"),)), P, now_s=lambda: port.now_s)  # type: ignore[arg-type]
+    write, late = port.write, list[tuple[float, bytes]]()
+
+    def answered_late(data: bytes) -> None:
+        write(data)
+        late.append((port.now_s + 0.35, data.split(b" ", 1)[0] + b" OK\n"))
+
+    def read(timeout_s: float) -> bytes:
+        TimedPort.read(port, timeout_s)
+        due = [reply for at_s, reply in late if at_s <= port.now_s]
+        late[:] = [each for each in late if each[0] > port.now_s]
+        return b"".join(due)
+
+    port.write, port.read = answered_late, read  # type: ignore[method-assign]
+    host.run(lambda: port.now_s < 1.5)
+    assert [line for _, line in port.sent][-1] == "PING a" and host.counts["unasked"] == 0
+
+
+def test_a_script_that_is_behind_ends_when_it_shall() -> None:
+    """Where the far side does not read, each line takes long to send."""
+    port = TimedPort()
+    host = RobotHost(port, Script(tuple((0.0, f"PING {k}") for k in range(1000))), P, now_s=lambda: port.now_s)  # type: ignore[arg-type]
+    write = port.write
+
+    def slowly(data: bytes) -> None:
+        write(data)
+        port.now_s += 0.2
+
+    port.write = slowly  # type: ignore[method-assign]
+    host.run(lambda: port.now_s < 2.0)
+    assert port.now_s < 3.0
+
+
 def test_a_loop_repeats_its_steps_in_its_own_time() -> None:
     port, _ = played(Script(((0.0, "PING a"), (0.125, "PING b")), loop_s=0.25), 0.7)
     start = 0.1  # after the greeting
