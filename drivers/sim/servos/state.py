@@ -166,7 +166,7 @@ class ServoState:
     def position_ticks(self, now_s: float) -> int:
         """Present Position."""
         self.update(now_s)
-        return self.drive.to_register(self.plant.motion(now_s).position)
+        return self.drive.to_register(self.drive.observe(now_s)[0].position)
 
     def register(self, name: str, now_s: float) -> int:
         """Value of any register, up to date; KeyError where the model has none of that name."""
@@ -231,6 +231,9 @@ class ServoState:
             plant.jam(now_s, begins)
         elif kind == "stops":
             plant.set_stops(now_s, value if begins else NO_STOPS)
+            self._sensed_at = -1.0
+        elif kind == "weight":
+            plant.weight = value if begins else 0.0
             self._sensed_at = -1.0
         elif kind == "hw" and begins:
             self.latch(int(value), now_s)
