@@ -405,9 +405,9 @@ def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> l
 
 def _animation(take: Path | None, rate_hz: float | None, head: Head, parameters: Parameters) -> Animation | None:
     """What a take shows, as an animation; None without one."""
-    # start-up: --help does without any of these
-    import numpy as np
+    import numpy as np  # start-up: --help does without any of these
 
+    # start-up: the same
     from controller.face.face import head_indices
     from controller.tools.motion_file import load_motion
     from surface.export.animation import Animation
