@@ -46,7 +46,7 @@ FAULTS = (
     "temp:{i}:85", "stall:{i}", "watchdog-ignored:{i}", "dup:{i}", "baud:{i}:57600", "eeprom-busy:{i}:20ms", "echo",
     "chain-stop", "slow-reader:60ms", "unplug",
 )  # fmt: skip
-"""Every fault of ``drivers.sim.wire.faults``, so that each pair of them comes; ``stops`` are no fault but a joint's."""
+"""Every fault of ``drivers.sim.wire.faults``, so that each pair comes; ``stops`` and ``weight`` belong to a joint."""
 CORRUPTING = {"crc", "dup", "flip", "noise", "short", "wrongid"}
 """Faults that change bytes of replies."""
 RETRY_S = 1.0

@@ -115,7 +115,7 @@ def words_of(line: str, port: str = "PORT") -> list[str]:
         words = [
             word if before == "--take" else word.replace("a.tsv", "head.glb") for before, word in pairwise(["", *words])
         ]
-    if "--frame" in words:  # this needs a fitted head
+    if "--frame" in words or (words[1:3] == ["export", "head.glb"] and "--vocabulary" in words):  # the head must fit
         words = ["ict" if word == "small" else word for word in words]
     elif (words[1] == "export" or {"--sheet", "--take"} & set(words)) and not {"--head", "--person"} & set(words):
         words += ["--head", "small"]
@@ -271,6 +271,7 @@ RULES: tuple[tuple[str, Callable[[str], object]], ...] = (
     ("python -m http.server", lambda line: None),  # of Python itself; it serves until it is interrupted
     ("pip install", has_packages),
     ("python ", has_program),
+    ("git clone https://", lambda line: None),  # needs the network
     ("sudo apt-get install", lambda line: None),  # changes the system of whoever reads it
     ("sudo usermod", lambda line: None),  # the same
     ("sudo setserial", lambda line: None),  # the same

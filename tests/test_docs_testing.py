@@ -23,6 +23,16 @@ ALONE = ("-p", "no:xdist", "-p", "no:hypothesispytest", "-p", "no:cacheprovider"
 """Plug-ins that the page's tests do without; hypothesis takes seconds."""
 
 
+@pytest.fixture(autouse=True, scope="module")
+def numba_is_whole() -> None:
+    """numba loads a part of itself when it first compiles, and cannot load it twice: a run of pytest in this process
+    forgets the modules that it has loaded.
+    """
+    import numba  # compiling is what other tests may not have done yet
+
+    assert numba.njit(lambda x: x + 1)(1) == 2
+
+
 @pytest.fixture
 def folder(pytester: pytest.Pytester) -> Path:
     """A folder with all files of the page; the makers' SDKs wait longer than the 34 ms they grant a USB adapter."""

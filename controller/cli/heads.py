@@ -18,6 +18,7 @@ from controller.cli.film import FilmRate, FilmTake, Sound, check_film, render_fi
 from surface.base.extras import require
 
 if TYPE_CHECKING:
+    from controller.base.parameters import Parameters  # start-up: --help does without it
     from controller.tools.surface_fit import SurfaceFit  # start-up: --help does without it
     from surface.export.animation import Animation  # start-up: --help does without it
     from surface.fit.points.report import FitReport  # start-up: --help does without it
@@ -31,6 +32,10 @@ Identity = Annotated[
     typer.Option(
         metavar="NAME=AMOUNT,...", help="Variations of the head to mix in, each 0 to 1.", autocompletion=identities
     ),
+]
+Vocabularies = Annotated[
+    list[str] | None,
+    typer.Option("--vocabulary", metavar="FILE", help="Expressions and parameters of your own; may be repeated."),
 ]
 Person = Annotated[
     str | None,
@@ -81,9 +86,7 @@ def render(
             autocompletion=names_of("stages"),
         ),
     ] = None,
-    vocabulary: Annotated[
-        list[str] | None, typer.Option(metavar="FILE", help="Expressions of your own; may be repeated.")
-    ] = None,
+    vocabulary: Vocabularies = None,
     group: Annotated[
         list[str] | None,
         typer.Option(metavar="FILE[=AMOUNT]", help="Group added to the head, by -1 to 1; may be repeated."),
@@ -327,6 +330,7 @@ def export(
     head: Annotated[str, typer.Option("--head", help=HEAD, autocompletion=names_of("heads"))] = "ict",
     settings: Setting = None,
     expression: Expression = None,
+    vocabulary: Vocabularies = None,
     identity: Identity = None,
     person: Person = None,
     frame: Annotated[
@@ -360,7 +364,9 @@ def export(
     from surface.export import export_head
 
     look = {"person": parse_person(person)}
-    still = Still.parse(settings or [], expression or [], look=look, head=head, identity=identity)
+    still = Still.parse(
+        settings or [], expression or [], look=look, head=head, identity=identity, vocabularies=vocabulary or ()
+    )
     with console.status("exporting"):
         loaded = still.load_head()
         values = zip(still.parameters.names, still.values, strict=True)
@@ -369,7 +375,9 @@ def export(
         kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
         with EXPORTERS.blaming(kind):
             if robot is None:
-                written = export_head(loaded, out, pose, added, frame, _animation(take, rate_hz), web)
+                written = export_head(
+                    loaded, out, pose, added, frame, _animation(take, rate_hz, loaded, still.parameters), web
+                )
             else:
                 written = _with_limits(robot, loaded, out, pose)
     for path in written:
@@ -395,10 +403,11 @@ def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> l
     return write_urdf(head, out, pose, joint_limits(found, parameters, joints_of(head.data)))
 
 
-def _animation(take: Path | None, rate_hz: float | None) -> Animation | None:
+def _animation(take: Path | None, rate_hz: float | None, head: Head, parameters: Parameters) -> Animation | None:
     """What a take shows, as an animation; None without one."""
-    # start-up: --help does without any of these
-    from controller.base.parameters import PARAMETERS
+    import numpy as np  # start-up: --help does without any of these
+
+    # start-up: the same
     from controller.face.face import head_indices
     from controller.tools.motion_file import load_motion
     from surface.export.animation import Animation
@@ -408,6 +417,8 @@ def _animation(take: Path | None, rate_hz: float | None) -> Animation | None:
         raise ConfigError("--rate: there is no --take", hint="--take alex_rom_3.csv --rate 30")
     if take is None:
         return None
-    motion = load_motion(take, PARAMETERS, rate_hz)
-    order = head_indices(PARAMETERS, NAMES)
-    return Animation(take.stem, motion.times_s, motion.with_rest()[:, order])
+    motion = load_motion(take, parameters, rate_hz)
+    values = motion.with_rest()[:, head_indices(parameters, head.parameters)]
+    amounts = np.array([head.own_amounts(row) for row in values]) if head.own_groups else np.zeros((len(values), 0))
+    own = {group.name: amounts[:, i] for i, group in enumerate(head.own_groups)}
+    return Animation(take.stem, motion.times_s, values[:, : len(NAMES)], own)

@@ -13,7 +13,7 @@ from rich.table import Table
 from controller.base.errors import OMOTE_ERRORS, ConfigError
 from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
-from controller.cli.heads import Identity, Person
+from controller.cli.heads import Identity, Person, Vocabularies
 from drivers.base.permission import ports_forbidden
 from surface.base.extras import require
 
@@ -34,10 +34,6 @@ VoiceHz = Annotated[
     typer.Option("--voice-rate", min=1000, help="The voice is signed 16 bit mono PCM without a header, at this rate."),
 ]
 Record = Annotated[Path | None, typer.Option("--record", help="Write every command and tick to this file (.rec).")]
-Vocabularies = Annotated[
-    list[str] | None,
-    typer.Option("--vocabulary", metavar="FILE", help="Expressions and parameters of your own; may be repeated."),
-]
 STAGE = "Stage: a name from configs/stages or a file."
 StageName = Annotated[str, typer.Option("--stage", help=STAGE, autocompletion=names_of("stages"))]
 

@@ -8,7 +8,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
@@ -20,14 +20,16 @@ _END_S = 5.0
 
 
 @contextmanager
-def face_in_the_making(stage: Path, look: Mapping[str, object], identity: Mapping[str, float] | None) -> Iterator[Path]:
+def face_in_the_making(
+    stage: Path, look: Mapping[str, object], identity: Mapping[str, float] | None, vocabularies: Sequence[Path] = ()
+) -> Iterator[Path]:
     """The path at which the face of a stage will appear; whatever is still at work ends with the context.
 
-    look, identity : what the command line puts over the stage's own.
+    look, identity : what the command line puts over the stage's own. vocabularies : as of :func:`load_stage`.
     """
     with tempfile.TemporaryDirectory(prefix="omote-web-", ignore_cleanup_errors=True) as folder:
         path = Path(folder) / "face.glb.gz"
-        orders = pickle.dumps((str(stage), dict(look), dict(identity or {}), str(path)))
+        orders = pickle.dumps((str(stage), dict(look), dict(identity or {}), str(path), list(vocabularies)))
         command = [sys.executable, "-m", "controller.panels.web_face"]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True)
         try:
@@ -44,7 +46,9 @@ def face_in_the_making(stage: Path, look: Mapping[str, object], identity: Mappin
             process.wait()
 
 
-def make_face(stage: str, look: Mapping[str, object], identity: Mapping[str, float], out: Path) -> None:
+def make_face(
+    stage: str, look: Mapping[str, object], identity: Mapping[str, float], out: Path, vocabularies: Sequence[Path] = ()
+) -> None:
     """Write the face of a stage, compressed, whole or not at all.
 
     Raises ConfigError, SurfaceError: the stage or its head cannot be read.
@@ -54,7 +58,7 @@ def make_face(stage: str, look: Mapping[str, object], identity: Mapping[str, flo
     from controller.stage.stage import load_stage, with_picture
     from surface.export.glb_web import web_glb
 
-    found = with_picture(load_stage(stage, PARAMETERS), look)
+    found = with_picture(load_stage(stage, PARAMETERS, vocabularies), look)
     if identity:
         settings = found.settings.model_copy(update={"identity": dict(identity)})
         found = replace(found, settings=settings)
@@ -66,9 +70,9 @@ def make_face(stage: str, look: Mapping[str, object], identity: Mapping[str, flo
 def main() -> None:
     """Read orders from standard input and carry them out."""
     orders: Any = pickle.loads(sys.stdin.buffer.read())
-    stage, look, identity, out = orders
+    stage, look, identity, out, vocabularies = orders
     os.nice(10)
-    make_face(stage, look, identity, Path(out))
+    make_face(stage, look, identity, Path(out), vocabularies)
 
 
 if __name__ == "__main__":

@@ -13,7 +13,8 @@ import sys
 import tempfile
 import time
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,8 @@ PACED_HZ = 50
 JITTER_HZ = 100
 GOAL, POSITION, WIDTH = 116, 132, 4
 ROUNDS = 3
+SHARES = (0.92, 0.85)
+"""Of the wire's limit that a loop of sync reads, and of fast ones, shall reach."""
 _SWING_RAD = 0.3
 _WARM_UP_CYCLES = 40
 _UNLIMITED_FPS, _PACED_FPS = 1000, 30
@@ -157,10 +160,18 @@ def _run_omote(path: str, specs: list[ServoSpec], seconds: float, fast: bool, ra
 
 
 def _run_bytes(path: str, seconds: float, fast: bool) -> Loop:
-    """The same packets sent and as many bytes awaited, without making or decoding packets: the least there can be."""
-    ids = tuple(range(1, SERVOS + 1))
-    goals = GoalFrame(ids, GOAL, WIDTH, np.arange(SERVOS)).encode(np.full(SERVOS, 2048, np.int32))
-    read, port = GroupRead((Run(ids, POSITION, WIDTH),), fast), SerialPort(path, BAUD)
+    with bytes_alone(path, SERVOS, BAUD, fast) as cycle:
+        return measure_loop(cycle, seconds, 0.0)
+
+
+@contextmanager
+def bytes_alone(path: str, servos: int, baud: int, fast: bool) -> Iterator[Cycle]:
+    """A cycle that sends the same packets and awaits as many bytes, without making or decoding packets: the least that
+    there can be.
+    """
+    ids = tuple(range(1, servos + 1))
+    goals = GoalFrame(ids, GOAL, WIDTH, np.arange(servos)).encode(np.full(servos, 2048, np.int32))
+    read, port = GroupRead((Run(ids, POSITION, WIDTH),), fast), SerialPort(path, baud)
 
     def cycle(_: object) -> bool:
         port.write(goals)
@@ -172,7 +183,7 @@ def _run_bytes(path: str, seconds: float, fast: bool) -> Loop:
 
     port.open()
     try:
-        return measure_loop(cycle, seconds, 0.0)
+        yield cycle
     finally:
         port.close()
 
@@ -230,8 +241,8 @@ def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
 
 def _rate_figures(rate: dict[str, float]) -> list[Figure]:
     figures = []
-    for kind, prefix, share in (("plain", "", 0.92), ("fast", "fast ", 0.85)):
-        limit = limit_hz(SERVOS, BAUD, kind == "fast")
+    for kind, prefix in (("plain", ""), ("fast", "fast ")):
+        limit, share = limit_hz(SERVOS, BAUD, kind == "fast"), SHARES[kind == "fast"]
         reach, kept = f">= {share:.0%} of {limit:.0f} Hz", rate[kind] >= share * limit
         figures += [
             Figure(f"write and {prefix}sync read", rate[kind], "Hz"),

@@ -70,7 +70,7 @@ def _find(name: str) -> Path:
 def _describe(path: Path) -> Iterator[str]:
     """Lines on a file; one that begins with a space continues the line before it."""
     suffix = path.suffix.lower()
-    if path.is_dir() or path.name == "head.toml":
+    if _is_head(path):
         yield from _check_head(path if path.is_dir() else path.parent)
     elif suffix == ".json" and _is_group(path):
         yield _check_group(path)
@@ -91,6 +91,16 @@ def _describe(path: Path) -> Iterator[str]:
         yield f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz"
     else:
         yield from _describe_toml(path)
+
+
+def _is_head(path: Path) -> bool:
+    """A head's folder, or the file in it; robots of that name are robots."""
+    if path.name != "head.toml" or path.is_dir():
+        return path.is_dir()
+    try:
+        return not {"buses", "channels"} & set(read_toml(path))
+    except ConfigError:
+        return True  # whoever reads heads says more of what is wrong
 
 
 def _check_head(folder: Path) -> Iterator[str]:

@@ -181,7 +181,8 @@ class StageRun:
         if self._web is None:
             yield self._options
             return
-        with face_in_the_making(self.stage.path, self._web_look, self._identity) as face:
+        stage = self.stage
+        with face_in_the_making(stage.path, self._web_look, self._identity, stage.vocabularies) as face:
             yield replace(self._options, web=WebPanel(self._web, face))
 
     def _load_head(self, body: BodyProcess) -> tuple[HeadValues, Head]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.errors import ExportError
-from surface.head.model.parameters import EYE_RAD, NAMES, read_pose, rotation
+from surface.head.model.parameters import EYE_RAD, NAMES, SHAPES, read_pose, rotation
 
 _AT = {name: i for i, name in enumerate(NAMES)}
 _LOOK = [[_AT[f"eyeLook{d}{side}"] for d in ("Down", "Up", "Out", "In")] for side in ("Left", "Right")]
@@ -19,7 +20,7 @@ class Animation:
     """Values of parameters over time.
 
     name : for people. times_s : (n,) float64 from 0, rising. values : (n, 59) float64, in the order of
-    :data:`surface.head.model.parameters.NAMES`.
+    :data:`surface.head.model.parameters.NAMES`. own : (n,) how much of each of a user's own groups is shown, by name.
 
     Raises ExportError: times or values that cannot be.
     """
@@ -27,12 +28,15 @@ class Animation:
     name: str
     times_s: Floats
     values: Floats
+    own: Mapping[str, Floats] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        good = self.times_s.ndim == 1 and self.values.shape == (len(self.times_s), len(NAMES)) and len(self.times_s)
+        rows = self.times_s.shape
+        good = len(rows) == 1 and self.values.shape == (*rows, len(NAMES)) and rows[0]
+        good = good and all(amounts.shape == rows for amounts in self.own.values())
         if not good or self.times_s[0] < 0 or (np.diff(self.times_s) <= 0).any():
             raise ExportError(f"{self.name}: an animation needs times that rise from 0", hint="check the take")
-        if not np.isfinite(self.values).all():
+        if not all(np.isfinite(each).all() for each in (self.values, *self.own.values())):
             raise ExportError(f"{self.name}: holds values that are no numbers", hint="check the take")
 
     def weights(self) -> Floats:
@@ -48,6 +52,11 @@ class Animation:
             for at, amount in ((down, pitch), (up, -pitch), (out, outward), (inward, -outward)):
                 shown[:, at] = np.maximum(amount, 0.0)
         return np.clip(shown, 0.0, 1.0, out=shown)
+
+    def weights_of(self, names: Iterable[str]) -> Floats:
+        """(n, k) weights of shapes and of a user's own groups, by name; 0 of groups that the animation lacks."""
+        shown, still = dict(zip(SHAPES, self.weights().T, strict=True)), np.zeros(len(self.times_s))
+        return np.column_stack([shown[name] if name in shown else self.own.get(name, still) for name in names])
 
     def head_quaternions(self) -> Floats | None:
         """(n, 4) rotation of the head, x, y, z, w, of one sign from frame to frame; None where it never turns."""

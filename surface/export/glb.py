@@ -12,7 +12,7 @@ from surface.export.frames import in_file, placement_of
 from surface.export.glb_document import METRES, Document
 from surface.export.glb_motion import add_motion
 from surface.export.glb_web import web_glb
-from surface.export.shapes import export_parts
+from surface.export.shapes import export_parts, is_posed
 from surface.head import Head
 from surface.head.model.parameters import ANGLES
 
@@ -45,7 +45,7 @@ def write_animated_glb(head: Head, animation: Animation, path: Path, pose: Mappi
 
 def write_web_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """As :func:`write_glb`, small and for pages of browsers; see :mod:`surface.export.glb_web`."""
-    if any(pose.values()):
+    if is_posed(head, pose):
         raise ExportError("a file for the web is written at rest", hint="leave out --set and --expression, or --web")
     _replace(path, web_glb(head))
     return [path]

@@ -32,7 +32,8 @@ class Document(GlbBuffers):
         self._materials: dict[str, dict[str, Any]] = {}
         self._images: list[dict[str, Any]] = []
         self._eyes: list[bytes] = []
-        self._pose = pose
+        amounts = head.own_amounts(head.values(pose)) if head.own_groups else ()
+        self._pose = {**pose, **{group.name: float(x) for group, x in zip(head.own_groups, amounts, strict=True)}}
         meshes = [self._mesh(part) for part in parts]
         nodes: list[dict[str, Any]] = [{"name": head.name, "children": list(range(1, len(parts) + 1))}]
         for k, part in enumerate(parts):

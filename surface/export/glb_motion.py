@@ -14,7 +14,6 @@ from surface.export.animation import Animation
 from surface.export.glb_document import Document
 from surface.export.shapes import ExportPart
 from surface.head import Head
-from surface.head.model.parameters import SHAPES
 
 _FLOAT, _BYTE, _ARRAY = 5126, 5121, 34962
 _METRES = 0.001
@@ -23,9 +22,10 @@ _METRES = 0.001
 def add_motion(document: Document, head: Head, parts: list[ExportPart], animation: Animation) -> None:
     """Add an animation of the parts, whose meshes and nodes 1.. the document has in the same order."""
     motion = _Motion(document, animation)
-    weights = animation.weights()
+    names = list(dict.fromkeys(name for part in parts for name in part.displacements))
+    weights = animation.weights_of(names) if names else np.zeros((len(animation.times_s), 0))
     for k, part in enumerate(parts):
-        shown = weights[:, [SHAPES.index(name) for name in part.displacements]]
+        shown = weights[:, [names.index(name) for name in part.displacements]]
         if shown.any():
             motion.channel(1 + k, "weights", shown.reshape(-1, 1), tuple(part.displacements))
     turned = animation.head_quaternions()

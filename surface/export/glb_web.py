@@ -33,7 +33,7 @@ from surface.export.textures import (
     strand_picture,
     strip_picture,
 )
-from surface.export.web_parts import HALF, WebPart, web_parts
+from surface.export.web_parts import HALF, HALVES, WebPart, web_parts
 from surface.head import Head
 
 METRES = 0.001
@@ -64,6 +64,7 @@ class _WebDocument(GlbBuffers):
         bound = [one for one in parts if not one.part.pivot.any()]
         self._middle, self._step_mm = _grid([one.part.vertices for one in bound])
         self._neck = head.data.neck
+        self._own = {group.name: list(group.times) for group in head.own_groups}
         self._nodes: list[dict[str, Any]] = []
         self._roots = [0]  # and every part that is bound to joints: what is above it would not move it
         self._meshes: list[dict[str, Any]] = []
@@ -81,9 +82,9 @@ class _WebDocument(GlbBuffers):
 
     def _extras(self) -> dict[str, Any]:
         neck = self._neck
-        names = sorted({name for mesh in self._meshes for name in mesh.get("extras", {}).get("targetNames", [])})
+        names = {name for mesh in self._meshes for name in mesh.get("extras", {}).get("targetNames", [])}
         return {
-            "format": _FORMAT, "half": [name for name in names if name.endswith(HALF)],
+            "format": _FORMAT, "half": sorted(names & {name + HALF for name in HALVES}), "own": self._own,
             "neck": {"pivot": (METRES * np.array(neck.pivot)).tolist()},
         }  # fmt: skip
 

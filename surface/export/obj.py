@@ -12,7 +12,7 @@ import numpy as np
 from surface.base.arrays import Floats32
 from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
-from surface.export.shapes import ExportPart, export_parts
+from surface.export.shapes import ExportPart, export_parts, is_posed
 from surface.export.textures import materials
 from surface.head import Head
 
@@ -20,14 +20,15 @@ from surface.head import Head
 def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """See :func:`surface.export.export_head`."""
     title = f"# {head.name}, written by omote; millimetres, y up, z forward"
-    return _write_parts(export_parts(head, pose, shapes=not pose), path, title)
+    return _write_parts(export_parts(head, pose, shapes=not is_posed(head, pose)), path, title)
 
 
 def write_obj_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """As :func:`write_obj`, in axes, origin and unit of the file that the head was fitted to."""
     placement = placement_of(head)
     title = f"# {head.name}, written by omote; in the frame of its source"
-    return _write_parts(in_file(export_parts(head, pose, shapes=not pose), placement), path, title)
+    parts = export_parts(head, pose, shapes=not is_posed(head, pose))
+    return _write_parts(in_file(parts, placement), path, title)
 
 
 def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:

@@ -68,25 +68,33 @@ def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes:
                 painted={key: part.attributes[key][0] for key in _PAINTED if key in part.attributes},
             )
         )
-    for name in _shapes(head) if shapes else ():
-        _add_shape(head, name, out)
+    for name, base in _shapes(head).items() if shapes else ():
+        _add_shape(head, name, base, out)
     head.pose(head.values({}))
     return out
 
 
-def _shapes(head: Head) -> list[str]:
-    """Shapes that move anything: those of groups, and those that rotate eyes and jaw."""
+def is_posed(head: Head, pose: Mapping[str, float]) -> bool:
+    """Whether a pose has more than a user's own groups, which may be there in the face at rest, too."""
+    own = {group.name for group in head.own_groups}
+    return any(value and name not in own for name, value in pose.items())
+
+
+def _shapes(head: Head) -> dict[str, Mapping[str, float]]:
+    """Shapes that move anything, each with the face that it is added to: those of groups, of turning eyes and jaw,
+    and a user's own behind them.
+    """
     follow = {part.follows for part in head.parts}
     names = set(head.groups)
     if follow & set(_EYES):
         names |= {name for name in SHAPES if name.startswith("eyeLook")}
     if "jaw" in follow:
         names |= {"jawOpen", *head.data.jaw.tilts}
-    return [name for name in SHAPES if name in names]
+    own = {group.name: dict.fromkeys(group.times, 1.0) for group in head.own_groups}
+    return {**{name: BASE_POSES.get(name, {}) for name in SHAPES if name in names}, **own}
 
 
-def _add_shape(head: Head, name: str, parts: list[ExportPart]) -> None:
-    base = BASE_POSES.get(name, {})
+def _add_shape(head: Head, name: str, base: Mapping[str, float], parts: list[ExportPart]) -> None:
     head.pose(head.values(base))
     before = [(part.vertices.copy(), unit(part.normals)) for part in head.parts]
     head.pose(head.values({**base, name: 1.0}))

@@ -1,7 +1,9 @@
 """Runs other people's programs against simulated buses: ``python -m tests.clients [NAME ...]``, or ``make clients``.
 
 Each gets an environment of its own with pinned versions (clients.toml), made once below .venv/clients, which needs a
-package index. A program must end well; its servos must then be off, and must have moved without a jump.
+package index. A program must end well; its servos must then be off, and must have moved without a jump. One that fails
+is run once more, and the table says so: some libraries wait for an answer for 50 ms at most, which a busy computer does
+not always keep.
 """
 
 from __future__ import annotations
@@ -16,12 +18,13 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from drivers.testing import ServoBus, open_servos
+from drivers.testing import ServoBoard, ServoBus, open_board, open_servos
 
 HERE = Path(__file__).resolve().parent
 ENVIRONMENTS = HERE.parents[1] / ".venv" / "clients"
 INSTALL_S, RUN_S = 600.0, 120.0
 DONE = "installed.txt"
+TRIES = 2
 
 
 def environment(name: str, packages: list[str], bare: list[str]) -> Path:
@@ -39,27 +42,44 @@ def environment(name: str, packages: list[str], bare: list[str]) -> Path:
     return python
 
 
-def run(name: str, client: dict[str, Any]) -> str:
-    """Run a client; what went wrong, or an empty text."""
-    python = environment(name, client["packages"], client.get("bare", []))
+def opened(client: dict[str, Any]) -> ServoBus | ServoBoard:
+    """The simulated servos or the board that a client's section names, on a port."""
+    if "board" in client:
+        return open_board(client["board"], **client.get("options", {}))
     models = {int(number): model for number, model in client.get("models", {}).items()} or client["model"]
-    with open_servos(models, client.get("ids", ())) as bus:
-        words = [python, HERE / "programs" / client["program"], bus.port]
+    return open_servos(models, client.get("ids", ()))
+
+
+def run(python: str | Path, client: dict[str, Any]) -> str:
+    """Run a client by an interpreter; what went wrong, or an empty text."""
+    with opened(client) as bench:
+        words = [python, HERE / "programs" / client["program"], bench.port]
         try:
             done = subprocess.run(words, capture_output=True, text=True, timeout=RUN_S)
         except subprocess.TimeoutExpired:
             return f"it had not ended after {RUN_S:g} s"
-        return done.stderr.strip()[-2000:] if done.returncode else faults(bus)
+        return done.stderr.strip()[-2000:] if done.returncode else faults(bench)
 
 
-def faults(bus: ServoBus) -> str:
+def faults(bench: ServoBus | ServoBoard) -> str:
     """What the assertions of the test bench say."""
     try:
-        bus.torque_off_at_exit()
-        bus.no_jump()
+        bench.torque_off_at_exit()
+        bench.no_jump()
     except AssertionError as error:
         return str(error)
-    return "" if bus.writes_to(bus.chain.servos[0].id, "Goal Position") else "it moved nothing"
+    goals = [write for write in bench.writes if write.register in ("Goal Position", "target_us")]
+    return "" if goals else "it moved nothing"
+
+
+def result(python: str | Path, client: dict[str, Any]) -> tuple[bool, str]:
+    """Whether a client passed, and what the table says; a second try where the first failed."""
+    wrong = [run(python, client)]
+    while wrong[-1] and len(wrong) < TRIES:
+        wrong.append(run(python, client))
+    if wrong[-1]:
+        return False, wrong[-1]
+    return True, f"passed at the second try; the first: {wrong[0].splitlines()[-1]}" if len(wrong) > 1 else "passed"
 
 
 def main(names: list[str]) -> int:
@@ -69,11 +89,11 @@ def main(names: list[str]) -> int:
         sys.exit(f"there is no client {unknown[0]}; there are {', '.join(clients)}")
     table, failed = Table("client", "versions", "seconds", "result"), False
     for name in names or clients:
-        begun = time.monotonic()
-        wrong = run(name, clients[name])
-        versions = " ".join(clients[name].get("bare", []) or clients[name]["packages"])
-        table.add_row(name, versions, f"{time.monotonic() - begun:.1f}", wrong or "passed")
-        failed = failed or bool(wrong)
+        client, begun = clients[name], time.monotonic()
+        passed, said = result(environment(name, client["packages"], client.get("bare", [])), client)
+        versions = " ".join(client.get("bare", []) or client["packages"])
+        table.add_row(name, versions, f"{time.monotonic() - begun:.1f}", said)
+        failed = failed or not passed
     Console().print(table)
     return int(failed)
 

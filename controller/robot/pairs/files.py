@@ -16,7 +16,7 @@ from controller.base.files import replacing
 from controller.base.parameters import Floats, Parameters
 from controller.base.plain_numbers import plain_number
 from controller.robot.pairs.fit import LEAST_PAIRS, FittedServo, FittedTerm, fit_servo
-from controller.robot.robot import load_robot
+from controller.robot.robot import load_robot, robot_parameters
 from controller.robot.settings import ChannelSettings, RobotSettings
 from surface.base.files import read_file, read_text, reading
 
@@ -122,10 +122,11 @@ def fit_channels(robot: RobotSettings, pairs: Pairs) -> list[FittedChannel]:
 def write_robot(path: Path, target: Path, fitted: list[FittedChannel], parameters: Parameters) -> Path | None:
     """Write the robot of ``path`` with the fitted channels to ``target``; returns where the old file is kept.
 
-    Nothing is written unless the new file can be read. Raises ConfigError, ControllerError.
+    parameters : without those of the robot's own vocabularies. Nothing is written unless the new file can be read.
+    Raises ConfigError, ControllerError.
     """
-    table = read_toml(path)
-    new = {each.channel.name: _keys(each, parameters) for each in fitted if not each.why_not}
+    table, known = read_toml(path), robot_parameters(load_robot(path, parameters), path, parameters)
+    new = {each.channel.name: _keys(each, known) for each in fitted if not each.why_not}
     table["channels"] = [
         {**{k: v for k, v in old.items() if k not in _REPLACED}, **new[old["name"]]} if old["name"] in new else old
         for old in table["channels"]

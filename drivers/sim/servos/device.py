@@ -13,7 +13,7 @@ from typing import Any
 from drivers.packets.packet import ErrorNumber
 from drivers.sim.servos.drive_x import CURRENT_POSITION, EXTENDED, GOAL_TORQUE
 from drivers.sim.servos.registers import GOALS, Change
-from drivers.sim.servos.state import BOOT_S, ServoState
+from drivers.sim.servos.state import ServoState
 from drivers.tables.tables import Item
 
 CLEAR_MULTI_TURN = b"\x01\x44\x58\x4c\x22"
@@ -80,12 +80,6 @@ class SimulatedServo(ServoState):
         self.registers.put("Registered Instruction", 0)
         self._apply(changes, now_s)
         return self.alert
-
-    def reboot(self, now_s: float) -> None:
-        """Set RAM to its initial values and clear errors; the servo receives nothing for `BOOT_S`."""
-        self._boot(now_s)
-        self.deaf_until = now_s + BOOT_S
-        self.on_change()
 
     def factory_reset(self, option: int, now_s: float) -> int:
         """Error byte. 0xFF resets all, 1 keeps the id, 2 keeps id and baud rate."""

@@ -80,7 +80,16 @@ class Drive(ABC):
         plant = self.plant
         commanded, motion = plant.trajectory.at(now_s), plant.motion(now_s)
         plant.torque_limit = self.torque_limit()
-        return motion, commanded, plant.load(motion, commanded)
+        load = plant.load(motion, commanded)
+        if plant.weight and plant.powered and plant.jammed_at is None:
+            low, high = plant.stops
+            position = motion.position - self.give() * plant.weight
+            motion = motion._replace(position=min(max(position, low), high))
+        return motion, commanded, load
+
+    def give(self) -> float:
+        """How far the position control lets the shaft give way to a torque, ticks for the motor's stall torque."""
+        return 0.0
 
     def hardware_errors(self, now_s: float, load: float) -> int:
         """Bits of Hardware Error Status whose causes are present."""

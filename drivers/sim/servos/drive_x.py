@@ -18,6 +18,8 @@ REVERSE, TIME_PROFILE, GOAL_TORQUE = 0x01, 0x04, 0x08
 MAX_POSITION_OFFSET = 1024
 """Homing Offset beyond this is ignored in position mode (e-Manual, Homing Offset)."""
 
+POSITION_P = 128
+"""Steps of Position P Gain for a whole step of PWM per step of error (e-Manual, Position PID Gain)."""
 FOLLOWING_TICKS = 10
 """Distance between commanded and real position from which on it is a following error."""
 
@@ -93,6 +95,13 @@ class XDrive(Drive):
             return 1.0
         names = ("Current Limit", "Goal Current") if self.mode == CURRENT_POSITION else ("Current Limit",)
         return min(1.0, *(abs(self.registers.get(name)) / self.full_current for name in names))
+
+    def give(self) -> float:
+        """By Position P Gain alone; the integral takes the error away, and other modes control no position."""
+        registers = self.registers
+        if self.mode not in (POSITION, EXTENDED, CURRENT_POSITION) or registers.get("Position I Gain"):
+            return 0.0
+        return self.full_pwm * POSITION_P / max(registers.get("Position P Gain"), 1)
 
     def _reach(self, current: int) -> float:
         """How far from its rest a current can stretch the skin, ticks."""

@@ -54,6 +54,7 @@ class Plant:
     jammed_since : when it got stuck, or None.
     stops : lowest and highest position that the mechanics behind the shaft allow.
     pressed_since : when the shaft came to a stop that the motor still pushes against, or None.
+    weight : torque from outside that turns the shaft towards lower positions, as a share of the stall torque.
     torque_limit : most that the motor may give, as a share of its stall torque.
     forced_c : temperature set from outside, or None.
     """
@@ -78,6 +79,7 @@ class Plant:
         self.jammed_since: float | None = None
         self.stops = NO_STOPS
         self.pressed_since: float | None = None
+        self.weight = 0.0
         self.torque_limit = 1.0
         self.forced_c: float | None = None
         self._winding_c, self._heated_s = self.AMBIENT_C, now_s
@@ -104,6 +106,7 @@ class Plant:
         load = skin.spring * (motion.position - self.rest) + skin.inertia * motion.acceleration
         if motion.velocity:
             load += math.copysign(skin.friction, motion.velocity)
+        load += self.weight
         if self.jammed_at is not None or self.pressed_since is not None:
             load += self.STIFFNESS * (commanded.position - motion.position)
         return min(max(load, -self.torque_limit), self.torque_limit)

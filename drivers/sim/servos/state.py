@@ -5,6 +5,7 @@ A servo takes the time as an argument and never sleeps.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,6 +24,8 @@ TRIPPED = 0xFF
 """Bus Watchdog (98) after it has expired."""
 WATCHDOG_STEP_S = 0.02
 HEALTH_PERIOD_S = 0.1
+BROWN_OUT_V = 2.5
+"""Supply below which a servo's processor stops: it receives nothing, and starts anew when the supply is back."""
 BOOT_S = 0.25
 """Time in which a servo receives nothing after a reboot."""
 
@@ -166,7 +169,7 @@ class ServoState:
     def position_ticks(self, now_s: float) -> int:
         """Present Position."""
         self.update(now_s)
-        return self.drive.to_register(self.plant.motion(now_s).position)
+        return self.drive.to_register(self.drive.observe(now_s)[0].position)
 
     def register(self, name: str, now_s: float) -> int:
         """Value of any register, up to date; KeyError where the model has none of that name."""
@@ -232,14 +235,33 @@ class ServoState:
         elif kind == "stops":
             plant.set_stops(now_s, value if begins else NO_STOPS)
             self._sensed_at = -1.0
+        elif kind == "weight":
+            plant.weight = value if begins else 0.0
+            self._sensed_at = -1.0
         elif kind == "hw" and begins:
             self.latch(int(value), now_s)
         elif kind == "volts":
-            plant.supply_v = value if begins else self.table.voltage / 10
-            self.check_health(now_s)
+            self._supply(value if begins else self.table.voltage / 10, now_s)
         elif kind == "temp":
             plant.forced_c = value if begins else None
             self.check_health(now_s)
+
+    def _supply(self, volts: float, now_s: float) -> None:
+        """Another supply: too little for the processor, enough of it again, or more or less than before."""
+        was_off, is_off = self.deaf_until == math.inf, volts < BROWN_OUT_V
+        self.plant.supply_v = volts
+        if is_off and not was_off:
+            self._set_power(False, now_s)
+            self.deaf_until = math.inf
+        elif was_off and not is_off:
+            self.reboot(now_s)
+        self.check_health(now_s)
+
+    def reboot(self, now_s: float) -> None:
+        """Set RAM to its initial values and clear errors; the servo receives nothing for `BOOT_S`."""
+        self._boot(now_s)
+        self.deaf_until = now_s + BOOT_S
+        self.on_change()
 
     def force_baud(self, baud: int, otherwise: int = 0) -> None:
         """Set the bit rate it listens at; one that the model lacks counts as `otherwise`, or as its lowest."""
@@ -250,7 +272,9 @@ class ServoState:
         self.registers.put("Baud Rate", rates.index(near))
 
     def check_health(self, now_s: float) -> None:
-        """Latch the hardware errors whose causes are present."""
+        """Latch the hardware errors whose causes are present, where there is a processor to notice them."""
+        if self.deaf_until == math.inf:
+            return
         load = self._sense(now_s)
         self.plant.heat(now_s, load)
         bits = self.drive.hardware_errors(now_s, load)

@@ -58,6 +58,13 @@ def _span(text: str) -> tuple[float, float]:
     return low, high
 
 
+def _share(text: str) -> float:
+    share = float(text)
+    if not -1.0 <= share <= 1.0:
+        raise ValueError("a share of the stall torque, -1 to 1")
+    return share
+
+
 KINDS: dict[str, Kind] = {
     "mute": Kind("servo"),  # neither receives nor answers (loose cable)
     "silent": Kind("reply"),  # receives and executes instructions, but its answers are lost
@@ -73,6 +80,7 @@ KINDS: dict[str, Kind] = {
     "volts": Kind("servo", float),  # supply at so many volts
     "temp": Kind("servo", float),  # motor at so many degrees Celsius
     "stops": Kind("servo", _span),  # mechanical stops of the shaft, LOW..HIGH in steps
+    "weight": Kind("servo", _share, 0.1),  # torque on the shaft towards lower steps, as a share of the stall torque
     "stall": Kind("servo"),  # shaft stuck where it is
     "watchdog-ignored": Kind("servo"),  # keeps turning when its bus watchdog trips
     "dup": Kind("servo"),  # a second servo has the same id; their replies collide

@@ -37,6 +37,7 @@ class Head:
 
     data : everything a head file holds; where : its path, for messages.
     sway : of its hair; who draws a moving picture tells it the time.
+    own_groups : what :meth:`add_groups` added.
     """
 
     parameters: tuple[str, ...] = NAMES
@@ -50,7 +51,7 @@ class Head:
         for stitch in self._stitches:
             stitch.close()
         self.sway = Sway()
-        self._own = OwnAmounts(())
+        self._own, self.own_groups = OwnAmounts(()), tuple[OwnGroup, ...]()
         self._at = {name: i for i, name in enumerate(self.parameters)}
         self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
 
@@ -138,7 +139,7 @@ class Head:
         for name, rig in rigs.items():
             rig.own = own[name]
             rig.invalidate()
-        self._own, self.parameters = amounts, amounts.names
+        self._own, self.parameters, self.own_groups = amounts, amounts.names, tuple(groups)
         self._at = {name: i for i, name in enumerate(self.parameters)}
 
     def values(self, given: Mapping[str, float]) -> Floats:
@@ -169,6 +170,10 @@ class Head:
         pose.own = self._own(given)
         pose.lag = self.sway.lag
         return pose
+
+    def own_amounts(self, values: Floats) -> Floats:
+        """(g,) how much of each of :attr:`own_groups` parameter values (P,) show, -1 to 1; errors as :meth:`pose`."""
+        return self._own(np.asarray(values, float))
 
     def place_points(self, values: Floats) -> tuple[list[Floats], Turn]:
         """As :meth:`pose`, but only the points that vertices are summed from; vertices and normals stay.

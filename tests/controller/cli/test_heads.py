@@ -1,11 +1,14 @@
 """``omote fit`` and ``omote export`` as a user types them."""
 
 import io
+import json
+import struct
 import sys
 from contextlib import nullcontext
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -16,6 +19,8 @@ from controller.cli.console import console
 from surface.base.errors import ExportError, FitError, HeadFileError, ViewError
 from surface.fit.points.report import DenseErrors, Spot
 from surface.fit.source.load import LoadOptions
+from surface.head.model.file import save_data
+from tests.surface.small_head import part, small_head
 
 SURFACE = str(Path(__file__).parents[2] / "surface")
 
@@ -276,3 +281,29 @@ def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeyp
     assert said.output.replace("\n", "") == f"wrote a.ODDwrote {tmp_path / 'more'}"
     assert CliRunner().invoke(make_app(), ["export", "b.glb", *head]).exit_code == 0
     assert calls[1][2] == {} and blamed == ["odd", ""]
+
+
+def content(path):
+    """The document of a .glb and its binary chunk."""
+    raw = path.read_bytes()
+    size = struct.unpack_from("<I", raw, 12)[0]
+    return json.loads(raw[20 : 20 + size]), raw[28 + size :]
+
+
+def test_export_has_the_groups_of_a_vocabulary_and_their_motion(tmp_path):
+    save_data(tmp_path / "small", small_head(parts=[part("face", -40)], seams=[], paint=[]))
+    (tmp_path / "ear.json").write_text('{"format": 1, "part": "face", "ids": [12], "moves_mm": [[0, 3, 0]]}')
+    vocabulary = tmp_path / "ears.toml"
+    vocabulary.write_text('[parameters.earLeft]\nregion = "mouth"\nprofile = "mouth"\ngroup = "ear.json"\n')
+    (tmp_path / "twitch.csv").write_text("time,earLeft\n0,0\n0.5,1\n1,0.25\n")
+    out = tmp_path / "out.glb"
+    words = ["export", str(out), "--head", str(tmp_path / "small"), "--vocabulary", str(vocabulary)]
+    said = CliRunner().invoke(make_app(), [*words, "--take", str(tmp_path / "twitch.csv"), "--rate", "2"])
+    assert said.exit_code == 0, said.output
+    document, data = content(out)
+    (sampler,) = document["animations"][0]["samplers"]
+    view = document["bufferViews"][document["accessors"][sampler["output"]]["bufferView"]]
+    assert np.frombuffer(data, "<f4", 3, view["byteOffset"]).tolist() == [0.0, 1.0, 0.25]
+    assert CliRunner().invoke(make_app(), [*words, "--set", "earLeft=0.5"]).exit_code == 0
+    (mesh,) = content(out)[0]["meshes"]
+    assert (mesh["extras"]["targetNames"], mesh["weights"]) == (["earLeft"], [0.5])

@@ -18,9 +18,17 @@ def test_every_bus_has_its_own_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "shorten_thread_switches", lambda: None)
     ((title, figures),) = bench_many(2, 3, 1_000_000, 0.2, lambda text: None)
     assert title.startswith("2 buses of 3 servos")
-    rates = [figure.value for figure in figures if figure.name.endswith("fast sync read")]
-    assert len(rates) == 2
-    assert all(0.0 < rate <= 1.01 * limit_hz(3, 1_000_000, True) for rate in rates)
+    for kind, fast, share in (("write and sync read", False, 92), ("write and fast sync read", True, 85)):
+        limit = limit_hz(3, 1_000_000, fast)
+        at = [k for k, figure in enumerate(figures) if figure.name.endswith(kind)]
+        assert [figures[k].name for k in at] == [f"bus 1, {kind}", f"bus 2, {kind}"]
+        for k in at:
+            rate, share_of_limit, bare = figures[k : k + 3]
+            assert 0.0 < rate.value <= 1.01 * limit
+            assert 0.0 < bare.value <= 101.0
+            assert share_of_limit.value == pytest.approx(100 * rate.value / limit)
+            assert share_of_limit.reach == f">= {share}% of {limit:.0f} Hz"
+            assert share_of_limit.kept == (share_of_limit.value >= share)
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,16 @@ def test_a_stage_that_is_not_there_is_named(tmp_path: Path) -> None:
         make_face(str(tmp_path / "nowhere.toml"), {}, {}, tmp_path / "face.glb.gz")
 
 
+def test_it_has_the_control_points_of_a_vocabulary_that_a_run_was_given(stage: Path, tmp_path: Path) -> None:
+    (tmp_path / "ear.json").write_text('{"format": 1, "part": "face", "ids": [12], "moves_mm": [[0, 3, 0]]}')
+    words = '[parameters.earLeft]\nregion = "mouth"\nprofile = "mouth"\ngroup = "ear.json"\n'
+    (tmp_path / "ears.toml").write_text(words)
+    make_face(str(stage), {}, {}, tmp_path / "face.glb.gz", [tmp_path / "ears.toml"])
+    assert b'"earLeft"' in gzip.decompress((tmp_path / "face.glb.gz").read_bytes())
+    make_face(str(stage), {}, {}, tmp_path / "face.glb.gz")
+    assert b'"earLeft"' not in gzip.decompress((tmp_path / "face.glb.gz").read_bytes())
+
+
 @pytest.mark.slow
 def test_it_appears_while_the_context_lasts_and_leaves_nothing(stage: Path) -> None:
     with face_in_the_making(stage, {}, None) as path:

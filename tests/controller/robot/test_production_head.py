@@ -17,11 +17,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from controller.base.parameters import PARAMETERS, Parameters
+from controller.cli.app import make_app
 from controller.robot.channels import build_table
 from controller.robot.linkages.rods import Rods
 from controller.robot.pairs.fit import fit_servo
+from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
 
 _US_PER_DEG = 10.0
@@ -171,6 +174,41 @@ def test_its_two_servo_neck_is_a_linkage_and_no_linear_mix(their_neck: Callable[
     assert len(given) > 250
     assert most(ours - wanted) < 1e-6
     assert most(linear - wanted) > 1.0
+
+
+def test_its_recorded_pairs_by_the_command(head: Path, tmp_path: Path) -> None:
+    """``omote calibrate --pairs`` writes channels that send what was recorded, as closely as its table says."""
+    keys, values = read(head / "src/tools/scripts/pau_data.csv")
+    names, quarters = read(head / "src/tools/scripts/serial_port_data.csv")
+    deg = (quarters / 4.0 - _MIDDLE_US) / _US_PER_DEG
+    own = own_parameters(keys, tmp_path)
+    columns = [*map(name_of, keys), *(f"servos:{name}" for name in names)]
+    np.savetxt(tmp_path / "pairs.csv", np.hstack([values, deg]), delimiter=",", header=",".join(columns), comments="")
+    lines = ['name = "production"', 'vocabularies = ["keys.toml"]', "[[buses]]", 'name = "b"', 'kind = "simulated"']
+    lines.append('simulates = "maestro"')
+    for number, name in enumerate(names):
+        lines += ["[[channels]]", f'name = "{name}"', 'bus = "b"', f"id = {number}", 'model = "rc-180"']
+        lines += ["mix = { jawOpen = 1 }", "map = { at = [0, 1], deg = [0, 1] }", "limit_deg = [-88, 88]"]
+        lines += ["max_speed_deg_s = 300", "max_accel_deg_s2 = 3000"]
+    (tmp_path / "robot.toml").write_text("\n".join(lines))
+    words = ["calibrate", str(tmp_path / "robot.toml"), "--pairs", str(tmp_path / "pairs.csv")]
+    said = CliRunner().invoke(make_app(), words)
+    assert said.exit_code == 0, said.output
+    robot = load_robot(tmp_path / "robot.toml", PARAMETERS)
+    table, at = build_table(robot.channels, own), own.indices(map(name_of, keys))
+    sent = []
+    for row in values:
+        face = own.neutral()
+        face[at] = row
+        sent.append(np.degrees(table.angles(face)[0]))
+    moving = np.flatnonzero(np.ptp(deg, axis=0) > 0.0)
+    away = _US_PER_DEG * np.sqrt(((np.array(sent) - deg) ** 2).mean(axis=0))
+    spans = _US_PER_DEG * np.ptp(deg, axis=0)
+    shares = away[moving] / spans[moving]
+    tell(f"\n{len(moving)} of {len(names)} servos move in {len(deg)} pairs: {away[moving].max():.2f} us rms at most, "
+         f"{100 * np.median(shares):.2f} % of its way in the median, {100 * shares.max():.2f} % at most")  # fmt: skip
+    assert len(moving) == 14
+    assert (shares < 0.01).all()
 
 
 def test_a_fit_to_its_recorded_pairs(head: Path, tmp_path: Path) -> None:

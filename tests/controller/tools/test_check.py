@@ -117,6 +117,16 @@ def test_a_good_head_says_what_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     assert line.startswith("head ict: 13 parts, ") and line.endswith(" 59 parameters: good")
 
 
+def test_a_robot_may_be_called_as_the_file_of_a_head(tmp_path: Path) -> None:
+    path = tmp_path / "head.toml"
+    path.write_text((config_dir() / "robots" / "head-feetech.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    assert next(iter(check_anything(str(path)))).startswith("robot head-feetech: 1 buses")
+    for damaged in ("name = 'me'\n", "name = \n"):
+        path.write_text(damaged, encoding="utf-8")
+        with pytest.raises(HeadFileError):
+            list(check_anything(str(path)))
+
+
 def test_every_defect_of_a_head_is_one_line_with_what_to_type(tmp_path: Path) -> None:
     head = small_head(parts=[part("face", -40), part("cheek", 10)], seams=[], paint=[])
     save_data(tmp_path, head)

@@ -157,6 +157,18 @@ def test_models_differ_as_their_pages_do(
     assert table.top_speed * table["Present Velocity"].scale == pytest.approx(rpm * 0.10472, rel=0.01)
 
 
+def test_y_models_have_the_gains_and_the_current_of_their_motor() -> None:
+    """The newest pages: YM070-210-B001-RH, A051; YM080-230-B001-RH, R099. The current limit is the motor's most."""
+    y_models = [model for model in DYNAMIXEL if model.startswith("ym")]
+    assert len(y_models) == 12
+    for model in y_models:
+        table = load_table(model)
+        gains = [table[f"{name} Gain"].initial for name in ("Velocity I", "Velocity P", "Position D")]
+        assert gains == ([2585331, 26184, 9090] if model.startswith("ym070") else [5765630, 51387, 8000])
+        assert table.motor is not None
+        assert table["Current Limit"].initial * table["Current Limit"].scale == pytest.approx(table.motor.stall_a)
+
+
 @pytest.mark.parametrize("model", DYNAMIXEL)
 def test_a_motor_can_be_supplied_within_the_limits_that_its_servo_has(model: str) -> None:
     table = load_table(model)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from drivers.base.errors import DriverError
@@ -287,3 +289,18 @@ def test_what_came_with_a_firmware_is_known_from_it_on(name: str) -> None:
     made = [ControlTable("m", 1, firmware, spec | {f"{name}_firmware": 3}, items) for firmware in (0, 2, 3, 4)]
     assert [getattr(table, name) for table in made] == [False, False, True, True]
     assert not getattr(ControlTable("m", 1, 9, spec, items), name), "no firmware has it"
+
+
+@pytest.mark.parametrize(
+    ("register", "steps"),
+    [
+        ("Acceleration", 100),
+        ("Goal Velocity", 1),
+        ("Moving Velocity Threshold", 50),
+        ("Maximum Velocity Limit", 50),
+        ("Maximum Acceleration", 100),
+    ],
+)
+def test_units_of_feetech_sts_are_the_vendors_steps(register: str, steps: int) -> None:
+    """Feetech's memory table of STS: steps/s or 100 steps/s² of 4096 a turn, limits by 50 steps/s."""
+    assert load_table("sts3215")[register].scale == pytest.approx(steps * 2 * math.pi / 4096)

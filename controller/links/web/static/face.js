@@ -1,7 +1,7 @@
 // Draws the face: loads it once, then poses it from numbers.
 import * as THREE from "/three.min.js";
 import { Part } from "/morph.js";
-import { readPose } from "/pose.js";
+import { ownAmounts, readPose } from "/pose.js";
 import { material, shared } from "/shaders.js";
 
 const EYES = ["eye_left", "eye_right"], HALF = "Half";
@@ -47,6 +47,7 @@ export class Face {
     const omote = gltf.userData.omote ?? {}, meshes = [];
     gltf.scene.traverse((node) => { if (node.isMesh) meshes.push(node); });
     this.half = omote.half ?? [];
+    this.own = omote.own ?? {};
     this.head = new THREE.Object3D();
     this.head.position.fromArray(omote.neck?.pivot ?? [0, 0, 0]);
     shared.pivot.value.copy(this.head.position);
@@ -93,6 +94,7 @@ export class Face {
 
   #show(names, values) {
     const { weights, eyes, head } = readPose(names, values);
+    Object.assign(weights, ownAmounts(names, values, this.own));
     for (const name of this.half) { const w = weights[name.slice(0, -HALF.length)]; weights[name] = 4 * w * (1 - w); }
     for (const part of this.#parts) part.show(weights);
     this.head.rotation.set(head[1], head[0], head[2], "YXZ");

@@ -24,6 +24,15 @@ function look(at, side, sign) {
   return [yaw * EYE_DEG[0] * RAD, pitch * EYE_DEG[1] * RAD];
 }
 
+// How much of a user's own groups is shown: the value of the parameter, times those that it names, 0 to 1.
+// own: { name: [names that it is multiplied by] }.
+export function ownAmounts(names, values, own) {
+  const at = {}, amounts = {};
+  names.forEach((name, i) => { at[name] = clamp(values[i], -1, 1); });
+  for (const [name, times] of Object.entries(own)) amounts[name] = times.reduce((amount, each) => amount * clamp(at[each] ?? 0, 0, 1), at[name] ?? 0);
+  return amounts;
+}
+
 // names, values: of the parameters. Returns { weights by shape, eyes: [yaw, pitch] left and right, head: yaw, pitch, roll }.
 export function readPose(names, values) {
   const at = {};

@@ -122,6 +122,18 @@ def test_the_command_writes_the_channels_and_keeps_the_old_file(files: tuple[Pat
     assert robot.with_name("robot.before2.toml").exists()
 
 
+def test_parameters_of_the_robot_s_own_are_fitted_too(files: tuple[Path, Path], tmp_path: Path) -> None:
+    robot, pairs = files
+    (tmp_path / "ears.toml").write_text('[parameters.earLeft]\nregion = "mouth"\nprofile = "mouth"\n')
+    robot.write_text('vocabularies = ["ears.toml"]\n' + ROBOT)
+    pairs.write_text(pairs.read_text().replace("jawOpen", "earLeft", 1))
+    result = CliRunner().invoke(make_app(), ["calibrate", str(robot), "--pairs", str(pairs)])
+    assert result.exit_code == 0, result.output
+    jaw, corner, _ = load_robot(robot, P).channels
+    assert set(jaw.mix or {}) == {"earLeft"}
+    assert set(corner.mix or {}) == {"mouthSmileLeft", "mouthFrownLeft"}
+
+
 def test_a_place_that_cannot_be_written_is_one_message_and_leaves_nothing(
     files: tuple[Path, Path], tmp_path: Path
 ) -> None:

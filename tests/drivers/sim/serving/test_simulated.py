@@ -7,9 +7,12 @@ import select
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import serial
@@ -329,3 +332,25 @@ def running(process_id: int) -> bool:
 def test_a_child_that_cannot_start_says_why(tmp_path: Path):
     with pytest.raises(PortError, match=r"did not start: .*cannot make the link"):
         SimulatedBus((1,), link=tmp_path / "none" / "port", process=True).__enter__()
+
+
+def test_what_was_written_is_carried_out_also_where_the_server_saw_only_the_first_command(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As on a busy computer: it looked for bytes before they came, and for commands after that."""
+    real, late = select.select, threading.Event()
+
+    def looked_before(watched: list[Any], *others: Any) -> tuple[list[Any], list[Any], list[Any]]:
+        ready = real(watched, *others)[0]
+        if late.is_set() and watched[0] in ready:
+            late.clear()
+            return watched[:1], [], []
+        return ready, [], []
+
+    monkeypatch.setattr("drivers.sim.serving.serve.select", SimpleNamespace(select=looked_before))
+    with SimulatedBus([1]) as bus, serial.Serial(bus.path, 1_000_000) as port:
+        for value in (1, 0) * 20:
+            late.set()
+            port.write(encode_instruction(1, I.WRITE, b"\x40\0" + bytes((value,))))
+            bus.sync()
+            assert bus.servo(1).torque == bool(value)

@@ -125,6 +125,22 @@ def test_lock_closes_the_eeprom_and_only_a_power_cycle_opens_it():
     assert ask(bus, 1, I.WRITE, b"\x05\x01", 1.0) == [Packet1(1, 0, b"")]
 
 
+def test_a_servo_without_supply_hears_nothing_and_starts_anew_when_it_is_back():
+    bus = chain("sts3215")
+    ask(bus, 1, I.WRITE, b"\x0d\x41")  # Temperature Limit 65 while Lock is 1
+    ask(bus, 1, I.WRITE, b"\x28\x01")
+    bus.faults.add(["volts:1:2"], 1.0)
+    bus.catch_up(1.0)
+    assert ask(bus, 1, I.PING, now_s=2.0) == []
+    assert not bus.servo(1).torque
+    bus.faults.clear("volts", 2.0)
+    bus.catch_up(2.0)
+    assert ask(bus, 1, I.PING, now_s=2.1) == []
+    assert ask(bus, 1, I.PING, now_s=2.3) == [Packet1(1, 0, b"")]
+    assert bus.servo(1).register("Temperature Limit", 2.3) == 70
+    assert not bus.servo(1).hardware_error
+
+
 def test_factory_reset_of_dynamixel_takes_the_id_too():
     bus = chain(ids=(9,))
     assert ask(bus, 9, I.FACTORY_RESET) == [Packet1(9, 0, b"")]

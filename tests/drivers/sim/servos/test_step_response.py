@@ -57,6 +57,41 @@ def test_velocity_based_profile_of_dynamixel(model: str, velocity: int, accelera
     check(servo, distance, ramp + level, ramp)
 
 
+@pytest.mark.parametrize(
+    ("model", "gain", "weight", "ticks"),
+    [
+        ("xl330-m288", 400, 0.1, 28.3),
+        ("xl330-m288", 800, 0.1, 14.2),
+        ("xm540-w270", 800, -0.25, -35.4),
+        ("mx-64", 850, 0.2, 26.7),
+    ],
+)
+def test_a_weight_leaves_the_error_that_the_position_gain_needs(model: str, gain: int, weight: float, ticks: float):
+    """e-Manual, Position PID Gain: KPP is P gain / 128, steps of PWM for one of error; 885 are all of the torque."""
+    servo = step(model, 300, Position_P_Gain=gain)
+    servo.change_fault("weight", weight, True, 1.0)
+    assert ticks == pytest.approx(weight * 885 / (gain / 128), abs=0.1)
+    assert servo.goal - servo.position_ticks(3.0) == pytest.approx(ticks, abs=0.5)
+    stall = 885 if "Current Limit" not in servo.table else servo.drive.full_current
+    assert servo.register("Present Current", 3.0) == pytest.approx(
+        weight * stall + 0.012 * stall, abs=0.001 * stall + 1
+    )
+    servo.force("Position I Gain", 10, 3.0)
+    assert servo.position_ticks(4.0) == servo.goal
+    servo.force("Position I Gain", 0, 4.0)
+    servo.change_fault("weight", None, False, 4.0)
+    assert servo.position_ticks(5.0) == servo.goal
+
+
+def test_a_weight_does_not_move_a_limp_shaft_or_one_beyond_its_stop():
+    servo = step("xl330-m288", 300)
+    servo.change_fault("weight", 0.5, True, 2.0)
+    servo.change_fault("stops", (2300.0, 2400.0), True, 2.0)
+    assert servo.position_ticks(3.0) == 2300
+    servo.force("Torque Enable", 0, 3.0)
+    assert servo.position_ticks(4.0) == pytest.approx(servo.position_ticks(9.0))
+
+
 @pytest.mark.parametrize(("total_ms", "ramp_ms"), [(1000, 200), (1000, 500), (600, 0), (800, 700)])
 def test_time_based_profile_of_dynamixel(total_ms: int, ramp_ms: int):
     servo = step("xl330-m288", 600, Drive_Mode=4, Profile_Velocity=total_ms, Profile_Acceleration=ramp_ms)

@@ -49,6 +49,7 @@ def test_specs(spec: str, expected: dict):
         ("late:7:soon", "'soon' is not a value for late"),
         ("volts:7", "volts needs a value"),
         ("stops:7", "stops needs a value"),
+        ("weight:7:2", "'2' is not a value for weight"),
         ("stops:7:900..800", "'900..800' is not a value for stops"),
         ("crc:7:evry=3", "there is no option 'evry'"),
         ("crc:7:every=x", "'x' is not a value for every"),
