@@ -11,7 +11,7 @@ import numpy as np
 from surface.base import files
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.fit.features.rigging import DROOP, DROOP_RULE, LOW_RULE, lowered_tongue
+from surface.fit.features.rigging import DROOP, DROOP_RULE, LOW_RULE, drawn_back_tongue, lowered_tongue
 from surface.fit.features.wrinkles import add_wrinkles
 from surface.fit.points.recipe import Recipe
 from surface.fit.points.strokes import arc_length
@@ -52,17 +52,20 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
 
 
 def lower_tongue(head: HeadData, recipe: Recipe) -> HeadData:
-    """The head whose tongue sinks as the jaw opens, where the recipe says how far."""
+    """The head whose tongue sinks as the jaw opens and draws back from a lower lip that rolls in, where the recipe says
+    how far."""
     if not recipe.tongue_low or not any(part.material == "tongue" for part in head.parts):
         return head
     path = np.array(recipe.tongue)
-    parts = [
-        replace(part, groups=[*part.groups, lowered_tongue(part.points, path, recipe.tongue_low)])
-        if part.material == "tongue"
-        else part
-        for part in head.parts
-    ]
+    parts = [_with_tongue_rig(p, path, recipe) if p.material == "tongue" else p for p in head.parts]
     return replace(head, parts=parts, rules=[*head.rules, LOW_RULE])
+
+
+def _with_tongue_rig(tongue: PartData, path: Floats, recipe: Recipe) -> PartData:
+    made = [lowered_tongue(tongue.points, path, recipe.tongue_low)]
+    if recipe.tongue_back:
+        made.append(drawn_back_tongue(tongue.points, path, recipe.tongue_back))
+    return replace(tongue, groups=[*tongue.groups, *made])
 
 
 def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:
