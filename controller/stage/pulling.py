@@ -221,7 +221,8 @@ class PullSolver:
 
 def _reach(samples: SkinSamples) -> Floats:
     """(s,) how far each shape moves the point that it moves the furthest, mm."""
-    return np.linalg.norm(samples.moves.sum(axis=3), axis=1).max(axis=0, initial=0.0)
+    reach: Floats = np.linalg.norm(samples.moves.sum(axis=3), axis=1).max(axis=0, initial=0.0)
+    return reach
 
 
 def _slopes(samples: SkinSamples, x: Floats) -> Floats:

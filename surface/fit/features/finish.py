@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -44,6 +45,7 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     parts = [wrinkled if p is face else p for p in head.parts]
     head = lower_tongue(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe)
     head = add_correctives(head, recipe.correctives)
+    head = draw_back_tongue(head, recipe)  # after the correctives: of a lip's roll, the lip alone has some
     rest = read_pose(np.zeros(59))
     for _ in range(SETTLINGS):
         points = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
@@ -52,20 +54,26 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
 
 
 def lower_tongue(head: HeadData, recipe: Recipe) -> HeadData:
-    """The head whose tongue sinks as the jaw opens and draws back from a lower lip that rolls in, where the recipe says
-    how far."""
+    """The head whose tongue sinks as the jaw opens, where the recipe says how far."""
     if not recipe.tongue_low or not any(part.material == "tongue" for part in head.parts):
         return head
-    path = np.array(recipe.tongue)
-    parts = [_with_tongue_rig(p, path, recipe) if p.material == "tongue" else p for p in head.parts]
-    return replace(head, parts=parts, rules=[*head.rules, LOW_RULE])
+    head = _with_tongue_group(head, lambda at: lowered_tongue(at, np.array(recipe.tongue), recipe.tongue_low))
+    return replace(head, rules=[*head.rules, LOW_RULE])
 
 
-def _with_tongue_rig(tongue: PartData, path: Floats, recipe: Recipe) -> PartData:
-    made = [lowered_tongue(tongue.points, path, recipe.tongue_low)]
-    if recipe.tongue_back:
-        made.append(drawn_back_tongue(tongue.points, path, recipe.tongue_back))
-    return replace(tongue, groups=[*tongue.groups, *made])
+def draw_back_tongue(head: HeadData, recipe: Recipe) -> HeadData:
+    """The head whose tongue draws back from a lower lip that rolls in, where the recipe says how far."""
+    if not recipe.tongue_back:
+        return head
+    return _with_tongue_group(head, lambda at: drawn_back_tongue(at, np.array(recipe.tongue), recipe.tongue_back))
+
+
+def _with_tongue_group(head: HeadData, made: Callable[[Floats], Group]) -> HeadData:
+    parts = [
+        replace(part, groups=[*part.groups, made(part.points)]) if part.material == "tongue" else part
+        for part in head.parts
+    ]
+    return replace(head, parts=parts)
 
 
 def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:
