@@ -35,6 +35,9 @@ _WORTH = 0.12
 """By which share a weaker prior must bring the pins closer to be worth what it costs the rest of the face."""
 _TOUCH_MM = 0.4
 """A shape that moves every pin by less takes no part."""
+_OWN = 0.3
+"""A shape that moves every pin by less than this share of its farthest point belongs to another place of the face: a
+lowered brow takes the lid along, but who pulls the lid does not mean the brow."""
 _OPENING = (0.68, 0.78)
 """Share of the jaw's motion that a pin follows: from the first on lips may open and the jaw take what it carries along,
 from the second on nothing hinders it."""
@@ -104,7 +107,7 @@ class PullSolver:
         self._ties = _ties(parameters, self.moved) if tied else np.eye(count)
         self._low, self._high = self._bounds()
         self._lips = lips[0] if self._sealed(*lips) else None
-        self._tied = tied
+        self._tied, self._farthest = tied, _reach(skin)
         self._prepared: tuple[int, ...] = ()
         self.missed_mm = 0.0
 
@@ -154,9 +157,11 @@ class PullSolver:
         weights = np.array([_STAY] * len(stay) + [_OTHER_SIDE] * len(other))
         weights *= 1.0 - opening * np.clip(self._staying.jaw / _OPENING[0], 0.0, 1.0)
         self._stay_weights = np.repeat(weights, 3)[:, None]
-        reach = np.linalg.norm(self._held.moves.sum(axis=3), axis=1).max(axis=0)
+        reach = _reach(self._held)
         names = [self._parameters.names[i] for i in self.moved]
         able = (reach > _TOUCH_MM) & [not name.startswith(_NEVER) for name in names]
+        own = reach / np.maximum(self._farthest, _TOUCH_MM)
+        able &= own >= min(_OWN, own[able].max(initial=0.0))  # where no shape is at home, the one that is most so
         self._free = np.flatnonzero(able @ self._ties > 0.0)
         self._lips_weight = _LIPS * float(1.0 - opening)
 
@@ -212,6 +217,12 @@ class PullSolver:
         )  # fmt: skip
         change = ties.T @ (x - self._x0) / ties.sum(axis=0)
         return self._x0 + ties @ solver.solve(goal, start=change)
+
+
+def _reach(samples: SkinSamples) -> Floats:
+    """(s,) how far each shape moves the point that it moves the furthest, mm."""
+    reach: Floats = np.linalg.norm(samples.moves.sum(axis=3), axis=1).max(axis=0, initial=0.0)
+    return reach
 
 
 def _slopes(samples: SkinSamples, x: Floats) -> Floats:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 from surface.base import files
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.fit.features.rigging import DROOP, DROOP_RULE, LOW_RULE, lowered_tongue
+from surface.fit.features.rigging import DROOP, DROOP_RULE, LOW_RULE, drawn_back_tongue, lowered_tongue
 from surface.fit.features.wrinkles import add_wrinkles
 from surface.fit.points.recipe import Recipe
 from surface.fit.points.strokes import arc_length
@@ -44,6 +45,7 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     parts = [wrinkled if p is face else p for p in head.parts]
     head = lower_tongue(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe)
     head = add_correctives(head, recipe.correctives)
+    head = draw_back_tongue(head, recipe)  # after the correctives: of a lip's roll, the lip alone has some
     rest = read_pose(np.zeros(59))
     for _ in range(SETTLINGS):
         points = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
@@ -55,14 +57,23 @@ def lower_tongue(head: HeadData, recipe: Recipe) -> HeadData:
     """The head whose tongue sinks as the jaw opens, where the recipe says how far."""
     if not recipe.tongue_low or not any(part.material == "tongue" for part in head.parts):
         return head
-    path = np.array(recipe.tongue)
+    head = _with_tongue_group(head, lambda at: lowered_tongue(at, np.array(recipe.tongue), recipe.tongue_low))
+    return replace(head, rules=[*head.rules, LOW_RULE])
+
+
+def draw_back_tongue(head: HeadData, recipe: Recipe) -> HeadData:
+    """The head whose tongue draws back from a lower lip that rolls in, where the recipe says how far."""
+    if not recipe.tongue_back:
+        return head
+    return _with_tongue_group(head, lambda at: drawn_back_tongue(at, np.array(recipe.tongue), recipe.tongue_back))
+
+
+def _with_tongue_group(head: HeadData, made: Callable[[Floats], Group]) -> HeadData:
     parts = [
-        replace(part, groups=[*part.groups, lowered_tongue(part.points, path, recipe.tongue_low)])
-        if part.material == "tongue"
-        else part
+        replace(part, groups=[*part.groups, made(part.points)]) if part.material == "tongue" else part
         for part in head.parts
     ]
-    return replace(head, parts=parts, rules=[*head.rules, LOW_RULE])
+    return replace(head, parts=parts)
 
 
 def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:

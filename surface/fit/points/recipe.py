@@ -64,6 +64,7 @@ class Recipe:
     lips_close: float = 0.0
     tongue: Sequence[Sequence[float]] = ()
     tongue_low: float = 0.0
+    tongue_back: float = 0.0
     source: dict[str, str] = field(default_factory=dict)
     paint: Tables = field(default_factory=list)
     hair: dict[str, Any] = field(default_factory=dict)

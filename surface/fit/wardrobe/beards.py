@@ -15,10 +15,11 @@ from surface.fit.wardrobe.styles import step
 #: By the angle from the front, degrees, about the vertical through (0, 20): the beard's upper and lower line, mm, and
 #: the upper line of its part below the mouth.
 _ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95.0])
-_UPPER = np.array([-15.5, -14.5, -17.0, -24.0, -31.0, -35.0, -35.0, -26.0, -8.0, 12.0, 14.0])
+_UPPER = np.array([-15.5, -14.5, -16.0, -20.0, -26.5, -35.0, -35.0, -26.0, -8.0, 12.0, 14.0])
 _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
 _BELOW = np.array([-45.0, -45.0, -43.5, -39.5, -35.0, -35.0, -35.0, -26.0, -8.0, 12.0, 14.0])
-_LIP = np.array([-22.5, -23.0, -26.0, -31.5, -37.0])  # lower line of the moustache, at the first five angles
+_LIP = np.array([-22.5, -23.0, -25.0, -28.5, -33.0])  # lower line of the moustache, at the first five angles: it ends
+# level with the corners of the mouth, since one that hangs over them makes every face look sad
 _EDGE_DEG = 93.0
 _LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.8])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs

@@ -27,8 +27,9 @@ REACH_MM = 5.0  # from a station, seen from above: what is further away does not
 CLEAR_MM, SOFT_MM = 0.6, 0.4  # between tongue and what it lies on; correction sets in so much earlier
 SLICE_MM = 2.5  # half the length of a slice in which its height and width are found
 BEND_MM = 16.0  # along the tongue, over which a rise fades
-SIDEWAYS = 0.8  # of the way of the lower lip to a side, which the tongue goes along
+SIDEWAYS = 1.1  # of the way of the lower lip to a side, which the tongue goes along: less, and the other corner cuts it
 PUT_OUT = (0.02, 0.3)  # tongueOut, from none to all of the correction: a tongue in the mouth lies as it was fitted
+BEYOND = (0.3, 0.5)  # tongueOut, over which it goes sideways: further in, it would go into the teeth beside it
 PASSES = 3
 LEAST_SAMPLES, LEAST_MM = 50, 5.0  # of a part that is a tongue, and its length
 
@@ -147,9 +148,7 @@ class TongueRest:
 
     def share(self, pose: Pose) -> float:
         """How much of the correction a pose takes, 0..1: none while the tongue is in the mouth."""
-        low, high = PUT_OUT
-        t = min(max((float(pose.shapes[TONGUE]) - low) / (high - low), 0.0), 1.0)
-        return t * t * (3.0 - 2.0 * t)
+        return _eased(float(pose.shapes[TONGUE]), *PUT_OUT)
 
     def apply(self, pose: Pose, lip: Floats, linear: Floats, shift: Floats, points: Floats) -> None:
         """Move control points (n, 3) in place; ``lip (k, 3)`` are samples of the lower lip, and the lower teeth are
@@ -158,10 +157,17 @@ class TongueRest:
         if share <= 0.0 or not len(lip):
             return
         aside = float(lip[:, 0].mean() - self._sideways @ points[:, 0] / self._sideways.sum())
-        points[:, 0] += share * SIDEWAYS * aside * self._sideways
+        beyond = _eased(float(pose.shapes[TONGUE]), *BEYOND)
+        points[:, 0] += beyond * SIDEWAYS * aside * self._sideways
         below = np.concatenate([lip, self._lower @ linear.T + shift])
         press(*self._sides[0], _by_depth(below, 1.0), self._fade, self._whole, 1.0, share, points)
         press(*self._sides[1], self._upper, self._fade, self._thick, -1.0, share, points)
+
+
+def _eased(x: float, low: float, high: float) -> float:
+    """0 up to ``low``, 1 from ``high`` on, and soft between."""
+    t = min(max((x - low) / (high - low), 0.0), 1.0)
+    return t * t * (3.0 - 2.0 * t)
 
 
 def _by_depth(at: Floats, sign: float) -> Floats:

@@ -82,7 +82,6 @@ LEFT, RIGHT, BROW, CHEEK, CHIN, LID = (
         (BROW, (0.0, 6.0, 0.0), "browOuterUpLeft"),
         (CHEEK, (0.0, 4.0, 0.0), "cheekSquintLeft"),
         (CHIN, (0.0, -12.0, 0.0), "jawOpen"),
-        (LID, (0.0, -6.0, 0.0), "eyeBlinkLeft"),
     ],
 )
 def test_a_pulled_point_arrives_and_the_rest_stays(
@@ -99,6 +98,20 @@ def test_a_pulled_point_arrives_and_the_rest_stays(
     if at in (LEFT, RIGHT):
         across = bench.near((-at[0], at[1], at[2]))
         assert np.linalg.norm(bench.moved(across, values)) < OTHER_SIDE_MM
+
+
+def test_who_pulls_the_upper_lid_down_closes_it_and_does_not_sink_the_brow(bench: Bench) -> None:
+    lid, brow = bench.near(LID), bench.near(BROW)
+    values = bench.pull(lid, (0.0, -6.0, 0.0))
+    assert np.abs(bench.moved(lid, values)[1] + 6.0) < 1.0  # a lid also goes inwards as it closes
+    assert np.linalg.norm(bench.moved(brow, values)) < 0.5 and not values[P.index("browDownLeft")]
+
+
+def test_who_pulls_the_brow_down_lowers_it_and_leaves_nose_and_cheek(bench: Bench) -> None:
+    point = bench.near(BROW)
+    values = bench.pull(point, (0.0, -4.0, 0.0))
+    assert values[P.index("browDownLeft")] > 0.15 and bench.moved(point, values)[1] < -1.5
+    assert not values[[P.index("noseSneerLeft"), P.index("cheekSquintLeft")]].any()
 
 
 def test_both_sides_change_alike_where_they_are_tied(bench: Bench) -> None:

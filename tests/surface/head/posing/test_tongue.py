@@ -32,7 +32,11 @@ def crossings(head: Head) -> TongueCrossings:
 @pytest.mark.parametrize(
     "pose",
     [*({"tongueOut": amount} for amount in (0.2, 0.4, 0.6, 0.8, 1.0)), {"tongueOut": 0.5, "mouthRollLower": 0.8},
-     {"tongueOut": 1.0, "mouthShrugLower": 1.0}, {"tongueOut": 1.0, "mouthPucker": 1.0}],
+     {"tongueOut": 1.0, "mouthShrugLower": 1.0}, {"tongueOut": 1.0, "mouthPucker": 1.0},
+     {"tongueOut": 1.0, "mouthRight": 1.0}, {"tongueOut": 1.0, "mouthLeft": 1.0}, {"tongueOut": 0.5, "mouthRight": 1.0},
+     {"tongueOut": 0.15, "mouthRight": 1.0}, {"tongueOut": 0.25, "mouthLeft": 1.0},
+     {"mouthRollLower": 1.0, "mouthLowerDownLeft": 1.0}, {"mouthRollLower": 1.0, "mouthFrownRight": 1.0},
+     {"mouthRollLower": 1.0, "cheekSquintLeft": 1.0}],
 )  # fmt: skip
 def test_the_tongue_pierces_neither_lips_nor_teeth(
     head: Head, crossings: TongueCrossings, pose: dict[str, float]
