@@ -1,10 +1,10 @@
 """Displacements of control points by groups, laid out so that a pose reads few bytes of them and in one go.
 
-A group moves some control points of a part. Each displacement is needed once a pose, so time goes to reading them: eight
-points make a tile, and of every group only the tiles that it moves are kept, one after the other. Points are put into
-tiles in the order of the reflected Gray code of the groups that move them, by which neighbours differ in few groups
-(Lemire and Kaser 2011, "Reordering columns for smaller indexes"); in the file's order, where the left and the right half
-of a face alternate, every fifth number would be a zero.
+A group moves some control points of a part. Each displacement is needed once a pose, so time goes to reading them:
+eight points make a tile, and of every group only the tiles that it moves are kept, one after the other. Points are put
+into tiles in the order of the reflected Gray code of the groups that move them, by which neighbours differ in few
+groups (Lemire and Kaser 2011, "Reordering columns for smaller indexes"); in the file's order, where the left and the
+right half of a face alternate, nearly every third number would be a zero.
 """
 
 from __future__ import annotations

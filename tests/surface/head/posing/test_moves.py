@@ -71,7 +71,7 @@ def test_points_that_the_same_groups_move_follow_each_other() -> None:
 
 
 def test_of_the_shipped_head_few_zeros_are_read() -> None:
-    """In the file's order every fifth number that a pose read was the zero of a point between two that moved."""
+    """In the file's order nearly every third number that a pose read was the zero of a point between two that moved."""
     data = load_data(ROOT / "configs" / "heads" / "ict")
     face = next(part for part in data.parts if part.name == "face")
     moves = Moves(face, tuple(group.name for group in face.groups))

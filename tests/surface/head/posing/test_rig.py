@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_head import JAW, all_points, part, small_head
 
-from surface.head.model.data import Contact, Group, Seam
+from surface.head.model.data import Contact, Seam
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing import rig as rig_module
