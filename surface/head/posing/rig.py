@@ -180,8 +180,9 @@ def _axis_of(pose: Pose, eye: int) -> Floats:
     """The optical axis of an eye in a pose, computed once."""
     key = ("axis", eye)
     if key not in pose.found:
-        pose.found[key] = (optical_axis(pose.gaze[eye]),)
-    return pose.found[key][0]
+        pose.found[key] = optical_axis(pose.gaze[eye])
+    axis: Floats = pose.found[key]
+    return axis
 
 
 def _path_of(pose: Pose, jaw: Jaw) -> tuple[Floats, Floats]:
@@ -236,7 +237,8 @@ def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
     key = ("key", follows, id(head))
     if key not in pose.found:
         pose.found[key] = _key_of(follows, head, pose)
-    return pose.found[key]
+    found: tuple[float, ...] = pose.found[key]
+    return found
 
 
 def _key_of(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
