@@ -1,7 +1,8 @@
 """One process among those that share the heads of a stage: what it publishes, hears and answers over Zenoh.
 
 Keys are ``<prefix>/<head>/parameters|commands|events|state|servos|configuration``; ``<prefix>/_/lease`` and
-``<prefix>/_/clock`` belong to all heads. Callbacks of Zenoh run in its own threads; each only decodes and hands over.
+``<prefix>/_/clock`` belong to all heads, and ``<prefix>/_/faces`` has the parameters of many of them in one message,
+for processes with many heads. Callbacks of Zenoh run in its own threads; each only decodes and hands over.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 from controller.base.errors import OMOTE_ERRORS, LinkError
 from controller.base.parameters import Floats, Parameters
 from controller.fleet import journal
+from controller.fleet.batch import Batches, Gathering
 from controller.fleet.follower import Follower
 from controller.fleet.lease import Lease, Token
 from controller.fleet.offset import ClockOffset
@@ -37,6 +39,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _STANDBY_TICKS = 5
+_MANY = 4
+"""A process with so many heads hears them all in one message; one with fewer only what is for its own."""
 _BEATS = 5
 """Signs of life in the length of a lease."""
 _STATE_S, _CLOCK_S = 0.2, 1.0
@@ -62,6 +66,7 @@ class Node:
         self.conducts = settings.role == "conductor"
         self.lease = Lease(random.getrandbits(62) | 1, lease_s, random.uniform(0.0, 0.2) * lease_s, time.monotonic())
         self._payloads, self._offset = Payloads(parameters, settings.payload), ClockOffset()
+        self._batches, self._gathering = Batches(self._payloads), Gathering(len(heads))
         delay_ns = 0 if self.conducts else round(settings.delay_ms * 1e6)
         self.followers = {name: Follower(parameters, 2.0 * lease_s, delay_ns) for name in heads}
         self.refused: Counter[str] = Counter()
@@ -141,8 +146,15 @@ class Node:
 
     def _declare(self) -> None:
         session, here = self.session, f"{self.settings.role}/{self.session.zid()}"
+        together = len(self._heads) >= _MANY
+        if together:
+            self._keep(
+                session.declare_subscriber(self.key("_", "faces"), self._directly(self._heard(self._hear_faces)))
+            )
         for name in self._heads:
-            self._keep(session.declare_subscriber(self.key(name, "parameters"), self._directly(self._face_of(name))))
+            if not together:
+                key, act = self.key(name, "parameters"), self._directly(self._face_of(name))
+                self._keep(session.declare_subscriber(key, act))
             about = self._answer(lambda: self.settings.model_dump(mode="json", exclude={"tls"}))
             tail = "" if self.conducts else f"/{self.settings.role}"  # equal keys would be one answer
             for what, answer in (("state", self._answer(partial(self.state, name))), ("configuration", about)):
@@ -156,6 +168,10 @@ class Node:
             self._keep(session.declare_subscriber(self.key("_", "lease"), self._heard(self._hear_lease)))
             self._keep(session.declare_subscriber(self.key("*", "state"), self._heard(self._hear_state)))
             self._keep(session.declare_queryable(self.key("_", "clock"), self._clock))
+            self._outlets = {name: session.declare_publisher(self.key(name, "parameters")) for name in self._heads}
+            self._all = session.declare_publisher(self.key("_", "faces"))
+            for outlet in (*self._outlets.values(), self._all):
+                self._keep(outlet)
             for name, state in self._heads.items():
                 state.on_event = self._tell(name)
 
@@ -183,21 +199,39 @@ class Node:
         return call
 
     def _face_of(self, head: str) -> Callable[[zenoh.Sample], None]:
-        follower = self.followers[head]
-
         def act(sample: zenoh.Sample) -> None:
             header = _header_of(sample)
-            if header.token.holder == self.lease.holder:
-                return
-            if self.conducts:
-                self.lease.hear(header.token, time.monotonic())
-            values = self._payloads.decode(sample.payload.to_bytes(), str(sample.encoding))
-            if follower.take(header, values):
-                if head in self._recordings:
-                    self._recordings[head].add(header.time_ns, values)
-                self._hurry()
+            if self._is_for_us(header):
+                values = self._payloads.decode(sample.payload.to_bytes(), str(sample.encoding))
+                if self._take(head, header, values):
+                    self._hurry()
 
         return self._heard(act)
+
+    def _hear_faces(self, sample: zenoh.Sample) -> None:
+        header, taken = _header_of(sample), False
+        if self._is_for_us(header):
+            for face in self._batches.decode(sample.payload.to_bytes(), str(sample.encoding)):
+                if face.head in self.followers:
+                    own = Header(header.token, face.sequence, header.time_ns, face.stamp_ns, header.stopped)
+                    taken = self._take(face.head, own, face.values) or taken
+        if taken:
+            self._hurry()
+
+    def _is_for_us(self, header: Header) -> bool:
+        """Whether a face is of another conductor, of whom a lease takes note."""
+        if header.token.holder == self.lease.holder:
+            return False
+        if self.conducts:
+            self.lease.hear(header.token, time.monotonic())
+        return True
+
+    def _take(self, head: str, header: Header, values: Floats) -> bool:
+        """Hand a face to its head; whether it takes it."""
+        taken = self.followers[head].take(header, values)
+        if taken and head in self._recordings:
+            self._recordings[head].add(header.time_ns, values)
+        return taken
 
     def _hear_lease(self, sample: zenoh.Sample) -> None:
         self.lease.hear(_header_of(sample).token, time.monotonic())
@@ -258,13 +292,23 @@ class Node:
         return Header(self.lease.token, sequence, now_ns or time.monotonic_ns(), stamp_ns, stopped)
 
     def _publish(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
+        """Send a face to who hears this head alone, and gather it for who hears many; nothing where nobody listens."""
         self._sequences[head] += 1
         self.published += 1
-        header = self._header(self._sequences[head], now_ns, stamp_ns)
-        self.session.put(
-            self.key(head, "parameters"), self._payloads.encode(values), encoding=self._payloads.encoding,
-            attachment=header.encode(),
-        )  # fmt: skip
+        sequence, data = self._sequences[head], self._payloads.encode(values)
+        if _is_heard(self._outlets[head]):
+            header = self._header(sequence, now_ns, stamp_ns)
+            self._outlets[head].put(data, encoding=self._payloads.encoding, attachment=header.encode())
+        if _is_heard(self._all):
+            self._send(*self._gathering.begin(now_ns))
+            if self._gathering.add(head, sequence, stamp_ns, data):
+                self._send(now_ns, self._gathering.take())
+
+    def _send(self, now_ns: int, faces: list[tuple[str, int, int, bytes]]) -> None:
+        """Send gathered faces, mixed at ``now_ns``, if there are any."""
+        if faces:
+            header = self._header(0, now_ns).encode()
+            self._all.put(self._batches.encode(faces), encoding=self._batches.encoding, attachment=header)
 
     def _beat(self, now_ns: int) -> None:
         if now_ns * 1e-9 - self._beat_s > self.settings.lease_ms * 1e-3 / _BEATS:
@@ -374,6 +418,12 @@ def _header_of(sample: zenoh.Sample) -> Header:
     if sample.attachment is None:
         raise LinkError("a message without a header, which is of no conductor")
     return Header.decode(sample.attachment.to_bytes())
+
+
+def _is_heard(outlet: zenoh.Publisher) -> bool:
+    """Whether anybody listens to what a publisher sends."""
+    status = outlet.matching_status
+    return bool(getattr(status, "matching", status))  # an object with that in earlier versions of the library
 
 
 def _follower_report(follower: Follower) -> dict[str, Any]:
