@@ -22,12 +22,13 @@ from typing import TYPE_CHECKING, Any
 from controller.base.errors import OMOTE_ERRORS, LinkError
 from controller.base.parameters import Floats, Parameters
 from controller.fleet import journal
-from controller.fleet.batch import Batches, Gathering
+from controller.fleet.batch import Batches
 from controller.fleet.follower import Follower
 from controller.fleet.lease import Lease, Token
 from controller.fleet.offset import ClockOffset
 from controller.fleet.payload import Header, Payloads
 from controller.fleet.recorder import Recording
+from controller.fleet.sending import FaceSender, is_heard
 from controller.fleet.session import open_session
 from controller.layers.commands import CommandState
 from controller.links.line.session import LineSession
@@ -66,12 +67,10 @@ class Node:
         self.conducts = settings.role == "conductor"
         self.lease = Lease(random.getrandbits(62) | 1, lease_s, random.uniform(0.0, 0.2) * lease_s, time.monotonic())
         self._payloads, self._offset = Payloads(parameters, settings.payload), ClockOffset()
-        self._batches, self._gathering = Batches(self._payloads), Gathering(len(heads))
+        self._batches = Batches(self._payloads)
         delay_ns = 0 if self.conducts else round(settings.delay_ms * 1e6)
         self.followers = {name: Follower(parameters, 2.0 * lease_s, delay_ns) for name in heads}
         self.refused: Counter[str] = Counter()
-        self.published = 0
-        self._sequences = dict.fromkeys(heads, 0)
         self._rests = {name: i for i, name in enumerate(heads)}  # those who stand by take turns
         self._beat_s, self._stop_time = -1.0, ""
         self._restored: Token | None = None
@@ -105,7 +104,7 @@ class Node:
                 self._beat(now_ns)
         theirs = follower.step(now_ns, step_s, values.copy(), values)
         if conducting:
-            self._publish(head, now_ns, values, stamp_ns)
+            self._sender.send(head, now_ns, values, stamp_ns)
             return stamp_ns
         self._handle_stop(head, follower)
         return theirs if follower.conducted else stamp_ns
@@ -129,6 +128,11 @@ class Node:
         for recording in self._recordings.values():
             recording.close()
 
+    @property
+    def published(self) -> int:
+        """How many faces were sent."""
+        return self._sender.sent if self.conducts else 0
+
     def report(self) -> dict[str, Any]:
         """Role, lease, and what each head took and refused."""
         lease = self.lease
@@ -146,13 +150,15 @@ class Node:
 
     def _declare(self) -> None:
         session, here = self.session, f"{self.settings.role}/{self.session.zid()}"
-        together = len(self._heads) >= _MANY
-        if together:
+        many = len(self._heads) >= _MANY
+        if many:
             self._keep(
                 session.declare_subscriber(self.key("_", "faces"), self._directly(self._heard(self._hear_faces)))
             )
+        self._states = self._outlets_of("state")
+        self._servos = self._outlets_of("servos") if self.settings.role == "head" else {}
         for name in self._heads:
-            if not together:
+            if not many:
                 key, act = self.key(name, "parameters"), self._directly(self._face_of(name))
                 self._keep(session.declare_subscriber(key, act))
             about = self._answer(lambda: self.settings.model_dump(mode="json", exclude={"tls"}))
@@ -166,12 +172,11 @@ class Node:
                 self._keep(session.declare_subscriber(self.key(name, "events"), self._event_of(name)))
         if self.conducts:
             self._keep(session.declare_subscriber(self.key("_", "lease"), self._heard(self._hear_lease)))
-            self._keep(session.declare_subscriber(self.key("*", "state"), self._heard(self._hear_state)))
+            self._keep(session.declare_subscriber(self.key("_", "state"), self._heard(self._hear_state)))
             self._keep(session.declare_queryable(self.key("_", "clock"), self._clock))
-            self._outlets = {name: session.declare_publisher(self.key(name, "parameters")) for name in self._heads}
-            self._all = session.declare_publisher(self.key("_", "faces"))
-            for outlet in (*self._outlets.values(), self._all):
-                self._keep(outlet)
+            together = session.declare_publisher(self.key("_", "faces"))
+            self._keep(together)
+            self._sender = FaceSender(self._outlets_of("parameters"), together, self._payloads, self._header)
             for name, state in self._heads.items():
                 state.on_event = self._tell(name)
 
@@ -180,6 +185,13 @@ class Node:
         from zenoh.handlers import Callback  # optional
 
         return Callback(act, indirect=False)
+
+    def _outlets_of(self, what: str) -> dict[str, zenoh.Publisher]:
+        """What sends something of each head, and knows whether anybody listens."""
+        found = {name: self.session.declare_publisher(self.key(name, what)) for name in self._heads}
+        for outlet in found.values():
+            self._keep(outlet)
+        return found
 
     def _keep(self, declared: Any) -> None:
         self._closers.callback(declared.undeclare)
@@ -291,25 +303,6 @@ class Node:
         stopped = any(state.stop_latch.stopped is not None for state in self._heads.values())
         return Header(self.lease.token, sequence, now_ns or time.monotonic_ns(), stamp_ns, stopped)
 
-    def _publish(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
-        """Send a face to who hears this head alone, and gather it for who hears many; nothing where nobody listens."""
-        self._sequences[head] += 1
-        self.published += 1
-        sequence, data = self._sequences[head], self._payloads.encode(values)
-        if _is_heard(self._outlets[head]):
-            header = self._header(sequence, now_ns, stamp_ns)
-            self._outlets[head].put(data, encoding=self._payloads.encoding, attachment=header.encode())
-        if _is_heard(self._all):
-            self._send(*self._gathering.begin(now_ns))
-            if self._gathering.add(head, sequence, stamp_ns, data):
-                self._send(now_ns, self._gathering.take())
-
-    def _send(self, now_ns: int, faces: list[tuple[str, int, int, bytes]]) -> None:
-        """Send gathered faces, mixed at ``now_ns``, if there are any."""
-        if faces:
-            header = self._header(0, now_ns).encode()
-            self._all.put(self._batches.encode(faces), encoding=self._batches.encoding, attachment=header)
-
     def _beat(self, now_ns: int) -> None:
         if now_ns * 1e-9 - self._beat_s > self.settings.lease_ms * 1e-3 / _BEATS:
             self._beat_s = now_ns * 1e-9
@@ -368,14 +361,17 @@ class Node:
                 log.debug("zenoh: %s", error)
 
     def _say_state(self) -> None:
-        for name, state in self._heads.items():
-            follower = self.followers[name]
-            token = self.lease.token if self.lease.active else follower.highest
-            short = {"version": 1, "role": self.settings.role, "token": list(token), **_follower_report(follower)}
-            self.session.put(self.key(name, "state"), json.dumps(short), encoding="application/json")
-            if self.settings.role == "head" and (servos := state.servo_records()):
-                text = json.dumps({"version": 1, "servos": servos})
-                self.session.put(self.key(name, "servos"), text, encoding="application/json")
+        """Tell conductors which one is obeyed here, once for all heads; and who listens to a head, how that is."""
+        tokens = {name: self.lease.token if self.lease.active else f.highest for name, f in self.followers.items()}
+        short = {"version": 1, "role": self.settings.role}
+        self.session.put(self.key("_", "state"), json.dumps({**short, "token": list(max(tokens.values()))}))
+        for name, outlet in self._states.items():
+            if is_heard(outlet):
+                own = {**short, "token": list(tokens[name]), **_follower_report(self.followers[name])}
+                outlet.put(json.dumps(own), encoding="application/json")
+        for name, outlet in self._servos.items():
+            if is_heard(outlet) and (servos := self._heads[name].servo_records()):
+                outlet.put(json.dumps({"version": 1, "servos": servos}), encoding="application/json")
 
     def _ask_clock(self) -> None:
         asked = time.monotonic_ns()
@@ -418,12 +414,6 @@ def _header_of(sample: zenoh.Sample) -> Header:
     if sample.attachment is None:
         raise LinkError("a message without a header, which is of no conductor")
     return Header.decode(sample.attachment.to_bytes())
-
-
-def _is_heard(outlet: zenoh.Publisher) -> bool:
-    """Whether anybody listens to what a publisher sends."""
-    status = outlet.matching_status
-    return bool(getattr(status, "matching", status))  # an object with that in earlier versions of the library
 
 
 def _follower_report(follower: Follower) -> dict[str, Any]:

@@ -239,3 +239,32 @@ def test_heads_of_a_process_that_hears_many_are_moved_by_the_next_conductor(hub:
             until(lambda: all(f.highest > before and f.exact for f in heads.node.followers.values()))
             first.paused.clear()
             until(lambda: not first.node.lease.active)
+
+
+def test_how_a_head_is_is_said_to_whoever_listens(hub: str, tmp_path: Path) -> None:
+    said = list[tuple[str, dict[str, object]]]()
+    with (
+        Running(hub, "conductor", folder=tmp_path, prefix="said", heads=MANY) as conductor,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="said", heads=MANY),
+        client(hub) as session,
+    ):
+
+        def note(sample: zenoh.Sample) -> None:
+            said.append((str(sample.key_expr), json.loads(sample.payload.to_bytes())))
+
+        subscribers = [session.declare_subscriber(f"said/{at}/state", note) for at in ("_", "b")]
+        until(lambda: {(key, each["role"]) for key, each in said if each["token"] != [0, 0]} >= {
+            (f"said/{at}/state", role) for at in ("_", "b") for role in ("conductor", "head")})  # fmt: skip
+        assert list(conductor.node.lease.token) in [each["token"] for _, each in said]
+        assert {key for key, _ in said} == {"said/_/state", "said/b/state"}
+        for subscriber in subscribers:
+            subscriber.undeclare()
+
+
+def test_a_conductor_hears_of_its_successor_from_a_head(hub: str, tmp_path: Path) -> None:
+    """One that has been cut off learns by the states of heads that they obey another."""
+    with Running(hub, "conductor", folder=tmp_path, prefix="told") as conductor, client(hub) as session:
+        until(lambda: conductor.node.lease.active)
+        token = [conductor.node.lease.token.fence + 5, 7]
+        session.put("told/_/state", json.dumps({"version": 1, "role": "head", "token": token}))
+        until(lambda: conductor.node.lease.highest == Token(*token))
