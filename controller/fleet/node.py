@@ -133,6 +133,10 @@ class Node:
         """How many faces were sent."""
         return self._sender.sent if self.conducts else 0
 
+    def sequence(self, head: str) -> int:
+        """The number of the last face that was sent of a head; 0 where none was."""
+        return self._sender.sequences[head] if self.conducts else 0
+
     def report(self) -> dict[str, Any]:
         """Role, lease, and what each head took and refused."""
         lease = self.lease

@@ -20,6 +20,7 @@ class FaceSender:
     """What a conductor sends faces by.
 
     outlets : publishers of the heads by name. together : that of faces in one message. sent : how many faces.
+    sequences : of the last face of each head.
     """
 
     def __init__(
@@ -27,14 +28,14 @@ class FaceSender:
     ) -> None:
         self._outlets, self._together, self._payloads, self._heading = outlets, together, payloads, heading
         self._batches, self._gathering = Batches(payloads), Gathering(len(outlets))
-        self._sequences = dict.fromkeys(outlets, 0)
+        self.sequences = dict.fromkeys(outlets, 0)
         self.sent = 0
 
     def send(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
         """Send what one head shows, mixed at ``now_ns``; ``values`` : (P,)."""
-        self._sequences[head] += 1
+        self.sequences[head] += 1
         self.sent += 1
-        sequence, data, outlet = self._sequences[head], self._payloads.encode(values), self._outlets[head]
+        sequence, data, outlet = self.sequences[head], self._payloads.encode(values), self._outlets[head]
         if is_heard(outlet):
             header = self._heading(sequence, now_ns, stamp_ns).encode()
             outlet.put(data, encoding=self._payloads.encoding, attachment=header)
