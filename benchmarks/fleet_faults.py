@@ -182,8 +182,9 @@ def lives(rows: np.ndarray, head: int) -> list[np.ndarray]:
 def over_limits(life: np.ndarray, sent_s: dict[tuple[int, int, int], float]) -> tuple[float, float]:
     """The greatest speed and acceleration of a life in units of their limits; ``sent_s`` : of :func:`sent_at`.
 
-    A face that is exactly a conductor's has moved for as long as that one's motion went on; else one's own counts. While
-    a head waits for a face it stands still, as servos behind it do within their own limits: that is no motion here.
+    A face that is exactly a conductor's has moved for as long as that one's motion went on; else one's own counts.
+    While a head waits for a face it stands still, as servos behind it do within their own limits: that is no motion
+    here.
     """
     keys = zip(life["fence"].tolist(), life["head"].tolist(), life["sequence"].tolist(), strict=True)
     theirs = np.array([sent_s.get(key, np.nan) for key in keys])
