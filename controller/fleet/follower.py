@@ -12,7 +12,7 @@ from controller.fleet.lease import NOBODY, Token
 from controller.fleet.payload import Header
 from controller.motion.motion import MotionLimiter, minimum_jerk
 
-_SHARE = 0.25
+_SHARE = 0.6
 """How much of the limits of speed and acceleration passing from one source to the other may use, beside the motion of
 the sources themselves; the limiter behind it holds them in any case."""
 _SHORTEST_S = 0.3
