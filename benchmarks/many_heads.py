@@ -42,12 +42,12 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def route(pipe: Connection, endpoint: str) -> None:
+def route(pipe: Connection, *endpoints: str) -> None:
     """The router's process, until it is told to end; then its processor time (s)."""
     import zenoh
 
     config = zenoh.Config()
-    entries = {"mode": "router", "listen/endpoints": [endpoint], "scouting/multicast/enabled": False}
+    entries = {"mode": "router", "listen/endpoints": list(endpoints), "scouting/multicast/enabled": False}
     for key, value in entries.items():
         config.insert_json5(key, json.dumps(value))
     with zenoh.open(config):
@@ -57,11 +57,11 @@ def route(pipe: Connection, endpoint: str) -> None:
         pipe.send(time.process_time() - begin)
 
 
-def make_node(endpoint: str, role: str, names: list[str]) -> tuple[Node, dict[str, CommandState]]:
+def make_node(endpoint: str, role: str, names: list[str], **more: object) -> tuple[Node, dict[str, CommandState]]:
     states = {name: CommandState(P, seed=i) for i, name in enumerate(names)}
     for state in states.values():
         state.live(1.0, 0)
-    settings = ZenohSettings.model_validate({"role": role, "connect": [endpoint]})
+    settings = ZenohSettings.model_validate({"role": role, "connect": [endpoint], **more})
     return Node(settings, P, states, ROOT / "stage.toml"), states
 
 

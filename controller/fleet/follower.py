@@ -12,7 +12,7 @@ from controller.fleet.lease import NOBODY, Token
 from controller.fleet.payload import Header
 from controller.motion.motion import MotionLimiter, minimum_jerk
 
-_SHARE = 0.25
+_SHARE = 0.6
 """How much of the limits of speed and acceleration passing from one source to the other may use, beside the motion of
 the sources themselves; the limiter behind it holds them in any case."""
 _SHORTEST_S = 0.3
@@ -57,6 +57,7 @@ class Follower:
         self._sent = p.neutral()  # what the conductor sent last
         self._shown = p.neutral()
         self._blend_before = p.neutral()
+        self._before, self._last_s, self._led = p.neutral(), 0.0, False  # the last but one that was shown
         self._gap, self._passed_s, self._whole_s = np.zeros(len(p)), 0.0, 0.0
         self._heard_s = -np.inf
         self._begun, self._leads = False, False
@@ -146,12 +147,17 @@ class Follower:
             self._approach(source, dt, out)
         if self.exact:
             out[:] = source
-            velocity = (out - self._shown) / dt if dt > 0.0 else np.zeros_like(out)
-            self._limiter.reset_moving(out, velocity)
+            self._before, self._last_s, self._led = self._shown, dt, True
         self._shown = out.copy()
 
     def _approach(self, source: Floats, dt: float, out: Floats) -> None:
         """Follow the blend of both sources within the limits; led by its speed, so that nothing lags behind."""
+        if self._led:  # what was shown last was exactly a source's: go on from there, as fast as it moved
+            self._led = False
+            moved = self._shown - self._before
+            self._limiter.reset_moving(
+                self._shown, moved / self._last_s if self._last_s > 0.0 else np.zeros_like(moved)
+            )
         self._passed_s += dt
         left = 1.0 - minimum_jerk(self._passed_s / self._whole_s) if self._whole_s > 0.0 else 0.0
         blend = source + left * self._gap

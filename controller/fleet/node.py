@@ -1,7 +1,8 @@
 """One process among those that share the heads of a stage: what it publishes, hears and answers over Zenoh.
 
 Keys are ``<prefix>/<head>/parameters|commands|events|state|servos|configuration``; ``<prefix>/_/lease`` and
-``<prefix>/_/clock`` belong to all heads. Callbacks of Zenoh run in its own threads; each only decodes and hands over.
+``<prefix>/_/clock`` belong to all heads, and ``<prefix>/_/faces`` has the parameters of many of them in one message,
+for processes with many heads. Callbacks of Zenoh run in its own threads; each only decodes and hands over.
 """
 
 from __future__ import annotations
@@ -21,11 +22,13 @@ from typing import TYPE_CHECKING, Any
 from controller.base.errors import OMOTE_ERRORS, LinkError
 from controller.base.parameters import Floats, Parameters
 from controller.fleet import journal
+from controller.fleet.batch import Batches
 from controller.fleet.follower import Follower
 from controller.fleet.lease import Lease, Token
 from controller.fleet.offset import ClockOffset
 from controller.fleet.payload import Header, Payloads
 from controller.fleet.recorder import Recording
+from controller.fleet.sending import FaceSender, is_heard
 from controller.fleet.session import open_session
 from controller.layers.commands import CommandState
 from controller.links.line.session import LineSession
@@ -37,6 +40,8 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _STANDBY_TICKS = 5
+_MANY = 4
+"""A process with so many heads hears them all in one message; one with fewer only what is for its own."""
 _BEATS = 5
 """Signs of life in the length of a lease."""
 _STATE_S, _CLOCK_S = 0.2, 1.0
@@ -62,11 +67,10 @@ class Node:
         self.conducts = settings.role == "conductor"
         self.lease = Lease(random.getrandbits(62) | 1, lease_s, random.uniform(0.0, 0.2) * lease_s, time.monotonic())
         self._payloads, self._offset = Payloads(parameters, settings.payload), ClockOffset()
+        self._batches = Batches(self._payloads)
         delay_ns = 0 if self.conducts else round(settings.delay_ms * 1e6)
         self.followers = {name: Follower(parameters, 2.0 * lease_s, delay_ns) for name in heads}
         self.refused: Counter[str] = Counter()
-        self.published = 0
-        self._sequences = dict.fromkeys(heads, 0)
         self._rests = {name: i for i, name in enumerate(heads)}  # those who stand by take turns
         self._beat_s, self._stop_time = -1.0, ""
         self._restored: Token | None = None
@@ -100,7 +104,7 @@ class Node:
                 self._beat(now_ns)
         theirs = follower.step(now_ns, step_s, values.copy(), values)
         if conducting:
-            self._publish(head, now_ns, values, stamp_ns)
+            self._sender.send(head, now_ns, values, stamp_ns)
             return stamp_ns
         self._handle_stop(head, follower)
         return theirs if follower.conducted else stamp_ns
@@ -124,6 +128,15 @@ class Node:
         for recording in self._recordings.values():
             recording.close()
 
+    @property
+    def published(self) -> int:
+        """How many faces were sent."""
+        return self._sender.sent if self.conducts else 0
+
+    def sequence(self, head: str) -> int:
+        """The number of the last face that was sent of a head; 0 where none was."""
+        return self._sender.sequences[head] if self.conducts else 0
+
     def report(self) -> dict[str, Any]:
         """Role, lease, and what each head took and refused."""
         lease = self.lease
@@ -141,8 +154,17 @@ class Node:
 
     def _declare(self) -> None:
         session, here = self.session, f"{self.settings.role}/{self.session.zid()}"
+        many = len(self._heads) >= _MANY
+        if many:
+            self._keep(
+                session.declare_subscriber(self.key("_", "faces"), self._directly(self._heard(self._hear_faces)))
+            )
+        self._states = self._outlets_of("state")
+        self._servos = self._outlets_of("servos") if self.settings.role == "head" else {}
         for name in self._heads:
-            self._keep(session.declare_subscriber(self.key(name, "parameters"), self._directly(self._face_of(name))))
+            if not many:
+                key, act = self.key(name, "parameters"), self._directly(self._face_of(name))
+                self._keep(session.declare_subscriber(key, act))
             about = self._answer(lambda: self.settings.model_dump(mode="json", exclude={"tls"}))
             tail = "" if self.conducts else f"/{self.settings.role}"  # equal keys would be one answer
             for what, answer in (("state", self._answer(partial(self.state, name))), ("configuration", about)):
@@ -154,8 +176,11 @@ class Node:
                 self._keep(session.declare_subscriber(self.key(name, "events"), self._event_of(name)))
         if self.conducts:
             self._keep(session.declare_subscriber(self.key("_", "lease"), self._heard(self._hear_lease)))
-            self._keep(session.declare_subscriber(self.key("*", "state"), self._heard(self._hear_state)))
+            self._keep(session.declare_subscriber(self.key("_", "state"), self._heard(self._hear_state)))
             self._keep(session.declare_queryable(self.key("_", "clock"), self._clock))
+            together = session.declare_publisher(self.key("_", "faces"))
+            self._keep(together)
+            self._sender = FaceSender(self._outlets_of("parameters"), together, self._payloads, self._header)
             for name, state in self._heads.items():
                 state.on_event = self._tell(name)
 
@@ -164,6 +189,13 @@ class Node:
         from zenoh.handlers import Callback  # optional
 
         return Callback(act, indirect=False)
+
+    def _outlets_of(self, what: str) -> dict[str, zenoh.Publisher]:
+        """What sends something of each head, and knows whether anybody listens."""
+        found = {name: self.session.declare_publisher(self.key(name, what)) for name in self._heads}
+        for outlet in found.values():
+            self._keep(outlet)
+        return found
 
     def _keep(self, declared: Any) -> None:
         self._closers.callback(declared.undeclare)
@@ -183,21 +215,39 @@ class Node:
         return call
 
     def _face_of(self, head: str) -> Callable[[zenoh.Sample], None]:
-        follower = self.followers[head]
-
         def act(sample: zenoh.Sample) -> None:
             header = _header_of(sample)
-            if header.token.holder == self.lease.holder:
-                return
-            if self.conducts:
-                self.lease.hear(header.token, time.monotonic())
-            values = self._payloads.decode(sample.payload.to_bytes(), str(sample.encoding))
-            if follower.take(header, values):
-                if head in self._recordings:
-                    self._recordings[head].add(header.time_ns, values)
-                self._hurry()
+            if self._is_for_us(header):
+                values = self._payloads.decode(sample.payload.to_bytes(), str(sample.encoding))
+                if self._take(head, header, values):
+                    self._hurry()
 
         return self._heard(act)
+
+    def _hear_faces(self, sample: zenoh.Sample) -> None:
+        header, taken = _header_of(sample), False
+        if self._is_for_us(header):
+            for face in self._batches.decode(sample.payload.to_bytes(), str(sample.encoding)):
+                if face.head in self.followers:
+                    own = Header(header.token, face.sequence, header.time_ns, face.stamp_ns, header.stopped)
+                    taken = self._take(face.head, own, face.values) or taken
+        if taken:
+            self._hurry()
+
+    def _is_for_us(self, header: Header) -> bool:
+        """Whether a face is of another conductor, of whom a lease takes note."""
+        if header.token.holder == self.lease.holder:
+            return False
+        if self.conducts:
+            self.lease.hear(header.token, time.monotonic())
+        return True
+
+    def _take(self, head: str, header: Header, values: Floats) -> bool:
+        """Hand a face to its head; whether it takes it."""
+        taken = self.followers[head].take(header, values)
+        if taken and head in self._recordings:
+            self._recordings[head].add(header.time_ns, values)
+        return taken
 
     def _hear_lease(self, sample: zenoh.Sample) -> None:
         self.lease.hear(_header_of(sample).token, time.monotonic())
@@ -257,15 +307,6 @@ class Node:
         stopped = any(state.stop_latch.stopped is not None for state in self._heads.values())
         return Header(self.lease.token, sequence, now_ns or time.monotonic_ns(), stamp_ns, stopped)
 
-    def _publish(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
-        self._sequences[head] += 1
-        self.published += 1
-        header = self._header(self._sequences[head], now_ns, stamp_ns)
-        self.session.put(
-            self.key(head, "parameters"), self._payloads.encode(values), encoding=self._payloads.encoding,
-            attachment=header.encode(),
-        )  # fmt: skip
-
     def _beat(self, now_ns: int) -> None:
         if now_ns * 1e-9 - self._beat_s > self.settings.lease_ms * 1e-3 / _BEATS:
             self._beat_s = now_ns * 1e-9
@@ -324,14 +365,17 @@ class Node:
                 log.debug("zenoh: %s", error)
 
     def _say_state(self) -> None:
-        for name, state in self._heads.items():
-            follower = self.followers[name]
-            token = self.lease.token if self.lease.active else follower.highest
-            short = {"version": 1, "role": self.settings.role, "token": list(token), **_follower_report(follower)}
-            self.session.put(self.key(name, "state"), json.dumps(short), encoding="application/json")
-            if self.settings.role == "head" and (servos := state.servo_records()):
-                text = json.dumps({"version": 1, "servos": servos})
-                self.session.put(self.key(name, "servos"), text, encoding="application/json")
+        """Tell conductors which one is obeyed here, once for all heads; and who listens to a head, how that is."""
+        tokens = {name: self.lease.token if self.lease.active else f.highest for name, f in self.followers.items()}
+        short = {"version": 1, "role": self.settings.role}
+        self.session.put(self.key("_", "state"), json.dumps({**short, "token": list(max(tokens.values()))}))
+        for name, outlet in self._states.items():
+            if is_heard(outlet):
+                own = {**short, "token": list(tokens[name]), **_follower_report(self.followers[name])}
+                outlet.put(json.dumps(own), encoding="application/json")
+        for name, outlet in self._servos.items():
+            if is_heard(outlet) and (servos := self._heads[name].servo_records()):
+                outlet.put(json.dumps({"version": 1, "servos": servos}), encoding="application/json")
 
     def _ask_clock(self) -> None:
         asked = time.monotonic_ns()

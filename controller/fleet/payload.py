@@ -96,6 +96,23 @@ class Payloads:
             raise LinkError("a face with a value that is not a finite number")
         return np.clip(values, self._parameters.low, self._parameters.high)
 
+    def decode_exact(self, data: bytes, length: int) -> Floats:
+        """(k, P) values in their ranges of k exact faces of ``length`` bytes each, one after the other.
+
+        Raises LinkError: damaged, or not finite.
+        """
+        wanted = len(self._parameters)
+        row = np.dtype([("count", "<u2"), ("values", "<f8", (wanted,))])
+        if length != row.itemsize or len(data) % length:
+            raise LinkError(f"faces of other parameters than the {wanted} known here")
+        rows = np.frombuffer(data, row)
+        if (rows["count"] != wanted).any():
+            raise LinkError(f"faces of other parameters than the {wanted} known here")
+        if not np.isfinite(rows["values"]).all():
+            raise LinkError("a face with a value that is not a finite number")
+        values: Floats = np.clip(rows["values"], self._parameters.low, self._parameters.high)
+        return values
+
     def _exact(self, data: bytes) -> Floats:
         wanted = len(self._parameters)
         if len(data) != _COUNT.size + 8 * wanted or _COUNT.unpack_from(data)[0] != wanted:

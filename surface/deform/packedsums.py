@@ -43,6 +43,8 @@ def sum_all_packed(packed, packed_slope, entry_row, first, end, local):
     for e in range(first, end):
         p = 3 * item(entry_row, e)
         w, u, v = load(packed, 8 * e), load(packed_slope, 16 * e), load(packed_slope, 16 * e + 8)
+        prefetch(packed, 8 * e + AHEAD)
+        prefetch(packed_slope, 16 * e + 2 * AHEAD)
         x, y, z = fma_at(w, local, p, x), fma_at(w, local, p + 1, y), fma_at(w, local, p + 2, z)
         ax, ay, az = fma_at(u, local, p, ax), fma_at(u, local, p + 1, ay), fma_at(u, local, p + 2, az)
         bx, by, bz = fma_at(v, local, p, bx), fma_at(v, local, p + 1, by), fma_at(v, local, p + 2, bz)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import atan2, cos, hypot, sin
+from typing import Any
 
 import numpy as np
 
@@ -66,7 +67,7 @@ class Pose:
     lip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
     lag: Floats = field(default_factory=lambda: np.zeros(3))
     own: Floats = field(default_factory=lambda: np.zeros(0))
-    found: dict[tuple[object, ...], tuple[Floats, ...]] = field(default_factory=dict, init=False, compare=False)
+    found: dict[tuple[object, ...], Any] = field(default_factory=dict, init=False, compare=False)
 
 
 def head_angles(values: Floats) -> Floats:

@@ -9,30 +9,56 @@ import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.base.jit import inlined, kernel, lean
-from surface.spline.lanes import add, div, fma, load_x, load_y, load_z, mul, root, splat, store3
+from surface.spline.lanes import (
+    add,
+    div,
+    fma,
+    item,
+    load,
+    load_x,
+    load_y,
+    load_z,
+    mul,
+    prefetch,
+    root,
+    splat,
+    store,
+    store3,
+)
 
 ONE, TINY = np.float32(1.0), np.float32(1e-30)
+AHEAD = 512  # numbers that are fetched before they are needed
 
 
 @lean
 def add_moves(
-    amounts: Floats, group: Ints, first: Ints, start: Ints, moves: Floats32,
-    points: Floats,
-) -> None:  # fmt: skip
-    """Add to the numbers ``points (m,)`` runs of ``moves``: the r-th, from ``start[r]`` to ``start[r + 1]``, by
-    ``amounts[group[r]]`` to those that begin at ``first[r]``."""
-    for r in range(group.shape[0]):
-        amount = amounts[group[r]]
+    amounts: Floats, start: Ints, tile: Ints, rows: Floats32, order: Ints, sums: Floats32, points: Floats
+) -> None:
+    """Add to ``points (n, 3)`` the displacements of groups, each by its one of ``amounts (g,)``.
+
+    Group g moves the tiles ``tile[start[g]]`` to ``tile[start[g + 1] - 1]`` by 24 numbers each in ``rows``, those of
+    eight points. Points are put into tiles by ``order (n,)``; ``sums (24 t,)`` is scratch space.
+    """
+    for k in range(sums.shape[0]):
+        sums[k] = np.float32(0.0)
+    for g in range(amounts.shape[0]):
+        amount = np.float32(amounts[g])
         if amount == 0.0:
             continue
-        run = moves[start[r] : start[r + 1]]
-        own = points[first[r] : first[r] + len(run)]
-        for k in range(len(run)):
-            own[k] += amount * run[k]
+        for e in range(start[g], start[g + 1]):
+            at, row = 24 * item(tile, e), 24 * e
+            prefetch(rows, row + AHEAD)
+            prefetch(rows, row + AHEAD + 16)
+            for part in range(0, 24, 8):
+                store(sums, at + part, fma(load(rows, row + part), amount, load(sums, at + part)))
+    for k in range(order.shape[0]):
+        i = order[k]
+        for c in range(3):
+            points[i, c] += sums[3 * k + c]
 
 
 @lean
-def mix_rows(amounts: Floats, rows: Floats, rest: Floats, least: Floats, out: Floats) -> None:
+def mix_rows(amounts: Floats, rows: Floats32, rest: Floats, least: Floats, out: Floats) -> None:
     """Write ``rest (k,)`` plus ``amounts (g,) @ rows (g, k)``, nowhere less than ``least (k,)``, to ``out (k,)``."""
     for k in range(out.shape[0]):
         out[k] = rest[k]

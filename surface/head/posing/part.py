@@ -209,7 +209,16 @@ class RigidPart(HeadPart):
             return
         self._last_key, self.changed = key, [(0, len(self._rest))]
         self._motion = rigid_motion(self.follows, self._head, pose)
-        self.move(*self._motion, turn, self.vertices, self.normals)
+        after = self._after(pose, turn)
+        move_rigid(self._rest, self._rest_normals, *after, self.vertices, self.normals)
+
+    def _after(self, pose: Pose, turn: Turn) -> tuple[Floats32, Floats32]:
+        """:meth:`Turn.after` of the part's motion in a pose, computed once for all parts that follow alike."""
+        key = ("after", self.follows, id(self._head), id(turn))
+        if key not in pose.found:
+            pose.found[key] = turn.after(*self._motion)
+        after: tuple[Floats32, Floats32] = pose.found[key]
+        return after
 
     def move(self, linear: Floats, shift: Floats, turn: Turn, vertices: Floats32, normals: Floats32) -> None:
         """Write the part, moved by ``linear (3, 3)`` and ``shift (3,)`` and turned with the head, to ``vertices`` and

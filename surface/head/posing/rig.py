@@ -6,75 +6,22 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from surface.base.arrays import Floats, Floats32, Ints
-from surface.head.model.data import Group, HeadData, Jaw, PartData
+from surface.base.arrays import Floats
+from surface.head.model.data import HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.own_groups import OwnMoves
 from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers, SealDriver
 from surface.head.model.sway import SWAYS
 from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
-from surface.head.posing.kernels import add_moves, keep_on_eyeball, mix_rows, swing_jaw
+from surface.head.posing.kernels import keep_on_eyeball, mix_rows, swing_jaw
+from surface.head.posing.moves import Moves
 from surface.head.posing.tongue import tongue_rest
 
-GAP = 16  # greatest number of unmoved points within one run of a group's points
 CLEARANCE_GRID = (72, 36)  # samples of the part behind the lids, along u and v
 CLEARANCE_RADII = 1.4  # in eyeball radii: nearer points of the part behind the lids are kept outside the eyeball
 UNDONE_MM = 20.0  # displacement by mouthClose that takes back the whole motion of the jaw
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
-
-
-class Moves:
-    """Displacements of one part's groups; ``used (g,)`` are the indices into ``names`` of the groups that it has."""
-
-    def __init__(self, part: PartData, names: tuple[str, ...]) -> None:
-        place = {name: i for i, name in enumerate(names)}
-        groups = [g for g in part.groups if g.name in place]
-        self.used = np.array([place[g.name] for g in groups], np.int64)
-        self._n = len(part.points)
-        runs = [run for g, group in enumerate(groups) for run in _runs(g, group)]
-        self._group, self._first = (np.array([run[i] for run in runs], np.int64) for i in (0, 1))
-        self._start = np.cumsum([0, *(run[2].size for run in runs)])
-        self._rows = np.concatenate([np.zeros(0, np.float32), *(run[2].ravel() for run in runs)])
-        self._dense: Floats | None = None  # made when first used
-
-    def add(self, amounts: Floats, points: Floats) -> None:
-        """Add the displacements by ``amounts (g,)`` of the groups to ``points (n, 3)``, contiguous."""
-        add_moves(amounts, self._group, self._first, self._start, self._rows, points.reshape(-1))
-
-    def add_all(self, amounts: Floats, points: Floats) -> Floats:
-        """(h, n, 3) ``points (n, 3)`` with displacements by each of ``amounts (h, g)``: one product of matrices, which
-        reads the displacements once for all."""
-        if self._dense is None:
-            self._dense = self._table().astype(np.float64)
-        moved: Floats = (amounts @ self._dense).reshape(-1, self._n, 3)
-        moved += points
-        return moved
-
-    def at(self, ids: Ints) -> Floats32:
-        """(g, k, 3) displacements of the points ``ids (k,)``."""
-        return self._table().reshape(len(self.used), self._n, 3)[:, ids]
-
-    def _table(self) -> Floats32:
-        """(g, 3 n) displacements of all points."""
-        dense = np.zeros((len(self.used), 3 * self._n), np.float32)
-        for group, first, start, stop in zip(self._group, self._first, self._start, self._start[1:], strict=False):
-            dense[group, first : first + stop - start] = self._rows[start:stop]
-        return dense
-
-
-def _runs(index: int, group: Group) -> list[tuple[int, int, Floats32]]:
-    """A group's displacements as runs of points: its index, the first coordinate of a run, and its rows (k, 3)."""
-    order = np.argsort(group.ids, kind="stable")
-    ids, moves = np.asarray(group.ids, np.int64)[order], np.asarray(group.moves, np.float32)[order]
-    cuts = np.flatnonzero(np.diff(ids) > GAP) + 1
-    found = []
-    for own, rows in zip(np.split(ids, cuts), np.split(moves, cuts), strict=True):
-        if len(own):
-            run = np.zeros((own[-1] - own[0] + 1, 3), np.float32)
-            np.add.at(run, own - own[0], rows)
-            found.append((index, 3 * int(own[0]), run))
-    return found
 
 
 class SkinRig:
@@ -211,14 +158,16 @@ class Lids:
         self._eye = head.eyes[(part.lids[self._ids] < 0).astype(int)]
         from_eye = part.points[self._ids] - self._eye
         self._rest = np.linalg.norm(from_eye, axis=1)
-        self._moves = np.linalg.norm(from_eye + moves.at(self._ids), axis=2) - self._rest
+        away = np.linalg.norm(from_eye + moves.at(self._ids), axis=2) - self._rest
+        self._used = np.flatnonzero(away.any(axis=1))
+        self._moves = away[self._used].astype(np.float32)
         self._radius = self._rest.copy()
         self._least = np.minimum(self._rest, head.eye_radius + LID_MM)
 
     def apply(self, amounts: Floats, points: Floats) -> None:
         """Set the distance of the lids' points among ``points (n, 3)``; ``amounts (g,)`` of the groups."""
         if len(self._ids):
-            mix_rows(amounts, self._moves, self._rest, self._least, self._radius)
+            mix_rows(amounts[self._used], self._moves, self._rest, self._least, self._radius)
             keep_on_eyeball(self._ids, self._eye, self._hold, self._radius, points)
 
 
@@ -231,8 +180,9 @@ def _axis_of(pose: Pose, eye: int) -> Floats:
     """The optical axis of an eye in a pose, computed once."""
     key = ("axis", eye)
     if key not in pose.found:
-        pose.found[key] = (optical_axis(pose.gaze[eye]),)
-    return pose.found[key][0]
+        pose.found[key] = optical_axis(pose.gaze[eye])
+    axis: Floats = pose.found[key]
+    return axis
 
 
 def _path_of(pose: Pose, jaw: Jaw) -> tuple[Floats, Floats]:
@@ -283,7 +233,16 @@ def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
 
 
 def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
-    """Everything in a pose that :func:`rigid_motion` depends on."""
+    """Everything in a pose that :func:`rigid_motion` depends on, gathered once for all parts that follow alike."""
+    key = ("key", follows, id(head))
+    if key not in pose.found:
+        pose.found[key] = _key_of(follows, head, pose)
+    found: tuple[float, ...] = pose.found[key]
+    return found
+
+
+def _key_of(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
+    """What :func:`motion_key` returns."""
     if follows == "jaw":
         return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))
     if follows in ("left_eye", "right_eye"):

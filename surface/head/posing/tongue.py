@@ -115,6 +115,69 @@ def press(
         lift_sections(rise, fade, part, sign * share, lift, points)
 
 
+@lean
+def sort_by_depth(at: Floats, order: Ints, out: Floats) -> None:
+    """Copy points ``at (k, 3)`` to ``out (k, 3)`` by rising z; ``order (k,)`` is where each comes from.
+
+    It starts as the last call left it, which is nearly right from one frame of a motion to the next.
+    """
+    for k in range(1, len(order)):
+        i, j = order[k], k
+        while j > 0 and at[order[j - 1], 2] > at[i, 2]:
+            order[j] = order[j - 1]
+            j -= 1
+        order[j] = i
+    for k in range(len(order)):
+        for c in range(3):
+            out[k, c] = at[order[k], c]
+
+
+@lean
+def go_aside(lip: Floats, sideways: Floats, share: float, points: Floats) -> None:
+    """Move points (n, 3) by ``share`` of the way along x from their mean, by ``sideways (n,)``, to that of the ``lip
+    (k, 3)``, each by its ``sideways``."""
+    middle, own, total = 0.0, 0.0, 0.0
+    for k in range(len(lip)):
+        middle += lip[k, 0]
+    for i in range(len(points)):
+        own += sideways[i] * points[i, 0]
+        total += sideways[i]
+    aside = share * (middle / len(lip) - own / total)
+    for i in range(len(points)):
+        points[i, 0] += aside * sideways[i]
+
+
+@lean
+def gather_below(lip: Floats, lower: Floats, linear: Floats, shift: Floats, out: Floats) -> None:
+    """Write samples of the ``lip (k, 3)``, and those of ``lower (m, 3)`` teeth by ``linear (3, 3)`` and ``shift (3,)``,
+    to ``out (k + m, 3)``."""
+    for k in range(len(lip)):
+        for c in range(3):
+            out[k, c] = lip[k, c]
+    for k in range(len(lower)):
+        for c in range(3):
+            moved = shift[c]
+            for d in range(3):
+                moved += linear[c, d] * lower[k, d]
+            out[len(lip) + k, c] = moved
+
+
+@kernel
+def rest_tongue(  # type: ignore[no-untyped-def]
+    underside, upper_side, lip, lower, upper, linear, shift, fade, sideways, thick, share, aside, order, points
+):  # fmt: skip
+    """The whole of :meth:`TongueRest.apply` in one call; the sides are what :func:`press` takes first, and ``aside`` is
+    the share of the lip's way to a side that the tongue goes along."""
+    go_aside(lip, sideways, aside, points)
+    at, below = np.empty((len(order), 3)), np.empty((len(order), 3))
+    gather_below(lip, lower, linear, shift, at)
+    sort_by_depth(at, order, below)
+    start, ids, weights = underside
+    press(start, ids, weights, below, fade, np.ones(len(points)), 1.0, share, points)
+    start, ids, weights = upper_side
+    press(start, ids, weights, upper, fade, thick, -1.0, share, points)
+
+
 def tongue_rest(part: PartData, head: HeadData) -> TongueRest | None:
     """The correction of a tongue; None for one that is too short to be told from a button, or has no surface."""
     surface = make_surface(part)
@@ -140,11 +203,11 @@ class TongueRest:
         away[0, z > along[0]] = 0.0  # the tip goes as its first station
         self._fade = 1.0 - smoothstep(away / BEND_MM)
         self._sideways = smoothstep(z, along[0] - 0.7 * length, along[0])
-        self._whole = np.ones(len(z))
         low, high = _thickness(at, z)
         self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
         self._lower, upper = (_edges(head, follows, sign) for follows, sign in (("jaw", 1.0), ("skull", -1.0)))
         self._upper = _by_depth(upper, -1.0)
+        self._order = np.zeros(0, np.int64)  # of what lies below the tongue, by depth
 
     def share(self, pose: Pose) -> float:
         """How much of the correction a pose takes, 0..1: none while the tongue is in the mouth."""
@@ -156,12 +219,12 @@ class TongueRest:
         share = self.share(pose)
         if share <= 0.0 or not len(lip):
             return
-        aside = float(lip[:, 0].mean() - self._sideways @ points[:, 0] / self._sideways.sum())
-        beyond = _eased(float(pose.shapes[TONGUE]), *BEYOND)
-        points[:, 0] += beyond * SIDEWAYS * aside * self._sideways
-        below = np.concatenate([lip, self._lower @ linear.T + shift])
-        press(*self._sides[0], _by_depth(below, 1.0), self._fade, self._whole, 1.0, share, points)
-        press(*self._sides[1], self._upper, self._fade, self._thick, -1.0, share, points)
+        below = len(lip) + len(self._lower)
+        if len(self._order) != below:
+            self._order = np.arange(below)
+        aside = SIDEWAYS * _eased(float(pose.shapes[TONGUE]), *BEYOND)
+        rest_tongue(*self._sides, lip, self._lower, self._upper, linear, shift, self._fade, self._sideways, self._thick,
+                    share, aside, self._order, points)  # fmt: skip
 
 
 def _eased(x: float, low: float, high: float) -> float:

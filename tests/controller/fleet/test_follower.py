@@ -167,3 +167,18 @@ def test_who_conducts_itself_shows_its_own_face_from_where_it_was() -> None:
     assert np.abs(rows[1] - before).max() < P.max_speed.max() * DT
     with pytest.raises(AssertionError):
         check_limits(np.array([before, own, own]))  # a jump would be seen
+
+
+def test_a_head_that_looks_the_other_way_has_joined_after_two_seconds() -> None:
+    """The greatest gap there is, from one end of the head's turn to the other; within the limits all the way."""
+    follower, yaw = Follower(P), P.index("headYaw")
+    own, theirs, rows = P.neutral(), P.neutral(), []
+    own[yaw], theirs[yaw] = -1.0, 1.0
+    for k in range(250):
+        now_ns, out = 10**9 + k * STEP_NS, P.neutral()
+        if k >= 50:
+            follower.take(Header(FIRST, k, now_ns), theirs)
+        follower.step(now_ns, DT, own, out)
+        rows.append(out)
+    assert follower.exact and rows[-1][yaw] == 1.0
+    check_limits(np.array(rows))

@@ -193,3 +193,78 @@ def test_endpoints_and_files_that_cannot_be_used_are_named(
     assert "start a router there" in str(caught.value.hint)
     with pytest.raises(LinkError, match=r"zenoh\.tls\.ca: .*none\.pem cannot be read"):
         Running(f"tls/127.0.0.1:{free_port()}", "head", folder=tmp_path, tls={"ca": "none.pem"})
+
+
+MANY = ("a", "b", "c", "d", "e")
+
+
+def test_many_heads_of_a_process_are_sent_in_one_message(hub: str, tmp_path: Path) -> None:
+    """Whoever follows many hears a few messages a tick; a process with one head, and one of a user, hears that one."""
+    singles, together = list[str](), list[int]()
+    with (
+        Running(hub, "conductor", folder=tmp_path, prefix="many", heads=MANY) as conductor,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="many", heads=MANY) as heads,
+        client(hub) as session,
+    ):
+        until(lambda: all(follower.exact and follower.taken > 20 for follower in heads.node.followers.values()))
+        session.declare_subscriber("many/_/faces", lambda sample: together.append(len(sample.payload.to_bytes())))
+        session.declare_subscriber("many/b/parameters", lambda sample: singles.append(str(sample.key_expr)))
+        until(lambda: len(singles) > 20)
+        begin = len(heads.rows["c"])
+        conductor.states["c"].expression("happiness", 1.0, None, time.monotonic_ns())
+        until(lambda: sum(heads.exact["c"][begin:]) > 60)
+        shown = {
+            row.tobytes() for row, own in zip(heads.rows["c"][begin:], heads.exact["c"][begin:], strict=False) if own
+        }
+        assert shown <= {row.tobytes() for row in conductor.rows["c"]}
+        taken = sum(follower.taken for follower in heads.node.followers.values())
+        assert not heads.node.refused and not any(f.refused for f in heads.node.followers.values())
+        with Running(hub, "head", seed=90, folder=tmp_path, prefix="many", heads=("d",)) as one:
+            until(lambda: one.node.followers["d"].exact)
+    assert set(singles) == {"many/b/parameters"}
+    assert max(together) > 3 * 475 and taken > 300
+
+
+def test_heads_of_a_process_that_hears_many_are_moved_by_the_next_conductor(hub: str, tmp_path: Path) -> None:
+    with (
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="next", heads=MANY) as heads,
+        Running(hub, "conductor", folder=tmp_path, prefix="next", heads=MANY) as first,
+    ):
+        until(lambda: all(follower.exact for follower in heads.node.followers.values()))
+        with Running(hub, "conductor", seed=30, folder=tmp_path, prefix="next", heads=MANY) as second:
+            until(lambda: second.node.followers["a"].conducted)
+            before = heads.node.followers["e"].highest
+            first.paused.set()
+            until(lambda: second.node.lease.active)
+            until(lambda: all(f.highest > before and f.exact for f in heads.node.followers.values()))
+            first.paused.clear()
+            until(lambda: not first.node.lease.active)
+
+
+def test_how_a_head_is_is_said_to_whoever_listens(hub: str, tmp_path: Path) -> None:
+    said = list[tuple[str, dict[str, object]]]()
+    with (
+        Running(hub, "conductor", folder=tmp_path, prefix="said", heads=MANY) as conductor,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="said", heads=MANY),
+        client(hub) as session,
+    ):
+
+        def note(sample: zenoh.Sample) -> None:
+            said.append((str(sample.key_expr), json.loads(sample.payload.to_bytes())))
+
+        subscribers = [session.declare_subscriber(f"said/{at}/state", note) for at in ("_", "b")]
+        until(lambda: {(key, each["role"]) for key, each in said if each["token"] != [0, 0]} >= {
+            (f"said/{at}/state", role) for at in ("_", "b") for role in ("conductor", "head")})  # fmt: skip
+        assert list(conductor.node.lease.token) in [each["token"] for _, each in said]
+        assert {key for key, _ in said} == {"said/_/state", "said/b/state"}
+        for subscriber in subscribers:
+            subscriber.undeclare()
+
+
+def test_a_conductor_hears_of_its_successor_from_a_head(hub: str, tmp_path: Path) -> None:
+    """One that has been cut off learns by the states of heads that they obey another."""
+    with Running(hub, "conductor", folder=tmp_path, prefix="told") as conductor, client(hub) as session:
+        until(lambda: conductor.node.lease.active)
+        token = [conductor.node.lease.token.fence + 5, 7]
+        session.put("told/_/state", json.dumps({"version": 1, "role": "head", "token": token}))
+        until(lambda: conductor.node.lease.highest == Token(*token))

@@ -17,6 +17,7 @@ from surface.head.posing.contact_kernels import (
     overlap_at,
     place_samples,
     trace_profiles,
+    turn_of,
 )
 from surface.head.posing.rig import optical_axis
 
@@ -235,3 +236,8 @@ def test_profiles_are_those_of_the_rows_that_can_touch(radius):
     np.testing.assert_array_equal(out[..., [0, 2]], own[..., [0, 3]])
     arc = radius * np.arctan2(own[..., 1], own[..., 2]) if radius else own[..., 1]
     np.testing.assert_allclose(out[..., 1], arc, atol=1e-6)
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.1, -0.249, 0.251, -2.0])
+def test_small_turns_are_as_exact_as_large_ones(angle: float) -> None:
+    np.testing.assert_allclose(turn_of(angle), (np.sin(angle), np.cos(angle)), rtol=0, atol=3e-16)

@@ -21,19 +21,22 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(4)
 
 
-def test_runs_of_moves_are_added_by_the_amounts_of_their_groups(rng: np.random.Generator) -> None:
-    moves = rng.normal(size=9).astype(np.float32)
-    points = rng.normal(size=12)
+def test_tiles_of_moves_are_added_by_the_amounts_of_their_groups(rng: np.random.Generator) -> None:
+    """Ten points in two tiles: the first group moves both, the second none, the third the latter tile."""
+    rows, points = rng.normal(size=(3, 8, 3)).astype(np.float32), rng.normal(size=(10, 3))
+    order, start, tile = rng.permutation(10), np.array([0, 2, 2, 3]), np.array([0, 1, 1], np.int32)
+    tiles = np.zeros((2, 8, 3))
+    tiles += -2.0 * rows[:2]
+    tiles[1] += 0.5 * rows[2]
     want = points.copy()
-    want[3:6] += 0.5 * moves[:3]
-    want[0:6] += -2.0 * moves[3:9]
-    group, first, start = np.array([2, 0, 1]), np.array([3, 0, 5]), np.array([0, 3, 9, 9])
-    add_moves(np.array([-2.0, 0.0, 0.5]), group, first, start, moves, points)
-    np.testing.assert_allclose(points, want, atol=1e-12)
+    want[order] += tiles.reshape(-1, 3)[:10]
+    sums = np.full(48, 9.0, np.float32)
+    add_moves(np.array([-2.0, 1.0, 0.5]), start, tile, rows.ravel(), order, sums, points)
+    np.testing.assert_allclose(points, want, atol=1e-6)
 
 
 def test_rows_are_mixed_and_kept_above_the_least(rng: np.random.Generator) -> None:
-    rows, rest, out = rng.normal(size=(3, 6)), rng.normal(size=6), np.full(6, 9.0)
+    rows, rest, out = rng.normal(size=(3, 6)).astype(np.float32), rng.normal(size=6), np.full(6, 9.0)
     amounts = np.array([1.0, 0.0, -0.5])
     least = np.array([-9.0, -9.0, -9.0, 5.0, -9.0, 5.0])
     mix_rows(amounts, rows, rest, least, out)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from small_head import JAW, all_points, part, small_head
 
-from surface.head.model.data import Contact, Group, Seam
+from surface.head.model.data import Contact, Seam
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing import rig as rig_module
-from surface.head.posing.rig import LID_MM, Moves, SkinRig, jaw_path, rigid_motion
+from surface.head.posing.rig import LID_MM, SkinRig, jaw_path, rigid_motion
 
 HEAD = small_head()
 
@@ -99,48 +99,6 @@ def test_rigid_parts_follow_jaw_and_eyes():
 def test_apply_reuses_its_buffer():
     rig = SkinRig(part("a", 0, groups=[all_points("mouthPucker", (0, 0, 6))]), HEAD)
     assert rig.apply(pose(mouthPucker=1)) is rig.apply(pose())
-
-
-NAMED = ("mouthPucker", "cheekPuff", "jawOpen")
-
-
-def test_sparse_is_dense():
-    one = Group("cheekPuff", np.array([3, 7], np.int32), np.array([[1, 2, 3], [4, 5, 6]], np.float32))
-    moves = Moves(
-        part("a", 0, groups=[all_points("mouthPucker", (0, 0, 6)), one, all_points("other", (9, 9, 9))]), NAMED
-    )
-    np.testing.assert_array_equal(moves.used, [0, 1])
-    points = np.ones((25, 3))
-    moves.add(np.array([0.5, 2.0]), points)
-    want = np.ones((25, 3))
-    want[:, 2] += 3.0
-    want[[3, 7]] += 2.0 * np.array([[1, 2, 3], [4, 5, 6]])
-    np.testing.assert_allclose(points, want, atol=1e-12)
-    np.testing.assert_array_equal(moves.at(np.array([7]))[:, 0], [[0, 0, 6], [4, 5, 6]])
-
-
-def test_displacements_of_many_poses_at_once_are_those_of_each():
-    rng = np.random.default_rng(4)
-    groups = [Group(name, rng.permutation(25)[:15], rng.normal(size=(15, 3)).astype(np.float32)) for name in NAMED[:3]]
-    moves, rest = Moves(part("a", 0, groups=groups), NAMED), rng.normal(size=(len(part("a", 0).points), 3))
-    amounts = rng.uniform(-1.0, 1.0, (5, len(moves.used)))
-    wanted = np.tile(rest, (5, 1, 1))
-    for pose, values in zip(wanted, amounts, strict=True):
-        for group, value in zip(groups, values, strict=True):
-            pose[group.ids] += value * group.moves.astype(np.float64)
-    np.testing.assert_allclose(moves.add_all(amounts, rest), wanted, atol=1e-12)
-    assert moves.add_all(amounts[:0], rest).shape == (0, *rest.shape)
-
-
-def test_runs_of_points_are_cut_at_wide_gaps_only():
-    ids = np.array([24, 1, 3, 1], np.int32)
-    moves = Moves(part("a", 0, groups=[Group("cheekPuff", ids, np.arange(12, dtype=np.float32).reshape(4, 3))]), NAMED)
-    points = np.zeros((25, 3))
-    moves.add(np.array([2.0]), points)
-    want = np.zeros((25, 3))
-    want[[24, 3]], want[1] = [[0, 2, 4], [12, 14, 16]], [24, 28, 32]
-    np.testing.assert_array_equal(points, want)
-    np.testing.assert_array_equal(moves.at(np.arange(25))[0], want / 2)
 
 
 def test_a_rig_rests_while_nothing_changes_and_wakes_when_it_is_told_to():

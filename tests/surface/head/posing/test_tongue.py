@@ -11,7 +11,7 @@ import pytest
 
 from surface.head import Head
 from surface.head.posing.part import SkinPart
-from surface.head.posing.tongue import find_rise
+from surface.head.posing.tongue import find_rise, gather_below, go_aside, sort_by_depth
 
 ROOT = Path(__file__).parents[4]
 sys.path.insert(0, str(ROOT / "benchmarks"))
@@ -84,3 +84,29 @@ def test_a_tongue_in_the_mouth_is_not_computed_again_where_lips_move(head: Head)
     put_out = tongue.rig.points.copy()
     head.pose(head.values({"tongueOut": 0.9, "jawOpen": 0.5, "mouthShrugLower": 1.0}))
     assert np.abs(tongue.rig.points - put_out).max() > 0.1
+
+
+def test_points_are_sorted_by_depth_whatever_order_is_given() -> None:
+    rng = np.random.default_rng(3)
+    at, order, out = rng.normal(size=(50, 3)), rng.permutation(50), np.zeros((50, 3))
+    sort_by_depth(at, order, out)
+    np.testing.assert_array_equal(out, at[np.argsort(at[:, 2])])
+    sort_by_depth(at[::-1].copy(), order, out)  # an order that is wrong by far
+    np.testing.assert_array_equal(out, at[np.argsort(at[:, 2])])
+
+
+def test_what_lies_below_is_the_lip_and_the_teeth_where_the_jaw_takes_them() -> None:
+    rng = np.random.default_rng(4)
+    lip, lower, linear, shift = (rng.normal(size=shape) for shape in ((4, 3), (5, 3), (3, 3), (3,)))
+    out = np.zeros((9, 3))
+    gather_below(lip, lower, linear, shift, out)
+    np.testing.assert_allclose(out, np.concatenate([lip, lower @ linear.T + shift]), atol=1e-14)
+
+
+def test_the_tip_goes_aside_with_the_lip() -> None:
+    rng = np.random.default_rng(5)
+    points, lip, sideways = rng.normal(size=(30, 3)), rng.normal(size=(7, 3)) + 4.0, rng.uniform(size=30)
+    want = points.copy()
+    want[:, 0] += 0.4 * (lip[:, 0].mean() - sideways @ points[:, 0] / sideways.sum()) * sideways
+    go_aside(lip, sideways, 0.4, points)
+    np.testing.assert_allclose(points, want, atol=1e-13)

@@ -1,0 +1,57 @@
+"""Sends faces: each to who hears its head alone, and all of a tick together to who hears many; nothing to nobody."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from controller.base.parameters import Floats
+from controller.fleet.batch import Batches, Gathering
+from controller.fleet.payload import Header, Payloads
+
+if TYPE_CHECKING:
+    import zenoh  # optional: the extra zenoh
+
+Heading = Callable[[int, int, int], Header]
+"""Makes a header of a sequence, a time and a stamp (ns)."""
+
+
+class FaceSender:
+    """What a conductor sends faces by.
+
+    outlets : publishers of the heads by name. together : that of faces in one message. sent : how many faces.
+    sequences : of the last face of each head.
+    """
+
+    def __init__(
+        self, outlets: Mapping[str, zenoh.Publisher], together: zenoh.Publisher, payloads: Payloads, heading: Heading
+    ) -> None:
+        self._outlets, self._together, self._payloads, self._heading = outlets, together, payloads, heading
+        self._batches, self._gathering = Batches(payloads), Gathering(len(outlets))
+        self.sequences = dict.fromkeys(outlets, 0)
+        self.sent = 0
+
+    def send(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
+        """Send what one head shows, mixed at ``now_ns``; ``values`` : (P,)."""
+        self.sequences[head] += 1
+        self.sent += 1
+        sequence, data, outlet = self.sequences[head], self._payloads.encode(values), self._outlets[head]
+        if is_heard(outlet):
+            header = self._heading(sequence, now_ns, stamp_ns).encode()
+            outlet.put(data, encoding=self._payloads.encoding, attachment=header)
+        if is_heard(self._together):
+            self._send(*self._gathering.begin(now_ns))
+            if self._gathering.add(head, sequence, stamp_ns, data):
+                self._send(now_ns, self._gathering.take())
+
+    def _send(self, now_ns: int, faces: list[tuple[str, int, int, bytes]]) -> None:
+        """Send gathered faces, mixed at ``now_ns``, if there are any."""
+        if faces:
+            header = self._heading(0, now_ns, 0).encode()
+            self._together.put(self._batches.encode(faces), encoding=self._batches.encoding, attachment=header)
+
+
+def is_heard(outlet: zenoh.Publisher) -> bool:
+    """Whether anybody listens to what a publisher sends."""
+    status = outlet.matching_status
+    return bool(getattr(status, "matching", status))  # some versions of the library wrap it

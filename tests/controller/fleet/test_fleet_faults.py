@@ -1,0 +1,101 @@
+"""benchmarks/fleet_faults.py: what it judges is found in rows that were made to have it, and in no others."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("zenoh", reason="pip install 'omote[zenoh]'")
+
+from controller.base.parameters import PARAMETERS as P
+
+sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
+from fleet_faults import (
+    HEADS,
+    IN_STEP_S,
+    RECORD,
+    lives,
+    mark_spreads,
+    out_of_step,
+    over_limits,
+    sent_at,
+    steps_back,
+)
+
+TICK_S = 0.01
+JAW = P.index("jawOpen")
+
+
+def rows_of(head: int, values: np.ndarray, *, fence: int = 1, begin: int = 1) -> np.ndarray:
+    """Ticks of one head that shows a conductor's faces, whose jaw is open by ``values`` : (k,)."""
+    rows = np.zeros(len(values), RECORD)
+    numbers = begin + np.arange(len(values))
+    rows["head"], rows["conducted"], rows["exact"], rows["fence"] = head, True, True, fence
+    rows["sequence"], rows["mixed_ns"] = numbers, 10_000_000 * numbers
+    rows["shown_ns"], rows["passed_s"] = 10_000_000 * numbers + 80_000_000, TICK_S * numbers
+    rows["values"][:, JAW] = values
+    return rows
+
+
+def sent_of(rows: np.ndarray) -> np.ndarray:
+    sent = rows.copy()
+    sent["mixed_ns"] = 0
+    return sent
+
+
+def ramp(speed: float, count: int = 60) -> np.ndarray:
+    """The jaw's values at a constant speed after a start and before a stop, both soft."""
+    bell = np.convolve(np.ones(count - 30), np.hanning(31) / np.hanning(31).sum())
+    return np.cumsum(speed * bell) * TICK_S
+
+
+def test_motion_at_its_limits_is_no_fault_and_beyond_them_it_is() -> None:
+    at_limit = rows_of(0, ramp(0.99 * P.max_speed[JAW], 80))
+    speed, _ = over_limits(at_limit, sent_at(sent_of(at_limit)))
+    assert 0.9 < speed < 1.0
+    over = at_limit.copy()
+    over["values"][45:, JAW] += 0.2
+    speed, acceleration = over_limits(over, sent_at(sent_of(over)))
+    assert speed > 1.05 and acceleration > 1.05
+
+
+def test_a_face_that_was_lost_counts_by_the_time_of_its_conductor() -> None:
+    whole = rows_of(0, ramp(0.9 * P.max_speed[JAW]))
+    missed = np.delete(whole, [30, 31])  # what is shown next has moved for three ticks, in one
+    missed["passed_s"] = TICK_S * np.arange(len(missed))
+    speed, _ = over_limits(missed, sent_at(sent_of(whole)))
+    assert speed < 1.0
+
+
+def test_a_start_cuts_the_life_of_a_head() -> None:
+    rows = np.concatenate([rows_of(0, np.zeros(20)), rows_of(1, np.zeros(9)), rows_of(0, np.ones(30))])
+    assert [len(life) for life in lives(rows, 0)] == [20, 30]
+
+
+def test_who_obeys_a_replaced_conductor_again_is_found() -> None:
+    first, second, again = (rows_of(0, np.zeros(5), fence=k, begin=b) for k, b in ((1, 1), (2, 6), (1, 11)))
+    assert steps_back(np.concatenate([first, second]), 0) == 0
+    assert steps_back(np.concatenate([first, second, again]), 0) == 1
+
+
+def test_who_does_not_join_the_newest_conductor_in_time_is_found() -> None:
+    ticks = round(IN_STEP_S / TICK_S)
+    joins = rows_of(0, np.zeros(ticks), fence=2)
+    stays = rows_of(1, np.zeros(ticks), fence=1)
+    blends = rows_of(2, np.zeros(ticks), fence=2)
+    blends["exact"] = False
+    rows = np.concatenate([joins, stays, blends])
+    assert out_of_step(rows, 0) == {1, 2}
+    blends["exact"][-20] = True
+    assert out_of_step(np.concatenate([joins, blends]), 0) == set()
+
+
+def test_the_spread_of_a_face_is_from_the_first_head_to_the_last() -> None:
+    rows = np.concatenate([rows_of(head, np.zeros(10)) for head in range(len(HEADS))])
+    assert mark_spreads(rows).max() == 0.0
+    rows["shown_ns"][rows["head"] == 2] += 3_000_000
+    np.testing.assert_allclose(mark_spreads(rows), 3.0)
+    assert not len(mark_spreads(rows[rows["head"] != 1]))
