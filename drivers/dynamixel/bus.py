@@ -154,7 +154,7 @@ class DynamixelBus(ServoBus):
         for servo in sorted(self._telemetry.tripped - left_out):
             try:
                 self._registers.put(servo, "watchdog", 0, tries=1)
-                goal = self._startup().goals_at_present([servo], held=[servo])[servo]
+                goal = self._goal_at_present(servo)
                 self._registers.put(servo, "goal", goal, tries=1)
                 self._registers.put(servo, "watchdog", self.policy.watchdog_steps, tries=1)
             except PortLost:
@@ -167,3 +167,9 @@ class DynamixelBus(ServoBus):
             self._telemetry.tripped.discard(servo)
             index = self.ids.index(servo)
             self._begin_at(index, self._radians(index, goal))
+
+    def _goal_at_present(self, servo: int) -> int:
+        """The goal that keeps a servo that holds where it is, inside its own limits: it refuses any other."""
+        startup, index = self._startup(), self.ids.index(servo)
+        startup.started.limits[servo] = int(self.scale.lowest[index]), int(self.scale.highest[index])
+        return startup.goals_at_present([servo], held=[servo])[servo]

@@ -252,6 +252,19 @@ def test_a_tripped_watchdog_is_cleared_without_a_jump(wire: ServoBus) -> None:
         settle(bus, [0.2, 0.2, 0.2])
 
 
+def test_a_watchdog_is_armed_again_where_the_servo_stands_outside_its_own_limits(wire: ServoBus) -> None:
+    """As a head that was placed by hand a few steps beyond them; a servo refuses goals outside of its limits."""
+    wire.servo(2).put("Min Position Limit", 2000)
+    wire.servo(2).place(1995)
+    wire.fault("stall:2")
+    with open_bus("dynamixel", SERVOS, port=wire.port, margin_s=0.5, watchdog_ms=2000) as bus:
+        bus.start()
+        wire.servo(2).put("Bus Watchdog", 255)
+        read_until(bus, lambda state: "watchdog" in bus.report().errors and not bus._telemetry.tripped)
+        assert wire.servo(2).register("Bus Watchdog") == 100
+        assert wire.servo(2).goal == 2000
+
+
 def test_a_watchdog_that_trips_unseen_is_found_in_turn(wire: ServoBus) -> None:
     with open_bus("dynamixel", SERVOS, port=wire.port, margin_s=0.5, watchdog_ms=2000) as bus:
         bus.start()
