@@ -105,7 +105,8 @@ def _check_steps(servos: Sequence[ServoSpec], fits: Flags, low: Floats, high: Fl
     """Raises DriverError for the first servo whose limits have no step between them: any goal would pass one."""
     for i in np.flatnonzero(~fits):
         raise DriverError(
-            f"servo {servos[i].name!r} (id {servos[i].id}): no {what} lies inside its limits, {low[i]:g} to {high[i]:g}",
+            f"servo {servos[i].name!r} (id {servos[i].id}): "
+            f"no {what} lies inside its limits, {low[i]:g} to {high[i]:g}",
             hint="widen limit_deg, or use a template with more decimals",
         )
 

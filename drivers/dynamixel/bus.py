@@ -19,7 +19,7 @@ from drivers.base.errors import BusError, PortLost
 from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.sdk import Packets
+from drivers.dynamixel.sdk import PING_DATA, Packets
 from drivers.dynamixel.startup import Policy, Startup
 from drivers.dynamixel.telemetry import Telemetry
 from drivers.servos.bus import ServoBus
@@ -88,9 +88,15 @@ class DynamixelBus(ServoBus):
             if ids is None:
                 found = self._registers.packets.ping_all(self._port)
             else:
-                answers = [self._registers.packets.hello(self._port, i).replies for i in ids]
-                found = {i: reply.params for replies in answers for i, reply in replies.items()}
+                found = {i: params for i in ids if len(params := self._ping(i)) == PING_DATA}
             return [self._info(i, params[0] | params[1] << 8, params[2]) for i, params in sorted(found.items())]
+
+    def _ping(self, servo: int) -> bytes:
+        """The data of a servo's answer to a ping; empty where it does not answer, or only with an error."""
+        reply = self._registers.packets.hello(self._port, servo).replies.get(servo)
+        if reply is None and servo not in self.ids:
+            self._port.suspects.discard(servo)  # no such servo
+        return b"" if reply is None else reply.params
 
     def _startup(self, policy: Policy | None = None) -> Startup:
         return Startup(self._registers, policy or self.policy, self._may_map)

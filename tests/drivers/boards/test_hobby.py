@@ -62,7 +62,7 @@ def test_limits_between_two_steps_of_the_wire_are_refused() -> None:
     whole = spec(low=math.radians(10), high=math.radians(10.8))
     assert ValueScale([whole], ["deg"], [0]).values(np.ones(1)) == pytest.approx(10)
     between = spec(low=math.radians(45.01), high=math.radians(45.02))  # 2000.11 to 2000.22 us
-    with pytest.raises(DriverError, match="no step of 0.25 us lies inside"):
+    with pytest.raises(DriverError, match=r"no step of 0\.25 us lies inside"):
         PulseScale([between]).check_steps([between], 4)
     PulseScale([between]).check_steps([between], 5)
 

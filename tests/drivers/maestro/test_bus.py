@@ -302,7 +302,7 @@ def test_a_start_needs_to_know_whether_the_board_has_errors(number: int, monkeyp
                 monkeypatch.setattr(bus, "_request", request)
 
         monkeypatch.setattr(bus, "_checked", check)
-        with pytest.raises((NoReply, ServoRefused), match="whether it has errors|reports protocol"):
+        with pytest.raises((NoReply, ServoRefused), match=r"whether it has errors|reports protocol"):
             bus.start()
     assert [row["pulse_us"] for row in rig.line.describe(rig.clock())] == [0] * 6
 
