@@ -117,7 +117,11 @@ class WireBus(Bus):
         return 1
 
     def open(self) -> None:
-        self._open_link()
+        try:
+            self._open_link()
+        except BaseException:
+            self._close_link()  # it may be open already
+            raise
         self._lost = False
 
     def reconnect(self) -> None:
