@@ -103,7 +103,7 @@ class PulseScale:
 
 def _check_steps(servos: Sequence[ServoSpec], fits: Flags, low: Floats, high: Floats, what: str) -> None:
     """Raises DriverError for the first servo whose limits have no step between them: any goal would pass one."""
-    for i in np.flatnonzero(~fits):
+    for i in np.flatnonzero(~fits).tolist():
         raise DriverError(
             f"servo {servos[i].name!r} (id {servos[i].id}): "
             f"no {what} lies inside its limits, {low[i]:g} to {high[i]:g}",

@@ -210,7 +210,8 @@ class ServoBus(WireBus):
 
     def _recover(self, ids: Sequence[int]) -> dict[int, BusError]:
         """As :meth:`recover`; returns why servos stay off, by id."""
-        chosen, failed = [servo for servo in self.servos if servo.id in ids], {}
+        chosen = [servo for servo in self.servos if servo.id in ids]
+        failed: dict[int, BusError] = {}
         with self._losing():
             while chosen:
                 try:
