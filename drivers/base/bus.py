@@ -195,6 +195,14 @@ class Bus(ABC):
         """True between a ``start`` that succeeded and ``stop``: motors may be on."""
 
     @property
+    def may_be_on(self) -> bool:
+        """True where motors may be on and can be tried: while it runs, and where switching them off was not confirmed.
+
+        :meth:`close` stops such a bus first.
+        """
+        return self.running
+
+    @property
     def driven(self) -> Flags:
         """(n,) servos that are sent goals; all others keep still until it is known where they are.
 
@@ -262,7 +270,7 @@ class Bus(ABC):
     def close(self) -> None:
         """Stop the servos, then close the port and raise what :meth:`stop` raised; may be called repeatedly."""
         try:
-            if self.running:
+            if self.may_be_on:
                 self.stop()
         finally:
             self._release()

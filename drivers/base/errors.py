@@ -73,7 +73,7 @@ class ServoFault(BusError):
 
 def merge_errors(failed: Mapping[int, BusError]) -> BusError:
     """One error for several servos, by id: kind, message and hint of the first one, and every servo's id."""
-    first, *others = failed.values()
+    first, *others = {id(error): error for error in failed.values()}.values()  # one error may concern several
     if not others:
         return first
     ids = tuple(sorted(failed))

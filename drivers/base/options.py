@@ -80,6 +80,10 @@ def check_options(options: type, reserved: Iterable[str] = ()) -> None:
             raise ValueError(f"{options.__name__}.{entry.name}: its type must be {allowed}, not {entry.type}")
 
 
+DIGITS = 9
+"""Digits of a number that count; one with more is too large anyway."""
+
+
 def parse_ids(text: str, most: int = 252) -> list[int]:
     """``1-3,7`` as [1, 2, 3, 7]; raises DriverError for other text, and for ids given twice or above ``most``."""
     hint = "for example --ids 1-24, or --ids 1,3,7-9"
@@ -89,7 +93,9 @@ def parse_ids(text: str, most: int = 252) -> list[int]:
         match = re.fullmatch(r"([0-9]+)(?:-([0-9]+))?", part.strip())
         if match is None:
             raise DriverError(f"--ids {text}: {part.strip()!r} is no id", hint=hint)
-        first, last = int(match[1]), int(match[2] or match[1])
+        first, last = (int(number.lstrip("0")[:DIGITS] or 0) for number in (match[1], match[2] or match[1]))
+        if first > last:
+            raise DriverError(f"--ids {text}: {part.strip()!r} runs backwards", hint=hint)
         if last > most:
             raise outside
         ids += range(first, last + 1)

@@ -126,7 +126,7 @@ class BoardBus(WireBus):
                 if self._stagger_s:
                     self._port.sleep(self._stagger_s)
         except BaseException:
-            self._switch_off()
+            self._back_out()
             raise
         start = np.where(np.isnan(present), rest, present)
         self._on[:] = True

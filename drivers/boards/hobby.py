@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.base.bus import Floats, ServoSpec
+from drivers.base.bus import Flags, Floats, ServoSpec
 from drivers.base.errors import DriverError
 
 Indices = NDArray[np.intp]
@@ -90,10 +90,25 @@ class PulseScale:
         kept: Indices = np.minimum(np.maximum(steps, low), high).astype(np.intp)
         return kept
 
+    def check_steps(self, servos: Sequence[ServoSpec], per_us: int) -> None:
+        """Raises DriverError where no whole step of ``1 / per_us`` us lies inside a servo's limits."""
+        low, high = np.ceil(self.low_us * per_us), np.floor(self.high_us * per_us)
+        _check_steps(servos, low <= high, self.low_us, self.high_us, f"step of {1 / per_us:g} us")
+
     def radians(self, pulse_us: Floats) -> Floats:
         """(n,) rad for pulses (n,) us; NaN for 0, which is no pulse."""
         angles = _extrapolated(self._sign * pulse_us, self._sign[:, None] * self._us, self._rad)
         return np.where(pulse_us > 0.0, angles, math.nan)
+
+
+def _check_steps(servos: Sequence[ServoSpec], fits: Flags, low: Floats, high: Floats, what: str) -> None:
+    """Raises DriverError for the first servo whose limits have no step between them: any goal would pass one."""
+    for i in np.flatnonzero(~fits).tolist():
+        raise DriverError(
+            f"servo {servos[i].name!r} (id {servos[i].id}): "
+            f"no {what} lies inside its limits, {low[i]:g} to {high[i]:g}",
+            hint="widen limit_deg, or use a template with more decimals",
+        )
 
 
 def _curve(servo: ServoSpec) -> tuple[Floats, Floats]:
@@ -138,6 +153,8 @@ class ValueScale:
     fields : value of each servo: ``us``, ``deg``, ``deg10``, ``angle``, ``unit`` (:mod:`drivers.text.template`), or
         ``parameter`` (1 for 90 degrees of the shaft).
     decimals : of each value on the wire.
+
+    Raises DriverError: no value with so few decimals lies inside a servo's limits.
     """
 
     def __init__(self, servos: Sequence[ServoSpec], fields: Sequence[str], decimals: Sequence[int]) -> None:
@@ -147,12 +164,17 @@ class ValueScale:
         self._pulses = PulseScale([servos[i] for i in self._us]) if self._us else None
         ends = [self._exact(np.array([getattr(s, end) for s in servos])) for end in ("min_rad", "max_rad")]
         self._low, self._high = np.minimum(*ends), np.maximum(*ends)
+        low, high = self._whole_ends()
+        _check_steps(servos, low <= high, self._low, self._high, "value on the wire")
+
+    def _whole_ends(self) -> tuple[Floats, Floats]:
+        """The lowest and the highest whole step inside the limits, (n,) each."""
+        return np.ceil(self._low / self._step - 1e-9), np.floor(self._high / self._step + 1e-9)
 
     def values(self, angle_rad: Floats) -> Floats:
         """(n,) values for angles (n,) rad, rounded to the last decimal inside the servos' limits."""
         rounded = np.rint(self._exact(angle_rad) / self._step)
-        low = np.ceil(self._low / self._step - 1e-9)
-        high = np.floor(self._high / self._step + 1e-9)
+        low, high = self._whole_ends()
         values: Floats = np.minimum(np.maximum(rounded, low), high) * self._step
         return values
 

@@ -65,7 +65,10 @@ class WireBus(Bus):
 
     @abstractmethod
     def _bring_up(self) -> Floats:
-        """Check every servo, switch it on at its present position, and return these (n,) rad; see :meth:`Bus.start`."""
+        """Check every servo, switch it on at its present position, and return these (n,) rad; see :meth:`Bus.start`.
+
+        Where it raises, what it had switched on was switched off, or ``_unconfirmed`` is set.
+        """
 
     def _bring_back(self) -> Floats:
         """As :meth:`_bring_up`, but NaN for servos that cannot be started, with ``_leave_out`` called for each.
@@ -101,6 +104,10 @@ class WireBus(Bus):
         return self._running
 
     @property
+    def may_be_on(self) -> bool:
+        return self._running or (self._unconfirmed and self.is_open)
+
+    @property
     def driven(self) -> Flags:
         return self._presence.driven
 
@@ -110,7 +117,11 @@ class WireBus(Bus):
         return 1
 
     def open(self) -> None:
-        self._open_link()
+        try:
+            self._open_link()
+        except BaseException:
+            self._close_link()  # it may be open already
+            raise
         self._lost = False
 
     def reconnect(self) -> None:
@@ -171,7 +182,7 @@ class WireBus(Bus):
             if not self._presence.driven.any():
                 # the next reconnect() starts them again, and stop() switches off what may still be on
                 self._running, self._unconfirmed = ran_before, True
-                raise merge_errors(self._reasons)
+                raise merge_errors({self.ids[index]: why for index, why in self._reasons.items()})
 
     def _begin_driving(self, here_rad: Floats) -> None:
         """Drive servos from where they are, (n,) rad; NaN for one that is left out."""
@@ -180,7 +191,13 @@ class WireBus(Bus):
         self._limits.reset(np.where(started, here_rad, 0.0), self._clock())
         self._presence.reset(started)
         self._join_s = self._clock() + JOIN_S
-        self._running = True
+        self._running, self._unconfirmed = True, False
+
+    def _back_out(self) -> None:
+        """Switch off what a failed start may have switched on; :meth:`stop` tries again where that is not confirmed."""
+        self._unconfirmed = True
+        self._switch_off()
+        self._unconfirmed = False
 
     def stop(self) -> None:
         if not self._running and not self._unconfirmed:

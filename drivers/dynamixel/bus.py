@@ -19,7 +19,7 @@ from drivers.base.errors import BusError, PortLost
 from drivers.base.rate_limited_log import RateLimitedLogger
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.registers import Registers
-from drivers.dynamixel.sdk import Packets
+from drivers.dynamixel.sdk import PING_DATA, Packets
 from drivers.dynamixel.startup import Policy, Startup
 from drivers.dynamixel.telemetry import Telemetry
 from drivers.servos.bus import ServoBus
@@ -88,9 +88,15 @@ class DynamixelBus(ServoBus):
             if ids is None:
                 found = self._registers.packets.ping_all(self._port)
             else:
-                answers = [self._registers.packets.hello(self._port, i).replies for i in ids]
-                found = {i: reply.params for replies in answers for i, reply in replies.items()}
+                found = {i: params for i in ids if len(params := self._ping(i)) == PING_DATA}
             return [self._info(i, params[0] | params[1] << 8, params[2]) for i, params in sorted(found.items())]
+
+    def _ping(self, servo: int) -> bytes:
+        """The data of a servo's answer to a ping; empty where it does not answer, or only with an error."""
+        reply = self._registers.packets.hello(self._port, servo).replies.get(servo)
+        if reply is None and servo not in self.ids:
+            self._port.suspects.discard(servo)  # no such servo
+        return b"" if reply is None else reply.params
 
     def _startup(self, policy: Policy | None = None) -> Startup:
         return Startup(self._registers, policy or self.policy, self._may_map)
@@ -154,7 +160,7 @@ class DynamixelBus(ServoBus):
         for servo in sorted(self._telemetry.tripped - left_out):
             try:
                 self._registers.put(servo, "watchdog", 0, tries=1)
-                goal = self._startup().goals_at_present([servo], held=[servo])[servo]
+                goal = self._goal_at_present(servo)
                 self._registers.put(servo, "goal", goal, tries=1)
                 self._registers.put(servo, "watchdog", self.policy.watchdog_steps, tries=1)
             except PortLost:
@@ -167,3 +173,9 @@ class DynamixelBus(ServoBus):
             self._telemetry.tripped.discard(servo)
             index = self.ids.index(servo)
             self._begin_at(index, self._radians(index, goal))
+
+    def _goal_at_present(self, servo: int) -> int:
+        """The goal that keeps a servo that holds where it is, inside its own limits: it refuses any other."""
+        startup, index = self._startup(), self.ids.index(servo)
+        startup.started.limits[servo] = int(self.scale.lowest[index]), int(self.scale.highest[index])
+        return startup.goals_at_present([servo], held=[servo])[servo]

@@ -8,6 +8,7 @@ from __future__ import annotations
 import time
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
 from dataclasses import fields
 from typing import Any
 
@@ -15,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.base.bus import BusReport, BusState, Floats, ServoInfo, ServoSpec, frozen
-from drivers.base.errors import DriverError, NoReply, PortLost
+from drivers.base.errors import BusError, DriverError, NoReply, PortLost, merge_errors
 from drivers.core.wirebus import WireBus
 from drivers.dynamixel.bus import DynamixelBus
 from drivers.dynamixel.legacy import LegacyBus
@@ -99,7 +100,9 @@ class MixedBus(WireBus):
             try:
                 half._start()
             except BaseException:
-                self._stop_halves()
+                self._unconfirmed = True
+                self._let_go_of_halves()
+                self._unconfirmed = any(half._unconfirmed for half in self._halves)
                 raise
             here[index] = half._limits.target
         return here
@@ -125,14 +128,15 @@ class MixedBus(WireBus):
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that switched off or were rebooted; see the drivers of both protocols."""
+        failed: dict[int, BusError] = {}
         with self._losing():
             for half in self._halves:
                 chosen = [servo for servo in half.ids if ids is None or servo in ids]
-                if not chosen:
-                    continue
-                half.recover(chosen)
-                for servo in chosen:
+                failed |= half._recover(chosen)
+                for servo in set(chosen) - failed.keys():
                     self._drive_again(self.ids.index(servo), half._limits.target[half.ids.index(servo)])
+        if failed:
+            raise merge_errors(failed)
 
     def _switch_off(self) -> None:
         failed = self._stop_halves()
@@ -142,14 +146,24 @@ class MixedBus(WireBus):
         kind = PortLost if any(isinstance(error, PortLost) for error in failed) else NoReply
         raise kind("; ".join(map(str, failed)), hint=failed[0].hint, port=self.path, servo_ids=left) from failed[0]
 
+    def _let_go_of_halves(self) -> None:
+        """Switch off what the start of both halves switched on, where the second one failed."""
+        for half in self._halves:
+            if half._running:
+                with suppress(DriverError):  # the first error is told; stop() tries again
+                    half._let_go()
+
     def _stop_halves(self) -> list[DriverError]:
-        """Switch the servos of both halves off, also where the first fails or is not running; returns the errors."""
+        """Switch off the servos of both halves that may be on, also where the first fails; returns the errors."""
         failed = []
         for half in self._halves:
-            half._running = False
+            if not half._running and not half._unconfirmed:
+                continue
+            half._running, half._unconfirmed = False, True
             try:
                 with half._losing():
                     half._switch_off()
+                half._unconfirmed = False
             except DriverError as error:
                 failed.append(error)
         return failed

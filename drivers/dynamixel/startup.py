@@ -101,13 +101,23 @@ class Startup(startup.Startup[StatusPacket]):
         for servo in bad:
             registers.packets.reboot(registers.port, servo)
         registers.port.sleep(BOOT_S / 4)
-        patience = math.ceil(BOOT_S / registers.port.margin_s)
-        registers.each(bad, lambda servo: registers.hello(servo, tries=patience))
+        registers.each(bad, self._await_boot)
         registers.put_all(dict.fromkeys(bad, 2), "status_level")  # all RAM is at its default again
         still = {servo: bits for servo, bits in registers.get_all(list(bad), "hardware").items() if bits}
         if still:
             raise self.fault("latched", still)
         return list(bad)
+
+    def _await_boot(self, servo: int) -> StatusPacket:
+        """The answer of a servo that was rebooted; raises as :meth:`Registers.hello` where none comes in time."""
+        port = self.registers.port
+        end_s = port.clock() + BOOT_S
+        while True:
+            try:
+                return self.registers.hello(servo)
+            except (NoReply, CorruptReply):
+                if port.clock() >= end_s:
+                    raise
 
     def _write_settings(self, servo: int, held: bool) -> None:
         """Operating mode, drive mode, startup configuration and return delay: read, and written only where they differ.

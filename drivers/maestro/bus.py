@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from drivers.base.bus import Floats, ServoSpec
-from drivers.base.errors import DriverError, ServoRefused
+from drivers.base.errors import DriverError, NoReply, ServoRefused
 from drivers.boards.ordered_replies import OrderedBus
 from drivers.maestro import protocol as m
 
@@ -59,6 +59,7 @@ class MaestroBus(OrderedBus):
         self._board, self._device, self._crc = board, device, crc
         self._code = m.Encoder(device, crc)
         self._errors = 0
+        self._scale.check_steps(self.servos, m.QUARTER)
 
     def far_end(self) -> dict[str, Any]:
         return {
@@ -86,17 +87,11 @@ class MaestroBus(OrderedBus):
 
     def _bring_up(self) -> Floats:
         start = super()._bring_up()
-        self._go(start)  # in one command, as in every cycle; a board that does not know it reports an error now
-        self._ask_pulses([], insist=True)
-        errors = self._errors
-        if errors:
-            self._switch_off()
-            raise self._error(
-                ServoRefused,
-                f"the Maestro on {self.path} reports {', '.join(m.error_names(errors))}",
-                'set board = "micro" for one with 6 channels; look at its errors in the Control Center',
-            )
-        present = self._begin()
+        try:
+            present = self._checked(start)
+        except BaseException:
+            self._back_out()
+            raise
         for index in np.flatnonzero(np.abs(present - start) * self._scale.us_per_rad > self.SLACK_US):
             log.warning(
                 "channel %d (%s) on %s stays at %.0f us: the board's own limits, or its speed, hold it back; "
@@ -104,6 +99,26 @@ class MaestroBus(OrderedBus):
                 *(self.ids[index], self.servos[index].name, self.path, self._scale.pulses(present)[index]),
             )
         return np.where(np.isnan(present), start, present)
+
+    def _checked(self, start: Floats) -> Floats:
+        """Send all goals as in every cycle; returns what the board puts out then, (n,) rad, NaN for no pulses.
+
+        Raises ServoRefused: the board reports errors, as one that does not know the command. NoReply.
+        """
+        self._errors = 0
+        self._go(start)
+        answered = self._ask_pulses([], insist=True) is not None  # the board forgets its errors as it reports them
+        present = self._begin()
+        if self._errors:
+            raise self._error(
+                ServoRefused,
+                f"the Maestro on {self.path} reports {', '.join(m.error_names(self._errors))}",
+                'set board = "micro" for one with 6 channels; look at its errors in the Control Center',
+            )
+        if not answered:
+            message = f"the Maestro on {self.path} did not answer whether it has errors"
+            raise self._error(NoReply, message, "start again; check its cable where it happens often")
+        return present
 
     def _limit_motion(self) -> None:
         """Set the board's limits of speed and acceleration, rounded up so that no servo falls behind its goals."""
@@ -148,15 +163,18 @@ class MaestroBus(OrderedBus):
                 yield self._code.targets(row[0], [goals[channel] for channel in row])
 
     def _poll(self) -> None:
+        self._errors = 0
         super()._poll()
         for name in m.error_names(self._errors):
             self._report.count("board_" + name.replace(" ", "_"))
             self._warn(f"the Maestro on {self.path} reports: {name}; it stopped all pulses")
 
     def _ask_pulses(self, group: Sequence[int], insist: bool = False) -> Floats | None:
-        """As in the base class; also reads and clears the board's errors."""
+        """As in the base class; also reads the board's errors, which clears them there, and adds them to those seen."""
         requests = b"".join(self._code.command(m.GET_POSITION, self.ids[index]) for index in group)
         data = self._request(requests + self._code.command(m.GET_ERRORS), 2 * len(group) + 2, insist)
-        words = np.frombuffer(data or b"\0\0", "<u2")
-        self._errors = int(words[-1])
-        return None if data is None else words[:-1] / m.QUARTER
+        if data is None:
+            return None
+        words = np.frombuffer(data, "<u2")
+        self._errors |= int(words[-1])
+        return words[:-1] / m.QUARTER

@@ -93,9 +93,9 @@ class Protocol1Bus(ServoBus):
             found = []
             for servo in range(MAX_ID + 1) if ids is None else ids:
                 reply = self._registers.packets.hello(self._port, servo).replies.get(servo)
-                if reply is not None:
+                if reply is not None and reply.params:  # not an error alone
                     found.append(self._info(servo, *startup.identity(reply, map(load_table, self.MODELS))))
-                elif servo not in self.ids:
+                elif reply is None and servo not in self.ids:
                     self._port.suspects.discard(servo)  # no such servo
             return found
 

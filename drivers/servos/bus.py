@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from drivers.base.bus import BusReport, Floats, ServoInfo, ServoSpec
-from drivers.base.errors import BusError
+from drivers.base.errors import BusError, merge_errors
 from drivers.core.scale import Scale
 from drivers.core.wirebus import WireBus
 from drivers.port.latency import slow_answers
@@ -56,6 +56,10 @@ class ServoBus(WireBus):
     _registers: Registers[Any]
     _telemetry: Telemetry
     policy: Policy
+    _to_switch_off: Sequence[int] | None = None
+    """Servos that a failed start left on; None: all may be on."""
+    _held: Sequence[int] = ()
+    """Servos that held before the newest start."""
 
     # ------------------------------------------------------------------ hooks
 
@@ -128,9 +132,23 @@ class ServoBus(WireBus):
         startup.identify(servos)
         self._tables([self._registers.tables[servo] for servo in self.ids])
         self._identified()
-        started = startup.bring_up(servos)
+        try:
+            started = startup.bring_up(servos)
+        except BaseException:
+            if startup.left_on and not startup.policy.partly:  # none was driven before
+                self._to_switch_off, self._unconfirmed = startup.left_on, True
+            raise
+        self._to_switch_off, self._held, self._unconfirmed = None, started.held, True
         self._say_slow_answers()
         return started
+
+    def _let_go(self) -> None:
+        """Switch off what the newest start switched on; servos that held before it go on, without a watchdog."""
+        self._to_switch_off = [servo for servo in self.ids if servo not in self._held]
+        self._running, self._unconfirmed = False, True
+        with self._losing():
+            self._startup().let_go(self._to_switch_off, self._held)
+        self._unconfirmed = False
 
     def own_settings(self, servo: int) -> OwnSettings:
         """What a servo's own registers say, of one that :meth:`discover` has found. Nothing is written.
@@ -183,13 +201,35 @@ class ServoBus(WireBus):
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that switched off or were rebooted, where they are; ``ids`` None means all of them.
 
-        Raises BusError where one stays off; see the policy of the family's start-up for what is allowed.
+        Servos that hold go on holding. Raises BusError where some stay off, after all others were brought back; see the
+        policy of the family's start-up for what is allowed.
         """
+        failed = self._recover(self.ids if ids is None else ids)
+        if failed:
+            raise merge_errors(failed)
+
+    def _recover(self, ids: Sequence[int]) -> dict[int, BusError]:
+        """As :meth:`recover`; returns why servos stay off, by id."""
+        chosen = [servo for servo in self.servos if servo.id in ids]
+        failed: dict[int, BusError] = {}
         with self._losing():
-            started = self._start_again([servo for servo in self.servos if ids is None or servo.id in ids])
-            for servo, ticks in started.ticks.items():
-                index = self.ids.index(servo)
-                self._drive_again(index, self._radians(index, ticks))
+            while chosen:
+                try:
+                    started = self._start_again(chosen, self._startup(self._for_recovery()))
+                except BusError as error:
+                    named = error.servo_ids or [servo.id for servo in chosen]
+                    failed |= {servo.id: error for servo in chosen if servo.id in named}
+                    chosen = [servo for servo in chosen if servo.id not in failed]
+                    continue
+                for servo, ticks in started.ticks.items():
+                    index = self.ids.index(servo)
+                    self._drive_again(index, self._radians(index, ticks))
+                break
+        return failed
+
+    def _for_recovery(self) -> Policy:
+        """The policy for servos of which some hold, and are not let go for the others."""
+        return replace(self.policy, takeover="adopt", partly=True)
 
     def _start_again(self, chosen: Sequence[ServoSpec], startup: Startup[Any] | None = None) -> Started:
         """Start some servos of a running bus."""
@@ -209,7 +249,8 @@ class ServoBus(WireBus):
         self._telemetry.started(list(started.ticks))
 
     def _switch_off(self) -> None:
-        self._startup().switch_off(self.ids)
+        self._startup().switch_off(self.ids if self._to_switch_off is None else self._to_switch_off)
+        self._to_switch_off = None
 
     def _tables(self, tables: Sequence[ControlTable]) -> None:
         """Use these control tables, in the order of the servos."""

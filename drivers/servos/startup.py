@@ -15,7 +15,16 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Generic
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel, merge_errors
+from drivers.base.errors import (
+    BusError,
+    DriverError,
+    NoReply,
+    PortLost,
+    ServoFault,
+    ServoRefused,
+    WrongModel,
+    merge_errors,
+)
 from drivers.servos.exchange import R
 from drivers.servos.layout import Block
 from drivers.servos.registers import Registers
@@ -56,12 +65,14 @@ class Started:
     ticks : present position by id, read after torque came on.
     limits : lowest and highest step by id that the servo's own registers allow.
     mapped : block that is read through pointers, by id.
+    held : servos that held with torque before, and were not rebooted.
     eeprom : one line for every permanent register written.
     """
 
     ticks: dict[int, int] = field(default_factory=dict)
     limits: dict[int, tuple[int, int]] = field(default_factory=dict)
     mapped: dict[int, Block] = field(default_factory=dict)
+    held: list[int] = field(default_factory=list)
     eeprom: list[str] = field(default_factory=list)
 
 
@@ -69,6 +80,7 @@ class Startup(ABC, Generic[R]):
     """The steps of start-up and stop; a protocol implements the hooks.
 
     started : what was found and done.
+    left_on : servos that a failed start has switched on and that are not confirmed off.
     out_of_turn_hint, not_on_hint, not_off_hint : what a user can do where a position is not within one turn, or a
         motor does not switch on, or off.
     """
@@ -80,6 +92,7 @@ class Startup(ABC, Generic[R]):
     def __init__(self, registers: Registers[R], policy: Policy) -> None:
         self.registers, self.policy = registers, policy
         self.started = Started()
+        self.left_on: list[int] = []
 
     # ------------------------------------------------------------------ hooks
 
@@ -158,32 +171,54 @@ class Startup(ABC, Generic[R]):
     def bring_up(self, servos: Sequence[ServoSpec]) -> Started:
         """Start identified servos where they are.
 
-        Raises BusError where that is not safe; torque was switched off again where it had been switched on, with the
-        policy ``partly`` only of the servos that the error names.
+        Raises BusError where that is not safe. Torque was switched off again where this start had switched it on, with
+        the policy ``partly`` only of the servos that the error names. Servos that held before go on holding, without a
+        watchdog, or with the policy ``partly`` with it.
         """
         ids = [servo.id for servo in servos]
         held = self.take_over(ids)
         self.wait_for_voltage(ids)
         rebooted = self._clear_faults(ids)
+        held = [servo for servo in held if servo not in rebooted]
         for servo in ids:
-            self._write_settings(servo, servo in held and servo not in rebooted)
+            self._write_settings(servo, servo in held)
         low, high = self.registers.get_all(ids, "min_ticks"), self.registers.get_all(ids, "max_ticks")
         self.started.limits = {servo: (low[servo], high[servo]) for servo in low}
-        self._prepare(servos)
+        self.started.held = held
         try:
-            self.torque_on(ids, [servo for servo in held if servo not in rebooted])
-        except BaseException as error:
-            self._back_out(ids, error)
+            self._prepare(servos)
+            self._torque_on_or_back_out(ids, held)
+        except BaseException:
+            if not self.policy.partly:
+                self._leave_holding(held)
             raise
         return self.started
+
+    def _torque_on_or_back_out(self, ids: Sequence[int], held: Sequence[int]) -> None:
+        """Switch torque on; after an error switch off again what was not on before."""
+        self.left_on = [servo for servo in ids if servo not in held]
+        try:
+            self.torque_on(ids, held)
+        except BaseException as error:
+            self._back_out(self.left_on, error)
+            self.left_on = []
+            raise
+        self.left_on = []
+
+    def _leave_holding(self, held: Sequence[int]) -> None:
+        """Leave servos on that held before a start that failed: nobody feeds their watchdogs now."""
+        if held:
+            with suppress(DriverError):  # the first error says more
+                self._disarm(held)
 
     def _back_out(self, ids: Sequence[int], error: BaseException) -> None:
         """Switch off what was switched on before an error."""
         if not self.policy.partly or not isinstance(error, BusError):
             self.switch_off(ids)
             return
+        named = error.servo_ids or ids
         with suppress(NoReply):  # the first error names them too
-            self.switch_off([servo for servo in ids if servo in error.servo_ids] or ids)
+            self.switch_off([servo for servo in ids if servo in named])
 
     def take_over(self, ids: Sequence[int]) -> list[int]:
         """Servos whose torque is on and stays on. Raises ServoRefused: some hold, and that is not allowed."""
@@ -285,6 +320,13 @@ class Startup(ABC, Generic[R]):
         return self.registers.error(ServoFault, message, self.out_of_turn_hint, servo)
 
     # ------------------------------------------------------------------ down
+
+    def let_go(self, ids: Sequence[int], held: Sequence[int]) -> None:
+        """Switch servos off as :meth:`switch_off`, and leave others on, without their watchdogs."""
+        try:
+            self.switch_off(ids)
+        finally:
+            self._leave_holding(held)
 
     def switch_off(self, ids: Sequence[int]) -> None:
         """Switch torque off for every servo that can be reached, each by itself.

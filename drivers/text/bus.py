@@ -19,6 +19,8 @@ from drivers.text.template import NAMES, TEXTS, VALUES, AnswerPattern, check_tex
 
 TIME_MS = (1, 1000)
 """Limits of the time that a line gives the board for its moves."""
+FINE = 6
+"""Decimals of values that are only read, which are not rounded."""
 MISSES = 2
 """Missing answers in a row after which a servo is silent."""
 RETRY_S = 1.0
@@ -58,7 +60,7 @@ class TextBus(PulseBus):
         self._main = next(iter(self._scales))
         answered = [field for field in VALUES if self._answer and field in self._answer.fields]
         self._answered = (*answered, "us")[0]
-        self._read_scale = ValueScale(self.servos, [self._answered] * n, [0] * n)
+        self._read_scale = ValueScale(self.servos, [self._answered] * n, [FINE] * n)
         self._sent = np.full(n, math.nan)
         self._refresh = 0
         self._sent_s = self._retry_s = -math.inf

@@ -95,17 +95,34 @@ def set_id(port: str, baud: int, protocol: int | None, old: int, new: int, *, re
                 message = f"servo {old} on {port} holds with torque, and an id changes only while the motor is off"
                 raise _error(message, "support what it carries, then add --release", port, old)
             _write(registers, old, "Torque Enable", 0)
-        locks = registers.tables[old].lock == "Lock"
-        if locks:
-            _write(registers, old, "Lock", 0)
-        _write(registers, old, "ID", new)
-        changed = _await(registers, new)
+            if registers.get(old, "torque"):
+                message = f"servo {old} on {port} did not switch its motor off"
+                raise _error(message, "try again, or switch its power off and on", port, old)
+        with _unlocked(registers, old, new, info.model):
+            _write(registers, old, "ID", new)
+            changed = _await(registers, new)
         if changed is None or changed.model_number != info.model_number:
             message = f"servo {old} on {port} did not take the id {new}"
             raise _error(message, "`omote scan` lists the servos", port, old)
-        if locks and changed.model.startswith(FEETECH):  # an AX opens only without power
-            _write(registers, new, "Lock", 1)
         return changed
+
+
+@contextmanager
+def _unlocked(registers: Registers[Any], old: int, new: int, model: str) -> Iterator[None]:
+    """Context in which a servo's permanent memory is open; it is closed again under either id on every way out."""
+    table = registers.tables[old]
+    if table.lock != "Lock":
+        yield
+        return
+    try:
+        _write(registers, old, "Lock", 0)
+        yield
+    finally:
+        if model.startswith(FEETECH):  # an AX opens only without power
+            registers.tables.setdefault(new, table)
+            for servo in dict.fromkeys((old, new)):
+                if registers.tables[servo].model == table.model:
+                    _write(registers, servo, "Lock", 1)
 
 
 def _protocol_of(port: str, baud: int, servo: int) -> int:

@@ -111,11 +111,14 @@ def mixes(vertices: Floats, modes: Floats, wanted: Wanted) -> list[Floats]:
     base = measure(vertices[at], wanted.measures)
     per_mode = {n: np.array([measure(d, wanted.measures)[n] for d in modes[:, at]]) for n in base}
     out = []
-    for goals in wanted.identities.values():
+    for name, goals in wanted.identities.items():
         system = np.array([per_mode[n] for n in goals])
         target = np.array([0.01 * percent * base[n] for n, percent in goals.items()])
         mix = np.linalg.lstsq(system, target, rcond=None)[0]
-        mix *= min(1.0, wanted.longest / float(np.linalg.norm(mix)))
+        length = float(np.linalg.norm(mix))
+        if not length:
+            raise FitError(f"identity {name}: the modes change none of {', '.join(goals)}", hint="give other modes")
+        mix *= min(1.0, wanted.longest / length)
         out.append(np.tensordot(mix, modes, axes=1))
     return out
 

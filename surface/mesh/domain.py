@@ -74,7 +74,7 @@ class Domain:
         loops = tuple(_check_loop(loop, i) for i, loop in enumerate(self.loops))
         object.__setattr__(self, "loops", loops)
         object.__setattr__(self, "slits", tuple(self.slits))
-        object.__setattr__(self, "marks", numbers(self.marks, "marks").reshape(-1, 2))
+        object.__setattr__(self, "marks", _check_marks(self.marks))
         parts = [np.hstack([loop, np.roll(loop, -1, axis=0)]) for loop in loops]
         segments = np.concatenate(parts) if parts else np.zeros((0, 4))
         segments.flags.writeable = False
@@ -112,6 +112,18 @@ class Domain:
             area = abs(float((ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]).sum() / 2))
             total += -area if depth % 2 else area
         return total
+
+
+def _check_marks(marks: ArrayLike) -> Floats:
+    """Marks as (k, 2) float64."""
+    points = numbers(marks, "marks")
+    if not points.size:
+        return np.zeros((0, 2))
+    if points.ndim > 2 or points.shape[-1] != 2:
+        raise ValueError(f"marks: shape {points.shape}, expected (k, 2)")
+    if not np.isfinite(points).all():
+        raise ValueError("marks: must be finite")
+    return points.reshape(-1, 2)
 
 
 def _check_loop(loop: ArrayLike, index: int) -> Floats:

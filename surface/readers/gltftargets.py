@@ -56,8 +56,8 @@ def read_expressions(file: Gltf) -> tuple[Expression, ...]:
 def _of_vrm_0(file: Gltf) -> Iterator[Expression]:
     master = _table(_extension(file, "VRM").get("blendShapeMaster"))
     for group in map(_table, _list(master.get("blendShapeGroups"))):
-        preset = str(group.get("presetName", "")).lower()
-        name = str(group.get("name", "")) if preset in ("", "unknown") else preset
+        preset = _text(group.get("presetName")).lower()
+        name = _text(group.get("name")) if preset in ("", "unknown") else preset
         binds = [
             (b.get("mesh"), b.get("index"), _number(b.get("weight")) * PERCENT)
             for b in map(_table, _list(group.get("binds")))
@@ -98,6 +98,10 @@ def _table(value: Any) -> dict[str, Any]:
 
 def _list(value: Any) -> list[Any]:
     return value if isinstance(value, list) else []
+
+
+def _text(value: Any) -> str:
+    return value if isinstance(value, str) else ""
 
 
 def _number(value: Any) -> float:

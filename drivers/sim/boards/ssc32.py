@@ -20,18 +20,22 @@ QUERY_US = 10
 VERSION = b"SSC32-V2.50USB\r"
 MAX_LINE = 2048
 
-_MOVE = re.compile(r"#(\d+)P(\d+)(?:S(\d+))?")
-_ONE = re.compile(r"(QP|STOP)(\d+)")
-_GROUP = re.compile(r"(?:#\d+P\d+(?:S\d+)?)+(?:T(\d+))?")
+_NUMBER = r"\d{1,9}"
+_MOVE = re.compile(rf"#({_NUMBER})P({_NUMBER})(?:S({_NUMBER}))?")
+_ONE = re.compile(rf"(QP|STOP)({_NUMBER})")
+_GROUP = re.compile(rf"(?:#{_NUMBER}P{_NUMBER}(?:S{_NUMBER})?)+(?:T({_NUMBER}))?")
 
 
 class LineReader(BufferingReader):
-    """Cuts a byte stream into lines: CR ends one, spaces, tabs and LF are passed over, case does not count."""
+    """Cuts a byte stream into lines: CR ends one, ESC forgets what has begun of one.
+
+    Spaces, tabs and LF are passed over, case does not count.
+    """
 
     def feed(self, data: bytes) -> list[str]:
         """Lines completed by these bytes, without blanks and in capitals; empty ones are left out."""
-        data = (self._buffer + data).rpartition(b"\x1b")[2]
-        *lines, rest = data.translate(None, b" \t\n").split(b"\r")
+        data = (self._buffer + data).translate(None, b" \t\n")
+        *lines, rest = (line.rpartition(b"\x1b")[2] for line in data.split(b"\r"))
         self._buffer = rest if len(rest) <= MAX_LINE else b""
         return [line.decode("latin-1").upper() for line in lines if line]
 
@@ -79,7 +83,8 @@ class Ssc32(Board):
     def _move(self, line: str, now_s: float) -> bool:
         """A group move: with T all channels arrive together, with S none is faster; False = not understood.
 
-        A move of several channels takes as long as its slowest member, so that they arrive together.
+        A move of several channels takes as long as its slowest member, so that they arrive together; a channel without
+        pulses is where it is told at once.
         """
         group = _GROUP.fullmatch(line)
         if group is None:
@@ -89,7 +94,7 @@ class Ssc32(Board):
             return False
         seconds = int(group[1] or 0) * 1e-3
         for number, pulse, speed in moves:
-            if speed:
+            if speed and pulse and self.channels[number].target:
                 seconds = max(seconds, abs(pulse - self.channels[number].position(now_s)) / speed)
         for number, pulse, _ in moves:
             self.channels[number].go_in(float(pulse), now_s, seconds)

@@ -15,6 +15,9 @@ from drivers.sim.wire.simulator import Servos, Setting, Simulator
 from drivers.text.template import VALUES, Piece, Template, check_texts, pattern_of, pieces_of
 
 MAX_LINE = 4096
+LARGEST = 1e9
+"""A sketch's numbers have 32 bits."""
+MAX_DIGITS = 18
 
 
 class Message(NamedTuple):
@@ -102,15 +105,15 @@ class TextBoard(Board):
     def answer(self, packet: Message, now_s: float) -> list[tuple[int, bytes]]:
         if packet.kind == "frame":
             return []
-        servo = self._servo(packet.values)
-        if packet.kind == "noise" or servo is None:
+        servo, value = self._servo(packet.values), float(packet.values.get(self._value, 0.0))
+        if packet.kind == "noise" or servo is None or not abs(value) <= LARGEST:
             self.refused += 1
         elif packet.kind == "query" and self._answer is not None:
-            value = self.values[servo] or 0.0
             named: dict[str, float | str] = {"ch": servo, "id": servo, "name": self._names[servo]}
-            return [(servo, self._answer.fill({**dict.fromkeys(VALUES, value), **named}).encode())]
+            told = dict.fromkeys(VALUES, self.values[servo] or 0.0)
+            return [(servo, self._answer.fill({**told, **named}).encode())]
         else:
-            self.values[servo] = float(packet.values[self._value]) if packet.kind == "move" else None
+            self.values[servo] = value if packet.kind == "move" else None
         return []
 
     def describe(self, now_s: float) -> list[dict[str, Any]]:
@@ -122,7 +125,9 @@ class TextBoard(Board):
         if "name" in values:
             return self._by_name.get(values["name"])
         number = values.get("ch", values.get("id"))
-        servo = int(number) if number is not None else next(iter(self.values))
+        if number is None:
+            return next(iter(self.values))
+        servo = int(number) if len(number) <= MAX_DIGITS else -1
         return servo if servo in self.values else None
 
 

@@ -30,6 +30,9 @@ def main() -> int:
         _print(f"error {error}")
         return 1
     _print(f"ready {server.port.path}")
+    handle = server.on_line
+    if handle is not None:
+        server.on_line = lambda line: _print(str(handle(line)))
     server.run(_standard_input())
     return 0
 

@@ -60,7 +60,7 @@ class Commands:
                 return f"ok {command(rest, time.monotonic()) or ''}".rstrip()
         except DriverError as error:
             return f"error {error}; {error.hint}"
-        except (KeyError, ValueError, IndexError) as error:
+        except (KeyError, ValueError, IndexError, OverflowError) as error:
             return f"error {line!r}: {error.args[0] if error.args else error}"
 
     def _place(self, words: list[str], now_s: float) -> None:

@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from drivers.base.errors import PortError
 from drivers.sim.serving.control import Commands, ControlSocket, Lines
 from drivers.sim.serving.make_port import make_port
 from drivers.sim.serving.ports import Link
@@ -169,7 +170,16 @@ class PortServer:
             self.port.close()
             self._queue.clear()
         elif not self.port.is_open:
-            self.port.open(fault.alias or self._link)
+            self._open_again(fault.alias)
+
+    def _open_again(self, alias: str | None) -> None:
+        """Open the port, under its old name where the other one cannot be had."""
+        for link in (alias, self._link) if alias else (self._link,):
+            try:
+                self.port.open(link)
+                return
+            except PortError as error:
+                log.warning("the port does not come back: %s", error)
 
 
 def make_server(settings: Mapping[str, Any], line: Line | None = None) -> PortServer:

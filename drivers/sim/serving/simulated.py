@@ -10,10 +10,11 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from typing import Any, Self
 
 from drivers.base.children import command, environment
-from drivers.base.errors import PortError
+from drivers.base.errors import DriverError, PortError
 from drivers.sim.serving.ports import Link
 from drivers.sim.serving.serve import PortServer, make_server
 from drivers.sim.servos.chain import Chain
@@ -23,6 +24,8 @@ from drivers.sim.wire.line import Line
 
 START_S = 20.0
 """A child process that is not ready after this time is given up."""
+ERROR = "error "
+"""How the answer to a command begins that was not carried out."""
 _CHILD = "drivers.sim.serving.child"
 
 
@@ -134,7 +137,7 @@ class SimulatedBus:
         self._server: PortServer | None = None
         self._thread: threading.Thread | None = None
         self._stop: socket.socket | None = None
-        self._done = threading.Event()
+        self._done, self._answer = threading.Event(), ""
 
     @property
     def path(self) -> str:
@@ -170,10 +173,16 @@ class SimulatedBus:
         return ServoView(self.chain, device_id)
 
     def fault(self, *specs: str) -> None:
-        """Set faults now. Raises DriverError: a spec cannot be read; then none is set."""
+        """Set faults now.
+
+        Raises DriverError: a spec cannot be read, or this bus has no such fault; then none is set.
+        """
         for spec in specs:
             parse_fault(spec)
-        self._send(shlex.join(("fault", *specs)))
+        answer = self._send(shlex.join(("fault", *specs)))
+        if answer.startswith(ERROR):
+            message, _, hint = answer.removeprefix(ERROR).partition("; ")
+            raise DriverError(message, hint=hint)
 
     def clear(self, kind: str | None = None) -> None:
         """End the faults of a kind; None: all."""
@@ -201,9 +210,9 @@ class SimulatedBus:
 
     def close(self) -> None:
         """Close the port and end the service; harmless when it has ended."""
-        if self._child:
-            _end_child(self._child)
-            self._child = None
+        child, self._child = self._child, None
+        if child:
+            _end_child(child)
         if self._stop is not None:
             self._stop.close()
         if self._thread is not None:
@@ -216,7 +225,7 @@ class SimulatedBus:
 
         def carry_out(line: str) -> None:
             if handle is not None:
-                handle(line)
+                self._answer = str(handle(line))
             self._done.set()
 
         server.on_line = carry_out
@@ -232,27 +241,29 @@ class SimulatedBus:
             stdout=subprocess.PIPE,
             env=environment(_CHILD),
         )
-        timer = threading.Timer(START_S, child.kill)
-        timer.start()
-        try:
-            words = (child.stdout.readline() if child.stdout else b"").decode().strip().partition(" ")
-        finally:
-            timer.cancel()
+        words = _next_line(child).partition(" ")
         if words[0] != "ready":
             self.close()
             raise PortError(f"the simulated bus did not start: {words[2] or 'its process ended'}")
         self._path = words[2]
 
-    def _send(self, command: str) -> None:
-        """Send a command; a bus in a thread has carried it out when this returns."""
-        line = command.encode() + b"\n"
-        if self._child and self._child.stdin:
-            self._child.stdin.write(line)
-            self._child.stdin.flush()
-        elif self._stop is not None:
-            self._done.clear()
-            self._stop.sendall(line)
-            self._done.wait(START_S)
+    def _send(self, command: str) -> str:
+        """Carry out a command; returns its answer. Raises PortError: the bus has ended."""
+        line, answer = command.encode() + b"\n", ""
+        with suppress(OSError):  # it has ended: there is no answer
+            if self._child and self._child.stdin:
+                self._child.stdin.write(line)
+                self._child.stdin.flush()
+                answer = _next_line(self._child)
+            elif self._stop is not None:
+                self._done.clear()
+                self._stop.sendall(line)
+                answer = self._answer if self._done.wait(START_S) else ""
+            else:
+                return ""
+        if not answer:
+            raise PortError(f"the simulated bus on {self._path} has ended", hint="start it again", port=self._path)
+        return answer
 
 
 def _serve(server: PortServer, reading: socket.socket) -> None:
@@ -260,10 +271,21 @@ def _serve(server: PortServer, reading: socket.socket) -> None:
         server.run(reading)
 
 
+def _next_line(child: subprocess.Popen[bytes]) -> str:
+    """What the child says next, without its end; empty where it ends, and it is killed where it takes too long."""
+    timer = threading.Timer(START_S, child.kill)
+    timer.start()
+    try:
+        return (child.stdout.readline() if child.stdout else b"").decode().strip()
+    finally:
+        timer.cancel()
+
+
 def _end_child(child: subprocess.Popen[bytes]) -> None:
     """End the child by the end of its standard input, or kill it."""
     if child.stdin:
-        child.stdin.close()
+        with suppress(OSError):  # it has ended already
+            child.stdin.close()
     try:
         child.wait(timeout=2.0)
     except subprocess.TimeoutExpired:

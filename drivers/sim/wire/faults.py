@@ -27,6 +27,9 @@ from typing import Any, NamedTuple
 
 from drivers.base.errors import DriverError
 
+LONGEST = 1e9
+"""No time and no number of steps is larger."""
+
 
 class Kind(NamedTuple):
     """One kind of fault.
@@ -51,9 +54,27 @@ def _integer(text: str) -> int:
     return int(text, 0)
 
 
+Read = Callable[[str], Any]
+
+
+def _within(read: Read, low: float, high: float) -> Read:
+    """A reader of values that refuses those outside of a range, and what is no number."""
+
+    def checked(text: str) -> Any:
+        value = read(text)
+        if not low <= value <= high:
+            raise ValueError(f"{low:g} to {high:g}")
+        return value
+
+    return checked
+
+
+_duration = _within(_seconds, 0.0, LONGEST)
+
+
 def _span(text: str) -> tuple[float, float]:
     low, high = (float(end) for end in text.split(".."))
-    if not low < high:
+    if not -LONGEST < low < high < LONGEST:
         raise ValueError("LOW..HIGH, the lower end first")
     return low, high
 
@@ -68,27 +89,27 @@ def _share(text: str) -> float:
 KINDS: dict[str, Kind] = {
     "mute": Kind("servo"),  # neither receives nor answers (loose cable)
     "silent": Kind("reply"),  # receives and executes instructions, but its answers are lost
-    "late": Kind("reply", _seconds, 0.045),  # answers late by the value
+    "late": Kind("reply", _duration, 0.045),  # answers late by the value
     "drop": Kind("reply"),  # loses a reply (use every= or p=)
     "crc": Kind("reply"),  # answers with a wrong CRC
     "flip": Kind("reply"),  # one bit of the answer is flipped
-    "short": Kind("reply", _integer, 1),  # answers with only so many data bytes
-    "wrongid": Kind("reply", _integer),  # answers under this id
-    "noise": Kind("reply", _integer, 5),  # so many random bytes before the answer
+    "short": Kind("reply", _within(_integer, 0, 65_535), 1),  # answers with only so many data bytes
+    "wrongid": Kind("reply", _within(_integer, 0, 252)),  # answers under this id
+    "noise": Kind("reply", _within(_integer, 0, 65_535), 5),  # so many random bytes before the answer
     "alert": Kind("servo"),  # alert bit set, data valid, no hardware error
-    "hw": Kind("servo", _integer, 0x20),  # latches these hardware error bits
-    "volts": Kind("servo", float),  # supply at so many volts
-    "temp": Kind("servo", float),  # motor at so many degrees Celsius
+    "hw": Kind("servo", _within(_integer, 0, 0xFF), 0x20),  # latches these hardware error bits
+    "volts": Kind("servo", _within(float, 0.0, 1000.0)),  # supply at so many volts
+    "temp": Kind("servo", _within(float, -1000.0, 1000.0)),  # motor at so many degrees Celsius
     "stops": Kind("servo", _span),  # mechanical stops of the shaft, LOW..HIGH in steps
     "weight": Kind("servo", _share, 0.1),  # torque on the shaft towards lower steps, as a share of the stall torque
     "stall": Kind("servo"),  # shaft stuck where it is
     "watchdog-ignored": Kind("servo"),  # keeps turning when its bus watchdog trips
     "dup": Kind("servo"),  # a second servo has the same id; their replies collide
-    "baud": Kind("servo", _integer),  # listens at so many bits per second
-    "eeprom-busy": Kind("servo", _seconds, 0.02),  # receives nothing for this time after each permanent write
+    "baud": Kind("servo", _within(_integer, 1, LONGEST)),  # listens at so many bits per second
+    "eeprom-busy": Kind("servo", _duration, 0.02),  # receives nothing for this time after each permanent write
     "echo": Kind("bus"),  # the adapter echoes every byte it was sent
     "chain-stop": Kind("bus"),  # no servo after a silent one answers
-    "slow-reader": Kind("bus", _seconds, 0.2),  # replies reach the host in bursts, one every so long
+    "slow-reader": Kind("bus", _duration, 0.2),  # replies reach the host in bursts, one every so long
     "unplug": Kind("bus"),  # the port disappears; for= restores it, as=PATH under another name
 }
 
@@ -116,9 +137,9 @@ class Fault:
 _OPTIONS: dict[str, tuple[str, Callable[[str], Any]]] = {
     "every": ("every", int),
     "p": ("chance", float),
-    "count": ("count", int),
+    "count": ("count", _within(int, 0, LONGEST)),
     "at": ("at_s", _seconds),
-    "for": ("for_s", _seconds),
+    "for": ("for_s", _duration),
     "as": ("alias", str),
 }
 """Attribute of `Fault` and type of each key."""
@@ -188,7 +209,7 @@ def _with_option(fault: Fault, part: str) -> Fault:
     attribute, read = _OPTIONS[key]
     changes: dict[str, Any] = {attribute: _convert(fault.spec, read, text, key)}
     fault = replace(fault, **changes)
-    if fault.every < 1 or not 0.0 <= fault.chance <= 1.0 or fault.at_s < 0.0:
+    if fault.every < 1 or not 0.0 <= fault.chance <= 1.0 or not 0.0 <= fault.at_s <= LONGEST:
         raise _bad(fault.spec, f"{part!r} is out of range")
     return fault
 

@@ -70,7 +70,7 @@ def boundary_loops(island: Island) -> list[Ints]:
     """
     a, b = directed_edges(island.faces)
     n = len(island.uv)
-    open_edge = ~np.isin(a * n + b, b * n + a)
+    open_edge = _uncancelled(a * n + b, b * n + a)
     following: dict[int, list[int]] = {}
     for i, j in zip(a[open_edge].tolist(), b[open_edge].tolist(), strict=True):
         following.setdefault(i, []).append(j)
@@ -78,6 +78,23 @@ def boundary_loops(island: Island) -> list[Ints]:
     while following:
         loops.append(np.array(_walk(following), np.int64))
     return sorted(loops, key=lambda loop: -_length(island.uv[loop]))
+
+
+def _uncancelled(edges: Ints, reverse: Ints) -> Bools:
+    """(m,) which edges are left where each that runs the other way cancels one.
+
+    As many then lead to a point as from it, also where more than two faces meet at an edge. ``reverse`` has the key of
+    each edge run the other way.
+    """
+    order = np.argsort(edges, kind="stable")
+    ranked = edges[order]
+    rank = np.arange(len(ranked)) - np.searchsorted(ranked, ranked)
+    backward = np.sort(reverse)
+    against = np.searchsorted(backward, ranked, "right") - np.searchsorted(backward, ranked)
+    count = np.searchsorted(ranked, ranked, "right") - np.searchsorted(ranked, ranked)
+    left = np.empty(len(edges), bool)
+    left[order] = rank < count - against
+    return left
 
 
 def _walk(following: dict[int, list[int]]) -> list[int]:

@@ -129,6 +129,9 @@ def _read(path: Path, shapes: Path | None) -> MeshData:
 
 def wanted_faces(mesh: FitMesh | MeshData, words: tuple[str, ...], where: str) -> Bools:
     """(f,) which faces belong to no object whose name holds one of the words. Raises FitError: none holds a word."""
+    if words and not mesh.pieces:
+        message = f"--without {words[0]}: {where} has no named objects or materials"
+        raise FitError(message, hint="leave the option out, or name the parts of the mesh before it is exported")
     out = np.zeros(len(mesh.pieces), bool)
     for word in words:
         hit = [word.lower() in name.lower() for name in mesh.pieces]

@@ -127,8 +127,9 @@ def draw_calls(
         rows = [{key: data[p.kept] for key, data in static(p.part).items()} for p in parts]
         joined = {key: np.concatenate([each[key] for each in rows]) for key in rows[0]}
         buffers = PartBuffers(ctx, JoinedParts(decimated, parts), programs[name], joined)
-        first = 0
+        first, owner = 0, True
         for _, alike in groupby(parts, lambda p: materials.uniforms_key(p.part)):
-            calls.append(DrawCall(buffers, list(alike), first, owner=first == 0))
+            calls.append(DrawCall(buffers, list(alike), first, owner=owner))
+            owner = False  # the first may have no triangles: clothes hide them
             first += len(calls[-1].triangles)
     return calls

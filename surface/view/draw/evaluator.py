@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from surface.head.posing.part import Turn
 
 EVALUATORS = ("auto", "cpu", "gpu")
+ENTRIES = 64
+"""Weights that a vertex usually has at most."""
 _IDENTITY = np.eye(3)
 
 
@@ -151,7 +153,7 @@ def why_not_gpu(info: Mapping[str, Any], head: ViewHead) -> str | None:
         return f"{type(head).__name__} has no control points"
     if info["GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS"] < SAMPLERS:
         return "vertex shaders here read no textures"
-    most = max((len(part.vertices) for part in head.parts), default=0) * 64 // WIDTH
+    most = -(-sum(len(part.vertices) for part in head.parts) * ENTRIES // WIDTH)
     if info["GL_MAX_TEXTURE_SIZE"] < max(WIDTH, most):
         return f"textures of {info['GL_MAX_TEXTURE_SIZE']} texels are too small for the weights"
     return None

@@ -5,17 +5,24 @@ from __future__ import annotations
 import subprocess
 import tempfile
 from collections.abc import Iterable, Iterator
-from itertools import chain
+from contextlib import suppress
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from PIL.Image import Image
 
 from surface.base import ffmpeg
 from surface.base.errors import ViewError
 from surface.view.pictures.imagefile import as_image, replacing
 
 SUFFIXES = (".webp", ".gif", ".mp4")
+_FPS = 0.01, 1000.0
+_TICK_MS = {".webp": 1, ".gif": 10}
+"""Unit of the time for which a frame is shown."""
+_LEAST_TICKS = {".webp": 1, ".gif": 2}
+"""Browsers show a GIF frame of less than 20 ms for 100 ms."""
 _WEBP_QUALITY = 80
 _MESSAGE_BYTES = 400  # of ffmpeg's output, its end
 
@@ -24,9 +31,10 @@ def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 2
     """Write frames as a clip; the suffix chooses the format (.webp, .gif, .mp4).
 
     frames : (height, width, 3) uint8 each, all of one size; taken one by one.
-    fps : frames per second. sound : file whose sound the clip has (.mp4), from its beginning, cut or silent at the end.
+    fps : frames per second, 0.01 to 1000; a GIF shows 50 at most and leaves out what is more.
+    sound : file whose sound the clip has (.mp4), from its beginning, cut or silent at the end.
 
-    Returns how many frames were written.
+    Returns how many frames were given.
 
     Raises ViewError: unknown suffix, no frames, no ffmpeg for .mp4, a sound that cannot be read or that
     the format has no room for, or the file cannot be written.
@@ -38,8 +46,9 @@ def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 2
             f"cannot write {path.name}: {path.suffix or 'no suffix'} is no clip format",
             hint=f"end the name with one of {', '.join(SUFFIXES)}",
         )
-    if not fps > 0:
-        raise ViewError(f"a clip cannot run at {fps} frames per second", hint="give a rate above 0")
+    if not _FPS[0] <= fps <= _FPS[1]:
+        message = f"a clip cannot run at {fps} frames per second"
+        raise ViewError(message, hint=f"give a rate of {_FPS[0]:g} to {_FPS[1]:g}")
     if sound is not None and suffix != ".mp4":
         raise ViewError(f"{path.name}: a {suffix} has no sound", hint="end the name with .mp4, or leave out the sound")
     counted = _CheckedFrames(frames)
@@ -72,11 +81,32 @@ class _CheckedFrames:
 
 def _write_pillow(path: Path, frames: _CheckedFrames, fps: float) -> None:
     """WebP or GIF, by the path's suffix."""
-    images = (as_image(frame) for frame in frames)
-    options: dict[str, Any] = {"loop": 0, "duration": max(1, round(1000.0 / fps))}
-    if path.suffix.lower() == ".webp":
+    suffix, durations = path.suffix.lower(), list[int]()
+    images = _timed(frames, _shown(fps, _TICK_MS[suffix], _LEAST_TICKS[suffix]), durations)
+    options: dict[str, Any] = {"loop": 0, "duration": durations}  # which grows as Pillow takes the frames
+    if suffix == ".webp":
         options |= {"quality": _WEBP_QUALITY, "method": 2, "minimize_size": False}
     next(images).save(path, save_all=True, append_images=images, **options)
+
+
+def _timed(frames: Iterable[np.ndarray], shown: Iterator[tuple[int, int]], durations: list[int]) -> Iterator[Image]:
+    """The frames that are shown, after their duration was added to ``durations``."""
+    wanted, duration_ms = next(shown)
+    for index, frame in enumerate(frames):
+        if index == wanted:
+            durations.append(duration_ms)
+            yield as_image(frame)
+            wanted, duration_ms = next(shown)
+
+
+def _shown(fps: float, tick_ms: int, least: int) -> Iterator[tuple[int, int]]:
+    """(index, duration in ms) of every frame that is shown: none for less than some ticks, and all keep the rate."""
+    begin, index = 0, 0
+    for other in count(1):
+        end = round(1000.0 * other / fps / tick_ms)
+        if end - begin >= least:
+            yield index, (end - begin) * tick_ms
+            begin, index = end, other
 
 
 def _write_mp4(path: Path, frames: _CheckedFrames, fps: float, sound: Path | None) -> None:
@@ -115,8 +145,9 @@ def _run(command: list[str], pieces: Iterable[bytes] = (), *, hint: str) -> None
                 for piece in pieces:
                     process.stdin.write(piece)
                 process.stdin.close()
-            except BrokenPipeError:
-                pass  # ffmpeg has ended: its exit status is checked below
+            except BrokenPipeError:  # ffmpeg has ended: its exit status is checked below
+                with suppress(BrokenPipeError):  # of what is still in the buffer
+                    process.stdin.close()
         if process.returncode != 0:
             log.seek(0)
             message = log.read()[-_MESSAGE_BYTES:].decode(errors="replace").strip()

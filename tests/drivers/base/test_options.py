@@ -17,7 +17,26 @@ def test_ids_are_numbers_and_ranges() -> None:
     assert parse_ids("252,5-5") == [252, 5]
 
 
-@pytest.mark.parametrize("text", ["", "x", "1-x", "-1", "1-", "1,,2", "²", "1-253", "999999999", "1,1", "2-1", "1.5"])
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "x",
+        "1-x",
+        "-1",
+        "1-",
+        "1,,2",
+        "²",
+        "1-253",
+        "999999999",
+        "1,1",
+        "2-1",
+        "1,5-3",
+        "1.5",
+        "9" * 5000,
+        "0-" + "9" * 5000,
+    ],
+)
 def test_what_is_no_list_of_ids_is_told(text: str) -> None:
     with pytest.raises(DriverError, match="--ids") as caught:
         parse_ids(text)
@@ -81,3 +100,9 @@ class Plain:
 def test_options_that_cannot_be_read_are_told(options: Any, reserved: tuple[str, ...], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         check_options(options, reserved)
+
+
+def test_a_range_that_runs_backwards_is_named() -> None:
+    with pytest.raises(DriverError, match="'5-3' runs backwards"):
+        parse_ids("1,5-3")
+    assert parse_ids("0" * 5000 + "7") == [7]

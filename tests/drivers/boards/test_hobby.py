@@ -53,6 +53,20 @@ def test_there_and_back_is_the_same_and_steps_stay_inside(angle: float, model: s
         assert servo.min_rad - 1e-12 <= sent <= servo.max_rad + 1e-12
 
 
+def test_limits_between_two_steps_of_the_wire_are_refused() -> None:
+    """Any goal would pass one of them: 10 or 11 degrees, where 10.2 to 10.8 are allowed."""
+    narrow = spec(low=math.radians(10.2), high=math.radians(10.8))
+    with pytest.raises(DriverError, match=r"'jaw' \(id 3\): no value on the wire lies inside its limits, 10.2 to 10.8"):
+        ValueScale([narrow], ["deg"], [0])
+    assert ValueScale([narrow], ["deg"], [1]).values(np.zeros(1)) == pytest.approx(10.2)
+    whole = spec(low=math.radians(10), high=math.radians(10.8))
+    assert ValueScale([whole], ["deg"], [0]).values(np.ones(1)) == pytest.approx(10)
+    between = spec(low=math.radians(45.01), high=math.radians(45.02))  # 2000.11 to 2000.22 us
+    with pytest.raises(DriverError, match=r"no step of 0\.25 us lies inside"):
+        PulseScale([between]).check_steps([between], 4)
+    PulseScale([between]).check_steps([between], 5)
+
+
 def test_no_pulse_is_no_angle() -> None:
     assert np.isnan(PulseScale([spec()]).radians(np.zeros(1))).all()
 

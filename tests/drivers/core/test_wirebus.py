@@ -284,3 +284,19 @@ def test_a_wrong_position_that_is_read_twice_becomes_no_goal(monkeypatch: pytest
         center, rad = wire.chain.servo(1).table.center, wire.chain.servo(1).table.rad_per_tick
         assert min(goals) > center + 0.2 / rad, "it was sent to a position that it never had"
         assert bus.driven.all()
+
+
+def test_a_port_that_goes_away_while_it_is_opened_is_not_left_open(
+    board: VirtualBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(data: bytes) -> None:
+        raise PortLost("it went away")
+
+    bus = board.bus()
+    monkeypatch.setattr(board.link, "write", gone)  # a Maestro is sent a byte by which it finds the rate
+    with pytest.raises(PortLost):
+        bus.open()
+    assert not bus.is_open
+    monkeypatch.undo()
+    with bus:
+        bus.start()

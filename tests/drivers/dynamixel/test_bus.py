@@ -18,10 +18,12 @@ import pytest
 from drivers import open_bus
 from drivers.base.bus import Bus
 from drivers.base.errors import NoReply, PortBusy, PortLost, PortMissing, ServoFault
+from drivers.packets.packet import ErrorNumber, encode_status
 from drivers.sim.serving.virtual import VirtualBus
 from drivers.testing import ServoBus
 from tests.drivers.contract import SERVOS, BusContract, read_until, settle
 from tests.drivers.programs import RAISE, program
+from tests.drivers.wire import Wire
 
 CALM = {"margin_s": 0.5, "watchdog_ms": 0}
 IDS = [servo.id for servo in SERVOS]
@@ -252,6 +254,19 @@ def test_a_tripped_watchdog_is_cleared_without_a_jump(wire: ServoBus) -> None:
         settle(bus, [0.2, 0.2, 0.2])
 
 
+def test_a_watchdog_is_armed_again_where_the_servo_stands_outside_its_own_limits(wire: ServoBus) -> None:
+    """As a head that was placed by hand a few steps beyond them; a servo refuses goals outside of its limits."""
+    wire.servo(2).put("Min Position Limit", 2000)
+    wire.servo(2).place(1995)
+    wire.fault("stall:2")
+    with open_bus("dynamixel", SERVOS, port=wire.port, margin_s=0.5, watchdog_ms=2000) as bus:
+        bus.start()
+        wire.servo(2).put("Bus Watchdog", 255)
+        read_until(bus, lambda state: "watchdog" in bus.report().errors and not bus._telemetry.tripped)
+        assert wire.servo(2).register("Bus Watchdog") == 100
+        assert wire.servo(2).goal == 2000
+
+
 def test_a_watchdog_that_trips_unseen_is_found_in_turn(wire: ServoBus) -> None:
     with open_bus("dynamixel", SERVOS, port=wire.port, margin_s=0.5, watchdog_ms=2000) as bus:
         bus.start()
@@ -310,3 +325,18 @@ def test_everybody_is_found_when_nobody_is_named(bus: Bus) -> None:
     assert [(info.id, info.model, info.firmware > 40) for info in bus.discover()] == [
         (i, "xl330-m288", True) for i in IDS
     ]
+
+
+def test_a_servo_that_answers_only_with_an_error_is_passed_over() -> None:
+    with Wire(lambda packet: [encode_status(packet.id, ErrorNumber.RESULT_FAIL)]) as far:
+        bus = open_bus("dynamixel", SERVOS, port=far.path, margin_s=0.5)
+        bus.open()
+        assert bus.discover([1]) == []
+        bus.close()
+
+
+def test_an_absent_id_that_is_not_configured_owes_no_answer() -> None:
+    wire = VirtualBus(SERVOS)
+    with wire.bus(**CALM) as bus:
+        assert [info.id for info in bus.discover([1, 9])] == [1]
+        assert bus._port.suspects == set()

@@ -76,6 +76,38 @@ def test_a_dead_servo_of_one_half_leaves_no_other_on(wire: VirtualBus, number: i
     assert torques(wire) == [servo.id == number for servo in SERVOS]
 
 
+def test_servos_that_held_go_on_holding_where_one_of_the_other_half_cannot_start(
+    wire: VirtualBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with make(wire) as first:
+        first.start()  # permanent settings are right from now on
+    for number in (5, 4):
+        wire.servo(number).put("Goal Position", wire.servo(number).position_ticks)
+        wire.servo(number).put("Torque Enable", 1)
+    with make(wire, watchdog_ms=200) as bus:
+        registers = bus._old._registers
+        original = registers.get_all
+        far = {3: 50_000}
+        monkeypatch.setattr(
+            registers, "get_all", lambda ids, name: original(ids, name) | (far if name == "position" else {})
+        )
+        with pytest.raises(ServoFault, match="reads position 50000"):
+            bus.start()
+    assert torques(wire) == [True, False, False, True]
+    assert wire.servo(5).register("Bus Watchdog") == 0
+
+
+def test_halves_that_are_not_confirmed_off_are_switched_off_when_the_bus_is_closed(wire: VirtualBus) -> None:
+    with make(wire, margin_s=0.05) as bus:
+        bus.start()
+        wire.fault("mute:3", "mute:1")
+        with pytest.raises(NoReply) as caught:
+            bus.stop()
+        assert set(caught.value.servo_ids) == {1, 3}
+        wire.clear()
+    assert not any(torques(wire))
+
+
 def test_counters_are_those_of_both_halves(wire: VirtualBus, bus: Bus) -> None:
     wire.fault("mute:3", "mute:1")
     read_until(bus, lambda state: int(state.silent.sum()) == 2)

@@ -214,6 +214,30 @@ def test_a_latched_error_needs_leave_to_reboot(wire: VirtualBus) -> None:
         settle(bus, [0.1, 0.1, 0.1])
 
 
+def test_a_rebooted_servo_is_awaited_also_where_no_time_is_granted_beyond_the_wires(
+    wire: VirtualBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for servo in IDS:
+        wire.servo(servo).put("Return Delay Time", 0)
+    wire.servo(2).latch(0x20)
+    with bus_on(wire, reboot_faulted=True) as bus:
+        registers, port = bus._registers, bus._port
+        reboot, put_all = registers.packets.reboot, registers.put_all
+
+        def without_margin(*given: object) -> None:
+            reboot(*given)
+            port.margin_s = 0.0
+
+        def with_margin(*given: object) -> None:
+            port.margin_s = 1.0
+            put_all(*given)
+
+        monkeypatch.setattr(registers.packets, "reboot", without_margin)
+        monkeypatch.setattr(registers, "put_all", with_margin)
+        bus.start()
+        assert torques(wire) == [True] * 3
+
+
 def test_a_voltage_error_that_leaves_torque_alone_is_no_reason_to_reboot(wire: VirtualBus) -> None:
     wire.servo(2).put("Shutdown", 52)
     wire.servo(2).latch(0x01)

@@ -255,12 +255,56 @@ def test_a_channel_that_goes_on_with_its_pulses_is_not_off() -> None:
     rig = board(SERVO, replace(SERVO, id=6, name="brow"))
     with rig.bus() as bus:
         bus.start()
+        go = rig.line.channels[6].go
         rig.line.channels[6].go = lambda *given: None  # it takes no target any more
         with pytest.raises(NoReply, match=r"not confirmed off on virtual: 6 \(brow\)") as caught:
             bus.stop()
         assert caught.value.servo_ids == (6,)
         assert not bus.running
-    assert rig.line.describe(rig.clock())[5]["pulse_us"] == 0
+        assert [row["pulse_us"] for row in rig.line.describe(rig.clock())[5:7]] == [0, 1500]
+        rig.line.channels[6].go = go
+    assert [row["pulse_us"] for row in rig.line.describe(rig.clock())[5:7]] == [0, 0]
+
+
+def test_a_board_whose_answers_are_lost_in_the_start_is_switched_off_as_soon_as_it_answers() -> None:
+    rig = VirtualBus([SERVO], "maestro", driver=QUICK | {"stagger_s": 0.3}, baud=115_200)
+    rig.fault("silent:*:at=0.2s")
+    with pytest.raises(NoReply, match=r"not confirmed off on virtual: 5 \(jaw\)"), rig.bus() as bus:
+        bus.start()
+    assert rig.line.describe(rig.clock())[5]["pulse_us"] == 0, "it hears, and was told"
+    rig.clear()
+    bus.open()
+    assert bus.may_be_on
+    bus.stop()
+    assert not bus.may_be_on
+    bus.close()
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_a_start_needs_to_know_whether_the_board_has_errors(number: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The board forgets its errors as it reports them; an answer that is lost may have had one."""
+    rig = VirtualBus([SERVO, replace(SERVO, id=4, name="brow")], "maestro", driver=QUICK, baud=115_200,
+                     options={"board": "micro"})  # fmt: skip
+    with rig.bus() as bus:
+        checked, request = bus._checked, bus._request
+
+        def check(start: object) -> object:
+            seen = iter(range(9))
+
+            def lose(*given: object) -> object:
+                answer = request(*given)
+                return None if next(seen) == number else answer
+
+            monkeypatch.setattr(bus, "_request", lose)
+            try:
+                return checked(start)
+            finally:
+                monkeypatch.setattr(bus, "_request", request)
+
+        monkeypatch.setattr(bus, "_checked", check)
+        with pytest.raises((NoReply, ServoRefused), match=r"whether it has errors|reports protocol"):
+            bus.start()
+    assert [row["pulse_us"] for row in rig.line.describe(rig.clock())] == [0] * 6
 
 
 def test_after_a_pulse_that_cannot_be_the_board_is_asked_for_its_state_alone_first() -> None:

@@ -15,6 +15,7 @@ from drivers.base.bus import Bus
 from drivers.packets import packet1 as v1
 from drivers.port.serialport import SerialPort
 from drivers.protocol1 import bus as module
+from drivers.servos.exchange import Exchange
 from drivers.sim.serving.virtual import VirtualBus
 from drivers.testing import ServoBus
 from tests.drivers import contract
@@ -231,3 +232,14 @@ def test_six_servos_that_must_be_read_one_by_one_are_read_a_cycle() -> None:
     with VirtualBus(servos, "dynamixel").bus(**CALM) as bus:
         bus.start()
         assert [int(bus.read().fresh.sum()) for _ in range(4)] == [6] * 4
+
+
+@pytest.mark.parametrize(("family", "model"), [("dynamixel", "ax-12a"), ("feetech", "sts3215")])
+def test_a_servo_that_answers_only_with_an_error_is_passed_over(
+    family: str, model: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    servos = [replace(servo, model=model) for servo in contract.SERVOS]
+    with VirtualBus(servos, family).bus() as bus:
+        refusal = Exchange({1: v1.Packet1(1, v1.Error1.INSTRUCTION, b"")}, (), False)
+        monkeypatch.setattr(type(bus._registers.packets), "hello", lambda self, port, servo: refusal)
+        assert bus.discover([1]) == []

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import Bus
-from drivers.base.errors import NoReply, PortLost
+from drivers.base.errors import NoReply, PortLost, ServoFault
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import SERVOS, read_until, settle
 
@@ -73,6 +73,39 @@ def test_what_does_not_answer_cannot_be_recovered(wire: VirtualBus, bus: Bus) ->
     with pytest.raises(NoReply) as caught:
         bus.recover()
     assert caught.value.servo_ids == (7,)
+
+
+def test_one_that_cannot_be_recovered_leaves_the_others_holding(
+    wire: VirtualBus, bus: Bus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wire.servo(1).put("Torque Enable", 0)
+    wire.servo(2).put("Torque Enable", 0)
+    original = bus._registers.get_all
+
+    def far(ids: list[int], name: str) -> dict[int, int]:
+        return original(ids, name) | ({2: 50_000} if name == "position" and 2 in ids else {})
+
+    monkeypatch.setattr(bus._registers, "get_all", far)
+    off: list[bool] = []
+    wire.link.tap = lambda sent, data: off.append(not wire.servo(7).torque)
+    with pytest.raises(ServoFault, match="reads position 50000") as caught:
+        bus.recover()
+    wire.link.tap = None
+    assert caught.value.servo_ids == (2,)
+    assert [wire.servo(servo.id).torque for servo in SERVOS] == [True, False, True]
+    assert not any(off)
+    assert bus.running
+    monkeypatch.undo()
+    bus.recover()
+    assert [wire.servo(servo.id).torque for servo in SERVOS] == [True] * 3
+
+
+def test_all_that_cannot_be_recovered_are_named(wire: VirtualBus, bus: Bus) -> None:
+    wire.fault("mute:7", "mute:1")
+    with pytest.raises(NoReply) as caught:
+        bus.recover()
+    assert caught.value.servo_ids == (1, 7)
+    assert wire.servo(2).torque
 
 
 def test_permanent_writes_are_reported_once(wire: VirtualBus) -> None:

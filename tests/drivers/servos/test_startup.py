@@ -179,7 +179,67 @@ def test_stop_names_who_is_not_confirmed_off_after_all_others_are_off(wire: Virt
     assert caught.value.servo_ids == (2,)
     assert torques(wire) == [False, True, False]
     assert caught.value.hint
+    with pytest.raises(NoReply, match='not confirmed off on virtual: "brow"'):
+        bus.close()
+    assert not bus.is_open
     bus.close()
+
+
+def test_closing_switches_off_again_what_was_not_confirmed_off(wire: VirtualBus) -> None:
+    with wire.bus() as bus:
+        bus.start()
+        wire.fault("mute:2")
+        with pytest.raises(NoReply):
+            bus.stop()
+        assert (bus.running, bus.may_be_on) == (False, True)
+        wire.clear()
+    assert torques(wire) == [False] * 3
+    assert not bus.may_be_on
+
+
+def test_a_servo_that_held_goes_on_holding_where_another_cannot_start(
+    wire: VirtualBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with wire.bus() as first:
+        first.start()  # permanent settings are right from now on
+    hold(wire)
+    wire.servo(2).put("Torque Enable", 0)
+    with wire.bus(watchdog_ms=200) as bus:
+        original = bus._registers.get_all
+
+        def far(ids: list[int], name: str) -> dict[int, int]:
+            return original(ids, name) | ({2: 50_000} if name == "position" else {})
+
+        monkeypatch.setattr(bus._registers, "get_all", far)
+        with pytest.raises(ServoFault, match="reads position 50000"):
+            bus.start()
+        assert torques(wire) == [True, False, True]
+    assert torques(wire) == [True, False, True], "also after the bus was closed"
+    wire.clock.sleep(1.0)
+    if "Bus Watchdog" in load_table(wire.servos[0].model):
+        assert [wire.servo(servo).register("Bus Watchdog") for servo in IDS] == [0] * 3
+
+
+def test_a_start_that_fails_and_cannot_switch_off_again_is_switched_off_later(
+    wire: VirtualBus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bus = wire.bus()
+    bus.open()
+    original = bus._registers.put_all
+
+    def on(values: dict[int, int], name: str) -> None:
+        original(values, name)
+        if name == "torque" and set(values.values()) == {1}:
+            wire.fault("mute:*")
+
+    monkeypatch.setattr(bus._registers, "put_all", on)
+    with pytest.raises(NoReply, match="not confirmed off"):
+        bus.start()
+    assert torques(wire) == [True] * 3
+    assert (bus.running, bus.may_be_on) == (False, True)
+    wire.clear()
+    bus.close()
+    assert torques(wire) == [False] * 3
 
 
 def test_stop_tries_again_where_replies_are_lost(wire: VirtualBus) -> None:

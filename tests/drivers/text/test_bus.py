@@ -36,6 +36,14 @@ def quiet(bus: Bus, rig: VirtualBus, target: list[float]) -> None:
         rig.clock.sleep(0.02)
 
 
+def test_what_is_only_read_needs_no_step_inside_the_limits() -> None:
+    narrow = (ServoSpec(1, "s1", "rc-180", math.radians(10.2), math.radians(10.8), 500.0, 5000.0),)
+    texts = {"template": "S{ch},{deg:.2f}\n", "query": "?{ch}\n", "answer": "{ch}={deg}\n"}
+    assert open_bus("text", narrow, port="", **texts)
+    with pytest.raises(DriverError, match="no value on the wire lies inside its limits"):
+        open_bus("text", narrow, port="", **texts | {"template": "S{ch},{deg:d}\n"})
+
+
 @pytest.mark.parametrize(
     ("template", "line"),
     [

@@ -38,6 +38,38 @@ def test_feetech_memory_is_closed_again() -> None:
         assert (servo.register("ID"), servo.register("Lock")) == (2, 1)
 
 
+def test_feetech_memory_is_closed_again_where_the_id_was_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    with SimulatedBus([1], model="sts3215") as bus:
+        bus.servo(1).put("Lock", 1)
+        write = module._write
+
+        def ignore_id(registers: object, servo: int, name: str, value: int) -> None:
+            if name != "ID":
+                write(registers, servo, name, value)
+
+        monkeypatch.setattr(module, "_write", ignore_id)
+        monkeypatch.setattr(module, "SETTLE_S", 0.1)
+        with pytest.raises(ServoRefused, match="did not take the id 2"):
+            set_id(bus.path, 1_000_000, 1, 1, 2)
+        assert bus.servo(1).register("Lock") == 1
+
+
+def test_an_id_stays_where_the_motor_does_not_switch_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    with SimulatedBus([1], model="sts3215") as bus:
+        _switch_on(bus, "sts3215")
+        write, names = module._write, []
+
+        def ignore_torque(registers: object, servo: int, name: str, value: int) -> None:
+            names.append(name)
+            if name != "Torque Enable":
+                write(registers, servo, name, value)
+
+        monkeypatch.setattr(module, "_write", ignore_torque)
+        with pytest.raises(ServoRefused, match="did not switch its motor off"):
+            set_id(bus.path, 1_000_000, 1, 1, 2, release=True)
+        assert names == ["Torque Enable"]
+
+
 @pytest.mark.parametrize(("model", "protocol"), FAMILIES)
 def test_a_taken_id_changes_nothing(model: str, protocol: int) -> None:
     with SimulatedBus([1, 5], model=model) as bus:

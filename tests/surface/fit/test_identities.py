@@ -340,3 +340,10 @@ def test_a_mix_is_as_long_as_allowed_and_no_longer(points):
     effect = np.array([list(measure(mode, MEASURES).values()) for mode in modes])
     nothing = np.linalg.svd(effect.T)[2][2:]
     np.testing.assert_allclose(nothing @ amounts, 0.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("modes", [np.zeros((3, 4, 3)), np.zeros((0, 4, 3))])
+def test_modes_that_change_nothing_of_what_is_asked_are_refused(points, modes):
+    wanted = Wanted(4, 100.0, np.arange(4), MEASURES, {"broad": {"width": 10.0}})
+    with pytest.raises(FitError, match="identity broad: the modes change none of width"):
+        mixes(points, modes, wanted)

@@ -38,6 +38,12 @@ def test_vrm_0_gives_presets_in_percent(tmp_path):
     )  # fmt: skip
 
 
+def test_a_group_whose_preset_is_null_keeps_its_own_name(tmp_path):
+    mesh = read(tmp_path, vrm_0({"name": "Smirk", "presetName": None, "binds": [bind(0, 100)]},
+                                {"name": None, "presetName": "none", "binds": [bind(1, 100)]}))  # fmt: skip
+    assert [expression.name for expression in mesh.expressions] == ["Smirk", "none"]
+
+
 def test_vrm_1_binds_by_node(tmp_path):
     builder = glb(slit_sheet())
     builder.document["nodes"] = [{"name": "root", "children": [1]}, {"mesh": 0}]

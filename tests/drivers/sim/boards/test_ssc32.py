@@ -153,3 +153,30 @@ def test_it_is_served_alone_and_to_a_driver_alike():
         board.faults.add(["noise:*:3"], 0.0)
         expected = Ssc32(seed=4, faults=("noise:*:3",))
         assert send(board, "Q\r") == send(expected, "Q\r") != b"."
+
+
+def test_escape_forgets_only_the_line_that_has_begun() -> None:
+    board = Ssc32()
+    assert send(board, "#3P1500\r#4P1500\x1bQP3\r") == bytes((150,))
+    assert (pulse(board, 3), pulse(board, 4)) == (1500, 0)
+    send(board, "#5P15")
+    send(board, "\x1b#6P1600\r")
+    assert (pulse(board, 5), pulse(board, 6)) == (0, 1600)
+
+
+@pytest.mark.parametrize("line", ["#1P1500T{}", "#1P1500S{}", "#{}P1500", "#1P{}", "QP{}", "STOP{}"])
+@pytest.mark.parametrize("digits", [400, 1900])
+def test_numbers_that_no_board_could_hold_are_refused(line: str, digits: int) -> None:
+    board = Ssc32()
+    send(board, "#1P1000\r")
+    assert send(board, line.format("9" * digits) + "\r") == b""
+    assert (pulse(board, 1), board.refused) == (1000, 1)
+
+
+def test_a_channel_without_pulses_takes_no_time_of_its_group() -> None:
+    """It is where it is told at once, and so is one whose pulses end."""
+    board = Ssc32()
+    send(board, "#1P1500\r#3P2000\r")
+    send(board, "#1P1600S100#2P1500S100#3P0S100\r")
+    assert (pulse(board, 1, 0.5), pulse(board, 1, 1.0)) == (1550, 1600)
+    assert (pulse(board, 2), pulse(board, 3)) == (1500, 0)

@@ -97,3 +97,15 @@ def test_options_of_the_command_line_write_line_ends_as_in_a_robot_file() -> Non
     assert [row["name"] for row in board.describe(0.0)] == ["servo3", "servo5", "servo6"]
     far_end = SIMULATOR.far_end([(3, "rc-180")], {"texts": TEXTS, "names": ["jaw"]}, Setting(now_s=0.0, baud=115_200))
     assert far_end.describe(0.0) == [{"id": 3, "name": "jaw", "us": None}]
+
+
+def test_numbers_that_no_sketch_could_hold_are_counted_and_passed_over() -> None:
+    board = TextBoard(ASKED, [1], ["jaw"])
+    say(board, b"#1P1500T9\r")
+    for count, line in enumerate((f"#1P{'9' * 400}", f"#{'9' * 4000}P1500", f"?{'1' * 4000}\r"), 1):
+        assert say(board, line.encode() + b"T9\r") == b""
+        assert (board.values, board.refused >= count) == ({1: 1500.0}, True)
+    assert say(board, b"?1\r") == b"1=1500\r"
+    long = TextBoard({"template": "{ch}:{us}\n"}, [1], ["jaw"])
+    assert say(long, b"9" * 5000 + b":1500\n1:1500\n") == b""
+    assert long.values == {1: 1500.0}

@@ -354,3 +354,39 @@ def test_what_was_written_is_carried_out_also_where_the_server_saw_only_the_firs
             port.write(encode_instruction(1, I.WRITE, b"\x40\0" + bytes((value,))))
             bus.sync()
             assert bus.servo(1).torque == bool(value)
+
+
+@pytest.mark.parametrize("process", [False, True])
+def test_a_fault_that_the_far_end_cannot_have_is_told(process: bool) -> None:
+    with SimulatedBus([1], family="maestro", model="rc-180", process=process) as board:
+        with pytest.raises(DriverError, match="a bus of this kind has only") as caught:
+            board.fault("mute:*", "hw:1:0x20")
+        assert caught.value.hint
+        board.fault("mute:*")
+        board.clear()
+
+
+def test_a_bus_whose_process_has_ended_says_so_and_closes() -> None:
+    with SimulatedBus((1,), process=True) as bus:
+        child = bus._child
+        child.kill()
+        child.wait()
+        with pytest.raises(PortError, match="has ended"):
+            bus.fault("mute:1")
+        with pytest.raises(PortError, match="has ended"):
+            bus.clear()
+        child.stdin.write(b"what is left in its buffer\n")
+        bus.close()
+        assert bus._child is None
+        bus.close()
+
+
+def test_a_port_that_cannot_come_back_under_another_name_keeps_its_own(tmp_path: Path, caplog) -> None:
+    link, taken = tmp_path / "port", tmp_path / "taken"
+    taken.write_text("a file")
+    with SimulatedBus((1,), link=link) as bus:
+        bus.fault(f"unplug:for=0.05s:as={taken}")
+        wait_until(lambda: "does not come back" in caplog.text and link.is_symlink())
+        assert len(exchange(str(link), PING_1, 14)) == 14
+        assert bus.path == str(link)
+    assert taken.read_text() == "a file"

@@ -50,3 +50,19 @@ def test_loops_that_touch_in_a_point_are_two():
     loops = [boundary_loops(i) for i in find_islands(mesh)]
     joined = sorted(len(loop) for island in loops for loop in island)
     assert joined == [4, 4]
+
+
+def test_a_third_face_at_an_inner_edge_has_a_border_of_its_own():
+    """A fin of one triangle on a sheet: at its foot three faces meet."""
+    size = 4
+    grid = np.arange((size + 1) ** 2).reshape(size + 1, size + 1)
+    v, u = np.divmod(grid.ravel(), size + 1)
+    vertices = np.vstack([np.column_stack([u, v, np.zeros(len(u))]), [1.5, 2.0, 1.0]]).astype(float)
+    quads = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = np.vstack([quads, [grid[2, 1], grid[2, 2], len(u), -1]])
+    uv = vertices[:, :2] / (2 * size)
+    uv[-1] = 0.9, 0.9
+    (island,) = find_islands(FitMesh(vertices, faces, uv, faces, (), np.zeros((0, len(vertices), 3))))
+    loops = [set(island.vertex[loop].tolist()) for loop in boundary_loops(island)]
+    border = {*grid[0].tolist(), *grid[-1].tolist(), *grid[:, 0].tolist(), *grid[:, -1].tolist()}
+    assert sorted(loops, key=len) == [{int(grid[2, 1]), int(grid[2, 2]), len(u)}, border]

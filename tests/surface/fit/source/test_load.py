@@ -7,7 +7,7 @@ import pytest
 from slit_sheet import slit_sheet, write_npz
 
 from surface.base.errors import FitError
-from surface.fit.source.load import LoadOptions, keep_faces, load_mesh
+from surface.fit.source.load import LoadOptions, keep_faces, load_mesh, wanted_faces
 from surface.fit.source.mesh import check_manifold
 from surface.readers import meshdata
 
@@ -103,3 +103,11 @@ def test_flipped_bits_give_one_kind_of_error(tmp_path):
         except FitError:
             errors += 1
     assert errors > 60
+
+
+def test_leaving_out_parts_of_a_mesh_without_names_says_that_it_has_none():
+    mesh = replace(slit_sheet(), pieces=())
+    with pytest.raises(FitError, match=r"--without Hair: face\.obj has no named objects or materials") as caught:
+        wanted_faces(mesh, ("Hair",), "face.obj")
+    assert "leave the option out" in caught.value.hint
+    assert wanted_faces(mesh, (), "face.obj").all()

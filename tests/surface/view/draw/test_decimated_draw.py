@@ -12,6 +12,7 @@ import pytest
 
 from surface.head import Head
 from surface.view import Camera, Offscreen
+from surface.view.draw import decimated_draw
 from surface.view.draw.decimated_draw import DrawCall, JoinedParts
 
 SIZE = (320, 240)
@@ -104,3 +105,28 @@ def test_shared_buffers_are_sent_and_released_by_one_draw_call() -> None:
     owner.release()
     assert done == ["upload", "release"]
     assert np.array_equal(owner.triangles, triangles[:6]) and np.array_equal(other.triangles, triangles[6:9])
+
+
+def test_one_draw_call_owns_the_buffers_also_where_clothes_hide_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    triangles = np.arange(30).reshape(10, 3)
+    made: list[Any] = []
+
+    def buffers(*_: object) -> Any:
+        made.append(SimpleNamespace(triangles=triangles))
+        return made[-1]
+
+    monkeypatch.setattr(decimated_draw, "PartBuffers", buffers)
+    monkeypatch.setattr(decimated_draw, "JoinedParts", lambda *_: None)
+    monkeypatch.setattr(decimated_draw.materials, "material_of", lambda name: SimpleNamespace(program="skin"))
+    monkeypatch.setattr(decimated_draw.materials, "uniforms_key", lambda part: part.name)
+    hidden, shown, last = (
+        SimpleNamespace(part=SimpleNamespace(name=name, material="skin"), triangles=triangles[:count], kept=[0])
+        for name, count in (("hidden", 0), ("shown", 4), ("last", 6))
+    )
+    head: Any = SimpleNamespace(parts=[hidden, shown, last])
+    calls = decimated_draw.draw_calls(
+        SimpleNamespace(), head, {"skin": SimpleNamespace()}, lambda part: {"uv": np.zeros((1, 2))}
+    )  # type: ignore[arg-type, dict-item]
+    assert len(made) == 1
+    assert [call._owner for call in calls] == [True, False, False]
+    assert [len(call.triangles) for call in calls] == [0, 4, 6]

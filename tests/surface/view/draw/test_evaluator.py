@@ -140,10 +140,15 @@ def test_textures_must_be_wide_enough_for_a_line_and_high_enough_for_all_weights
     """64 weights a vertex at most, 1024 a line."""
     info = {"GL_MAX_VERTEX_TEXTURE_IMAGE_UNITS": 2, "GL_MAX_TEXTURE_SIZE": 1024}
     small, large = (
-        SimpleNamespace(place_points=None, parts=[SimpleNamespace(vertices=range(k)) for k in (5, count)])
+        SimpleNamespace(place_points=None, parts=[SimpleNamespace(vertices=range(k)) for k in (5, count - 5)])
         for count in (16 * 1024, 32 * 1024)
     )
     none = SimpleNamespace(place_points=None, parts=[])
+    halves = SimpleNamespace(place_points=None, parts=[SimpleNamespace(vertices=range(16 * 1024))] * 2)
+    assert "2047 texels" in str(why_not_gpu(info | {"GL_MAX_TEXTURE_SIZE": 2047}, halves)), (
+        "one texture holds all parts"
+    )
+    assert why_not_gpu(info | {"GL_MAX_TEXTURE_SIZE": 2048}, halves) is None
     assert why_not_gpu(info, small) is why_not_gpu(info, none) is None
     assert "1023 texels" in str(why_not_gpu(info | {"GL_MAX_TEXTURE_SIZE": 1023}, none))
     assert "2047 texels" in str(why_not_gpu(info | {"GL_MAX_TEXTURE_SIZE": 2047}, large))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+import time
 import wave
 from collections.abc import Iterator
 from pathlib import Path
@@ -39,6 +40,50 @@ def test_pillow_formats_keep_frames_and_rate(tmp_path: Path, suffix: str) -> Non
     assert (shown[16, 24:] < 25).all()
 
 
+def durations(path: Path) -> list[int]:
+    with Image.open(path) as clip:
+        out = []
+        for index in range(clip.n_frames):
+            clip.seek(index)
+            clip.load()
+            out.append(clip.info["duration"])
+        return out
+
+
+@pytest.mark.parametrize(
+    ("suffix", "fps", "shown", "total_ms"),
+    [
+        (".gif", 30.0, [30, 40, 30] * 4, 400),  # a GIF counts hundredths of a second
+        (".gif", 60.0, [20, 30, 20, 30] * 2, 200),  # and browsers show less than two of them for ten
+        (".gif", 120.0, [20, 20, 20, 20, 20], 100),
+        (".gif", 12.0, [80, 90, 80, 80, 80, 90, 80, 80, 90, 80, 80, 90], 1000),
+        (".webp", 30.0, [33, 34, 33] * 4, 400),
+        (".webp", 120.0, [8, 9, 8] * 4, 100),
+    ],
+)
+def test_a_clip_runs_at_its_rate(tmp_path: Path, suffix: str, fps: float, shown: list[int], total_ms: int) -> None:
+    path = tmp_path / f"clip{suffix}"
+    assert write_clip(frames(12, (64, 32)), path, fps=fps) == 12
+    told = durations(path)
+    assert sum(told) == pytest.approx(total_ms, abs=20)
+    assert set(told) <= set(shown)
+    if suffix == ".webp" or fps in (30.0, 120.0):
+        assert len(told) == len(shown)
+
+
+def test_a_clip_of_one_frame(tmp_path: Path) -> None:
+    for name in ("clip.gif", "clip.webp"):
+        assert write_clip(frames(1), tmp_path / name, fps=30.0) == 1
+        with Image.open(tmp_path / name) as clip:
+            assert clip.n_frames == 1
+
+
+@pytest.mark.parametrize("fps", [0.0, -1.0, 1e-6, float("inf"), float("nan")])
+def test_rates_that_no_clip_can_have(tmp_path: Path, fps: float) -> None:
+    with pytest.raises(ViewError, match="cannot run at"):
+        write_clip(frames(2), tmp_path / "clip.gif", fps=fps)
+
+
 @pytest.mark.skipif(shutil.which("ffprobe") is None, reason="needs ffprobe on the PATH: apt install ffmpeg")
 def test_mp4_keeps_frames_and_cuts_odd_sizes(tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
@@ -66,6 +111,22 @@ def test_an_ffmpeg_that_fails_is_quoted(tmp_path: Path, monkeypatch: pytest.Monk
     with pytest.raises(ViewError, match="no such encoder"):
         write_clip(frames(400, (256, 256)), tmp_path / "clip.mp4")
     assert list(tmp_path.iterdir()) == [fake]
+
+
+def test_an_ffmpeg_that_fails_on_small_pictures_is_quoted_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it was sent is still in a buffer when it has ended."""
+    fake = tmp_path / "ffmpeg"
+    fake.write_text("#!/bin/sh\nexec <&-\necho no such encoder >&2\nexit 3\n")
+    fake.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
+
+    def slow() -> Iterator[np.ndarray]:
+        yield from frames(1, (16, 16))
+        time.sleep(0.5)
+        yield from frames(40, (16, 16))
+
+    with pytest.raises(ViewError, match="no such encoder"):
+        write_clip(slow(), tmp_path / "clip.mp4")
 
 
 needs_ffmpeg = pytest.mark.skipif(ffmpeg.find_ffmpeg() is None, reason=f"needs ffmpeg: {ffmpeg.INSTALL}")
