@@ -16,10 +16,10 @@ from surface.fit.points.lid_seating import AHEAD, LID_MM
 from surface.fit.source.mesh import FitMesh, directed_edges
 
 RINGS = 4  # of vertices, from a hole's rim outwards, that may belong to a margin
-REACH, FRONT = 1.4, 0.5  # in radii: margins lie no further from an eye's centre, and so far before it: beside it a
-# lid's margin hides the edge of the eyeball
+REACH = 1.4  # in radii: margins lie no further from an eye's centre
 STANDS = 0.6  # of an edge's length: how far it leads straight away from the eyeball where it is a margin's
 CRUSHED = 0.35  # of an edge's length: a rim that is lifted so far comes to lie on the next ring
+CORNER = 0.06  # of the opening's width: there only what would be crushed goes
 MOST = 0.3  # of the rim of a lid: where so much of it would be crushed, all of it goes, so that no teeth stay
 
 
@@ -41,7 +41,8 @@ def margins(mesh: FitMesh, skin: Bools, centres: Floats, radius: float) -> Ints:
         going = np.zeros(len(rim), bool)
         for k in (0, 1):  # upper, lower
             if np.mean([c[own[k]].mean() if len(own[k]) else 0.0 for c, own in zip(crushed, lids, strict=True)]) > MOST:
-                going[np.concatenate([own[k] for own in lids])] = True
+                for eye, hit, own in zip(eyes, crushed, lids, strict=True):
+                    going[own[k][hit[own[k]] | eye.between_corners(own[k], np.concatenate(own))]] = True
         if going.sum() < FEWEST:
             break
         kept &= ~going[filled].any(axis=1)
@@ -55,7 +56,7 @@ class _Eye:
         self._local, self._away = local, np.maximum(np.linalg.norm(local, axis=1), 1e-9)
         height = radius * surface_height(local / self._away[:, None], AHEAD) + LID_MM[0]
         self._lift = height - self._away
-        self._close = (self._away < REACH * radius) & (local[:, 2] > FRONT * radius)
+        self._close = (self._away < REACH * radius) & (local[:, 2] > 0)
 
     def lids(self, rim: Bools) -> tuple[Ints, Ints]:
         """Vertices of the rim (n,) of the upper and of the lower lid, which meet in its corners."""
@@ -66,6 +67,13 @@ class _Eye:
         (x0, y0), (x1, y1) = self._local[ids[[0, -1]], :2]
         above = self._local[ids, 1] > np.interp(self._local[ids, 0], [x0, x1], [y0, y1])
         return ids[above], ids[~above]
+
+    def between_corners(self, ids: Ints, rim: Ints) -> Bools:
+        """Which of some vertices do not lie in the corners of the rim: there skin behind a margin is further off the
+        eyeball, and one could see in between."""
+        x = self._local[rim, 0]
+        off = np.minimum(self._local[ids, 0] - x.min(), x.max() - self._local[ids, 0])
+        return np.asarray(off > CORNER * np.ptp(x))
 
     def crushed(self, a: Ints, b: Ints, rim: Bools) -> Bools:
         """(n,) which vertices of the rim, lifted out of the eyeball, come as high as one that an edge a -> b (e,) leads
