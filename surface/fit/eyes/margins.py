@@ -28,7 +28,7 @@ def margins(mesh: FitMesh, skin: Bools, centres: Floats, radius: float) -> Ints:
     lids that are seen.
 
     From the rim outwards, the vertices of both upper or both lower lids go with all their faces as long as many lie so
-    deep in the eyeballs that lifting them out would bring them as high as the next ring, above which they then would be.
+    deep in the eyeballs that lifting them out would bring them as high as the next ring, and on top of it.
     """
     eyes = [_Eye(mesh.vertices - centre, radius) for centre in centres]
     filled = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)

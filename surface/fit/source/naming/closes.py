@@ -24,8 +24,10 @@ SKIN = "skin"
 
 
 def made_close(mesh: FitMesh) -> Floats | None:
-    """(n, 3) displacements of a mouthClose that brings the lips together over a jawOpen of 1; None where the mesh has no
-    jawOpen, or no lips that it opens. The mesh is in head space: y up."""
+    """(n, 3) displacements of a mouthClose that brings the lips together over a jawOpen of 1.
+
+    None where the mesh, which is in head space, has no jawOpen, or no lips that it opens.
+    """
     if "jawOpen" not in mesh.names:
         return None
     jaw, skin = mesh.deltas[mesh.names.index("jawOpen")], _of(mesh, (SKIN,))

@@ -23,8 +23,8 @@ def egg(count: int, *, dent: float = 0.0) -> Samples:
     x, y = RNG.uniform(-60, 60, count), RNG.uniform(-80, 80, count)
     points = np.column_stack([x, y, _height(x, y, dent)])
     step = 1e-3
-    slope = [(_height(x + a, y + b, dent) - _height(x - a, y - b, dent)) / (2 * step) for a, b in ((step, 0), (0, step))]
-    normals = np.column_stack([-slope[0], -slope[1], np.ones(count)])
+    rise = [_height(x + a, y + b, dent) - _height(x - a, y - b, dent) for a, b in ((step, 0), (0, step))]
+    normals = np.column_stack([-rise[0], -rise[1], np.full(count, 2 * step)])
     return Samples(points, normals / np.linalg.norm(normals, axis=1)[:, None], np.zeros(count, bool))
 
 
