@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.register import Mark, Registered
 from surface.fit.transfer.scan import Samples
@@ -60,14 +60,14 @@ def mirror_plane(template: Template, samples: Samples) -> Plane | None:
     return plane if float(np.sqrt((off**2).mean())) < ALIKE * template.height else None
 
 
-def _off(plane: Plane, tree: cKDTree, samples: Samples, rows: Floats) -> tuple[Floats, Floats]:
+def _off(plane: Plane, tree: cKDTree, samples: Samples, rows: Ints) -> tuple[Floats, Ints]:
     """Distances (m,) of mirrored samples from the surface at the samples nearest to them, and these (m,)."""
     at = plane.mirrored(samples.points[rows])
     near = tree.query(at)[1]
     return ((at - samples.points[near]) * samples.normals[near]).sum(axis=1), near
 
 
-def _nearer(plane: Plane, tree: cKDTree, samples: Samples, rows: Floats) -> Plane:
+def _nearer(plane: Plane, tree: cKDTree, samples: Samples, rows: Ints) -> Plane:
     """The plane turned about its vertical and its sagittal axis, and moved along its normal, in least squares."""
     off, near = _off(plane, tree, samples, rows)
     out, local = samples.normals[near], samples.points[rows] - plane.centre
