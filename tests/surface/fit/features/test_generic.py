@@ -83,7 +83,7 @@ def test_a_row_of_small_pieces_is_teeth():
     row = [("head", ball((x, -20, 0), 3)) for x in np.linspace(-40, 40, 14)]
     plan = make_plan(joined([("head", slit_sheet()), *row]))
     assert [(p.name, p.material, len(i)) for p, i in plan.parts] == [("face", "skin", 1), ("teeth_1", "teeth", 14)]
-    assert [p.budget[2] for p, _ in plan.parts] == [8, 9]  # cells as small, though their roots are larger
+    assert [p.budget[2] for p, _ in plan.parts] == [9, 10]  # cells as small, though their roots are larger
 
 
 def test_one_skin_for_face_and_back_gets_points_by_its_area():
