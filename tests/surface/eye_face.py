@@ -145,3 +145,26 @@ def with_sockets(mesh: FitMesh, reach: float = 13.5) -> FitMesh:
     grown[:, : len(mesh.vertices)] = mesh.deltas
     return replace(mesh, vertices=np.vstack(points), faces=every, uv=np.vstack(uv), face_uv=every.copy(), deltas=grown,
                    piece=np.zeros(len(every), np.int64))  # fmt: skip
+
+
+def with_margins(mesh: FitMesh, steps: tuple[float, ...] = (-0.8, -1.6)) -> FitMesh:
+    """The face with lids as thick as so many mm: rings that lead from their edges straight towards the eyes' centres,
+    and move with the edges in every shape."""
+    points, deltas, uv, faces = [mesh.vertices], [mesh.deltas], [mesh.uv], [mesh.faces]
+    count = len(mesh.vertices)
+    for outwards in boundary_loops(Island(np.arange(count), mesh.vertices[:, :2], mesh.faces))[1:]:
+        loop = last = outwards[::-1]
+        local = mesh.vertices[loop] - CENTRES[int(mesh.vertices[loop[0], 0] < 0)]
+        outward = local / np.linalg.norm(local, axis=1)[:, None]
+        for k, step in enumerate(steps):
+            points.append(mesh.vertices[loop] + step * outward)
+            deltas.append(mesh.deltas[:, loop])
+            uv.append(mesh.uv[loop] + 0.1 * (k + 1) * (mesh.uv[loop].mean(axis=0) - mesh.uv[loop]))
+            own, count = count + np.arange(len(loop)), count + len(loop)
+            faces.append(np.column_stack([np.roll(last, -1), last, own, np.roll(own, -1)])[:, ::-1])
+            last = own
+    every = np.vstack(faces)
+    return replace(
+        mesh, vertices=np.vstack(points), faces=every, uv=np.vstack(uv), face_uv=every.copy(),
+        deltas=np.concatenate(deltas, axis=1), piece=np.zeros(len(every), np.int64),
+    )  # fmt: skip

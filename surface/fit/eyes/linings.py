@@ -29,7 +29,7 @@ def linings(mesh: FitMesh, skin: Bools, centre: Floats, radius: float, side: str
     kept = skin.copy()
     for _ in range(RINGS):
         a, b = directed_edges(mesh.faces[kept])
-        rim, most = _on_rim(a, b, len(moved)), np.zeros(len(moved))
+        rim, most = on_rim(a, b, len(moved)), np.zeros(len(moved))
         np.maximum.at(most, np.concatenate([a, b]), np.where(rim, 0.0, moved)[np.concatenate([b, a])])
         behind = rim & close & (most > TIMES * moved + BEHIND * radius)
         if behind.sum() < FEWEST:
@@ -39,7 +39,7 @@ def linings(mesh: FitMesh, skin: Bools, centre: Floats, radius: float, side: str
     return np.flatnonzero(skin & ~kept)
 
 
-def _on_rim(a: Ints, b: Ints, count: int) -> Bools:
+def on_rim(a: Ints, b: Ints, count: int) -> Bools:
     """(count,) vertices of the directed edges a -> b (e,) that have none in the opposite direction."""
     single = ~np.isin(a * count + b, b * count + a)
     out = np.zeros(count, bool)

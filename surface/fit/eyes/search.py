@@ -13,6 +13,7 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats
 from surface.fit.eyes.linings import linings
+from surface.fit.eyes.margins import margins
 from surface.fit.eyes.names import is_beside
 from surface.fit.eyes.openings import Opening, ball_behind, find_openings
 from surface.fit.eyes.patches import LOOKS, island_sides, shaped_sides, turns
@@ -72,7 +73,7 @@ def find_eyes(mesh: FitMesh, skin_of: Callable[[Bools], Bools]) -> Eyes:
     if not skin.any():
         return Eyes(np.zeros((2, 3)), 0.0, gone, gone, skin, notes=[MISSING])
     found = replace(_placed(mesh, sides, what, gone, find_openings(mesh, skin, middle, near)), skin=skin)
-    return _without_sockets(mesh, found, skin, middle, near)
+    return _without_margins(mesh, _without_sockets(mesh, found, skin, middle, near), middle, near)
 
 
 def _without_sockets(mesh: FitMesh, eyes: Eyes, skin: Bools, middle: float, near: Floats | None) -> Eyes:
@@ -89,6 +90,20 @@ def _without_sockets(mesh: FitMesh, eyes: Eyes, skin: Bools, middle: float, near
         return eyes
     notes = [*eyes.notes, f"{count} faces of sockets behind the eyes are left out"]
     return replace(eyes, faces=behind, skin=skin & ~behind, openings=openings, notes=notes)
+
+
+def _without_margins(mesh: FitMesh, eyes: Eyes, middle: float, near: Floats | None) -> Eyes:
+    """The eyes, to whose faces those of margins are added that would be crushed on the eyeballs."""
+    if eyes.radius <= 0 or not eyes.openings:
+        return eyes
+    crushed = np.zeros(len(mesh.faces), bool)
+    crushed[margins(mesh, eyes.skin, eyes.centres, eyes.radius)] = True
+    openings = find_openings(mesh, eyes.skin & ~crushed, middle, near) if crushed.any() else []
+    if not openings:
+        return eyes
+    notes = [*eyes.notes, f"{int(crushed.sum())} faces of lids' margins inside the eyeballs are left out"]
+    skin = eyes.skin & ~crushed
+    return replace(eyes, faces=eyes.faces | crushed, skin=skin, openings=openings, notes=notes)
 
 
 def _piece_sides(mesh: FitMesh, middle: float, near: Floats | None, kept: Bools) -> tuple[list[Side], str, Bools]:

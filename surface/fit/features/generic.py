@@ -34,7 +34,8 @@ FINEST = 0.3  # in spacings of the mesh: the largest around a place count, and a
 ASTRAY_MM = 1.8  # of a head of usual size: where the surface is further off, it is mended
 SPARE = 60  # points of the face that are kept for mending
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
-DEPTH = 8  # of the cells; more where many islands lie side by side, since roots are shared by all
+DEPTH = 9  # of the cells: one in a nostril is 3 mm wide then; more where many islands lie side by side, since roots are
+# shared by all
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
 MOVING = 0.4  # an island moved by at least this share of the shapes that move the most mobile one is the face's
 LESS = 1e-6  # what is said to be no skin counts as face only where there is nothing else

@@ -20,6 +20,7 @@ from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.carry import carry
 from surface.fit.transfer.colours import with_colours
 from surface.fit.transfer.lids import close_lids
+from surface.fit.transfer.mirrored import alike, levelled, mirror_plane
 from surface.fit.transfer.places import scaled
 from surface.fit.transfer.refused import HINT, faults_of_transfer
 from surface.fit.transfer.register import STAGES, Matcher, register
@@ -95,10 +96,12 @@ def transfer(
     template = make_template(head, head.name)
     progress("face", 0.02)
     found = find_face(scan, template, picked, options, where)
+    found, mirrored = upright(scan, template, found)
     scan, marks = in_frame(scan, template, found), {n: found.points(p) for n, p in picked.items()}
     samples = sample(scan, MANY)
     progress("face", 0.15)
     done = register(template, samples, marks, lambda share: progress("face", 0.15 + 0.5 * share))
+    done = alike(done) if mirrored else done
     matcher = Matcher(samples)
     provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
     carried = carry(head, template, done.warp, done.smooth, matcher, provenance, name)
@@ -108,6 +111,7 @@ def transfer(
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
     notes += [*scan.notes, *lid_notes]
+    notes += ["both sides of the face are alike, and fitted alike"] if mirrored else []
     if scan.colours is not None:
         data, colour_notes = with_colours(data, scan.colours)
         notes += colour_notes
@@ -150,6 +154,12 @@ def find_face(
     if off > WRONG:
         raise FitError(f"{where}: its landmarks do not lie as those of a face do", hint="check their names and places")
     return found
+
+
+def upright(scan: Scan, template: Template, found: Similarity) -> tuple[Similarity, bool]:
+    """The similarity by which a scan that mirrors itself does so in x = 0, and whether it does."""
+    plane = mirror_plane(template, sample(in_frame(scan, template, found)))
+    return (found, False) if plane is None else (levelled(found, plane), True)
 
 
 def _by_landmarks(picked: dict[str, Floats], template: Template) -> tuple[Similarity, float]:

@@ -13,7 +13,8 @@ from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
 from surface.fit.source.load import LoadOptions
 from surface.fit.transfer.align import NoFaceFound, Similarity
-from surface.fit.transfer.api import direction, find_face, in_frame
+from surface.fit.transfer.api import direction, find_face, in_frame, upright
+from surface.fit.transfer.mirrored import alike
 from surface.fit.transfer.register import Mark, register
 from surface.fit.transfer.reports.landmarkfile import read_landmarks
 from surface.fit.transfer.reports.picture import Frontal, draw_landmarks, frontal
@@ -62,9 +63,11 @@ def pick_landmarks(
         picture = _write(Path(mesh_path), out, scan, view, {n: Mark(p, "given") for n, p in given.items()}, BY_HAND)
         hint = f"look at {picture}, give their pixels in {out}, and then omote landmarks {mesh_path} -o {out} --keep"
         raise NoFaceFound(f"{e}; {out} has lines for landmarks by hand", hint=hint) from e
+    found, mirrored = upright(scan, template, found)
     report("face", 0.25)
     samples, held = sample(in_frame(scan, template, found), MANY), {n: found.points(p) for n, p in given.items()}
     done = register(template, samples, held, lambda share: report("landmarks", 0.25 + 0.7 * share))
+    done = alike(done) if mirrored else done
     marks = {n: Mark(_in_file(found, m), m.how, m.sure) for n, m in done.marks.items()}
     view = view_of(found, np.array([m.place for m in marks.values()]))
     return marks, _write(Path(mesh_path), out, scan, view, marks)

@@ -1,4 +1,4 @@
-"""Shapes that do something else than their names say: exchanged or left out, and said.
+"""Shapes that do something else than their names say: exchanged or made anew, and said.
 
 Those that take mouth or jaw to a side and go to the other one, and a ``mouthClose`` that closes no open jaw.
 """
@@ -11,6 +11,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.fit.source.mesh import FitMesh
+from surface.fit.source.naming.closes import made_close
 
 PAIRS = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
 CLOSES = 0.25  # of the way of jawOpen: a mouthClose that moves nothing so far only presses the lips
@@ -25,18 +26,31 @@ def right_shapes(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
 
 
 def closing(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
-    """The mesh without a mouthClose that cannot bring the lips together over its jawOpen, and a note of it."""
-    if not {"jawOpen", "mouthClose"} <= set(mesh.names):
+    """The mesh with a mouthClose that brings the lips together over its jawOpen, and a note of what that took.
+
+    One that cannot do so, as in drawn characters, whose jaw is made from a vowel, is replaced by one made from jawOpen,
+    or left out where the lips cannot be found; one that is missing is made.
+    """
+    if "jawOpen" not in mesh.names:
         return mesh, []
-    most = {n: float(np.abs(mesh.deltas[mesh.names.index(n)]).max(initial=0.0)) for n in ("jawOpen", "mouthClose")}
-    if most["mouthClose"] >= CLOSES * most["jawOpen"]:
-        return mesh, []
-    kept = [k for k, n in enumerate(mesh.names) if n != "mouthClose"]
-    note = (
-        f"mouthClose: left out: it moves the lips by {most['mouthClose']:.1f} mm, and closes no jaw that opens by "
-        f"{most['jawOpen']:.1f} mm"
-    )
-    return replace(mesh, names=tuple(mesh.names[k] for k in kept), deltas=mesh.deltas[kept]), [note]
+    why, kept = "the mesh has none", mesh
+    if "mouthClose" in mesh.names:
+        close, jaw = (float(np.abs(_delta(mesh, n)).max(initial=0.0)) for n in ("mouthClose", "jawOpen"))
+        if close >= CLOSES * jaw:
+            return mesh, []
+        why = f"that of the mesh moves the lips by {close:.1f} mm, and closes no jaw that opens by {jaw:.1f} mm"
+        rows = [k for k, n in enumerate(mesh.names) if n != "mouthClose"]
+        kept = replace(mesh, names=tuple(mesh.names[k] for k in rows), deltas=mesh.deltas[rows])
+    made = made_close(kept)
+    if made is None:
+        return kept, [f"mouthClose: left out: {why}"] if kept is not mesh else []
+    names, deltas = (*kept.names, "mouthClose"), np.concatenate([kept.deltas, made[None]])
+    return replace(kept, names=names, deltas=deltas), [f"mouthClose: made from jawOpen: {why}"]
+
+
+def _delta(mesh: FitMesh, name: str) -> Floats:
+    delta: Floats = mesh.deltas[mesh.names.index(name)]
+    return delta
 
 
 def right_sides(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
