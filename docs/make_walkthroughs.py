@@ -18,7 +18,8 @@ from controller.base.paths import find_config
 from controller.body.body import Body
 from controller.face.face import head_indices
 from controller.face.overlays import Overlays
-from controller.face.point_editing import PointEditor, Screen
+from controller.face.point_editing import PointEditor
+from controller.face.skin_model import Screen
 from controller.panels.session.own_expressions import save_expression
 from controller.robot.anchors import anchor_places
 from controller.robot.robot import load_robot

@@ -20,8 +20,8 @@ TEMPLATES: dict[int, tuple[tuple[int, int, int], ...]] = {
     6: ((0, 1, 5), (1, 4, 5), (5, 4, 2)),
     7: ((0, 3, 5), (3, 1, 4), (5, 4, 2), (3, 4, 5)),
 }
-"""Triangles for each set of split edges, by bits: 1 for the edge from corner 0 to 1, 2 for 1 to 2, 4 for 2 to 0. Corners 3
-to 5 are the middles of these edges."""
+"""Triangles for each set of split edges, by bits: 1 for the edge from corner 0 to 1, 2 for 1 to 2, 4 for 2 to 0.
+Corners 3 to 5 are the middles of these edges."""
 
 
 class Middles:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from controller.panels.session.commands import Commands
     from controller.stage.stage import Stage
     from surface.head import Head
+    from surface.head.model.light import LightPoints
 
 NOBODY = "nobody"
 _THEMES, _QUALITIES = (get_args(PictureSettings.model_fields[key].annotation) for key in ("theme", "quality"))
@@ -30,10 +31,16 @@ class Looks:
     """Changes the look of a stage's face.
 
     swap : draws a head with settings from now on. jobs : loads it.
+
+    Attributes
+    ----------
+    light : control points that were added to the face. shown_light : those of the head that was loaded last.
     """
 
     def __init__(self, stage: Stage, swap: Callable[[Head | None, FaceSettings], None], jobs: Jobs) -> None:
         self._swap, self._jobs = swap, jobs
+        self.light: tuple[LightPoints, ...] = ()
+        self.shown_light: tuple[LightPoints, ...] = ()
         self._begin(stage)
 
     def _begin(self, stage: Stage) -> None:
@@ -49,8 +56,20 @@ class Looks:
         self._shown = look or self.first
 
     def _load(self, stage: Stage, title: str) -> None:
-        face = stage.settings.face
-        self._jobs.start(title, lambda _: stage.load_head(), lambda head: self._swap(head, face))
+        face, asked = stage.settings.face, self.light
+        light = asked if stage.head == self.stage.head else ()
+
+        def done(head: Head) -> None:
+            if asked == self.light:  # else the next one is being loaded
+                self.shown_light = light
+                self._swap(head, face)
+
+        self._jobs.start(title, lambda _: stage.load_head(light), done)
+
+    def show_light(self, light: tuple[LightPoints, ...]) -> None:
+        """Show the face with control points that were added to it."""
+        self.light = light
+        self._load(self._stage(self._shown), "changing control points")
 
     def show(self, look: Look | None) -> None:
         """Show a look; the first one without. What fails is reported, and the face stays."""
@@ -66,7 +85,7 @@ class Looks:
 
     def load(self) -> Head:
         """Load the head that is shown again, as it was."""
-        return self._stage(self._shown).load_head()
+        return self._stage(self._shown).load_head(self.shown_light)
 
     def _stage(self, look: Look) -> Stage:
         """The stage with a look. Raises ConfigError: no such person, or one that does not fit the head."""

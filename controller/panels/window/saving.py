@@ -143,6 +143,6 @@ class Saving:
         """Open the window with the new parameter in place of the moved control points, and hold it."""
         history = self._commands.history
         if self.reopen is not None:
-            now = replace(history.now, moves=None)
+            now = replace(history.now, moves=None, light=())
             self.reopen(History(now, (*history.past, history.now), ()), held)
         return f"wrote {name} to {self._words.own}"

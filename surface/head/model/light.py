@@ -1,17 +1,18 @@
 """Light control points: added to a part of a head, they leave its surface where it is until they are moved.
 
-A control point with knots of its own has little weight, :data:`WEIGHT`, and lies on the surface S. With W the sum of all
-b w and N the numerator of Eq. (1), it turns N / W into (N + b w P) / (W + b w): a change by b w (P - S) / (W + b w), which
-is less than WEIGHT times the distance over which b reaches, 0.0002 mm where that is 2 mm. A move of it by D adds b w D to
-the numerator and nothing to the denominator, as in Eq. (2): to move the skin by d it is moved by d W / (b w), far away from
-the face. In the limit of no weight it is the infinite control point of Piegl, "On the use of infinite control points in
-CAGD" (1987), whose displacement is a pure addition to the numerator.
+A control point with knots of its own has little weight, :data:`WEIGHT`, and lies on the surface S. With W the sum of
+all b w and N the numerator of Eq. (1), it turns N / W into (N + b w P) / (W + b w), a change by b w (P - S) / (W + b w)
+which is less than WEIGHT times the distance over which b reaches, 0.0002 mm where that is 2 mm. A move of it by D adds
+b w D to the numerator and nothing to the denominator, as in Eq. (2): to move the skin by d it is moved by d W / (b w),
+far away from the face. In the limit of no weight it is the infinite control point of Piegl, "On the use of infinite
+control points in CAGD" (1987), whose displacement is a pure addition to the numerator.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -88,7 +89,7 @@ def with_light(
         mesh = unpack(part.mesh, surface, part.budget, rough=False, flip=part.flip)
         mesh = mesh or tessellate(part, surface, data.seams)
         refined[name] = Refined(mesh, own, part, coarser(name, mesh))
-        grown = _with_points(part, own)
+        grown = with_points(part, own)
         parts[name] = replace(grown, mesh=refined[name].packed(grown))
     return replace(data, parts=list(parts.values())), refined
 
@@ -111,8 +112,8 @@ def check_light(part: PartData, own: LightPoints) -> None:
         raise ValueError("a control point lies where the part has no surface")
 
 
-def _with_points(part: PartData, own: LightPoints) -> PartData:
-    """The part with the points behind its own; they lie on the surface and follow every group and the jaw as it does."""
+def with_points(part: PartData, own: LightPoints) -> PartData:
+    """The part with the points behind its own: on the surface, and following every group and the jaw as it does."""
     surface = make_surface(part)
     share, n, k = surface.basis_matrix(own.centres).tocsr(), surface.n, len(own)
     width = part.knots_u.shape[1]
@@ -208,7 +209,8 @@ class Refined:
         for first in range(0, len(near), 4096):
             which = near[first : first + 4096]
             at = ends[which, :1] + _SAMPLES[None, :, None] * (ends[which, 1:] - ends[which, :1])  # (e, 5, 2)
-            inside = (np.abs(at[:, :, None] - centres) < reach).all(axis=3).any(axis=1)  # (e, k)
+            far = np.abs(at[:, :, None] - centres) / reach  # (e, 5, k, 2)
+            inside = far.max(axis=-1).min(axis=1) < 1.0
             out[which] = (inside & (length[which, None] > self._longest)).any(axis=1)
         return out
 
@@ -221,7 +223,7 @@ class Refined:
             basis = surface.basis_matrix(self._uv[self._count :]).tocsr()
             cuts = np.append(np.arange(0, len(self.ends), 64), len(self.ends))
             starts.append(self._count + cuts[1:])
-            lists += [np.unique(basis[a:b].indices).astype(np.int32) for a, b in zip(cuts, cuts[1:], strict=False)]
+            lists += [np.unique(basis[a:b].indices).astype(np.int32) for a, b in pairwise(cuts)]
         finer = replace(
             mesh,
             vertices=self._places, normals=np.zeros_like(self._places), triangles=self.triangles.astype(np.int32),
@@ -242,7 +244,7 @@ class Refined:
         return lists
 
     def carry(self, values: Array) -> Array:
-        """Rows (m, ...) by vertex, those that seams added behind the mesh's own included, with rows for new vertices."""
+        """Rows (m, ...) by vertex, behind the mesh's own those that seams added, with rows for new vertices between."""
         own = [np.asarray(values[: self._count], np.float64)]
         rows = np.concatenate([own[0], np.zeros((len(self.ends), *values.shape[1:]))])
         for i, (a, b) in enumerate(self.ends.tolist(), self._count):

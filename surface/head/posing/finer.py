@@ -11,7 +11,12 @@ import numpy as np
 from surface.base.arrays import Ints
 from surface.head.model.light import Refined
 from surface.head.posing.baked import (
-    LEVELS, apply_decimated, apply_shade, read_decimated, read_shade, tessellation_key,
+    LEVELS,
+    apply_decimated,
+    apply_shade,
+    read_decimated,
+    read_shade,
+    tessellation_key,
 )  # fmt: skip
 from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import Mesh
