@@ -22,7 +22,8 @@ def uv_under(pixels: Floats, shown: Floats, triangles: NDArray[np.integer], uv: 
 
     shown : (m, 3) pixels and depth of its vertices. triangles : (t, 3). uv : (m, 2) of its vertices.
     """
-    a, b, c = (shown[triangles[:, i]] for i in range(3))
+    corners = [shown[triangles[:, i]] for i in range(3)]
+    a, b, c = (each[:, :2] for each in corners)
     area = _cross(b - a, c - a)
     out = np.full((len(pixels), 2), np.nan)
     for k, pixel in enumerate(np.asarray(pixels, np.float64)):
@@ -31,7 +32,7 @@ def uv_under(pixels: Floats, shown: Floats, triangles: NDArray[np.integer], uv: 
             shares = shares / area
             inside = np.flatnonzero((shares >= 0.0).all(axis=0))
         if len(inside):
-            depth = (shares[:, inside] * np.stack([x[inside, 2] for x in (a, b, c)])).sum(axis=0)
+            depth = (shares[:, inside] * np.stack([each[inside, 2] for each in corners])).sum(axis=0)
             first = inside[np.argmin(depth)]
             out[k] = shares[:, first] @ uv[triangles[first]]
     return out

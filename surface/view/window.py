@@ -303,6 +303,7 @@ class _Window:
                 style, name, size * scale if isinstance(size, float) else type(size)(size.x * scale, size.y * scale)
             )
         style.tab_min_width_shrink = _LEAST_TAB * scale  # in a small window titles are cut, and none is away
+        style.window_menu_button_position = self._imgui.Dir.none  # its room is that of a title
         style.font_scale_main = self._scaled = scale
 
     def panels(self) -> None:

@@ -116,7 +116,7 @@ class Panel:
             "Sliders": self.sliders,
             **({"Sculpt": self.sculpt} if self.sculpt is not None else {}),
             "View": self.view,
-            "Timeline": self.timeline,
+            "Time": self.timeline,
         }
         if self.feed is not None:
             parts |= {"Servos": self.servos, "Links": self.links}
