@@ -84,6 +84,11 @@ class Hands:
         sys.argv = ["omote", *words]
         main()
 
+    @staticmethod
+    def began() -> float:
+        """Now, for :meth:`seconds`."""
+        return time.monotonic()
+
     def seconds(self) -> float:
         """Since the hands began."""
         return time.monotonic() - self.began_s

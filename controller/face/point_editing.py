@@ -21,7 +21,7 @@ from controller.face.skin_model import SkinModel as _Model
 from controller.stage.inverse import GroupMoves, save_group
 from controller.stage.pulling import Pin, PullSolver
 from surface.head import Head
-from surface.head.model.furrow import Furrow, furrow_knots, furrow_moves
+from surface.head.model.furrow import Furrow, even_moves, furrow_knots
 from surface.head.model.light import WEIGHT, LightPoints, join_light, with_points
 from surface.head.model.meshes import make_surface
 
@@ -212,7 +212,7 @@ class PointEditor:
         light = LightPoints(PART, *(np.concatenate([pair[k] for pair in knots]) for k in range(2)))
         surface, first = make_surface(with_points(model.data, light)), model.surface.n
         ids = [first + np.arange(len(line)) + i * len(line) for i in range(len(lines))]
-        moves = [furrow_moves(each, surface, own) for each, own in zip(furrows, ids, strict=True)]
+        moves = [even_moves(each, surface, own) for each, own in zip(furrows, ids, strict=True)]
         return light, np.concatenate(moves)
 
     @staticmethod

@@ -42,7 +42,7 @@ class Brush:
     pinning: bool = False
     falloff_mm: float = 22.0
     depth_mm: float = 1.2
-    width_mm: float = 4.0
+    width_mm: float = 3.0
     reach_mm: float = 8.0
 
 

@@ -10,7 +10,7 @@ from controller.panels.window.editing import TOOLS, Brush, MouseEditing, Tool
 ABOUT: dict[Tool, str] = {
     "pull the face": "Ctrl and drag a point: sliders follow.",
     "pull the skin": "Ctrl and drag the skin itself. With Ctrl and Shift any tool does.",
-    "wrinkle": "Ctrl and draw a line on the face: a furrow with a ridge along both sides.",
+    "wrinkle": "Ctrl and draw a line on the face: the skin sinks along it.",
     "add points": "Ctrl and click adds a control point, and leaves the skin as it is. Ctrl and drag moves it.",
     "remove points": "Ctrl and click takes an added point out, and what it did to the skin.",
 }
