@@ -176,7 +176,8 @@ def beside(pictures: list[Image.Image]) -> Image.Image:
 def main() -> None:
     """Write the pictures of the page."""
     made = {
-        "expression": lambda f: new_expression(f)[1], "smirk": lambda f: smirk(f)[1], "wrinkle": lambda f: wrinkle(f)[1],
+        "expression": lambda f: new_expression(f)[1],
+        "smirk": lambda f: smirk(f)[1], "wrinkle": lambda f: wrinkle(f)[1],
         "anchors": lambda f: servo_head(f)[1], "phone": phone,
     }  # fmt: skip
     for name in sys.argv[1:] or made:

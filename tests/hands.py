@@ -1,7 +1,7 @@
 """Hands for the window of ``omote edit``: they move the mouse of a virtual display, press and let go, and look.
 
-A script is a generator that is gone on with once a frame; it runs in the process of the window. The pointer is that of the
-display, moved by Xlib; buttons and keys are ImGui's events.
+A script is a generator that is gone on with once a frame; it runs in the process of the window. The pointer is that of
+the display, moved by Xlib; buttons and keys are ImGui's events.
 """
 
 from __future__ import annotations
