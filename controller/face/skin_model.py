@@ -20,7 +20,8 @@ from surface.head.model.parameters import NAMES, read_pose, rotation
 from surface.view.scene.camera import Camera
 
 PART = "face"
-_POINTS = 900
+_POINTS = 900  # among the mesh's vertices, which lie close where the face has features
+_BETWEEN = 600  # over its area, so that flat cheeks can be taken, too
 _SEED = 11
 
 
@@ -58,7 +59,7 @@ class SkinModel:
         part = head.part(PART)
         self.order = head_order(NAMES, parameters)
         self._head, self._all = head, head_order(head.parameters, parameters)
-        self.skin = sample_skin(head, PART, skin_points(head, PART, _POINTS, _SEED))
+        self.skin = sample_skin(head, PART, np.concatenate([skin_points(head, PART, _POINTS, _SEED), _over_area(head)]))
         self.basis = part.surface.basis_matrix(self.skin.uv)
         along_u, along_v = part.surface.derivatives(self.skin.uv)[1:]
         normals = np.cross(along_u, along_v)
@@ -117,6 +118,17 @@ class SkinModel:
 
     def _of_head(self, values: Floats) -> Floats:
         return values[self._all]
+
+
+def _over_area(head: Head) -> Floats:
+    """(_BETWEEN, 2) places drawn evenly over the area of the skin at rest."""
+    part, rng = head.part(PART), np.random.default_rng(_SEED)
+    a, b, c = (part.vertices[part.mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    chosen = part.mesh.triangles[rng.choice(len(area), _BETWEEN, p=area / area.sum())]
+    shares = rng.dirichlet(np.ones(3), _BETWEEN)
+    found: Floats = (shares[..., None] * part.mesh.uv[chosen]).sum(axis=1)
+    return found
 
 
 def turn_of(head_values: Floats) -> Floats:
