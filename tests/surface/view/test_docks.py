@@ -15,6 +15,16 @@ def test_text_grows_with_the_window_but_not_twice(height: float, system: float, 
     assert text_scale(height, system) == pytest.approx(scale)
 
 
+@pytest.mark.parametrize(
+    ("height", "system", "desktop", "scale"),
+    [(900, 1.0, 2.0, 2.0), (2160, 1.0, 1.5, 2.0), (900, 2.0, 2.0, 1.0), (600, 1.0, 1.0, 1.0), (1080, 1.0, 1.25, 1.25)],
+)
+def test_text_grows_with_a_desktop_that_the_runner_does_not_hear_of(
+    height: float, system: float, desktop: float, scale: float
+) -> None:
+    assert text_scale(height, system, desktop) == pytest.approx(scale)
+
+
 def params(docks: list[Dock], size: tuple[float, float]) -> object:
     hello_imgui = pytest.importorskip("imgui_bundle").hello_imgui
     found = hello_imgui.RunnerParams()
@@ -35,7 +45,7 @@ def test_panels_of_one_side_share_a_column_and_columns_are_equally_wide() -> Non
     assert [split.new_dock for split in splits] == ["left", "right"]
     left = splits[0].ratio * 2000
     right = splits[1].ratio * (2000 - left)  # the second is cut off what the first has left
-    assert left == pytest.approx(420, rel=1e-5) and right == pytest.approx(420, rel=1e-5)
+    assert left == pytest.approx(440, rel=1e-5) and right == pytest.approx(440, rel=1e-5)
     assert [window.dock_space_name for window in docking.dockable_windows] == ["left", "left", "right"]
     assert not any(window.can_be_closed for window in docking.dockable_windows)
 
