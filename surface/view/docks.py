@@ -64,13 +64,9 @@ class PictureArea:
     dropped: Callable[[Sequence[Path]], None] | None = None
 
 
-def text_scale(height: float, system: float, desktop: float = 1.0) -> float:
-    """Factor on the size of text, for a window ``height`` points high.
-
-    system : the desktop's factor as far as the runner has heard of it. desktop : as the desktop tells it.
-    """
-    heard = max(system, 1.0)
-    return max(1.0, desktop / heard, height / 1080.0 / heard)
+def text_scale(height: float, system: float) -> float:
+    """Factor on the size of text, for a window ``height`` points high; ``system`` : the desktop's own factor."""
+    return max(1.0, height / 1080.0 / max(system, 1.0))
 
 
 def add_docks(runner: Any, params: Any, docks: Sequence[Dock], size: tuple[float, float], line: float) -> None:

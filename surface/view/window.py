@@ -105,8 +105,8 @@ def run_window(
     window.area = area or PictureArea()
     if docks and not kiosk:
         safe = [replace(dock, draw=window.as_callback(dock.draw)) for dock in docks]
-        window.desktop = desktop_scale()
-        add_docks(hello_imgui, params, safe, size, _LINE * text_scale(size[1], 1.0, window.desktop))
+        desktop = desktop_scale()
+        add_docks(hello_imgui, params, safe, size, _LINE * desktop * text_scale(size[1], desktop))
         window.docked = True
     if kiosk:
         geometry = params.app_window_params.window_geometry
@@ -152,7 +152,6 @@ class _Window:
         self._imgui, self._source, self._viewpoint = imgui, source, viewpoint
         self._make_renderer, self._quality = make_renderer, quality
         self.kiosk = self.docked = False
-        self.desktop = 1.0
         self.area = PictureArea()
         self.gui: Callable[[], None] | None = None
         self.seconds: float | None = None
@@ -295,7 +294,7 @@ class _Window:
 
     def _scale(self, style: Any) -> None:
         """Let text, and all distances between and within widgets, grow with the window."""
-        scale = text_scale(self._imgui.get_io().display_size.y, style.font_scale_dpi, self.desktop)
+        scale = text_scale(self._imgui.get_io().display_size.y, style.font_scale_dpi)
         if scale == self._scaled:
             return
         # from sizes as they were made: those of 4K, made smaller again, would be rounded ones

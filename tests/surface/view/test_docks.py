@@ -15,16 +15,6 @@ def test_text_grows_with_the_window_but_not_twice(height: float, system: float, 
     assert text_scale(height, system) == pytest.approx(scale)
 
 
-@pytest.mark.parametrize(
-    ("height", "system", "desktop", "scale"),
-    [(900, 1.0, 2.0, 2.0), (2160, 1.0, 1.5, 2.0), (900, 2.0, 2.0, 1.0), (600, 1.0, 1.0, 1.0), (1080, 1.0, 1.25, 1.25)],
-)
-def test_text_grows_with_a_desktop_that_the_runner_does_not_hear_of(
-    height: float, system: float, desktop: float, scale: float
-) -> None:
-    assert text_scale(height, system, desktop) == pytest.approx(scale)
-
-
 def params(docks: list[Dock], size: tuple[float, float]) -> object:
     hello_imgui = pytest.importorskip("imgui_bundle").hello_imgui
     found = hello_imgui.RunnerParams()
