@@ -40,6 +40,11 @@ def test_panels_of_one_side_share_a_column_and_columns_are_equally_wide() -> Non
     assert not any(window.can_be_closed for window in docking.dockable_windows)
 
 
+def test_one_column_is_wide_enough_for_its_titles_in_a_small_window() -> None:
+    splits = params(DOCKS[:2], (800.0, 600.0)).docking_params.docking_splits  # type: ignore[attr-defined]
+    assert splits[0].ratio == pytest.approx(0.44)  # of seven titles, none is cut: looked at with text of 16 points
+
+
 def test_panels_leave_room_for_the_face_in_a_small_window() -> None:
     docking = params(DOCKS, (400.0, 300.0)).docking_params  # type: ignore[attr-defined]
     room = 1.0
