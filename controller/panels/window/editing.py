@@ -7,7 +7,7 @@ draw a wrinkle, or take added points out. With Shift they always move control po
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any, Literal, get_args
 
@@ -83,6 +83,12 @@ class MouseEditing:
             self.editor.prepare()
         if self._commands.now.moves is not None:
             self._show_moves(self._commands.now.moves)
+
+    def keep_points(self) -> None:
+        """Let those control points be the added ones that the shown head has."""
+        now, editor = self._commands.now, self.editor
+        moves = editor.fitted(now.moves, now.light)
+        self._commands.change(replace(now, light=editor.light, moves=moves))
 
     def find_editor(self) -> PointEditor:
         """What drags the points of the head that is shown now."""

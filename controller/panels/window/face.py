@@ -98,6 +98,8 @@ class WindowFace:
         if copy is not None and not settings.kiosk:
             self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area, parameters)
             self._mouse.can_add = self._looks is not None
+            if self._looks is not None:
+                self._looks.keep_light = self._mouse.keep_points
             self._panel.sculpt = SculptPanel(self._mouse, self._panel.commands)
             self._panel.saving.editor = self._mouse.find_editor
         self._devices = Devices(Controls(controls, parameters), ask) if controls else None

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from surface.head import Head
     from surface.head.model.light import LightPoints
 
-NOBODY = "nobody"
+NOBODY, _CHANGING = "nobody", "changing control points"
 _THEMES, _QUALITIES = (get_args(PictureSettings.model_fields[key].annotation) for key in ("theme", "quality"))
 
 
@@ -35,12 +35,14 @@ class Looks:
     Attributes
     ----------
     light : control points that were added to the face. shown_light : those of the head that was loaded last.
+    keep_light : makes these the added ones, where the user does not wait for others, or they cannot be loaded.
     """
 
     def __init__(self, stage: Stage, swap: Callable[[Head | None, FaceSettings], None], jobs: Jobs) -> None:
         self._swap, self._jobs = swap, jobs
         self.light: tuple[LightPoints, ...] = ()
         self.shown_light: tuple[LightPoints, ...] = ()
+        self.keep_light: Callable[[], None] = lambda: None
         self._begin(stage)
 
     def _begin(self, stage: Stage) -> None:
@@ -64,12 +66,16 @@ class Looks:
                 self.shown_light = light
                 self._swap(head, face)
 
-        self._jobs.start(title, lambda _: stage.load_head(light), done)
+        given_up = self.keep_light if title == _CHANGING else lambda: None
+        self._jobs.start(title, lambda _: stage.load_head(light), done, given_up)
 
     def show_light(self, light: tuple[LightPoints, ...]) -> None:
         """Show the face with control points that were added to it."""
         self.light = light
-        self._load(self._stage(self._shown), "changing control points")
+        if light != self.shown_light:
+            self._load(self._stage(self._shown), _CHANGING)
+            return
+        self._jobs.drop(_CHANGING)
 
     def show(self, look: Look | None) -> None:
         """Show a look; the first one without. What fails is reported, and the face stays."""

@@ -15,11 +15,13 @@ from controller.face.skin_lines import even_line, knots_round, mirrored, uv_unde
 from controller.face.skin_model import Screen
 from controller.panels.session.commands import Commands
 from controller.panels.session.own_groups import place_of, save_corrective, save_own_group
+from controller.panels.window.editing import MouseEditing
 from controller.stage.inverse import load_group, save_group
 from controller.stage.stage import load_stage
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
 from surface.head.model.light import LightPoints
+from surface.view.docks import PictureArea
 from surface.view.scene.camera import Camera
 
 SIZE, FRONT = (1280.0, 720.0), Screen(Camera.front(), (1280.0, 720.0))
@@ -311,3 +313,36 @@ def test_points_beside_the_surface_are_a_fault_of_the_stage(editor: PointEditor,
     (tmp_path / "s.toml").write_text('name = "s"\n[groups]\n"g.json" = 1.0\n', encoding="utf-8")
     with pytest.raises(ConfigError, match="do not fit this head: a control point lies where the part has no surface"):
         load_stage(str(tmp_path / "s.toml"), P).load_head()
+
+
+def mouse_of(editor: PointEditor, commands: Commands) -> MouseEditing:
+    """The tools of a window on a head that is ready."""
+    found = MouseEditing(editor.head, lambda: editor.head, P.neutral, commands, PictureArea())
+    found.editor, found.can_add = editor, True
+    return found
+
+
+def test_the_tools_add_draw_and_take_out_points_and_say_why_not(editor: PointEditor, folder: Path) -> None:
+    commands = Commands(lambda request: None)
+    mouse, at = mouse_of(editor, commands), pixel(CHEEK)
+    mouse._remove(at, FRONT)
+    assert "no added point there" in mouse.message
+    mouse._add((4.0, 4.0), FRONT)
+    assert "click on the face" in mouse.message and not commands.undoable
+    mouse._wrinkle([at, at], FRONT)
+    assert "draw a longer line" in mouse.message and not commands.undoable
+    mouse._wrinkle([tuple(p) for p in FRONT.project(dense(LINE))[:, :2]], FRONT)
+    (line,) = commands.now.light
+    assert len(line) > 12 and commands.now.moves is not None and len(commands.now.moves) == editor.own + len(line)
+    mouse._add(at, FRONT)
+    assert "on its way" in mouse.message and len(commands.now.light) == 1
+    mouse.keep_points()  # cancelled while it was loaded: as the shown head is
+    assert commands.now.light == () and not np.any(commands.now.moves)
+    mouse._add(at, FRONT)
+    assert "added" in mouse.message and len(commands.now.light[0]) == 1
+    mouse.editor = ready(Head.load(folder, light=commands.now.light), folder, commands.now.light)
+    mouse._remove(at, FRONT)
+    assert commands.now.light == () and mouse.message == ""
+    mouse.can_add = False
+    mouse._add((at[0] + 60, at[1]), FRONT)
+    assert "omote edit" in mouse.message
