@@ -36,7 +36,7 @@ def test_a_smirk_is_made_and_saved_in_under_a_minute_without_typing(tmp_path: Pa
 
 @pytest.mark.slow
 @on_a_display
-def test_a_wrinkle_is_drawn_undone_redone_and_saved_in_two_minutes(tmp_path: Path) -> None:
+def test_a_wrinkle_is_drawn_and_saved_in_two_minutes_and_undone_and_redone_to_the_bit(tmp_path: Path) -> None:
     told, _ = wrinkle(tmp_path)
     assert told["seconds"] < 120.0 and told["slider"] == ["fold_1"] and told["points"] > 20
     assert told["undone to the bit"] and told["redone to the bit"]
