@@ -7,6 +7,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -18,12 +19,14 @@ from controller.base.paths import find_config
 from controller.body.body import Body
 from controller.face.face import head_indices
 from controller.face.overlays import Overlays
-from controller.face.point_editing import PointEditor, Screen
+from controller.face.point_editing import PointEditor
+from controller.face.skin_model import Screen
 from controller.panels.session.own_expressions import save_expression
 from controller.robot.anchors import anchor_places
 from controller.robot.robot import load_robot
 from controller.stage.stage import load_stage
 from controller.vocabulary.vocabulary import Vocabulary
+from docs.window_steps import take
 from surface.head import Head
 from surface.view.pictures.offscreen import Offscreen
 from surface.view.scene.camera import Camera
@@ -31,6 +34,7 @@ from surface.view.scene.framing import framed
 
 PAGE, PICTURES = Path(__file__).with_name("walkthroughs.md"), Path(__file__).parent / "pictures"
 SIZE = (480, 480)
+WINDOW, CLOSE = (972, 547), (580, 160, 1040, 620)
 PULLS = (((28.6, -34.0, 102.0), (10.0, -16.0)), ((-44.0, 56.0, 97.0), (0.0, -14.0)))
 """Points of the skin (mm) and how far the mouse drags each, pixels."""
 _LONGEST_S = 60.0
@@ -62,6 +66,27 @@ def new_expression(folder: Path) -> tuple[Floats, Image.Image]:
     save_expression(folder / "mine.toml", "glee", values, Vocabulary.load(P), P)
     weights = Vocabulary.load(P, more=[folder / "mine.toml"])["glee"].weights
     return weights, beside([draw(head, P.neutral()), draw(head, weights)])
+
+
+def smirk(folder: Path) -> tuple[dict[str, Any], Image.Image]:
+    """Pull one corner of the mouth in a window and save it without typing; what was told, and the window."""
+    told = take("smirk", folder)
+    return told, Image.open(folder / "saved.png").convert("RGB").resize(WINDOW, Image.Resampling.LANCZOS)
+
+
+def wrinkle(folder: Path) -> tuple[dict[str, Any], Image.Image]:
+    """Draw a fold in a window and save it as a slider; what was told, and the window with the face before and after."""
+    told = take("wrinkle", folder)
+    before, drawn, slider = (
+        Image.open(folder / f"{name}.png").convert("RGB") for name in ("before", "drawn", "slider")
+    )
+    close = [each.crop(CLOSE).resize(SIZE, Image.Resampling.LANCZOS) for each in (before, slider)]
+    window = drawn.resize((WINDOW[0], WINDOW[1]), Image.Resampling.LANCZOS)
+    row = beside(close)
+    out = Image.new("RGB", (max(window.width, row.width), window.height + row.height + 12), "#888")
+    out.paste(window, (0, 0))
+    out.paste(row, (0, window.height + 12))
+    return told, out
 
 
 def servo_head(folder: Path) -> tuple[dict[str, float], Image.Image]:
@@ -150,7 +175,11 @@ def beside(pictures: list[Image.Image]) -> Image.Image:
 
 def main() -> None:
     """Write the pictures of the page."""
-    made = {"expression": lambda f: new_expression(f)[1], "anchors": lambda f: servo_head(f)[1], "phone": phone}
+    made = {
+        "expression": lambda f: new_expression(f)[1],
+        "smirk": lambda f: smirk(f)[1], "wrinkle": lambda f: wrinkle(f)[1],
+        "anchors": lambda f: servo_head(f)[1], "phone": phone,
+    }  # fmt: skip
     for name in sys.argv[1:] or made:
         with tempfile.TemporaryDirectory() as folder:
             made[name](Path(folder)).save(PICTURES / f"walkthrough-{name}.webp", quality=82)

@@ -147,6 +147,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (here / "mine.toml").write_text(
         "[glee]\nweights = { mouthSmile = 1 }\n"
         '[parameters.dimple]\nregion = "mouth"\nprofile = "mouth"\ngroup = "dimple.json"\n'
+        '[parameters.fold_1]\nregion = "mouth"\nprofile = "mouth"\ngroup = "dimple.json"\n'
     )
     (here / "me.toml").write_text("[ranges]\njawOpen = [0, 0.6]\n")
     (here / "dimple.json").write_text('{"format": 1, "name": "dimple", "part": "face", "ids": [1], '

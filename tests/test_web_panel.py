@@ -31,6 +31,10 @@ from tests.surface.small_head import small_head
 
 CHROMIUM = find_chromium()
 JAW = P.index("jawOpen")
+WIDER = """[...document.querySelectorAll('body *')].filter(each => each.offsetParent && each.tagName !== 'CANVAS'
+  && each.scrollWidth > each.clientWidth + 1 && getComputedStyle(each).overflowX !== 'visible')
+  .map(each => each.tagName + ' ' + each.id + ': ' + each.textContent.slice(0, 40))"""
+"""What holds more than it shows."""
 needs_chromium = pytest.mark.skipif(
     CHROMIUM is None, reason="no Chromium here; Debian, Ubuntu: sudo apt-get install chromium"
 )
@@ -102,6 +106,22 @@ def slide(browser: Page, name: str, value: float) -> None:
 
 
 @pytest.mark.slow
+@needs_chromium
+@pytest.mark.parametrize(("width", "height"), [(390, 844), (1280, 720)])
+def test_nothing_is_cut_or_needs_scrolling_sideways(tmp_path: Path, width: int, height: int) -> None:
+    with robot(tmp_path) as (_, _, where), page(CHROMIUM or "") as browser:
+        open_panel(browser, where, width, height)
+        for tab in ("express", "sliders", "shows", "servos", "links"):
+            browser.evaluate(f"document.getElementById('tab-{tab}').click()")
+            if tab == "links":
+                browser.wait("document.querySelectorAll('#link-list td').length > 0")
+            assert browser.evaluate(WIDER) == [], tab
+        broken = browser.evaluate(
+            "[...document.querySelectorAll('#link-list :is(th, td)')].filter(each => each.clientHeight > 40).length"
+        )
+        assert broken == 0  # an address on two lines
+
+
 @needs_chromium
 def test_a_phone_drives_the_head_and_stops_it_while_another_client_floods(tmp_path: Path) -> None:
     with robot(tmp_path) as (body, link, where), page(CHROMIUM or "") as browser:
@@ -181,8 +201,11 @@ def test_two_panels_show_each_others_changes_without_leaving_their_origin(tmp_pa
         browser.wait("document.querySelectorAll('.servo').length === 24")
         browser.evaluate("document.getElementById('tab-links').click()")
         browser.wait("document.querySelectorAll('#link-list td').length > 0")
-        head = browser.evaluate("[...document.querySelectorAll('#link-list th')].map(each => each.textContent)")
-        assert head == ["Link", "State", "In", "Jitter", "Lost", "Age", "Refused"]
+        head = browser.evaluate("[...document.querySelectorAll('#link-list thead th')].map(each => each.textContent)")
+        assert head == ["In", "Jitter", "Lost", "Age", "Refused"]
+        assert (
+            browser.evaluate("document.querySelector('#link-list tbody th').textContent") == "127.0.0.1:0 · 1 connected"
+        )
         loaded = browser.evaluate("performance.getEntriesByType('resource').map(each => new URL(each.name).host)")
         assert loaded and set(loaded) == {where}
         open_panel(browser, where, 1280, 720)  # again: what the browser has is not sent again

@@ -1,86 +1,33 @@
 """Points of the face that the mouse picks on the picture and drags in the plane of the screen.
 
-Dragging moves parameters; sculpting moves control points of the drawn head, which can be saved as a group file.
-Independent of the window library.
+Dragging moves parameters; sculpting moves control points of the drawn head, which can be saved as a group file. Light
+control points, which the user added to the head, are moved one by one. Independent of the window library.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from controller.base.parameters import Floats, Parameters
-from controller.robot.anchors import head_order, sample_skin, shapes_of, skin_points
-from controller.stage.inverse import GroupMoves, SculptSolver, save_group
-from controller.stage.pulling import Pin, PullSolver, lip_pairs
+from controller.face.sculpting import LightDrag, SculptDrag
+from controller.face.skin_lines import even_line, knots_round, mirrored
+from controller.face.skin_model import PART, Screen, turn_of
+from controller.face.skin_model import SkinModel as _Model
+from controller.stage.inverse import GroupMoves, save_group
+from controller.stage.pulling import Pin, PullSolver
 from surface.head import Head
-from surface.head.model.parameters import NAMES, read_pose, rotation
-from surface.view.scene.camera import Camera
+from surface.head.model.furrow import Furrow, even_moves, furrow_knots
+from surface.head.model.light import WEIGHT, LightPoints, join_light, with_points
+from surface.head.model.meshes import make_surface
 
-PART = "face"
-_POINTS = 900
-_SEED = 11
 _PICK_PIXELS, _HIDING_PIXELS, _HIDDEN_MM = 16.0, 48.0, 40.0
 _LEAST_CHANGE, _LEAST_MM = 0.004, 0.01
-
-
-@dataclass(frozen=True)
-class Screen:
-    """The projection of a picture: its camera and its size (width, height) in pixels."""
-
-    camera: Camera
-    size: tuple[float, float]
-
-    def project(self, places: Floats) -> Floats:
-        """(m, 3) pixel x, pixel y and depth of places (m, 3) mm."""
-        clip = np.column_stack([places, np.ones(len(places))]) @ self._matrix.T
-        x, y = clip[:, 0] / clip[:, 3], clip[:, 1] / clip[:, 3]
-        return np.column_stack([(x + 1) / 2 * self.size[0], (1 - y) / 2 * self.size[1], clip[:, 3]])
-
-    def place(self, pixel: tuple[float, float], beside: Floats) -> Floats:
-        """(3,) mm: the place under a pixel, at the depth of the place ``beside`` : (3,)."""
-        clip = self._matrix @ np.append(beside, 1.0)
-        clip[0] = (2 * pixel[0] / self.size[0] - 1) * clip[3]
-        clip[1] = (1 - 2 * pixel[1] / self.size[1]) * clip[3]
-        found = np.linalg.solve(self._matrix, clip)
-        point: Floats = found[:3] / found[3]
-        return point
-
-    @property
-    def _matrix(self) -> Floats:
-        return self.camera.matrix(self.size[0] / self.size[1]).astype(np.float64)
-
-
-class _Model:
-    """Samples of a head, computed once: points of its skin, how shapes move them, and how control points do."""
-
-    def __init__(self, head: Head, parameters: Parameters) -> None:
-        part = head.part(PART)
-        self.order = head_order(NAMES, parameters)
-        self._head, self._all = head, head_order(head.parameters, parameters)
-        self.skin = sample_skin(head, PART, skin_points(head, PART, _POINTS, _SEED))
-        self.basis = part.surface.basis_matrix(self.skin.uv)
-        along_u, along_v = part.surface.derivatives(self.skin.uv)[1:]
-        normals = np.cross(along_u, along_v)
-        self.normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
-        if self.normals[np.argmax(self.skin.rest[:, 2]), 2] < 0.0:
-            self.normals = -self.normals
-        self.sculptor = SculptSolver(head, PART)
-        self.lips = lip_pairs(head, PART)
-        self.pivot = np.array(head.data.neck.pivot)
-        self._own = part.rig.own  # type: ignore[attr-defined]
-
-    def shown(self, values: Floats, moves: Floats) -> Floats:
-        """(m, 3) mm that control points moved by hand, ``moves`` (n, 3), and a user's own groups add to a face (P,)."""
-        amounts, moved = self._head.read_pose(values[self._all]).own, moves
-        for own in self._own:
-            moved = moved.copy()
-            moved[own.ids] += amounts[own.index] * own.moves
-        return np.asarray(self.basis @ moved)
+_MIDDLE_MM = 2.0  # a line whose mirror image lies nearer is its own mirror image
 
 
 class PointEditor:
@@ -89,16 +36,27 @@ class PointEditor:
     It samples a copy of the head, in a separate thread, when the user first picks a point.
 
     head : the head that is drawn; sculpting moves its control points. copy : loads the same head again.
+    light : the control points that the user has added, which are the head's last ones.
+
+    Between the head's own control points and these there may be light ones that saved groups have added. They move with
+    their groups alone: :attr:`moves` and :meth:`set_moves` leave them out.
     """
 
-    def __init__(self, head: Head, copy: Callable[[], Head], parameters: Parameters) -> None:
+    def __init__(
+        self, head: Head, copy: Callable[[], Head], parameters: Parameters, light: Sequence[LightPoints] = ()
+    ) -> None:
         self.head, self._rig, self._parameters = head, head.part(PART).rig, parameters  # type: ignore[attr-defined]
-        self._rest = self._rig.rest.copy()
+        self._rest, self.light = self._rig.rest.copy(), tuple(light)
+        n, added = len(self._rest), sum(len(each) for each in light)
+        self._free = np.arange(n) >= n - added  # the user's own, then also the head's own
+        self._heavy: NDArray[np.bool_] = head.part(PART).surface.weights > WEIGHT
+        self._free |= self._heavy
+        self._set: Floats = np.zeros((int(self._free.sum()), 3))
         self._moves: Floats = np.zeros_like(self._rest)
         self._before = self._moves
         self._model: _Model | None = None
-        self._held: _PointDrag | _SculptDrag | None = None
-        self._asked: tuple[tuple[float, float], Screen, Floats, bool, bool] | None = None
+        self._held: _PointDrag | SculptDrag | LightDrag | None = None
+        self._asked: tuple[tuple[float, float], Screen, Floats, bool, bool, float | None] | None = None
         self._pins: dict[int, Floats] = {}
         self._settled = False
         self._last: int | None = None
@@ -121,8 +79,13 @@ class PointEditor:
 
     @property
     def moves(self) -> Floats:
-        """(n, 3) mm that the control points were moved by; another array after each change."""
-        return self._moves
+        """(n, 3) mm that control points were moved by, those the user added last; another array after each change."""
+        return self._set
+
+    @property
+    def own(self) -> int:
+        """How many control points the head has without those that were added."""
+        return int(self._heavy.sum())
 
     @property
     def sculpted(self) -> bool:
@@ -135,25 +98,27 @@ class PointEditor:
             self._thread.start()
 
     def take(
-        self, pixel: tuple[float, float], screen: Screen, values: Floats, *, sculpt: bool = False, tied: bool = False
-    ) -> bool:
+        self, pixel: tuple[float, float], screen: Screen, values: Floats, *, sculpt: bool = False, tied: bool = False,
+        falloff_mm: float | None = None,
+    ) -> bool:  # fmt: skip
         """Take the point of the skin under a pixel; False when there is none.
 
         One that is asked for while points get ready is taken by :meth:`drag` as soon as they are, where it was then.
 
         ``values`` : (P,) parameters of the shown face. ``sculpt`` : move control points instead of parameters.
-        ``tied`` : both sides of the face change alike.
+        ``tied`` : both sides of the face change alike. ``falloff_mm`` : see :class:`.sculpting.SculptDrag`.
         """
         self._settled = False
         if self._model is None:
-            self._asked = (pixel, screen, values.copy(), sculpt, tied)
+            self._asked = (pixel, screen, values.copy(), sculpt, tied, falloff_mm)
             self.prepare()
             return True
-        return self._take(self._model, pixel, screen, values, sculpt, tied)
+        return self._take(self._model, pixel, screen, values, sculpt, tied, falloff_mm)
 
     def _take(
-        self, model: _Model, pixel: tuple[float, float], screen: Screen, values: Floats, sculpt: bool, tied: bool
-    ) -> bool:
+        self, model: _Model, pixel: tuple[float, float], screen: Screen, values: Floats, sculpt: bool, tied: bool,
+        falloff_mm: float | None,
+    ) -> bool:  # fmt: skip
         places, turn = self._places(model, values)
         shown = screen.project(places)
         towards = np.einsum("mc,mc->m", model.normals @ turn.T, np.array(screen.camera.eye) - places) > 0.0
@@ -164,11 +129,97 @@ class PointEditor:
             return False
         self._last = point
         offset = places[point] - screen.place(pixel, places[point])
-        self._held = _SculptDrag(model, point, places[point], offset) if sculpt else _PointDrag(
+        self._held = SculptDrag(
+            model, point, places[point], offset, self._heavy, falloff_mm, tied=tied
+        ) if sculpt else _PointDrag(
             model, point, places[point], offset, self._parameters, values, model.shown(values, self._moves), self._pins,
             tied=tied,
         )  # fmt: skip
         return True
+
+    def take_light(
+        self, pixel: tuple[float, float], screen: Screen, values: Floats, *, tied: bool = False
+    ) -> int | None:  # fmt: skip
+        """Take the control point that the user added nearest to a pixel, with that on the other side where ``tied``;
+        returns its number among these. None where there is none, or points are not ready."""
+        self._settled = False
+        model, found = self._model, self.light_at(pixel, screen, values)
+        if model is None or found is None:
+            return None
+        centres = self._centres()
+        rest = model.surface.evaluate(centres)
+        across = np.linalg.norm(rest - rest[found] * [-1.0, 1.0, 1.0], axis=1)
+        other = int(np.argmin(across))
+        both = [found, other] if tied and other != found and across[other] < _MIDDLE_MM else [found]
+        place = model.places_of(centres[found : found + 1], values, self._moves)[0]
+        ids = len(self._rest) - len(centres) + np.array(both)
+        self._held = LightDrag(model, ids, centres[both], place, place - screen.place(pixel, place))
+        return found
+
+    def light_at(self, pixel: tuple[float, float], screen: Screen, values: Floats) -> int | None:
+        """Number of the control point that the user added nearest to a pixel; None for none near."""
+        shown = self.light_pixels(screen, values)
+        if not shown:
+            return None
+        away = np.hypot(*(np.array(shown) - pixel).T)
+        return int(np.argmin(away)) if away.min() < _PICK_PIXELS else None
+
+    def light_pixels(self, screen: Screen, values: Floats) -> list[tuple[float, float]]:
+        """Where the control points that the user added are in the picture."""
+        centres = self._centres()
+        if self._model is None or not len(centres):
+            return []
+        shown = screen.project(self._model.places_of(centres, values, self._moves))
+        return [(float(x), float(y)) for x, y, _ in shown]
+
+    def _centres(self) -> Floats:
+        own = [each.centres for each in self.light]
+        return np.concatenate([np.zeros((0, 2)), *own])
+
+    def point_at(
+        self, pixel: tuple[float, float], screen: Screen, values: Floats, reach_mm: float, *, tied: bool = False
+    ) -> LightPoints | None:
+        """A control point to add under a pixel, and on the other side of the face where ``tied``; None beside the face.
+
+        reach_mm : how far from its middle it moves the skin.
+        """
+        model = self._model
+        uv = np.zeros((0, 2)) if model is None else model.under(np.array([pixel]), screen, values)
+        if model is None or not np.isfinite(uv).all():
+            return None
+        at = [uv, *([mirrored(model.surface, uv, *model.mesh_rest)] if tied and self._aside(model, uv) else [])]
+        knots = [knots_round(model.surface, each[0], reach_mm) for each in at]
+        return LightPoints(PART, *(np.concatenate([pair[k] for pair in knots]) for k in range(2)))
+
+    def wrinkle(
+        self, pixels: Sequence[tuple[float, float]], screen: Screen, values: Floats, depth_mm: float, width_mm: float,
+        *, tied: bool = False,
+    ) -> tuple[LightPoints, Floats] | None:  # fmt: skip
+        """Control points (k) to add along a line of pixels, and how they sink the skin to a furrow, (k, 3) mm.
+
+        None where the line is too short, or not on the face. ``tied`` : another one on the other side of the face.
+        """
+        model = self._model
+        if model is None:
+            return None
+        line = even_line(model.surface, model.under(np.array(pixels), screen, values), width_mm)
+        if not len(line):
+            return None
+        other = tied and self._aside(model, line)
+        lines = [line, *([mirrored(model.surface, line, *model.mesh_rest)] if other else [])]
+        furrows = [Furrow(each, depth_mm, width_mm) for each in lines]
+        knots = [furrow_knots(each, model.surface) for each in furrows]
+        light = LightPoints(PART, *(np.concatenate([pair[k] for pair in knots]) for k in range(2)))
+        surface, first = make_surface(with_points(model.data, light)), model.surface.n
+        ids = [first + np.arange(len(line)) + i * len(line) for i in range(len(lines))]
+        moves = [even_moves(each, surface, own) for each, own in zip(furrows, ids, strict=True)]
+        return light, np.concatenate(moves)
+
+    @staticmethod
+    def _aside(model: _Model, uv: Floats) -> bool:
+        """Whether places (k, 2) are not their own mirror images."""
+        places = model.surface.evaluate(uv)
+        return bool(np.abs(places[:, 0]).min() > _MIDDLE_MM)
 
     def drag(self, pixel: tuple[float, float], screen: Screen, values: Floats) -> dict[int, float]:
         """Move the held point under a pixel; returns indices of parameters and the values to hold them at."""
@@ -182,12 +233,12 @@ class PointEditor:
         if held is None or model is None:
             return {}
         wanted = screen.place(pixel, held.place) + held.offset
-        turn = _turn(values[model.order])
+        turn = turn_of(values[model.order])
         local = model.pivot + turn.T @ (wanted - model.pivot)
         if isinstance(held, _PointDrag):
             return held.solve(local, turn.T @ (wanted - np.array(screen.camera.eye)))
         moves = self._before.copy()
-        moves[held.ids] += held.share[:, None] * (turn.T @ (wanted - held.place))
+        moves[held.ids] += held.share * (turn.T @ (wanted - held.place))
         self._set_moves(moves)
         return {}
 
@@ -199,7 +250,7 @@ class PointEditor:
     def pin(self, values: Floats) -> None:
         """Pin the held point where it is in the face ``values`` (P,); later pulls of others leave it there."""
         if isinstance(self._held, _PointDrag) and self._model is not None:
-            self._pins[self._held.point] = self._local(self._model, values)[self._held.point]
+            self._pins[self._held.point] = self._model.local(values, self._moves)[self._held.point]
 
     def unpin(self) -> None:
         """Let go of all pinned points."""
@@ -214,7 +265,7 @@ class PointEditor:
         """Where the pinned points shall be in the picture."""
         if self._model is None or not self._pins:
             return []
-        turn, pivot = _turn(values[self._model.order]), self._model.pivot
+        turn, pivot = turn_of(values[self._model.order]), self._model.pivot
         shown = screen.project(pivot + (np.array(list(self._pins.values())) - pivot) @ turn.T)
         return [(float(x), float(y)) for x, y, _ in shown]
 
@@ -228,13 +279,41 @@ class PointEditor:
 
     def set_moves(self, moves: Floats | None) -> None:
         """Move the control points by (n, 3) mm from where they were at first; None for not at all."""
-        self._set_moves(np.zeros_like(self._rest) if moves is None else moves)
+        every = np.zeros_like(self._rest)
+        if moves is not None:
+            every[self._free] = moves
+        self._set_moves(every, moves)
         self.release()
 
+    def fitted(self, moves: Floats | None, light: Sequence[LightPoints]) -> Floats | None:
+        """(n, 3) moves that were made of a head with the added points ``light``, for this one; None for another head.
+
+        Points that only one of the two has do not move.
+        """
+        own, added = self.own, sum(len(each) for each in light)
+        if moves is None or len(moves) - added != own:
+            return None
+        if tuple(light) == self.light:
+            return moves
+        out = np.zeros_like(self._set)
+        out[:own] = moves[:own]
+        same, row = 0, own
+        while same < min(len(light), len(self.light)) and light[same] is self.light[same]:
+            row += len(light[same])
+            same += 1
+        out[own:row] = moves[own:row]
+        return out
+
     def group(self) -> GroupMoves:
-        """The control points that were moved."""
-        ids = np.flatnonzero(np.linalg.norm(self._moves, axis=1) >= _LEAST_MM).astype(np.int32)
-        return GroupMoves(PART, ids, self._moves[ids])
+        """The control points that were moved, and those that were added and moved."""
+        moved = np.linalg.norm(self._set, axis=1) >= _LEAST_MM
+        own = self.own
+        ids = np.flatnonzero(moved[:own]).astype(np.int32)
+        found, added = GroupMoves(PART, ids, self._set[ids]), np.flatnonzero(moved[own:])
+        if not len(added):
+            return found
+        light = join_light(self.light)[PART].take(added)
+        return GroupMoves(PART, ids, found.moves, light, self._set[own + added])
 
     def last_pull(self, values: Floats) -> tuple[Floats, Floats]:
         """(3,) mm where the point that was held last lies at rest, and (3,) mm how far the face ``values`` (P,) and
@@ -242,27 +321,20 @@ class PointEditor:
         if self._model is None or self._last is None:
             return np.zeros(3), np.zeros(3)
         place = self._model.skin.rest[self._last]
-        return place, self._local(self._model, values)[self._last] - place
+        return place, self._model.local(values, self._moves)[self._last] - place
 
     def save(self, path: Path, name: str) -> None:
         """Write the moved control points as a group file; a stage adds it with ``groups``. Raises ControllerError."""
         save_group(path, name, self.group())
 
-    def _set_moves(self, moves: Floats) -> None:
-        self._moves = moves
+    def _set_moves(self, moves: Floats, free: Floats | None = None) -> None:
+        self._moves, self._set = moves, moves[self._free] if free is None else free
         np.add(self._rest, moves, out=self._rig.rest)
         self._rig.invalidate()
 
     def _places(self, model: _Model, values: Floats) -> tuple[Floats, Floats]:
         """(m, 3) mm where the points are in the picture, and the head's rotation (3, 3)."""
-        turn = _turn(values[model.order])
-        return model.pivot + (self._local(model, values) - model.pivot) @ turn.T, turn
-
-    def _local(self, model: _Model, values: Floats) -> Floats:
-        """(m, 3) mm where the points are, head not turned."""
-        moved = model.skin.displacement(shapes_of(values, model.order))
-        local: Floats = model.skin.rest + moved + model.shown(values, self._moves)
-        return local
+        return model.turned(model.local(values, self._moves), values)
 
     def _prepare(self, copy: Callable[[], Head]) -> None:
         model = _Model(copy(), self._parameters)
@@ -302,17 +374,3 @@ class _PointDrag:
         changed = at[np.abs(found[at] - self._returned[at]) > _LEAST_CHANGE]
         self._returned[changed] = found[changed]
         return {int(i): float(found[i]) for i in changed}
-
-
-class _SculptDrag:
-    """A held point that control points ``ids`` : (k,) follow in every direction, each by its ``share`` : (k,)."""
-
-    def __init__(self, model: _Model, point: int, place: Floats, offset: Floats) -> None:
-        self.place, self.offset = place, offset
-        unit = model.sculptor.solve(model.skin.uv[point : point + 1], np.array([[1.0, 0.0, 0.0]]), least_mm=1e-4)
-        self.ids, self.share = unit.ids, unit.moves[:, 0]
-
-
-def _turn(head_values: Floats) -> Floats:
-    """(3, 3) rotation of the head for values (h,) in its own order."""
-    return rotation(*read_pose(head_values).head)

@@ -8,7 +8,9 @@ displacements that bring the points there exactly, which can be kept as a group 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,6 +29,7 @@ from surface.base import files
 from surface.base.extras import require
 from surface.head import Head
 from surface.head.model.data import HeadData
+from surface.head.model.light import LightPoints, join_light
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix  # start-up: only sculpting needs it
@@ -109,11 +112,15 @@ class GroupMoves:
     """Control points of one part that move together: what a head calls a group.
 
     part : the part. ids : (k,) int32 control points. moves : (k, 3) mm per unit.
+    light : control points that the group adds to the part, see :mod:`surface.head.model.light`; None for none.
+    light_moves : (j, 3) mm per unit of these.
     """
 
     part: str
     ids: NDArray[np.int32]
     moves: Floats
+    light: LightPoints | None = None
+    light_moves: Floats = field(default_factory=lambda: np.zeros((0, 3)))
 
 
 class SculptSolver:
@@ -180,42 +187,61 @@ def add_group(head: Head, group: GroupMoves, amount: float = 1.0) -> None:
     rig.invalidate()
 
 
+class LightPoint(Settings, extra="ignore"):
+    """A control point that a group adds: its knots in u and v, and its displacement."""
+
+    u: tuple[Finite, Finite, Finite, Finite, Finite]
+    v: tuple[Finite, Finite, Finite, Finite, Finite]
+    move_mm: tuple[Finite, Finite, Finite]
+
+
 class GroupFile(Settings, extra="ignore"):
-    """The contents of a group file: control points ``ids`` of a part and their displacements."""
+    """The contents of a group file: control points ``ids`` of a part and their displacements, and those it adds."""
 
     name: str = ""
     part: str
     ids: list[Annotated[int, Field(ge=0)]]
     moves_mm: list[tuple[Finite, Finite, Finite]]
+    light: list[LightPoint] = []
 
 
 def save_group(path: Path, name: str, group: GroupMoves) -> None:
     """Write a group file, whole or not at all; see docs/expression.md."""
-    table = {
+    table: dict[str, object] = {
         "format": FORMAT,
         "name": name,
         "part": group.part,
         "ids": group.ids.tolist(),
         "moves_mm": np.round(group.moves, 5).tolist(),
     }
+    if group.light is not None:
+        rows = zip(group.light.knots_u.tolist(), group.light.knots_v.tolist(), group.light_moves.tolist(), strict=True)
+        table["light"] = [{"u": u, "v": v, "move_mm": [round(x, 3) for x in move]} for u, v, move in rows]
     with replacing(path) as temporary:
         temporary.write_text(json.dumps(table) + "\n", encoding="utf-8")
 
 
 def load_group(path: Path, head: HeadData) -> tuple[str, GroupMoves]:
-    """Read a group file for a head; returns its name and content.
+    """Read a group file for a head without the control points that groups add; returns its name and content.
 
     Raises ConfigError, with every fault, when the file cannot be read, is no group file, or does not fit the head.
     """
-    counts = {part.name: len(part.points) for part in head.parts}
+    return read_group(path, {part.name: len(part.points) for part in head.parts})
+
+
+def read_group(path: Path, counts: Mapping[str, int] | None = None) -> tuple[str, GroupMoves]:
+    """Read a group file; returns its name and content. ``counts`` : control points of the head's parts, if it is to fit
+    one. Errors as :func:`load_group`."""
 
     def misfits(group: GroupFile) -> list[str]:
-        if group.part not in counts:
-            return [f"part: the head has no part {group.part!r}"]
         faults = []
         if len(group.moves_mm) != len(group.ids):
             faults.append(f"moves_mm: must be {len(group.ids)} rows of 3")
-        if max(group.ids, default=0) >= counts[group.part]:
+        if any(b <= a for each in group.light for k in (each.u, each.v) for a, b in pairwise(k)):
+            faults.append("light: knots must rise")
+        if counts is not None and group.part not in counts:
+            return [f"part: the head has no part {group.part!r}"]
+        if counts is not None and max(group.ids, default=0) >= counts[group.part]:
             faults.append(f"ids: a control point that is not there (0 to {counts[group.part] - 1})")
         return faults
 
@@ -226,4 +252,29 @@ def load_group(path: Path, head: HeadData) -> tuple[str, GroupMoves]:
         raise config_error(path, [fault])
     group = check(table, GroupFile, path, misfits)
     moves = np.array(group.moves_mm, dtype=np.float64).reshape(-1, 3)
-    return group.name or path.stem, GroupMoves(group.part, np.array(group.ids, dtype=np.int32), moves)
+    found = GroupMoves(group.part, np.array(group.ids, dtype=np.int32), moves)
+    if group.light:
+        u, v, added = (np.array([getattr(each, key) for each in group.light]) for key in ("u", "v", "move_mm"))
+        found = replace(found, light=LightPoints(group.part, u, v), light_moves=added)
+    return group.name or path.stem, found
+
+
+def light_of(groups: Sequence[GroupMoves]) -> list[LightPoints]:
+    """The control points that groups add to a head, in their order."""
+    return [group.light for group in groups if group.light is not None]
+
+
+def placed_groups(groups: Sequence[GroupMoves], head: HeadData, more: Sequence[LightPoints] = ()) -> list[GroupMoves]:
+    """Groups with the numbers that their own control points have in a head that was loaded with :func:`light_of`
+    ``groups`` and, behind these, with ``more``."""
+    added = {name: len(own) for name, own in join_light([*light_of(groups), *more]).items()}
+    first = {part.name: len(part.points) - added.get(part.name, 0) for part in head.parts}
+    out = []
+    for group in groups:
+        count = len(group.light_moves)
+        ids = first.get(group.part, 0) + np.arange(count, dtype=np.int32)
+        if count:
+            first[group.part] += count
+        moves = np.concatenate([group.moves, group.light_moves])
+        out.append(GroupMoves(group.part, np.concatenate([group.ids, ids]).astype(np.int32), moves))
+    return out

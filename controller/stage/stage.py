@@ -35,6 +35,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
     from surface.head import Head  # start-up: the body reads stages and draws nothing
+    from surface.head.model.light import LightPoints  # start-up: the same
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 
@@ -158,11 +159,11 @@ class Stage:
         """Length of a control tick."""
         return 1.0 / self.settings.control_hz
 
-    def load_head(self) -> Head:
+    def load_head(self, light: Sequence[LightPoints] = ()) -> Head:
         """The stage's head with its persons, identity and groups; see :func:`load_head`."""
         dressed = self.settings.face.dressed
         groups, own = self.groups, self.own_groups
-        return load_head(self.head, self.settings.identity, groups, self.persons, dressed=dressed, own=own)
+        return load_head(self.head, self.settings.identity, groups, self.persons, dressed=dressed, own=own, light=light)
 
     def state(
         self, parameters: Parameters | None = None, seed: int | None = None, period_s: float | None = None
@@ -195,23 +196,43 @@ def heads_of(stage: Stage) -> tuple[Stage, ...]:
 def load_head(
     folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]],
     persons: Sequence[tuple[Person, float]] = (), *, dressed: bool = True,
-    own: Mapping[str, PointGroup] = MappingProxyType({}),
+    own: Mapping[str, PointGroup] = MappingProxyType({}), light: Sequence[LightPoints] = (),
 ) -> Head:  # fmt: skip
     """A head as one of ``persons`` or their mixture, with identities and groups added, each by its amount.
 
     dressed : with hair and clothes; a mask wears none. own : control points that own parameters move.
+    light : control points that are added behind those of the groups.
 
     Raises SurfaceError when the head cannot be read, ConfigError when a group does not fit it.
     """
-    from controller.stage.inverse import add_group, load_group  # start-up: as Head
+    from controller.stage.inverse import add_group, light_of, placed_groups, read_group  # start-up: as Head
     from surface.head import Head, OwnGroup  # start-up: the body reads stages and draws nothing
 
-    head = Head.load(folder, mixed_identity(persons, identity), mixed_look(persons, dressed=dressed))
-    for path, amount in groups:
-        add_group(head, load_group(path, head.data)[1], amount)
-    found = {name: load_group(group.file, head.data)[1] for name, group in own.items()}
-    head.add_groups([OwnGroup(name, g.part, g.ids, g.moves, own[name].times) for name, g in found.items()])
+    files = [*(path for path, _ in groups), *(group.file for group in own.values())]
+    found = [read_group(path)[1] for path in files]
+    every = [*light_of(found), *light]
+    try:
+        head = Head.load(folder, mixed_identity(persons, identity), mixed_look(persons, dressed=dressed), every)
+    except ValueError as error:
+        hint = "make the group again on this head, or take it out of the stage"
+        raise ConfigError(f"{folder}: control points of a group do not fit this head: {error}", hint=hint) from error
+    _check_groups(files, head, every)
+    placed = placed_groups(found, head.data, light)
+    for (_, amount), group in zip(groups, placed, strict=False):
+        add_group(head, group, amount)
+    named = zip(own.items(), placed[len(groups) :], strict=True)
+    head.add_groups([OwnGroup(name, g.part, g.ids, g.moves, each.times) for (name, each), g in named])
     return head
+
+
+def _check_groups(files: Sequence[Path], head: Head, light: Sequence[LightPoints]) -> None:
+    """Raise ConfigError for the first group file that does not fit a head, which has ``light`` besides its own."""
+    from controller.stage.inverse import read_group  # start-up: as Head
+
+    added = {part.name: sum(len(each) for each in light if each.part == part.name) for part in head.data.parts}
+    counts = {part.name: len(part.points) - added[part.name] for part in head.data.parts}
+    for path in files:
+        read_group(path, counts)
 
 
 def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 Side = Literal["left", "right", "bottom"]
 MAIN = "MainDockSpace"
-_WIDEST = 0.4
-_SHARES: dict[Side, float] = {"left": 21.0, "right": 21.0, "bottom": 13.0}
+_WIDEST, _WIDEST_OF_TWO = 0.44, 0.4  # share of the window that a column takes, and each of two
+_SHARES: dict[Side, float] = {"left": 22.0, "right": 22.0, "bottom": 13.0}
 """Width of a column and height of a row, in heights of a line of text."""
 
 
@@ -78,9 +78,11 @@ def add_docks(runner: Any, params: Any, docks: Sequence[Dock], size: tuple[float
     window.default_imgui_window_type = runner.DefaultImGuiWindowType.provide_full_screen_dock_space
     docking, rest = params.docking_params, 1.0
     docking.main_dock_space_node_flags = imgui.DockNodeFlags_.passthru_central_node
-    for side in dict.fromkeys(dock.side for dock in docks):
+    sides = dict.fromkeys(dock.side for dock in docks)
+    widest = _WIDEST_OF_TWO if {"left", "right"} <= sides.keys() else _WIDEST
+    for side in sides:
         across = size[1] if side == "bottom" else size[0] * rest
-        share = min(_SHARES[side] * line / across, _WIDEST)
+        share = min(_SHARES[side] * line / across, widest)
         docking.docking_splits += [runner.DockingSplit(MAIN, side, places[side], share)]
         rest *= 1.0 if side == "bottom" else 1.0 - share
     windows = [_window(runner, dock) for dock in docks]

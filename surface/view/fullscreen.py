@@ -42,6 +42,19 @@ def glfw_window() -> tuple[Any, Any]:
         return None, None
 
 
+def desktop_scale() -> float:
+    """The desktop's factor on sizes under X11, before there is a window that tells it; 1 elsewhere."""
+    try:
+        import glfw  # optional, and after imgui_bundle, whose library it then uses
+
+        if not glfw.init() or glfw.get_platform() != glfw.PLATFORM_X11:
+            return 1.0
+        scale = glfw.get_monitor_content_scale(glfw.get_primary_monitor())
+        return max(float(scale[0]), 1.0)
+    except Exception:  # noqa: BLE001  no GLFW, or no monitor: text is as large as without
+        return 1.0
+
+
 def _nearest(glfw: Any, window: tuple[int, int, int, int]) -> Any:
     """The monitor that holds most of a window."""
     left, top, width, height = window

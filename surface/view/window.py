@@ -20,7 +20,7 @@ from surface.view.draw.alternating import Alternating
 from surface.view.draw.placing import Box, Placing
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import read_pixels
-from surface.view.fullscreen import glfw_window
+from surface.view.fullscreen import desktop_scale, glfw_window
 from surface.view.live import LiveDrawing
 from surface.view.scene.camera import Camera
 from surface.view.scene.choice import LEVELS, QualityChoice
@@ -105,7 +105,8 @@ def run_window(
     window.area = area or PictureArea()
     if docks and not kiosk:
         safe = [replace(dock, draw=window.as_callback(dock.draw)) for dock in docks]
-        add_docks(hello_imgui, params, safe, size, _LINE * text_scale(size[1], 1.0))
+        desktop = desktop_scale()
+        add_docks(hello_imgui, params, safe, size, _LINE * desktop * text_scale(size[1], desktop))
         window.docked = True
     if kiosk:
         geometry = params.app_window_params.window_geometry
@@ -303,6 +304,7 @@ class _Window:
                 style, name, size * scale if isinstance(size, float) else type(size)(size.x * scale, size.y * scale)
             )
         style.tab_min_width_shrink = _LEAST_TAB * scale  # in a small window titles are cut, and none is away
+        style.window_menu_button_position = self._imgui.Dir.none  # its room is that of a title
         style.font_scale_main = self._scaled = scale
 
     def panels(self) -> None:

@@ -8,11 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
+import numpy as np
+
 from controller.base.parameters import Floats
 from controller.body.messages import Hold, Live, LookAt, Neutral, PanelRequest, Show
 from controller.panels.session.look import Look
 from controller.takes.livelink import Take
 from controller.takes.timeline import Timeline
+from surface.head.model.light import LightPoints
 
 _CALM_S = 0.6
 _NOTHING_SHOWN = Show("neutral", 1.0)
@@ -25,6 +28,7 @@ class Settings:
     held : parameters by index and the values they are held at. expression : the one that is shown.
     gaze : the point that is looked at, see :class:`controller.body.messages.LookAt`. life : amount of idle motion.
     moves : (n, 3) mm that the control points of the face were moved by hand; None for none.
+    light : control points that were added to the face; they are the last of ``moves``.
     look : theme, quality, person and head; None for those of the stage.
     timeline : keys that become a show. take : the recording that is edited.
     """
@@ -34,6 +38,7 @@ class Settings:
     gaze: tuple[float, float, float] | None = None
     life: float = 0.0
     moves: Floats | None = None
+    light: tuple[LightPoints, ...] = ()
     look: Look | None = None
     timeline: Timeline = field(default_factory=Timeline)
     take: Take | None = None
@@ -53,6 +58,7 @@ class Commands:
 
     send : sends requests to the body. life : amount of idle motion at first.
     show_moves : draws the control points moved by (n, 3) mm, or where they were for None.
+    show_light : draws a face with added control points; set by who can.
     show_look : shows a look, or the first one for None; set by who can.
     """
 
@@ -63,6 +69,7 @@ class Commands:
         show_moves: Callable[[Floats | None], None] = lambda moves: None,
     ) -> None:
         self.send, self.show_moves = send, show_moves
+        self.show_light: Callable[[tuple[LightPoints, ...]], None] = lambda light: None
         self.show_look: Callable[[Look | None], None] = lambda look: None
         self.now = Settings(life=life)
         self._past: list[Settings] = []
@@ -119,8 +126,28 @@ class Commands:
         self.change(replace(self.now, life=amount), step)
 
     def move(self, moves: Floats | None, step: Hashable = None) -> None:
-        """Move control points."""
-        self.change(replace(self.now, moves=moves), step)
+        """Move control points; None puts all of them back, and takes those out that were added."""
+        light = self.now.light if moves is not None else ()
+        self.change(replace(self.now, moves=moves, light=light), step)
+
+    def add_points(self, light: LightPoints, moves: Floats, own: int) -> None:
+        """Add control points (k) to the face, moved by ``moves`` (k, 3); ``own`` : how many it has without any."""
+        before = np.zeros((own, 3)) if self.now.moves is None else self.now.moves
+        self.change(replace(self.now, moves=np.concatenate([before, moves]), light=(*self.now.light, light)))
+
+    def remove_point(self, number: int) -> None:
+        """Take out one of the control points that were added, by its number among them."""
+        moves = self.now.moves
+        if moves is None:
+            return
+        own, light = len(moves) - sum(map(len, self.now.light)), []
+        first = 0
+        for each in self.now.light:
+            kept = np.arange(len(each)) != number - first
+            light.append(each if kept.all() else each.take(np.flatnonzero(kept)))
+            first += len(each)
+        rest = np.delete(moves, own + number, axis=0)
+        self.change(replace(self.now, moves=rest, light=tuple(each for each in light if len(each))))
 
     def appear(self, look: Look | None) -> None:
         """Change the look."""
@@ -137,7 +164,7 @@ class Commands:
     def neutral(self) -> None:
         """Give everything back and return to the neutral face; idle motion, moved control points and the look stay."""
         self._remember()
-        kept = {name: getattr(self.now, name) for name in ("life", "moves", "look", "timeline", "take")}
+        kept = {name: getattr(self.now, name) for name in ("life", "moves", "light", "look", "timeline", "take")}
         self.now = Settings(**kept)
         self.send(Neutral(_CALM_S))
 
@@ -175,7 +202,9 @@ class Commands:
         before, self.now = self.now, to
         for request in _differences(before, to):
             self.send(request)
-        if before.moves is not to.moves:
+        if before.light != to.light:
+            self.show_light(to.light)
+        if before.moves is not to.moves or before.light != to.light:
             self.show_moves(to.moves)
         if before.look != to.look:
             self.show_look(to.look)

@@ -23,16 +23,20 @@ class Cancelled(Exception):
 class Job:
     """Work in a thread of its own.
 
-    title : for people. done : gets the result, in the window's thread.
+    title : for people. done : gets the result, in the window's thread. given_up : called there instead, where the user
+    cancels it or it fails.
 
     Attributes
     ----------
-    cancelled : the user does not want it any more. since_s : when it began.
+    cancelled : the user does not want it any more. replaced : another one does its work. since_s : when it began.
     """
 
-    def __init__(self, title: str, work: Callable[[Job], Any], done: Callable[[Any], None]) -> None:
-        self.title, self._work, self._done = title, work, done
-        self.cancelled = False
+    def __init__(
+        self, title: str, work: Callable[[Job], Any], done: Callable[[Any], None],
+        given_up: Callable[[], None] = lambda: None,
+    ) -> None:  # fmt: skip
+        self.title, self._work, self._done, self._given_up = title, work, done, given_up
+        self.cancelled = self.replaced = False
         self.since_s = time.monotonic()
         self._result: Any = None
         self._error: BaseException | None = None
@@ -56,9 +60,13 @@ class Job:
 
     def finish(self, problems: Problems) -> None:
         """Hand over the result, or tell the error; neither of a cancelled one."""
-        if self.cancelled:
+        if self.replaced:
             return
         try:
+            if self.cancelled or self._error is not None:
+                self._given_up()
+            if self.cancelled:
+                return
             if self._error is not None:
                 raise self._error
             self._done(self._result)
@@ -76,13 +84,21 @@ class Jobs:
         self.running: list[Job] = []
         self._problems = problems
 
-    def start(self, title: str, work: Callable[[Job], Any], done: Callable[[Any], None]) -> Job:
-        """Begin one; one of the same title that still runs is cancelled."""
-        for job in self.running:
-            job.cancelled = job.cancelled or job.title == title
-        job = Job(title, work, done)
+    def start(
+        self, title: str, work: Callable[[Job], Any], done: Callable[[Any], None],
+        given_up: Callable[[], None] = lambda: None,
+    ) -> Job:  # fmt: skip
+        """Begin one; one of the same title that still runs is dropped."""
+        self.drop(title)
+        job = Job(title, work, done, given_up)
         self.running.append(job)
         return job
+
+    def drop(self, title: str) -> None:
+        """Take nothing from jobs of a title: nobody needs them any more."""
+        for job in self.running:
+            if job.title == title:
+                job.cancelled = job.replaced = True
 
     def __call__(self) -> None:
         """Take the results of those that have ended."""

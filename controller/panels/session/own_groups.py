@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,6 +18,7 @@ from controller.stage.inverse import GroupMoves, save_group
 from controller.vocabulary.expression import read_expressions
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
+from surface.head.model.light import WEIGHT
 from surface.head.model.parameters import SHAPES
 
 _MOST_TIMES, _LEAST_VALUE, _LEAST_PRODUCT = 3, 0.1, 0.05
@@ -63,7 +65,7 @@ def save_corrective(
         raise ParameterError(
             "a corrective belongs to a face: none of its shapes is strong", hint="show the face, then move the skin"
         )
-    scaled = GroupMoves(group.part, group.ids, group.moves / product)
+    scaled = replace(group, moves=group.moves / product, light_moves=group.light_moves / product)
     entry = {**place._asdict(), "range": [0.0, 1.0], "rest": 1.0, "group": f"{name}.json", "times": list(times)}
     _save(path, name, scaled, {"parameters": {name: entry}}, known, parameters, earlier)
     return times
@@ -71,7 +73,7 @@ def save_corrective(
 
 def place_of(head: Head, group: GroupMoves) -> Place:
     """Region and profile of the shape that moves the same control points the most; the mouth's where none does."""
-    part = next(part for part in head.data.parts if part.name == group.part)
+    part, group = next(part for part in head.data.parts if part.name == group.part), _on_own_points(head, group)
     moved = {each.name: _shared(each.ids, each.moves, group) for each in part.groups if each.name in SHAPES}
     if not any(moved.values()):
         return Place("mouth", "mouth")
@@ -80,11 +82,21 @@ def place_of(head: Head, group: GroupMoves) -> Place:
     return Place(shape["region"], shape["profile"])
 
 
+def _on_own_points(head: Head, group: GroupMoves) -> GroupMoves:
+    """A group with those of the head's own control points that count most where it adds some."""
+    if group.light is None:
+        return group
+    share = head.part(group.part).surface.basis_matrix(group.light.centres)
+    ids = np.asarray(share.argmax(axis=1)).ravel()
+    moves = group.light_moves * WEIGHT
+    return GroupMoves(group.part, np.concatenate([group.ids, ids]), np.concatenate([group.moves, moves]))
+
+
 def _shared(ids: np.ndarray, moves: np.ndarray, group: GroupMoves) -> float:
     """How far a shape moves the control points of a group, each weighted with how far the group moves it."""
-    _, of_shape, of_group = np.intersect1d(ids, group.ids, return_indices=True)
-    far = np.linalg.norm(np.asarray(moves, float)[of_shape], axis=1) * np.linalg.norm(group.moves[of_group], axis=1)
-    return float(far.sum())
+    far = np.zeros(max(ids.max(initial=-1), group.ids.max(initial=-1)) + 1)
+    np.add.at(far, ids, np.linalg.norm(np.asarray(moves, float), axis=1))
+    return float((far[group.ids] * np.linalg.norm(group.moves, axis=1)).sum())
 
 
 def _strongest(face: Floats, parameters: Parameters) -> list[int]:
@@ -100,8 +112,10 @@ def _save(
     check_name(name, known)
     if (found := parameters.find(name)) is not None:
         raise ParameterError(f"there is a parameter {parameters.names[found]!r} already", hint="choose another name")
-    if not len(group.ids):
-        raise ParameterError("no control point was moved", hint="Ctrl, Shift and drag the skin first")
+    if not len(group.ids) and group.light is None:
+        raise ParameterError(
+            "no control point was moved", hint="Ctrl, Shift and drag the skin first, or draw a wrinkle: tab Sculpt"
+        )
     points = path.parent / f"{name}.json"
     if points.exists():
         raise ParameterError(f"{points}: there is such a file already", hint="choose another name")

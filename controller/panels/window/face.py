@@ -24,6 +24,7 @@ from controller.panels.window.heads import HeadChoice, HeadSource
 from controller.panels.window.looks import Looks
 from controller.panels.window.overlay_view import OverlayView
 from controller.panels.window.panel import Panel, PanelOptions
+from controller.panels.window.sculpting import SculptPanel
 from controller.stage.stage import FaceSettings, Stage
 from controller.vocabulary.controls import ControlsFile
 from surface.head import Head
@@ -82,10 +83,11 @@ class WindowFace:
             self._panel.calibrating.mirror = partial(self._mirror, panel_state)
         self.next_run: NextRun | None = None
         self._overlays: OverlayView | None = None
-        self._mouse = None
+        self._mouse, self._looks = None, None  # type: tuple[MouseEditing | None, Looks | None]
         if stage is not None and not settings.kiosk:
             looks = Looks(stage, self._swap, self._panel.jobs)
-            copy = looks.load
+            self._looks, copy = looks, looks.load
+            self._panel.commands.show_light = looks.show_light
             self._panel.add_looks(looks, self._restart)
             self._panel.saving.reopen = partial(self._open_again, stage, options or PanelOptions())
             self._overlays = OverlayView(
@@ -95,7 +97,10 @@ class WindowFace:
             choice.show = partial(self._turn_to, looks)
         if copy is not None and not settings.kiosk:
             self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area, parameters)
-            self._panel.more.append(self._mouse.draw_panel)
+            self._mouse.can_add = self._looks is not None
+            if self._looks is not None:
+                self._looks.keep_light = self._mouse.keep_points
+            self._panel.sculpt = SculptPanel(self._mouse, self._panel.commands)
             self._panel.saving.editor = self._mouse.find_editor
         self._devices = Devices(Controls(controls, parameters), ask) if controls else None
         self._log = FrameLog()
@@ -160,7 +165,7 @@ class WindowFace:
         self._values.follow(head.parameters)
         self._viewpoint.reframe(framing_of(head))
         if self._mouse is not None:
-            self._mouse.change(head)
+            self._mouse.change(head, self._looks.shown_light if self._looks is not None else ())
         if self._overlays is not None:
             self._overlays.forget()
 
@@ -173,6 +178,7 @@ class WindowFace:
         if self._overlays is not None:
             self._overlays.robots = stage.robots
         try:
+            looks.light = self._panel.commands.now.light
             looks.turn_to(stage, self._panel.commands.now.look)
         except OMOTE_ERRORS as error:
             self._panel.problems.add(error)

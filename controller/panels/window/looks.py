@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from controller.panels.session.commands import Commands
     from controller.stage.stage import Stage
     from surface.head import Head
+    from surface.head.model.light import LightPoints
 
-NOBODY = "nobody"
+NOBODY, _CHANGING = "nobody", "changing control points"
 _THEMES, _QUALITIES = (get_args(PictureSettings.model_fields[key].annotation) for key in ("theme", "quality"))
 
 
@@ -30,10 +31,18 @@ class Looks:
     """Changes the look of a stage's face.
 
     swap : draws a head with settings from now on. jobs : loads it.
+
+    Attributes
+    ----------
+    light : control points that were added to the face. shown_light : those of the head that was loaded last.
+    keep_light : makes these the added ones, where the user does not wait for others, or they cannot be loaded.
     """
 
     def __init__(self, stage: Stage, swap: Callable[[Head | None, FaceSettings], None], jobs: Jobs) -> None:
         self._swap, self._jobs = swap, jobs
+        self.light: tuple[LightPoints, ...] = ()
+        self.shown_light: tuple[LightPoints, ...] = ()
+        self.keep_light: Callable[[], None] = lambda: None
         self._begin(stage)
 
     def _begin(self, stage: Stage) -> None:
@@ -49,8 +58,24 @@ class Looks:
         self._shown = look or self.first
 
     def _load(self, stage: Stage, title: str) -> None:
-        face = stage.settings.face
-        self._jobs.start(title, lambda _: stage.load_head(), lambda head: self._swap(head, face))
+        face, asked = stage.settings.face, self.light
+        light = asked if stage.head == self.stage.head else ()
+
+        def done(head: Head) -> None:
+            if asked == self.light:  # else the next one is being loaded
+                self.shown_light = light
+                self._swap(head, face)
+
+        given_up = self.keep_light if title == _CHANGING else lambda: None
+        self._jobs.start(title, lambda _: stage.load_head(light), done, given_up)
+
+    def show_light(self, light: tuple[LightPoints, ...]) -> None:
+        """Show the face with control points that were added to it."""
+        self.light = light
+        if light != self.shown_light:
+            self._load(self._stage(self._shown), _CHANGING)
+            return
+        self._jobs.drop(_CHANGING)
 
     def show(self, look: Look | None) -> None:
         """Show a look; the first one without. What fails is reported, and the face stays."""
@@ -66,7 +91,7 @@ class Looks:
 
     def load(self) -> Head:
         """Load the head that is shown again, as it was."""
-        return self._stage(self._shown).load_head()
+        return self._stage(self._shown).load_head(self.shown_light)
 
     def _stage(self, look: Look) -> Stage:
         """The stage with a look. Raises ConfigError: no such person, or one that does not fit the head."""

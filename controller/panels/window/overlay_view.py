@@ -10,7 +10,7 @@ import numpy as np
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.face.face import head_indices
 from controller.face.overlays import KINDS, PART, Kind, Marks, Overlays
-from controller.face.point_editing import Screen
+from controller.face.skin_model import Screen
 from controller.panels.session.jobs import Jobs
 from controller.robot.anchors import anchor_places
 from surface.view.docks import PictureArea

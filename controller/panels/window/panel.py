@@ -75,7 +75,8 @@ class Panel:
 
     Attributes
     ----------
-    heads : the choice between several heads; None for one.
+    heads : the choice between several heads; None for one. sculpt : draws what the mouse does to the face; None for
+        nothing.
     """
 
     def __init__(
@@ -105,16 +106,17 @@ class Panel:
             self.calibrating = Calibrating(ServoCaptures(options.robots, options.folder), send, self.problems)
             self.servos, self.links = ServoBars(self.feed, self.calibrating), LinkList(self.feed)
         self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
-        self.more: list[Callable[[], None]] = []
+        self.sculpt: Callable[[], None] | None = None
         self.heads: HeadChoice | None = None
 
     def docks(self) -> list[Dock]:
         """The parts, as tabs beside the picture."""
         parts: dict[str, Callable[[], None]] = {
             "Faces": self.expressions,
-            "Sliders": self._sliders,
+            "Sliders": self.sliders,
+            **({"Sculpt": self.sculpt} if self.sculpt is not None else {}),
             "View": self.view,
-            "Timeline": self.timeline,
+            "Time": self.timeline,
         }
         if self.feed is not None:
             parts |= {"Servos": self.servos, "Links": self.links}
@@ -209,11 +211,6 @@ class Panel:
             imgui.end_child()
 
         return draw
-
-    def _sliders(self) -> None:
-        self.sliders()
-        for part in self.more:
-            part()
 
     def _stop_or_start(self, imgui: Any) -> None:
         """The button that stops the servos; while they are stopped, who did it and the button that ends that."""

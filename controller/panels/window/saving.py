@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from controller.base.errors import ControllerError, ParameterError
-from controller.base.parameters import PARAMETERS, Floats, Parameters
+from controller.base.parameters import PARAMETERS, Floats, Parameters, fold
 from controller.body.messages import Learn, PanelRequest
 from controller.face.point_editing import PointEditor
 from controller.panels.session.commands import Commands, History
@@ -24,6 +25,10 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 Kind = Literal["expression", "gesture", "group", "corrective", "anchor"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
+STEMS: dict[Kind, str] = {
+    "expression": "face", "gesture": "gesture", "group": "fold", "corrective": "corrective", "anchor": "anchor",
+}  # fmt: skip
+"""What a name begins with that omote chooses."""
 ABOUT: dict[Kind, str] = {
     "expression": "the present face, as a mood",
     "gesture": "the present face, which keeps the mood meanwhile",
@@ -73,25 +78,45 @@ class Saving:
 
         width = imgui.get_content_region_avail().x
         imgui.set_next_item_width(imgui.get_font_size() * 7.5)
-        changed, at = imgui.combo("##kind", KINDS.index(self.kind), list(KINDS))
-        self.kind = KINDS[at] if changed else self.kind
+        self._choose(imgui)
         imgui.same_line()
         imgui.set_next_item_width(max(width - imgui.get_font_size() * 12.5, imgui.get_font_size() * 4))
         entered, self._name = imgui.input_text_with_hint(
-            "##name", "its name", self._name, imgui.InputTextFlags_.enter_returns_true
+            "##name", self.suggested(self.kind), self._name, imgui.InputTextFlags_.enter_returns_true
         )
         imgui.same_line()
         if imgui.button("save##word") or entered:
             self.save(self._name)
         self._wrapped(imgui, self.message or ABOUT[self.kind])
 
+    def _choose(self, imgui: Any) -> None:
+        """The list of kinds."""
+        if not imgui.begin_combo("##kind", self.kind):
+            return
+        for kind in KINDS:
+            if imgui.selectable(f"{kind}##kind", kind == self.kind)[0]:
+                self.kind, self.message = kind, ""
+        imgui.end_combo()
+
+    def suggested(self, kind: Kind) -> str:
+        """A name that nothing has yet."""
+        words = self._words
+        known = {fold(name) for name in (*words.vocabulary.names, *words.parameters.names)}
+        names = (f"{STEMS[kind]}_{i}" for i in count(1))
+        return next(name for name in names if fold(name) not in known and not self._is_file(name))
+
+    def _is_file(self, name: str) -> bool:
+        folder = self._words.own.parent
+        return any((folder / file).exists() for file in (f"{name}.json", f"{name}-anchor.toml"))
+
     @staticmethod
     def _wrapped(imgui: Any, words: str) -> None:
         imgui.text_wrapped(words)
 
     def save(self, name: str, kind: Kind | None = None) -> None:
-        """Save under a name, as the chosen kind without ``kind``; what cannot be saved is told."""
-        name = name.strip()
+        """Save under a name, or one that omote chooses, as the chosen kind without ``kind``; what cannot be saved is
+        told."""
+        name = name.strip() or self.suggested(kind or self.kind)
         makers: dict[Kind, Callable[[str], str]] = {
             "expression": lambda name: self._expression(name, "user"),
             "gesture": lambda name: self._expression(name, "gesture"),
@@ -143,6 +168,6 @@ class Saving:
         """Open the window with the new parameter in place of the moved control points, and hold it."""
         history = self._commands.history
         if self.reopen is not None:
-            now = replace(history.now, moves=None)
+            now = replace(history.now, moves=None, light=())
             self.reopen(History(now, (*history.past, history.now), ()), held)
         return f"wrote {name} to {self._words.own}"

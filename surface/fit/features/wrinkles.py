@@ -17,27 +17,20 @@ from surface.fit.points.strokes import arc_length, evenly, smooth_line, uv_of
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, PartData, Rule
+from surface.head.model.furrow import Furrow, furrow_knots, furrow_moves
 from surface.head.model.meshes import make_surface
-from surface.head.model.parameters import smoothstep
 
 PREFIX = "wrinkle"  # of their groups' names
 DEEPENED = 1.5
 ALONG = 1.8  # distance of the points along a line, in widths of its furrow
-SPAN = 0.62  # of a knot, in widths across a line; along it spans are as long as the points are apart
-TAPER = 0.3  # share of a line's length over which its ends run out
-REGULARISATION = 0.03  # weight of moving no point, relative to that of the samples of an average one
-RIDGE = 0.35  # height of the skin along both sides of a furrow, in its depths
 
 
 @dataclass(frozen=True)
 class WrinkleLine:
-    """One line in the skin: places (k, 2) in (u, v), (k, 3) in mm; depth and width in mm; the group that sinks it."""
+    """One line in the skin, and the group that sinks it."""
 
     group: str
-    uv: Floats
-    line: Floats
-    depth: float
-    width: float
+    furrow: Furrow
 
 
 def add_wrinkles(
@@ -59,13 +52,13 @@ def add_wrinkles(
     if not lines:
         return face, []
     surface = make_surface(face)
-    knots = [_knots(f, surface) for f in lines]
+    knots = [furrow_knots(f.furrow, surface) for f in lines]
     face = _with_points(face, surface, np.concatenate([k[0] for k in knots]), np.concatenate([k[1] for k in knots]))
     first = np.cumsum([surface.n, *(len(k[0]) for k in knots)])
     groups: dict[str, list[tuple[Ints, Floats]]] = {}
     surface = make_surface(face)
     for f, a, b in zip(lines, first, first[1:], strict=False):
-        groups.setdefault(f.group, []).append(_depth_moves(f, surface, np.arange(a, b)))
+        groups.setdefault(f.group, []).append(_moves(f.furrow, surface, np.arange(a, b)))
     made = [
         Group(name, np.concatenate([i for i, _ in own]).astype(np.int32),
               np.concatenate([m for _, m in own]).astype(np.float32))
@@ -104,18 +97,7 @@ def _wrinkle_line(table: dict[str, Any], line: Floats, chart: Chart, mesh: FitMe
     at = np.column_stack([smooth, np.convolve(np.pad(z, 3, mode="edge"), np.full(7, 1 / 7), "valid")])
     width = float(table["width"])
     at = evenly(at, max(3, round(arc_length(at)[-1] / (ALONG * width)) + 1))
-    return WrinkleLine(table["group"], uv_of(chart, mesh, at), at, float(table["depth"]), width)
-
-
-def _knots(f: WrinkleLine, surface: DCPSurface) -> tuple[Floats, Floats]:
-    """Knots (k, 5) in u and in v: spans as wide as the furrow across it, as long as the points are apart along it."""
-    _, su, sv = surface.derivatives(f.uv)
-    along = np.abs(np.gradient(f.uv, axis=0))
-    out = []
-    for axis, slope in enumerate((su, sv)):
-        span = np.maximum(SPAN * f.width / np.linalg.norm(slope, axis=1), along[:, axis])
-        out.append(f.uv[:, axis, None] + span[:, None] * np.arange(-2.0, 3.0))
-    return out[0], out[1]
+    return WrinkleLine(table["group"], Furrow(uv_of(chart, mesh, at), float(table["depth"]), width))
 
 
 def _with_points(face: PartData, surface: DCPSurface, knots_u: Floats, knots_v: Floats) -> PartData:
@@ -144,28 +126,5 @@ def _with_points(face: PartData, surface: DCPSurface, knots_u: Floats, knots_v: 
     )
 
 
-def _depth_moves(f: WrinkleLine, surface: DCPSurface, ids: Ints) -> tuple[Ints, Floats]:
-    """The furrow's points and how they move when it is whole: along the skin's normals, in least squares."""
-    _, su, sv = surface.derivatives(f.uv)
-    normal = np.cross(su, sv)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    t = np.linspace(0.0, 1.0, len(f.uv))
-    ends = 0.15 + 0.85 * smoothstep(np.minimum(t, 1.0 - t) / TAPER)
-    x = np.linspace(-2.5, 2.5, 11)[:, None]  # across, in widths
-    profile = np.exp(-0.5 * (x / 0.5) ** 2) - RIDGE * np.exp(-0.5 * ((np.abs(x) - 1.3) / 0.5) ** 2)
-    samples = f.uv + (x * f.width)[..., None] * _sideways_step(f, su, sv)
-    matrix = surface.basis_matrix(samples.reshape(-1, 2)).tocsc()[:, ids].toarray()
-    normal_matrix = matrix.T @ matrix
-    normal_matrix += REGULARISATION * np.trace(normal_matrix) / len(ids) * np.eye(len(ids))
-    amount = np.linalg.solve(normal_matrix, matrix.T @ (-f.depth * profile * ends).ravel())
-    return ids, amount[:, None] * normal
-
-
-def _sideways_step(f: WrinkleLine, su: Floats, sv: Floats) -> Floats:
-    """(k, 2) step in (u, v) that is 1 mm of skin to the side of the line."""
-    tangent = np.gradient(f.uv, axis=0)
-    forward = tangent[:, :1] * su + tangent[:, 1:] * sv
-    normal = np.cross(su, sv)
-    left = np.cross(normal, forward)
-    left /= np.linalg.norm(left, axis=1)[:, None]
-    return (np.linalg.pinv(np.stack([su, sv], axis=2)) @ left[..., None])[..., 0]
+def _moves(f: Furrow, surface: DCPSurface, ids: Ints) -> tuple[Ints, Floats]:
+    return ids, furrow_moves(f, surface, ids)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from surface.base.arrays import Array, Floats32
 from surface.base.errors import HeadFileError
 from surface.head.model.sidecar import Sidecar, read_sidecar, sidecar_path, write_sidecar
 from surface.head.posing.part import HeadPart
+from surface.mesh.mesh import Mesh
 
 SHADE, DECIMATED = "occlusion.npz", "decimated.npz"
 LEVELS = ("full", "fast")
@@ -28,6 +30,17 @@ STEPS = 1 << 14  # of u and v per unit
 OFFSET = 1 / 3  # of a step: halves, quarters and so on never lie between two steps, where a last bit would decide
 Shares = Mapping[str, NDArray[np.floating]]
 Triangles = NDArray[np.int32]
+
+
+class Meshed(Protocol):
+    """What a file of baked arrays is checked against: a part's name and mesh, and whether that was stored."""
+
+    @property
+    def name(self) -> str: ...
+    @property
+    def mesh(self) -> Mesh: ...
+    @property
+    def stored(self) -> bool: ...
 
 
 def checksum(triangles: NDArray[np.integer], uv: NDArray[np.floating]) -> int:
@@ -42,7 +55,7 @@ def checksums(parts: Iterable[HeadPart]) -> dict[str, int]:
     return {part.name: checksum(part.mesh.triangles, part.mesh.uv) for part in parts}
 
 
-def _read(head: str | Path, file: str, parts: Iterable[HeadPart]) -> dict[str, Array]:
+def _read(head: str | Path, file: str, parts: Iterable[Meshed]) -> dict[str, Array]:
     """The arrays of a file that belong to these parts as they are tessellated; empty where there is no such file."""
 
     def matching(stored: Sidecar) -> dict[str, Array]:
@@ -61,7 +74,7 @@ def _read(head: str | Path, file: str, parts: Iterable[HeadPart]) -> dict[str, A
     return read_sidecar(path, matching, hint) or {}
 
 
-def read_shade(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, Floats32]:
+def read_shade(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Floats32]:
     """Shares (m, k), 0..1, by the name they are stored under; empty where the head has no such file.
 
     head : the head's folder or its head.toml.
@@ -99,7 +112,7 @@ def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:
                 part.attributes[name] = more
 
 
-def read_decimated(head: str | Path, parts: Iterable[HeadPart] = ()) -> dict[str, Triangles]:
+def read_decimated(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Triangles]:
     """Triangles (k, 3) by "PART/LEVEL", and :func:`tessellation_key` under "PART"; errors as :func:`read_shade`."""
     return {name: array.astype(np.int32) for name, array in _read(head, DECIMATED, parts).items()}
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from surface.base.errors import HeadFileError
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data
 from surface.head.model.identity import load_identities, with_identities
+from surface.head.model.light import LightPoints, Refined, with_light
 from surface.head.model.look import Look, with_age
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.own_groups import OwnAmounts, OwnGroup, OwnMoves
@@ -20,8 +22,8 @@ from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
 from surface.head.model.sway import Sway
 from surface.head.model.wardrobe import read_garment, with_garments
-from surface.head.posing.baked import apply_decimated, apply_shade, read_decimated, read_shade
 from surface.head.posing.dressing import dress
+from surface.head.posing.finer import apply_baked, coarser_of
 from surface.head.posing.looks import apply_look
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
@@ -56,14 +58,18 @@ class Head:
         self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
 
     @classmethod
-    def load(cls, path: str | Path, identity: Mapping[str, float] | None = None, look: Look | None = None) -> Head:
+    def load(
+        cls, path: str | Path, identity: Mapping[str, float] | None = None, look: Look | None = None,
+        light: Sequence[LightPoints] = (),
+    ) -> Head:  # fmt: skip
         """Read a head from its folder or its head.toml.
 
         identity : variations of the head to mix in, by name, each by 0 to 1.
         look : colours of a person, and what is worn; the head's own where it is None.
+        light : control points to add behind those of each part, see :mod:`surface.head.model.light`.
 
         Raises HeadFileError: a file is missing, damaged, cut short, of another version or made for another mesh (names
-        file and key), or the head has no identity of that name.
+        file and key), or the head has no identity of that name. ValueError: control points that cannot be added.
         """
         data = load_data(path)
         if identity:
@@ -79,10 +85,12 @@ class Head:
                     f"{path}: jaw.tilts.{shape}: is no shape",
                     hint="name a shape of the head",
                 )
+        refined: Mapping[str, Refined] = {}
+        if light:
+            data, refined = with_light(data, light, partial(coarser_of, path))
         try:
             head = cls(data, str(path))
-            apply_shade(head.parts, read_shade(path, head.parts))
-            apply_decimated(head.parts, read_decimated(path, head.parts))
+            apply_baked(path, head.parts, refined)
             if look is not None:
                 apply_look(head.parts, look, data.eyes)
                 dress(head.parts, garments)

@@ -12,7 +12,8 @@ import pytest
 from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
-from controller.face.point_editing import PointEditor, Screen
+from controller.face.point_editing import PointEditor
+from controller.face.skin_model import Screen
 from controller.stage.inverse import load_group
 from controller.stage.stage import load_stage
 from controller.tools.check import check_anything

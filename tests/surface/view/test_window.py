@@ -390,3 +390,44 @@ def test_seconds_are_counted_from_the_first_picture_or_the_first_call(monkeypatc
     window.seconds, asked = None, [True, False]
     window.keep_going = lambda: asked.pop(0)
     assert [closes(999.0), closes(999.0)] == [False, True]
+
+
+SCALED = """
+import json, subprocess, sys
+sys.path[:0] = [{root!r}, {here!r}]
+subprocess.run(["xrdb", "-merge"], input="Xft.dpi: {dpi}\\n", text=True, check=True)
+from ball_head import BallHead, values
+from imgui_bundle import imgui
+from surface.view import run_window
+from surface.view.docks import Dock, PictureArea
+told, area, frames = [], PictureArea(), [0]
+def panel():
+    frames[0] += 1
+    told[:] = [imgui.get_font_size(), imgui.get_window_size().x]
+run_window(BallHead(), lambda: values(), size=(1600, 900), docks=[Dock("a", "left", panel)], area=area,
+           keep_going=lambda: frames[0] < 8)
+print(json.dumps(told))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    shutil.which("xvfb-run") is None or shutil.which("xrdb") is None,
+    reason="needs xvfb-run and xrdb (apt-get install xvfb x11-xserver-utils)",
+)
+def test_text_and_panels_are_twice_as_large_on_a_desktop_at_200_percent() -> None:
+    here = Path(__file__).parents[1]
+
+    def told(dpi: int) -> list[float]:
+        program = SCALED.format(root=str(here.parents[1]), here=str(here), dpi=dpi)
+        screen = "-screen 0 1600x1200x24 -noreset"  # else what xrdb has set is lost with it
+        command = ["xvfb-run", "-a", "-s", screen, sys.executable, "-c", program]
+        environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
+        assert done.returncode == 0, done.stderr
+        found: list[float] = json.loads(done.stdout.splitlines()[-1])
+        return found
+
+    plain, doubled = told(96), told(192)
+    assert doubled[0] == pytest.approx(2 * plain[0], rel=0.02)
+    assert doubled[1] > 1.7 * plain[1]  # as wide as the window's share of panels allows

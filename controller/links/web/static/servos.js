@@ -59,11 +59,13 @@ export class Links {
     });
     this.#at = seconds;
     if (!visible) return;
-    const head = make("tr", {}, ...["Link", "State", "In", "Jitter", "Lost", "Age", "Refused"].map((text) => make("th", { scope: "col", text })));
-    const rows = links.map((link, i) => make("tr", {}, make("td", { text: link.port ?? "" }),
-      make("td", { text: link.fault || link.error || link.send_error || (link.clients == null ? "good" : `${link.clients} connected`) }), make("td", { text: `${(link.rate_hz ?? rates[i]).toFixed(0)} /s` }),
+    const head = make("tr", {}, ...["In", "Jitter", "Lost", "Age", "Refused"].map((text) => make("th", { scope: "col", text })));
+    const state = (link) => link.fault || link.error || link.send_error || (link.clients == null ? "good" : `${link.clients} connected`);
+    const rows = links.flatMap((link, i) => [
+      make("tr", {}, make("th", { scope: "colgroup", colspan: 5, text: `${link.port ?? ""} · ${state(link)}` })),
+      make("tr", {}, make("td", { text: `${(link.rate_hz ?? rates[i]).toFixed(0)} /s` }),
       make("td", { text: number(link.jitter_ms, "ms", 1) }), make("td", { text: String(link.lost ?? "") }), make("td", { text: number(link.age_s, "s", 1) }),
-      make("td", { text: String(Object.values(link.refused ?? {}).reduce((a, b) => a + b, 0)) })));
+      make("td", { text: String(Object.values(link.refused ?? {}).reduce((a, b) => a + b, 0)) }))]);
     $("link-list").replaceChildren(make("table", {}, make("thead", {}, head), make("tbody", {}, ...rows)));
   }
 }

@@ -46,6 +46,22 @@ def test_a_cancelled_or_replaced_job_changes_nothing() -> None:
     assert got == ["second"]
 
 
+def test_who_waits_for_a_job_hears_that_it_was_given_up_but_not_that_it_was_replaced() -> None:
+    jobs, heard, go = Jobs(Problems()), [], threading.Event()
+
+    def broken(job: Job) -> None:
+        raise ConfigError("head: no such file")
+
+    jobs.start("loading", lambda _: go.wait(30.0), heard.append, lambda: heard.append("replaced"))
+    jobs.start("loading", lambda _: go.wait(30.0), heard.append, lambda: heard.append("cancelled")).cancelled = True
+    jobs.start("reading", broken, heard.append, lambda: heard.append("failed"))
+    jobs.start("counting", lambda _: go.wait(30.0), heard.append, lambda: heard.append("dropped"))
+    jobs.drop("counting")
+    go.set()
+    finished(jobs)
+    assert sorted(heard) == ["cancelled", "failed"]
+
+
 def test_a_program_that_fails_says_why_and_a_cancelled_one_is_ended(tmp_path: Path) -> None:
     job = Job("fitting", lambda _: None, lambda _: None)
     with pytest.raises(ControllerError, match="fitting failed: no mesh here"):

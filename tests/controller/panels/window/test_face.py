@@ -73,7 +73,7 @@ import json
 
 import numpy as np
 from controller.face.face import HeadValues
-from controller.face.point_editing import Screen
+from controller.face.skin_model import Screen
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.body.messages import Hold

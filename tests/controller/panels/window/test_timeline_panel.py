@@ -115,7 +115,7 @@ def test_a_recording_is_cut_smoothed_saved_and_taken_back(desk: Desk, tmp_path: 
 def test_the_window_makes_a_show_of_two_keys(
     screen: Screen, monkeypatch: pytest.MonkeyPatch, desk: Desk, tmp_path: Path
 ) -> None:
-    places, draw = Places(screen.imgui, monkeypatch), drawn(desk.panel, "Timeline")
+    places, draw = Places(screen.imgui, monkeypatch), drawn(desk.panel, "Time")
 
     def click(label: str) -> None:
         screen.click(draw, *places.at[label])

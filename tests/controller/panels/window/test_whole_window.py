@@ -53,7 +53,7 @@ def act():
     actions = {
         3: lambda: focus("Servos"), 4: lambda: state.servos.toggle("head/3 servo3"), 8: lambda: grab("servos"),
         9: lambda: focus("Links"), 12: lambda: grab("links"),
-        13: lambda: keys(state), 14: lambda: focus("Timeline"), 17: lambda: grab("timeline"),
+        13: lambda: keys(state), 14: lambda: focus("Time"), 17: lambda: grab("timeline"),
         18: lambda: state.playback.scrub(0.5), 19: lambda: state.playback.stop(),
         20: lambda: face._overlays.switch("control points", on=True), 21: lambda: wait(state),
         22: lambda: focus("View"), 25: lambda: grab("overlays"), 26: lambda: drop("a.tsv"), 27: lambda: wait(state),

@@ -1,0 +1,136 @@
+"""What the mouse needs to know of a head: where points of its skin are in a picture, and what moves them.
+
+Independent of the window library.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from controller.base.parameters import Floats, Parameters
+from controller.face.skin_lines import uv_under
+from controller.robot.anchors import head_order, sample_skin, shapes_of, skin_points
+from controller.stage.inverse import SculptSolver
+from controller.stage.pulling import lip_pairs
+from surface.head import Head
+from surface.head.model.data import PartData
+from surface.head.model.parameters import NAMES, read_pose, rotation
+from surface.view.scene.camera import Camera
+
+PART = "face"
+_POINTS = 900  # among the mesh's vertices, which lie close where the face has features
+_BETWEEN = 600  # over its area, so that flat cheeks can be taken, too
+_SEED = 11
+
+
+@dataclass(frozen=True)
+class Screen:
+    """The projection of a picture: its camera and its size (width, height) in pixels."""
+
+    camera: Camera
+    size: tuple[float, float]
+
+    def project(self, places: Floats) -> Floats:
+        """(m, 3) pixel x, pixel y and depth of places (m, 3) mm."""
+        clip = np.column_stack([places, np.ones(len(places))]) @ self._matrix.T
+        x, y = clip[:, 0] / clip[:, 3], clip[:, 1] / clip[:, 3]
+        return np.column_stack([(x + 1) / 2 * self.size[0], (1 - y) / 2 * self.size[1], clip[:, 3]])
+
+    def place(self, pixel: tuple[float, float], beside: Floats) -> Floats:
+        """(3,) mm: the place under a pixel, at the depth of the place ``beside`` : (3,)."""
+        clip = self._matrix @ np.append(beside, 1.0)
+        clip[0] = (2 * pixel[0] / self.size[0] - 1) * clip[3]
+        clip[1] = (1 - 2 * pixel[1] / self.size[1]) * clip[3]
+        found = np.linalg.solve(self._matrix, clip)
+        point: Floats = found[:3] / found[3]
+        return point
+
+    @property
+    def _matrix(self) -> Floats:
+        return self.camera.matrix(self.size[0] / self.size[1]).astype(np.float64)
+
+
+class SkinModel:
+    """Samples of a head, computed once: points of its skin, how shapes move them, and how control points do."""
+
+    def __init__(self, head: Head, parameters: Parameters) -> None:
+        part = head.part(PART)
+        self.order = head_order(NAMES, parameters)
+        self._head, self._all = head, head_order(head.parameters, parameters)
+        self.skin = sample_skin(head, PART, np.concatenate([skin_points(head, PART, _POINTS, _SEED), _over_area(head)]))
+        self.basis = part.surface.basis_matrix(self.skin.uv)
+        along_u, along_v = part.surface.derivatives(self.skin.uv)[1:]
+        normals = np.cross(along_u, along_v)
+        self.normals = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-9)
+        if self.normals[np.argmax(self.skin.rest[:, 2]), 2] < 0.0:
+            self.normals = -self.normals
+        self.surface, self.jaw = part.surface, np.asarray(self.data.jaw, np.float64)
+        self.sculptor = SculptSolver(head, PART)
+        self.lips = lip_pairs(head, PART)
+        self.pivot = np.array(head.data.neck.pivot)
+        self._own = part.rig.own  # type: ignore[attr-defined]
+
+    def shown(self, values: Floats, moves: Floats) -> Floats:
+        """(m, 3) mm that control points moved by hand, ``moves`` (n, 3), and a user's own groups add to a face (P,)."""
+        amounts, moved = self._head.read_pose(values[self._all]).own, moves
+        for own in self._own:
+            moved = moved.copy()
+            moved[own.ids] += amounts[own.index] * own.moves
+        return np.asarray(self.basis @ moved)
+
+    @property
+    def data(self) -> PartData:
+        """The part's data."""
+        return next(part for part in self._head.data.parts if part.name == PART)
+
+    @property
+    def mesh_rest(self) -> tuple[Floats, Floats]:
+        """(m, 3) mm and (m, 2): the vertices of the part at rest, and their places."""
+        mesh = self._head.part(PART).mesh
+        return self.surface.evaluate(mesh.uv), mesh.uv
+
+    def local(self, values: Floats, moves: Floats) -> Floats:
+        """(m, 3) mm where the sampled points are in a face (P,) with moved control points, head not turned."""
+        moved = self.skin.displacement(shapes_of(values, self.order))
+        local: Floats = self.skin.rest + moved + self.shown(values, moves)
+        return local
+
+    def turned(self, local: Floats, values: Floats) -> tuple[Floats, Floats]:
+        """Places (m, 3) mm with the rotation of the head in a face, and this rotation (3, 3)."""
+        turn = turn_of(values[self.order])
+        return self.pivot + (local - self.pivot) @ turn.T, turn
+
+    def places_of(self, uv: Floats, values: Floats, moves: Floats) -> Floats:
+        """(k, 3) mm where places ``uv`` (k, 2) are in the picture of a face (P,)."""
+        index = self._head.parts.index(self._head.part(PART))
+        points = self._head.place_points(self._of_head(values))[0][index] + moves
+        return self.turned(np.asarray(self.surface.basis_matrix(uv) @ points), values)[0]
+
+    def under(self, pixels: Floats, screen: Screen, values: Floats) -> Floats:
+        """(k, 2) which places lie under pixels (k, 2) in the picture of a face (P,); NaN for none."""
+        self._head.pose(self._of_head(values))
+        part = self._head.part(PART)
+        count = len(part.mesh.uv)
+        own = part.mesh.triangles
+        return uv_under(pixels, screen.project(part.vertices[:count].astype(np.float64)), own, part.mesh.uv)
+
+    def _of_head(self, values: Floats) -> Floats:
+        return values[self._all]
+
+
+def _over_area(head: Head) -> Floats:
+    """(_BETWEEN, 2) places drawn evenly over the area of the skin at rest."""
+    part, rng = head.part(PART), np.random.default_rng(_SEED)
+    a, b, c = (part.vertices[part.mesh.triangles[:, k]].astype(np.float64) for k in range(3))
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    chosen = part.mesh.triangles[rng.choice(len(area), _BETWEEN, p=area / area.sum())]
+    shares = rng.dirichlet(np.ones(3), _BETWEEN)
+    found: Floats = (shares[..., None] * part.mesh.uv[chosen]).sum(axis=1)
+    return found
+
+
+def turn_of(head_values: Floats) -> Floats:
+    """(3, 3) rotation of the head for values (h,) in its own order."""
+    return rotation(*read_pose(head_values).head)

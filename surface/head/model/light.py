@@ -1,0 +1,252 @@
+"""Light control points: added to a part of a head, they leave its surface where it is until they are moved.
+
+A control point with knots of its own has little weight, :data:`WEIGHT`, and lies on the surface S. With W the sum of
+all b w and N the numerator of Eq. (1), it turns N / W into (N + b w P) / (W + b w), a change by b w (P - S) / (W + b w)
+which is less than WEIGHT times the distance over which b reaches, 0.0002 mm where that is 2 mm. A move of it by D adds
+b w D to the numerator and nothing to the denominator, as in Eq. (2): to move the skin by d it is moved by d W / (b w),
+far away from the face. In the limit of no weight it is the infinite control point of Piegl, "On the use of infinite
+control points in CAGD" (1987), whose displacement is a pure addition to the numerator.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from surface.base.arrays import Array, Floats, Ints
+from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.meshes import make_surface, pack, tessellate, unpack
+from surface.mesh.mesh import Mesh
+from surface.mesh.splitedges import Middles, split_edges
+
+WEIGHT = 1e-4
+EDGES = 0.5  # longest edge of triangles where such points reach, in spans of their knots
+REACH = 1.7  # spans from its middle within which a point is followed
+ROUNDS = 6  # of splitting edges, each halves them
+LEAST_MM = 0.25  # no edge is split that is shorter than twice this
+Coarser = Callable[[str, Mesh], Mapping[str, Ints]]
+_SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
+
+
+@dataclass(frozen=True, eq=False)
+class LightPoints:
+    """Light control points of one part.
+
+    part : its name. knots_u, knots_v : (k, 5) knots of cubic blending functions, rising.
+    """
+
+    part: str
+    knots_u: Floats
+    knots_v: Floats
+
+    def __len__(self) -> int:
+        return len(self.knots_u)
+
+    @property
+    def centres(self) -> Floats:
+        """(k, 2) u and v of their middles."""
+        return np.column_stack([self.knots_u[:, 2], self.knots_v[:, 2]])
+
+    def take(self, which: Ints) -> LightPoints:
+        """Some of them."""
+        return LightPoints(self.part, self.knots_u[which], self.knots_v[which])
+
+
+def join_light(points: Sequence[LightPoints]) -> dict[str, LightPoints]:
+    """All light points by part, in their order."""
+    names = dict.fromkeys(each.part for each in points)
+    return {
+        name: LightPoints(
+            name,
+            np.concatenate([each.knots_u for each in points if each.part == name]),
+            np.concatenate([each.knots_v for each in points if each.part == name]),
+        )
+        for name in names
+    }
+
+
+def with_light(
+    data: HeadData, points: Sequence[LightPoints], coarser: Coarser = lambda name, mesh: {}
+) -> tuple[HeadData, dict[str, Refined]]:  # fmt: skip
+    """The head with light control points behind those of each part, and the meshes of these parts, made finer there.
+
+    coarser : fewer triangles (t, 3) over the mesh of a part, by level; they are made finer, too.
+
+    Raises ValueError: no such part, a rigid or closed one, knots of a wrong shape or that do not rise, or a place where
+    the part has no surface.
+    """
+    refined: dict[str, Refined] = {}
+    parts = {part.name: part for part in data.parts}
+    for name, own in join_light([each for each in points if len(each)]).items():
+        if name not in parts:
+            raise ValueError(f"the head has no part {name!r}")
+        part = parts[name]
+        check_light(part, own)
+        surface = make_surface(part)
+        mesh = unpack(part.mesh, surface, part.budget, rough=False, flip=part.flip)
+        mesh = mesh or tessellate(part, surface, data.seams)
+        refined[name] = Refined(mesh, own, part, coarser(name, mesh))
+        grown = with_points(part, own)
+        parts[name] = replace(grown, mesh=refined[name].packed(grown))
+    return replace(data, parts=list(parts.values())), refined
+
+
+def check_light(part: PartData, own: LightPoints) -> None:
+    """ValueError where light points cannot belong to a part."""
+    if part.follows != "skin" or part.closed_u is not None or part.closed_v is not None:
+        raise ValueError(f"part {part.name!r} takes no control points: it is rigid, or closed")
+    for name in ("knots_u", "knots_v"):
+        knots = getattr(own, name)
+        if knots.ndim != 2 or knots.shape[1] != 5 or not np.isfinite(knots).all():
+            raise ValueError(f"{name}: must be rows of 5 finite numbers")
+        if not (np.diff(knots, axis=1) > 0.0).all():
+            raise ValueError(f"{name}: must rise")
+    surface = make_surface(part)
+    u0, u1, v0, v1 = surface.rect
+    at = own.centres
+    inside = (at[:, 0] >= u0) & (at[:, 0] <= u1) & (at[:, 1] >= v0) & (at[:, 1] <= v1)
+    if not (inside.all() and surface.covered(at).all()):
+        raise ValueError("a control point lies where the part has no surface")
+
+
+def with_points(part: PartData, own: LightPoints) -> PartData:
+    """The part with the points behind its own: on the surface, and following every group and the jaw as it does."""
+    surface = make_surface(part)
+    share, n, k = surface.basis_matrix(own.centres).tocsr(), surface.n, len(own)
+    width = part.knots_u.shape[1]
+    return replace(
+        part,
+        points=np.concatenate([part.points, share @ part.points]),
+        weights=np.concatenate([part.weights, np.full(k, WEIGHT)]),
+        knots_u=np.concatenate([part.knots_u, _padded(own.knots_u, width)]),
+        knots_v=np.concatenate([part.knots_v, _padded(own.knots_v, part.knots_v.shape[1])]),
+        degrees=np.concatenate([part.degrees, np.full((k, 2), 3)]),
+        groups=[_carried(group, share, n) for group in part.groups],
+        jaw=np.concatenate([part.jaw, share @ part.jaw]),
+        lids=np.concatenate([part.lids, np.zeros(k)]),  # who is far from the face keeps no distance from the eyeball
+    )
+
+
+def _padded(knots: Floats, width: int) -> Floats:
+    return np.hstack([knots, np.repeat(knots[:, -1:], width - knots.shape[1], axis=1)])
+
+
+def _carried(group: Group, share: Array, n: int) -> Group:
+    """A group that moves new points as the surface at their middles."""
+    field = np.zeros((n, 3))
+    field[group.ids] = group.moves
+    extra = share @ field
+    moved = np.flatnonzero(np.abs(extra).max(axis=1) > 1e-3)
+    if not len(moved):
+        return group
+    ids, moves = np.concatenate([group.ids, n + moved]), np.concatenate([group.moves, extra[moved]])
+    return Group(group.name, ids.astype(np.int32), moves.astype(np.float32))
+
+
+class Refined:
+    """A part's mesh with shorter edges where light points reach: its vertices keep their numbers, new ones follow.
+
+    mesh : the mesh before. own : the points. part : without them. coarser : fewer triangles over the mesh, by level.
+
+    Attributes
+    ----------
+    triangles : (t, 3) of the finer mesh. coarser : those by level, as fine where light points reach.
+    """
+
+    def __init__(self, mesh: Mesh, own: LightPoints, part: PartData, coarser: Mapping[str, Ints]) -> None:
+        self.mesh, self._own, self._surface = mesh, own, make_surface(part)
+        self._count = len(mesh.uv)
+        self._middles = Middles(self._count)
+        self._spans = np.column_stack([np.diff(k, axis=1).mean(axis=1) for k in (own.knots_u, own.knots_v)])
+        _, along_u, along_v = self._surface.derivatives(own.centres)
+        millimetres = np.column_stack([np.linalg.norm(along_u, axis=1), np.linalg.norm(along_v, axis=1)])
+        self._longest = np.maximum(EDGES * (self._spans * millimetres).min(axis=1), 2 * LEAST_MM)
+        self._uv, self._places = mesh.uv, mesh.vertices
+        self.triangles = self._refine(np.asarray(mesh.triangles, np.int64))
+        inner = {level: (each < self._count).all(axis=1) for level, each in coarser.items()}
+        finer = {level: self._refine(np.asarray(each[inner[level]], np.int64)) for level, each in coarser.items()}
+        new = len(self.ends)  # what seams added comes behind the new vertices
+        self.coarser = {
+            level: np.concatenate([finer[level], each[~inner[level]] + new * (each[~inner[level]] >= self._count)])
+            for level, each in coarser.items()
+        }
+
+    @property
+    def ends(self) -> Ints:
+        """(k, 2) the vertices between which each new one lies, which may be new ones before it."""
+        return np.array(self._middles.ends, np.int64).reshape(-1, 2)
+
+    def _refine(self, triangles: Ints) -> Ints:
+        """Triangles (t', 3) with shorter edges where light points reach, of (t, 3) over the mesh's own vertices."""
+        for _ in range(ROUNDS):
+            before = len(triangles)
+            triangles = split_edges(triangles, self._is_long, self._middles)
+            self._place()
+            if len(triangles) == before:
+                break
+        return triangles
+
+    def _place(self) -> None:
+        """Put vertices that were made since the last call onto the surface."""
+        ends = self.ends[len(self._uv) - self._count :]
+        if len(ends):
+            uv = self._uv[ends].mean(axis=1)
+            self._uv = np.concatenate([self._uv, uv])
+            self._places = np.concatenate([self._places, self._surface.evaluate(uv)])
+
+    def _is_long(self, edges: Ints) -> np.ndarray:
+        """(e,) which edges reach a light point and are longer than there is use for."""
+        length = np.linalg.norm(self._places[edges[:, 0]] - self._places[edges[:, 1]], axis=1)
+        ends = self._uv[edges]
+        low, high = ends.min(axis=1), ends.max(axis=1)
+        reach, centres = REACH * self._spans, self._own.centres
+        box = (low < (centres + reach).max(axis=0)) & (high > (centres - reach).min(axis=0))
+        near = np.flatnonzero(box.all(axis=1) & (length > self._longest.min()))
+        out = np.zeros(len(edges), bool)
+        for first in range(0, len(near), 4096):
+            which = near[first : first + 4096]
+            at = ends[which, :1] + _SAMPLES[None, :, None] * (ends[which, 1:] - ends[which, :1])  # (e, 5, 2)
+            far = np.abs(at[:, :, None] - centres) / reach  # (e, 5, k, 2)
+            inside = far.max(axis=-1).min(axis=1) < 1.0
+            out[which] = (inside & (length[which, None] > self._longest)).any(axis=1)
+        return out
+
+    def packed(self, grown: PartData) -> dict[str, Array]:
+        """The finer mesh of the part with the points, as arrays to keep: new vertices are in cells of their own."""
+        mesh, surface = self.mesh, make_surface(grown)
+        lists = self._with_own(surface.n - len(self._own))
+        starts = [mesh.cell_start]
+        if len(self.ends):
+            basis = surface.basis_matrix(self._uv[self._count :]).tocsr()
+            cuts = np.append(np.arange(0, len(self.ends), 64), len(self.ends))
+            starts.append(self._count + cuts[1:])
+            lists += [np.unique(basis[a:b].indices).astype(np.int32) for a, b in pairwise(cuts)]
+        finer = replace(
+            mesh,
+            vertices=self._places, normals=np.zeros_like(self._places), triangles=self.triangles.astype(np.int32),
+            uv=self._uv, side=np.concatenate([mesh.side, np.zeros(len(self.ends), np.int64)]),
+            cell_start=np.concatenate(starts), list_start=np.cumsum([0, *map(len, lists)]),
+            list_ids=np.concatenate(lists).astype(np.int32),
+        )  # fmt: skip
+        return pack(finer, grown.budget)
+
+    def _with_own(self, first: int) -> list[Array]:
+        """By cell of the mesh its points, with those light ones that reach it."""
+        boxes, _ = self.mesh.cell_boxes
+        u, v = self._own.knots_u, self._own.knots_v
+        lists = []
+        for c, (u0, u1, v0, v1) in enumerate(boxes.tolist()):
+            reached = (u[:, 0] <= u1) & (u[:, -1] >= u0) & (v[:, 0] <= v1) & (v[:, -1] >= v0)
+            lists.append(np.concatenate([self.mesh.points_of(c), first + np.flatnonzero(reached)]))
+        return lists
+
+    def carry(self, values: Array) -> Array:
+        """Rows (m, ...) by vertex, behind the mesh's own those that seams added, with rows for new vertices between."""
+        own = [np.asarray(values[: self._count], np.float64)]
+        rows = np.concatenate([own[0], np.zeros((len(self.ends), *values.shape[1:]))])
+        for i, (a, b) in enumerate(self.ends.tolist(), self._count):
+            rows[i] = (rows[a] + rows[b]) / 2
+        return np.concatenate([rows.astype(values.dtype), values[self._count :]])
