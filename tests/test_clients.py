@@ -37,7 +37,8 @@ def program(folder: Path, text: str) -> dict[str, str]:
 
 
 def test_a_gentle_program_passes() -> None:
-    assert result(sys.executable, {**SERVOS, "program": "dynamixel_sdk_program.py"}) == (True, "passed")
+    passed, said = result(sys.executable, {**SERVOS, "program": "dynamixel_sdk_program.py"})
+    assert passed and said.startswith("passed"), said  # at the second try on a busy machine
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def found(draw_head: ModuleType, root: Path) -> list:
 
 @pytest.mark.slow
 def test_a_head_is_evaluated_from_its_files_alone_as_the_engine_does(found: list, root: Path) -> None:
-    """Without contacts and lids, which the program leaves out."""
+    """Without contacts and lids, which the program leaves out; the engine sums displacements in 32-bit numbers."""
     folder = root / "configs" / "heads" / "ict"
     head = replace(load_data(folder), contacts=[])
     pose = read_pose(np.array([SHAPES.get(name, 0.0) for name in NAMES]))
@@ -58,7 +58,7 @@ def test_a_head_is_evaluated_from_its_files_alone_as_the_engine_does(found: list
             linear, shift = rigid_motion(own.follows, head, pose)
             points = own.points @ linear.T + shift
         expected = surface.with_points(points).evaluate(own.mesh["mesh_uv"], own.mesh["mesh_side"])
-        assert np.abs(vertices - expected).max() < 1e-9
+        assert np.abs(vertices - expected).max() < 5e-6  # mm
         assert np.array_equal(triangles, own.mesh["mesh_triangles"])
 
 

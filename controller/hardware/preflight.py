@@ -117,6 +117,7 @@ class _ChannelCheck:
         self, port: BusPort, bus: BusFindings, channel: ChannelSettings, options: Options, *, moves: bool
     ) -> None:
         self._port, self._bus, self._channel, self._options, self._moves = port, bus, channel, options, moves
+        self._still_on: StillOn | None = None
         self.findings = ChannelFindings(
             channel.name, channel.bus, channel.id, channel.model, limit_deg=channel.limit_deg
         )
@@ -134,9 +135,9 @@ class _ChannelCheck:
                     self._move(bus, describe, ask)
                 elif not self.findings.skipped:
                     self.findings.skipped = "not moved"
-        except StillOn:
-            raise
         except BusError as error:
+            if self._still_on is not None:  # closing the bus tried again, and failed in its own words
+                raise self._still_on from error
             self._fault(f"{error}" + (f" ({error.hint})" if error.hint else ""))
 
     def _fault(self, text: str) -> None:
@@ -235,7 +236,11 @@ class _ChannelCheck:
             self._fault(str(error))
             moved = error.moved
         finally:
-            switch_off(bus)
+            try:
+                switch_off(bus)
+            except StillOn as still_on:
+                self._still_on = still_on
+                raise
         findings.wanted_deg, findings.moved_deg = math.degrees(moved.wanted_rad), math.degrees(moved.moved_rad)
         findings.lag_ms, findings.least_voltage_v = 1e3 * moved.lag_s, moved.least_voltage_v
         findings.peak_current_a, findings.peak_load = moved.peak_current_a, moved.peak_load

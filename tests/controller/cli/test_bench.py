@@ -139,9 +139,9 @@ def test_every_subject_is_given_its_own_options(calls: list[tuple[Any, ...]], tm
     calls.clear()
     svg, png = tmp_path / "a.svg", tmp_path / "b.PNG"
     assert "table of bench_large" in said("surface", "--large", "--vertices", "1000", "--seconds", "0.01")
-    said("surface", "--growth", str(svg), "--out", "ignored.doc")
-    said("quadtree", "--out", str(png), "--level", "9", "--head", "me", "--growth", "ignored.doc")
-    said("drift", "--updates", "1", "--head", "me", "--out", "ignored.doc")
+    said("surface", "--growth", str(svg))
+    said("quadtree", "--out", str(png), "--level", "9", "--head", "me")
+    said("drift", "--updates", "1", "--head", "me")
     said("quadtree", "--level", "0")
     names = [call[:3] for call in calls]
     assert names == [

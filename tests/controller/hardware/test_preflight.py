@@ -236,6 +236,7 @@ def test_a_servo_that_is_not_confirmed_off_ends_the_preflight(head: Head, monkey
     assert caught.value.servo_ids == (1,) and "power off" in caught.value.hint
     assert [row.name for row in head.preflight.channels] == ["jaw"]
     assert "no longer says where it is" in of(head.preflight, "jaw")
+    head.on = []  # it cannot be reached
 
 
 def test_one_lost_confirmation_is_asked_for_again() -> None:
