@@ -54,7 +54,7 @@ class Readings:
 
     @cached_property
     def _visemes(self) -> tuple[Visemes, _Levels]:
-        """The visemes, and a solver for them and for each shape that an expression may lend to a speaking mouth.
+        """The visemes, and a solver for them and for each mouth shape that an expression may add during speech.
 
         Without the latter a smile would be read as the viseme that smiles most.
         """
@@ -76,7 +76,7 @@ def _shown(names: Sequence[str], levels: Floats) -> list[tuple[str, float]]:
 class _Levels:
     """Levels 0..1 of the columns of a matrix (P, n), few of them not zero.
 
-    Columns are brought to one length first: otherwise two long ones would be preferred to the short one that fits.
+    Columns are normalised to one length first: otherwise two long ones would be preferred to the short one that fits.
     """
 
     def __init__(self, matrix: Floats) -> None:

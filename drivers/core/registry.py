@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # start-up: they import numpy, which listing the kinds does n
 SIMULATED = "simulated"
 _BITS_PER_BYTE = 10
 _MOST_OF_WIRE = 0.6
-"""Share of the time that bytes may take at the high rate: adapters pause, and giving up a late answer takes time."""
+"""Greatest share of the wire's time for choosing the high rate; the rest is for pauses of adapters and late answers."""
 
 FAMILIES: Registry[Family] = Registry(
     Family,

@@ -220,7 +220,7 @@ class WireBus(Bus):
             raise ValueError(f"angle_rad: shape {wanted.shape}, expected {(len(self.servos),)}")
         if not self._running:
             raise BusError(f"the bus on {self.path} is not started", hint="call start()", port=self.path)
-        self._raise_if_lost()  # not _losing(): between a reply and the next goals the wire waits for every line here
+        self._raise_if_lost()  # not _losing(): the wire waits for every line between a reply and the next goals
         try:
             now = self._clock()
             self._settle(now)
@@ -252,7 +252,7 @@ class WireBus(Bus):
             self._let_join(np.flatnonzero(self._presence.left_out & ~state.silent).tolist())
 
     def _come_back(self, index: int, angle_rad: float) -> None:
-        """Drive a servo that was away on from its position.
+        """Go on driving a servo that was away, from its position.
 
         One that kept its torque stands near its last goal. One that reads far from there has lost its torque and its
         settings, or two servos answer at once and what is read is wrong: it is started as if it were new, which reads

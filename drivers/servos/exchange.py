@@ -35,7 +35,7 @@ class Exchange(NamedTuple, Generic[R]):
     replies : by servo id; only those with the right sender, length and checksum.
     missing : ids that were addressed and are not in ``replies``.
     corrupt : True when damaged bytes arrived too, so that a missing reply may have been one of them.
-    joint_lost : True when no servo answered a fast read, whatever the plain read after it brought.
+    joint_lost : True when no servo answered a fast read, also where the plain read after it was answered.
     """
 
     replies: dict[int, R]
@@ -51,7 +51,7 @@ class Exchanges(ABC, Generic[R]):
     number_size : bytes of an address or a length in a packet.
     refusals : bits of the error byte that refuse the request, so that the reply may be without the requested data.
     reader : finds replies in received bytes.
-    greeting : instruction that a servo in ``port.suspects`` may be sent at once, where it is not a plain read.
+    greeting : the instruction that a servo in ``port.suspects`` is asked first; -1 where that is a plain read.
     """
 
     status_size: ClassVar[int]
@@ -102,7 +102,7 @@ class Exchanges(ABC, Generic[R]):
         """One instruction to one servo and its reply of ``length`` data bytes.
 
         A servo that missed a deadline must first answer a greeting: its replies come in order, so a late one has
-        arrived by then. Never ask for as many bytes as the reply to a greeting has.
+        arrived by then. A request whose reply has as many bytes as that to a greeting cannot be told from a late one.
         """
         if servo in port.suspects and code != self.greeting and not self.revive(port, servo):
             return Exchange({}, (servo,), False)

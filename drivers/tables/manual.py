@@ -45,7 +45,7 @@ _NUMBER = re.compile(r"[-+]?\d[\d,]*")
 class Page:
     """The control table of one model as the manual prints it.
 
-    model : omote's name of it.
+    model : the model's name in omote.
     page, version : file in the repository ROBOTIS-GIT/emanual, and the commit whose text was read.
     rows : name -> (address, size, access, initial value, range, unit), the last four as printed ("" where the page
         has no such column).

@@ -1,4 +1,4 @@
-"""Measures of the engine beside its peers, all in one run on one machine. Prints nothing.
+"""Benchmarks of the engine beside other libraries, all in one run on one machine. Prints nothing.
 
 Times are the least of many calls: on a machine with other work that is the steadiest figure.
 """

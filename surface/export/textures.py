@@ -17,7 +17,7 @@ from surface.export.shapes import ExportPart
 from surface.head.model.parameters import smoothstep
 
 Picture = NDArray[np.uint8]
-#: Noise of a strand below which it is cut off, times its vertex's cover.
+#: Threshold of the alpha test of strands.
 STRAND_CUTOFF = 0.3
 EYE_RIM = 0.47  # of an eye's picture: how far from its middle the eye's own equator lies
 _PUPIL = 0.38  # radius of a pupil, in radii of its iris
@@ -31,7 +31,8 @@ def materials() -> dict[str, Any]:
 
 
 def png_bytes(picture: Picture) -> bytes:
-    """(height, width, 1, 3 or 4) uint8, top row first, as a PNG file; without Pillow, which exporting does not need.
+    """A picture (height, width, channels) uint8 of 1, 3 or 4 channels, top row first, as a PNG file; without Pillow, which
+    exporting does not need.
 
     (PNG specification, second edition: signature, IHDR, IDAT, IEND.)
     """

@@ -1,7 +1,8 @@
 """OSC faders: ``/omote/jawOpen 0.5``, one parameter for each address.
 
 The last part of an address is the name of a parameter, whatever stands before it, so that programs with addresses of
-their own, such as ``/avatar/parameters/JawOpen``, are read as well. What is not named stays as it was.
+their own, such as ``/avatar/parameters/JawOpen``, are read as well. Parameters that a packet does not name keep their
+value.
 """
 
 from __future__ import annotations

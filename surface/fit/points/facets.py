@@ -1,4 +1,4 @@
-"""How far a mesh's own flat faces are from a smooth surface: where it has no detail, no fit can follow it closely."""
+"""How far a mesh's own flat faces are from a smooth surface: a lower bound on the error of any fit to a coarse mesh."""
 
 from __future__ import annotations
 

@@ -48,13 +48,13 @@ class AdaptiveSampling:
         return self.live and self._adaptive and self._software
 
     def start_live(self) -> None:
-        """From now on drawing time matters."""
+        """Switch to live pictures: from now on drawing time matters."""
         self.live = True
         if self.simplified:
             self.settings = 1, self._live_scale
 
     def add_frame(self, seconds: float) -> None:
-        """Count a live frame's drawing time; falls back to one sample when many in a row were too slow."""
+        """Count a live frame's drawing time; falls back to one sample when the mean of the last frames was too slow."""
         if not self._adaptive or self.settings[0] == 1:
             return
         self._frames += 1

@@ -28,8 +28,8 @@ LOOK = {"eyelook", "eyeslook"}
 class Meaning:
     """What a name says.
 
-    key : the parameter without its side, ``mouthFunnel/1`` for the second shape of those that make it together, or a
-        mood or sound of ``presets.toml``.
+    key : the parameter without its side, as ``mouthFunnel/mouthfunnelup`` for one of the shapes that make it together,
+        or a mood or sound of ``presets.toml``.
     side : "Left", "Right" or "". plain : whether it is ARKit's own word for it.
     """
 
