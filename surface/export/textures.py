@@ -31,8 +31,8 @@ def materials() -> dict[str, Any]:
 
 
 def png_bytes(picture: Picture) -> bytes:
-    """A picture (height, width, channels) uint8 of 1, 3 or 4 channels, top row first, as a PNG file; without Pillow, which
-    exporting does not need.
+    """A picture (height, width, channels) uint8 of 1, 3 or 4 channels, top row first, as a PNG file; without Pillow,
+    which exporting does not need.
 
     (PNG specification, second edition: signature, IHDR, IDAT, IEND.)
     """
