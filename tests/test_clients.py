@@ -22,11 +22,17 @@ import sys
 from dynamixel_sdk import PacketHandler, PortHandler
 port, packets = PortHandler(sys.argv[1]), PacketHandler(2.0)
 port.openPort()
-packets.write1ByteTxRx(port, 1, 64, 1)
-packets.write4ByteTxRx(port, 1, 116, 3000)
-while packets.read4ByteTxRx(port, 1, 132)[0] < 2990:
-    pass
-packets.write1ByteTxRx(port, 1, 64, 0)
+def until(done):  # replies are late on a busy machine, which the SDK answers with an IndexError
+    while True:
+        try:
+            if done():
+                return
+        except IndexError:
+            pass
+until(lambda: packets.write1ByteTxRx(port, 1, 64, 1)[0] == 0)
+until(lambda: packets.write4ByteTxRx(port, 1, 116, 3000)[0] == 0)
+until(lambda: packets.read4ByteTxRx(port, 1, 132)[0] >= 2990)
+until(lambda: packets.write1ByteTxRx(port, 1, 64, 0)[0] == 0)
 """
 
 
