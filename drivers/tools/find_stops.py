@@ -47,8 +47,8 @@ STILL_S, STILL_RAD = 0.25, math.radians(0.2)
 """A shaft that moves no further than this in this time stands still."""
 PUSHING = 0.5
 """Share of the limit of current above which the motor pushes."""
-IDLE_S = 1.5
-"""A shaft that stands still so long without pushing does not follow."""
+IDLE_S, IDLE_STEPS = 1.5, 10
+"""A shaft that stands still so long, and for more steps than that, without pushing does not follow."""
 PERIOD_S, WATCHDOG_STEPS = 0.02, 25
 NEAR_RAD = math.radians(1.0)
 
@@ -264,7 +264,7 @@ class _Search:
     def _approach(self, side: int, end: int, speed_rad_s: float) -> int | None:
         """Move towards ``end`` until the shaft stands still and the motor pushes; the position, or None at the end."""
         tick = self._table.rad_per_tick
-        goal, seen, idle_s = float(self._position()), deque[tuple[float, int]](), 0.0
+        goal, seen, idle = float(self._position()), deque[tuple[float, int]](), list[float]()
         while True:
             position, push = self._step(round(goal))
             if side * (end - position) <= NEAR_RAD / tick and side * (end - goal) <= 0.0:
@@ -273,14 +273,14 @@ class _Search:
             seen.append((now, position))
             while now - seen[0][0] > STILL_S:
                 seen.popleft()
-            if self._is_still(seen, now) and side * (goal - position) >= PUSH_RAD / tick:
-                if push >= PUSHING * self._allowed:
-                    return position
-                idle_s = idle_s or now
-                if now - idle_s > IDLE_S:
-                    raise self._stuck()
-            else:
-                idle_s = 0.0
+            lead, still = side * (goal - position), self._is_still(seen, now)
+            if still and lead >= PUSH_RAD / tick and push >= PUSHING * self._allowed:
+                return position
+            # On a busy machine the goal takes long to get as far ahead as it may: before, a servo need not push.
+            is_far = lead >= 0.99 * min(LEAD_RAD / tick, side * (end - position))
+            idle = [*idle, now] if still and is_far else []
+            if len(idle) > IDLE_STEPS and now - idle[0] > IDLE_S:
+                raise self._stuck()
             ahead = min(side * (goal - position) + speed_rad_s * PERIOD_S / tick, LEAD_RAD / tick)
             goal = side * min(side * (position + side * ahead), side * end)
 

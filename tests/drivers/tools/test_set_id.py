@@ -51,6 +51,7 @@ def test_feetech_memory_is_closed_again_where_the_id_was_not_taken(monkeypatch: 
         monkeypatch.setattr(module, "SETTLE_S", 0.1)
         with pytest.raises(ServoRefused, match="did not take the id 2"):
             set_id(bus.path, 1_000_000, 1, 1, 2)
+        bus.sync()
         assert bus.servo(1).register("Lock") == 1
 
 
