@@ -1,4 +1,8 @@
-"""Sends faces: each to who hears its head alone, and all of a tick together to who hears many; nothing to nobody."""
+"""Sends faces: each by itself, and all of a tick together to processes that hear many.
+
+Where there are many heads, nothing is sent that nobody listens to; of a few heads each face is sent in any case, as
+Zenoh may take a while to say that somebody listens.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +16,8 @@ from controller.fleet.payload import Header, Payloads
 if TYPE_CHECKING:
     import zenoh  # optional: the extra zenoh
 
+FEW = 3
+"""So many heads, or fewer, are sent whether or not somebody is known to listen."""
 Heading = Callable[[int, int, int], Header]
 """Makes a header of a sequence, a time and a stamp (ns)."""
 
@@ -36,7 +42,7 @@ class FaceSender:
         self.sequences[head] += 1
         self.sent += 1
         sequence, data, outlet = self.sequences[head], self._payloads.encode(values), self._outlets[head]
-        if is_heard(outlet):
+        if len(self._outlets) <= FEW or is_heard(outlet):
             header = self._heading(sequence, now_ns, stamp_ns).encode()
             outlet.put(data, encoding=self._payloads.encoding, attachment=header)
         if is_heard(self._together):
