@@ -21,11 +21,18 @@ demo: setup ## set up, then drive the face and the simulated servo head
 	@$(BIN)/omote demo
 
 # Without bytecode, where a user has switched it off, every process of a test would compile all modules again.
+PYTEST := PYTHONDONTWRITEBYTECODE= $(PY) -m pytest
+BESIDE := -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+# Hundreds of tests wait for clocks and processes, which a busy machine keeps waiting: what failed beside other tests
+# is run once more with nothing beside it, and named by that run. What fails alone too has failed.
+ALONE = { [ $$? = 1 ] && echo 'What failed beside other tests runs once more, alone:' && \
+	$(PYTEST) --last-failed --last-failed-no-failures none -v $(1); }
+
 test: setup ## set up, then run the quick tests (no display, graphics processor or servo needed)
-	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder -m 'not slow'
+	@$(PYTEST) $(BESIDE) -m 'not slow' || $(call ALONE,-m 'not slow')
 
 test-all: setup ## set up, then run every test, as CI does
-	@PYTHONDONTWRITEBYTECODE= $(PY) -m pytest -n auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
+	@$(PYTEST) $(BESIDE) || $(call ALONE)
 
 check: setup ## check style and types
 	@$(BIN)/ruff check . && $(BIN)/ruff format --check . && $(BIN)/mypy

@@ -38,7 +38,7 @@ class Follower:
     Attributes
     ----------
     highest : the highest token obeyed. taken, refused : counts; refused by reason.
-    conducted : whether a conductor is followed. exact : whether what is shown is exactly what it sent.
+    conducted : whether a conductor is followed. exact : whether exactly its faces are shown, or one's own without it.
     header : of the face that is shown. offset_ns : what one's own clock lacks to the conductor's.
     """
 

@@ -87,7 +87,8 @@ class Running:
                     self.mixed[name] += 1
                 self.node.relay(name, now, 0.01, values, stamp)
                 self.rows[name].append(values)
-                self.exact[name].append(self.node.followers[name].exact)
+                follower = self.node.followers[name]  # exact is also who shows exactly its own life
+                self.exact[name].append(follower.exact and follower.conducted)
 
     def __enter__(self) -> Running:
         return self
