@@ -61,7 +61,9 @@ class Result:
 
     cycles, groups, replugs : how many. faults : by kind. pairs : that came, of ``wanted``.
     wrong : fresh positions that were not the servo's. unnoticed : the same of Protocol 1.0 under faults that change
-        bytes: one such reply in 256 has a right checksum, for it has 8 bits. jumps : goals beyond the speed limit.
+        bytes: one such reply in 256 has a right checksum, for it has 8 bits. twins : positions of a second servo with
+        the id that answered alone, since the first was silent: nobody can tell it from the first. jumps : goals
+        beyond the speed limit.
     driven, healthy : cycles times servos. left_on : servos with torque after the end.
     findings : the first wrong values and jumps.
     """
@@ -74,6 +76,7 @@ class Result:
     wanted: int = 0
     wrong: int = 0
     unnoticed: int = 0
+    twins: int = 0
     jumps: int = 0
     driven: int = 0
     healthy: int = 0
@@ -223,18 +226,23 @@ class Head:
         """Fresh positions against where the shafts were between two moments, under some kinds of faults."""
         for at in np.flatnonzero(state.fresh):
             servo = self.wire.chain.servo(IDS[at])
-            places = [
-                _angle(servo, servo.drive.to_register(servo.plant.motion(t).position)) for t in (began, self.clock())
-            ]
-            slack = 0.03 + SPEED_RAD_S * 2 * (self.clock() - began)
-            if not min(places) - slack <= state.position_rad[at] <= max(places) + slack:
+            if not self._is_at(servo, state.position_rad[at], began):
+                if any(self._is_at(twin, state.position_rad[at], began) for twin in self.wire.chain.twins(servo.id)):
+                    self.result.twins += 1
+                    continue
                 if servo.table.protocol == 1 and active & CORRUPTING:
                     self.result.unnoticed += 1
                     continue
                 self.result.wrong += 1
-                self._tell(
-                    f"servo {IDS[at]}: {state.position_rad[at]:.2f} rad read, it is at {places[1]:.2f}; {active}"
-                )
+                place = _angle(servo, servo.position_ticks(self.clock()))
+                self._tell(f"servo {IDS[at]}: {state.position_rad[at]:.2f} rad read, it is at {place:.2f}; {active}")
+
+    def _is_at(self, servo: SimulatedServo, position_rad: float, began: float) -> bool:
+        """Whether a shaft can have been there between two moments."""
+        moments = (began, self.clock())
+        places = [_angle(servo, servo.drive.to_register(servo.plant.motion(t).position)) for t in moments]
+        slack = 0.03 + SPEED_RAD_S * 2 * (self.clock() - began)
+        return min(places) - slack <= position_rad <= max(places) + slack
 
     def _tell(self, what: str) -> None:
         if len(self.result.findings) < 10:
@@ -301,6 +309,7 @@ def main() -> int:
         "replugs": result.replugs,
         "wrong values": result.wrong,
         "wrong values with a right 8 bit checksum": result.unnoticed,
+        "values of a second servo that answered alone": result.twins,
         "jumps": result.jumps,
         "healthy servos driven": f"{result.share:.3%}",
         "servos left on": result.left_on,

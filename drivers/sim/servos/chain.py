@@ -111,6 +111,10 @@ class Chain(Line):
             super().set_line_baud(baud)
             self._outdated = True
 
+    def twins(self, device_id: int) -> list[SimulatedServo]:
+        """Servos that the fault ``dup`` has added with this id; they answer alone where the first one is silent."""
+        return [servo for added in self._added.values() for servo in added if servo.id == device_id]
+
     def _adopt(self, servo: SimulatedServo) -> None:
         servo.last_instruction = self._last_instruction
         servo.on_change = self._mark_outdated

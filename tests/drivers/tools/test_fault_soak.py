@@ -27,6 +27,21 @@ def test_groups_of_faults_cost_no_wrong_value_no_jump_and_no_healthy_servo(progr
     assert (result.groups, result.replugs) == (1, 1) and result.healthy > 500
 
 
+@pytest.mark.parametrize(("silencing", "answers"), [("baud:3:57600", True), ("temp:3:40", False)])
+def test_a_second_servo_that_answers_alone_is_told_from_a_wrong_value(
+    program: ModuleType, silencing: str, answers: bool
+) -> None:
+    result = program.Result()
+    head = program.Head("dynamixel", 5, result)
+    head.start()
+    for fault in ("dup:3:for=2s", f"{silencing}:for=2s"):
+        head.wire.fault(fault)
+    for _ in range(150):
+        head._cycle()
+    head.finish()
+    assert result.wrong == 0 and (result.twins > 0) == answers
+
+
 def test_every_pair_of_all_faults_comes(program: ModuleType) -> None:
     kinds = [spec.partition(":")[0] for spec in program.FAULTS]
     assert sorted(kinds) == sorted(set(KINDS) - {"stops", "weight"})  # these belong to a joint, and are no faults

@@ -161,8 +161,9 @@ def test_duplicate_id_as_a_fault():
     bus = chain(faults=("dup:2",))
     assert StatusReader().feed(wire(bus, 2, I.READ, POSITION)) == []
     assert len(ask(bus, 1, I.READ, POSITION)) == 1
+    assert [twin.id for twin in bus.twins(2)] == [2] and bus.twins(1) == []
     bus.faults.clear("dup", 1.0)
-    assert len(ask(bus, 2, I.READ, POSITION, 1.0)) == 1
+    assert len(ask(bus, 2, I.READ, POSITION, 1.0)) == 1 and bus.twins(2) == []
 
 
 def test_unplug_is_passed_on():
