@@ -271,7 +271,7 @@ class _Search:
                 return None
             now = self._port.clock()
             seen.append((now, position))
-            while now - seen[0][0] > STILL_S:
+            while len(seen) > 2 and now - seen[1][0] > STILL_S:  # two at least, also where a step takes longer
                 seen.popleft()
             lead, still = side * (goal - position), self._is_still(seen, now)
             if still and lead >= PUSH_RAD / tick and push >= PUSHING * self._allowed:
