@@ -17,9 +17,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-import serial
 
 from drivers.packets.packet import Instruction, encode_instruction
+from drivers.port.serialport import SerialPort
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCKERFILE = ROOT / "examples" / "Dockerfile"
@@ -110,7 +110,6 @@ def test_the_docs_publish_the_port_that_the_image_exposes(container: Container) 
     assert all("-p 4000:4000" in line for line in RUN_LINES)
 
 
-@pytest.mark.filterwarnings("ignore:setDaemon")  # pyserial's client of RFC 2217
 def test_a_client_talks_to_the_servos_and_the_container_stops(container: Container, words: list[str]) -> None:
     with served(container, words or container.command) as ready:
         servo = ping2(ready) if "dynamixel" in (words or container.command) else ping1(ready)
@@ -136,13 +135,23 @@ def served(container: Container, words: list[str]) -> Iterator[str]:
 
 def ping2(address: str) -> int:
     """Who answers a ping of servo 1 in Protocol 2.0."""
-    with serial.serial_for_url(address, timeout=30) as port:
-        port.write(encode_instruction(1, Instruction.PING, b""))
-        return port.read(14)[4]
+    return answer(address, encode_instruction(1, Instruction.PING, b""), 14)[4]
 
 
 def ping1(address: str) -> int:
     """The same in Feetech's protocol."""
-    with serial.serial_for_url(address, timeout=30) as port:
-        port.write(bytes([255, 255, 1, 2, 1, 251]))
-        return port.read(6)[2]
+    return answer(address, bytes([255, 255, 1, 2, 1, 251]), 6)[2]
+
+
+def answer(address: str, request: bytes, size: int) -> bytes:
+    """So many bytes of the answer to a request."""
+    port, data = SerialPort(address), b""
+    port.open()
+    try:
+        port.write(request)
+        end_s = port.clock() + 30.0
+        while len(data) < size and port.clock() < end_s:
+            data += port.read(end_s)
+    finally:
+        port.close()
+    return data

@@ -100,10 +100,6 @@ class Startup(ABC, Generic[R]):
     def _identity(self, reply: R, expected: ControlTable) -> tuple[int, int]:
         """Model number and firmware in a servo's reply to the greeting."""
 
-    def _accepts(self, expected: ControlTable, number: int) -> bool:
-        """Whether a model number is the configured model's."""
-        return number == expected.number
-
     def _greet(self, servo: int) -> R:
         """A servo's reply to the greeting."""
         return self.registers.hello(servo)
@@ -158,7 +154,7 @@ class Startup(ABC, Generic[R]):
         for servo in servos:
             expected = load_table(servo.model)
             number, firmware = self._identity(replies[servo.id], expected)
-            if self._accepts(expected, number):
+            if number == expected.number:
                 self.registers.tables[servo.id] = load_table(expected.number, firmware)
                 continue
             label = self.registers.label(servo.id)

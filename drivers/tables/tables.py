@@ -100,6 +100,7 @@ class Motor:
 
     supply_v : supply at which the others were measured, volts. lowest_v, highest_v : range of supply.
     no_load_rpm : no-load speed, rev/min. stall_nm, stall_a : torque and current at stall (P-series: continuous).
+    play_arcmin : gear play, 0 where its specification states none.
     """
 
     supply_v: float
@@ -108,6 +109,7 @@ class Motor:
     no_load_rpm: float
     stall_nm: float
     stall_a: float
+    play_arcmin: float = 0.0
 
     @property
     def no_load_rad_s(self) -> float:

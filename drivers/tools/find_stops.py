@@ -156,7 +156,7 @@ class _Search:
             found = identity(registers, self._id) or (0, 0)
         else:
             found = reply.params[0] | reply.params[1] << 8, reply.params[2]
-        if found[0] == expected.number or (expected.protocol == 1 and expected.number > 0xFFFF):
+        if found[0] == expected.number:
             return load_table(expected.number, found[1] if expected.protocol == 2 else None)
         message = f"servo {registers.label(self._id)} is {model_name(found[0])}, configured is {self._servo.model}"
         raise registers.error(WrongModel, message, "correct the configuration, or the servo's id", self._id)
