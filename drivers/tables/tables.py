@@ -136,6 +136,8 @@ class ControlTable(Mapping[str, Item]):
     hardware_error : bit by cause (``voltage``, ``temperature``, ``overload`` ...) of Hardware Error Status and
         Shutdown; the XL-320 orders them differently from every other model.
     indirect : (first Indirect Address, first Indirect Data, slots) of each indirect area.
+    play_arcmin : gear play by its specification; 0 where that states none.
+    motor_encoder : the encoder counts turns of the motor, before the gear; else it is at the shaft.
     driven : whether omote drives and simulates the model; else it only scans and monitors it.
     fast_read, time_profile, goal_torque : whether this firmware knows fast reads, the time-based profile and
         torque on by goal update.
@@ -159,6 +161,8 @@ class ControlTable(Mapping[str, Item]):
         self.indirect: tuple[tuple[int, int, int], ...] = tuple(tuple(area) for area in spec.get("indirect", ()))
         self.hardware_error: dict[str, int] = spec["hardware_error"]
         self.driven: bool = spec.get("driven", True)
+        self.play_arcmin: float = self.motor.play_arcmin if self.motor else spec.get("play_arcmin", 0.0)
+        self.motor_encoder: bool = spec.get("motor_encoder", False)
         self.fast_read = 0 < spec.get("fast_read_firmware", 0) <= firmware
         self.time_profile = 0 < spec.get("time_profile_firmware", 0) <= firmware
         self.goal_torque = 0 < spec.get("goal_torque_firmware", 0) <= firmware
@@ -183,6 +187,11 @@ class ControlTable(Mapping[str, Item]):
     def rad_per_tick(self) -> float:
         """Angle of one position step."""
         return self.turn_rad / self.ticks_per_turn
+
+    @property
+    def play_ticks(self) -> float:
+        """Gear play that the encoder sees, in steps; 0 where none is stated, or where the encoder is at the motor."""
+        return 0.0 if self.motor_encoder else math.radians(self.play_arcmin / 60.0) / self.rad_per_tick
 
     @property
     def first_step(self) -> int:

@@ -102,7 +102,8 @@ class ServoState:
         self.force_baud(baud, self.baud)
         start = float(table.center if position is None else position)
         top_speed = (table.top_speed or table["Velocity Limit"].initial) * speed_unit(table)
-        self.plant = Plant(now_s, start, top_speed, table.voltage / 10, skin or Skin.for_turn(table.ticks_per_turn))
+        skin = skin or Skin.for_turn(table.ticks_per_turn)
+        self.plant = Plant(now_s, start, top_speed, table.voltage / 10, skin, table.play_ticks)
         kind: type[Drive] = WordDrive
         if "Goal Velocity" in table:
             kind = XDrive if "Profile Velocity" in table else FeetechDrive
