@@ -1,8 +1,8 @@
 """Benchmark of ``omote bench bus --buses N``: several buses at once in one process, as ``omote run`` drives them.
 
 Each bus has a thread and simulated servos in a process of its own, with the time of the bytes on its wire, so each has
-its own limit. Beside the rates it tells the processor time of a cycle, and what the drivers reach where each has a process
-of its own: the difference is what their common interpreter costs.
+its own limit. Beside the rates it tells the processor time of a cycle, and what the drivers reach where each has a
+process of its own: the difference is what their common interpreter costs.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from typing import Any
 from controller.base.steal_time import StealTime
 from controller.tools.bench_bus import (
     SHARES,
+    WARM_UP_CYCLES,
     Cycle,
     Figure,
     Log,
@@ -47,19 +48,22 @@ def bench_many(buses: int, servos: int, baud: int, seconds: float, log: Log) -> 
     steal = StealTime()
     figures: list[Figure] = []
     with ExitStack() as stack:
-        paths = [
-            stack.enter_context(SimulatedBus(specs, process=True, wire=True, baud=baud)).path for _ in range(buses)
-        ]
+        wires = [stack.enter_context(SimulatedBus(specs, process=True, wire=True, baud=baud)) for _ in range(buses)]
+        paths = [wire.path for wire in wires]
         for fast in (False, True):
             kind = "fast sync read" if fast else "sync read"
             log(f"{buses} buses at once, {kind}, as fast as they can")
+            used_s = [wire.processor_s or 0.0 for wire in wires]
             free = _at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0)
+            used_s = [(wire.processor_s or 0.0) - before for wire, before in zip(wires, used_s, strict=True)]
             log(f"{buses} buses at once, {kind}, the same bytes without a driver")
             alone = _at_once(paths, partial(bytes_alone, servos=servos, baud=baud, fast=fast), seconds, 0.0)
             log(f"{buses} buses at once, {kind}, each driven from a process of its own")
             apart = _at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0, processes=True)
             figures += _free_figures(kind, limit_hz(servos, baud, fast), SHARES[fast], free, alone)
+            simulated = 1e6 * sum(used_s) / sum(loop.rate_hz * seconds + WARM_UP_CYCLES for loop in free)
             figures += _cost_figures(kind, limit_hz(servos, baud, fast), free, alone, apart)
+            figures.append(Figure("  simulated servos, processor of a cycle", simulated, "us"))
         log(f"{buses} buses at once, {PACED_HZ:g} Hz")
         figures += _paced_figures(_at_once(paths, partial(_driver, specs, baud, True), seconds, PACED_HZ))
     return [(f"{buses} buses of {servos} servos at {baud} baud, wire-timed", figures + steal_figures(steal))]
