@@ -29,7 +29,11 @@ STEPS = [line.split(maxsplit=1) for line in LINES if line.strip() and not line.s
 RUN_LINES = re.findall(r"^docker run .*$", PAGE.read_text(encoding="utf-8"), re.M)
 LIMIT_S = 240.0
 
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(os.name != "posix", reason="runs commands of a Linux container")]
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(os.name != "posix", reason="runs commands of a Linux container"),
+    pytest.mark.filterwarnings("ignore:set:DeprecationWarning"),  # of pyserial's client of RFC 2217
+]
 
 
 @dataclass

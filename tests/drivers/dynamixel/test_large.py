@@ -69,6 +69,21 @@ def test_it_is_no_faster_than_it_was_told(wire: VirtualBus, bus: Bus) -> None:
     assert 0.5 < fastest < 1.05
 
 
+@pytest.mark.parametrize("asked", [3.0, 50.0])
+def test_a_y_series_servo_accelerates_as_told_and_at_most_by_its_own_limit(asked: float) -> None:
+    """YM070-210-R051: Acceleration Limit 313 x 10 rev/min2 are 5.46 rad/s2. Half of a step that is all ramp."""
+    wire = VirtualBus([ServoSpec(1, "one", "ym070-210-r051", -1.2, 1.2, 30.0, asked)], "dynamixel")
+    acceleration = min(asked, 313 * 10 * 2 * np.pi / 3600)
+    with wire.bus() as bus:
+        bus.start()
+        begun, half_s = wire.clock(), np.sqrt(0.4 / acceleration)
+        while wire.clock() - begun < half_s:
+            bus.write([0.4])
+            wire.clock.sleep(0.001)
+        turned = wire.servo(1).position_ticks / 524_288 * 2 * np.pi
+    assert turned == pytest.approx(0.2, rel=0.1)
+
+
 def test_goals_stay_within_the_limits_of_specification_and_servo(wire: VirtualBus, bus: Bus) -> None:
     for _ in range(200):
         sent = bus.write([3.0, -3.0])
