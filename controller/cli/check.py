@@ -10,6 +10,8 @@ from rich.table import Table
 
 from controller.cli.completion import names_of
 from controller.cli.console import console, show_table
+from controller.cli.heads import Vocabularies
+from controller.cli.run import vocabulary_files
 
 
 def checkable(incomplete: str) -> list[str]:
@@ -26,6 +28,7 @@ def check(
             autocompletion=checkable,
         ),
     ],
+    vocabulary: Vocabularies = None,
 ) -> None:
     """Check any file omote reads, and all it refers to, without running it; lists every fault with its place.
 
@@ -33,7 +36,7 @@ def check(
     """
     from controller.tools.check import check_anything  # start-up: --help does without it
 
-    for line in check_anything(file):
+    for line in check_anything(file, vocabulary_files(vocabulary)):
         console.print(escape(line), soft_wrap=True)
 
 

@@ -1,11 +1,13 @@
 """Benchmark of ``omote bench bus --buses N``: several buses at once in one process, as ``omote run`` drives them.
 
 Each bus has a thread and simulated servos in a process of its own, with the time of the bytes on its wire, so each has
-its own limit; a machine needs about as many cores as buses for the simulators alone.
+its own limit. Beside the rates it tells the processor time of a cycle, and what the drivers reach where each has a
+process of its own: the difference is what their common interpreter costs.
 """
 
 from __future__ import annotations
 
+import multiprocessing
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
@@ -15,6 +17,7 @@ from typing import Any
 from controller.base.steal_time import StealTime
 from controller.tools.bench_bus import (
     SHARES,
+    WARM_UP_CYCLES,
     Cycle,
     Figure,
     Log,
@@ -45,16 +48,22 @@ def bench_many(buses: int, servos: int, baud: int, seconds: float, log: Log) -> 
     steal = StealTime()
     figures: list[Figure] = []
     with ExitStack() as stack:
-        paths = [
-            stack.enter_context(SimulatedBus(specs, process=True, wire=True, baud=baud)).path for _ in range(buses)
-        ]
+        wires = [stack.enter_context(SimulatedBus(specs, process=True, wire=True, baud=baud)) for _ in range(buses)]
+        paths = [wire.path for wire in wires]
         for fast in (False, True):
             kind = "fast sync read" if fast else "sync read"
             log(f"{buses} buses at once, {kind}, as fast as they can")
+            used_s = [wire.processor_s or 0.0 for wire in wires]
             free = _at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0)
+            used_s = [(wire.processor_s or 0.0) - before for wire, before in zip(wires, used_s, strict=True)]
             log(f"{buses} buses at once, {kind}, the same bytes without a driver")
             alone = _at_once(paths, partial(bytes_alone, servos=servos, baud=baud, fast=fast), seconds, 0.0)
+            log(f"{buses} buses at once, {kind}, each driven from a process of its own")
+            apart = _at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0, processes=True)
             figures += _free_figures(kind, limit_hz(servos, baud, fast), SHARES[fast], free, alone)
+            simulated = 1e6 * sum(used_s) / sum(loop.rate_hz * seconds + WARM_UP_CYCLES for loop in free)
+            figures += _cost_figures(kind, limit_hz(servos, baud, fast), free, alone, apart)
+            figures.append(Figure("  simulated servos, processor of a cycle", simulated, "us"))
         log(f"{buses} buses at once, {PACED_HZ:g} Hz")
         figures += _paced_figures(_at_once(paths, partial(_driver, specs, baud, True), seconds, PACED_HZ))
     return [(f"{buses} buses of {servos} servos at {baud} baud, wire-timed", figures + steal_figures(steal))]
@@ -66,6 +75,21 @@ def _free_figures(kind: str, limit: float, share: float, free: list[Loop], alone
         yield Figure(f"bus {k}, write and {kind}", driven.rate_hz, "Hz")
         yield Figure(f"  bus {k}, of the wire limit", 100 * driven.rate_hz / limit, "%", reach, kept)
         yield Figure(f"  bus {k}, the same bytes without a driver", 100 * bare.rate_hz / limit, "%")
+
+
+def _cost_figures(kind: str, limit: float, free: list[Loop], alone: list[Loop], apart: list[Loop]) -> Iterator[Figure]:
+    """What the rates cost, and where they are lost."""
+    driven, bare = (1e6 * sum(loop.processor for loop in loops) / sum(loop.rate_hz for loop in loops)
+        for loops in (free, alone))  # fmt: skip
+    yield Figure(f"{kind}, processor of a cycle", driven, "us")
+    yield Figure("  the same bytes without a driver", bare, "us")
+    typical = [1e3 / limit / _middle([loop.cycle_ms["p50"] for loop in loops]) for loops in (free, apart, alone)]
+    names = ("half of all cycles, of the wire limit", "  each driven from a process of its own", "  without a driver")
+    yield from (Figure(name, 100 * share, "%") for name, share in zip(names, typical, strict=True))
+
+
+def _middle(values: list[float]) -> float:
+    return sorted(values)[len(values) // 2]
 
 
 def _paced_figures(paced: list[Loop]) -> Iterator[Figure]:
@@ -88,8 +112,36 @@ def _driver(specs: list[ServoSpec], baud: int, fast: bool, path: str) -> Iterato
         yield cycle
 
 
-def _at_once(paths: list[str], opened: Drive, seconds: float, rate_hz: float) -> list[Loop]:
-    """A loop of every bus, all in threads that begin together; raises what the first of them raised."""
+def _in_a_process(opened: Drive, path: str, seconds: float, rate_hz: float, together: Any, results: Any) -> None:
+    """A loop of one bus in a process of its own."""
+    shorten_thread_switches()
+    request_realtime()
+    with opened(path) as cycle:
+        together.wait(timeout=60.0)
+        results.put((path, measure_loop(cycle, seconds, rate_hz)))
+
+
+def _apart(paths: list[str], opened: Drive, seconds: float, rate_hz: float) -> list[Loop]:
+    """A loop of every bus, all in processes that begin together."""
+    context = multiprocessing.get_context("spawn")
+    together, results = context.Barrier(len(paths)), context.Queue()
+    arguments = [(opened, path, seconds, rate_hz, together, results) for path in paths]
+    processes = [context.Process(target=_in_a_process, args=each, daemon=True) for each in arguments]
+    for process in processes:
+        process.start()
+    loops: dict[str, Loop] = dict(results.get(timeout=seconds + 120.0) for _ in paths)
+    for process in processes:
+        process.join()
+    return [loops[path] for path in paths]
+
+
+def _at_once(paths: list[str], opened: Drive, seconds: float, rate_hz: float, *, processes: bool = False) -> list[Loop]:
+    """A loop of every bus, all in threads that begin together; raises what the first of them raised.
+
+    processes : in processes instead.
+    """
+    if processes:
+        return _apart(paths, opened, seconds, rate_hz)
     loops: list[Loop | BaseException | None] = [None] * len(paths)
     together = threading.Barrier(len(paths))
 

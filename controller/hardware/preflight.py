@@ -167,7 +167,7 @@ class _ChannelCheck:
 
     def _is_model(self, found: ServoInfo) -> bool:
         wanted = load_table(self._channel.model)
-        return found.model_number == wanted.number or wanted.number > 0xFFFF
+        return found.model_number == wanted.number
 
     def _compare_state(self, found: ServoInfo, own: OwnSettings) -> None:
         """Supply, temperature, errors and torque."""

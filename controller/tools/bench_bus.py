@@ -48,7 +48,7 @@ ROUNDS = 3
 SHARES = (0.92, 0.85)
 """Of the wire's limit that a loop of sync reads, and of fast ones, shall reach."""
 _SWING_RAD = 0.3
-_WARM_UP_CYCLES = 40
+WARM_UP_CYCLES = 40
 _UNLIMITED_FPS, _PACED_FPS = 1000, 30
 _FACE_SECONDS = 10.0
 """Least time of a run with the face: of a shorter one, the first second, when servos start, is the worst hundredth."""
@@ -223,7 +223,7 @@ def _run_sdk(path: str, seconds: float, rate_hz: float) -> Loop:
 def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
     """Run cycles for some time, paced or, with ``rate_hz`` 0, without pause."""
     swing = np.repeat(_SWING_RAD * np.sin(np.arange(314) / 50)[:, None], SERVOS, axis=1)  # a slow one of all servos
-    for angles in swing[:_WARM_UP_CYCLES]:
+    for angles in swing[:WARM_UP_CYCLES]:
         cycle(angles)
     clock = Clock(rate_hz or 1.0)
     began, used, end = time.monotonic(), time.thread_time(), time.monotonic() + seconds

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from controller.base.config import load, read_toml
@@ -43,13 +44,29 @@ SURFACE_SUFFIXES = (".3dm", ".xml", ".tsm")
 TRAFFIC = (".pcapng", ".log")
 
 
-def check_anything(name: str) -> list[str]:
+@dataclass(frozen=True)
+class _Known:
+    """What a file may name: ``parameters``, and the expressions of the files ``more`` beside the shipped ones."""
+
+    parameters: Parameters
+    more: tuple[Path, ...] = ()
+
+    def vocabulary(self, *more: Path) -> Vocabulary:
+        """The expressions, with those of further files."""
+        return Vocabulary.load(self.parameters.with_files(more), more=(*self.more, *more))
+
+
+def check_anything(name: str, vocabularies: Sequence[Path] = ()) -> list[str]:
     """Check any file omote reads; returns what it is, in a line or two.
 
-    ``name`` : a path, or the name of a shipped stage, robot or head. Raises ConfigError or SurfaceError.
+    ``name`` : a path, or the name of a shipped stage, robot or head. ``vocabularies`` : files with expressions and
+    parameters that it may name. Raises ConfigError or SurfaceError.
     """
     with ports_forbidden("a check"):
-        return [f"{line}: good" if not line.startswith(" ") else line for line in _describe(_find(name))]
+        path = _find(name)
+        more = tuple(each for each in vocabularies if each.resolve() != path.resolve())
+        known = _Known(PARAMETERS.with_files(more), more)
+        return [f"{line}: good" if not line.startswith(" ") else line for line in _describe(path, known)]
 
 
 def _find(name: str) -> Path:
@@ -67,7 +84,7 @@ def _find(name: str) -> Path:
     )
 
 
-def _describe(path: Path) -> Iterator[str]:
+def _describe(path: Path, known: _Known) -> Iterator[str]:
     """Lines on a file; one that begins with a space continues the line before it."""
     suffix = path.suffix.lower()
     if _is_head(path):
@@ -81,16 +98,16 @@ def _describe(path: Path) -> Iterator[str]:
         for error in left_out:
             yield f"  left out: {error}"
     elif path.suffix == SUFFIX:  # replayed as fast as possible; every tick has to give the recorded values
-        times = [now_ns for now_ns, _ in replay(path, PARAMETERS)]
+        times = [now_ns for now_ns, _ in replay(path, known.parameters)]
         seconds = (times[-1] - times[0]) * 1e-9 if times else 0.0
         yield f"recording {path.name}: {len(times)} ticks, {seconds:.1f} s, all came out again bit by bit"
     elif suffix in TRAFFIC:
         yield describe_traffic(path)
     elif suffix in suffixes():
-        take = load_take(path, PARAMETERS)
+        take = load_take(path, known.parameters)
         yield f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz"
     else:
-        yield from _describe_toml(path)
+        yield from _describe_toml(path, known)
 
 
 def _is_head(path: Path) -> bool:
@@ -140,47 +157,47 @@ def _check_group(path: Path) -> str:
     return f"group {name}: {len(group.ids)} control points of part {group.part} of head {head.name}"
 
 
-def _describe_toml(path: Path) -> Iterator[str]:
+def _describe_toml(path: Path, known: _Known) -> Iterator[str]:
     table = read_toml(path)
     kind = file_kinds.kind_of(table)
     if kind is None and table:
         why = f"no kind of file has the keys {', '.join(table)[:200]}"
         raise ConfigError(f"{path}: {why}", hint="compare it with the file of its kind in omote's folder configs")
-    yield from _READERS.get(kind or file_kinds.STAGE, _describe_stage)(path)
+    yield from _READERS.get(kind or file_kinds.STAGE, _describe_stage)(path, known)
 
 
-def _describe_calibration(path: Path) -> Iterator[str]:
+def _describe_calibration(path: Path, known: _Known) -> Iterator[str]:
     found = load(path, CalibrationFile)
     yield f"calibration {found.name} of robot {found.robot}: {len(found.channels)} channels"
 
 
-def _describe_script(path: Path) -> Iterator[str]:
-    script = load_script(str(path), PARAMETERS)
+def _describe_script(path: Path, known: _Known) -> Iterator[str]:
+    script = load_script(str(path), known.parameters, known.vocabulary())
     yield f"script {script.name}: {len(script.steps)} steps, {len(script.marks)} marks"
 
 
-def _describe_faults(path: Path) -> Iterator[str]:
+def _describe_faults(path: Path, known: _Known) -> Iterator[str]:
     timeline = load_fault_script(path)
     loop = f", again every {timeline.loop_s:g} s" if timeline.loop_s else ""
     yield f"timeline of faults {path.name}: {len(timeline.steps)} entries{loop}"
 
 
-def _describe_expressions(path: Path) -> Iterator[str]:
+def _describe_expressions(path: Path, known: _Known) -> Iterator[str]:
     shipped = config_dir() / "vocabularies" / "expressions.toml"
     more = () if path.resolve() == shipped.resolve() else (path,)
-    known = len(Vocabulary.load(PARAMETERS).names) if more else 0
-    parameters = PARAMETERS.with_files(more)
-    own = f", parameters of its own: {', '.join(parameters.own)}" if parameters.own else ""
-    yield f"expressions {path.name}: {len(Vocabulary.load(parameters, more=more).names) - known}{own}"
+    before = len(known.vocabulary().names) if more else 0
+    names = known.parameters.with_files(more).own[len(known.parameters.own) :]
+    own = f", parameters of its own: {', '.join(names)}" if names else ""
+    yield f"expressions {path.name}: {len(known.vocabulary(*more).names) - before}{own}"
 
 
-def _describe_life(path: Path) -> Iterator[str]:
-    settings = IdleSettings.named(str(path), PARAMETERS)
+def _describe_life(path: Path, known: _Known) -> Iterator[str]:
+    settings = IdleSettings.named(str(path), known.parameters)
     poses = sum(len(each.poses) for each in (settings.fidget, settings.smile, settings.swallow))
     yield f"life {path.name}: a blink every {mean_of(settings.blink.interval_s):g} s on average, {poses} gestures"
 
 
-def _describe_person(path: Path) -> Iterator[str]:
+def _describe_person(path: Path, known: _Known) -> Iterator[str]:
     person = load_person(path).settings
     check_identity(find_config("heads", DEFAULT_HEAD), person.identity)
     mix = ", ".join(f"{name} {amount:g}" for name, amount in person.identity.items()) or "the head's own"
@@ -189,56 +206,57 @@ def _describe_person(path: Path) -> Iterator[str]:
     yield f"  wears {worn or 'nothing'}"
 
 
-def _describe_parameters(path: Path) -> Iterator[str]:
+def _describe_parameters(path: Path, known: _Known) -> Iterator[str]:
     """A base vocabulary, which has the shipped names, or one that adds parameters to it, perhaps with expressions."""
     named = read_toml(path).get("parameters")
     if isinstance(named, Mapping) and set(PARAMETERS.names) & set(named):
         yield f"parameters {path.name}: {len(Parameters.load(path))}"
     else:
-        yield from _describe_expressions(path)
+        yield from _describe_expressions(path, known)
 
 
-def _describe_units(path: Path) -> Iterator[str]:
-    found = Facs.load(PARAMETERS, path)
+def _describe_units(path: Path, known: _Known) -> Iterator[str]:
+    found = Facs.load(known.parameters, path)
     yield f"action units {path.name}: {len(found.names)} with sides, {len(found.emotions)} emotions"
 
 
-def _describe_visemes(path: Path) -> Iterator[str]:
-    found = Visemes.load(PARAMETERS, path)
+def _describe_visemes(path: Path, known: _Known) -> Iterator[str]:
+    found = Visemes.load(known.parameters, path)
     yield f"visemes {path.name}: {len(found.names)}, {len(found.phonemes)} phonemes"
 
 
-def _describe_presets(path: Path) -> Iterator[str]:
-    yield f"presets {path.name}: {len(Presets.load(PARAMETERS, path).names)}"
+def _describe_presets(path: Path, known: _Known) -> Iterator[str]:
+    yield f"presets {path.name}: {len(Presets.load(known.parameters, path).names)}"
 
 
-def _describe_controls(path: Path) -> Iterator[str]:
-    found = load_controls(path, PARAMETERS)
+def _describe_controls(path: Path, known: _Known) -> Iterator[str]:
+    found = load_controls(path, known.parameters, known.vocabulary())
     counts = (f"{len(getattr(found, what))} {what}" for what in ("controllers", "axes", "buttons", "keys"))
     yield f"controls {path.name}: {', '.join(text for text in counts if not text.startswith('0 ')) or 'nothing'}"
 
 
-def _describe_ranges(path: Path) -> Iterator[str]:
-    low, high = load_ranges(path, PARAMETERS)
-    yield f"ranges {path.name}: of {int(((low != PARAMETERS.low) | (high != PARAMETERS.high)).sum())} parameters"
+def _describe_ranges(path: Path, known: _Known) -> Iterator[str]:
+    parameters = known.parameters
+    low, high = load_ranges(path, parameters)
+    yield f"ranges {path.name}: of {int(((low != parameters.low) | (high != parameters.high)).sum())} parameters"
 
 
-def _describe_study(path: Path) -> Iterator[str]:
-    study = load_study(path, PARAMETERS)
+def _describe_study(path: Path, known: _Known) -> Iterator[str]:
+    study = load_study(path, known.parameters)
     conditions = len(study.settings.conditions)
     yield f"study {study.settings.name}: {len(study.trials)} trials of {conditions} conditions, {study.length_s:.0f} s"
 
 
-def _describe_moods(path: Path) -> Iterator[str]:
-    yield f"moods {path.name}: {len(Affect.load(Vocabulary.load(PARAMETERS), path).names) - 1} anchors"
+def _describe_moods(path: Path, known: _Known) -> Iterator[str]:
+    yield f"moods {path.name}: {len(Affect.load(known.vocabulary(), path).names) - 1} anchors"
 
 
-def _describe_layers(path: Path) -> Iterator[str]:
+def _describe_layers(path: Path, known: _Known) -> Iterator[str]:
     yield f"layers {path.name}: {', '.join(layer.name for layer in load_layers(base=path))}"
 
 
-def _describe_stage(path: Path) -> Iterator[str]:
-    stage = load_stage(str(path), PARAMETERS)
+def _describe_stage(path: Path, known: _Known) -> Iterator[str]:
+    stage = load_stage(str(path), PARAMETERS, known.more)
     if stage.groups:
         stage.load_head()
     name = f"stage {stage.settings.name}"
@@ -263,10 +281,10 @@ def _warnings(robots: Sequence[RobotSettings]) -> Iterator[str]:
     yield from (f"  warning: {line}" for line in robot_warnings(robots))
 
 
-def _describe_robot(path: Path) -> Iterator[str]:
+def _describe_robot(path: Path, known: _Known) -> Iterator[str]:
     """A robot; with anchors, by region how far emotions move the skin and the servos fall short (rms, mm)."""
-    robot = load_robot(path, PARAMETERS)
-    parameters = robot_parameters(robot, path, PARAMETERS)
+    robot = load_robot(path, known.parameters)
+    parameters = robot_parameters(robot, path, known.parameters)
     yield f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels"
     yield from _warnings([robot])
     if not robot.anchored_channels:
@@ -275,7 +293,7 @@ def _describe_robot(path: Path) -> Iterator[str]:
     from controller.robot.suggest import described, suggest  # start-up: as Head
 
     anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), parameters, where=str(path))
-    vocabulary = Vocabulary.load(parameters)
+    vocabulary = Vocabulary.load(parameters, more=known.more)
     emotions = {n: vocabulary[n].weights for n in vocabulary.names if vocabulary[n].kind == "emotion"}
     if anchors is None:
         return
@@ -284,7 +302,7 @@ def _describe_robot(path: Path) -> Iterator[str]:
     yield from (f"  {described(found)}" for found in suggest(anchors, emotions, parameters))
 
 
-_READERS: dict[file_kinds.FileKind, Callable[[Path], Iterator[str]]] = {
+_READERS: dict[file_kinds.FileKind, Callable[[Path, _Known], Iterator[str]]] = {
     file_kinds.STAGE: _describe_stage,
     file_kinds.ROBOT: _describe_robot,
     file_kinds.CALIBRATION: _describe_calibration,

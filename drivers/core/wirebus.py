@@ -262,10 +262,14 @@ class WireBus(Bus):
         if abs(angle_rad - goal_rad) <= FAR_RAD:
             self._begin_at(index, angle_rad)
             return
-        self._presence.leave_out(index)
         message = f"it came back at {angle_rad:.2f} rad, far from its last goal of {goal_rad:.2f} rad"
         hint = "it is started again; look for a second servo of its id, and at its supply"
-        self._leave_out(index, self._error(BusError, message, hint, [index]))
+        self._give_up(index, self._error(BusError, message, hint, [index]))
+
+    def _give_up(self, index: int, why: BusError) -> None:
+        """Send a servo no more goals until it has been started again."""
+        self._presence.leave_out(index)
+        self._leave_out(index, why)
 
     def _begin_at(self, index: int, angle_rad: float) -> None:
         """Let the goals of one servo begin at a position."""

@@ -1,7 +1,8 @@
 """Indirect addressing of Dynamixel servos: registers that lie apart are mapped side by side and read in one go.
 
-X-series servos keep pointers in RAM (Indirect Address); reading the bytes behind them (Indirect Data) reads the
-registers that they point at. Their address depends on model and firmware. A servo that reboots loses them.
+X-series servos keep pointers in RAM (Indirect Address); those of P- and Y-series are permanent, and are left alone.
+Reading the bytes behind them (Indirect Data) reads the registers that they point at. Their address depends on model and
+firmware. A servo that reboots loses them.
 """
 
 from __future__ import annotations
@@ -37,7 +38,8 @@ def pointers_of(table: ControlTable) -> Pointers | None:
         return None
     targets = [at for item in items.values() for at in range(item.address, item.end)]
     first = table.get("Indirect Address 1")
-    area = next((area for area in table.indirect if area[2] >= len(targets)), None)
+    in_ram = (area for area in table.indirect if not table.is_permanent(area[0]))  # else each start would wear it
+    area = next((area for area in in_ram if area[2] >= len(targets)), None)
     if area is None or first is None or not all((first.minimum or 0) <= at <= (first.maximum or 0) for at in targets):
         return None
     address, at, _ = area

@@ -133,8 +133,11 @@ class MixedBus(WireBus):
             for half in self._halves:
                 chosen = [servo for servo in half.ids if ids is None or servo in ids]
                 failed |= half._recover(chosen)
-                for servo in set(chosen) - failed.keys():
-                    self._drive_again(self.ids.index(servo), half._limits.target[half.ids.index(servo)])
+                for index, servo in [(self.ids.index(servo), servo) for servo in chosen]:
+                    if servo in failed:
+                        self._give_up(index, failed[servo])
+                    else:
+                        self._drive_again(index, half._limits.target[half.ids.index(servo)])
         if failed:
             raise merge_errors(failed)
 

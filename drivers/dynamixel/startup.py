@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import logging
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
 from drivers.base.bus import ServoSpec
-from drivers.base.errors import CorruptReply, NoReply, ServoRefused
+from drivers.base.errors import BusError, CorruptReply, NoReply, ServoFault, ServoRefused
 from drivers.dynamixel.indirect import set_up
 from drivers.dynamixel.registers import Registers
-from drivers.packets.packet import StatusPacket
+from drivers.packets.packet import Instruction, StatusPacket
 from drivers.servos import startup
 from drivers.tables.tables import ControlTable, Item
+
+log = logging.getLogger(__name__)
 
 WATCHDOG_STEP_S = 0.02
 INPUT_VOLTAGE = 0x01
@@ -21,6 +24,12 @@ REVERSE, TIME_PROFILE, TORQUE_BY_GOAL = 0x01, 0x04, 0x08
 OUT_OF_TURN_TICKS = 64
 MAX_OFFSET = 1024
 BOOT_S = 1.0
+ERROR_CLEAR = b"\x02ERCL"
+"""Parameters of Clear that end an error (e-Manual, Y-series, Error Clear Packet)."""
+TURNING_ON, RUNNING, TURNING_OFF = 4, 5, 6
+"""Values of Controller State: the motor is being switched on, takes goals, is being switched off."""
+STATE_S = 3.0
+"""Longest time to switch a motor on or off that has a brake, or stops first."""
 EEPROM_TRIES = 10
 
 
@@ -68,8 +77,47 @@ class Startup(startup.Startup[StatusPacket]):
         A limp servo that was turned to -30 is at 4066 then, and a goal at 0 would spin it. Source: e-Manual, Present
         Position (132). Offsets beyond `MAX_OFFSET` do not act in position mode.
         """
-        offsets = self.registers.get_all(ids, "offset")
+        bare = [servo for servo in ids if not self.registers.tables[servo].error_codes]  # Y-series keep their turns
+        offsets = self.registers.get_all(bare, "offset")
         return {servo: offset for servo, offset in offsets.items() if abs(offset) <= MAX_OFFSET}
+
+    def torque_on(self, ids: Sequence[int], held: Sequence[int]) -> None:
+        """Switch torque on; servos with a brake take goals only once it is open.
+
+        Raises ServoFault: one does not run, or a motor did not come on.
+        """
+        super().torque_on(ids, held)
+        waiting = self._with_state(ids, lambda state: state != RUNNING)
+        if waiting:
+            which = ", ".join(map(self.registers.label, waiting))
+            hint = "look at its Controller State, Brake Delay and Goal Update Delay"
+            message = f"servos do not run {STATE_S:g} s after torque: {which}"
+            raise self.registers.error(ServoFault, message, hint, *waiting)
+        self.started.ticks |= self.registers.get_all(self.registers.having(ids, "state"), "position")
+
+    def _confirmed_off(self, servo: int) -> bool:
+        """Off, and no longer stopping or closing its brake: while it does that it refuses what is written."""
+        registers = self.registers
+        if not registers.having([servo], "state"):
+            return super()._confirmed_off(servo)
+        try:
+            self._with_state([servo], lambda state: state in (TURNING_ON, TURNING_OFF))
+            if registers.get(servo, "torque", tries=1):
+                registers.put(servo, "torque", 0, tries=1)
+            settled = not self._with_state([servo], lambda state: state in (TURNING_ON, RUNNING, TURNING_OFF))
+            return settled and registers.get(servo, "torque", tries=1) == 0
+        except BusError:
+            return False
+
+    def _with_state(self, ids: Sequence[int], waits: Callable[[int], bool]) -> list[int]:
+        """Servos whose Controller State is still wrong after `STATE_S`; those without such a register never wait."""
+        registers = self.registers
+        left, end_s = registers.having(ids, "state"), registers.port.clock() + STATE_S
+        while left := [servo for servo, state in registers.get_all(left, "state").items() if waits(state)]:
+            if registers.port.clock() >= end_s:
+                break
+            registers.port.sleep(0.02)
+        return left
 
     def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
         latched = self.registers.get_all(ids, "hardware")
@@ -77,10 +125,45 @@ class Startup(startup.Startup[StatusPacket]):
 
     def bring_up(self, servos: Sequence[ServoSpec]) -> startup.Started:
         """Make identified servos answer writes, then start them where they are."""
+        self._with_state([servo.id for servo in servos], lambda state: state in (TURNING_ON, TURNING_OFF))
         self.registers.put_all(dict.fromkeys([servo.id for servo in servos], 2), "status_level")
         return super().bring_up(servos)
 
     def _clear_faults(self, ids: Sequence[int]) -> list[int]:
+        """End errors where that is allowed; returns servos that were rebooted."""
+        coded = [servo for servo in ids if self.registers.tables[servo].error_codes]
+        self._clear_codes(coded)
+        return self._reboot_faulted([servo for servo in ids if servo not in coded])
+
+    def _clear_codes(self, ids: Sequence[int]) -> None:
+        """Y-series: end errors by the instruction Clear, where that is allowed; none is rebooted.
+
+        A tripped watchdog is cleared with its register later, and with a warning of its battery a servo goes on. An
+        error of the supply needs no leave: the motor is off already, and the supply was found good.
+        """
+        registers = self.registers
+        bad: dict[int, int] = {}
+        refused: dict[int, int] = {}
+        for servo, code in registers.get_all(ids, "hardware").items():
+            table = registers.tables[servo]
+            codes = table.error_codes
+            if code in (0, codes["watchdog"]):
+                continue
+            if code == codes["battery"]:
+                log.warning("servo %s: the battery that keeps its turns is low", registers.label(servo))
+                continue
+            of_supply = code in (codes["voltage"], codes["over_voltage"])
+            allowed = code in table.clearable_codes and (of_supply or self.policy.reboot_faulted)
+            (bad if allowed else refused)[servo] = code
+        if refused:
+            raise self.fault("latched", refused)
+        for servo in bad:
+            registers.packets.ask(registers.port, servo, Instruction.CLEAR, ERROR_CLEAR, 0)
+        still = {servo: code for servo, code in registers.get_all(list(bad), "hardware").items() if code}
+        if still:
+            raise self.fault("latched", still)
+
+    def _reboot_faulted(self, ids: Sequence[int]) -> list[int]:
         """Reboot servos with a latched error where that is allowed.
 
         Input voltage alone is ignored where it does not switch the motor off; else the servo is rebooted in any case:
@@ -125,9 +208,10 @@ class Startup(startup.Startup[StatusPacket]):
         ``held`` : its torque is on, so nothing may be written; raises ServoRefused where something differs.
         """
         registers, table = self.registers, self.registers.tables[servo]
+        self._check_gear(servo)
         wanted: dict[str, int] = {"mode": 2 if table.model == "xl320" else 3}
         keep = {"drive_mode": ~(REVERSE | TIME_PROFILE | TORQUE_BY_GOAL)}
-        if table.goal_torque:  # older firmware has no Startup Configuration and refuses to read it
+        if table.goal_torque or table.error_codes:  # older firmware has no Startup Configuration and refuses to read it
             keep["startup"] = ~1
         names = [name for name in ("mode", *keep) if registers.item(servo, name) is not None]
         present = {name: registers.get(servo, name) for name in names}
@@ -141,6 +225,16 @@ class Startup(startup.Startup[StatusPacket]):
             if held:
                 raise self.locked(servo, name, present[name], value)
             self._write_eeprom(servo, name, present[name], value)
+
+    def _check_gear(self, servo: int) -> None:
+        """Y-series: an electronic gear that is not the model's own makes another angle of every step."""
+        registers = self.registers
+        for name in ("gear_numerator", "gear_denominator"):
+            item = registers.item(servo, name)
+            if item is None or (value := registers.get(servo, name)) == item.initial:
+                continue
+            message = f"servo {registers.label(servo)} has {item.name} {value}, and its angles need {item.initial}"
+            raise registers.error(ServoRefused, message, f"write {item.initial} to it, with torque off", servo)
 
     def _write_eeprom(self, servo: int, name: str, old: int, new: int) -> None:
         registers = self.registers

@@ -25,6 +25,8 @@ log = logging.getLogger(__name__)
 
 JOINT_FAILURES = 2
 """Fast reads in a row that no servo answers before plain ones are used."""
+TRIPPED_VALUES = (TRIPPED, -1)
+"""Bus Watchdog after it has expired, in registers of one byte and of two."""
 FAST_AGAIN_S, FAST_AGAIN_MOST_S = 5.0, 320.0
 """Time until fast reads are tried again, twice as long after each try in vain, and its longest."""
 
@@ -148,7 +150,8 @@ class Telemetry(telemetry.Telemetry):
                 values, errors = {name: value[mapped] for name, value in values.items()}, errors[mapped]
         super()._store(request, values, errors, now, running)
         if "watchdog" in values and running:
-            for servo in [i for i, value in zip(request.ids, values["watchdog"], strict=True) if value == TRIPPED]:
+            found = zip(request.ids, values["watchdog"], strict=True)
+            for servo in [servo for servo, value in found if value in TRIPPED_VALUES]:
                 if servo not in self.tripped:
                     self.tripped.add(servo)
                     self.report.count("watchdog", servo)

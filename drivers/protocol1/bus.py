@@ -100,10 +100,7 @@ class Protocol1Bus(ServoBus):
             return found
 
     def _table_of(self, servo: int, number: int, firmware: int) -> ControlTable:
-        """Table of a model number; that of the configured model where no source gives its number."""
-        configured = self._registers.tables.get(servo)
-        if configured is not None and configured.number >= startup.UNNUMBERED:
-            return configured
+        """Table of a model number."""
         return load_table(number)
 
     def _startup(self, policy: Policy | None = None) -> Startup:

@@ -24,8 +24,6 @@ OUT_OF_TURN = 1 / 64
 """Share of a turn that a position may lie outside of it."""
 RELAPSE_S = 0.25
 """Time in which a servo that had shut down shuts down again if the cause persists."""
-UNNUMBERED = 0x10000
-"""Model numbers from here on stand for models whose real number no source gives."""
 
 
 @dataclass(frozen=True)
@@ -74,11 +72,6 @@ class Startup(startup.Startup[Packet1]):
 
     def _identity(self, reply: Packet1, expected: ControlTable) -> tuple[int, int]:
         return identity(reply, [expected])
-
-    def _accepts(self, expected: ControlTable, number: int) -> bool:
-        """Whether a number is the configured model's. One that no source gives may be any that no other model has."""
-        unknown = expected.number >= UNNUMBERED and number not in known_models()
-        return number == expected.number or unknown
 
     def _greet(self, servo: int) -> Packet1:
         """A servo's first registers; one that answers only pings is set to answer everything."""

@@ -202,7 +202,8 @@ class ServoBus(WireBus):
         """Bring servos back that switched off or were rebooted, where they are; ``ids`` None means all of them.
 
         Servos that hold go on holding. Raises BusError where some stay off, after all others were brought back; see the
-        policy of the family's start-up for what is allowed.
+        policy of the family's start-up for what is allowed. Those are sent no goals, and are tried again once a second
+        without a reboot, as after :meth:`reconnect`.
         """
         failed = self._recover(self.ids if ids is None else ids)
         if failed:
@@ -217,8 +218,10 @@ class ServoBus(WireBus):
                 try:
                     started = self._start_again(chosen, self._startup(self._for_recovery()))
                 except BusError as error:
-                    named = error.servo_ids or [servo.id for servo in chosen]
-                    failed |= {servo.id: error for servo in chosen if servo.id in named}
+                    named = [servo.id for servo in chosen if servo.id in error.servo_ids] or [s.id for s in chosen]
+                    failed |= dict.fromkeys(named, error)
+                    for number in named:
+                        self._give_up(self.ids.index(number), error)
                     chosen = [servo for servo in chosen if servo.id not in failed]
                     continue
                 for servo, ticks in started.ticks.items():

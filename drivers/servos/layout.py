@@ -44,6 +44,9 @@ NAMES = {
     "status_level": ("Status Return Level", "Response Level"),
     "shutdown": ("Shutdown",),
     "lock": ("Lock",),
+    "state": ("Controller State",),
+    "gear_numerator": ("Electronic GearRatio Numerator",),
+    "gear_denominator": ("Electronic GearRatio Denominator",),
 }
 """Short name -> the makers' names of a register, which differ by family."""
 SCALED = {"velocity": "rad/s", "current": "A", "load": "1", "voltage": "V", "temperature": "C"}

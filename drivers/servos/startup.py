@@ -100,10 +100,6 @@ class Startup(ABC, Generic[R]):
     def _identity(self, reply: R, expected: ControlTable) -> tuple[int, int]:
         """Model number and firmware in a servo's reply to the greeting."""
 
-    def _accepts(self, expected: ControlTable, number: int) -> bool:
-        """Whether a model number is the configured model's."""
-        return number == expected.number
-
     def _greet(self, servo: int) -> R:
         """A servo's reply to the greeting."""
         return self.registers.hello(servo)
@@ -158,7 +154,7 @@ class Startup(ABC, Generic[R]):
         for servo in servos:
             expected = load_table(servo.model)
             number, firmware = self._identity(replies[servo.id], expected)
-            if self._accepts(expected, number):
+            if number == expected.number:
                 self.registers.tables[servo.id] = load_table(expected.number, firmware)
                 continue
             label = self.registers.label(servo.id)
@@ -244,7 +240,7 @@ class Startup(ABC, Generic[R]):
         port = registers.port
         deadline = port.clock() + self.policy.voltage_wait_s
         while True:
-            volts = registers.get_all(ids, "voltage")
+            volts = {servo: self._tenths(servo, value) for servo, value in registers.get_all(ids, "voltage").items()}
             low = {servo: value for servo, value in volts.items() if value < need.get(servo, 0)}
             if not low:
                 return
@@ -258,11 +254,20 @@ class Startup(ABC, Generic[R]):
         )
         raise self.registers.error(ServoFault, message, "check the power supply and its cable", *sorted(low))
 
+    def _tenths(self, servo: int, value: int) -> float:
+        """A supply that was read, in 0.1 V."""
+        item = self.registers.item(servo, "voltage")
+        return value if item is None else 10.0 * item.scale * value
+
     def fault(self, what: str, bad: Mapping[int, int]) -> BusError:
         """The error of servos with a hardware error; their bits by id."""
-        which = ", ".join(f"{self.registers.label(servo)} 0x{bits:02X}" for servo, bits in bad.items())
+        label = self.registers.label
+        which = ", ".join(f"{label(servo)} {self._error_text(servo, bits)}" for servo, bits in bad.items())
         hint = "support the head, then start with reboot_faulted=true, or switch the power off and on"
         return self.registers.error(ServoFault, f"servos {what} a hardware error: {which}", hint, *sorted(bad))
+
+    def _error_text(self, servo: int, bits: int) -> str:
+        return f"code {bits}" if self.registers.tables[servo].error_codes else f"0x{bits:02X}"
 
     def locked(self, servo: int, name: str, old: int, new: int) -> BusError:
         """The error of a permanent register that must change while the servo holds."""

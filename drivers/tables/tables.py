@@ -100,6 +100,7 @@ class Motor:
 
     supply_v : supply at which the others were measured, volts. lowest_v, highest_v : range of supply.
     no_load_rpm : no-load speed, rev/min. stall_nm, stall_a : torque and current at stall (P-series: continuous).
+    play_arcmin : gear play, 0 where its specification states none.
     """
 
     supply_v: float
@@ -108,6 +109,7 @@ class Motor:
     no_load_rpm: float
     stall_nm: float
     stall_a: float
+    play_arcmin: float = 0.0
 
     @property
     def no_load_rad_s(self) -> float:
@@ -134,6 +136,11 @@ class ControlTable(Mapping[str, Item]):
     hardware_error : bit by cause (``voltage``, ``temperature``, ``overload`` ...) of Hardware Error Status and
         Shutdown; the XL-320 orders them differently from every other model.
     indirect : (first Indirect Address, first Indirect Data, slots) of each indirect area.
+    play_arcmin : gear play by its specification; 0 where that states none.
+    motor_encoder : the encoder counts turns of the motor, before the gear; else it is at the shaft.
+    error_codes : code by cause of Error Code (Y-series, which reports one code instead of bits); else empty.
+    clearable_codes, holding_codes : codes that the instruction Clear ends, and those that leave the torque on.
+    ram : first and end of each area below `eeprom_end` that is not permanent.
     driven : whether omote drives and simulates the model; else it only scans and monitors it.
     fast_read, time_profile, goal_torque : whether this firmware knows fast reads, the time-based profile and
         torque on by goal update.
@@ -156,7 +163,13 @@ class ControlTable(Mapping[str, Item]):
         self.voltage: int = round(10.0 * self.motor.supply_v) if self.motor else spec["voltage"]
         self.indirect: tuple[tuple[int, int, int], ...] = tuple(tuple(area) for area in spec.get("indirect", ()))
         self.hardware_error: dict[str, int] = spec["hardware_error"]
+        self.error_codes: dict[str, int] = spec.get("error_codes", {})
+        self.clearable_codes = frozenset(spec.get("clearable_codes", ()))
+        self.holding_codes = frozenset(spec.get("holding_codes", ()))
+        self.ram: tuple[tuple[int, int], ...] = tuple(tuple(area) for area in spec.get("ram", ()))
         self.driven: bool = spec.get("driven", True)
+        self.play_arcmin: float = self.motor.play_arcmin if self.motor else spec.get("play_arcmin", 0.0)
+        self.motor_encoder: bool = spec.get("motor_encoder", False)
         self.fast_read = 0 < spec.get("fast_read_firmware", 0) <= firmware
         self.time_profile = 0 < spec.get("time_profile_firmware", 0) <= firmware
         self.goal_torque = 0 < spec.get("goal_torque_firmware", 0) <= firmware
@@ -181,6 +194,15 @@ class ControlTable(Mapping[str, Item]):
     def rad_per_tick(self) -> float:
         """Angle of one position step."""
         return self.turn_rad / self.ticks_per_turn
+
+    def is_permanent(self, address: int) -> bool:
+        """Whether what lies at an address outlasts the supply, and is closed to writes while the motor is on."""
+        return address < self.eeprom_end and not any(first <= address < end for first, end in self.ram)
+
+    @property
+    def play_ticks(self) -> float:
+        """Gear play that the encoder sees, in steps; 0 where none is stated, or where the encoder is at the motor."""
+        return 0.0 if self.motor_encoder else math.radians(self.play_arcmin / 60.0) / self.rad_per_tick
 
     @property
     def first_step(self) -> int:

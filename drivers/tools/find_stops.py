@@ -156,7 +156,7 @@ class _Search:
             found = identity(registers, self._id) or (0, 0)
         else:
             found = reply.params[0] | reply.params[1] << 8, reply.params[2]
-        if found[0] == expected.number or (expected.protocol == 1 and expected.number > 0xFFFF):
+        if found[0] == expected.number:
             return load_table(expected.number, found[1] if expected.protocol == 2 else None)
         message = f"servo {registers.label(self._id)} is {model_name(found[0])}, configured is {self._servo.model}"
         raise registers.error(WrongModel, message, "correct the configuration, or the servo's id", self._id)
@@ -271,7 +271,7 @@ class _Search:
                 return None
             now = self._port.clock()
             seen.append((now, position))
-            while now - seen[0][0] > STILL_S:
+            while len(seen) > 2 and now - seen[1][0] > STILL_S:  # two at least, also where a step takes longer
                 seen.popleft()
             lead, still = side * (goal - position), self._is_still(seen, now)
             if still and lead >= PUSH_RAD / tick and push >= PUSHING * self._allowed:

@@ -234,6 +234,15 @@ class SimulatedBus:
         self._thread = threading.Thread(target=_serve, args=(server, reading), name="simulated-bus", daemon=True)
         self._thread.start()
 
+    @property
+    def processor_s(self) -> float | None:
+        """Processor time that its child process has used, s; None where there is none, or the system does not tell."""
+        if self._child is None or not os.path.exists(f"/proc/{self._child.pid}/stat"):
+            return None
+        with open(f"/proc/{self._child.pid}/stat", encoding="ascii", errors="replace") as file:
+            fields = file.read().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / float(os.sysconf("SC_CLK_TCK"))
+
     def _start_child(self) -> None:
         child = self._child = subprocess.Popen(
             command(_CHILD, json.dumps(self._settings)),

@@ -13,10 +13,12 @@ from typing import Any
 from drivers.packets.packet import ErrorNumber
 from drivers.sim.servos.drive_x import CURRENT_POSITION, EXTENDED, GOAL_TORQUE
 from drivers.sim.servos.registers import GOALS, Change
-from drivers.sim.servos.state import ServoState
+from drivers.sim.servos.state import INVERTER_OFF, RUNNING, TURNING_OFF, TURNING_ON, ServoState
 from drivers.tables.tables import Item
 
 CLEAR_MULTI_TURN = b"\x01\x44\x58\x4c\x22"
+CLEAR_ERROR = b"\x02\x45\x52\x43\x4c"
+"""Y-series."""
 CALIBRATE = 128
 """Feetech: written to Torque Enable it sets the middle of the turn."""
 
@@ -44,6 +46,7 @@ class SimulatedServo(ServoState):
         registers = self.registers
         if not registers.readable(address, length):
             return self.alert | ErrorNumber.ACCESS, b""
+        self.settle(now_s)
         first, end = registers.span(address, length)
         drive = self.drive
         if end > drive.first_sensed and first < drive.last_sensed and now_s != self._sensed_at:
@@ -59,8 +62,21 @@ class SimulatedServo(ServoState):
         if isinstance(changes, ErrorNumber):
             self.on_refusal(address, data, changes, now_s)
             return self.alert | changes
+        if self.table.error_codes and self._cannot_now(changes, now_s):
+            self.on_refusal(address, data, ErrorNumber.RESULT_FAIL, now_s)
+            return self.alert | ErrorNumber.RESULT_FAIL
         self._apply(changes, now_s)
         return self.alert
+
+    def _cannot_now(self, changes: list[Change], now_s: float) -> bool:
+        """Y-series: goals and torque while the motor is switched on or off, and torque on with an error."""
+        self.settle(now_s)
+        busy = self.registers.get("Controller State") in (TURNING_ON, TURNING_OFF)
+        return any(
+            (busy and item.name in GOALS | {"Torque Enable"})
+            or (self.shut_down and item.name == "Torque Enable" and value)
+            for item, value in changes
+        )
 
     def reg_write(self, address: int, data: bytes) -> int:
         """Error byte; keeps an allowed write for `action`."""
@@ -97,11 +113,24 @@ class SimulatedServo(ServoState):
 
     def clear(self, params: bytes, now_s: float) -> int:
         """Error byte. Multi-turn clear: Present Position back into one turn, only at rest, else Result Fail."""
+        if self.table.error_codes and params == CLEAR_ERROR:
+            return self._clear_error(now_s)
         if params != CLEAR_MULTI_TURN:
             return self.alert | ErrorNumber.DATA_RANGE
         if self.plant.motion(now_s).velocity:
             return self.alert | ErrorNumber.RESULT_FAIL
         self._wrap_turns(now_s)
+        return self.alert
+
+    def _clear_error(self, now_s: float) -> int:
+        """Error byte. Y-series: ends an error that can be cleared and whose cause has gone, else Result Fail."""
+        code = self.hardware_error
+        if code and (code not in self.table.clearable_codes or self.drive.hardware_errors(now_s, 0.0) == code):
+            return self.alert | ErrorNumber.RESULT_FAIL
+        self.hardware_error = 0
+        self.shut_down = self.registers.goals_locked = False
+        self.registers.put("Bus Watchdog", max(self.registers.get("Bus Watchdog"), 0))
+        self.registers.put("Controller State", RUNNING if self.plant.powered else INVERTER_OFF)
         return self.alert
 
     # ------------------------------------------------------------ effects of writes
@@ -132,7 +161,7 @@ class SimulatedServo(ServoState):
         if item.name == "Torque Enable" and value and self.shut_down and not self._recover():
             return
         self.registers.store(item, value)
-        if item.address < self.table.eeprom_end:
+        if self.table.is_permanent(item.address):
             self._store_permanent(item, now_s)
         effect = self._effects.get(item.name)
         if effect is not None:
@@ -165,7 +194,8 @@ class SimulatedServo(ServoState):
         if value == CALIBRATE:
             self._calibrate(now_s)
         elif bool(value) != self.plant.powered:
-            if value and "Homing Offset" in self.table and not (self.is_feetech or self.registers.extended):
+            keeps_turns = self.is_feetech or self.registers.extended or self.table.error_codes
+            if value and "Homing Offset" in self.table and not keeps_turns:
                 self._wrap_position(now_s)  # e-Manual, Present Position (132); the goal stays as it is
             self._set_power(bool(value), now_s)
 
@@ -191,9 +221,12 @@ class SimulatedServo(ServoState):
     def _write_watchdog(self, value: int, now_s: float) -> None:
         """0 clears a tripped watchdog. (A period written while tripped re-arms it as well.)"""
         self.registers.goals_locked = False
+        if self.table.error_codes and self.hardware_error == self.table.error_codes["watchdog"]:
+            self.hardware_error = 0
 
     def _write_mode(self, value: int, now_s: float) -> None:
         """Goals are reset to those of a servo at rest; Present Position back into one turn."""
         self.registers.extended = self.table.protocol == 2 and value in (EXTENDED, CURRENT_POSITION)
-        self._wrap_turns(now_s)
+        if not self.table.error_codes:
+            self._wrap_turns(now_s)
         self._reset_goals(now_s)

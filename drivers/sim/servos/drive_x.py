@@ -59,6 +59,9 @@ _SENSED = (
 class XDrive(Drive):
     """Plans and senses for one X-series servo. See :class:`~drivers.sim.servos.drive.Drive`."""
 
+    time_s = 1e-3
+    """One step of the time of a time-based profile."""
+
     def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
         super().__init__(registers, plant, now_s)
         table = registers.table
@@ -121,14 +124,14 @@ class XDrive(Drive):
     def _plan_position(self, now_s: float, mode: int) -> None:
         """To Goal Position, or as far as the current can stretch the skin."""
         plant = self.plant
-        acceleration, speed, register = _PROFILE.unpack_from(self.registers.memory, self._profile_at)
+        acceleration, speed, register = self._profile()
         reach = self.reach
         if mode == CURRENT_POSITION:
             reach = min(reach, self._reach(self.registers.get("Goal Current")))
         goal = min(max(self.to_shaft(register), plant.rest - reach), plant.rest + reach)
         now = plant.motion(now_s)
         if speed and self.timed:
-            plan = plan_timed(now_s, now, goal, speed * 1e-3, acceleration * 1e-3)
+            plan = plan_timed(now_s, now, goal, speed * self.time_s, acceleration * self.time_s)
             if abs(plan.at(now_s + 0.5 * plan.duration).velocity) <= self.top_speed:
                 plant.trajectory = plan
                 return
@@ -139,6 +142,11 @@ class XDrive(Drive):
             if acceleration:
                 limit, profile = min(acceleration * self.ticks_s2, limit), Profile.TRAPEZOIDAL
         plant.trajectory = plan_move(now_s, now, goal, top, limit, profile)
+
+    def _profile(self) -> tuple[int, int, int]:
+        """Acceleration (or its time), velocity (or the time) and goal of the next move."""
+        profile: tuple[int, int, int] = _PROFILE.unpack_from(self.registers.memory, self._profile_at)
+        return profile
 
     def _plan_current(self, now_s: float) -> None:
         """The shaft goes where the skin's spring balances the current; without a spring it turns."""

@@ -66,6 +66,23 @@ class Trajectory:
         self.duration = at
         self.end, self._end_velocity = (position, velocity) if goal is None else (goal, 0.0)
 
+    @property
+    def heading(self) -> int:
+        """Way in which it goes in the end: 1 to higher positions, -1 to lower ones, 0 where it stands still."""
+        return _sign(self._end_velocity) or _sign(self.end - self.turn[1])
+
+    @property
+    def turn(self) -> tuple[float, float]:
+        """Time and position where it turns at the beginning; its start where it goes on as it was going."""
+        if not self._pieces:
+            return self.start_s, self.end
+        _, position, velocity, acceleration = self._pieces[0]
+        ends_s = self._pieces[1][0] if len(self._pieces) > 1 else self.duration
+        turn_s = -velocity / acceleration if velocity and acceleration else 0.0
+        if not 0.0 < turn_s < ends_s:
+            return self.start_s, position
+        return self.start_s + turn_s, position + 0.5 * velocity * turn_s
+
     def moving(self, now_s: float) -> bool:
         """Whether the pieces have not ended."""
         return now_s - self.start_s < self.duration
@@ -79,6 +96,10 @@ class Trajectory:
         begin, position, velocity, acceleration = next(piece for piece in reversed(self._pieces) if t >= piece[0])
         t -= begin
         return Motion(position + (velocity + 0.5 * acceleration * t) * t, velocity + acceleration * t, acceleration)
+
+
+def _sign(value: float) -> int:
+    return (value > 0.0) - (value < 0.0)
 
 
 def hold(now_s: float, position: float) -> Trajectory:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from drivers.sim.servos.motion import Motion, hold
+from drivers.sim.servos.motion import Motion, Trajectory, hold
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,6 +32,8 @@ class Skin:
         return cls(spring=cls().spring * fine, inertia=cls().inertia * fine)
 
 
+SETTLED = 5.0
+"""Time constants after which nothing is left of a lag."""
 NO_STOPS = (-math.inf, math.inf)
 """A shaft that may turn without end."""
 
@@ -45,10 +47,12 @@ class Plant:
     top_speed : no-load speed, ticks/s.
     supply_v : voltage of the bus.
     skin : its load.
+    play : gear play between motor and shaft, ticks. The encoder is at the shaft: where that turns, it waits until the
+        motor has run through the play. A load that pulls more than the friction keeps the gear at one flank.
 
     Attributes
     ----------
-    trajectory : the motion commanded to the motor.
+    trajectory : the motion commanded to the shaft.
     powered : the motor holds and moves the shaft; otherwise the shaft stays where it is left.
     jammed_at : position at which the shaft is stuck, or None.
     jammed_since : when it got stuck, or None.
@@ -61,6 +65,8 @@ class Plant:
 
     RAMP_S = 0.03
     """Time from rest to the no-load speed: the shortest possible, whatever the profile."""
+    CATCH_UP_S = 0.01
+    """Time constant in which the position control makes up for what the shaft lost in the play."""
     STIFFNESS = 0.02
     """Share of stall torque per tick of following error of a shaft that is jammed or at a stop."""
     RESISTANCE_V = 0.4
@@ -68,8 +74,13 @@ class Plant:
     AMBIENT_C, RISE_C, LAG_S = 30.0, 60.0, 200.0
     """Winding temperature: a first-order lag of 200 s behind ambient + rise x load²."""
 
-    def __init__(self, now_s: float, position: float, top_speed: float, supply_v: float, skin: Skin) -> None:
-        self.skin = skin
+    def __init__(
+        self, now_s: float, position: float, top_speed: float, supply_v: float, skin: Skin, play: float = 0.0
+    ) -> None:
+        self.skin, self.play = skin, play
+        self._flank = 0  # at which the gear lies: 1 or -1, 0 in the middle
+        self._turned, self._engaged_s = (now_s, position), -math.inf
+        self.weight = 0.0
         self.rest = position if skin.rest is None else skin.rest
         self.top_speed, self.supply_v = top_speed, supply_v
         self.top_acceleration = top_speed / self.RAMP_S
@@ -79,16 +90,56 @@ class Plant:
         self.jammed_since: float | None = None
         self.stops = NO_STOPS
         self.pressed_since: float | None = None
-        self.weight = 0.0
         self.torque_limit = 1.0
         self.forced_c: float | None = None
         self._winding_c, self._heated_s = self.AMBIENT_C, now_s
+
+    @property
+    def trajectory(self) -> Trajectory:
+        return self._commanded
+
+    @trajectory.setter
+    def trajectory(self, commanded: Trajectory) -> None:
+        self._commanded = commanded
+        if self.play:
+            self._turn_gear(commanded)
+
+    def _turn_gear(self, commanded: Trajectory) -> None:
+        """Note from when to when the shaft waits for the motor, where the gear changes its flank."""
+        now_s, way, (turn_s, position) = commanded.start_s, commanded.heading, commanded.turn
+        before_s, left_s = self._turned[0], self._engaged_s - now_s
+        if left_s <= 0.0 or not way:
+            self._engaged_s = -math.inf  # it goes on from where it is
+        if not way or abs(self.weight + self.skin.spring * (position - self.rest)) > self.skin.friction:
+            return
+        if way == self._flank:
+            if now_s < before_s:
+                self._turned, self._engaged_s = (turn_s, position), self._engaged_s + turn_s - before_s
+            return
+        gap_s = _time_for(self.play if self._flank else 0.5 * self.play, self.top_acceleration, self.top_speed)
+        if commanded.at(now_s).velocity * way <= 0.0:  # else it goes that way already
+            self._turned, self._engaged_s = (turn_s, position), turn_s + max(gap_s - max(left_s, 0.0), 0.0)
+        self._flank = way
+
+    def _in_play(self, now_s: float, motion: Motion) -> Motion:
+        """The shaft while the motor runs through the play, and while the control then catches up."""
+        turn_s, position = self._turned
+        if now_s < turn_s:
+            return motion
+        if now_s < self._engaged_s:
+            return Motion(position)
+        lag = (self._commanded.at(self._engaged_s).position - position) * math.exp(
+            (self._engaged_s - now_s) / self.CATCH_UP_S
+        )
+        return motion._replace(position=motion.position - lag, velocity=motion.velocity + lag / self.CATCH_UP_S)
 
     def motion(self, now_s: float) -> Motion:
         """Motion of the shaft."""
         if self.jammed_at is not None:
             return Motion(self.jammed_at)
-        motion = self.trajectory.at(now_s)
+        motion = self._commanded.at(now_s)
+        if now_s < self._engaged_s + SETTLED * self.CATCH_UP_S:
+            motion = self._in_play(now_s, motion)
         if self.stops is NO_STOPS:
             return motion
         low, high = self.stops
@@ -130,7 +181,7 @@ class Plant:
     def jam(self, now_s: float, stuck: bool) -> None:
         """Hold the shaft where it is, or release it (it then goes on from there)."""
         if stuck and self.jammed_at is None:
-            self.jammed_at = self.trajectory.at(now_s).position
+            self.jammed_at = self.motion(now_s).position
             self.jammed_since = now_s
         elif not stuck and self.jammed_at is not None:
             self.trajectory = hold(now_s, self.jammed_at)
@@ -147,3 +198,11 @@ class Plant:
         self.trajectory = hold(now_s, position)
         if self.jammed_at is not None:
             self.jammed_at = position
+
+
+def _time_for(distance: float, acceleration: float, top_speed: float) -> float:
+    """Time from rest through a distance, s: at an acceleration, and at most at a speed."""
+    ramp = 0.5 * top_speed * top_speed / acceleration
+    if distance <= ramp:
+        return math.sqrt(2.0 * distance / acceleration)
+    return top_speed / acceleration + (distance - ramp) / top_speed

@@ -231,6 +231,6 @@ class Protocol(ABC):
 
 def _write(servo: SimulatedServo, device_id: int, address: int, data: bytes, now_s: float) -> int:
     """A write to an id; one to a secondary id reaches RAM only. Returns the error byte of Protocol 2.0."""
-    if address < servo.table.eeprom_end and servo.secondary_id == device_id != servo.id:
+    if servo.table.is_permanent(address) and servo.secondary_id == device_id != servo.id:
         return ErrorNumber.ACCESS
     return servo.write(address, data, now_s)

@@ -46,6 +46,12 @@ class Registers:
                 self.memory[item.address : item.end] = item.encode(item.initial)
         self.remap()
 
+    def reset_ram(self) -> None:
+        """Initial values for all that does not outlast the supply."""
+        self.reset(self.table.eeprom_end, self.table.size)
+        for first, end in self.table.ram:
+            self.reset(first, end)
+
     def get(self, name: str) -> int:
         """Value of an item in memory; KeyError where the model has none of that name."""
         cell, address, sign_bit = self._cells[name]
@@ -129,7 +135,7 @@ class Registers:
 
     def _refusal(self, item: Item, value: int) -> ErrorNumber:
         """Why a value may not be written now; NONE where it may."""
-        if self.locked and item.address < self.table.eeprom_end:
+        if self.locked and self.table.is_permanent(item.address):
             return ErrorNumber.ACCESS
         if self.goals_locked and item.name in GOALS:
             return ErrorNumber.DATA_RANGE

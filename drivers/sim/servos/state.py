@@ -15,6 +15,7 @@ from drivers.packets.packet import ALERT, ErrorNumber
 from drivers.sim.servos.drive import Drive, speed_unit
 from drivers.sim.servos.drive_word import FeetechDrive, WordDrive
 from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM, XDrive
+from drivers.sim.servos.drive_y import YDrive
 from drivers.sim.servos.plant import NO_STOPS, Plant, Skin
 from drivers.sim.servos.registers import Change, Registers
 from drivers.tables.models import check_driven
@@ -26,6 +27,8 @@ WATCHDOG_STEP_S = 0.02
 HEALTH_PERIOD_S = 0.1
 BROWN_OUT_V = 2.5
 """Supply below which a servo's processor stops: it receives nothing, and starts anew when the supply is back."""
+INVERTER_OFF, TURNING_ON, RUNNING, TURNING_OFF, HARDWARE_FAULT = 2, 4, 5, 6, 8
+"""Controller State of Y-series servos."""
 BOOT_S = 0.25
 """Time in which a servo receives nothing after a reboot."""
 
@@ -95,17 +98,22 @@ class ServoState:
         self._sensed_at = -1.0
         self._pending: list[Change] = []
         self._errors = 0
-        self._has_error_register = "Hardware Error Status" in table
+        names = ("Hardware Error Status", "Error Code")
+        self._error_register = next((name for name in names if name in table), "")
+        self._settled_s = math.inf  # when a Y-series servo that is switched on or off is done
         self.is_feetech = "Response Level" in table
         self._permanent = bytearray()
         self.registers.put("ID", device_id)
         self.force_baud(baud, self.baud)
         start = float(table.center if position is None else position)
         top_speed = (table.top_speed or table["Velocity Limit"].initial) * speed_unit(table)
-        self.plant = Plant(now_s, start, top_speed, table.voltage / 10, skin or Skin.for_turn(table.ticks_per_turn))
+        skin = skin or Skin.for_turn(table.ticks_per_turn)
+        self.plant = Plant(now_s, start, top_speed, table.voltage / 10, skin, table.play_ticks)
         kind: type[Drive] = WordDrive
         if "Goal Velocity" in table:
             kind = XDrive if "Profile Velocity" in table else FeetechDrive
+        if table.error_codes:
+            kind = YDrive
         self.drive = kind(self.registers, self.plant, now_s)
         self._boot(now_s)
 
@@ -147,13 +155,13 @@ class ServoState:
     @property
     def hardware_error(self) -> int:
         """Latched hardware errors, as bits of the model's own order."""
-        return self.registers.get("Hardware Error Status") if self._has_error_register else self._errors
+        return self.registers.get(self._error_register) if self._error_register else self._errors
 
     @hardware_error.setter
     def hardware_error(self, bits: int) -> None:
         self._errors = bits
-        if self._has_error_register:
-            self.registers.put("Hardware Error Status", bits)
+        if self._error_register:
+            self.registers.put(self._error_register, bits)
 
     # ------------------------------------------------------------ access for tests and tools
     @property
@@ -187,6 +195,9 @@ class ServoState:
     def latch(self, bits: int, now_s: float) -> None:
         """Latch hardware errors; those in the Shutdown mask switch the motor off until a reboot."""
         registers = self.registers
+        if self.table.error_codes:
+            self._latch_code(bits, now_s)
+            return
         self.hardware_error |= bits
         if bits & registers.get("Shutdown") and not self.shut_down:
             self.shut_down = True
@@ -196,13 +207,45 @@ class ServoState:
                 registers.put("Torque Enable", 0)
             self._set_power(False, now_s)
 
+    def _latch_code(self, code: int, now_s: float) -> None:
+        """Y-series: the last error is its code; with some it holds the shaft, with the others it lets go."""
+        registers, before = self.registers, self.hardware_error
+        self.hardware_error = code
+        if code != before:
+            history = [registers.get(f"Error Code History {k}") for k in range(1, 16)]
+            for k, value in enumerate((code, *history), 1):
+                registers.put(f"Error Code History {k}", value)
+        if code in self.table.holding_codes:
+            registers.goals_locked |= code != self.table.error_codes["battery"]
+        elif not self.shut_down:
+            self.shut_down = True
+            registers.put("Torque Enable", 0)
+            self._set_power(False, now_s)
+            self._settled_s = math.inf
+            registers.put("Controller State", HARDWARE_FAULT)
+
     # ------------------------------------------------------------ watchdog, faults, health
     def update(self, now_s: float) -> None:
         """Check bus watchdog, heat, supply and overload up to now."""
         self.check_watchdog(now_s)
+        self.settle(now_s)
         if now_s >= self.next_health_s:
             self.next_health_s = now_s + HEALTH_PERIOD_S
             self.check_health(now_s)
+
+    def settle(self, now_s: float) -> None:
+        """Y-series: the brake is open, or closed, and the motor as it was told to be."""
+        if now_s >= self._settled_s:
+            self._settled_s = math.inf
+            self.registers.put("Controller State", RUNNING if self.plant.powered else INVERTER_OFF)
+
+    def _begin_settling(self, on: bool, now_s: float) -> None:
+        """Y-series: Brake Delay and Goal Update Delay to switch on; Safe Stop Time and Brake Delay to switch off."""
+        names = ("Brake Delay", "Goal Update Delay") if on else ("Brake Delay",)
+        if not on and self.plant.motion(now_s).velocity:
+            names = ("Safe Stop Time", *names)
+        self._settled_s = now_s + 1e-3 * sum(map(self.registers.get, names))
+        self.registers.put("Controller State", TURNING_ON if on else TURNING_OFF)
 
     def check_watchdog(self, now_s: float) -> None:
         """Trip the bus watchdog where no instruction (for any servo) arrived within its time."""
@@ -212,10 +255,12 @@ class ServoState:
         due = self.last_instruction.at_s + period * WATCHDOG_STEP_S
         if not 0 < period < 128 or now_s <= due:
             return
-        self.registers.put("Bus Watchdog", TRIPPED)
+        self.registers.put("Bus Watchdog", -1 if self.table.error_codes else TRIPPED)
         self.registers.goals_locked = True
         if not self._ignores_watchdog():
             self.drive.stop(due)
+        if self.table.error_codes:
+            self._latch_code(self.table.error_codes["watchdog"], now_s)
 
     def _ignores_watchdog(self) -> bool:
         small = self.table.model.startswith(("xl330", "xc330"))
@@ -287,7 +332,10 @@ class ServoState:
 
     # ------------------------------------------------------------ states
     def _set_power(self, on: bool, now_s: float) -> None:
+        if self.table.error_codes and on != self.plant.powered:
+            self._begin_settling(on, now_s)
         self.plant.powered = on
+        self.settle(now_s)
         if self.table.lock == "torque":
             self.registers.locked = on
         if on:
@@ -299,7 +347,7 @@ class ServoState:
         """Power-up. Startup Configuration bit 0 switches the motor on at once."""
         registers = self.registers
         registers.memory[: len(self._permanent)] = self._permanent
-        registers.reset(self.table.eeprom_end, self.table.size)
+        registers.reset_ram()
         registers.goals_locked = self.shut_down = False
         registers.locked = not self.is_feetech and self.table.lock == "Lock" and bool(registers.get("Lock"))
         self.keep_permanent(0, self.table.eeprom_end)
@@ -307,6 +355,9 @@ class ServoState:
         self._pending = []
         self.drive.born_s = now_s
         self._set_power(False, now_s)
+        if self.table.error_codes:
+            self._settled_s = now_s
+            self.settle(now_s)
         if self.table.protocol == 2 and "Operating Mode" in self.table:
             registers.extended = registers.get("Operating Mode") in (EXTENDED, CURRENT_POSITION)
         self._reset_goals(now_s)
@@ -330,7 +381,7 @@ class ServoState:
         """Goal Position where the shaft is; current and PWM at their limits, or 0 in the mode that they control."""
         registers = self.registers
         registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))
-        if "Goal PWM" not in self.table:
+        if "Goal PWM" not in self.table or self.table.error_codes:
             return
         mode = registers.get("Operating Mode")
         registers.put("Goal Velocity", 0)

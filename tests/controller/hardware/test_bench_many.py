@@ -29,6 +29,15 @@ def test_every_bus_has_its_own_rate(monkeypatch: pytest.MonkeyPatch) -> None:
             assert share_of_limit.value == pytest.approx(100 * rate.value / limit)
             assert share_of_limit.reach == f">= {share}% of {limit:.0f} Hz"
             assert share_of_limit.kept == (share_of_limit.value >= share)
+    by_name = {each.name: each.value for each in figures if each.name.endswith("read, processor of a cycle")}
+    assert list(by_name) == ["sync read, processor of a cycle", "fast sync read, processor of a cycle"]
+    assert all(10.0 < value < 20_000.0 for value in by_name.values())
+    simulated = [figure.value for figure in figures if figure.name.endswith("simulated servos, processor of a cycle")]
+    assert len(simulated) == 2
+    assert all(value > 10.0 for value in simulated) or sys.platform != "linux"
+    names = ("half of all cycles, of the wire limit", "  each driven from a process of its own", "  without a driver")
+    for name in names:
+        assert [0.0 < figure.value <= 101.0 for figure in figures if figure.name == name] == [True, True]
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="no pseudo-termi
 def short(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "PINGS", 8)
     monkeypatch.setattr(module, "RATES_HZ", (50.0,))
-    monkeypatch.setattr(bench_bus, "_WARM_UP_CYCLES", 2)
+    monkeypatch.setattr(bench_bus, "WARM_UP_CYCLES", 2)
 
 
 def measured(port: str, protocol: int = 2) -> dict[str, Figure]:

@@ -73,6 +73,29 @@ def test_the_command_prints_it(tmp_path: Path) -> None:
     assert "surface cheek: 4 control points" in result.output
 
 
+def test_files_that_use_expressions_and_parameters_of_ones_own_are_checked_with_them(tmp_path: Path) -> None:
+    own, more = tmp_path / "own.toml", tmp_path / "more.toml"
+    own.write_text('[parameters.earLeft]\nregion = "brows"\nprofile = "brow"\n[smirk]\nweights = { earLeft = 1 }')
+    more.write_text("[both]\nof = { smirk = 0.5 }")
+    script, layers = tmp_path / "script.toml", tmp_path / "script2.toml"
+    script.write_text('steps = ["0 EXPR smirk", "0.5 SET earLeft 0.5", "1 NEUTRAL"]')
+    with pytest.raises(ConfigError, match=r"steps\[0\][\s\S]*smirk[\s\S]*steps\[1\][\s\S]*earLeft"):
+        check_anything(str(script))
+    assert check_anything(str(script), [own]) == ["script script: 3 steps, 0 marks: good"]
+    with pytest.raises(ConfigError, match="smirk"):
+        check_anything(str(more))
+    assert check_anything(str(more), [own]) == ["expressions more.toml: 1: good"]
+    layers.write_text('steps = ["0 EXPR both"]')
+    result = CliRunner().invoke(make_app(), ["check", str(layers), "--vocabulary", str(own), "--vocabulary", str(more)])
+    assert (result.exit_code, result.output) == (0, "script script2: 1 steps, 0 marks: good\n")
+    assert check_anything(str(own), [own]) == check_anything(str(own))
+    controls = tmp_path / "controls.toml"
+    controls.write_text('[keys]\ns = "smirk"')
+    with pytest.raises(ConfigError, match="smirk"):
+        check_anything(str(controls))
+    assert check_anything(str(controls), [own]) == ["controls controls.toml: 1 keys: good"]
+
+
 def test_every_kind_of_file_is_told_apart(tmp_path: Path) -> None:
     (tmp_path / "own.toml").write_text("[smirk]\nweights = { mouthSmileLeft = 0.7 }\n[both]\nof = { smirk = 0.5 }")
     (tmp_path / "script.toml").write_text('steps = ["0 EXPR smile", "1 NEUTRAL"]\nmarks = { end = 1 }')

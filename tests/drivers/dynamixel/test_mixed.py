@@ -129,6 +129,7 @@ def test_a_servo_of_either_half_is_recovered_where_it_is(wire: VirtualBus, bus: 
     read_until(bus, lambda state: state.torque.tolist() == [True, False, False, True])
     with pytest.raises(ServoFault):
         bus.recover()
+    assert dict(zip(bus.ids, bus.driven.tolist(), strict=True)) == {5: True, 3: False, 1: False, 4: True}
     for half in bus._halves:
         object.__setattr__(half.policy, "reboot_faulted", True)
     bus.recover([3, 1])

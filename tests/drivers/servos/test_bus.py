@@ -108,6 +108,37 @@ def test_all_that_cannot_be_recovered_are_named(wire: VirtualBus, bus: Bus) -> N
     assert wire.servo(2).torque
 
 
+def test_one_that_cannot_be_recovered_is_driven_no_longer_and_joins_where_it_is(wire: VirtualBus, bus: Bus) -> None:
+    settle(bus, [0.1, 0.1, 0.1], 0.02)
+    step = bus.scale.rad_per_tick[1]
+    wire.fault("hw:2:0x20")
+    read_until(bus, lambda state: not state.torque[1])
+    assert bus.report().not_driven == ()
+    with pytest.raises(ServoFault, match="0x20"):
+        bus.recover([2])
+    assert bus.driven.tolist() == [True, False, True]
+    assert bus.report().not_driven == (2,)
+    goal = wire.servo(2).goal
+    for _ in range(20):
+        bus.write([0.2, -0.2, 0.2])
+        bus.read()
+        wire.clock.sleep(0.1)
+    assert not wire.servo(2).torque, "nobody reboots it unasked"
+    assert wire.servo(2).goal == goal, "it is sent no goals"
+    wire.chain.servo(2).reboot(wire.clock())  # somebody has switched its power off and on
+    wire.servo(2).place(wire.servo(2).position_ticks - round(0.1 / step))
+    here = wire.servo(2).position_ticks
+    sent = [0.0, 0.0, 0.0]
+    end = wire.clock() + 10.0
+    while not bus.driven[1]:
+        bus.read()
+        sent = bus.write([0.2, -0.2, 0.2]).tolist()
+        wire.clock.sleep(0.02)
+        assert wire.clock() < end
+    assert sent[1] == pytest.approx(bus.scale.radians(np.array([0, here, 0]))[1], abs=0.1), "a ramp begins there"
+    settle(bus, [0.2, -0.2, 0.2], 0.02)
+
+
 def test_permanent_writes_are_reported_once(wire: VirtualBus) -> None:
     wire.servo(2).put("Return Delay Time", 250)
     with wire.bus() as bus:

@@ -8,7 +8,7 @@ import pytest
 from drivers.servos.layout import NAMES, block_of, item_of
 from drivers.tables.tables import load_table
 
-MODELS = ("xm430-w350", "xl320", "mx1-28", "ax-12a", "sts3215", "scs0009")
+MODELS = ("ym070-210-a051", "xm430-w350", "xl320", "mx1-28", "ax-12a", "sts3215", "scs0009")
 
 
 def test_every_short_name_is_a_register_of_some_model() -> None:

@@ -11,10 +11,12 @@ from drivers.tables.tables import load_table
 
 def test_models_that_are_only_read_say_so():
     table = load_table("ym070-210-r051")
-    assert (table.driven, table.center, table.first_step, table.baud[9]) == (False, 0, -262144, 10_500_000)
+    assert (table.driven, table.center, table.first_step, table.baud[9]) == (True, 0, -262144, 10_500_000)
     assert table["Goal Position"].upper == "Max Position Limit"
-    with pytest.raises(DriverError, match="not driven by omote yet"):
-        check_dynamixel("ym070-210-r051")
+    assert [table.is_permanent(table[name].address) for name in ("ID", "Bus Watchdog", "Profile Velocity")] == [
+        True, False, False
+    ]  # fmt: skip
+    check_dynamixel("ym070-210-r051")
     check_dynamixel("ph54-100-s500")
     hls = load_table("hls3606m")
     assert (hls.driven, hls["Goal Torque"].address, "Goal Time" in hls, hls["Secondary ID"].address) == (

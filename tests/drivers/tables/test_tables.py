@@ -212,9 +212,19 @@ LEGACY = {
     ),
     "sts3215": (777, 1, {"ID": (5, 1), "Homing Offset": (31, 0), "Goal Position": (42, 0), "Lock": (55, 1)}),
     "sm8512bl": (11272, 1, {"Goal Position": (42, 0), "Lock": (55, 1), "Max Position Limit": (11, 4095)}),
-    "scs15": (65551, 1, {"Lock": (48, 1), "Max Position Limit": (11, 1023), "Temperature Limit": (13, 80)}),
+    "scs15": (1295, 1, {"Lock": (48, 1), "Max Position Limit": (11, 1023), "Temperature Limit": (13, 80)}),
     "scs0009": (1284, 1, {"Lock": (48, 1), "Protective Torque": (37, 40), "Present Position": (56, 0)}),
 }
+
+
+def test_feetech_numbers_are_the_bytes_of_series_and_model_in_the_order_of_the_series():
+    numbers = {"sts3215": (9, 3), "sts3032": (9, 2), "sts3020": (9, 5), "sts3250": (9, 11), "sm8512bl": (8, 44),
+        "scs0009": (5, 4), "scs15": (5, 15), "scs115": (5, 25), "hls3625": (10, 13), "hls3930": (10, 16)}  # fmt: skip
+    for model, series in numbers.items():
+        table = load_table(model)
+        assert table["Model Number"].encode(table.number) == bytes(series), model
+        assert table["Model Number"].address == 3
+    assert all(not load_table(name).driven for name in known_models().values() if name.startswith("hls"))
 
 
 @pytest.mark.parametrize("model", LEGACY)

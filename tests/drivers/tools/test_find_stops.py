@@ -8,7 +8,10 @@ import pytest
 
 from drivers.base.bus import ServoSpec
 from drivers.base.errors import ServoFault, ServoRefused, WrongModel
+from drivers.servos.port import Port
 from drivers.sim.serving.virtual import VirtualBus
+from drivers.sim.servos.drive_x import XDrive
+from drivers.sim.servos.plant import Plant
 from drivers.tools import find_stops as module
 from drivers.tools.find_stops import Found, find_stops, why_not
 
@@ -168,6 +171,71 @@ def test_a_shaft_that_is_stuck_from_the_beginning_is_no_pair_of_stops() -> None:
     assert found.low_rad is not None
     assert found.high_rad is not None
     assert found.high_rad - found.low_rad < math.radians(1.0)
+
+
+def slow_steps(monkeypatch: pytest.MonkeyPatch, step_s: float, late: int = 0) -> None:
+    """Let every step take so long, as on a machine that does other things, and its current be known steps late."""
+    plain_step, plain_init = module._Search._step, Port.__init__
+    pushes = [0] * late
+
+    def step(self: module._Search, goal: int) -> tuple[int, int]:
+        position, push = plain_step(self, goal)
+        pushes.append(push)
+        return position, pushes[-1 - late]
+
+    def busy(self: Port, *arguments: object) -> None:
+        plain_init(self, *arguments)
+        sleep = self.sleep
+        self.sleep = lambda span_s: sleep(span_s + step_s)
+
+    monkeypatch.setattr(Port, "__init__", busy)
+    monkeypatch.setattr(module._Search, "_step", step)
+
+
+def soft(monkeypatch: pytest.MonkeyPatch, bus: VirtualBus, pushing_at_deg: float) -> None:
+    """Let the motor at a stop push enough only so far from its goal."""
+    drive = bus.chain.servo(3).drive
+    full = drive.registers.get("Current Limit") / drive.full_current if isinstance(drive, XDrive) else 1.0
+    steps = pushing_at_deg * 4096 / 360
+    monkeypatch.setattr(Plant, "STIFFNESS", full * module.PUSHING * module.TORQUE / steps)
+
+
+@pytest.mark.parametrize(("step_s", "late"), [(0.3, 0), (0.5, 9)])
+@pytest.mark.parametrize("model", ["xm430-w350", "sts3215"])
+def test_a_busy_machine_and_a_soft_gear_do_not_end_the_search_early(
+    monkeypatch: pytest.MonkeyPatch, model: str, step_s: float, late: int
+) -> None:
+    """The goal takes seconds to get as far ahead as it may be; a servo that stands still before need not push yet."""
+    spec = servo(model)
+    bus = wire(spec)
+    if "Bus Watchdog" in bus.chain.servo(3).table:
+        monkeypatch.setattr(module, "WATCHDOG_STEPS", 120)
+    soft(monkeypatch, bus, 7.0)
+    slow_steps(monkeypatch, step_s, late)
+    found = search(bus, spec)
+    assert found.low_rad is not None
+    assert found.high_rad is not None
+    assert [math.degrees(found.low_rad), math.degrees(found.high_rad)] == pytest.approx(
+        [angle_deg(step) for step in STOPS], abs=1.0
+    )
+    assert not bus.servo(3).torque
+
+
+@pytest.mark.parametrize("step_s", [0.0, 0.3])
+def test_a_shaft_that_stands_still_and_does_not_push_ends_the_search(
+    monkeypatch: pytest.MonkeyPatch, step_s: float
+) -> None:
+    spec = servo("xm430-w350")
+    bus = wire(spec)
+    before = registers(bus)
+    monkeypatch.setattr(Plant, "STIFFNESS", 0.0)
+    slow_steps(monkeypatch, step_s)
+    began = bus.clock()
+    with pytest.raises(ServoFault, match="does not move, and does not push either"):
+        search(bus, spec)
+    assert bus.clock() - began < 60.0
+    assert not bus.servo(3).torque
+    assert registers(bus) == before
 
 
 @pytest.mark.parametrize("torque", [0.0, -0.1, 0.51, math.nan])

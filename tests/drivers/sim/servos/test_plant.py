@@ -8,6 +8,8 @@ import pytest
 
 from drivers.sim.servos.motion import Motion, plan_move, plan_speed
 from drivers.sim.servos.plant import NO_STOPS, Plant, Skin
+from drivers.sim.servos.state import ServoState
+from drivers.tables.tables import load_table
 
 AT_REST = Motion(2048.0, 0.0, 0.0)
 
@@ -140,3 +142,67 @@ def test_a_shaft_is_put_between_its_stops():
     motor.set_stops(3.0, NO_STOPS)
     motor.place(3.0, 0.0)
     assert motor.motion(3.0).position == 0.0
+
+
+PLAY = 4.0
+
+
+def geared(**skin: float) -> Plant:
+    made = Plant(0.0, 2048.0, 1000.0, 5.0, Skin(**{"spring": 0.0, "inertia": 0.0, "friction": 0.02, **skin}), PLAY)
+    made.powered = True
+    return made
+
+
+def moved(plant: Plant, now_s: float, goal: float) -> None:
+    plant.trajectory = plan_move(now_s, plant.motion(now_s), goal, plant.top_speed, plant.top_acceleration)
+
+
+def test_a_shaft_that_turns_waits_until_the_motor_has_run_through_the_play():
+    """From rest through 4 steps at the motor's greatest acceleration: sqrt(2 x 4 / 33333) = 15.5 ms; half at first."""
+    geared_plant = geared()
+    moved(geared_plant, 0.0, 2148.0)
+    assert geared_plant.motion(0.0109).position == 2048.0
+    assert geared_plant.motion(0.012).position > 2048.0
+    assert geared_plant.motion(1.0) == Motion(2148.0)
+    moved(geared_plant, 1.0, 2248.0)
+    assert geared_plant.motion(1.005).position > 2148.0, "on the same flank it follows at once"
+    moved(geared_plant, 2.0, 2048.0)
+    assert geared_plant.motion(2.0154).position == geared_plant.motion(2.0).position
+    assert geared_plant.motion(2.017).position < 2248.0
+    assert geared_plant.motion(2.2).position == pytest.approx(geared_plant.trajectory.at(2.2).position, abs=0.1)
+    assert geared_plant.motion(3.0) == Motion(2048.0)
+
+
+def test_the_shaft_never_jumps_in_its_play_however_often_it_gets_goals():
+    geared_plant, last, now_s = geared(), 2048.0, 0.0
+    for k in range(4000):
+        now_s = 0.001 * k
+        position = geared_plant.motion(now_s).position
+        assert abs(position - last) < 3.0, now_s  # 1000 steps/s, and what it makes up for
+        last = position
+        if k % 7 == 0:
+            moved(geared_plant, now_s, 2048.0 + 50.0 * math.sin(9.0 * now_s))
+    assert abs(last - (2048.0 + 50.0 * math.sin(9.0 * now_s))) < 30.0
+
+
+@pytest.mark.parametrize("load", [{"spring": 1e-3, "rest": 1900.0}, {"weight": 0.1}])
+def test_a_load_holds_the_gear_at_one_flank(load: dict[str, float]):
+    geared_plant = geared(**{name: value for name, value in load.items() if name != "weight"})
+    geared_plant.weight = load.get("weight", 0.0)
+    moved(geared_plant, 0.0, 2148.0)
+    assert geared_plant.motion(0.002).position > 2048.0
+    moved(geared_plant, 1.0, 2048.0)
+    assert geared_plant.motion(1.002).position < 2148.0
+
+
+def test_the_play_of_a_model_is_that_of_its_specification():
+    """e-Manual: 15 arcmin (XM430), 20 (MX-64), none stated (XL330), P-series less than 6, but they count at the motor;
+    Feetech: at most 0.5 degrees (STS3215, STS3250).
+    """
+    arcmin = 4096 / 360 / 60
+    plays = {"xm430-w350": 15 * arcmin, "mx-64": 20 * arcmin, "xl330-m288": 0.0, "ph54-100-s500": 0.0,
+        "sts3215": 30 * arcmin, "scs0009": 0.0}  # fmt: skip
+    for model, play in plays.items():
+        assert load_table(model).play_ticks == pytest.approx(play), model
+        assert ServoState(1, model).plant.play == pytest.approx(play), model
+    assert load_table("ph54-100-s500").motor.play_arcmin == 6.0

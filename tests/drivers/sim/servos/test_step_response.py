@@ -134,12 +134,13 @@ def test_goal_time_of_feetech_scs_is_the_time_of_the_move():
 
 # ---------------------------------------------------------------- drivers: limits in rad/s arrive as such
 
-TICKS = {"xl330-m288": 4096, "mx-64": 4096, "ph54-200-s500": 1003846, "sts3215": 4096, "xl320": 360 / 0.29,
-         "ax-12a": 360 / 0.29, "mx1-28": 4096, "scs0009": 1024 * 360 / 300}  # fmt: skip
+TICKS = {"xl330-m288": 4096, "mx-64": 4096, "ph54-200-s500": 1003846,
+         "sts3215": 4096, "xl320": 360 / 0.29, "ax-12a": 360 / 0.29, "mx1-28": 4096,
+         "scs0009": 1024 * 360 / 300}  # fmt: skip
 """Steps of a turn."""
 FAMILY = {"sts3215": "feetech", "scs0009": "feetech"}
-STEP = {"xl330-m288": 0.229 * RPM, "mx-64": 0.229 * RPM, "ph54-200-s500": 0.01 * RPM, "xl320": 0.111 * RPM,
-        "ax-12a": 0.111 * RPM, "mx1-28": 0.114 * RPM}  # fmt: skip
+STEP = {"xl330-m288": 0.229 * RPM, "mx-64": 0.229 * RPM, "ph54-200-s500": 0.01 * RPM,
+        "xl320": 0.111 * RPM, "ax-12a": 0.111 * RPM, "mx1-28": 0.114 * RPM}  # fmt: skip
 """One step of the speed register, rad/s; Feetech's is one step of position in a second."""
 
 
