@@ -54,11 +54,11 @@ LONG_PAUSE_S, PAUSE_S = (0.3, 3.0), (0.05, 1.5)
 DELAY_MS = 80.0  # of the stage: a face is shown so long after it was mixed, everywhere at once
 IN_STEP_S = 2.0
 RECORD = np.dtype([
-    ("place", "u1"), ("head", "u1"), ("conducted", "?"), ("exact", "?"), ("fence", "<i8"), ("holder", "<u8"), ("sequence", "<i8"),
-    ("mixed_ns", "<i8"), ("shown_ns", "<i8"), ("passed_s", "<f8"), ("values", "<f8", (len(P),)),
+    ("place", "u1"), ("head", "u1"), ("conducted", "?"), ("exact", "?"), ("fence", "<i8"), ("holder", "<u8"),
+    ("sequence", "<i8"), ("mixed_ns", "<i8"), ("shown_ns", "<i8"), ("passed_s", "<f8"), ("values", "<f8", (len(P),)),
 ])  # fmt: skip
-"""One tick of one head: ``place`` which of :data:`PLACES` shows it, ``shown_ns`` when it was written, ``passed_s`` how far the motion of its process had come, the
-others of the face that is shown, or that a conductor sent."""
+"""One tick of one head: ``place`` which of :data:`PLACES` shows it, ``shown_ns`` when it was written, ``passed_s`` how
+far the motion of its process had come, the others of the face that is shown, or that a conductor sent."""
 EXPRESSIONS = ("happiness", "anger", "surprise", "sadness")
 
 
@@ -295,7 +295,8 @@ def judge(hall: Hall, table: Table) -> bool:
     for name, (value, kept) in found.items():
         table.add_row(name, str(value), "" if kept else "missed")
     for (at, what), those in late.items():
-        table.add_row(f"{what} ({1e-9 * (at - hall.events[0][0]):.1f} s)", "\n".join(why_late(rows, at, p) for p in those))
+        when_s = 1e-9 * (at - hall.events[0][0])
+        table.add_row(f"{what} ({when_s:.1f} s)", "\n".join(why_late(rows, at, place) for place in those))
     return all(kept for _, kept in found.values())
 
 

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 _CONNECT_MS = 20_000
 """A client waits so long for its router; afterwards whoever started it hears what is missing."""
+_RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
+"""Between two tries to reach a router that has gone; Zenoh's own would grow to 4 s."""
 _NO_ROUTER_HINT = "start a router there, as zenohd -l tcp/0.0.0.0:7447, or correct [zenoh] connect"
 
 
@@ -59,7 +61,7 @@ def _entries(settings: ZenohSettings, folder: Path) -> dict[str, object]:
     if settings.connect or settings.listen:
         found |= {"connect/endpoints": settings.connect, "listen/endpoints": settings.listen}
     if settings.connect:
-        found |= {"connect/timeout_ms": _CONNECT_MS, "connect/exit_on_failure": False}
+        found |= {"connect/timeout_ms": _CONNECT_MS, "connect/exit_on_failure": False, "connect/retry": _RETRY}
     return found | (_tls(settings.tls, folder) if settings.tls is not None else {})
 
 

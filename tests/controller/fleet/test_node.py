@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,7 @@ from controller.takes.reader import load_take  # noqa: E402
 from tests.controller.fleet.nodes import Running, free_port, router, until  # noqa: E402
 
 JAW = P.index("jawOpen")
+MANY = ("a", "b", "c", "d", "e")
 
 
 @pytest.fixture(scope="module")
@@ -185,6 +187,31 @@ def test_a_head_without_a_conductor_lives_on_and_joins_again(hub: str, tmp_path:
             until(lambda: follower.conducted and follower.exact)
 
 
+@pytest.mark.slow
+def test_all_find_each_other_again_when_the_router_comes_back(tmp_path: Path) -> None:
+    more = {"folder": tmp_path, "prefix": "again"}
+    with ExitStack() as stack:
+        hub = stack.enter_context(ExitStack())
+        endpoint = hub.enter_context(router())
+        first = stack.enter_context(Running(endpoint, "conductor", **more))
+        heads = [stack.enter_context(Running(endpoint, role, seed=5, heads=names, **more))
+                 for role, names in (("head", ("maple",)), ("face", MANY))]  # fmt: skip
+        second = stack.enter_context(Running(endpoint, "conductor", seed=9, heads=("maple", *MANY), **more))
+        followers = [head.node.followers[name] for head in heads for name in head.states]
+        until(lambda: heads[0].node.followers["maple"].exact)
+        hub.close()
+        gone = time.monotonic()
+        until(lambda: not any(follower.conducted for follower in followers) and second.node.lease.active)
+        before = second.node.lease.highest
+        time.sleep(max(0.0, gone + 3.3 - time.monotonic()))  # who tries more and more seldom would try again after 7 s
+        with router(endpoint=endpoint):
+            back = time.monotonic()
+            until(lambda: all(f.conducted and f.exact and f.highest >= before for f in followers))
+            assert time.monotonic() - back < 2.0 + 1.0  # of a busy machine
+            until(lambda: [first.node.lease.active, second.node.lease.active].count(True) == 1)
+            assert len({follower.highest for follower in followers}) == 1
+
+
 def test_endpoints_and_files_that_cannot_be_used_are_named(
     hub: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -197,9 +224,6 @@ def test_endpoints_and_files_that_cannot_be_used_are_named(
     assert "start a router there" in str(caught.value.hint)
     with pytest.raises(LinkError, match=r"zenoh\.tls\.ca: .*none\.pem cannot be read"):
         Running(f"tls/127.0.0.1:{free_port()}", "head", folder=tmp_path, tls={"ca": "none.pem"})
-
-
-MANY = ("a", "b", "c", "d", "e")
 
 
 def test_many_heads_of_a_process_are_sent_in_one_message(hub: str, tmp_path: Path) -> None:
