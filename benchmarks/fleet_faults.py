@@ -65,9 +65,9 @@ EXPRESSIONS = ("happiness", "anger", "surprise", "sadness")
 def play(pipe: Connection, endpoint: str, role: str, names: tuple[str, ...], path: str, delay_ms: float) -> None:
     """A process with a role: ticks until it is told to end, and writes what its heads show to ``path``."""
     more = {"delay_ms": delay_ms} if role in ("head", "face") else {"record": str(Path(path).with_suffix(""))}
-    node, states = make_node(endpoint, role, list(names), **more)
-    pipe.send("ready")
     clock, shown = Clock(100.0), {name: P.neutral() for name in names}
+    node, states = make_node(endpoint, role, list(names), clock.align, **more)
+    pipe.send("ready")
     rested, count, passed_s = dict.fromkeys(names, 0.0), 0, 0.0
     with open(path, "ab", buffering=0) as file:
         for now in clock.run(lambda: not pipe.poll()):

@@ -76,6 +76,13 @@ class Follower:
             self._waiting.append((header, values))
             return True
 
+    @property
+    def due_ns(self) -> int | None:
+        """When what is shown was due by one's own clock; None for what is shown as soon as it comes."""
+        if not self._delay_ns or self.header is None or not self.conducted:
+            return None
+        return self.header.time_ns + self._delay_ns - self.offset_ns
+
     def lead(self, token: Token) -> None:
         """Conduct by oneself: nobody with a lower token is followed from now on."""
         with self._lock:
@@ -96,12 +103,12 @@ class Follower:
             before = self.header
             changed = before is None or newest[0].token != before.token
             self.header, self._sent = newest
-            if before is not None and newest[0].time_ns - before.time_ns > _GAP_NS:
-                self._catch_up()
             self._heard_s = now_s
             if not self.conducted or changed:
                 self._pass_to(self._sent, first=not self._begun)
                 self.conducted = True
+            elif before is not None and newest[0].time_ns - before.time_ns > _GAP_NS:
+                self._catch_up()
         elif self.conducted and (leads or now_s - self._heard_s > self._patience_s):
             self.conducted = False
             self._pass_to(own)

@@ -54,6 +54,7 @@ class Running:
     """A node whose heads are ticked 100 times a second in a thread, as a body does.
 
     rows : for each head, what was shown, in order, with the time. paused : ticks nothing, as a stopped process.
+    times : when rows were written.
     mixed : how often the layers of each head ticked. exact : for each row, whether it is exactly what a conductor sent.
     """
 
@@ -65,6 +66,7 @@ class Running:
             state.live(1.0, 0)
         self.node = Node(ZenohSettings.model_validate(settings), P, self.states, folder / "stage.toml")
         self.rows: dict[str, list[np.ndarray]] = {name: [P.neutral()] for name in heads}
+        self.times: list[int] = [0]
         self.mixed = dict.fromkeys(heads, 0)
         self.exact: dict[str, list[bool]] = {name: [False] for name in heads}
         self.paused, self._stopping = threading.Event(), threading.Event()
@@ -79,6 +81,7 @@ class Running:
             due = max(due + 0.01, time.monotonic() - 0.05)
             time.sleep(max(0.0, due - time.monotonic()))
             now = time.monotonic_ns()
+            self.times.append(now)
             for name, state in self.states.items():
                 values, stamp = self.rows[name][-1].copy(), 0
                 rested[name] += 0.01

@@ -187,6 +187,50 @@ def test_a_head_without_a_conductor_lives_on_and_joins_again(hub: str, tmp_path:
             until(lambda: follower.conducted and follower.exact)
 
 
+class Far:
+    """A conductor on another machine: its clock has nothing in common with that of this one."""
+
+    def __init__(self, session: zenoh.Session, prefix: str, token: Token, ahead_ns: int) -> None:
+        self._session, self._prefix, self._token, self._ahead_ns = session, prefix, token, ahead_ns
+        self.sequence, self.sent_ns = 0, dict[bytes, int]()
+        self._clock = session.declare_queryable(f"{prefix}/_/clock", self._tell)
+
+    def _tell(self, query: zenoh.Query) -> None:
+        now = time.monotonic_ns() + self._ahead_ns
+        query.reply(query.key_expr, json.dumps([now, now, self._token.holder]))
+
+    def conduct(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.sequence += 1
+            values, now = P.neutral(), time.monotonic_ns()
+            values[JAW] = 0.3 + 1e-4 * self.sequence + 1e-6 * self._token.fence
+            self.sent_ns[values.tobytes()] = now
+            header = Header(self._token, self.sequence, now + self._ahead_ns)
+            self._session.put(f"{self._prefix}/maple/parameters", Payloads(P).encode(values),
+                              encoding="omote/exact;1", attachment=header.encode())  # fmt: skip
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        self._clock.undeclare()
+
+
+def test_heads_follow_conductors_on_machines_whose_clocks_have_nothing_in_common(hub: str, tmp_path: Path) -> None:
+    """The clock of a machine begins when that starts: a conductor that takes over may be days before or after."""
+    delay_ms, day_ns = 150.0, 86_400 * 10**9
+    with Running(hub, "head", folder=tmp_path, prefix="clocks", delay_ms=delay_ms) as head, client(hub) as session:
+        for fence, ahead_ns in ((1, day_ns), (2, -day_ns), (3, 7 * day_ns)):
+            far = Far(session, "clocks", Token(fence, fence), ahead_ns)
+            begin = len(head.rows["maple"])
+            far.conduct(3.0)
+            exact = [(at, row) for at, row, own in zip(head.times[begin:], head.rows["maple"][begin:],
+                     head.exact["maple"][begin:], strict=False) if own and row.tobytes() in far.sent_ns]  # fmt: skip
+            far.close()
+            waits = [1e-6 * (at - far.sent_ns[row.tobytes()]) for at, row in exact]
+            assert len(waits) > 50 and delay_ms - 1.0 < np.percentile(waits, 20) < delay_ms + 30.0, waits[:5]
+            assert abs(head.node.report()["clock_offset_ms"] * 1e6 - ahead_ns) < 50e6
+
+
 @pytest.mark.slow
 def test_all_find_each_other_again_when_the_router_comes_back(tmp_path: Path) -> None:
     more = {"folder": tmp_path, "prefix": "again"}
