@@ -257,7 +257,7 @@ def _first_s(span: np.ndarray, mark: np.ndarray, at_ns: int) -> str:
 
 def mark_spreads(rows: np.ndarray) -> Floats:
     """(k,) ms from the first to the last head that showed a face, for faces that all heads showed."""
-    exact = rows[rows["exact"]]
+    exact = rows[rows["exact"] & rows["conducted"]]
     first: dict[tuple[int, int], dict[int, int]] = {}
     for row in exact:
         first.setdefault((int(row["fence"]), int(row["mixed_ns"])), {}).setdefault(

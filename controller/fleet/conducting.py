@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +26,17 @@ _BEATS = 5
 
 
 class Conducting:
-    """Of a process that conducts, or stands by to do so. heads : the layers by name."""
+    """Of a process that conducts, or stands by to do so.
+
+    heads : the layers by name. events : counts commands of another conductor that were heard as they took effect, by
+    head.
+    """
 
     def __init__(
-        self, wire: Wire, heads: Mapping[str, CommandState], payloads: Payloads, lease: Lease, lease_s: float
-    ) -> None:
+        self, wire: Wire, heads: Mapping[str, CommandState], payloads: Payloads, lease: Lease, lease_s: float,
+        events: Counter[str],
+    ) -> None:  # fmt: skip
+        self._events = events
         self._wire, self._heads, self._lease, self._every_s = wire, heads, lease, lease_s / _BEATS
         self._beat_s, self._term = -1.0, 0
         self._lines = {name: LineSession(state, 0, name=f"zenoh {name}") for name, state in heads.items()}
@@ -110,6 +117,7 @@ class Conducting:
             header = header_of(sample)
             if header.token.holder != self._lease.holder and header.token >= self._lease.highest:
                 state, on_event = self._heads[head], self._heads[head].on_event
+                self._events[head] += 1
                 state.on_event = None  # what another conductor said is not said again
                 try:
                     journal.apply(sample.payload.to_bytes(), state, time.monotonic_ns())

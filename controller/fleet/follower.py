@@ -19,8 +19,9 @@ the sources themselves; the limiter behind it holds them in any case."""
 _SHORTEST_S = 0.3
 _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
 """Of the minimum-jerk curve over one second."""
-_GAP_NS = 45_000_000
-"""What comes after a longer gap is not shown at once: a face can have moved far meanwhile."""
+_GAP_NS, _STEP_NS = 45_000_000, 110_000_000
+"""What comes after a longer gap in which faces were lost, or what was mixed after a longer step, is not shown at once, as a
+face can have moved far meanwhile."""
 _WAITING = 128
 
 
@@ -107,7 +108,7 @@ class Follower:
             if not self.conducted or changed:
                 self._pass_to(self._sent, first=not self._begun)
                 self.conducted = True
-            elif before is not None and newest[0].time_ns - before.time_ns > _GAP_NS:
+            elif before is not None and _is_far(before, newest[0]):
                 self._catch_up()
         elif self.conducted and (leads or now_s - self._heard_s > self._patience_s):
             self.conducted = False
@@ -175,3 +176,9 @@ class Follower:
         left = self._left()
         self._way.step(dt, source + left * self._gap, out, stay=left == 0.0)
         self.exact = left == 0.0 and bool(self._way.met.all())
+
+
+def _is_far(before: Header, after: Header) -> bool:
+    """Whether a face is too far from the one shown before to be shown at once."""
+    passed = after.time_ns - before.time_ns
+    return passed > (_GAP_NS if after.sequence - before.sequence > 1 else _STEP_NS)

@@ -79,9 +79,10 @@ class Node:
         wire, heads, followers, lease, clocks = self._wire, self._heads, self.followers, self.lease, self._clocks
         self._hearing = Hearing(wire, followers, payloads, lease, clocks, self._recordings, hurry)
         self._states = States(wire, self.settings, heads, followers, lease)
-        self._asking = Asking(wire, clocks, lease, heads, restore=self.conducts)
+        events = Counter[str]()
+        self._asking = Asking(wire, clocks, lease, heads if self.conducts else {}, events)
         if self.conducts:
-            self._conducting = Conducting(wire, heads, payloads, lease, lease_s)
+            self._conducting = Conducting(wire, heads, payloads, lease, lease_s, events)
 
     def relay(self, head: str, now_ns: int, step_s: float, values: Floats, stamp_ns: int) -> int:
         """Called once a tick with what the layers of a head made: publishes it, or writes to ``values`` : (P,) what the

@@ -27,7 +27,7 @@ def free_port() -> int:
         return int(probe.getsockname()[1])
 
 
-def until(condition: Callable[[], object], seconds: float = 20.0) -> None:
+def until(condition: Callable[[], object], seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
     while time.monotonic() < end:
         if condition():
@@ -48,6 +48,15 @@ def router(config: dict[str, Any] | None = None, endpoint: str | None = None) ->
         made.insert_json5(key, json.dumps(value))
     with zenoh.open(made):
         yield endpoint
+
+
+def joined(*runs: Running) -> Callable[[], bool]:
+    """Whether every head of some nodes has been exactly a conductor's at any moment from now on.
+
+    On a busy machine faces come so late that heads catch up again and again, and hardly all are exact at one time.
+    """
+    begins = [(run, name, len(run.exact[name])) for run in runs for name in run.exact]
+    return lambda: all(any(run.exact[name][begin:]) for run, name, begin in begins)
 
 
 class Running:

@@ -202,3 +202,20 @@ def test_a_face_that_moves_all_the_time_is_shown_exactly_again_soon_after_every_
             faces.next(now_ns)
             follower.step(now_ns, DT, P.neutral(), out)
     assert max(waits) < 0.8
+
+
+def test_a_slow_conductor_is_followed_exactly_and_after_a_lost_face_within_the_limits() -> None:
+    follower, faces, slow = Follower(P), Faces(1, FIRST), 8
+    own, out, exact, rows = P.neutral(), P.neutral(), list[bool](), list[np.ndarray]()
+    for k in range(8, 400):
+        if k % slow == 0:
+            header, values = faces.next(k * STEP_NS)
+            if k != 240:
+                follower.take(header, values)
+        follower.step(k * STEP_NS, DT, own, out)
+        exact.append(follower.exact and follower.conducted)
+        rows.append(out.copy())
+    lost = 248 - 8
+    assert all(exact[:lost]) and not exact[lost] and exact[-1]
+    steps = np.abs(np.diff(np.array(rows), axis=0)) / (P.max_speed * DT)
+    assert steps[lost - 1 : exact.index(True, lost)].max() < 1.001

@@ -118,4 +118,4 @@ def test_a_stopped_conductor_is_replaced_and_does_not_come_back_while_servos_go_
     terms = reports["second"]["zenoh"]["terms"]  # type: ignore[index]
     assert terms >= 1
     if terms == 1:  # a pause of a busy machine can cost the second its lease, too
-        assert reports["first"]["zenoh"]["lost"] == 1 and not reports["first"]["zenoh"]["conducting"]  # type: ignore[index]
+        assert reports["first"]["zenoh"]["lost"] >= 1 and not reports["first"]["zenoh"]["conducting"]  # type: ignore[index]
