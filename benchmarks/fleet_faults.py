@@ -188,11 +188,24 @@ class Hall:
             process.join(10.0)
 
 
-def sent_at(rows: np.ndarray) -> dict[tuple[int, int, int], float]:
-    """By fencing number, head and sequence: how far a conductor's motion had come when it sent the face."""
-    sent = rows[(rows["mixed_ns"] == 0) & (rows["fence"] > 0)]
-    keys = zip(sent["fence"].tolist(), sent["head"].tolist(), sent["sequence"].tolist(), strict=True)
-    return dict(zip(keys, sent["passed_s"].tolist(), strict=True))
+class Sent:
+    """What conductors sent, by fencing number, head and sequence; ``rows`` : theirs."""
+
+    def __init__(self, rows: np.ndarray) -> None:
+        self._rows = rows[(rows["mixed_ns"] == 0) & (rows["fence"] > 0)]
+        self._at = {key: at for at, key in enumerate(_keys(self._rows))}
+
+    def of(self, rows: np.ndarray) -> tuple[Floats, Floats]:
+        """(k,) how far the conductor's motion had come when it sent the faces that ``rows`` show, and (k, P) these; NaN
+        where it has not noted them."""
+        at = np.array([self._at.get(key, -1) for key in _keys(rows)], int)
+        found = at[:, None] >= 0
+        passed = np.where(found[:, 0], self._rows["passed_s"][at], np.nan)
+        return passed, np.where(found, self._rows["values"][at], np.nan)
+
+
+def _keys(rows: np.ndarray) -> Iterable[tuple[int, int, int]]:
+    return zip(rows["fence"].tolist(), rows["head"].tolist(), rows["sequence"].tolist(), strict=True)
 
 
 def lives(rows: np.ndarray, place: int) -> list[np.ndarray]:
@@ -202,22 +215,21 @@ def lives(rows: np.ndarray, place: int) -> list[np.ndarray]:
     return [life for life in np.split(own, cuts) if len(life) > 2]
 
 
-def over_limits(life: np.ndarray, sent_s: dict[tuple[int, int, int], float]) -> tuple[float, float]:
-    """The greatest speed and acceleration of a life in units of their limits; ``sent_s`` : of :func:`sent_at`.
+def over_limits(life: np.ndarray, sent: Sent) -> tuple[float, float]:
+    """The greatest speed and acceleration of a life in units of their limits.
 
-    A face that is exactly a conductor's has moved for as long as that one's motion went on; else one's own counts.
+    A parameter that is exactly a conductor's has moved for as long as that one's motion went on; else one's own counts.
     While a head waits for a face it stands still, as servos behind it do within their own limits: that is no motion
     here.
     """
-    keys = zip(life["fence"].tolist(), life["head"].tolist(), life["sequence"].tolist(), strict=True)
-    theirs = np.array([sent_s.get(key, np.nan) for key in keys])
-    exact = life["exact"] & life["conducted"]
-    both = exact[1:] & exact[:-1] & (np.diff(life["fence"]) == 0)
-    passed, step = np.where(both, np.diff(theirs), np.diff(life["passed_s"])), np.diff(life["values"], axis=0)
-    known = passed > 1e-4
-    speed = step / np.where(known, passed, np.inf)[:, None]
+    theirs, faces = sent.of(life)
+    same = (life["values"] == faces) & life["conducted"][:, None]
+    both = same[1:] & same[:-1] & (np.diff(life["fence"]) == 0)[:, None]
+    passed = np.where(both, np.diff(theirs)[:, None], np.diff(life["passed_s"])[:, None])
+    step, known = np.diff(life["values"], axis=0), passed > 1e-4
+    speed = step / np.where(known, passed, np.inf)
     between = np.where(known[1:] & known[:-1], 0.5 * (passed[1:] + passed[:-1]), np.inf)
-    change = np.diff(speed, axis=0) / between[:, None]
+    change = np.diff(speed, axis=0) / between
     fastest = (np.abs(speed) / P.max_speed).max(initial=0.0)
     return float(fastest), float((np.abs(change) / P.max_acceleration).max(initial=0.0))
 
@@ -269,9 +281,9 @@ def mark_spreads(rows: np.ndarray) -> Floats:
 
 def judge(hall: Hall, table: Table) -> bool:
     """Fill a table with what the heads showed; whether all bounds were kept."""
-    rows, sent = (_read(hall.folder, names) for names in (SHOWING, CONDUCTORS))
-    sent_s, places = sent_at(sent), range(len(PLACES))
-    limits = np.array([over_limits(life, sent_s) for place in places for life in lives(rows, place)])
+    rows, sent = _read(hall.folder, SHOWING), Sent(_read(hall.folder, CONDUCTORS))
+    places = range(len(PLACES))
+    limits = np.array([over_limits(life, sent) for place in places for life in lives(rows, place)])
     back = sum(steps_back(rows, place) for place in places)
     judged = judged_events(hall.events, int(rows["shown_ns"][-1]))
     late = {(at, what): places for at, what in judged if (places := out_of_step(rows, at))}

@@ -46,10 +46,11 @@ class Approach:
         self._face[:] = face
         self.met[:] = False
 
-    def step(self, dt: float, face: Floats, out: Floats, *, stay: bool) -> None:
+    def step(self, dt: float, face: Floats, out: Floats, *, stay: bool, passed_s: float | None = None) -> None:
         """Write to ``out`` : (P,) what is shown ``dt`` s later, when the face is at ``face`` : (P,).
 
-        stay : what has met the face is exactly there from now on; else it has no more than the limits allow.
+        stay : what has met the face is exactly there from now on; else it has no more than the limits allow. passed_s :
+        the time in which the face moved so far, ``dt`` where it is not given; what has met it moved for as long.
         """
         if dt <= 0.0:
             out[:] = self._shown
@@ -61,7 +62,10 @@ class Approach:
         if stay:
             self.met |= np.abs(out - face) < _NEAR
             np.copyto(out, face, where=self.met)
-        np.divide(out - self._shown, dt, out=self._speed)
+        moved = out - self._shown
+        np.divide(moved, dt, out=self._speed)
+        if passed_s is not None and passed_s > 0.0:
+            np.divide(moved, passed_s, out=self._speed, where=self.met)
         self._shown[:], self._face[:], self._step_s = out, face, dt
 
     def _closing(self, distance: Floats, dt: float) -> Floats:

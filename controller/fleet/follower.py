@@ -20,8 +20,8 @@ _SHORTEST_S = 0.3
 _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
 """Of the minimum-jerk curve over one second."""
 _GAP_NS, _STEP_NS = 45_000_000, 110_000_000
-"""What comes after a longer gap in which faces were lost, or what was mixed after a longer step, is not shown at once, as a
-face can have moved far meanwhile."""
+"""What comes after a longer gap in which faces were lost, or was mixed after a longer step, is not shown at once: it
+can be far away by then."""
 _WAITING = 128
 
 
@@ -56,8 +56,9 @@ class Follower:
         self._sequence = -1
         self._sent = p.neutral()  # what the conductor sent last
         self._shown = p.neutral()
-        self._before, self._last_s = p.neutral(), 0.0  # the last but one that was shown
-        self._gap, self._passed_s, self._whole_s = np.zeros(len(p)), 0.0, 0.0
+        self._before, self._last_s = p.neutral(), 0.0  # what was shown before, and how long it moved from there
+        self._passed_s = 0.0  # how far a conductor's time went on since the face that was shown before
+        self._gap, self._blended_s, self._whole_s = np.zeros(len(p)), 0.0, 0.0
         self._heard_s = -np.inf
         self._begun, self._leads = False, False
 
@@ -97,19 +98,12 @@ class Follower:
 
         Returns when the newest command in it came, by one's own clock (ns); 0 for none.
         """
-        newest = self._due(now_ns)
+        newest, self._passed_s = self._due(now_ns), 0.0
         now_s = now_ns * 1e-9
         leads, self._leads = self._leads, False
         if newest is not None:
-            before = self.header
-            changed = before is None or newest[0].token != before.token
-            self.header, self._sent = newest
             self._heard_s = now_s
-            if not self.conducted or changed:
-                self._pass_to(self._sent, first=not self._begun)
-                self.conducted = True
-            elif before is not None and _is_far(before, newest[0]):
-                self._catch_up()
+            self._turn_to(*newest)
         elif self.conducted and (leads or now_s - self._heard_s > self._patience_s):
             self.conducted = False
             self._pass_to(own)
@@ -119,6 +113,17 @@ class Follower:
         self._show(self._sent if self.conducted else own, dt, out)
         header = self.header
         return 0 if not self.conducted or header is None or not header.stamp_ns else header.stamp_ns - self.offset_ns
+
+    def _turn_to(self, header: Header, face: Floats) -> None:
+        """Show a face from now on, or go on to it."""
+        before, self.header, self._sent = self.header, header, face
+        if before is None or before.token != header.token or not self.conducted:
+            self._pass_to(face, first=not self._begun)
+            self.conducted = True
+            return
+        self._passed_s = 1e-9 * (header.time_ns - before.time_ns)
+        if _is_far(before, header):
+            self._catch_up()
 
     def _due(self, now_ns: int) -> tuple[Header, Floats] | None:
         """The newest face that is to be shown by now."""
@@ -149,7 +154,7 @@ class Follower:
         speed = _PEAK_SPEED * size / (_SHARE * self._p.max_speed)
         acceleration = np.sqrt(_PEAK_ACCELERATION * size / (_SHARE * self._p.max_acceleration))
         self._whole_s = 0.0 if first else max(_SHORTEST_S, float(speed.max()), float(acceleration.max()))
-        self._passed_s = 0.0
+        self._blended_s = 0.0
         self._way.follow(source + self._gap)
         self.exact = first
 
@@ -158,7 +163,7 @@ class Follower:
             self._approach(source, dt, out)
         if self.exact:
             out[:] = source
-            self._before, self._last_s = self._shown, dt
+            self._before, self._last_s = self._shown, self._passed_s or dt
         self._shown = out.copy()
 
     def _leave(self) -> None:
@@ -168,13 +173,13 @@ class Follower:
 
     def _left(self) -> float:
         """How much of the gap is still to be closed, 1 to 0."""
-        return 1.0 - minimum_jerk(self._passed_s / self._whole_s) if self._whole_s > 0.0 else 0.0
+        return 1.0 - minimum_jerk(self._blended_s / self._whole_s) if self._whole_s > 0.0 else 0.0
 
     def _approach(self, source: Floats, dt: float, out: Floats) -> None:
         """Follow the blend of both sources within the limits, until every parameter has met its end."""
-        self._passed_s += dt
+        self._blended_s += dt
         left = self._left()
-        self._way.step(dt, source + left * self._gap, out, stay=left == 0.0)
+        self._way.step(dt, source + left * self._gap, out, stay=left == 0.0, passed_s=self._passed_s or dt)
         self.exact = left == 0.0 and bool(self._way.met.all())
 
 

@@ -17,12 +17,12 @@ from fleet_faults import (
     IN_STEP_S,
     PLACES,
     RECORD,
+    Sent,
     judged_events,
     lives,
     mark_spreads,
     out_of_step,
     over_limits,
-    sent_at,
     steps_back,
     why_late,
 )
@@ -57,11 +57,11 @@ def ramp(speed: float, count: int = 60) -> np.ndarray:
 
 def test_motion_at_its_limits_is_no_fault_and_beyond_them_it_is() -> None:
     at_limit = rows_of(0, ramp(0.99 * P.max_speed[JAW], 80))
-    speed, _ = over_limits(at_limit, sent_at(sent_of(at_limit)))
+    speed, _ = over_limits(at_limit, Sent(sent_of(at_limit)))
     assert 0.9 < speed < 1.0
     over = at_limit.copy()
     over["values"][45:, JAW] += 0.2
-    speed, acceleration = over_limits(over, sent_at(sent_of(over)))
+    speed, acceleration = over_limits(over, Sent(sent_of(over)))
     assert speed > 1.05 and acceleration > 1.05
 
 
@@ -69,8 +69,22 @@ def test_a_face_that_was_lost_counts_by_the_time_of_its_conductor() -> None:
     whole = rows_of(0, ramp(0.9 * P.max_speed[JAW]))
     missed = np.delete(whole, [30, 31])  # what is shown next has moved for three ticks, in one
     missed["passed_s"] = TICK_S * np.arange(len(missed))
-    speed, _ = over_limits(missed, sent_at(sent_of(whole)))
+    speed, _ = over_limits(missed, Sent(sent_of(whole)))
     assert speed < 1.0
+
+
+def test_what_is_exactly_a_conductors_counts_by_its_time_and_all_else_by_ones_own() -> None:
+    """Of a head that joins: the jaw is met and shows two faces in one tick, the brow is still on its way."""
+    brow = P.index("browInnerUp")
+    whole = rows_of(0, ramp(0.9 * P.max_speed[JAW]))
+    joins = np.delete(whole, [30])
+    joins["passed_s"], joins["exact"] = TICK_S * np.arange(len(joins)), False
+    joins["values"][:, brow] = ramp(0.9 * P.max_speed[brow])[: len(joins)]
+    speed, acceleration = over_limits(joins, Sent(sent_of(whole)))
+    assert speed < 1.0 and acceleration < 1.05
+    joins["values"][40:, brow] += 0.3
+    speed, _ = over_limits(joins, Sent(sent_of(whole)))
+    assert speed > 1.05
 
 
 def test_a_start_cuts_the_life_of_a_head() -> None:
