@@ -60,7 +60,7 @@ def joined(*runs: Running) -> Callable[[], bool]:
 
 
 class Running:
-    """A node whose heads are ticked 100 times a second in a thread, as a body does.
+    """A node whose heads are ticked ``hz`` times a second in a thread, as a body does.
 
     rows : for each head, what was shown, in order, with the time. paused : ticks nothing, as a stopped process.
     times : when rows were written.
@@ -68,7 +68,8 @@ class Running:
     """
 
     def __init__(self, endpoint: str, role: str, *, folder: Path, seed: int = 1, heads: tuple[str, ...] = ("maple",),
-                 **more: Any) -> None:  # fmt: skip
+                 hz: float = 100.0, **more: Any) -> None:  # fmt: skip
+        self._step_s = 1.0 / hz
         settings = {"role": role, "connect": [endpoint], "lease_ms": LEASE_MS, **more}
         self.states = {name: CommandState(P, seed=seed + i) for i, name in enumerate(heads)}
         for state in self.states.values():
@@ -87,17 +88,17 @@ class Running:
         while not self._stopping.is_set():
             while self.paused.is_set() and not self._stopping.is_set():
                 time.sleep(0.001)
-            due = max(due + 0.01, time.monotonic() - 0.05)
+            due = max(due + self._step_s, time.monotonic() - 0.05)
             time.sleep(max(0.0, due - time.monotonic()))
             now = time.monotonic_ns()
             self.times.append(now)
             for name, state in self.states.items():
                 values, stamp = self.rows[name][-1].copy(), 0
-                rested[name] += 0.01
+                rested[name] += self._step_s
                 if not self.node.rests(name):
                     stamp, rested[name] = state.tick(now, rested[name], values), 0.0
                     self.mixed[name] += 1
-                self.node.relay(name, now, 0.01, values, stamp)
+                self.node.relay(name, now, self._step_s, values, stamp)
                 self.rows[name].append(values)
                 follower = self.node.followers[name]  # exact is also who shows exactly its own life
                 self.exact[name].append(follower.exact and follower.conducted)

@@ -262,7 +262,7 @@ def test_heads_follow_conductors_on_machines_whose_clocks_have_nothing_in_common
 
 @pytest.mark.slow
 def test_all_find_each_other_again_when_the_router_comes_back(tmp_path: Path) -> None:
-    more = {"folder": tmp_path, "prefix": "again"}
+    more = {"folder": tmp_path, "prefix": "again", "hz": 40.0}
     with ExitStack() as stack:
         hub = stack.enter_context(ExitStack())
         endpoint = hub.enter_context(router())
@@ -304,8 +304,8 @@ def test_many_heads_of_a_process_are_sent_in_one_message(hub: str, tmp_path: Pat
     """Whoever follows many hears a few messages a tick; a process with one head, and one of a user, hears that one."""
     singles, together = list[str](), list[int]()
     with (
-        Running(hub, "conductor", folder=tmp_path, prefix="many", heads=MANY) as conductor,
-        Running(hub, "head", seed=60, folder=tmp_path, prefix="many", heads=MANY) as heads,
+        Running(hub, "conductor", folder=tmp_path, prefix="many", hz=40.0, heads=MANY) as conductor,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="many", hz=40.0, heads=MANY) as heads,
         client(hub) as session,
     ):
         until(joined(heads))
@@ -321,7 +321,7 @@ def test_many_heads_of_a_process_are_sent_in_one_message(hub: str, tmp_path: Pat
         assert shown <= {row.tobytes() for row in conductor.rows["c"]}
         taken = sum(follower.taken for follower in heads.node.followers.values())
         assert not heads.node.refused and not any(f.refused for f in heads.node.followers.values())
-        with Running(hub, "head", seed=90, folder=tmp_path, prefix="many", heads=("d",)) as one:
+        with Running(hub, "head", seed=90, folder=tmp_path, prefix="many", hz=40.0, heads=("d",)) as one:
             until(joined(one))
     assert set(singles) == {"many/b/parameters"}
     assert max(together) > 3 * 475 and taken > 300
@@ -329,11 +329,11 @@ def test_many_heads_of_a_process_are_sent_in_one_message(hub: str, tmp_path: Pat
 
 def test_heads_of_a_process_that_hears_many_are_moved_by_the_next_conductor(hub: str, tmp_path: Path) -> None:
     with (
-        Running(hub, "head", seed=60, folder=tmp_path, prefix="next", heads=MANY) as heads,
-        Running(hub, "conductor", folder=tmp_path, prefix="next", heads=MANY) as first,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="next", hz=40.0, heads=MANY) as heads,
+        Running(hub, "conductor", folder=tmp_path, prefix="next", hz=40.0, heads=MANY) as first,
     ):
         until(joined(heads))
-        with Running(hub, "conductor", seed=30, folder=tmp_path, prefix="next", heads=MANY) as second:
+        with Running(hub, "conductor", seed=30, folder=tmp_path, prefix="next", hz=40.0, heads=MANY) as second:
             until(lambda: second.node.followers["a"].conducted)
             before = heads.node.followers["e"].highest
             first.paused.set()
@@ -347,8 +347,8 @@ def test_heads_of_a_process_that_hears_many_are_moved_by_the_next_conductor(hub:
 def test_how_a_head_is_is_said_to_whoever_listens(hub: str, tmp_path: Path) -> None:
     said = list[tuple[str, dict[str, object]]]()
     with (
-        Running(hub, "conductor", folder=tmp_path, prefix="said", heads=MANY) as conductor,
-        Running(hub, "head", seed=60, folder=tmp_path, prefix="said", heads=MANY),
+        Running(hub, "conductor", folder=tmp_path, prefix="said", hz=40.0, heads=MANY) as conductor,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="said", hz=40.0, heads=MANY),
         client(hub) as session,
     ):
 
