@@ -53,8 +53,13 @@ class Asking:
 
         def heard(reply: zenoh.Reply) -> None:
             arrived = time.monotonic_ns()
-            if reply.ok is not None:
+            if reply.ok is None:
+                return
+            try:
                 received, answered, holder = map(int, json.loads(reply.ok.payload.to_bytes()))
+            except (ValueError, TypeError):
+                self._wire.refuse(LinkError("a time that is not the JSON it should be"))
+            else:
                 self._clocks.add(holder, asked, received, answered, arrived)
 
         self._wire.session.get(self._wire.key(ALL, "clock"), heard, timeout=_CLOCK_S)

@@ -62,17 +62,20 @@ def joined(*runs: Running) -> Callable[[], bool]:
 class Running:
     """A node whose heads are ticked ``hz`` times a second in a thread, as a body does.
 
+    journal : is told every tick and command of the layers.
+
     rows : for each head, what was shown, in order, with the time. paused : ticks nothing, as a stopped process.
     times : when rows were written.
     mixed : how often the layers of each head ticked. exact : for each row, whether it is exactly what a conductor sent.
     """
 
     def __init__(self, endpoint: str, role: str, *, folder: Path, seed: int = 1, heads: tuple[str, ...] = ("maple",),
-                 hz: float = 100.0, **more: Any) -> None:  # fmt: skip
+                 hz: float = 100.0, journal: Callable[..., None] | None = None, **more: Any) -> None:  # fmt: skip
         self._step_s = 1.0 / hz
         settings = {"role": role, "connect": [endpoint], "lease_ms": LEASE_MS, **more}
         self.states = {name: CommandState(P, seed=seed + i) for i, name in enumerate(heads)}
         for state in self.states.values():
+            state.record(journal)
             state.live(1.0, 0)
         self.node = Node(ZenohSettings.model_validate(settings), P, self.states, folder / "stage.toml")
         self.rows: dict[str, list[np.ndarray]] = {name: [P.neutral()] for name in heads}

@@ -7,6 +7,7 @@ import time
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from controller.base.parameters import PARAMETERS as P  # noqa: E402
 from controller.fleet import journal  # noqa: E402
 from controller.fleet.lease import Token  # noqa: E402
 from controller.fleet.payload import Header, Payloads  # noqa: E402
+from controller.layers.commands import CommandState  # noqa: E402
 from controller.takes.reader import load_take  # noqa: E402
 from tests.controller.fleet.nodes import Running, free_port, joined, router, until  # noqa: E402
 
@@ -82,6 +84,34 @@ def test_heads_show_bit_for_bit_what_is_conducted_and_say_so(hub: str, tmp_path:
         assert report["role"] == "head" and report["heads"]["maple"]["taken"] > 120
     take = load_take(tmp_path / "recorded-oak.csv", P)
     assert take.values[:, JAW].max() > 0.85 and take.duration_s > 0.5
+
+
+@pytest.mark.slow
+def test_a_stage_split_over_processes_moves_as_in_one(hub: str, tmp_path: Path) -> None:
+    """What the head shows is, bit for bit, what the layers alone make of the same commands at the same times."""
+    calls, more = list[tuple[str, tuple[Any, ...]]](), {"folder": tmp_path, "prefix": "split"}
+    with (
+        Running(hub, "conductor", journal=lambda name, *given: calls.append((name, given)), **more) as conductor,
+        Running(hub, "head", seed=50, **more) as head,
+    ):
+        until(joined(head))
+        begin, state = len(head.rows["maple"]), conductor.states["maple"]
+        state.expression("surprise", 0.8, None, time.monotonic_ns())
+        state.set_parameters([JAW], [0.4], time.monotonic_ns())
+        until(lambda: sum(head.exact["maple"][begin:]) > 100)
+        conductor.paused.set()
+        until(lambda: head.node.followers["maple"].conducted is False)
+    alone, made = CommandState(P, seed=1), set[bytes]()
+    for name, given in calls:
+        if name == "tick":
+            out = P.neutral()
+            alone.tick(*given[:2], out)
+            made.add(out.tobytes())
+        else:
+            getattr(alone, name)(*given)
+    exact = zip(head.rows["maple"][begin:], head.exact["maple"][begin:], strict=False)
+    shown = {row.tobytes() for row, own in exact if own}
+    assert len(shown) > 50 and shown <= made
 
 
 def test_the_parts_of_a_stage_are_alive_as_tokens(hub: str, tmp_path: Path) -> None:
