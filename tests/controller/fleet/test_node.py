@@ -19,6 +19,7 @@ from controller.base.parameters import PARAMETERS as P  # noqa: E402
 from controller.fleet import journal  # noqa: E402
 from controller.fleet.lease import Token  # noqa: E402
 from controller.fleet.payload import Header, Payloads  # noqa: E402
+from controller.fleet.wire import header_of  # noqa: E402
 from controller.layers.commands import CommandState  # noqa: E402
 from controller.takes.reader import load_take  # noqa: E402
 from tests.controller.fleet.nodes import Running, free_port, joined, router, until  # noqa: E402
@@ -355,6 +356,26 @@ def test_many_heads_of_a_process_are_sent_in_one_message(hub: str, tmp_path: Pat
             until(joined(one))
     assert set(singles) == {"many/b/parameters"}
     assert max(together) > 3 * 475 and taken > 300
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_messages_of_many_heads_are_in_shared_memory_where_that_is_asked_for(
+    hub: str, tmp_path: Path, shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many, found = (
+        tuple(f"h{k}" for k in range(8)),
+        list[bool](),
+    )  # 3 kB and more; what is smaller travels faster as it is
+
+    def noting(sample: zenoh.Sample) -> Header:
+        found.append(sample.payload.as_shm() is not None)
+        return header_of(sample)
+
+    monkeypatch.setattr("controller.fleet.hearing.header_of", noting)
+    more = {"folder": tmp_path, "prefix": f"shared{shared}", "hz": 20.0, "heads": many, "shared_memory": shared}
+    with Running(hub, "conductor", **more), Running(hub, "head", seed=60, **more) as head:
+        until(lambda: len(found) > 40 and head.node.followers["h7"].taken > 20)
+    assert any(found) is shared
 
 
 def test_heads_of_a_process_that_hears_many_are_moved_by_the_next_conductor(hub: str, tmp_path: Path) -> None:
