@@ -64,9 +64,9 @@ class Running:
 
     journal : is told every tick and command of the layers.
 
-    rows : for each head, what was shown, in order, with the time. paused : ticks nothing, as a stopped process.
-    times : when rows were written.
-    mixed : how often the layers of each head ticked. exact : for each row, whether it is exactly what a conductor sent.
+    rows : for each head, what was shown, in order. times : when rows were written. paused : ticks nothing, as a stopped
+    process. mixed : for each tick of each head, whether it showed exactly what a conductor sent, and whether its layers
+    ticked. exact : for each row, whether it is exactly what a conductor sent.
     """
 
     def __init__(self, endpoint: str, role: str, *, folder: Path, seed: int = 1, heads: tuple[str, ...] = ("maple",),
@@ -80,7 +80,7 @@ class Running:
         self.node = Node(ZenohSettings.model_validate(settings), P, self.states, folder / "stage.toml")
         self.rows: dict[str, list[np.ndarray]] = {name: [P.neutral()] for name in heads}
         self.times: list[int] = [0]
-        self.mixed = dict.fromkeys(heads, 0)
+        self.mixed: dict[str, list[tuple[bool, bool]]] = {name: [] for name in heads}
         self.exact: dict[str, list[bool]] = {name: [False] for name in heads}
         self.paused, self._stopping = threading.Event(), threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -98,13 +98,14 @@ class Running:
             for name, state in self.states.items():
                 values, stamp = self.rows[name][-1].copy(), 0
                 rested[name] += self._step_s
-                if not self.node.rests(name):
+                follower = self.node.followers[name]
+                follows, rests = follower.exact and follower.conducted, self.node.rests(name)
+                self.mixed[name].append((follows, not rests))
+                if not rests:
                     stamp, rested[name] = state.tick(now, rested[name], values), 0.0
-                    self.mixed[name] += 1
                 self.node.relay(name, now, self._step_s, values, stamp)
                 self.rows[name].append(values)
-                follower = self.node.followers[name]  # exact is also who shows exactly its own life
-                self.exact[name].append(follower.exact and follower.conducted)
+                self.exact[name].append(follower.exact and follower.conducted)  # not who shows exactly its own life
 
     def __enter__(self) -> Running:
         return self
