@@ -35,6 +35,8 @@ log = logging.getLogger(__name__)
 
 _STANDBY_TICKS = 5
 _STATE_S, _HOUSE_S = 0.2, 0.05
+_FIRST_S = 1.0
+"""So much longer one waits that has just started, before it conducts."""
 _MARGIN_NS = 2_000_000
 """So long after a face is due it is shown: a conductor's ticks begin late now and then, and a face that is due a little
 after a tick would wait for the next one."""
@@ -57,7 +59,8 @@ class Node:
         self.settings, self._heads, self._align = settings, dict(heads), align
         lease_s = settings.lease_ms * 1e-3
         self.conducts = settings.role == "conductor"
-        self.lease = Lease(random.getrandbits(62) | 1, lease_s, random.uniform(0.0, 0.2) * lease_s, time.monotonic())
+        number, wait_s = random.getrandbits(62) | 1, random.uniform(0.0, 0.2) * lease_s
+        self.lease = Lease(number, lease_s, wait_s, time.monotonic(), _FIRST_S)
         self._clocks, self._stopping = Clocks(), threading.Event()
         delay_ns = 0 if self.conducts else round(settings.delay_ms * 1e6)
         self.followers = {name: Follower(parameters, 2.0 * lease_s, delay_ns) for name in heads}
