@@ -4,17 +4,20 @@
     python benchmarks/fleet_faults.py --seconds 60            # a quiet hall: spread of one mark over the heads
     python benchmarks/fleet_faults.py --seconds 60 --loss 0.05 --delay-ms 50 --jitter-ms 20
 
-Two conductors, two processes of two heads each, and one that records, on one machine; with ``--loss`` or ``--delay-ms``
-the heads reach the router through a proxy that drops and delays datagrams. Each process that shows faces writes every
-tick to a file, which outlives it. Afterwards those files are judged: speed and acceleration of all parameters against
-their limits, whether all heads show the same conductor two seconds after each event, whether any head went back to a
-conductor that was replaced, and when each face was shown by which head. Ends with 1 where a bound is not kept.
+A router, two conductors, two processes of two heads each, one that draws all heads, and one that records, on one
+machine; with ``--loss`` or ``--delay-ms`` the heads reach the router through a proxy that drops and delays datagrams.
+Every one of them is killed and started again, or stopped and continued, conductors and the router for longer than a
+lease. Each process that shows faces writes every tick to a file, which outlives it. Afterwards those files are judged:
+speed and acceleration of all parameters against their limits, whether all heads show the same conductor two seconds
+after each event, and for one that does not what it waited for, whether any head went back to a conductor that was
+replaced, and when each face was shown by which head. Ends with 1 where a bound is not kept.
 """
 
 from __future__ import annotations
 
 import argparse
 import heapq
+import json
 import os
 import random
 import select
@@ -25,6 +28,7 @@ import tempfile
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import pairwise
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
@@ -40,25 +44,30 @@ from controller.base.parameters import Floats
 from controller.fleet.node import Node
 
 HEADS = ("a", "b", "c", "d")
-PROCESSES = {"one": HEADS[:2], "two": HEADS[2:]}
+SHOWING = {"one": HEADS[:2], "two": HEADS[2:], "screen": HEADS}
+"""Processes that show faces, and those of which heads: two with servos, and one that draws."""
+PLACES = [(process, head) for process, heads in SHOWING.items() for head in heads]
 CONDUCTORS = ("first", "second")
+ROLES = {"one": "head", "two": "head", "screen": "face", "recorder": "recorder"}
+LONG_PAUSE_S, PAUSE_S = (0.3, 3.0), (0.05, 1.5)
+"""How long a process is stopped: a conductor or the router for longer than a lease, and another one."""
 DELAY_MS = 80.0  # of the stage: a face is shown so long after it was mixed, everywhere at once
 IN_STEP_S = 2.0
 RECORD = np.dtype([
-    ("head", "u1"), ("conducted", "?"), ("exact", "?"), ("fence", "<i8"), ("holder", "<u8"), ("sequence", "<i8"),
-    ("mixed_ns", "<i8"), ("shown_ns", "<i8"), ("passed_s", "<f8"), ("values", "<f8", (len(P),)),
+    ("place", "u1"), ("head", "u1"), ("conducted", "?"), ("exact", "?"), ("fence", "<i8"), ("holder", "<u8"),
+    ("sequence", "<i8"), ("mixed_ns", "<i8"), ("shown_ns", "<i8"), ("passed_s", "<f8"), ("values", "<f8", (len(P),)),
 ])  # fmt: skip
-"""One tick of one head: ``shown_ns`` when it was written, ``passed_s`` how far the motion of its process had come, the
-others of the face that is shown, or that a conductor sent."""
+"""One tick of one head: ``place`` which of :data:`PLACES` shows it, ``shown_ns`` when it was written, ``passed_s`` how
+far the motion of its process had come, the others of the face that is shown, or that a conductor sent."""
 EXPRESSIONS = ("happiness", "anger", "surprise", "sadness")
 
 
 def play(pipe: Connection, endpoint: str, role: str, names: tuple[str, ...], path: str, delay_ms: float) -> None:
     """A process with a role: ticks until it is told to end, and writes what its heads show to ``path``."""
-    more = {"delay_ms": delay_ms} if role == "head" else {"record": str(Path(path).with_suffix(""))}
-    node, states = make_node(endpoint, role, list(names), **more)
-    pipe.send("ready")
+    more = {"delay_ms": delay_ms} if role in ("head", "face") else {"record": str(Path(path).with_suffix(""))}
     clock, shown = Clock(100.0), {name: P.neutral() for name in names}
+    node, states = make_node(endpoint, role, list(names), clock.align, **more)
+    pipe.send("ready")
     rested, count, passed_s = dict.fromkeys(names, 0.0), 0, 0.0
     with open(path, "ab", buffering=0) as file:
         for now in clock.run(lambda: not pipe.poll()):
@@ -71,10 +80,17 @@ def play(pipe: Connection, endpoint: str, role: str, names: tuple[str, ...], pat
                 if not node.rests(name):
                     stamp, rested[name] = state.tick(now, rested[name], shown[name]), 0.0
                 node.relay(name, now, clock.step_s, shown[name], stamp)
-                row["head"], row["values"], row["passed_s"] = HEADS.index(name), shown[name], passed_s
+                row["place"], row["head"] = place_of(path, name), HEADS.index(name)
+                row["values"], row["passed_s"] = shown[name], passed_s
                 _note_face(row, node, name)
             file.write(rows.tobytes())
     node.close()
+
+
+def place_of(path: str, head: str) -> int:
+    """Which of :data:`PLACES` writes the file; 255 for a process that shows nothing."""
+    place = Path(path).stem, head
+    return PLACES.index(place) if place in PLACES else 255
 
 
 def _note_face(row: Any, node: Node, name: str) -> None:
@@ -125,9 +141,13 @@ def disturb(pipe: Connection, listen: int, to: int, loss: float, delay_s: float,
 
 @dataclass
 class Hall:
-    """The processes of a stage, by name; events are times (ns) and what was done."""
+    """The processes of a stage, by name; events are times (ns) and what was done.
+
+    endpoint : of the router, which listens at ``datagrams`` too. heads_by : where heads find it, the proxy perhaps.
+    """
 
     endpoint: str
+    datagrams: str
     heads_by: str
     folder: Path
     delay_ms: float
@@ -136,10 +156,12 @@ class Hall:
 
     def begin(self, name: str) -> None:
         """Start the process of that name; it is ready when this returns."""
-        role = {"one": "head", "two": "head", "recorder": "recorder"}.get(name, "conductor")
-        where = self.heads_by if role == "head" else self.endpoint
-        names, path = PROCESSES.get(name, HEADS), str(self.folder / f"{name}.rows")
-        self.running[name] = start(play, where, role, names, path, self.delay_ms)
+        role, names = ROLES.get(name, "conductor"), SHOWING.get(name, HEADS)
+        if name == "router":
+            self.running[name] = start(route, self.endpoint, self.datagrams)
+        else:
+            where, path = self.heads_by if role == "head" else self.endpoint, str(self.folder / f"{name}.rows")
+            self.running[name] = start(play, where, role, names, path, self.delay_ms)
         self.events.append((time.monotonic_ns(), f"start {name}"))
 
     def kill(self, name: str) -> None:
@@ -159,82 +181,112 @@ class Hall:
         self.events.append((time.monotonic_ns(), f"continue {name}"))
 
     def end(self) -> None:
-        """End all of them."""
-        for process, pipe in self.running.values():
+        """End all of them, the router last."""
+        for name in sorted(self.running, key="router".__eq__):
+            process, pipe = self.running[name]
             pipe.send("end")
             process.join(10.0)
 
 
-def sent_at(rows: np.ndarray) -> dict[tuple[int, int, int], float]:
-    """By fencing number, head and sequence: how far a conductor's motion had come when it sent the face."""
-    sent = rows[(rows["mixed_ns"] == 0) & (rows["fence"] > 0)]
-    keys = zip(sent["fence"].tolist(), sent["head"].tolist(), sent["sequence"].tolist(), strict=True)
-    return dict(zip(keys, sent["passed_s"].tolist(), strict=True))
+class Sent:
+    """What conductors sent, by fencing number, head and sequence; ``rows`` : theirs."""
+
+    def __init__(self, rows: np.ndarray) -> None:
+        self._rows = rows[(rows["mixed_ns"] == 0) & (rows["fence"] > 0)]
+        self._at = {key: at for at, key in enumerate(_keys(self._rows))}
+
+    def of(self, rows: np.ndarray) -> tuple[Floats, Floats]:
+        """(k,) how far the conductor's motion had come when it sent the faces that ``rows`` show, and (k, P) these; NaN
+        where it has not noted them."""
+        at = np.array([self._at.get(key, -1) for key in _keys(rows)], int)
+        found = at[:, None] >= 0
+        passed = np.where(found[:, 0], self._rows["passed_s"][at], np.nan)
+        return passed, np.where(found, self._rows["values"][at], np.nan)
 
 
-def lives(rows: np.ndarray, head: int) -> list[np.ndarray]:
-    """Rows of one head, cut where its process was started again."""
-    own = rows[rows["head"] == head]
+def _keys(rows: np.ndarray) -> Iterable[tuple[int, int, int]]:
+    return zip(rows["fence"].tolist(), rows["head"].tolist(), rows["sequence"].tolist(), strict=True)
+
+
+def lives(rows: np.ndarray, place: int) -> list[np.ndarray]:
+    """Rows of one head in one process, cut where that was started again."""
+    own = rows[rows["place"] == place]
     cuts = np.flatnonzero(np.diff(own["passed_s"]) <= 0.0) + 1
     return [life for life in np.split(own, cuts) if len(life) > 2]
 
 
-def over_limits(life: np.ndarray, sent_s: dict[tuple[int, int, int], float]) -> tuple[float, float]:
-    """The greatest speed and acceleration of a life in units of their limits; ``sent_s`` : of :func:`sent_at`.
+def over_limits(life: np.ndarray, sent: Sent) -> tuple[float, float]:
+    """The greatest speed and acceleration of a life in units of their limits.
 
-    A face that is exactly a conductor's has moved for as long as that one's motion went on; else one's own counts.
+    A parameter that is exactly a conductor's has moved for as long as that one's motion went on; else one's own counts.
     While a head waits for a face it stands still, as servos behind it do within their own limits: that is no motion
     here.
     """
-    keys = zip(life["fence"].tolist(), life["head"].tolist(), life["sequence"].tolist(), strict=True)
-    theirs = np.array([sent_s.get(key, np.nan) for key in keys])
-    exact = life["exact"] & life["conducted"]
-    both = exact[1:] & exact[:-1] & (np.diff(life["fence"]) == 0)
-    passed, step = np.where(both, np.diff(theirs), np.diff(life["passed_s"])), np.diff(life["values"], axis=0)
-    known = passed > 1e-4
-    speed = step / np.where(known, passed, np.inf)[:, None]
+    theirs, faces = sent.of(life)
+    same = (life["values"] == faces) & life["conducted"][:, None]
+    both = same[1:] & same[:-1] & (np.diff(life["fence"]) == 0)[:, None]
+    passed = np.where(both, np.diff(theirs)[:, None], np.diff(life["passed_s"])[:, None])
+    step, known = np.diff(life["values"], axis=0), passed > 1e-4
+    speed = step / np.where(known, passed, np.inf)
     between = np.where(known[1:] & known[:-1], 0.5 * (passed[1:] + passed[:-1]), np.inf)
-    change = np.diff(speed, axis=0) / between[:, None]
+    change = np.diff(speed, axis=0) / between
     fastest = (np.abs(speed) / P.max_speed).max(initial=0.0)
     return float(fastest), float((np.abs(change) / P.max_acceleration).max(initial=0.0))
 
 
-def steps_back(rows: np.ndarray, head: int) -> int:
+def steps_back(rows: np.ndarray, place: int) -> int:
     """How often a head that had obeyed a conductor obeyed one with a lower token afterwards, in one life."""
-    return sum(int((np.diff(life["fence"][life["conducted"]]) < 0).sum()) for life in lives(rows, head))
+    return sum(_lower(life[life["conducted"]]) for life in lives(rows, place))
+
+
+def _lower(life: np.ndarray) -> int:
+    tokens = list(zip(life["fence"].tolist(), life["holder"].tolist(), strict=True))
+    return sum(after < before for before, after in pairwise(tokens))
 
 
 def out_of_step(rows: np.ndarray, at_ns: int) -> set[int]:
-    """Heads that at no time in the two seconds from ``at_ns`` on show exactly what the newest conductor sends."""
+    """Places that at no time in the two seconds from ``at_ns`` on show exactly what the newest conductor sends."""
     span = rows[(rows["shown_ns"] > at_ns) & (rows["shown_ns"] <= at_ns + IN_STEP_S * 1e9)]
     joined = span["conducted"] & span["exact"] & (span["fence"] == span["fence"].max(initial=0))
-    return set(span["head"].tolist()) - set(span["head"][joined].tolist())
+    return set(span["place"].tolist()) - set(span["place"][joined].tolist())
+
+
+def why_late(rows: np.ndarray, at_ns: int, place: int) -> str:
+    """What a head that is not in step in time waited for: the processor, a face, or its own way to that face."""
+    span = rows[(rows["place"] == place) & (rows["shown_ns"] > at_ns) & (rows["shown_ns"] <= at_ns + 2e9 * IN_STEP_S)]
+    newest = span["fence"].max(initial=0)
+    heard = span["conducted"] & (span["fence"] == newest)
+    marks = [("a face of the newest conductor", heard), ("exactly that", heard & span["exact"])]
+    found = [f"{what} after {_first_s(span, mark, at_ns)}" for what, mark in marks]
+    gap = 1e-6 * np.diff(span["shown_ns"]).max(initial=0)
+    process, head = PLACES[place]
+    return f"{head} in {process}: {', '.join(found)}; its longest tick {gap:.0f} ms"
+
+
+def _first_s(span: np.ndarray, mark: np.ndarray, at_ns: int) -> str:
+    return f"{1e-9 * (int(span['shown_ns'][mark.argmax()]) - at_ns):.2f} s" if mark.any() else "more than 4 s"
 
 
 def mark_spreads(rows: np.ndarray) -> Floats:
     """(k,) ms from the first to the last head that showed a face, for faces that all heads showed."""
-    exact = rows[rows["exact"]]
+    exact = rows[rows["exact"] & rows["conducted"]]
     first: dict[tuple[int, int], dict[int, int]] = {}
     for row in exact:
         first.setdefault((int(row["fence"]), int(row["mixed_ns"])), {}).setdefault(
-            int(row["head"]), int(row["shown_ns"])
+            int(row["place"]), int(row["shown_ns"])
         )
-    whole = [times.values() for times in first.values() if len(times) == len(HEADS)]
+    whole = [times.values() for times in first.values() if len(times) == len(PLACES)]
     return np.array([1e-6 * (max(times) - min(times)) for times in whole])
 
 
 def judge(hall: Hall, table: Table) -> bool:
     """Fill a table with what the heads showed; whether all bounds were kept."""
-    rows, sent = (_read(hall.folder, names) for names in (PROCESSES, CONDUCTORS))
-    sent_s = sent_at(sent)
-    limits = np.array([over_limits(life, sent_s) for head in range(len(HEADS)) for life in lives(rows, head)])
-    back = sum(steps_back(rows, head) for head in range(len(HEADS)))
-    checked, late = 0, 0
-    times = [at for at, _ in hall.events]
-    for at, following in zip(times, [*times[1:], int(rows["shown_ns"][-1])], strict=True):
-        if following - at > IN_STEP_S * 1e9:
-            checked += 1
-            late += bool(out_of_step(rows, at))
+    rows, sent = _read(hall.folder, SHOWING), Sent(_read(hall.folder, CONDUCTORS))
+    places = range(len(PLACES))
+    limits = np.array([over_limits(life, sent) for place in places for life in lives(rows, place)])
+    back = sum(steps_back(rows, place) for place in places)
+    judged = judged_events(hall.events, int(rows["shown_ns"][-1]))
+    late = {(at, what): places for at, what in judged if (places := out_of_step(rows, at))}
     spreads = mark_spreads(rows)
     exact, conducted = rows["exact"].mean(), rows["conducted"].mean()
     speed, acceleration = limits.max(axis=0)
@@ -245,8 +297,8 @@ def judge(hall: Hall, table: Table) -> bool:
         "greatest acceleration / limit": (f"{acceleration:.3f}", acceleration < 1.05),
         "conductors, by fencing number": (len(np.unique(rows["fence"][rows["conducted"]])), True),
         "went back to a replaced conductor": (back, back == 0),
-        f"events with {IN_STEP_S:g} s until the next": (checked, True),
-        "of these, a head not in step by then": (late, late == 0),
+        f"events with {IN_STEP_S:g} s until the next": (len(judged), True),
+        "of these, a head not in step by then": (len(late), not late),
     }  # fmt: skip
     if len(spreads):
         p50, p99, most = np.percentile(spreads, [50, 99, 100])
@@ -254,7 +306,18 @@ def judge(hall: Hall, table: Table) -> bool:
         found["spread of one mark p50, p99, max (ms)"] = text, bool(p99 <= 10.0)
     for name, (value, kept) in found.items():
         table.add_row(name, str(value), "" if kept else "missed")
+    for (at, what), those in late.items():
+        when_s = 1e-9 * (at - hall.events[0][0])
+        table.add_row(f"{what} ({when_s:.1f} s)", "\n".join(why_late(rows, at, place) for place in those))
     return all(kept for _, kept in found.values())
+
+
+def judged_events(events: list[tuple[int, str]], end_ns: int) -> list[tuple[int, str]]:
+    """Those that are followed by nothing else for long enough to join, while the router runs."""
+    following = [*(at for at, _ in events[1:]), end_ns]
+    without = ("kill router", "pause router")
+    pairs = zip(events, following, strict=True)
+    return [(at, what) for (at, what), after in pairs if after - at > IN_STEP_S * 1e9 and what not in without]
 
 
 def _read(folder: Path, names: Iterable[str]) -> np.ndarray:
@@ -268,8 +331,8 @@ def kill_at_random(hall: Hall, count: int, seed: int, until_s: float) -> int:
     numbers, done = random.Random(seed), 0
     while done < count and time.monotonic() < until_s:
         name = numbers.choice(sorted(hall.running))
-        if numbers.random() < 0.2:
-            hall.pause(name, numbers.uniform(0.05, 1.5))
+        if numbers.random() < 0.25:
+            hall.pause(name, numbers.uniform(*(LONG_PAUSE_S if name in ("router", *CONDUCTORS) else PAUSE_S)))
         else:
             hall.kill(name)
             time.sleep(numbers.choice((0.0, numbers.uniform(0.0, 1.0))))
@@ -295,24 +358,24 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as own:
         folder = Path(options.keep or own)
         folder.mkdir(parents=True, exist_ok=True)
-        _, hub = start(route, f"tcp/127.0.0.1:{tcp}", f"udp/127.0.0.1:{udp}")
         by = f"udp/127.0.0.1:{proxy}" if proxied else f"tcp/127.0.0.1:{tcp}"
         way = (options.loss, options.delay_ms * 1e-3, options.jitter_ms * 1e-3)
         between = start(disturb, proxy, udp, *way)[1] if proxied else None
-        hall = Hall(f"tcp/127.0.0.1:{tcp}", by, folder, shown_after)
-        for name in (*CONDUCTORS, *PROCESSES, "recorder"):
+        hall = Hall(f"tcp/127.0.0.1:{tcp}", f"udp/127.0.0.1:{udp}", by, folder, shown_after)
+        for name in ("router", *CONDUCTORS, *SHOWING, "recorder"):
             hall.begin(name)
         time.sleep(3.0)
         end = time.monotonic() + options.seconds
         done = kill_at_random(hall, options.kills, options.seed, end) if options.kills else 0
         time.sleep(max(IN_STEP_S + 1.0, 0.0 if done else end - time.monotonic()))
         hall.end()
-        for pipe in filter(None, (between, hub)):
-            pipe.send("end")
+        if between is not None:
+            between.send("end")
+        (folder / "events.json").write_text(json.dumps(hall.events))
         title = f"{done} events, {100 * options.loss:g} % loss, {options.delay_ms:g} +- {options.jitter_ms:g} ms"
         table = Table("measured", "value", "", title=title, title_justify="left")
         kept = judge(hall, table)
-    Console(width=110).print(table)
+    Console(width=150).print(table)
     sys.exit(not kept)
 
 

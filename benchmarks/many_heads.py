@@ -57,12 +57,14 @@ def route(pipe: Connection, *endpoints: str) -> None:
         pipe.send(time.process_time() - begin)
 
 
-def make_node(endpoint: str, role: str, names: list[str], **more: object) -> tuple[Node, dict[str, CommandState]]:
+def make_node(
+    endpoint: str, role: str, names: list[str], align: Callable[[int], None] = lambda _: None, **more: object
+) -> tuple[Node, dict[str, CommandState]]:
     states = {name: CommandState(P, seed=i) for i, name in enumerate(names)}
     for state in states.values():
         state.live(1.0, 0)
     settings = ZenohSettings.model_validate({"role": role, "connect": [endpoint], **more})
-    return Node(settings, P, states, ROOT / "stage.toml"), states
+    return Node(settings, P, states, ROOT / "stage.toml", align=align), states
 
 
 def conduct(pipe: Connection, endpoint: str, names: list[str], hz: float) -> None:

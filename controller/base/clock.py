@@ -10,6 +10,9 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+_ALIGN_SHARE, _ALIGN_MOST = 4, 20
+"""A deadline is moved by this part of what it is off, and by this part of a period at most."""
+
 
 class Samples:
     """The newest ``capacity`` measurements; older ones are overwritten."""
@@ -72,6 +75,14 @@ class Clock:
         self._sleep_s = sleep_s
         self._prompt = prompt
         self._started_ns = self._last_ns = self._deadline_ns = 0
+        self._aim_ns: int | None = None
+
+    def align(self, at_ns: int) -> None:
+        """Let ticks fall at ``at_ns`` and whole periods before and after it.
+
+        The next tick comes a little nearer to that, so steps stay even. Called at each tick, as clocks drift.
+        """
+        self._aim_ns = at_ns
 
     def run(self, keep_going: Callable[[], bool]) -> Iterator[int]:
         """Yield the present time (ns) once per tick until ``keep_going()`` is false."""
@@ -84,7 +95,7 @@ class Clock:
             before_ns = self._deadline_ns
             yield now
             self._last_ns = self._now_ns()
-            self._deadline_ns = self._next_deadline(self._deadline_ns)
+            self._deadline_ns = self._aligned(self._next_deadline(self._deadline_ns))
 
     def _wait(self) -> int:
         """Wait for the next tick; the present time (ns)."""
@@ -104,6 +115,15 @@ class Clock:
         missed = max(0, (self._last_ns - deadline) // self.period_ns)
         self.skipped += missed
         return deadline + (missed + 1) * self.period_ns
+
+    def _aligned(self, deadline: int) -> int:
+        """A deadline, nearer to what :meth:`align` asked for since the last one."""
+        if self._aim_ns is None:
+            return deadline
+        half, most = self.period_ns // 2, self.period_ns // _ALIGN_MOST
+        off = (self._aim_ns - deadline + half) % self.period_ns - half
+        self._aim_ns = None
+        return deadline + min(max(off // _ALIGN_SHARE, -most), most)
 
     def report(self) -> dict[str, object]:
         """Measured rate (Hz), ticks, skipped deadlines and jitter percentiles (ms)."""

@@ -26,7 +26,7 @@ def open_node(stage: Stage, bodies: Sequence[Body]) -> Node | None:
 
     heads = {head_key(body.state.name or stage.settings.name): body for body in bodies}
     states = {name: body.state for name, body in heads.items()}
-    node = Node(settings, stage.parameters, states, stage.path, bodies[0].clock.hurry)
+    node = Node(settings, stage.parameters, states, stage.path, bodies[0].clock.hurry, bodies[0].clock.align)
     for name, body in heads.items():
         body.relay, body.rests = partial(node.relay, name), partial(node.rests, name)
     return node

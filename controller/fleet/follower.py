@@ -8,9 +8,10 @@ from collections import Counter, deque
 import numpy as np
 
 from controller.base.parameters import Floats, Parameters
+from controller.fleet.approach import Approach
 from controller.fleet.lease import NOBODY, Token
 from controller.fleet.payload import Header
-from controller.motion.motion import MotionLimiter, minimum_jerk
+from controller.motion.motion import minimum_jerk
 
 _SHARE = 0.6
 """How much of the limits of speed and acceleration passing from one source to the other may use, beside the motion of
@@ -18,10 +19,9 @@ the sources themselves; the limiter behind it holds them in any case."""
 _SHORTEST_S = 0.3
 _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
 """Of the minimum-jerk curve over one second."""
-_NEAR = 1e-4
-"""From so near on, in units of a parameter, what is shown is exactly what was sent: half a step of a servo or less."""
-_GAP_NS = 45_000_000
-"""What comes after a longer gap is not shown at once: a face can have moved far meanwhile."""
+_GAP_NS, _STEP_NS = 45_000_000, 110_000_000
+"""What comes after a longer gap in which faces were lost, or was mixed after a longer step, is not shown at once: it
+can be far away by then."""
 _WAITING = 128
 
 
@@ -44,7 +44,7 @@ class Follower:
 
     def __init__(self, parameters: Parameters, patience_s: float = 0.5, delay_ns: int = 0) -> None:
         p = parameters
-        self._limiter = MotionLimiter(p.max_speed, p.max_acceleration, p.low, p.high, response_s=p.response_s)
+        self._way = Approach(p)
         self._p, self._patience_s, self._delay_ns = p, patience_s, delay_ns
         self.highest: Token = NOBODY
         self.taken, self.refused = 0, Counter[str]()
@@ -56,9 +56,9 @@ class Follower:
         self._sequence = -1
         self._sent = p.neutral()  # what the conductor sent last
         self._shown = p.neutral()
-        self._blend_before = p.neutral()
-        self._before, self._last_s, self._led = p.neutral(), 0.0, False  # the last but one that was shown
-        self._gap, self._passed_s, self._whole_s = np.zeros(len(p)), 0.0, 0.0
+        self._before, self._last_s = p.neutral(), 0.0  # what was shown before, and how long it moved from there
+        self._passed_s = 0.0  # how far a conductor's time went on since the face that was shown before
+        self._gap, self._blended_s, self._whole_s = np.zeros(len(p)), 0.0, 0.0
         self._heard_s = -np.inf
         self._begun, self._leads = False, False
 
@@ -78,6 +78,13 @@ class Follower:
             self._waiting.append((header, values))
             return True
 
+    @property
+    def due_ns(self) -> int | None:
+        """When what is shown was due by one's own clock; None for what is shown as soon as it comes."""
+        if not self._delay_ns or self.header is None or not self.conducted:
+            return None
+        return self.header.time_ns + self._delay_ns - self.offset_ns
+
     def lead(self, token: Token) -> None:
         """Conduct by oneself: nobody with a lower token is followed from now on."""
         with self._lock:
@@ -91,19 +98,12 @@ class Follower:
 
         Returns when the newest command in it came, by one's own clock (ns); 0 for none.
         """
-        newest = self._due(now_ns)
+        newest, self._passed_s = self._due(now_ns), 0.0
         now_s = now_ns * 1e-9
         leads, self._leads = self._leads, False
         if newest is not None:
-            before = self.header
-            changed = before is None or newest[0].token != before.token
-            self.header, self._sent = newest
-            if before is not None and newest[0].time_ns - before.time_ns > _GAP_NS:
-                self._catch_up()
             self._heard_s = now_s
-            if not self.conducted or changed:
-                self._pass_to(self._sent, first=not self._begun)
-                self.conducted = True
+            self._turn_to(*newest)
         elif self.conducted and (leads or now_s - self._heard_s > self._patience_s):
             self.conducted = False
             self._pass_to(own)
@@ -113,6 +113,17 @@ class Follower:
         self._show(self._sent if self.conducted else own, dt, out)
         header = self.header
         return 0 if not self.conducted or header is None or not header.stamp_ns else header.stamp_ns - self.offset_ns
+
+    def _turn_to(self, header: Header, face: Floats) -> None:
+        """Show a face from now on, or go on to it."""
+        before, self.header, self._sent = self.header, header, face
+        if before is None or before.token != header.token or not self.conducted:
+            self._pass_to(face, first=not self._begun)
+            self.conducted = True
+            return
+        self._passed_s = 1e-9 * (header.time_ns - before.time_ns)
+        if _is_far(before, header):
+            self._catch_up()
 
     def _due(self, now_ns: int) -> tuple[Header, Floats] | None:
         """The newest face that is to be shown by now."""
@@ -127,19 +138,24 @@ class Follower:
     def _catch_up(self) -> None:
         """Go on within the limits to what a conductor sent after a gap."""
         if self.exact:
-            self.exact, self._whole_s, self._blend_before = False, 0.0, self._sent.copy()
+            self._leave()
+            self._gap[:], self._whole_s = 0.0, 0.0
+            self.exact = False
+        self._way.follow(self._sent + self._left() * self._gap)
 
     def _pass_to(self, source: Floats, *, first: bool = False) -> None:
         """Begin to pass to another source: the gap to it closes along a minimum-jerk curve."""
         self._gap = np.zeros_like(source) if first else self._shown - source
         if first:
             self._shown[:] = source
+        elif self.exact:
+            self._leave()
         size = np.abs(self._gap)
         speed = _PEAK_SPEED * size / (_SHARE * self._p.max_speed)
         acceleration = np.sqrt(_PEAK_ACCELERATION * size / (_SHARE * self._p.max_acceleration))
         self._whole_s = 0.0 if first else max(_SHORTEST_S, float(speed.max()), float(acceleration.max()))
-        self._passed_s = 0.0
-        self._blend_before = source + self._gap
+        self._blended_s = 0.0
+        self._way.follow(source + self._gap)
         self.exact = first
 
     def _show(self, source: Floats, dt: float, out: Floats) -> None:
@@ -147,22 +163,27 @@ class Follower:
             self._approach(source, dt, out)
         if self.exact:
             out[:] = source
-            self._before, self._last_s, self._led = self._shown, dt, True
+            self._before, self._last_s = self._shown, self._passed_s or dt
         self._shown = out.copy()
 
+    def _leave(self) -> None:
+        """What was shown last was exactly a source's: go on from there, as fast as it moved."""
+        speed = (self._shown - self._before) / self._last_s if self._last_s > 0.0 else np.zeros_like(self._shown)
+        self._way.begin(self._shown, speed, self._last_s, self._shown)
+
+    def _left(self) -> float:
+        """How much of the gap is still to be closed, 1 to 0."""
+        return 1.0 - minimum_jerk(self._blended_s / self._whole_s) if self._whole_s > 0.0 else 0.0
+
     def _approach(self, source: Floats, dt: float, out: Floats) -> None:
-        """Follow the blend of both sources within the limits; led by its speed, so that nothing lags behind."""
-        if self._led:  # what was shown last was exactly a source's: go on from there, as fast as it moved
-            self._led = False
-            moved = self._shown - self._before
-            self._limiter.reset_moving(
-                self._shown, moved / self._last_s if self._last_s > 0.0 else np.zeros_like(moved)
-            )
-        self._passed_s += dt
-        left = 1.0 - minimum_jerk(self._passed_s / self._whole_s) if self._whole_s > 0.0 else 0.0
-        blend = source + left * self._gap
-        speed = (blend - self._blend_before) / dt if dt > 0.0 else np.zeros_like(blend)
-        self._blend_before = blend
-        self._limiter.step(dt, blend + speed * self._p.response_s, out)
-        if left == 0.0 and float(np.abs(out - source).max()) < _NEAR:
-            self.exact = True
+        """Follow the blend of both sources within the limits, until every parameter has met its end."""
+        self._blended_s += dt
+        left = self._left()
+        self._way.step(dt, source + left * self._gap, out, stay=left == 0.0, passed_s=self._passed_s or dt)
+        self.exact = left == 0.0 and bool(self._way.met.all())
+
+
+def _is_far(before: Header, after: Header) -> bool:
+    """Whether a face is too far from the one shown before to be shown at once."""
+    passed = after.time_ns - before.time_ns
+    return passed > (_GAP_NS if after.sequence - before.sequence > 1 else _STEP_NS)

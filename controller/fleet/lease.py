@@ -28,7 +28,8 @@ class Lease:
     holder : its own number, different from every other's, below 2^63.
     lease_s : a conductor that is not heard for so long has lost its lease.
     wait_s : what this one waits longer before it takes over; different for each, so that rarely two do.
-    now_s : the time, s, of any clock that does not jump.
+    now_s : the time, s, of any clock that does not jump. first_s : what it waits longer at first, so that one that has
+        just started, and knows nothing of what was commanded, replaces nobody whom it has not heard yet.
 
     Attributes
     ----------
@@ -36,11 +37,11 @@ class Lease:
     highest : the highest token seen. terms : how often it began to conduct. lost : how often it stopped.
     """
 
-    def __init__(self, holder: int, lease_s: float, wait_s: float, now_s: float) -> None:
+    def __init__(self, holder: int, lease_s: float, wait_s: float, now_s: float, first_s: float = 0.0) -> None:
         self.holder, self._lease_s, self._wait_s = holder, lease_s, wait_s
         self.active, self.token, self.highest = False, NOBODY, NOBODY
         self.terms = self.lost = 0
-        self._heard_s = self._ticked_s = now_s
+        self._heard_s, self._ticked_s = now_s + first_s, now_s
 
     def hear(self, token: Token, now_s: float, *, alive: bool = True) -> None:
         """Take note of a token: of a conductor that is ``alive``, or one that a head has obeyed."""
@@ -57,7 +58,7 @@ class Lease:
         """Whether this one conducts now. After a pause longer than the lease it does not: it listens first."""
         if now_s - self._ticked_s > self._lease_s:
             self._step_down(now_s)
-            self._heard_s = now_s
+            self._heard_s = max(self._heard_s, now_s)
         self._ticked_s = now_s
         if not self.active and now_s - self._heard_s > self._lease_s + self._wait_s:
             self.token = self.highest = Token(self.highest.fence + 1, self.holder)

@@ -1,7 +1,7 @@
 """Sends faces: each by itself, and all of a tick together to processes that hear many.
 
-Where there are many heads, nothing is sent that nobody listens to; of a few heads each face is sent in any case, as
-Zenoh may take a while to say that somebody listens.
+Where there are many heads, nothing is sent that nobody is known to listen to. But Zenoh may take a while to say that
+somebody listens: so who begins to conduct sends every face both ways at first, and faces of a few heads in any case.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 FEW = 3
 """So many heads, or fewer, are sent whether or not somebody is known to listen."""
+FIRST_S = 3.0
+"""So long after it has begun to conduct, a process sends everything whether or not somebody is known to listen."""
 Heading = Callable[[int, int, int], Header]
 """Makes a header of a sequence, a time and a stamp (ns)."""
 
@@ -36,16 +38,22 @@ class FaceSender:
         self._batches, self._gathering = Batches(payloads), Gathering(len(outlets))
         self.sequences = dict.fromkeys(outlets, 0)
         self.sent = 0
+        self._all_until_ns = 0
+
+    def begin(self, now_ns: int) -> None:
+        """Begin to conduct: for some time everything is sent."""
+        self._all_until_ns = now_ns + round(FIRST_S * 1e9)
 
     def send(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
         """Send what one head shows, mixed at ``now_ns``; ``values`` : (P,)."""
         self.sequences[head] += 1
         self.sent += 1
         sequence, data, outlet = self.sequences[head], self._payloads.encode(values), self._outlets[head]
-        if len(self._outlets) <= FEW or is_heard(outlet):
+        all_ways = now_ns < self._all_until_ns
+        if all_ways or len(self._outlets) <= FEW or is_heard(outlet):
             header = self._heading(sequence, now_ns, stamp_ns).encode()
             outlet.put(data, encoding=self._payloads.encoding, attachment=header)
-        if is_heard(self._together):
+        if all_ways or is_heard(self._together):
             self._send(*self._gathering.begin(now_ns))
             if self._gathering.add(head, sequence, stamp_ns, data):
                 self._send(now_ns, self._gathering.take())

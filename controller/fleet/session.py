@@ -16,6 +16,10 @@ if TYPE_CHECKING:
 
 _CONNECT_MS = 20_000
 """A client waits so long for its router; afterwards whoever started it hears what is missing."""
+_RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
+"""Between two tries to reach a router that has gone; Zenoh's own would grow to 4 s."""
+_OPEN_MS = 2_000
+"""So long a router may take to greet; Zenoh's own 10 s are lost on one that takes a connection while it ends."""
 _NO_ROUTER_HINT = "start a router there, as zenohd -l tcp/0.0.0.0:7447, or correct [zenoh] connect"
 
 
@@ -55,11 +59,12 @@ def _entries(settings: ZenohSettings, folder: Path) -> dict[str, object]:
         "scouting/gossip/autoconnect": {"router": [], "peer": []},
         "transport/shared_memory/enabled": settings.shared_memory,
         "timestamping/enabled": False,
+        "transport/unicast/open_timeout": _OPEN_MS,
     }
     if settings.connect or settings.listen:
         found |= {"connect/endpoints": settings.connect, "listen/endpoints": settings.listen}
     if settings.connect:
-        found |= {"connect/timeout_ms": _CONNECT_MS, "connect/exit_on_failure": False}
+        found |= {"connect/timeout_ms": _CONNECT_MS, "connect/exit_on_failure": False, "connect/retry": _RETRY}
     return found | (_tls(settings.tls, folder) if settings.tls is not None else {})
 
 

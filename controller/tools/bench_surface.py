@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from controller.base.parameters import Floats
+from controller.base.parameters import PARAMETERS, Floats
 from controller.base.paths import find_config
+from controller.layers.commands import CommandState
 from surface.base.progress import Progress
 from surface.bench import cold, growth
 from surface.bench.bench import Measure, build_table, large_table, least, least_of, measure, sheet, speed_table
@@ -175,15 +176,32 @@ def bench_crowd(name: str, count: int, seconds: float, log: Log) -> Tables:
     poses = np.random.default_rng(1).uniform(0, 0.5, (_POSES, count, len(alone.parameters)))
     each = cycle(poses)
     log(f"{count} heads")
-    one, together = least_of([poser(alone, poses[:, 0]), lambda: crowd.pose(next(each))], seconds)
+    moves = [poser(alone, poses[:, 0]), lambda: crowd.pose(next(each)), mover(count)]
+    one, together, mixed = least_of(moves, seconds)
     share = together / count
     arrays = sum(part.vertices.nbytes + part.normals.nbytes for part in alone.parts)
     rows = [
         Measure("one head alone, every parameter changed", one),
         Measure("a head of the crowd, every parameter changed", share, share / one, "one alone"),
+        Measure("its tick: layers, idle motion, limits", mixed / count, mixed / together, "posing it"),
         Measure("memory of a further head", 0.0, crowd.nbytes / count / arrays, "its vertices and normals", "<= 3"),
     ]
     return [(f"{count} heads like {alone.name}, {arrays / 1e6:.1f} MB of vertices and normals each", rows)]
+
+
+def mover(count: int) -> Callable[[], object]:
+    """A call that ticks the layers of ``count`` heads, each with an idle motion of its own, 10 ms later each time."""
+    states = [CommandState(PARAMETERS, seed=seed) for seed in range(count)]
+    for state in states:
+        state.live(1.0, 0)
+    shown, times = PARAMETERS.neutral(), iter(range(10**9, 10**15, 10**7))
+
+    def move() -> None:
+        now_ns = next(times)
+        for state in states:
+            state.tick(now_ns, 0.01, shown)
+
+    return move
 
 
 def poser(head: Head, poses: Floats) -> Callable[[], object]:

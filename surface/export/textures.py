@@ -71,11 +71,27 @@ def eye_column(part: ExportPart) -> Picture:
     return np.repeat(np.rint(255 * column).astype(np.uint8)[:, None], 4, axis=1)
 
 
-def eye_picture(part: ExportPart, size: int = 256) -> Picture:
-    """(size, size, 3) an eye looked at from the front, as far as :data:`EYE_RIM`; fibres run out from the pupil."""
+def eye_rings(part: ExportPart) -> list[tuple[str, float, float, Floats]]:
+    """Pupil, iris and white of an eye part, where a mesh has one colour.
+
+    Of each the name, from and to which distance from the eye's axis it reaches, in the eye's radii, and linear RGB.
+    """
+    iris, sclera, radius = _eye_colours(part)
+    pupil = _PUPIL * radius
+    rings = [("pupil", 0.0, pupil, np.full(3, 0.01)), ("iris", pupil, radius, iris), ("sclera", radius, np.inf, sclera)]
+    return [(name, low, high, np.clip(colour, 0.0, 1.0)) for name, low, high, colour in rings]
+
+
+def _eye_colours(part: ExportPart) -> tuple[Floats, Floats, float]:
+    """Linear RGB of iris and white, and the radius of the iris in those of the eyeball."""
     plain = materials()["eye_colours"]
     iris, sclera = (np.asarray(part.painted.get(name, plain[name]), float) for name in ("iris", "sclera"))
-    radius = float(np.ravel(part.painted.get("iris_radius", plain["iris_radius"]))[0])
+    return iris, sclera, float(np.ravel(part.painted.get("iris_radius", plain["iris_radius"]))[0])
+
+
+def eye_picture(part: ExportPart, size: int = 256) -> Picture:
+    """(size, size, 3) an eye looked at from the front, as far as :data:`EYE_RIM`; fibres run out from the pupil."""
+    iris, sclera, radius = _eye_colours(part)
     y, x = (((np.arange(size) + 0.5) / size - 0.5) / EYE_RIM for _ in range(2))
     r, angle = np.hypot(y[:, None], x[None]), np.arctan2(y[:, None], x[None])
     q = r / radius

@@ -2,7 +2,9 @@
 
 Axes are those of ROS (REP 103): x forward, y left, z up, metres; joints turn about them by the right-hand rule, so that
 yaw is positive to the head's own left and pitch downwards. The joints are called as the parameters, and the link
-``NAME`` is what the joint of that name carries. What bends is cut: skin belongs to the link that moves it most.
+``NAME`` is what the joint of that name carries. What bends is cut: skin belongs to the link that moves it most. A URDF
+has one colour for a mesh, so iris and pupil are meshes of their own; many viewers draw only the front of a triangle, so
+strips of hair, which are seen from both sides, have both.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +20,7 @@ import numpy as np
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.export.exporter import Exporter
 from surface.export.shapes import ExportPart, export_parts, unit
-from surface.export.textures import materials
+from surface.export.textures import eye_rings, materials
 from surface.head import Head
 from surface.head.model.joints import BASE, JAW, ROS_AXES, SKULL, Joint, JointLimit, joints_of
 from surface.head.posing.part import HeadPart
@@ -29,8 +32,31 @@ _STL_HEADER = b"written by omote; metres, x forward, y left, z up".ljust(80)
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
 
 
-Piece = tuple[str, ExportPart, Ints]
-"""A link, a part, and the triangles (t, 3) of the part that belong to the link."""
+_STRIPS = ("brow", "lash", "hair")
+"""Materials of what is seen from both sides."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What a link carries: the triangles (t, 3) of a part that have one colour, RGB from 0 to 1."""
+
+    link: str
+    name: str
+    part: ExportPart
+    triangles: Ints
+    material: str
+    colour: Floats
+
+    @property
+    def file(self) -> str:
+        """The name of its mesh."""
+        return f"{self.link}-{self.name}.stl"
+
+    def corners(self) -> Floats32:
+        """(t, 3, 3) mm."""
+        both = [self.triangles, self.triangles[:, ::-1]] if self.part.material in _STRIPS else [self.triangles]
+        found: Floats32 = self.part.vertices[np.concatenate(both)]
+        return found
 
 
 def write_urdf(
@@ -50,12 +76,10 @@ def write_urdf(
         folder.mkdir(exist_ok=True)
         (made / path.name).write_text(_document(head.name, joints, pieces, folder.name), encoding="utf-8")
         origins = {BASE: np.zeros(3)} | {joint.name: joint.origin for joint in joints}
-        names = []
-        for link, part, triangles in pieces:
-            names.append(f"{link}-{part.name}.stl")
-            corners = (part.vertices[triangles] - origins[link]) @ ROS_AXES.T * 1e-3
-            (made / names[-1]).write_bytes(_stl(corners.astype(np.float32)))
-        meshes = [(made / name).replace(folder / name) for name in names]
+        for piece in pieces:
+            corners = (piece.corners() - origins[piece.link]) @ ROS_AXES.T * 1e-3
+            (made / piece.file).write_bytes(_stl(corners.astype(np.float32)))
+        meshes = [(made / piece.file).replace(folder / piece.file) for piece in pieces]
         return [(made / path.name).replace(path), *meshes]
 
 
@@ -68,9 +92,30 @@ def _pieces(head: Head, pose: Mapping[str, float]) -> list[Piece]:
         carrier = _carriers(head, own, part.vertices, wide)
         of_triangle = np.sort(carrier[part.triangles], axis=1)[:, 1]  # as two of its corners or the middle one
         for number in np.unique(of_triangle).tolist():
-            found.append((links[number], part, part.triangles[of_triangle == number]))
+            found += _coloured(links[number], part, part.triangles[of_triangle == number])
     head.pose(head.values({}))
     return found
+
+
+def _coloured(link: str, part: ExportPart, triangles: Ints) -> list[Piece]:
+    """A piece of each colour: one, but for an eyeball."""
+    if part.material != "eye":
+        colour = np.asarray(materials().get(part.material, materials()["skin"])["colour"], float)
+        return [Piece(link, part.name, part, triangles, part.material, colour)]
+    found, distance = [], _off_axis(part, triangles)
+    for name, low, high, colour in eye_rings(part):
+        inside = (distance >= low) & (distance < high)
+        if inside.any():
+            own = part.name if name == "sclera" else f"{part.name}_{name}"
+            found.append(Piece(link, own, part, triangles[inside], f"{part.name}_{name}", colour))
+    return found
+
+
+def _off_axis(part: ExportPart, triangles: Ints) -> Floats:
+    """(t,) how far the middles of triangles of an eyeball are from its axis, in its radii; 2 on its back."""
+    away = part.vertices[triangles].astype(float).mean(axis=1) - part.pivot
+    distance: Floats = np.hypot(away[:, 0], away[:, 1]) / np.linalg.norm(away, axis=1)
+    return np.where(away[:, 2] > 0.0, distance, 2.0)
 
 
 def _posed(head: Head, pose: Mapping[str, float]) -> tuple[HeadPart, ...]:
@@ -102,16 +147,14 @@ def _swing(head: Head, points: Floats32) -> Floats:
 
 def _document(name: str, joints: list[Joint], pieces: list[Piece], folder: str) -> str:
     robot = ET.Element("robot", name=name)
-    parts = dict.fromkeys(part.material for _, part, _ in pieces)
-    for material in parts:
-        colour = materials().get(material, materials()["skin"])["colour"]
+    for material, colour in {piece.material: piece.colour for piece in pieces}.items():
         rgba = " ".join(f"{c ** (1 / 2.2):.4f}" for c in colour) + " 1"
         ET.SubElement(ET.SubElement(robot, "material", name=material), "color", rgba=rgba)
     for link in (BASE, *(joint.name for joint in joints)):
         element = ET.SubElement(robot, "link", name=link)
-        for carrier, part, _ in pieces:
-            if carrier == link:
-                _add_mesh(element, f"{folder}/{link}-{part.name}.stl", part.material)
+        for piece in pieces:
+            if piece.link == link:
+                _add_mesh(element, f"{folder}/{piece.file}", piece.material)
     origins = {BASE: np.zeros(3)} | {joint.name: joint.origin for joint in joints}
     for joint in joints:
         _add_joint(robot, joint, origins[joint.parent])

@@ -49,6 +49,30 @@ def test_a_step_is_the_time_between_two_deadlines_also_where_some_were_skipped()
     assert steps == pytest.approx([0.01, 0.01, 0.04])
 
 
+@pytest.mark.parametrize("off_ns", [4_000_000, -4_000_000, 123_456_789_000])
+def test_ticks_come_to_where_they_are_aligned_in_steps_that_stay_even(off_ns: int) -> None:
+    time = Time()
+    clock, began = Clock(100.0, now_ns=time.now, sleep_s=time.sleep), list[int]()
+    for now in clock.run(lambda: len(began) < 60):
+        began.append(now)
+        clock.align(1_000 + off_ns)
+    left = (began[-1] - 1_000 - off_ns + 5_000_000) % 10_000_000 - 5_000_000
+    assert abs(left) < 10_000
+    steps = np.diff(began)
+    assert steps.min() >= 9_500_000 and steps.max() <= 10_500_000
+    assert clock.step_s == pytest.approx(steps[-1] * 1e-9)
+
+
+def test_a_clock_that_is_no_longer_aligned_keeps_its_grid() -> None:
+    time = Time()
+    clock, began = Clock(100.0, now_ns=time.now, sleep_s=time.sleep), list[int]()
+    for now in clock.run(lambda: len(began) < 10):
+        began.append(now)
+        if len(began) == 1:
+            clock.align(now + 2_000_000)
+    assert np.diff(began).tolist() == [10_500_000, *[10_000_000] * 8]
+
+
 def test_a_late_tick_skips_deadlines_and_does_not_hurry() -> None:
     time = Time()
     clock = Clock(100.0, now_ns=time.now, sleep_s=time.sleep)

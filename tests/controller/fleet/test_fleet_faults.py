@@ -14,26 +14,29 @@ from controller.base.parameters import PARAMETERS as P
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
 from fleet_faults import (
-    HEADS,
     IN_STEP_S,
+    PLACES,
     RECORD,
+    Sent,
+    judged_events,
     lives,
     mark_spreads,
     out_of_step,
     over_limits,
-    sent_at,
     steps_back,
+    why_late,
 )
 
 TICK_S = 0.01
 JAW = P.index("jawOpen")
 
 
-def rows_of(head: int, values: np.ndarray, *, fence: int = 1, begin: int = 1) -> np.ndarray:
+def rows_of(place: int, values: np.ndarray, *, fence: int = 1, begin: int = 1) -> np.ndarray:
     """Ticks of one head that shows a conductor's faces, whose jaw is open by ``values`` : (k,)."""
     rows = np.zeros(len(values), RECORD)
     numbers = begin + np.arange(len(values))
-    rows["head"], rows["conducted"], rows["exact"], rows["fence"] = head, True, True, fence
+    rows["place"], rows["head"] = place, place
+    rows["conducted"], rows["exact"], rows["fence"] = True, True, fence
     rows["sequence"], rows["mixed_ns"] = numbers, 10_000_000 * numbers
     rows["shown_ns"], rows["passed_s"] = 10_000_000 * numbers + 80_000_000, TICK_S * numbers
     rows["values"][:, JAW] = values
@@ -54,11 +57,11 @@ def ramp(speed: float, count: int = 60) -> np.ndarray:
 
 def test_motion_at_its_limits_is_no_fault_and_beyond_them_it_is() -> None:
     at_limit = rows_of(0, ramp(0.99 * P.max_speed[JAW], 80))
-    speed, _ = over_limits(at_limit, sent_at(sent_of(at_limit)))
+    speed, _ = over_limits(at_limit, Sent(sent_of(at_limit)))
     assert 0.9 < speed < 1.0
     over = at_limit.copy()
     over["values"][45:, JAW] += 0.2
-    speed, acceleration = over_limits(over, sent_at(sent_of(over)))
+    speed, acceleration = over_limits(over, Sent(sent_of(over)))
     assert speed > 1.05 and acceleration > 1.05
 
 
@@ -66,8 +69,22 @@ def test_a_face_that_was_lost_counts_by_the_time_of_its_conductor() -> None:
     whole = rows_of(0, ramp(0.9 * P.max_speed[JAW]))
     missed = np.delete(whole, [30, 31])  # what is shown next has moved for three ticks, in one
     missed["passed_s"] = TICK_S * np.arange(len(missed))
-    speed, _ = over_limits(missed, sent_at(sent_of(whole)))
+    speed, _ = over_limits(missed, Sent(sent_of(whole)))
     assert speed < 1.0
+
+
+def test_what_is_exactly_a_conductors_counts_by_its_time_and_all_else_by_ones_own() -> None:
+    """Of a head that joins: the jaw is met and shows two faces in one tick, the brow is still on its way."""
+    brow = P.index("browInnerUp")
+    whole = rows_of(0, ramp(0.9 * P.max_speed[JAW]))
+    joins = np.delete(whole, [30])
+    joins["passed_s"], joins["exact"] = TICK_S * np.arange(len(joins)), False
+    joins["values"][:, brow] = ramp(0.9 * P.max_speed[brow])[: len(joins)]
+    speed, acceleration = over_limits(joins, Sent(sent_of(whole)))
+    assert speed < 1.0 and acceleration < 1.05
+    joins["values"][40:, brow] += 0.3
+    speed, _ = over_limits(joins, Sent(sent_of(whole)))
+    assert speed > 1.05
 
 
 def test_a_start_cuts_the_life_of_a_head() -> None:
@@ -78,6 +95,8 @@ def test_a_start_cuts_the_life_of_a_head() -> None:
 def test_who_obeys_a_replaced_conductor_again_is_found() -> None:
     first, second, again = (rows_of(0, np.zeros(5), fence=k, begin=b) for k, b in ((1, 1), (2, 6), (1, 11)))
     assert steps_back(np.concatenate([first, second]), 0) == 0
+    assert steps_back(np.concatenate([first, second, again]), 0) == 1
+    again["fence"], again["holder"], second["holder"] = 2, 3, 4  # as high a number, of another one
     assert steps_back(np.concatenate([first, second, again]), 0) == 1
 
 
@@ -94,8 +113,30 @@ def test_who_does_not_join_the_newest_conductor_in_time_is_found() -> None:
 
 
 def test_the_spread_of_a_face_is_from_the_first_head_to_the_last() -> None:
-    rows = np.concatenate([rows_of(head, np.zeros(10)) for head in range(len(HEADS))])
+    rows = np.concatenate([rows_of(place, np.zeros(10)) for place in range(len(PLACES))])
     assert mark_spreads(rows).max() == 0.0
-    rows["shown_ns"][rows["head"] == 2] += 3_000_000
+    rows["shown_ns"][rows["place"] == 2] += 3_000_000
     np.testing.assert_allclose(mark_spreads(rows), 3.0)
-    assert not len(mark_spreads(rows[rows["head"] != 1]))
+    assert not len(mark_spreads(rows[rows["place"] != 1]))
+
+
+def test_what_a_late_head_waited_for_is_said() -> None:
+    blends = rows_of(2, np.zeros(300), fence=2)
+    blends["exact"] = False
+    blends["exact"][250:] = True
+    blends["fence"][:30] = 1
+    blends["shown_ns"][100:] += 90_000_000
+    process, head = PLACES[2]
+    assert why_late(blends, 80_000_000, 2) == (
+        f"{head} in {process}: a face of the newest conductor after 0.31 s, exactly that after 2.60 s; "
+        "its longest tick 100 ms"
+    )
+    never = "a face of the newest conductor after 0.01 s, exactly that after more than 4 s"
+    assert never in why_late(blends[30:200], 380_000_000, 2)
+
+
+def test_only_events_are_judged_that_leave_time_to_join_and_a_router() -> None:
+    seconds = 10**9
+    events = [(0, "kill one"), (seconds, "start one"), (4 * seconds, "kill router"), (7 * seconds, "start router")]
+    assert judged_events(events, 10 * seconds) == [events[1], events[3]]
+    assert judged_events(events, 8 * seconds) == [events[1]]

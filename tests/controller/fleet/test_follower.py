@@ -182,3 +182,40 @@ def test_a_head_that_looks_the_other_way_has_joined_after_two_seconds() -> None:
         rows.append(out)
     assert follower.exact and rows[-1][yaw] == 1.0
     check_limits(np.array(rows))
+
+
+@pytest.mark.parametrize("lost_ms", [60, 300])
+def test_a_face_that_moves_all_the_time_is_shown_exactly_again_soon_after_every_gap(lost_ms: int) -> None:
+    """A filter that lags would have to wait until nothing accelerates any more: 2.3 s, and on a busy machine longer."""
+    rng, follower, faces = np.random.default_rng(7), Follower(P), Faces(1, FIRST)
+    now_ns, waits, out = 10**9, [], P.neutral()
+    for gap in range(41):
+        for k in range(int(rng.integers(90, 150))):
+            now_ns += STEP_NS
+            follower.take(*faces.next(now_ns))
+            follower.step(now_ns, DT, P.neutral(), out)
+            if gap and follower.exact and len(waits) < gap:
+                waits.append(k * DT)
+        assert len(waits) == gap or not gap
+        for _ in range(lost_ms // 10):
+            now_ns += STEP_NS
+            faces.next(now_ns)
+            follower.step(now_ns, DT, P.neutral(), out)
+    assert max(waits) < 0.8
+
+
+def test_a_slow_conductor_is_followed_exactly_and_after_a_lost_face_within_the_limits() -> None:
+    follower, faces, slow = Follower(P), Faces(1, FIRST), 8
+    own, out, exact, rows = P.neutral(), P.neutral(), list[bool](), list[np.ndarray]()
+    for k in range(8, 400):
+        if k % slow == 0:
+            header, values = faces.next(k * STEP_NS)
+            if k != 240:
+                follower.take(header, values)
+        follower.step(k * STEP_NS, DT, own, out)
+        exact.append(follower.exact and follower.conducted)
+        rows.append(out.copy())
+    lost = 248 - 8
+    assert all(exact[:lost]) and not exact[lost] and exact[-1]
+    steps = np.abs(np.diff(np.array(rows), axis=0)) / (P.max_speed * DT)
+    assert steps[lost - 1 : exact.index(True, lost)].max() < 1.001

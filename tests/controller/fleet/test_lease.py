@@ -36,6 +36,19 @@ def test_one_conducts_and_another_follows_within_half_a_second() -> None:
     assert now - died_s < 0.5 and second.token > first.token
 
 
+def test_one_that_has_just_started_waits_longer_also_after_a_pause() -> None:
+    for pause_s in (0.0, 0.5):
+        lease = Lease(3, 0.2, 0.02, 10.0, first_s=1.0)
+        times = [10.0 + pause_s + 0.01 * k for k in range(1, 200)]
+        begins = next(at for at in times if lease.tick(at))
+        assert 11.2 < begins < 11.25
+    heard = Lease(3, 0.2, 0.02, 10.0, first_s=1.0)
+    heard.hear(Token(1, 9), 11.5)
+    assert not any(heard.tick(11.0 + 0.01 * k) for k in range(70)) and any(
+        heard.tick(11.7 + 0.01 * k) for k in range(5)
+    )
+
+
 def test_one_that_was_stopped_and_continues_steps_down_before_it_says_anything() -> None:
     first, second = leases = conductors(0.0, 0.03)
     now = run(leases, run(leases, 0.0, 1.0), 1.0, asleep=first)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,12 +16,16 @@ zenoh = pytest.importorskip("zenoh", reason="pip install 'omote[zenoh]'")
 
 from controller.base.errors import LinkError  # noqa: E402
 from controller.base.parameters import PARAMETERS as P  # noqa: E402
+from controller.fleet import journal  # noqa: E402
 from controller.fleet.lease import Token  # noqa: E402
 from controller.fleet.payload import Header, Payloads  # noqa: E402
+from controller.fleet.wire import header_of  # noqa: E402
+from controller.layers.commands import CommandState  # noqa: E402
 from controller.takes.reader import load_take  # noqa: E402
-from tests.controller.fleet.nodes import Running, free_port, router, until  # noqa: E402
+from tests.controller.fleet.nodes import Running, free_port, joined, router, until  # noqa: E402
 
 JAW = P.index("jawOpen")
+MANY = ("a", "b", "c", "d", "e")
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +87,34 @@ def test_heads_show_bit_for_bit_what_is_conducted_and_say_so(hub: str, tmp_path:
     assert take.values[:, JAW].max() > 0.85 and take.duration_s > 0.5
 
 
+@pytest.mark.slow
+def test_a_stage_split_over_processes_moves_as_in_one(hub: str, tmp_path: Path) -> None:
+    """What the head shows is, bit for bit, what the layers alone make of the same commands at the same times."""
+    calls, more = list[tuple[str, tuple[Any, ...]]](), {"folder": tmp_path, "prefix": "split"}
+    with (
+        Running(hub, "conductor", journal=lambda name, *given: calls.append((name, given)), **more) as conductor,
+        Running(hub, "head", seed=50, **more) as head,
+    ):
+        until(joined(head))
+        begin, state = len(head.rows["maple"]), conductor.states["maple"]
+        state.expression("surprise", 0.8, None, time.monotonic_ns())
+        state.set_parameters([JAW], [0.4], time.monotonic_ns())
+        until(lambda: sum(head.exact["maple"][begin:]) > 100)
+        conductor.paused.set()
+        until(lambda: head.node.followers["maple"].conducted is False)
+    alone, made = CommandState(P, seed=1), set[bytes]()
+    for name, given in calls:
+        if name == "tick":
+            out = P.neutral()
+            alone.tick(*given[:2], out)
+            made.add(out.tobytes())
+        else:
+            getattr(alone, name)(*given)
+    exact = zip(head.rows["maple"][begin:], head.exact["maple"][begin:], strict=False)
+    shown = {row.tobytes() for row, own in exact if own}
+    assert len(shown) > 20 and shown <= made
+
+
 def test_the_parts_of_a_stage_are_alive_as_tokens(hub: str, tmp_path: Path) -> None:
     with Running(hub, "head", folder=tmp_path, prefix="tokens"), client(hub) as session:
         found = [str(reply.ok.key_expr) for reply in session.liveliness().get("tokens/**") if reply.ok]
@@ -135,7 +169,8 @@ def test_a_conductor_that_dies_or_is_stopped_is_replaced_and_nobody_obeys_it_aga
         until(lambda: first.node.lease.active)
         first.states["maple"].set_parameters([JAW], [0.7], time.monotonic_ns())
         with Running(hub, "conductor", seed=9, **more) as second, Running(hub, "head", seed=5, **more) as head:
-            until(lambda: head.node.followers["maple"].exact and JAW in second.states["maple"].held())
+            until(joined(head))
+            until(lambda: JAW in second.states["maple"].held())
             assert not second.node.lease.active  # it stands by, and knows what was commanded before it came
             first.states["maple"].expression("anger", 1.0, None, time.monotonic_ns())
             until(lambda: second.states["maple"].status()["expression"] == "anger")
@@ -143,15 +178,47 @@ def test_a_conductor_that_dies_or_is_stopped_is_replaced_and_nobody_obeys_it_aga
             first.paused.set()
             until(lambda: second.node.lease.active and head.node.followers["maple"].highest.holder
                   == second.node.lease.holder)  # fmt: skip
-            assert time.monotonic() - stopped < 0.5 + 0.3  # of a busy machine
+            assert time.monotonic() - stopped < 0.5 + 3.0 * slowest(second, head)
             taken = head.node.followers["maple"].taken
             first.paused.clear()
             until(lambda: head.node.followers["maple"].taken > taken + 100)
-            assert not first.node.lease.active and second.node.lease.active
-            assert first.node.followers["maple"].conducted
+            until(lambda: [first.node.lease.active, second.node.lease.active].count(True) == 1)
             steps = np.abs(np.diff(np.array(head.rows["maple"][begin:]), axis=0)) / (P.max_speed * 0.01)
-            assert steps.max() < 4.0  # of one tick; none is a jump, ticks of a busy machine differ
+            assert steps.max() < 4.0 + 100.0 * slowest(
+                head
+            )  # of one tick; none is a jump, ticks of a busy machine differ
             assert head.rows["maple"][-1][JAW] > 0.6
+
+
+def test_one_that_stands_by_asks_what_was_commanded_until_it_is_answered(hub: str, tmp_path: Path) -> None:
+    """An answer may be lost, and one that crossed a command may not have it."""
+    commanded = {"held": {"jawOpen": 0.6}, "expression": ["anger", 1.0], "gaze": None, "life": [0.0, "auto"]}
+    asked, conductor, key = list[int](), Token(5, 3), "asks/maple"
+    with client(hub) as session:
+
+        def answer(query: zenoh.Query) -> None:
+            asked.append(1)
+            if len(asked) == 2:
+                event = journal.encode("set_parameters", ([P.index("tongueOut")], [0.5]))
+                session.put(f"{key}/events", event or b"", attachment=Header(conductor, 1, 1).encode())
+                until(lambda: P.index("tongueOut") in standby.states["maple"].held())
+            if len(asked) > 1:
+                values = {"held": {"jawOpen": 0.1}} if len(asked) == 2 else {}
+                query.reply(f"{key}/state", json.dumps({"conducting": True, "commanded": {**commanded, **values}}))
+
+        queryable = session.declare_queryable(f"{key}/state", answer)
+        with Running(hub, "conductor", folder=tmp_path, prefix="asks", lease_ms=10_000) as standby:
+            until(lambda: session.put("asks/_/lease", b"", attachment=Header(conductor, 1, 1).encode())
+                  or standby.node.lease.highest == conductor)  # fmt: skip
+            until(lambda: standby.states["maple"].held().get(JAW) == 0.6)
+            assert not standby.node.lease.active and standby.states["maple"].status()["expression"] == "anger"
+            assert len(asked) >= 3
+        queryable.undeclare()
+
+
+def slowest(*nodes: Running) -> float:
+    """The longest time (s) between two of the last ticks: how busy the machine is."""
+    return 1e-9 * max(int(np.diff(node.times[-200:]).max()) for node in nodes)
 
 
 @pytest.mark.slow
@@ -160,15 +227,16 @@ def test_layers_rest_while_another_process_decides_and_who_stands_by_keeps_up(hu
     with Running(hub, "conductor", **more) as first:
         until(lambda: first.node.lease.active)
         with Running(hub, "conductor", seed=9, **more) as second, Running(hub, "head", seed=5, **more) as head:
-            nodes = (first, second, head)
-            until(lambda: all(f.exact and f.conducted for n in (second, head) for f in n.node.followers.values()))
-            before = [(len(n.rows[name]), n.mixed[name]) for n in nodes for name in n.rows]
-            until(lambda: len(head.rows["maple"]) > before[4][0] + 200)
-            after = [(len(n.rows[name]), n.mixed[name]) for n in nodes for name in n.rows]
-            shares = [(b[1] - a[1]) / (b[0] - a[0]) for a, b in zip(before, after, strict=True)]
-    assert min(shares[:2]) > 0.97, shares  # it conducts
-    assert max(shares[2:4]) < 0.6 and min(shares[2:4]) > 0.15, shares  # a fifth, and after gaps on a busy machine more
-    assert max(shares[4:]) < 0.5, shares
+            until(lambda: all(len(mixed_of(node, follows=True)) > 60 for node in (second, head)))
+    assert all(all(mixed_of(node, follows=False)) for node in (first, second, head))
+    assert not any(mixed_of(head, follows=True))
+    standby = mixed_of(second, follows=True)
+    assert sum(standby) == pytest.approx(len(standby) / 5, abs=3)  # every fifth tick of each head
+
+
+def mixed_of(node: Running, *, follows: bool) -> list[bool]:
+    """Of the ticks at which heads showed exactly what a conductor sent, or of the others, whether layers ticked."""
+    return [mixed for name in node.mixed for following, mixed in node.mixed[name] if following is follows]
 
 
 @pytest.mark.slow
@@ -178,11 +246,82 @@ def test_a_head_without_a_conductor_lives_on_and_joins_again(hub: str, tmp_path:
         follower = head.node.followers["maple"]
         with Running(hub, "conductor", **more) as conductor:
             conductor.states["maple"].set_parameters([JAW], [0.8], time.monotonic_ns())
-            until(lambda: follower.exact and follower.conducted and head.rows["maple"][-1][JAW] > 0.7)
+            until(joined(head))
+            until(lambda: head.rows["maple"][-1][JAW] > 0.7)
         until(lambda: not follower.conducted)
-        until(lambda: follower.exact and head.rows["maple"][-1][JAW] < 0.1)
+        until(lambda: head.rows["maple"][-1][JAW] < 0.1)
         with Running(hub, "conductor", **more):
-            until(lambda: follower.conducted and follower.exact)
+            until(joined(head))
+
+
+class Far:
+    """A conductor on another machine: its clock has nothing in common with that of this one."""
+
+    def __init__(self, session: zenoh.Session, prefix: str, token: Token, ahead_ns: int) -> None:
+        self._session, self._prefix, self._token, self._ahead_ns = session, prefix, token, ahead_ns
+        self.sequence, self.sent_ns = 0, dict[bytes, int]()
+        self._clock = session.declare_queryable(f"{prefix}/_/clock", self._tell)
+
+    def _tell(self, query: zenoh.Query) -> None:
+        now = time.monotonic_ns() + self._ahead_ns
+        query.reply(query.key_expr, json.dumps([now, now, self._token.holder]))
+
+    def conduct(self, seconds: float) -> None:
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.sequence += 1
+            values, now = P.neutral(), time.monotonic_ns()
+            values[JAW] = 0.3 + 1e-4 * self.sequence + 1e-6 * self._token.fence
+            self.sent_ns[values.tobytes()] = now
+            header = Header(self._token, self.sequence, now + self._ahead_ns)
+            self._session.put(f"{self._prefix}/maple/parameters", Payloads(P).encode(values),
+                              encoding="omote/exact;1", attachment=header.encode())  # fmt: skip
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        self._clock.undeclare()
+
+
+def test_heads_follow_conductors_on_machines_whose_clocks_have_nothing_in_common(hub: str, tmp_path: Path) -> None:
+    """The clock of a machine begins when that starts: a conductor that takes over may be days before or after."""
+    delay_ms, day_ns = 150.0, 86_400 * 10**9
+    with Running(hub, "head", folder=tmp_path, prefix="clocks", delay_ms=delay_ms) as head, client(hub) as session:
+        for fence, ahead_ns in ((1, day_ns), (2, -day_ns), (3, 7 * day_ns)):
+            far = Far(session, "clocks", Token(fence, fence), ahead_ns)
+            begin = len(head.rows["maple"])
+            far.conduct(3.0)
+            exact = [(at, row) for at, row, own in zip(head.times[begin:], head.rows["maple"][begin:],
+                     head.exact["maple"][begin:], strict=False) if own and row.tobytes() in far.sent_ns]  # fmt: skip
+            far.close()
+            waits = [1e-6 * (at - far.sent_ns[row.tobytes()]) for at, row in exact]
+            assert len(waits) > 50 and delay_ms - 1.0 < np.percentile(waits, 20) < delay_ms + 30.0, waits[:5]
+            assert abs(head.node.report()["clock_offset_ms"] * 1e6 - ahead_ns) < 50e6
+
+
+@pytest.mark.slow
+def test_all_find_each_other_again_when_the_router_comes_back(tmp_path: Path) -> None:
+    more = {"folder": tmp_path, "prefix": "again", "hz": 40.0}
+    with ExitStack() as stack:
+        hub = stack.enter_context(ExitStack())
+        endpoint = hub.enter_context(router())
+        first = stack.enter_context(Running(endpoint, "conductor", **more))
+        heads = [stack.enter_context(Running(endpoint, role, seed=5, heads=names, **more))
+                 for role, names in (("head", ("maple",)), ("face", MANY))]  # fmt: skip
+        second = stack.enter_context(Running(endpoint, "conductor", seed=9, heads=("maple", *MANY), **more))
+        followers = [head.node.followers[name] for head in heads for name in head.states]
+        until(joined(heads[0]))
+        hub.close()
+        gone = time.monotonic()
+        until(lambda: not any(follower.conducted for follower in followers) and second.node.lease.active)
+        before = second.node.lease.highest
+        time.sleep(max(0.0, gone + 3.3 - time.monotonic()))  # who tries more and more seldom would try again after 7 s
+        with router(endpoint=endpoint):
+            back = time.monotonic()
+            until(lambda: all(f.conducted and f.highest >= before for f in followers))
+            assert time.monotonic() - back < 3.0  # 0.5 s where nothing else runs
+            until(joined(*heads))
+            until(lambda: [first.node.lease.active, second.node.lease.active].count(True) == 1)
+            until(lambda: len({follower.highest for follower in followers}) == 1)
 
 
 def test_endpoints_and_files_that_cannot_be_used_are_named(
@@ -199,18 +338,15 @@ def test_endpoints_and_files_that_cannot_be_used_are_named(
         Running(f"tls/127.0.0.1:{free_port()}", "head", folder=tmp_path, tls={"ca": "none.pem"})
 
 
-MANY = ("a", "b", "c", "d", "e")
-
-
 def test_many_heads_of_a_process_are_sent_in_one_message(hub: str, tmp_path: Path) -> None:
     """Whoever follows many hears a few messages a tick; a process with one head, and one of a user, hears that one."""
     singles, together = list[str](), list[int]()
     with (
-        Running(hub, "conductor", folder=tmp_path, prefix="many", heads=MANY) as conductor,
-        Running(hub, "head", seed=60, folder=tmp_path, prefix="many", heads=MANY) as heads,
+        Running(hub, "conductor", folder=tmp_path, prefix="many", hz=40.0, heads=MANY) as conductor,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="many", hz=40.0, heads=MANY) as heads,
         client(hub) as session,
     ):
-        until(lambda: all(follower.exact and follower.taken > 20 for follower in heads.node.followers.values()))
+        until(joined(heads))
         session.declare_subscriber("many/_/faces", lambda sample: together.append(len(sample.payload.to_bytes())))
         session.declare_subscriber("many/b/parameters", lambda sample: singles.append(str(sample.key_expr)))
         until(lambda: len(singles) > 20)
@@ -223,24 +359,45 @@ def test_many_heads_of_a_process_are_sent_in_one_message(hub: str, tmp_path: Pat
         assert shown <= {row.tobytes() for row in conductor.rows["c"]}
         taken = sum(follower.taken for follower in heads.node.followers.values())
         assert not heads.node.refused and not any(f.refused for f in heads.node.followers.values())
-        with Running(hub, "head", seed=90, folder=tmp_path, prefix="many", heads=("d",)) as one:
-            until(lambda: one.node.followers["d"].exact)
+        with Running(hub, "head", seed=90, folder=tmp_path, prefix="many", hz=40.0, heads=("d",)) as one:
+            until(joined(one))
     assert set(singles) == {"many/b/parameters"}
     assert max(together) > 3 * 475 and taken > 300
 
 
+@pytest.mark.parametrize("shared", [True, False])
+def test_messages_of_many_heads_are_in_shared_memory_where_that_is_asked_for(
+    hub: str, tmp_path: Path, shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    many, found = (
+        tuple(f"h{k}" for k in range(8)),
+        list[bool](),
+    )  # 3 kB and more; what is smaller travels faster as it is
+
+    def noting(sample: zenoh.Sample) -> Header:
+        found.append(sample.payload.as_shm() is not None)
+        return header_of(sample)
+
+    monkeypatch.setattr("controller.fleet.hearing.header_of", noting)
+    more = {"folder": tmp_path, "prefix": f"shared{shared}", "hz": 20.0, "heads": many, "shared_memory": shared}
+    with Running(hub, "conductor", **more), Running(hub, "head", seed=60, **more) as head:
+        until(lambda: len(found) > 40 and head.node.followers["h7"].taken > 20)
+    assert any(found) is shared
+
+
 def test_heads_of_a_process_that_hears_many_are_moved_by_the_next_conductor(hub: str, tmp_path: Path) -> None:
     with (
-        Running(hub, "head", seed=60, folder=tmp_path, prefix="next", heads=MANY) as heads,
-        Running(hub, "conductor", folder=tmp_path, prefix="next", heads=MANY) as first,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="next", hz=40.0, heads=MANY) as heads,
+        Running(hub, "conductor", folder=tmp_path, prefix="next", hz=40.0, heads=MANY) as first,
     ):
-        until(lambda: all(follower.exact for follower in heads.node.followers.values()))
-        with Running(hub, "conductor", seed=30, folder=tmp_path, prefix="next", heads=MANY) as second:
+        until(joined(heads))
+        with Running(hub, "conductor", seed=30, folder=tmp_path, prefix="next", hz=40.0, heads=MANY) as second:
             until(lambda: second.node.followers["a"].conducted)
             before = heads.node.followers["e"].highest
             first.paused.set()
             until(lambda: second.node.lease.active)
-            until(lambda: all(f.highest > before and f.exact for f in heads.node.followers.values()))
+            until(lambda: all(f.highest > before for f in heads.node.followers.values()))
+            until(joined(heads))
             first.paused.clear()
             until(lambda: not first.node.lease.active)
 
@@ -248,8 +405,8 @@ def test_heads_of_a_process_that_hears_many_are_moved_by_the_next_conductor(hub:
 def test_how_a_head_is_is_said_to_whoever_listens(hub: str, tmp_path: Path) -> None:
     said = list[tuple[str, dict[str, object]]]()
     with (
-        Running(hub, "conductor", folder=tmp_path, prefix="said", heads=MANY) as conductor,
-        Running(hub, "head", seed=60, folder=tmp_path, prefix="said", heads=MANY),
+        Running(hub, "conductor", folder=tmp_path, prefix="said", hz=40.0, heads=MANY) as conductor,
+        Running(hub, "head", seed=60, folder=tmp_path, prefix="said", hz=40.0, heads=MANY),
         client(hub) as session,
     ):
 

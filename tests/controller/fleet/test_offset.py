@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 
-from controller.fleet.offset import ClockOffset
+from controller.fleet.offset import ClockOffset, Clocks
 
 MS = 10**6
 
@@ -22,11 +22,33 @@ def test_the_offset_is_within_half_of_the_shortest_round_trip() -> None:
     assert abs(clock.offset_ns - ahead) <= MS and clock.error_ns <= MS
 
 
-def test_an_impossible_answer_is_left_out_and_another_clock_begins_anew() -> None:
+def test_an_impossible_answer_is_left_out() -> None:
     clock = ClockOffset()
     clock.add(0, 100, 900, 500)
     assert clock.error_ns is None
     clock.add(0, 100, 200, 500)
     assert clock.offset_ns == -100
-    clock.forget()
-    assert (clock.offset_ns, clock.error_ns) == (0, None)
+
+
+def test_each_conductor_has_a_clock_of_its_own() -> None:
+    clocks, day = Clocks(), 86_400 * 10**9
+    assert clocks.offset_ns(1) == 0 and clocks.answers(1) == 0
+    clocks.add(1, 0, day + 5 * MS, day + 5 * MS, 10 * MS)
+    clocks.add(2, 0, 5 * MS - day, 5 * MS - day, 10 * MS)
+    assert (clocks.offset_ns(1), clocks.offset_ns(2), clocks.answers(1)) == (day, -day, 1)
+
+
+def test_before_it_has_answered_what_arrives_first_says_how_a_clock_is() -> None:
+    clocks, ahead = Clocks(), 10**15
+    for late in (9, 2, 7):
+        clocks.hear(1, ahead, late * MS)
+    assert clocks.offset_ns(1) == ahead - 2 * MS
+    clocks.add(1, 0, ahead + MS, ahead + MS, 2 * MS)
+    assert clocks.offset_ns(1) == ahead
+
+
+def test_clocks_that_were_long_not_heard_are_forgotten() -> None:
+    clocks = Clocks()
+    for holder in range(1, 100):
+        clocks.hear(holder, 10**15 + holder, 0)
+    assert clocks.offset_ns(1) == 0 and clocks.offset_ns(99) == 10**15 + 99

@@ -13,7 +13,7 @@ import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.fleet.payload import Header, Payloads
-from controller.fleet.sending import FEW, FaceSender
+from controller.fleet.sending import FEW, FIRST_S, FaceSender
 
 
 class Outlet:
@@ -53,3 +53,15 @@ def test_faces_of_many_heads_are_sent_to_who_listens() -> None:
 
 def test_a_tick_of_many_heads_is_one_message_to_who_hears_them_all() -> None:
     assert sent(FEW + 1, listens=False, together=True) == (0, 2)
+
+
+def test_who_begins_to_conduct_sends_everything_before_somebody_is_known_to_listen() -> None:
+    outlets, many = {f"head{k}": Outlet(False) for k in range(FEW + 1)}, Outlet(False)
+    sender = FaceSender(outlets, many, Payloads(P, "exact"), heading)  # type: ignore[arg-type]
+    end = round(FIRST_S * 1e9)
+    for begin in (10**12, 10**13):
+        sender.begin(begin)
+        for now in (begin, begin + end - 1, begin + end, begin + 2 * end):
+            for name in outlets:
+                sender.send(name, now, np.zeros(len(P)), 0)
+    assert [outlet.put_count for outlet in outlets.values()] == [4] * (FEW + 1) and many.put_count == 4

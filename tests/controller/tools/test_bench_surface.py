@@ -130,9 +130,10 @@ def test_growth_scales_its_sizes_down_to_a_least(monkeypatch: pytest.MonkeyPatch
 
 
 def test_a_crowd_is_measured_beside_one_head(small: str) -> None:
-    ((title, (alone, each, memory)),) = bench_crowd(small, 3, 0.0, lambda text: None)
+    ((title, (alone, each, tick, memory)),) = bench_crowd(small, 3, 0.0, lambda text: None)
     assert title.startswith("3 heads like ") and alone.milliseconds > 0.0
     assert each.ratio == pytest.approx(each.milliseconds / alone.milliseconds)
+    assert tick.ratio == pytest.approx(tick.milliseconds / each.milliseconds) and tick.milliseconds > 0.0
     assert memory.ratio is not None and memory.ratio > 1.0 and memory.reach == "<= 3"
 
 

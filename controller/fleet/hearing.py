@@ -1,0 +1,77 @@
+"""Hears the faces of conductors, one by one or all of a tick in one message, and hands them to their heads."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
+
+from controller.base.parameters import Floats
+from controller.fleet.batch import Batches
+from controller.fleet.follower import Follower
+from controller.fleet.lease import Lease
+from controller.fleet.offset import Clocks
+from controller.fleet.payload import Header, Payloads
+from controller.fleet.recorder import Recording
+from controller.fleet.wire import ALL, Wire, header_of
+
+if TYPE_CHECKING:
+    import zenoh  # optional: the extra zenoh
+
+MANY = 4
+"""A process with so many heads hears them all in one message; one with fewer only what is for its own."""
+
+
+class Hearing:
+    """Faces for the heads of this process.
+
+    lease : of this process, which takes note of who conducts; it obeys nobody of its own number. clocks : of the
+    conductors. recordings : where faces are written, by head. hurry : called when one was taken that is shown at once.
+    """
+
+    def __init__(
+        self, wire: Wire, followers: Mapping[str, Follower], payloads: Payloads, lease: Lease, clocks: Clocks,
+        recordings: Mapping[str, Recording], hurry: Callable[[], None],
+    ) -> None:  # fmt: skip
+        self._followers, self._payloads, self._batches = followers, payloads, Batches(payloads)
+        self._lease, self._clocks, self._recordings, self._hurry = lease, clocks, recordings, hurry
+        if len(followers) >= MANY:
+            wire.hear(ALL, "faces", self._hear_many, direct=True)
+        else:
+            for name in followers:
+                wire.hear(name, "parameters", self._hearer(name), direct=True)
+
+    def _hearer(self, head: str) -> Callable[[zenoh.Sample], None]:
+        def act(sample: zenoh.Sample) -> None:
+            header = header_of(sample)
+            if self._is_for_us(header):
+                values = self._payloads.decode(sample.payload.to_bytes(), str(sample.encoding))
+                if self._take(head, header, values):
+                    self._hurry()
+
+        return act
+
+    def _hear_many(self, sample: zenoh.Sample) -> None:
+        header, taken = header_of(sample), False
+        if self._is_for_us(header):
+            for face in self._batches.decode(sample.payload.to_bytes(), str(sample.encoding)):
+                if face.head in self._followers:
+                    own = Header(header.token, face.sequence, header.time_ns, face.stamp_ns, header.stopped)
+                    taken = self._take(face.head, own, face.values) or taken
+        if taken:
+            self._hurry()
+
+    def _is_for_us(self, header: Header) -> bool:
+        """Whether a face is of another conductor, of whom the lease takes note."""
+        if header.token.holder == self._lease.holder:
+            return False
+        self._lease.hear(header.token, time.monotonic())
+        self._clocks.hear(header.token.holder, header.time_ns, time.monotonic_ns())
+        return True
+
+    def _take(self, head: str, header: Header, values: Floats) -> bool:
+        """Hand a face to its head; whether it takes it."""
+        taken = self._followers[head].take(header, values)
+        if taken and head in self._recordings:
+            self._recordings[head].add(header.time_ns, values)
+        return taken
