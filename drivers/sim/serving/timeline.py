@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
-
 AT_ONCE = 100
 """Commands carried out at a time, beyond those of a whole round."""
 
