@@ -122,7 +122,7 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
     request = request.request if isinstance(request, messages.ToHead) else request
     try:
         return _answer(request, body.body_of(to) if isinstance(body, Hall) else body, pipe)
-    except Exception as error:  # noqa: BLE001  nothing that a panel asks for ends the run
+    except Exception as error:  # nothing that a panel asks for ends the run
         trace = error if os.environ.get("OMOTE_DEBUG") else None
         log.error("panel: %s failed: %s; all else goes on", type(request).__name__, describe(error), exc_info=trace)
         if isinstance(request, messages.AskDetails):
