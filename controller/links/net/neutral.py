@@ -7,6 +7,7 @@ file in the user's state folder holds both, as JSON with parameters by name.
 from __future__ import annotations
 
 import json
+import os
 import re
 import zlib
 from pathlib import Path
@@ -100,11 +101,11 @@ class Ranges:
 
 
 def load_state(path: Path, parameters: Parameters, neutral: Neutral, ranges: Ranges) -> None:
-    """Read what was kept; nothing where there is no file.
+    """Read what was kept; nothing where there is no file, or none that may be seen.
 
     Raises LinkError: the file is damaged, or of a newer omote.
     """
-    if not path.exists():
+    if not os.path.exists(path):  # false, too, in a folder that is somebody else's
         return
     with files.reading(path, LinkError, hint=f"delete it: rm {path}"):
         table = files.read_json(path, _MOST_BYTES)

@@ -128,3 +128,10 @@ def test_sources_in_other_alphabets_have_files_of_their_own() -> None:
     assert state_file("livelink-左") != state_file("livelink-右")
     assert state_file("x" * 150) != state_file("x" * 151)
     assert state_file("livelink-capture").name == "livelink-capture.json"
+
+
+def test_a_name_that_no_file_can_have_is_no_file_and_no_error(tmp_path: Path) -> None:
+    """As in a folder of somebody else's: the link opens, and learns again."""
+    neutral = Neutral(P)
+    load_state(tmp_path / ("x" * 300), P, neutral, Ranges(P))
+    assert not neutral.known
