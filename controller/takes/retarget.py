@@ -1,4 +1,4 @@
-"""Fits takes to a person: for each parameter, the range that this face goes through where the take goes through all."""
+"""Fits takes to a person: maps the whole range of each parameter to the range that this person's face reaches."""
 
 from __future__ import annotations
 

@@ -51,7 +51,7 @@ class Expression:
 
 
 class Expressions(Protocol):
-    """Named expressions, as what blends them uses them."""
+    """Named expressions by name, as the player of expressions uses them."""
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -282,7 +282,7 @@ def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
 
 
 def _chains(ids: Ints) -> list[Ints]:
-    """Rows of edges (e, 2) that hang together."""
+    """Rows of edges (e, 2) that are connected, chain by chain."""
     label = _components(ids, int(ids.max(initial=-1)) + 1)
     own = label[ids[:, 0]] if len(ids) else np.zeros(0, np.int64)
     return [np.flatnonzero(own == k) for k in np.unique(own)]
