@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Iterable
+from contextvars import ContextVar
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -18,6 +19,7 @@ from surface.base import files
 Model = TypeVar("Model", bound=BaseModel)
 
 _MOST_FAULTS = 50  # listed of a file
+_guesses_left: ContextVar[list[int] | None] = ContextVar("guesses left", default=None)
 _KIND = re.compile(r"(constrained|function)-|(tuple|list|dict)\[")  # pydantic's names of kinds: no keys of the file
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -57,6 +59,25 @@ def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str
 def check(table: dict[str, Any], model: type[Model], path: Path,
           cross_check: Callable[[Model], list[str]] | None = None) -> Model:  # fmt: skip
     """Turn a table into ``model``; ``path`` only names the source in messages. See :func:`load`."""
+    token = _guesses_left.set([2 * _MOST_FAULTS])
+    try:
+        return _checked(table, model, path, cross_check)
+    finally:
+        _guesses_left.reset(token)
+
+
+def may_guess() -> bool:
+    """Whether to look for the name that a wrong one may mean; while a file is checked, only for as many faults as are
+    listed of it, since a file may hold a hundred thousand."""
+    left = _guesses_left.get()
+    if left is None:
+        return True
+    left[0] -= 1
+    return left[0] >= 0
+
+
+def _checked(table: dict[str, Any], model: type[Model], path: Path,
+             cross_check: Callable[[Model], list[str]] | None) -> Model:  # fmt: skip
     try:
         read = model.model_validate(table)
     except ValidationError as error:
@@ -103,7 +124,7 @@ def describe(fault: Any, model: type[BaseModel]) -> str:
     """One pydantic fault as ``key.path: reason``; misspelt keys get the closest known one."""
     where = key_path(fault["loc"])
     if fault["type"] == "extra_forbidden":
-        known = _keys_at(model, fault["loc"][:-1])
+        known = _keys_at(model, fault["loc"][:-1]) if may_guess() else []
         close = difflib.get_close_matches(str(fault["loc"][-1]), known, n=1)
         return f"{where}: unknown key" + (f", did you mean {close[0]!r}?" if close else "")
     if fault["type"] == "missing":

@@ -52,5 +52,15 @@ def exhausted(error: BaseException) -> ControllerError | None:
     return ControllerError(f"{where}{os.strerror(error.errno)}", hint=_EXHAUSTED[error.errno])
 
 
+_DENIED = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.ENAMETOOLONG, errno.ELOOP, errno.EIO)
+
+
+def denied(error: BaseException) -> ControllerError | None:
+    """An error of the system that says that a file which it names cannot be used; None for any other error."""
+    if not isinstance(error, OSError) or error.errno not in _DENIED or not error.filename:
+        return None
+    return ControllerError(f"{error.filename}: {os.strerror(error.errno)}", hint=f"look at: ls -ld {error.filename}")
+
+
 OMOTE_ERRORS = (ControllerError, DriverError, SurfaceError)
 """Everything omote raises on purpose; the command line prints one message and exits with code 1."""

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import errno
-import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from controller.base.errors import ControllerError
+from surface.base import writing
 
 _NO_PLACE = {
     errno.ENOENT: "mkdir -p {folder}",
@@ -23,39 +22,23 @@ NEWER = "written by a newer omote"
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` that takes its place when the block ends well.
+    """A temporary path that takes the place of ``path`` when the block ends well; see
+    :func:`surface.base.writing.replacing`. Folders that are missing are made.
 
-    Raises ControllerError: when the folder cannot be written; ``path`` stays as it was.
+    Raises ControllerError: when the file cannot be written; ``path`` stays as it was.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(suffix=path.suffix, prefix=f".{path.stem}-", dir=path.parent)
+        with writing.replacing(path) as temporary:
+            yield temporary
     except OSError as error:
-        raise ControllerError(
-            f"{path}: cannot be written: {error.strerror}", hint="choose another place with -o"
-        ) from error
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        os.chmod(temporary, 0o666 & ~_umask())
-        temporary.replace(path)
-    except OSError as error:
-        hint = "make room on the disk, or choose another place with -o"
-        raise ControllerError(f"{path}: cannot be written: {error.strerror}", hint=hint) from error
-    finally:
-        temporary.unlink(missing_ok=True)
+        why = error.strerror or error
+        raise ControllerError(f"{path}: cannot be written: {why}", hint=place_hint(error, path)) from error
 
 
 def place_hint(error: OSError, path: Path) -> str:
     """What to do where a file of the user's choice cannot be written."""
     return _NO_PLACE.get(error.errno or 0, "choose another folder: ls -ld {folder}").format(folder=path.parent)
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
 
 
 def format_fault(found: object, newest: int) -> str | None:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, field_validator
 
-from controller.base.config import Number, Positive, Settings, check, load, read_toml
+from controller.base.config import Number, Positive, Settings, check, load, may_guess, read_toml
 from controller.base.errors import ParameterError
 from controller.base.paths import config_dir
 
@@ -201,6 +201,8 @@ def fold(name: str) -> str:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """``, did you mean 'x'?`` or nothing; at most three guesses."""
+    if not may_guess():
+        return ""
     folded = {fold(k): k for k in known}
     close = difflib.get_close_matches(fold(name), folded, n=3, cutoff=0.6)
     if not close:

@@ -13,6 +13,7 @@ from multiprocessing.connection import Connection
 
 from controller.base.errors import OMOTE_ERRORS
 from controller.base.mailboxes import Mailbox
+from controller.base.parts import describe
 from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.body import Body
@@ -24,6 +25,8 @@ from controller.layers.mixer import by_priority
 from controller.stage.stage import heads_of
 from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.base.shutdown import combine_with_context
+
+log = logging.getLogger(__name__)
 
 _POLL_S = 0.1
 
@@ -117,19 +120,29 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
         return True
     to = request.head if isinstance(request, messages.ToHead) else ""
     request = request.request if isinstance(request, messages.ToHead) else request
-    who = body.body_of(to) if isinstance(body, Hall) else body
+    try:
+        return _answer(request, body.body_of(to) if isinstance(body, Hall) else body, pipe)
+    except Exception as error:  # nothing that a panel asks for ends the run
+        trace = error if os.environ.get("OMOTE_DEBUG") else None
+        log.error("panel: %s failed: %s; all else goes on", type(request).__name__, describe(error), exc_info=trace)
+        if isinstance(request, messages.AskDetails):
+            _send(pipe, messages.Details())  # it asks again only when it has an answer
+        return True
+
+
+def _answer(request: object, who: Body, pipe: Connection) -> bool:
+    """Carry out a request for one head; False when it is none of a panel's, but asks to stop."""
     if isinstance(request, messages.AskDetails):
         _send(pipe, who.details())
-        return True
-    if isinstance(request, messages.PlayTake):
+    elif isinstance(request, messages.PlayTake):
         who.play_take(request.path)
-        return True
-    if isinstance(request, messages.Jog):
+    elif isinstance(request, messages.Jog):
         who.jog(request.bus, request.servo, request.angle_deg)
-        return True
-    if isinstance(request, messages.Neutral):
-        who.end_jogs()
-    return carry_out(request, who.state, time.monotonic_ns())
+    else:
+        if isinstance(request, messages.Neutral):
+            who.end_jogs()
+        return carry_out(request, who.state, time.monotonic_ns())
+    return True
 
 
 def _send(pipe: Connection, message: object) -> None:

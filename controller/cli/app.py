@@ -181,13 +181,13 @@ def _run() -> int:
 
 def _report_fault(error: Exception) -> int:
     """Report an error that no command expected; returns the exit code."""
-    from controller.base.errors import exhausted  # start-up: main() ends Ctrl-C quietly
+    from controller.base.errors import denied, exhausted  # start-up: main() ends Ctrl-C quietly
 
     if _is_interrupt(error):
         return 130
     if os.environ.get("OMOTE_DEBUG"):
         raise error
-    if (plain := exhausted(error)) is not None:
+    if (plain := exhausted(error) or denied(error)) is not None:
         report_error(plain)
         return 1
     report_error(error, "This is a fault in omote. OMOTE_DEBUG=1 shows where.")

@@ -1,4 +1,4 @@
-"""The port of a robot's bus as several tools in turn open it; a simulated bus is served meanwhile."""
+"""Gives tools the port of a robot's bus, to be opened one after the other; a simulated bus is served meanwhile."""
 
 from __future__ import annotations
 

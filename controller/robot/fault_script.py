@@ -11,7 +11,7 @@ from controller.base.config import Number, Settings, load
 from controller.base.plain_numbers import plain_number
 from drivers.base.errors import DriverError
 from drivers.sim.serving.timeline import Timeline
-from drivers.sim.wire.faults import KINDS, parse_fault
+from drivers.sim.wire.faults import KINDS, LONGEST, parse_fault
 
 MOST_STEPS = 10_000
 _Seconds = Annotated[Number, Field(ge=0, le=86_400)]
@@ -70,6 +70,7 @@ def _check_command(words: list[str]) -> None:
         case ["clear", kind]:
             raise ValueError(f"there is no fault {kind!r}; there are {', '.join(sorted(KINDS))}")
         case ["place", number, ticks] if number.isdecimal() and ticks.removeprefix("-").isdecimal():
-            pass
+            if not abs(int(ticks)) <= LONGEST:
+                raise ValueError(f"positions go from {-LONGEST:.0f} to {LONGEST:.0f} steps")
         case _:
             raise ValueError("write fault SPEC, clear KIND or place ID TICKS after the time")

@@ -1,9 +1,10 @@
 """Where a further servo would help a robot most: the place and direction on the skin that take up most of what is left.
 
 What a servo adds to the skin is its direction times the share that falls off around its point, as for anchors
-(:func:`controller.robot.anchors.servo_field`). Let the servos that there are leave displacements L over some faces: the
-best pull a servo adds to one face is the least-squares one, and of all directions at a point the best is the first
-eigenvector of sum v v^T over the faces, with v the sum of L weighed by the shares. Every sampled point is tried.
+(:func:`controller.robot.anchors.servo_field`). The servos of the robot leave some displacement L of the skin in each of
+some faces. For one face, the best pull of a further servo follows by least squares; of all directions at a point, the
+best is the first eigenvector of the sum of v v^T over the faces, where v is the sum of L weighed by the shares. Every
+sampled point is tried.
 """
 
 from __future__ import annotations

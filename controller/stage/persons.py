@@ -174,8 +174,8 @@ def mixed_identity(persons: Sequence[tuple[Person, float]], own: Mapping[str, fl
 
 
 def mixed_look(persons: Sequence[tuple[Person, float]], *, dressed: bool = True) -> Look | None:
-    """The look of a mixture: numbers and colours are averaged by the shares, what cannot be is taken from whom most is
-    there of. Without ``dressed`` nothing is worn. None without persons."""
+    """The look of a mixture: numbers and colours are averaged by the shares; what has no average is taken from the
+    person with the largest share. Without ``dressed`` nothing is worn. None without persons."""
     if not persons:
         return None
     looks = [(person.look, share) for person, share in persons]

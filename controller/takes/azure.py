@@ -9,8 +9,8 @@ Files hold one event, a list of them, or one a line, with the names that the SDK
 
 from __future__ import annotations
 
-import math
 import re
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -56,7 +56,7 @@ def viseme_take(path: Path, parameters: Parameters) -> Take:
         offset, number = _value(event, _OFFSETS), _value(event, _IDS)
         if cues and offset == 0 and _value(event, _ANIMATIONS):
             continue  # events of blend shapes come after those of visemes, without a viseme of their own
-        if not _is_number(offset) or not 0 <= offset < math.inf:
+        if not _is_number(offset) or offset < 0:
             raise _fault(path, where, "its offset must be a number of ticks of 100 ns")
         if isinstance(number, bool) or not isinstance(number, int) or number not in visemes.sapi:
             raise _fault(path, where, f"viseme {number!r}: must be 0 to {max(visemes.sapi, default=0)}")
@@ -106,7 +106,7 @@ def _arkit_order(parameters: Parameters) -> tuple[str, ...]:
 def _row(path: Path, where: str, row: Any) -> Floats:
     if not isinstance(row, list) or len(row) != _SHAPES:
         raise _fault(path, where, f"must be a list of {_SHAPES} numbers")
-    if not all(_is_number(value) and math.isfinite(value) for value in row):
+    if not all(_is_number(value) for value in row):
         raise _fault(path, where, "holds what is no finite number")
     return np.array(row, dtype=np.float64)
 
@@ -157,7 +157,8 @@ def _value(event: dict[str, Any], names: tuple[str, ...]) -> Any:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether a value is a number that a float can hold; whole numbers of JSON may be larger than any."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def _fault(path: Path, where: str, why: str) -> TakeError:

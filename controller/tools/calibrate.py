@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 import select
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -18,10 +19,11 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.live import Live
 
-from controller.base.errors import ControllerError
+from controller.base.config import load
+from controller.base.errors import ConfigError, ControllerError
 from controller.base.signals import stop_flag
 from controller.robot.buses import BusSettings
-from controller.robot.calibration import rest_deg, save_calibration
+from controller.robot.calibration import SUFFIX, CalibrationFile, CapturedAngles, rest_deg, save_calibration
 from controller.robot.channels import servo_specs
 from controller.robot.settings import ChannelSettings, RobotSettings
 from controller.tools.calibrate_screen import CalibrationScreen
@@ -47,8 +49,12 @@ def run_calibration(
 ) -> bool:  # fmt: skip
     """Let a person capture ``channels``; the motors are off whenever it ends. Returns whether the file was written.
 
+    Channels that ``target`` holds already and that are not captured now stay in it. Where a signal or an error ends it,
+    what was captured and not saved goes into a file beside ``target``.
+
     Raises DriverError or ControllerError.
     """
+    before = _known_channels(target, robot)
     with ExitStack() as stack:
         ended = stack.enter_context(stop_flag())
         read_keys = stack.enter_context(keyboard())
@@ -57,18 +63,34 @@ def run_calibration(
         screen = CalibrationScreen(channels, all(bus.measures for bus, _ in buses), margin_deg)
         written = False
         title = f"{robot.name}, calibration {name!r}"
-        with Live(screen.picture(title), console=console, auto_refresh=False, screen=True) as live:
-            while not (screen.done or ended.is_set()):
-                try:
-                    _cycle(buses, screen)
-                except DriverError as error:  # what was captured is still here: s saves it
-                    screen.fail(f"{error}; the motors are to be off; trying again")
-                live.update(screen.picture(title), refresh=True)
-                for key in read_keys(PERIOD_S):
-                    screen.handle_key(key)
-                if screen.saving:
-                    written |= _save(screen, robot, name, target, written)
+        try:
+            with Live(screen.picture(title), console=console, auto_refresh=False, screen=True) as live:
+                while not (screen.done or ended.is_set()):
+                    try:
+                        _cycle(buses, screen)
+                    except DriverError as error:  # what was captured is still here: s saves it
+                        screen.fail(f"{error}; the motors are to be off; trying again")
+                    live.update(screen.picture(title), refresh=True)
+                    for key in read_keys(PERIOD_S):
+                        screen.handle_key(key)
+                    if screen.saving:
+                        written |= _save(screen, robot, name, target, before, written)
+        finally:
+            if not screen.done:
+                _save_aside(screen, robot, name, target, before, console)
     return written
+
+
+def _known_channels(target: Path, robot: RobotSettings) -> dict[str, CapturedAngles]:
+    """The channels of the robot in a calibration that is there already; none where it is another robot's or damaged."""
+    try:
+        found = load(target, CalibrationFile) if target.exists() else None
+    except ConfigError:
+        found = None
+    if found is None or found.robot != robot.name:
+        return {}
+    known = {channel.name for channel in robot.channels}
+    return {name: angles for name, angles in found.channels.items() if name in known}
 
 
 def _open_bus(stack: ExitStack, bus: BusSettings, channels: Sequence[ChannelSettings]) -> BusChannels:
@@ -95,14 +117,18 @@ def _cycle(buses: Sequence[BusChannels], screen: CalibrationScreen) -> None:
     screen.set_angles(angles)
 
 
-def _save(screen: CalibrationScreen, robot: RobotSettings, name: str, target: Path, own: bool) -> bool:
-    """Write the file, or ask first if it exists and this run did not write it."""
-    if target.exists() and not own and not screen.may_replace:
-        screen.ask(f"replace {target}? (y/n)")
-        return False
+def _save(
+    screen: CalibrationScreen, robot: RobotSettings, name: str, target: Path, before: Mapping[str, CapturedAngles],
+    own: bool,
+) -> bool:  # fmt: skip
+    """Write the file, or ask first if it exists and this run did not write it. ``before`` : what it held then."""
     captured = screen.captured()
+    kept = len(before.keys() - captured.keys())
+    if target.exists() and not own and not screen.may_replace:
+        screen.ask(f"replace {target}{f', in which {kept} other channels stay' if kept else ''}? (y/n)")
+        return False
     try:
-        save_calibration(target, name, robot.name, captured)
+        save_calibration(target, name, robot.name, {**before, **captured})
     except ControllerError as error:  # what was captured is still here: once there is room, s saves it
         screen.not_saved(f"not saved: {error}")
         return False
@@ -114,6 +140,26 @@ def _save(screen: CalibrationScreen, robot: RobotSettings, name: str, target: Pa
     return True
 
 
+def _save_aside(
+    screen: CalibrationScreen, robot: RobotSettings, name: str, target: Path, before: Mapping[str, CapturedAngles],
+    console: Console,
+) -> None:  # fmt: skip
+    """Write what was captured and not saved to a new file beside ``target``, and say so; nothing without such."""
+    captured = screen.captured()
+    if not screen.changed or not captured:
+        return
+    stem = target.name.removesuffix(SUFFIX if target.name.endswith(SUFFIX) else target.suffix)
+    places = (target.with_name(f"{stem}.unsaved{number or ''}{SUFFIX}") for number in itertools.count())
+    place = next(path for path in places if not path.exists())
+    try:
+        save_calibration(place, name, robot.name, {**before, **captured})
+        text = f"ended before it was saved: what was captured of {len(captured)} channels is in {place}"
+    except ControllerError as error:
+        text = f"ended before it was saved: {error}"
+    with suppress(OSError):  # the terminal is gone
+        console.print(text, soft_wrap=True, markup=False)
+
+
 @contextmanager
 def keyboard(descriptor: int | None = None) -> Iterator[Callable[[float], list[str]]]:
     """A function that returns the keys pressed within a time (s): characters, ``up``, ``down``, ``left``, ``right``.
@@ -121,7 +167,7 @@ def keyboard(descriptor: int | None = None) -> Iterator[Callable[[float], list[s
     ``descriptor`` : of a terminal, standard input without; its settings are restored at the end. Raises ControllerError
     where it is no terminal.
     """
-    fd = sys.stdin.fileno() if descriptor is None else descriptor
+    fd = (sys.stdin.fileno() if sys.stdin is not None else -1) if descriptor is None else descriptor
     if not os.isatty(fd):
         raise ControllerError("keys can only be read from a terminal", hint="start omote in a terminal window")
     if sys.platform == "win32":
@@ -135,15 +181,19 @@ def keyboard(descriptor: int | None = None) -> Iterator[Callable[[float], list[s
     try:
         yield partial(_terminal_keys, fd)
     finally:
-        termios.tcsetattr(fd, termios.TCSADRAIN, before)
+        with suppress(termios.error):  # the terminal is gone
+            termios.tcsetattr(fd, termios.TCSADRAIN, before)
 
 
 def _terminal_keys(fd: int, wait_s: float) -> list[str]:
     end, data = time.monotonic() + wait_s, b""
     while select.select([fd], [], [], max(0.0, end - time.monotonic()))[0]:
-        piece = os.read(fd, 64)
+        try:
+            piece = os.read(fd, 64)
+        except OSError:
+            piece = b""
         if not piece:
-            break
+            raise ControllerError("the terminal was closed", hint="start it again in another one")
         data += piece
     return split_keys(data.decode("utf-8", "ignore"))
 

@@ -17,6 +17,7 @@ from controller.base.parameters import TABLE_KEYS, Floats, Parameters, describes
 from controller.vocabulary.sides import sides, unknown_names
 
 _RISE_S = 0.4
+_MOST_CIRCLES = 20
 _Seconds = Annotated[Number, Field(ge=0, le=60)]
 _Override = Literal["keep", "block", "blend"]
 
@@ -50,7 +51,7 @@ class Expression:
 
 
 class Expressions(Protocol):
-    """Named expressions, as what blends them uses them."""
+    """Named expressions by name, as the player of expressions uses them."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -158,16 +159,20 @@ def _faults(
 
 
 def _mixing_faults(tables: Mapping[str, _Table], known: Iterable[str], *, complete: bool) -> list[str]:
-    """Circles in what expressions are mixed of, and unknown ones where the ``known`` expressions are ``complete``."""
-    names = [*tables, *known]
+    """Circles in what expressions are mixed of, and unknown ones where the ``known`` expressions are ``complete``.
+
+    Of circles, only the first :data:`_MOST_CIRCLES` are looked for: each takes a pass over the whole file.
+    """
+    names = {**tables, **dict.fromkeys(known)}
     faults = [f"{name}.of.{part}: unknown expression {part!r}{did_you_mean(part, names)}"
               for name, table in tables.items() for part in table.of if complete and part not in names]  # fmt: skip
     graph = {name: list(table.of) for name, table in tables.items()}
-    while True:
+    for _ in range(_MOST_CIRCLES):
         try:
             TopologicalSorter(graph).prepare()
-            return faults
+            break
         except CycleError as error:
             circle = error.args[1][::-1]
             faults.append(f"{circle[0]}.of.{circle[1]}: goes in a circle: {' -> '.join(circle)}")
             graph[circle[0]].remove(circle[1])
+    return faults

@@ -37,8 +37,8 @@ def reduce_timer_slack() -> None:
 def shorten_thread_switches() -> None:
     """Shorten how long threads of this process wait for each other and for garbage collection.
 
-    By default Python switches threads every 5 ms, and a full collection looks at all objects ever loaded: either is
-    longer than a servo's cycle may be late.
+    By default Python switches threads every 5 ms, and a full collection visits all objects that were ever loaded;
+    either takes longer than a servo's cycle may be late.
     """
     sys.setswitchinterval(_SWITCH_S)
     gc.collect()

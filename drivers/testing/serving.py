@@ -1,4 +1,5 @@
-"""Where a test's servos are: behind a port that any program opens, in time that runs, or in time that a test steps."""
+"""Serves the simulated servos of a test: on a port that any program can open, in real time, or without a port, in time
+that the test steps."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@
 ``time_ms`` time since the last line
 =========== ==================================================================================
 
-A placeholder may have a format, as ``{us:04d}`` or ``{deg:.2f}``.
+A placeholder may have a format, as ``{us:04d}`` or ``{deg:.2f}``, of at most 99 characters.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ VALUES = {"us": "d", "deg": ".1f", "deg10": "d", "angle": "d", "unit": ".4f"}
 """Placeholders of positions, with their default formats."""
 NAMES = ("ch", "id", "name")
 FORMATS = VALUES | {"ch": "d", "id": "d", "name": "s", "time_ms": "d"}
-_FORMAT = re.compile(r"0?\d*(?:\.(\d))?([df]?)\Z")
+_FORMAT = re.compile(r"0?\d{0,2}(?:\.(\d))?([df]?)\Z")
 _NUMBER = r" *([+-]?\d+(?:\.\d*)?)"
 
 

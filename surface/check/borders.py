@@ -130,35 +130,72 @@ def _none(edges: int) -> tuple[Ints, Ints]:
 def _beside(ids: Ints, length: Floats, reach: float) -> tuple[Ints, Ints]:
     """``first (e + 1,)`` and ``beside`` of edges between vertices ``ids (e, 2)``: those that less than ``reach`` mm of
     border lies between. A border of very short edges is near itself everywhere, and sewn to nothing."""
-    meet: dict[int, list[int]] = {}
-    for edge, pair in enumerate(ids.tolist()):
-        for vertex in pair:
-            meet.setdefault(vertex, []).append(edge)
-    ends, long, short = ids.tolist(), length.tolist(), np.flatnonzero(length < reach).tolist()
-    between: list[set[int]] = [set() for _ in ends]
-    for start in short:  # a path with anything between its ends begins with a short edge
-        for vertex in ends[start]:
-            _walk(start, vertex, meet, ends, long, reach, between)
-    first = np.append(0, np.cumsum([len(b) for b in between])).astype(np.int64)
-    return first, np.array([j for b in between for j in sorted(b)], np.int64)
+    names, ends = np.unique(ids, return_inverse=True)
+    ends = np.ascontiguousarray(ends.reshape(-1, 2), np.int64)
+    order = np.argsort(ends.ravel(), kind="stable")
+    start = np.searchsorted(ends.ravel()[order], np.arange(len(names) + 1)).astype(np.int64)
+    edge, far = order // 2, ends[:, ::-1].ravel()[order]
+    first, long = np.zeros(len(ends) + 1, np.int64), np.asarray(length, np.float64)
+    count = _near_along(start, edge, far, ends, long, reach, first, np.zeros(0, np.int64))
+    beside = np.zeros(count, np.int64)
+    _near_along(start, edge, far, ends, long, reach, first, beside)
+    return first, beside
 
 
-def _walk(
-    start: int, vertex: int, meet: dict[int, list[int]], ends: list[list[int]], long: list[float], reach: float,
-    between: list[set[int]],
-) -> None:  # fmt: skip
-    """Record all pairs of edges that are joined by a short path along the border, which begins with edge ``start`` and
-    leaves it at ``vertex``."""
-    before = [j for j in meet[sum(ends[start]) - vertex] if j != start]
-    ways = [(vertex, long[start], {start})]
-    while ways:
-        at, gone, used = ways.pop()
-        for edge in (j for j in meet[at] if j not in used):
-            for other in before:
-                between[other].add(edge)
-                between[edge].add(other)
-            if gone + long[edge] < reach:
-                ways.append((sum(ends[edge]) - at, gone + long[edge], used | {edge}))
+@kernel
+def _ways(
+    ends: Any, start: Any, edge: Any, far: Any, length: Any, reach: float,
+    way: Any, waits: Any, queue: Any, reached: Any,
+) -> int:  # fmt: skip
+    """Write to ``way (v,)``, infinite before, the lengths of the shortest ways below ``reach`` from two vertices
+    ``ends (2,)``, and to ``reached`` the vertices that have one; returns how many. Others as in :func:`_near_along`.
+
+    Ways are corrected from a queue until nothing changes (Moore's algorithm).
+    """
+    head, size, found = 0, 2, 2
+    for side in range(2):
+        way[ends[side]], waits[ends[side]], queue[side], reached[side] = 0.0, True, ends[side], ends[side]
+    while size > 0:
+        v = queue[head]
+        head, size, waits[v] = (head + 1) % len(queue), size - 1, False
+        for k in range(start[v], start[v + 1]):
+            w, along = far[k], way[v] + length[edge[k]]
+            if along < reach and along < way[w]:
+                if way[w] == np.inf:
+                    reached[found], found = w, found + 1
+                way[w] = along
+                if not waits[w]:
+                    queue[(head + size) % len(queue)], waits[w], size = w, True, size + 1
+    return found
+
+
+@kernel
+def _near_along(
+    start: Any, edge: Any, far: Any, ends: Any, length: Any, reach: float, first: Any, beside: Any
+) -> int:  # fmt: skip
+    """Write to ``beside``, as far as there is room, for each edge between vertices ``ends (e, 2)`` those to which a way
+    along edges of ``length (e,)`` is shorter than ``reach``, without those that share a vertex with it; of edge i they
+    begin at ``first[i]``. Vertex v has the edges ``edge[start[v]]`` to ``edge[start[v + 1]]``, which end at ``far``.
+    Returns how many there are."""
+    count, total = len(start) - 1, 0
+    way, waits = np.full(count, np.inf), np.zeros(count, np.bool_)
+    queue, reached, noted = np.zeros(count, np.int64), np.zeros(count, np.int64), np.full(len(ends), -1)
+    for i in range(len(ends)):
+        first[i] = total
+        a, b = ends[i]
+        for v in reached[: _ways(ends[i], start, edge, far, length, reach, way, waits, queue, reached)]:
+            way[v] = np.inf
+            for j in edge[start[v] : start[v + 1]]:
+                joined = ends[j, 0] == a or ends[j, 0] == b or ends[j, 1] == a or ends[j, 1] == b
+                if noted[j] != i and not joined:
+                    noted[j] = i
+                    if total < len(beside):
+                        beside[total] = j
+                    total += 1
+        if total <= len(beside):
+            beside[first[i] : total].sort()
+    first[len(ends)] = total
+    return total
 
 
 def _welded(subject: Subject, number: int) -> Ints:
@@ -245,7 +282,7 @@ def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
 
 
 def _chains(ids: Ints) -> list[Ints]:
-    """Rows of edges (e, 2) that hang together."""
+    """Rows of edges (e, 2) that are connected, chain by chain."""
     label = _components(ids, int(ids.max(initial=-1)) + 1)
     own = label[ids[:, 0]] if len(ids) else np.zeros(0, np.int64)
     return [np.flatnonzero(own == k) for k in np.unique(own)]

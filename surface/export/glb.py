@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from surface.base.errors import ExportError
+from surface.base.writing import replacing
 from surface.export.animation import Animation
 from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
@@ -59,13 +60,8 @@ def _refuse_angles(pose: Mapping[str, float]) -> None:
 
 def _replace(path: Path, content: bytes) -> None:
     """Write a file whole or not at all."""
-    new = path.with_name(path.name + ".new")
-    try:
-        new.write_bytes(content)
-        new.replace(path)
-    finally:
-        if path.parent.is_dir():
-            new.unlink(missing_ok=True)
+    with replacing(path) as temporary:
+        temporary.write_bytes(content)
 
 
 EXPORTER = Exporter(

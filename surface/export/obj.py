@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,29 +9,34 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.arrays import Floats32
+from surface.base.files import open_file
 from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
 from surface.export.shapes import ExportPart, export_parts, is_posed
 from surface.export.textures import materials
 from surface.head import Head
 
+_OWN = ", written by omote;"
+"""What the first line of every file says behind the name of the head."""
+_TITLE_BYTES = 1000
+
 
 def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """See :func:`surface.export.export_head`."""
-    title = f"# {head.name}, written by omote; millimetres, y up, z forward"
+    title = f"# {head.name}{_OWN} millimetres, y up, z forward"
     return _write_parts(export_parts(head, pose, shapes=not is_posed(head, pose)), path, title)
 
 
 def write_obj_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """As :func:`write_obj`, in axes, origin and unit of the file that the head was fitted to."""
     placement = placement_of(head)
-    title = f"# {head.name}, written by omote; in the frame of its source"
+    title = f"# {head.name}{_OWN} in the frame of its source"
     parts = export_parts(head, pose, shapes=not is_posed(head, pose))
     return _write_parts(in_file(parts, placement), path, title)
 
 
 def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
-    """The OBJ with its materials and its folder of shapes, complete or not at all."""
+    """Write the OBJ with its materials and its folder of shapes; nothing is replaced before all of it is complete."""
     shapes = dict.fromkeys(name for part in parts for name in part.displacements)
     vertices, normals = (np.concatenate([getattr(p, key) for p in parts]) for key in ("vertices", "normals"))
     textures = [f"vt {u:.6f} {v:.6f}" for part in parts for u, v in part.uv.tolist()]
@@ -49,9 +53,30 @@ def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
         for name in shapes:
             moves = np.concatenate([p.displacements.get(name, np.zeros_like(p.vertices)) for p in parts])
             _write(made[2] / f"{name}.obj", [title, *_moved_rows(rows, vertices, moves), *textures, *faces])
-        if shapes and folder.exists():  # everything new is complete: replace the old
-            shutil.rmtree(folder)
-        return [new.replace(path.parent / new.name) for new in made]
+        for new in made[:2]:  # everything is complete: replace the old
+            new.replace(path.parent / new.name)
+        if shapes:
+            _replace_shapes(made[2], folder)
+    return [path, path.with_suffix(".mtl"), *([folder] if shapes else [])]
+
+
+def _replace_shapes(new: Path, folder: Path) -> None:
+    """Move new shapes into their folder, and remove older ones that omote wrote there; other files in it stay."""
+    folder.mkdir(exist_ok=True)
+    for old in folder.glob("*.obj"):
+        if _is_own(old):
+            old.unlink()
+    for shape in new.iterdir():
+        shape.replace(folder / shape.name)
+
+
+def _is_own(path: Path) -> bool:
+    """Whether omote wrote a file, by its first line."""
+    try:
+        with open_file(path) as file:
+            return _OWN.encode() in file.readline(_TITLE_BYTES)
+    except OSError:
+        return False
 
 
 EXPORTER = Exporter(

@@ -12,6 +12,7 @@ from math import cos, sin
 from typing import Any
 
 from surface.base.errors import FitError
+from surface.base.files import DATA_LIMIT
 from surface.readers.gltf import Gltf
 from surface.readers.meshdata import Material, kind_of_picture
 
@@ -23,14 +24,38 @@ _Rows = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 def read_materials(file: Gltf) -> list[Material]:
     """All materials of a file."""
-    return [_material(file, k, _table(table)) for k, table in enumerate(file.items("materials"))]
+    images = _Images(file)
+    return [_material(file, images, k, _table(table)) for k, table in enumerate(file.items("materials"))]
 
 
-def _material(file: Gltf, index: int, table: dict[str, Any]) -> Material:
+class _Images:
+    """The bytes of pictures; a picture of many materials is kept once, and all together take at most ``DATA_LIMIT``."""
+
+    def __init__(self, file: Gltf) -> None:
+        self._file, self._found, self._size = file, dict[tuple[str, Any], bytes](), 0
+
+    def bytes_of(self, source: Any) -> bytes:
+        """The bytes of an image. Raises FitError."""
+        image, where = self._file.item("images", source, "texture"), f"images[{source}]"
+        place = "bufferView" if "bufferView" in image else "uri"
+        value = image.get(place)
+        if not isinstance(value, int | str):
+            raise self._file.error(f"{where}.{place}", "is damaged")
+        if (place, value) not in self._found:
+            read = self._file.view_bytes if place == "bufferView" else self._file.uri_bytes
+            data = read(value, where)
+            self._size += len(data)
+            if self._size > DATA_LIMIT:
+                raise self._file.error(where, f"pictures hold more than {DATA_LIMIT >> 20} MB")
+            self._found[place, value] = data
+        return self._found[place, value]
+
+
+def _material(file: Gltf, images: _Images, index: int, table: dict[str, Any]) -> Material:
     colour, texture = _colour_and_texture(table)
     if not texture and colour == WHITE:
         colour, texture = _vrm_colour_and_texture(file, index)
-    data, mime = _picture(file, texture)
+    data, mime = _picture(file, images, texture)
     alpha, cutoff = str(table.get("alphaMode", "OPAQUE")), _number(table.get("alphaCutoff"), 0.5)
     name = table.get("name")
     return Material(
@@ -82,7 +107,7 @@ def _linear(srgb: float) -> float:
     return float(srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4)
 
 
-def _picture(file: Gltf, texture: dict[str, Any]) -> tuple[bytes | None, str]:
+def _picture(file: Gltf, images: _Images, texture: dict[str, Any]) -> tuple[bytes | None, str]:
     """The encoded texture and its kind. One over the second texture coordinates, which are not read, is left out."""
     moved = _extension(texture, "KHR_texture_transform")
     if not texture or moved.get("texCoord", texture.get("texCoord", 0)) != 0:
@@ -90,7 +115,7 @@ def _picture(file: Gltf, texture: dict[str, Any]) -> tuple[bytes | None, str]:
     try:
         entry = file.item("textures", texture.get("index"), "texture")
         for source in (_extension(entry, "EXT_texture_webp").get("source"), entry.get("source")):
-            data, mime = _image(file, source) if source is not None else (None, "")
+            data, mime = _image(images, source) if source is not None else (None, "")
             if data is not None:
                 return data, mime
     except FitError:
@@ -98,12 +123,9 @@ def _picture(file: Gltf, texture: dict[str, Any]) -> tuple[bytes | None, str]:
     return None, ""
 
 
-def _image(file: Gltf, source: Any) -> tuple[bytes | None, str]:
+def _image(images: _Images, source: Any) -> tuple[bytes | None, str]:
     """The bytes of a picture and its kind; None for a format that cannot be read."""
-    image = file.item("images", source, "texture")
-    where = f"images[{source}]"
-    inside = "bufferView" in image
-    data = file.view_bytes(image["bufferView"], where) if inside else file.uri_bytes(image.get("uri"), where)
+    data = images.bytes_of(source)
     mime = kind_of_picture(data)
     return (data, mime) if mime else (None, "")
 

@@ -16,7 +16,7 @@ from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.readers.gltf import Gltf
 from surface.readers.gltfmaterials import read_materials
-from surface.readers.gltftargets import read_expressions, target_names
+from surface.readers.gltftargets import TargetNames, read_expressions
 from surface.readers.meshdata import Material, MeshData, check_size
 
 WELD = 1e-6  # of the mesh's size: vertices nearer than this are welded
@@ -50,15 +50,15 @@ def read_gltf(path: Path) -> MeshData:
 def _read(file: Gltf) -> MeshData:
     found: list[_Primitive] = []
     total = 0
-    world = _world_matrices(file)
+    world, names = _world_matrices(file), TargetNames(file)
     for index in world:
-        for primitive in _primitives(file, index, world):
+        for primitive in _primitives(file, index, world, names):
             found.append(primitive)
             total += len(primitive.vertices)
             check_size(str(file.path), total, len({n for p in found for n in p.deltas}))
     if not found:
         raise file.error("scene", "holds no triangles", "export the head's mesh, not only its skeleton")
-    return replace(_weld(_join(found, read_materials(file))), expressions=read_expressions(file))
+    return replace(_weld(_join(found, read_materials(file))), expressions=read_expressions(file, names))
 
 
 def _world_matrices(file: Gltf) -> dict[int, Floats]:
@@ -111,7 +111,7 @@ def _numbers(file: Gltf, table: dict[str, Any], key: str, where: str, default: l
     return out
 
 
-def _primitives(file: Gltf, index: int, world: dict[int, Floats]) -> list[_Primitive]:
+def _primitives(file: Gltf, index: int, world: dict[int, Floats], names: TargetNames) -> list[_Primitive]:
     """The primitives of a node's mesh that are made of triangles, in world space."""
     node = file.item("nodes", index, "scene")
     if "mesh" not in node:
@@ -125,8 +125,7 @@ def _primitives(file: Gltf, index: int, world: dict[int, Floats]) -> list[_Primi
         if not isinstance(table, dict):
             raise file.error(at, "is no object")
         if table.get("mode", TRIANGLES) in (TRIANGLES, STRIP, FAN):
-            names = target_names(file, node["mesh"], len(file.value(table, "targets", list, at, [])))
-            out.append(_primitive(file, table, at, name, names, world[index], joints))
+            out.append(_primitive(file, table, at, name, names.of(node["mesh"]), world[index], joints))
     return out
 
 

@@ -7,8 +7,6 @@ damaged in them is left out: the mesh is whole without.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
-from itertools import count as count_from
 from typing import Any
 
 from surface.readers.gltf import Gltf
@@ -17,43 +15,65 @@ from surface.readers.meshdata import Expression
 PERCENT = 0.01  # VRM 0 gives weights in percent
 
 
-def target_names(file: Gltf, index: int, count: int) -> list[str]:
-    """Names of the morph targets of a mesh, at least ``count``: what the file calls them, or their numbers.
+class TargetNames:
+    """Names of the morph targets of a file's meshes: what the file calls them, or their numbers.
 
-    No two are equal: a name that occurs again is numbered.
+    No two of a mesh are equal: a name that occurs again is numbered. The names of a mesh are made once.
     """
-    mesh = _table(file.items("meshes")[index])
-    found = _named(mesh) or next((n for p in _list(mesh.get("primitives")) if (n := _named(_table(p)))), [])
-    prefix = f"mesh{index}_" if _unnamed(file) > 1 else ""
-    every = found + [f"{prefix}target{k}" for k in range(len(found), count)]
-    seen: set[str] = set()
-    for k, name in enumerate(every):
-        numbered = (f"{name} ({n})" for n in count_from(2))
-        every[k] = next(n for n in chain([name], numbered) if n not in seen)
-        seen.add(every[k])
-    return every
+
+    def __init__(self, file: Gltf) -> None:
+        self._meshes = file.items("meshes")
+        self._several = _unnamed(self._meshes) > 1
+        self._made: dict[int, list[str]] = {}
+
+    def of(self, index: int) -> list[str]:
+        """As many names as any primitive of a mesh has targets, or more where the file names more."""
+        if index not in self._made:
+            mesh = _table(self._meshes[index])
+            primitives = [_table(p) for p in _list(mesh.get("primitives"))]
+            found = _named(mesh) or next((n for p in primitives if (n := _named(p))), [])
+            count = max((len(_list(p.get("targets"))) for p in primitives), default=0)
+            prefix = f"mesh{index}_" if self._several else ""
+            self._made[index] = _numbered([*found, *(f"{prefix}target{k}" for k in range(len(found), count))])
+        return self._made[index]
+
+    def __len__(self) -> int:
+        return len(self._meshes)
+
+
+def _numbered(names: list[str]) -> list[str]:
+    """The names, with a number behind each that occurred before."""
+    seen, numbers, out = set[str](), dict[str, int](), list[str]()
+    for name in names:
+        unique, number = name, numbers.get(name, 2)
+        while unique in seen:
+            unique, number = f"{name} ({number})", number + 1
+        numbers[name] = number
+        seen.add(unique)
+        out.append(unique)
+    return out
 
 
 def _named(table: dict[str, Any]) -> list[str]:
     return [str(n) for n in _list(_table(table.get("extras")).get("targetNames"))]
 
 
-def _unnamed(file: Gltf) -> int:
+def _unnamed(meshes: list[Any]) -> int:
     """How many meshes have targets without names: two of them must not be taken for one another."""
     out = 0
-    for mesh in file.items("meshes"):
+    for mesh in meshes:
         primitives = [_table(p) for p in _list(_table(mesh).get("primitives"))]
         named = _named(_table(mesh)) or any(_named(p) for p in primitives)
         out += not named and any(p.get("targets") for p in primitives)
     return out
 
 
-def read_expressions(file: Gltf) -> tuple[Expression, ...]:
+def read_expressions(file: Gltf, names: TargetNames) -> tuple[Expression, ...]:
     """Every expression of a VRM file that moves something; presets go by the names of the specification."""
-    return tuple(e for e in (*_of_vrm_0(file), *_of_vrm_1(file)) if e.binds)
+    return tuple(e for e in (*_of_vrm_0(file, names), *_of_vrm_1(file, names)) if e.binds)
 
 
-def _of_vrm_0(file: Gltf) -> Iterator[Expression]:
+def _of_vrm_0(file: Gltf, names: TargetNames) -> Iterator[Expression]:
     master = _table(_extension(file, "VRM").get("blendShapeMaster"))
     for group in map(_table, _list(master.get("blendShapeGroups"))):
         preset = _text(group.get("presetName")).lower()
@@ -62,10 +82,10 @@ def _of_vrm_0(file: Gltf) -> Iterator[Expression]:
             (b.get("mesh"), b.get("index"), _number(b.get("weight")) * PERCENT)
             for b in map(_table, _list(group.get("binds")))
         ]
-        yield Expression(name, _shapes(file, binds))
+        yield Expression(name, _shapes(names, binds))
 
 
-def _of_vrm_1(file: Gltf) -> Iterator[Expression]:
+def _of_vrm_1(file: Gltf, names: TargetNames) -> Iterator[Expression]:
     expressions, nodes = _table(_extension(file, "VRMC_vrm").get("expressions")), file.items("nodes")
     for group in ("preset", "custom"):
         for name, table in _table(expressions.get(group)).items():
@@ -74,17 +94,17 @@ def _of_vrm_1(file: Gltf) -> Iterator[Expression]:
                 node = bind.get("node")
                 mesh = _table(nodes[node]).get("mesh") if isinstance(node, int) and 0 <= node < len(nodes) else None
                 binds.append((mesh, bind.get("index"), _number(bind.get("weight"))))
-            yield Expression(str(name), _shapes(file, binds))
+            yield Expression(str(name), _shapes(names, binds))
 
 
-def _shapes(file: Gltf, binds: list[tuple[Any, Any, float]]) -> tuple[tuple[str, float], ...]:
+def _shapes(names: TargetNames, binds: list[tuple[Any, Any, float]]) -> tuple[tuple[str, float], ...]:
     """Names of shapes and weights of (mesh, target, weight); a shape that several meshes share counts once."""
     out: dict[str, float] = {}
     for mesh, index, weight in binds:
-        if isinstance(mesh, int) and isinstance(index, int) and 0 <= mesh < len(file.items("meshes")):
-            names = target_names(file, mesh, index + 1) if 0 <= index < 10_000 else []
-            if names and weight:
-                out[names[index]] = max(out.get(names[index], 0.0), weight, key=abs)
+        if isinstance(mesh, int) and isinstance(index, int) and 0 <= mesh < len(names):
+            found = names.of(mesh)
+            if 0 <= index < len(found) and weight:
+                out[found[index]] = max(out.get(found[index], 0.0), weight, key=abs)
     return tuple(out.items())
 
 

@@ -28,6 +28,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from surface.base.files import parse_json, read_json
+from surface.base.writing import replacing
 from surface.dcp import DCPSurface
 from surface.mesh.domain import Domain, Slit
 
@@ -146,14 +147,15 @@ def _numbers(here: Location, value: Any, count: int | None = None) -> list[float
 
 
 def write_surfaces(path: str | os.PathLike[str], surfaces: Sequence[NamedSurface]) -> None:
-    """Write surfaces; reading them back gives the same numbers.
+    """Write surfaces, whole or not at all; reading them back gives the same numbers.
 
-    Raises SurfaceFileError: if the file cannot be written.
+    Raises SurfaceFileError: if the file cannot be written; one that was there stays as it was.
     """
     table = {"format": FORMAT, "version": VERSION, "surfaces": [_row(item) for item in surfaces]}
     text = json.dumps(table, allow_nan=False).replace('{"position"', '\n{"position"')
     try:
-        Path(path).write_text(text + "\n", encoding="utf-8")
+        with replacing(Path(path)) as temporary:
+            temporary.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
         raise Location(Path(path)).error(f"cannot be written: {error.strerror}", hint="choose another place") from error
 

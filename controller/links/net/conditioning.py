@@ -10,7 +10,7 @@ import numpy as np
 from controller.base.errors import ControllerError
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.formats.frame import Frame
-from controller.links.net.neutral import Neutral, Ranges, load_state, save_state
+from controller.links.net.neutral import MOST, Neutral, Ranges, load_state, save_state
 from controller.links.net.one_euro import OneEuro
 from controller.links.net.settings import NetSettings
 
@@ -31,6 +31,7 @@ class Conditioning:
     def __init__(self, settings: NetSettings, parameters: Parameters, path: Path | None = None) -> None:
         self._settings, self._parameters, self._path = settings, parameters, path
         self._low, self._high, self._rest = parameters.low, parameters.high, parameters.rest
+        self._reach = np.maximum(self._high - self._rest, self._rest - self._low)
         self._mirrored = _mirror(parameters) if settings.mirror else None
         self._looks = np.array([i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")])
         self._angles = np.array([i for i, name in enumerate(parameters.names) if _is_eye_angle(name)])
@@ -45,7 +46,7 @@ class Conditioning:
 
     def apply(self, frame: Frame, now_s: float) -> tuple[Floats, Flags]:
         """Values (P,) in range, and which of them the layer gets."""
-        values, mask = np.where(frame.mask, frame.values - self._rest, 0.0), frame.mask
+        values, mask = np.where(frame.mask, self._shares(frame.values), 0.0), frame.mask
         if self._mirrored is not None:
             swap, sign = self._mirrored
             values, mask = values[swap] * sign, mask[swap]
@@ -56,7 +57,15 @@ class Conditioning:
             values = self._ranges.apply(values, now_s)
         if self._filter is not None:
             values = self._filter(values, now_s)
-        return np.clip(self._rest + values * self._gain, self._low, self._high), mask
+        return np.clip(self._rest + values * self._reach * self._gain, self._low, self._high), mask
+
+    def _shares(self, values: Floats) -> Floats:
+        """Values as shares of the way from rest to the farther end of the range; see the module of the neutral face.
+
+        One message with a huge number would otherwise stay in the filter for minutes, and in what is kept for ever.
+        """
+        beyond = MOST * self._reach
+        return np.clip(values - self._rest, -beyond, beyond) / self._reach
 
     def reset(self) -> None:
         """The source fell silent: do not smooth across the gap."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from pathlib import Path
 
 from controller.base.errors import LinkError
 from controller.base.parameters import did_you_mean
@@ -68,7 +69,7 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
         address, connect=settings.connect is not None, baud=settings.baud, gate=gate, greeting=greeting
     )
     learns = settings.calibrate != "off" or settings.ranges
-    path = state_file(f"{settings.form.kind}-{settings.source or settings.layer}") if learns else None
+    path = _learned_file(settings, getattr(context.sink, "name", "")) if learns else None
     try:
         incoming = Incoming(settings, receiver, context.sink, name, path, gate)
     except BaseException:
@@ -76,6 +77,13 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
         raise
     context.closers.callback(incoming.stop)
     return incoming
+
+
+def _learned_file(settings: NetSettings, head: str) -> Path:
+    """Where the face of a source is kept: by the source where only one is taken, else by the head, where heads have
+    names, and the layer."""
+    of = settings.source or "-".join(filter(None, (head, settings.layer)))
+    return state_file(f"{settings.form.kind}-{of}")
 
 
 def _open_outgoing(

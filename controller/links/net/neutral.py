@@ -1,12 +1,15 @@
 """What a link learns of a person and keeps: the neutral face, and how far each parameter goes.
 
-A file in the user's state folder holds both, as JSON with parameters by name.
+Values are shares of the way from a parameter's rest to the farther end of its range, -1 to 1; sources may send more. A
+file in the user's state folder holds both, as JSON with parameters by name.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import re
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +20,8 @@ from controller.base.parameters import Flags, Floats, Parameters
 from controller.links.access import state_folder
 from surface.base import files
 
+MOST = 2.0
+"""Shares are kept from -2 to 2; beyond is what no source means."""
 STILL_S = 2.0
 """How long a face must be still to be taken as neutral."""
 _STILL = 0.03  # most that a parameter varies meanwhile
@@ -24,25 +29,32 @@ _LEARN_S = 10.0  # until what was seen of the ranges counts wholly
 _LEAST_RANGE = 0.5  # smaller ones are not widened further
 _FORMAT = 1
 _MOST_BYTES = 100_000
+_LONGEST_NAME = 100
 
 
 def state_file(name: str) -> Path:
-    """The file of a link's name, of which any character may be foreign to file names."""
-    return state_folder() / "links" / f"{re.sub(r'[^A-Za-z0-9.-]+', '_', name)[:100]}.json"
+    """The file of a link's name, of which any character may be foreign to file names.
+
+    Names in other alphabets, and long ones, keep apart by a checksum.
+    """
+    plain = re.sub(r"[^A-Za-z0-9.-]+", "_", name)
+    if not name.isascii() or len(plain) > _LONGEST_NAME:
+        plain = f"{plain[:_LONGEST_NAME]}-{zlib.crc32(name.encode(errors='surrogatepass')):08x}"
+    return state_folder() / "links" / f"{plain}.json"
 
 
 class Neutral:
     """The neutral face of a source: learned in the first two seconds in which it is still.
 
-    values : (P,) float64, what the source sends for a neutral face; zero until it is known.
+    values : (P,) float64 shares that the source sends for a neutral face; zero until it is known.
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self.values = parameters.neutral()
+        self.values = np.zeros(len(parameters))
         self.known = False
-        self._signed = parameters.low < 0.0
+        self._signed = parameters.low < parameters.rest
         self._since_s = 0.0
-        self._low = self._high = self._sum = parameters.neutral()
+        self._low = self._high = self._sum = self.values
         self._count = 0
 
     def learn(self, values: Floats, now_s: float) -> bool:
@@ -72,7 +84,7 @@ class Ranges:
     """
 
     def __init__(self, parameters: Parameters) -> None:
-        self.top = parameters.neutral()
+        self.top = np.zeros(len(parameters))
         self.seen_s = 0.0
         self._last_s: float | None = None
 
@@ -89,11 +101,11 @@ class Ranges:
 
 
 def load_state(path: Path, parameters: Parameters, neutral: Neutral, ranges: Ranges) -> None:
-    """Read what was kept; nothing where there is no file.
+    """Read what was kept; nothing where there is no file, or none that may be seen.
 
     Raises LinkError: the file is damaged, or of a newer omote.
     """
-    if not path.exists():
+    if not os.path.exists(path):  # false, too, in a folder that is somebody else's
         return
     with files.reading(path, LinkError, hint=f"delete it: rm {path}"):
         table = files.read_json(path, _MOST_BYTES)
@@ -120,10 +132,10 @@ def save_state(path: Path, parameters: Parameters, neutral: Neutral, ranges: Ran
 
 def _read(table: dict[str, object], parameters: Parameters) -> tuple[Floats, Flags]:
     """Values by position, and which there are. Raises ValueError: one is no number."""
-    values, mask = parameters.neutral(), np.zeros(len(parameters), dtype=bool)
+    values, mask = np.zeros(len(parameters)), np.zeros(len(parameters), dtype=bool)
     for name, value in table.items():
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not -2.0 <= value <= 2.0:
-            raise ValueError(f"{name}: must be a number from -2 to 2")
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not -MOST <= value <= MOST:
+            raise ValueError(f"{name}: must be a number from {-MOST:g} to {MOST:g}")
         at = parameters.find(name)
         if at is not None:
             values[at], mask[at] = value, True

@@ -116,7 +116,7 @@ def _open(settings: Ros2Settings, beside: Path | None) -> zenoh.Session:
     with importing("a link to ROS 2", "zenoh"):
         import zenoh  # optional: the extra ros2
     zenoh.init_log_from_env_or("error")
-    config = zenoh.Config() if settings.config is None else zenoh.Config.from_file(str(_file(settings.config, beside)))
+    config = zenoh.Config() if settings.config is None else _read_config(settings.config, beside)
     entries: dict[str, object] = {
         "mode": "client", "connect/endpoints": [settings.connect], "connect/timeout_ms": CONNECT_MS,
         "scouting/multicast/enabled": False, "timestamping/enabled": False,
@@ -130,8 +130,15 @@ def _open(settings: Ros2Settings, beside: Path | None) -> zenoh.Session:
         raise LinkError(f"ros2 {settings.connect}: {why}", hint=_HINT) from error
 
 
-def _file(name: str, beside: Path | None) -> Path:
+def _read_config(name: str, beside: Path | None) -> zenoh.Config:
+    """Zenoh's own settings from a file, relative to the stage. Raises LinkError."""
+    import zenoh  # optional: the extra ros2
+
     path = (beside.parent if beside is not None else Path()) / name
-    if not os.access(path, os.R_OK):
-        raise LinkError(f"ros2 config: {path} cannot be read", hint=f"look at: ls -l {path}")
-    return path
+    if not os.access(path, os.R_OK) or not path.is_file():
+        raise LinkError(f"ros2 config: {path} cannot be read as a file", hint=f"look at: ls -l {path}")
+    try:
+        return zenoh.Config.from_file(str(path))
+    except zenoh.ZError as error:
+        why = str(error).rpartition(" at /")[0] or str(error)  # a place in Zenoh's own source comes last
+        raise LinkError(f"ros2 config {path}: {why.strip()}", hint="correct it, or leave config out") from error

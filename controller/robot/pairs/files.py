@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,13 +71,17 @@ def read_pairs(path: Path, robot: RobotSettings, parameters: Parameters) -> Pair
 
 
 def _column_faults(head: list[str], channels: set[str], parameters: Parameters) -> Iterator[str]:
+    counts, first = Counter(head), dict[int, str]()
     for name in head:
+        at = parameters.find(name)
         if name.startswith(PREFIX) and name.removeprefix(PREFIX) not in channels:
             yield f"column {name!r}: the robot has no channel of that name"
-        elif not name.startswith(PREFIX) and name.lower() != "time" and parameters.find(name) is None:
+        elif not name.startswith(PREFIX) and name.lower() != "time" and at is None:
             yield f"column {name!r}: is no parameter, and no {PREFIX}NAME of a channel"
-        if head.count(name) > 1:
+        if counts[name] > 1:
             yield f"column {name!r}: stands there twice"
+        elif at is not None and first.setdefault(at, name) != name:
+            yield f"column {name!r}: is the same parameter as column {first[at]!r}"
     if not any(name.startswith(PREFIX) for name in head):
         yield f"there is no column {PREFIX}NAME with the angles of a channel (degrees)"
 

@@ -112,7 +112,7 @@ def _answers(record: TrafficRecord) -> dict[bytes, list[Answers]]:
     reader, last_s = frame_reader(record.wire), 0.0
     open_answer: Answers = []
     for piece in record.pieces:
-        for sent, data in _told_apart(piece, reader):
+        for sent, data in _requests_and_answers(piece, reader):
             if sent:
                 open_answer = []
                 found[data].append(open_answer)
@@ -124,8 +124,8 @@ def _answers(record: TrafficRecord) -> dict[bytes, list[Answers]]:
     return dict(found)
 
 
-def _told_apart(piece: Piece, reader: FrameReader[Any] | None) -> list[tuple[bool, bytes]]:
-    """Requests of a piece one by one, or an answer as it came."""
+def _requests_and_answers(piece: Piece, reader: FrameReader[Any] | None) -> list[tuple[bool, bytes]]:
+    """(sent by the host, bytes) of each request in a piece of the record, or of the answer that the piece is."""
     if piece.sent is False:
         return [(False, piece.data)]
     if piece.sent is True:

@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 
+AT_ONCE = 100
+"""Commands carried out at a time, beyond those of a whole round."""
+
 
 class Timeline:
     """Command lines (``drivers.sim.serving.control``) with the seconds after which each is carried out.
@@ -28,8 +31,10 @@ class Timeline:
         return self._start_s + self.steps[self._next][0]
 
     def advance(self, now_s: float, carry_out: Callable[[str], object]) -> None:
-        """Carry out what is due."""
-        while self.due_s <= now_s:
+        """Carry out what is due; of a loop that is behind, some rounds, so that the caller's other work goes on."""
+        for _ in range(len(self.steps) + AT_ONCE):
+            if self.due_s > now_s:
+                return
             line = self.steps[self._next][1]
             self._next += 1
             if self._next == len(self.steps) and self.loop_s:

@@ -18,6 +18,7 @@ from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM,
 from drivers.sim.servos.drive_y import YDrive
 from drivers.sim.servos.plant import NO_STOPS, Plant, Skin
 from drivers.sim.servos.registers import Change, Registers
+from drivers.sim.wire.faults import LONGEST
 from drivers.tables.models import check_driven
 from drivers.tables.tables import load_table
 
@@ -186,7 +187,12 @@ class ServoState:
         return self.registers.get(name)
 
     def place(self, position: float, now_s: float) -> None:
-        """Move the limp shaft by hand to a Present Position. Raises ValueError: the motor is on and holds the shaft."""
+        """Move the limp shaft by hand to a Present Position.
+
+        Raises ValueError: the motor is on and holds the shaft, or the position is further away than servos count.
+        """
+        if not abs(position) <= LONGEST:
+            raise ValueError(f"servo {self.id}: positions go from {-LONGEST:.0f} to {LONGEST:.0f} steps")
         if self.plant.powered:
             raise ValueError(f"servo {self.id} holds its shaft: switch its torque off before moving it by hand")
         self.plant.place(now_s, self.drive.to_shaft(round(position)))

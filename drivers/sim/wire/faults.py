@@ -26,6 +26,7 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 from drivers.base.errors import DriverError
+from drivers.packets.packet import MAX_ID
 
 LONGEST = 1e9
 """No time and no number of steps is larger."""
@@ -194,11 +195,14 @@ def _parse_ids(spec: str, text: str) -> frozenset[int] | None:
     for part in text.split(","):
         first, _, last = part.partition("-")
         try:
-            ids.update(range(int(first), int(last or first) + 1))
+            ends = int(first), int(last or first)
         except ValueError:
             raise _bad(spec, f"{part!r} is not an id, a range 1-5 or *") from None
-    if not ids or min(ids) < 0 or max(ids) > 252:
-        raise _bad(spec, f"ids {text!r} must be 0 to 252")
+        if ends[0] < 0 or ends[1] > MAX_ID:
+            raise _bad(spec, f"ids {text!r} must be 0 to {MAX_ID}")
+        ids.update(range(ends[0], ends[1] + 1))
+    if not ids:
+        raise _bad(spec, f"{text!r} names no id: a range begins with its lower end")
     return frozenset(ids)
 
 

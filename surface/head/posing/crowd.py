@@ -102,8 +102,8 @@ class Crowd:
             crowd.part.show(crowd.vertices[k], crowd.normals[k])
 
     def _place(self, k: int, pose: Pose, moved: Mapping[str, Floats]) -> Callable[[], None]:
-        """Place the control points of head k, of which groups have ``moved`` those of deforming parts; returns what
-        turns and sews it when vertices are computed."""
+        """Place the control points of head k, of which groups have ``moved`` those of deforming parts; returns
+        a function that turns it and closes its seams once the vertices are computed."""
         rows, turn = self.head.place_pose(pose, moved)
         for crowd, points in zip(self.parts, rows, strict=True):
             if crowd.batch is not None:

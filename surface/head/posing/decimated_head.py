@@ -56,7 +56,8 @@ class DecimatedHead:
 
     The head itself keeps its pose; changes to its rigs' points at rest are seen.
 
-    parts : the head's, in the order of their vertices here; as an attribute who has which of them.
+    parts : parts of the head, in the order of their vertices here; the attribute of this name says which vertices each
+        part has.
     level : "full" or "fast"; a part without decimated triangles keeps all.
     wanted : other vertices to pose, by part.
     vertices, normals : (m, 3) float32, as posed last.

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from surface.base import writing
 from surface.base.errors import ViewError
 from surface.base.extras import importing
 
@@ -27,24 +26,16 @@ def as_image(pixels: np.ndarray) -> Image:
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path beside `path` to write to; moved to `path` on success, removed on failure.
+    """A temporary path to write to; moved to `path` on success, removed on failure; see
+    :func:`surface.base.writing.replacing`.
 
     Raises ViewError: the folder is missing or cannot be written.
     """
     if not path.parent.is_dir():
         raise ViewError(f"cannot write {path}: there is no folder {path.parent}", hint=f"mkdir -p {path.parent}")
     try:
-        handle, name = tempfile.mkstemp(prefix=".", suffix=path.suffix, dir=path.parent)
-        os.close(handle)
+        with writing.replacing(path) as temporary:
+            yield temporary
     except OSError as error:
-        raise ViewError(f"cannot write {path}: {error.strerror}", hint="choose another folder with -o") from error
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(0o644)
-        temporary.replace(path)
-    except OSError as error:
-        hint = "check the free space and the folder's rights"
+        hint = "check the free space and the folder's rights, or choose another folder with -o"
         raise ViewError(f"cannot write {path}: {error.strerror or error}", hint=hint) from error
-    finally:
-        temporary.unlink(missing_ok=True)

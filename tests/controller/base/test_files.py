@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 from pathlib import Path
 
@@ -61,3 +62,22 @@ def test_a_new_file_has_the_permissions_that_programs_usually_give(tmp_path: Pat
     finally:
         os.umask(before)
     assert (tmp_path / "a.json").stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes of POSIX")
+def test_a_report_for_a_pipe_or_a_device_does_not_replace_it(tmp_path: Path) -> None:
+    target = tmp_path / "report.json"
+    os.mkfifo(target)
+    reading = os.open(target, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        with replacing(target) as path:
+            path.write_text("1")
+        assert target.is_fifo() and os.read(reading, 10) == b"1"
+    finally:
+        os.close(reading)
+
+
+def test_a_full_disk_is_named_with_what_to_do(tmp_path: Path) -> None:
+    with pytest.raises(ControllerError, match="No space left") as caught, replacing(tmp_path / "a.json"):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    assert "df -h" in caught.value.hint and not list(tmp_path.iterdir())

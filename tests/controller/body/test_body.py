@@ -511,3 +511,25 @@ def test_a_show_that_failed_too_often_is_refused(tmp_path: Path) -> None:
             part.fail(ValueError("no"), time.monotonic())
         with pytest.raises(ConfigError, match="show act failed too often and is switched off: ValueError: no"):
             shows.start("act")
+
+
+@pytest.mark.parametrize("request_", [messages.PlayTake(Path("a.plugin")), messages.AskDetails()])
+def test_an_error_in_a_request_of_the_panel_ends_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture, request_: object
+) -> None:
+    """Readers of takes come from other packages, too, and may raise anything."""
+
+    def fails(*_: object) -> None:
+        raise ZeroDivisionError("of another package")
+
+    monkeypatch.setattr("controller.body.body.load_take", fails)
+    ours, theirs = multiprocessing.Pipe()
+    with running(stage_of(tmp_path)) as (body, _):
+        monkeypatch.setattr(body.state, "overview", fails)
+        ours.send(request_)
+        assert _handle(body, theirs) is True
+        assert f"panel: {type(request_).__name__} failed: ZeroDivisionError: of another package" in caplog.text
+        if isinstance(request_, messages.AskDetails):
+            assert ours.poll(5.0) and ours.recv() == messages.Details()
+        ours.send(messages.Stop())
+        assert _handle(body, theirs) is False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -406,3 +407,19 @@ def test_a_command_that_resembles_none_is_refused(omote: Omote) -> None:
 )
 def test_the_web_panel_has_an_address_where_none_is_given(words: str, wanted: str) -> None:
     assert module.with_web_address(["omote", *words.split()]) == ["omote", *wanted.split()]
+
+
+@pytest.mark.parametrize("number", [errno.EACCES, errno.ENAMETOOLONG, errno.EROFS])
+def test_a_file_that_may_not_be_used_is_no_fault_of_omote(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], number: int
+) -> None:
+    def app() -> None:
+        raise OSError(number, os.strerror(number), "/home/other/head.toml")
+
+    monkeypatch.delenv("OMOTE_DEBUG", raising=False)
+    monkeypatch.setattr(module, "make_app", lambda *_: app)
+    with pytest.raises(SystemExit) as ended:
+        main()
+    said = capsys.readouterr().err
+    assert ended.value.code == 1 and "fault in omote" not in said
+    assert f"error: /home/other/head.toml: {os.strerror(number)}\ntry: look at: ls -ld /home/other/head.toml" in said

@@ -42,6 +42,8 @@ def test_a_timeline_is_read_and_described(tmp_path: Path) -> None:
         ("1 clear mood", "there is no fault 'mood'"),
         ("1 place 3", "write fault SPEC"),
         ("1 place x 3", "write fault SPEC"),
+        ("1 place 1 99999999999", "positions go from"),
+        ("1 fault mute:0-99999999999", "must be 0 to 252"),
         ("1 servos", "write fault SPEC"),
         ("-1 clear", "begins with a time|times must rise"),
         ("nan clear", "begins with a time"),

@@ -44,6 +44,30 @@ def test_what_the_file_does_not_name_stays(ranges: Path) -> None:
     np.testing.assert_allclose(retarget(values, low, high, P)[:, same], values[:, same])
 
 
+def test_parameters_of_ones_own_go_through_ranges_of_their_own(tmp_path: Path) -> None:
+    file, ranges = tmp_path / "ears.toml", tmp_path / "me.toml"
+    limits = "response_s = 0.1\nmax_speed = 9\nmax_acceleration = 90\n"
+    text = "".join(
+        f'[parameters.{name}]\nregion = "head"\nrange = {ends}\nrest = {ends[0]}\n{limits}'
+        for name, ends in (
+            ("earUp", [0.0, 0.5]),
+            ("earTurn", [-2.0, 3.0]),
+            ("earTilt", [-3.0, -1.0]),
+            ("glow", [2.0, 5.0]),
+        )
+    )
+    file.write_text(text)
+    own = P.with_files([file])
+    at = [own.index(name) for name in ("earUp", "earTurn", "earTilt", "glow")]
+    values = np.zeros((3, len(own)))
+    values[:, at] = [(0.0, -2.0, -3.0, 2.0), (0.2, -1.0, -2.0, 3.0), (0.5, 3.0, -1.0, 5.0)]
+    ranges.write_text("[ranges]\njawOpen = [0, 0.5]\n")
+    np.testing.assert_allclose(retarget(values, *load_ranges(ranges, own), own)[:, at], values[:, at])
+    ranges.write_text("[ranges]\nearUp = [0, 0.25]\nearTurn = [-1, 1.5]\nearTilt = [-2, -1]\nglow = [2, 3.5]\n")
+    wanted = [(0.0, -1.0, -2.0, 2.0), (0.1, -0.5, -1.5, 2.5), (0.25, 1.5, -1.0, 3.5)]
+    np.testing.assert_allclose(retarget(values, *load_ranges(ranges, own), own)[:, at], wanted)
+
+
 def test_omote_convert_takes_ranges(ranges: Path, tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text("time,jawOpen,mouthSmileLeft\n0,0,1\n1,1,0.5\n")
     convert(tmp_path / "a.csv", tmp_path / "b.csv", P, ranges=ranges)
@@ -58,8 +82,9 @@ def test_omote_convert_takes_ranges(ranges: Path, tmp_path: Path) -> None:
     [
         ("", "ranges: missing"),
         ("[ranges]\njawOpn = [0, 1]", "ranges.jawOpn: unknown parameter, did you mean 'jawOpen'"),
-        ("[ranges]\njawOpen = [0, 2]", "less than or equal to 1"),
-        ("[ranges]\njawOpen = [-0.5, 1]", "ranges.jawOpen: begins at 0 or higher"),
+        ("[ranges]\njawOpen = [0, 2]", "ranges.jawOpen: must lie in the range of the parameter, 0 to 1"),
+        ("[ranges]\njawOpen = [-0.5, 1]", "ranges.jawOpen: must lie in the range of the parameter, 0 to 1"),
+        ("[ranges]\njawOpen = [0, inf]", "finite"),
         ("[ranges]\nheadYaw = [0.1, 1]", "ranges.headYaw: an angle goes from 0 or less"),
     ],
 )

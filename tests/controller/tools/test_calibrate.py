@@ -7,6 +7,7 @@ import itertools
 import os
 import re
 import resource
+import signal
 import subprocess
 import sys
 import time
@@ -263,7 +264,11 @@ class Servos:
 
 
 def calibrated(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, keys: list[list[str]], **changes: Any
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    keys: list[list[str]],
+    read_keys: Callable[[float], list[str]] | None = None,
+    **changes: Any,
 ) -> tuple[bool, Servos, list[Any], str]:
     """Run a calibration of jaw and brow, of two servos on one bus; keys come a round at a time, then q and y."""
     text = ROBOT.format(port="/dev/none")
@@ -278,12 +283,12 @@ def calibrated(
         opened.append((kind, specs, options))
         return servos
 
-    def read_keys(wait_s: float) -> list[str]:
+    def read_next(wait_s: float) -> list[str]:
         assert wait_s == 0.03
         return next(left, ["q", "y"])
 
     monkeypatch.setattr(module, "open_bus", open_bus)
-    monkeypatch.setattr(module, "keyboard", lambda: nullcontext(read_keys))
+    monkeypatch.setattr(module, "keyboard", lambda: nullcontext(read_keys or read_next))
     out = io.StringIO()
     console = Console(file=out, force_terminal=True, width=140)
     target = tmp_path / "c.toml"
@@ -397,3 +402,88 @@ def test_what_was_captured_stays_where_it_cannot_be_saved_until_it_can(
     assert "not saved: " in shown and "saved 1 channels" in shown and written
     assert tomllib.loads((tmp_path / "c.toml").read_text())["channels"]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["c.toml", "pair.toml"]
+
+
+OLD = """
+name = "desk"
+robot = "{robot}"
+[channels.jaw]
+min_deg = -1
+neutral_deg = 0
+max_deg = 1
+[channels.brow]
+min_deg = -7
+neutral_deg = 0
+max_deg = 7
+[channels.gone]
+min_deg = -7
+neutral_deg = 0
+max_deg = 7
+"""
+
+
+def moved_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The jaw is at -10, 3 and 20 degrees, in turn, and then rests."""
+    angles, read = iter([-10.0, 3.0, 20.0]), Servos.read
+
+    def moving(servos: Servos) -> SimpleNamespace:
+        servos.angle_deg = np.array([next(angles, 3.0), 3.0])
+        return read(servos)
+
+    monkeypatch.setattr(Servos, "read", moving)
+
+
+@pytest.mark.parametrize(("robot", "kept"), [("pair", {"jaw", "brow"}), ("another", {"jaw"})])
+def test_channels_that_are_not_captured_again_stay_in_the_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, robot: str, kept: set[str]
+) -> None:
+    """Of this robot, that is, and channels that it still has."""
+    (tmp_path / "c.toml").write_text(OLD.format(robot=robot))
+    moved_by_hand(monkeypatch)
+    written, _, _, shown = calibrated(monkeypatch, tmp_path, [["["], ["n"], ["]"], ["s"], ["y"], []])
+    found = tomllib.loads((tmp_path / "c.toml").read_text())
+    assert written and set(found["channels"]) == kept and found["robot"] == "pair"
+    assert found["channels"]["jaw"]["max_deg"] == pytest.approx(20)
+    assert ("in which 1 other channels stay?" in shown) == (len(kept) == 2)
+
+
+@pytest.mark.parametrize("end", ["SIGHUP", "SIGINT", "closed terminal"])
+def test_what_was_captured_and_not_saved_is_not_lost_when_it_is_ended(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, end: str
+) -> None:
+    (tmp_path / "c.unsaved.calibration.toml").write_text("of another time")
+    moved_by_hand(monkeypatch)
+    rounds = iter([["["], ["n"], ["]"]])
+
+    def read_keys(_: float) -> list[str]:
+        if (keys := next(rounds, None)) is not None:
+            return keys
+        if end == "closed terminal":
+            raise ControllerError("the terminal was closed")
+        os.kill(os.getpid(), getattr(signal, end))
+        return []
+
+    ending = pytest.raises(ControllerError) if end == "closed terminal" else nullcontext()
+    with ending:
+        _, servos, _, shown = calibrated(monkeypatch, tmp_path, [], read_keys=read_keys)
+        assert "c.unsaved1.calibration.toml" in shown and servos.asked == ["closed"]
+    found = tomllib.loads((tmp_path / "c.unsaved1.calibration.toml").read_text())
+    assert found["channels"] == {"jaw": pytest.approx({"min_deg": -10, "neutral_deg": 3, "max_deg": 20})}
+    assert not (tmp_path / "c.toml").exists()
+
+
+def test_a_terminal_that_was_closed_is_an_error_and_no_endless_loop() -> None:
+    master, slave = os.openpty()
+    try:
+        with pytest.raises(ControllerError, match="the terminal was closed"), keyboard(slave) as read_keys:
+            os.close(master)
+            read_keys(5.0)
+    finally:
+        with suppress(OSError):
+            os.close(slave)
+
+
+def test_without_standard_input_keys_cannot_be_read(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdin", None)
+    with pytest.raises(ControllerError, match="only be read from a terminal"):
+        keyboard().__enter__()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import FrozenInstanceError
 from pathlib import Path
+from time import process_time
 
 import pytest
 
@@ -48,3 +49,24 @@ def test_faults_of_all_files_are_told_at_once(tmp_path: Path) -> None:
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         object.__new__(Expression).anything = 1
+
+
+def test_expressions_that_all_mix_each_other_are_refused_at_once(tmp_path: Path) -> None:
+    """160 kB of circles; without a limit to those that are looked for, this takes minutes."""
+    names, file = [f"e{i}" for i in range(160)], tmp_path / "circles.toml"
+    mixed = ", ".join(f"{name} = 1" for name in names)
+    file.write_text("".join(f"[{name}]\nof = {{ {mixed} }}\n" for name in names))
+    begin_s = process_time()
+    with pytest.raises(ConfigError, match="goes in a circle"):
+        read_expressions(P, (file,))
+    assert process_time() - begin_s < 5.0
+
+
+def test_ten_thousand_unknown_names_are_refused_at_once(tmp_path: Path) -> None:
+    """Only the first faults are listed, so only theirs get a suggestion, which takes half a millisecond each."""
+    file = tmp_path / "names.toml"
+    file.write_text("[a]\nweights = { " + ", ".join(f"jawOpem{i} = 1" for i in range(20_000)) + " }\n")
+    begin_s = process_time()
+    with pytest.raises(ConfigError, match=r"20000 faults\n.*jawOpem0: unknown parameter, did you mean 'jawOpen'"):
+        read_expressions(P, (file,))
+    assert process_time() - begin_s < 4.0

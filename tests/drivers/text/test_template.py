@@ -40,6 +40,8 @@ def test_values_are_put_in(text: str, line: str) -> None:
         ("{}", "unknown placeholder {}"),
         ("#{ch", "expected '}'"),
         ("{us!r}", "cannot have the format '!r'"),
+        ("{us:900000000d}", "cannot have the format '900000000d'"),
+        ("{us:0100d}", "cannot have the format '0100d'"),
         ("{us:x}", "cannot have the format 'x'"),
         ("{us:.2d}", "cannot have the format '.2d'"),
         ("{us:{ch}}", "cannot have the format"),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import combinations, pairwise
+from time import process_time
 
 import numpy as np
 import pytest
@@ -303,3 +304,22 @@ def test_where_the_skin_of_a_mesh_ends_is_a_warning() -> None:
         head = plain.subject(plain.part("face", points, faces), lobe, eyes=ABOVE)
         found = list(borders.holes(head, None, Places(head, None), borders.find_borders(head)))
         assert [f.warning for f in found] == [warned] * len(found) and len(found) == 1 + warned
+
+
+def test_borders_of_many_short_edges_take_no_time() -> None:
+    """Ways along them are not enumerated: where every vertex has an edge to every other one there are thousands of
+    millions, and a line has as many as pairs of edges."""
+    tangle, line = np.array(list(combinations(range(9), 2))), np.column_stack([np.arange(2000), np.arange(1, 2001)])
+    begin_s = process_time()
+    first, beside = borders._beside(tangle, np.full(len(tangle), 0.01), 1.0)
+    rows = [set(beside[a:b].tolist()) for a, b in pairwise(first)]
+    assert all({j for j, other in enumerate(tangle) if not set(other) & set(own)} == row
+               for own, row in zip(tangle, rows, strict=True))  # fmt: skip
+    first, beside = borders._beside(line, np.full(len(line), 1e-4), 1.0)
+    assert len(beside) == 2000 * 1999 - 2 * 1999
+    assert process_time() - begin_s < 30.0  # a new machine compiles it first
+
+
+def test_without_borders_nothing_is_beside_anything() -> None:
+    first, beside = borders._beside(np.zeros((0, 2), np.int64), np.zeros(0), 1.0)
+    assert first.tolist() == [0] and not len(beside)

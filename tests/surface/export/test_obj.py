@@ -58,12 +58,18 @@ def test_every_shape_is_a_file_with_the_same_faces(tmp_path, head):
         assert not lines(file, "vn") and not lines(file, "mtllib")
 
 
-def test_old_shapes_are_replaced_and_nothing_else_is_left(tmp_path, head):
-    (tmp_path / "h_shapes").mkdir()
-    (tmp_path / "h_shapes" / "old.obj").write_text("old")
+def test_old_shapes_are_replaced_and_other_files_stay(tmp_path, head):
     (tmp_path / "other.txt").write_text("stays")
     export_head(head, tmp_path / "h.obj")
-    assert not (tmp_path / "h_shapes" / "old.obj").exists()
+    shapes = tmp_path / "h_shapes"
+    (shapes / "jawOpen.obj").rename(shapes / "older.obj")  # a shape that the head had when it was exported before
+    (shapes / "mine.obj").write_text("# sculpted by hand\n")
+    (shapes / "notes.txt").write_text("what is left to do")
+    (shapes / "mine").mkdir()
+    export_head(head, tmp_path / "h.obj")
+    wanted = ["jawForward.obj", "jawOpen.obj", "mine", "mine.obj", "mouthPucker.obj", "notes.txt"]
+    assert sorted(p.name for p in shapes.iterdir()) == wanted
+    assert (shapes / "mine.obj").read_text() == "# sculpted by hand\n"
     assert sorted(p.name for p in tmp_path.iterdir()) == ["h.mtl", "h.obj", "h_shapes", "other.txt"]
 
 

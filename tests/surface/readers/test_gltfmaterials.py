@@ -107,3 +107,29 @@ def test_a_picture_outside_the_folder_is_not_opened(tmp_path):
     (tmp_path / "secret.png").write_bytes(PNG)
     found = read(tmp_path / "in", builder)
     assert found is not None and found.texture is None
+
+
+def test_a_picture_of_many_materials_is_kept_once(tmp_path):
+    """Ten thousand materials that share a picture of 20 MB would take 200 GB."""
+    table = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+    builder = coloured(table, PNG)
+    builder.document["materials"] = [table] * 3
+    primitive = builder.document["meshes"][0]["primitives"][0]
+    builder.document["meshes"][0]["primitives"] = [{**primitive, "material": k} for k in range(3)]
+    path = tmp_path / "m.glb"
+    path.write_bytes(builder.bytes())
+    first, *others = (material.texture for material in read_gltf(path).materials)
+    assert first == PNG and len(others) == 2 and all(each is first for each in others)
+
+
+def test_pictures_beyond_what_a_file_may_hold_are_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr("surface.readers.gltfmaterials.DATA_LIMIT", len(PNG) + 10)
+    table = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+    second = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}
+    builder = coloured(table, PNG, PNG)
+    builder.document["materials"] = [table, second]
+    primitive = builder.document["meshes"][0]["primitives"][0]
+    builder.document["meshes"][0]["primitives"] = [{**primitive, "material": k} for k in range(2)]
+    path = tmp_path / "m.glb"
+    path.write_bytes(builder.bytes())
+    assert [material.texture for material in read_gltf(path).materials] == [PNG, None]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -121,3 +122,19 @@ def test_missing_files_other_suffixes_and_bytes_are_named(tmp_path: Path) -> Non
         read_surface(tmp_path / "b.json")
     with pytest.raises(SurfaceFileError, match="cannot be written"):
         write_surfaces(tmp_path / "no" / "a.json", [])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+def test_a_full_disk_leaves_the_surfaces_that_were_there(tmp_path: Path) -> None:
+    import resource
+
+    file = tmp_path / "a.json"
+    write_surfaces(file, [NamedSurface("old", shapes.hills(4))])
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        with pytest.raises(SurfaceFileError, match="cannot be written"):
+            write_surfaces(file, [NamedSurface("new", shapes.hills(8))])
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert [item.name for item in read_surface(file)] == ["old"] and list(tmp_path.iterdir()) == [file]

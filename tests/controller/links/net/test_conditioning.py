@@ -106,7 +106,57 @@ def test_ranges_are_widened_to_at_most_twice_as_much(tmp_path: Path) -> None:
 
 def test_the_file_of_a_link_lies_in_the_users_state(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    assert state_file("livelink-../../My iPhone/é") == tmp_path / "omote/links/livelink-.._.._My_iPhone_.json"
+    assert state_file("livelink-../../My iPhone") == tmp_path / "omote/links/livelink-.._.._My_iPhone.json"
+
+
+@pytest.mark.parametrize("huge", [3.0, 1e30, -1e300])
+def test_one_message_with_a_huge_number_is_over_with_the_next_one(tmp_path: Path, huge: float) -> None:
+    """Neither the filter nor what is kept remembers it: the link opens again, and the face moves as before."""
+    path = tmp_path / "phone.json"
+    hit = chain(path, ranges=True, smoothing=True, beta=0.0)
+    shown(hit, 0.0, jawOpen=0.1)
+    shown(hit, 1 / 60, jawOpen=huge)
+    for n in range(2, 60):
+        found = shown(hit, n / 60, jawOpen=0.1)
+    assert found["jawOpen"] == pytest.approx(0.1, abs=0.05)
+    hit.save()
+    assert shown(chain(path, ranges=True), jawOpen=0.5) == {"jawOpen": 0.5}
+
+
+def test_parameters_of_ones_own_are_learned_in_their_range(tmp_path: Path) -> None:
+    """Ears that turn from -2 to 10 and rest at 1, in another unit than all others."""
+    file, path = tmp_path / "ears.toml", tmp_path / "phone.json"
+    file.write_text(
+        '[parameters.earTurn]\nregion = "head"\nrange = [-2, 10]\nrest = 1\nresponse_s = 0.1\n'
+        "max_speed = 50\nmax_acceleration = 500\n"
+        '[parameters.earUp]\nregion = "head"\nrange = [0, 0.4]\nresponse_s = 0.1\nmax_speed = 1\nmax_acceleration = 9\n'
+    )
+    own = P.with_files([file])
+    turn, up = own.index("earTurn"), own.index("earUp")
+
+    def show(link: Conditioning, now_s: float, turned: float, raised: float) -> list[float]:
+        given = own.neutral()
+        given[[turn, up]] = turned, raised
+        found, _ = link.apply(Frame(given, np.ones(len(own), dtype=bool)), now_s)
+        return [round(float(found[at]), 4) for at in (turn, up)]
+
+    def opened(**keys: Any) -> Conditioning:
+        return Conditioning(link_of(FORMATS.get("livelink")).settings(**keys), own, path)
+
+    link = opened(calibrate="keep")
+    assert show(link, 0.0, 3.0, 0.1) == [3.0, 0.1]
+    for n in range(1, 90):
+        show(link, n / 30, 3.0, 0.1)
+    assert link.neutral_known and show(link, 3.0, 3.0, 0.1) == [1.0, 0.0], "at rest where the source is neutral"
+    assert show(link, 3.1, 10.0, 0.4) == [8.0, 0.4]
+    assert show(opened(calibrate="keep"), 0.0, 3.0, 0.1) == [1.0, 0.0]
+    path.unlink()
+    link = opened(ranges=True)
+    for n in range(400):
+        show(link, n / 30, 1.0 + 9.0 * (n % 2), 0.4 * (n % 2))
+    assert show(link, 14.0, 5.0, 0.2) == [5.0, 0.2], "what goes through its whole range is not widened"
+    link.save()
+    assert show(opened(ranges=True), 0.0, 5.0, 0.2) == [5.0, 0.2]
 
 
 def test_smoothing_takes_noise_away() -> None:

@@ -237,3 +237,15 @@ def test_there_is_a_kind_of_link_for_every_format() -> None:
     assert {*FORMATS.kinds()} <= {*LINKS.kinds()}
     for kind in FORMATS.kinds():
         assert LINKS.get(kind).settings.form is FORMATS.get(kind)
+
+
+def test_two_heads_keep_what_they_learn_of_their_persons_apart(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    for head in ("maple", "oak", ""):
+        state = CommandState(P)
+        state.name = head
+        with ExitStack() as closers:
+            keys = {"kind": "livelink", "listen": f"127.0.0.1:{free_port()}", "ranges": True}
+            open_links([read_link(keys)], LinkContext(state, closers))
+    found = sorted(path.stem for path in (tmp_path / "omote" / "links").iterdir())
+    assert found == ["livelink-capture", "livelink-maple-capture", "livelink-oak-capture"]

@@ -121,4 +121,17 @@ def test_a_damaged_file_is_named_and_changes_nothing(tmp_path: Path, text: str, 
 def test_any_name_makes_a_file_name(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     path = state_file("../../etc/passwd ü" + "x" * 300)
-    assert path.parent.name == "links" and ".." not in path.parts and len(path.name) == 105
+    assert path.parent.name == "links" and ".." not in path.parts and len(path.name) == 114
+
+
+def test_sources_in_other_alphabets_have_files_of_their_own() -> None:
+    assert state_file("livelink-左") != state_file("livelink-右")
+    assert state_file("x" * 150) != state_file("x" * 151)
+    assert state_file("livelink-capture").name == "livelink-capture.json"
+
+
+def test_a_name_that_no_file_can_have_is_no_file_and_no_error(tmp_path: Path) -> None:
+    """As in a folder of somebody else's: the link opens, and learns again."""
+    neutral = Neutral(P)
+    load_state(tmp_path / ("x" * 300), P, neutral, Ranges(P))
+    assert not neutral.known

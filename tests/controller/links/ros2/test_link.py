@@ -332,3 +332,17 @@ def test_what_travels_with_a_message_is_read_by_the_other_side() -> None:
     gid = bytes(range(16))
     found = other.Attachment.from_bytes(attachment(7, 1_700_000_000_000_000_001, gid))
     assert (found.sequence_id, found.timestamp_ns, found.gid) == (7, 1_700_000_000_000_000_001, gid)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [("{ mode: ", "expected"), ("{ nonsense: 5 }", "unknown field `nonsense`"), (None, "cannot be read")],
+)
+def test_a_damaged_file_of_settings_is_named_without_zenohs_own_source(
+    tmp_path: Path, text: str | None, why: str
+) -> None:
+    path = tmp_path / "zenoh.json5"
+    path.mkdir() if text is None else path.write_text(text)
+    with pytest.raises(LinkError, match=why) as caught:
+        Near("tcp/127.0.0.1:1", None, config=str(path))
+    assert str(path) in str(caught.value) and ".rs:" not in str(caught.value) and caught.value.hint

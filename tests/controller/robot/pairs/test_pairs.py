@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -177,3 +178,17 @@ def test_a_wrong_table_says_what_is_wrong(files: tuple[Path, Path], change: Any,
     with pytest.raises(ConfigError) as caught:
         read_pairs(pairs, load_robot(robot, P), P)
     assert fault in str(caught.value)
+
+
+def test_two_spellings_of_one_parameter_and_a_hundred_thousand_columns_are_refused_at_once(tmp_path: Path) -> None:
+    robot, pairs = tmp_path / "one.toml", tmp_path / "pairs.csv"
+    robot.write_text(ROBOT)
+    settings = load_robot(robot, P)
+    pairs.write_text("mouthSmileLeft,mouthSmile_L,servos:jaw\n" + "0,1,2\n" * 100)
+    with pytest.raises(ConfigError, match="column 'mouthSmile_L': is the same parameter as column 'mouthSmileLeft'"):
+        read_pairs(pairs, settings, P)
+    pairs.write_text(",".join(f"a{i}" for i in range(100_000)) + "\n1,2\n")
+    begin_s = process_time()
+    with pytest.raises(ConfigError, match="column 'a0': is no parameter"):
+        read_pairs(pairs, settings, P)
+    assert process_time() - begin_s < 10.0

@@ -50,6 +50,10 @@ def test_servos_and_a_hand(chain: Chain):
         ("place 9 5", "no simulated servo has id 9"),
         ("place 1 x", "invalid literal"),
         ("place 1", "not enough values"),
+        ("place 1 5000000000", "positions go from -1000000000 to 1000000000 steps"),
+        (f"place 1 -1{'0' * 400}", "positions go from"),
+        ("fault mute:0-99999999999", "must be 0 to 252"),
+        ("fault mute:5-3", "names no id: a range begins with its lower end"),
     ],
 )
 def test_bad_lines_are_answered_with_the_reason(chain: Chain, line: str, why: str):

@@ -34,6 +34,16 @@ def test_a_loop_begins_again() -> None:
     assert done == ["a", "b", "a", "b", "a"] and timeline.due_s == 5.0
 
 
+@pytest.mark.parametrize("loop_s", [1e-300, 1e-9])
+def test_a_loop_that_is_always_behind_leaves_time_for_the_wire(loop_s: float) -> None:
+    timeline, done = Timeline([(0.0, "a")], loop_s=loop_s), []
+    timeline.start(100.0)
+    timeline.advance(101.0, done.append)
+    assert 1 < len(done) < 1000
+    timeline.advance(101.0, done.append)
+    assert len(done) < 2000
+
+
 def test_a_server_plays_it_without_any_client(caplog: pytest.LogCaptureFixture) -> None:
     chain = Chain([SimulatedServo(1, now_s=time.monotonic())], time.monotonic())
     steps = [(0.0, "place 1 1000"), (0.0, "fault mute:1"), (0.05, "place 9 1"), (0.1, "clear"), (0.15, "fault alert:1")]

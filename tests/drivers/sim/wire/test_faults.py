@@ -44,7 +44,7 @@ def test_specs(spec: str, expected: dict):
         ("mute:x", "'x' is not an id"),
         ("mute:1-x", "'1-x' is not an id"),
         ("mute:300", "must be 0 to 252"),
-        ("mute:5-3", "must be 0 to 252"),
+        ("mute:5-3", "begins with its lower end"),
         ("mute:7:8", "'8' is one word too many"),
         ("late:7:soon", "'soon' is not a value for late"),
         ("volts:7", "volts needs a value"),

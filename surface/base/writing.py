@@ -1,0 +1,71 @@
+"""Writing files whole or not at all: to a temporary file beside the old one, which it replaces at the end."""
+
+from __future__ import annotations
+
+import os
+import secrets
+import shutil
+import stat
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_LONGEST_STEM = 100
+"""Characters of a file's name that the temporary name repeats, so that it is not longer than a name may be."""
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path to write to; what was written there replaces the file ``path`` when the block ends well.
+
+    Links are followed and stay links, and a file that is replaced keeps its permissions and, where the system allows
+    it, its owner. A device or a pipe, as ``/dev/stdout``, is never replaced: what was written is copied into it.
+
+    Raises OSError: the folder or the file cannot be written; ``path`` stays as it was.
+    """
+    old = _status(path)
+    if old is not None and not stat.S_ISREG(old.st_mode) and not stat.S_ISDIR(old.st_mode):
+        with _copying_into(path) as temporary:
+            yield temporary
+        return
+    target = Path(os.path.realpath(path))
+    temporary = target.with_name(f".{path.stem[:_LONGEST_STEM]}-{secrets.token_hex(6)}{path.suffix}")
+    try:
+        # created with the permissions that the system gives new files
+        os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
+        if old is not None:
+            _copy_rights(old, temporary)
+        yield temporary
+        temporary.replace(target)
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def _copying_into(path: Path) -> Iterator[Path]:
+    """A path to write to; what was written there is copied into a device or a pipe when the block ends well."""
+    with tempfile.TemporaryDirectory() as folder:
+        temporary = Path(folder) / f"content{path.suffix}"
+        temporary.touch()
+        yield temporary
+        with temporary.open("rb") as content, path.open("wb") as device:
+            shutil.copyfileobj(content, device)
+
+
+def _status(path: Path) -> os.stat_result | None:
+    """What the system says about a file, links followed; None where there is none yet."""
+    try:
+        return path.stat()
+    except FileNotFoundError:
+        return None
+
+
+def _copy_rights(old: os.stat_result, new: Path) -> None:
+    """Give a file the owner, where that is allowed, and the permissions of the one that it will replace."""
+    if hasattr(os, "chown"):
+        with suppress(OSError):  # only root may give files away
+            os.chown(new, old.st_uid, old.st_gid)
+    with suppress(OSError):  # some file systems have no permissions
+        new.chmod(stat.S_IMODE(old.st_mode))
