@@ -102,7 +102,7 @@ def test_emotions_stand_where_their_moods_are_inside_the_pad_and_none_covers_ano
         assert left >= 12.0 - 1e-9 and right <= 408.0 + 1e-9
         for other in boxes[:number]:
             assert right <= other[0] or other[2] <= left or bottom <= other[1] + 1e-9 or other[3] <= top + 1e-9
-    for name, (valence, arousal) in zip(affect.names, affect.points, strict=True):
+    for name, (valence, arousal, *_) in zip(affect.names, affect.points, strict=True):
         middle = labels[name].x + 0.5 * LETTER * len(name)
         wanted = 10.0 + 0.5 * side * (1.0 + valence)
         inside = min(max(wanted, 12.0 + 0.5 * LETTER * len(name)), 408.0 - 0.5 * LETTER * len(name))
