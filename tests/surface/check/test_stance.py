@@ -120,10 +120,10 @@ def test_a_part_that_shows_its_back_is_named(way: str, material: str, radius: fl
 def tube(yaw: float, *, deep: float = 60.0, radius: float = 20.0):
     """A tube that is open towards a viewer at ``yaw`` only, and a disc in it that shows him its back."""
     angle = np.radians(yaw)
-    out, aside, up = np.array([np.sin(angle), 0, np.cos(angle)]), np.array([np.cos(angle), 0, -np.sin(angle)]), [0, 1, 0]
+    out, aside = np.array([np.sin(angle), 0, np.cos(angle)]), np.array([np.cos(angle), 0, -np.sin(angle)])
     uv, triangles = plain.sheet((0.0, 1.0), (0.0, 1.0), 0.025)
     turn = 2.0 * np.pi * uv[:, 0]
-    ring = np.cos(turn)[:, None] * aside + np.outer(np.sin(turn), up)
+    ring = np.cos(turn)[:, None] * aside + np.outer(np.sin(turn), [0, 1, 0])
     wall = ring * (radius * np.minimum(1.0, 4.0 * (1.0 - uv[:, 1])))[:, None] - np.outer(uv[:, 1], (deep + 20.0) * out)
     disc = ring * (0.9 * radius * uv[:, 1])[:, None] - deep * out
     normals = np.tile(out, (len(uv), 1))

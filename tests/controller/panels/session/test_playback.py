@@ -179,7 +179,8 @@ def test_a_key_is_the_face_of_now_at_the_line_and_is_selected() -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "to", "at"), [(0, -1.0, 0.0), (0, 5.0, 1.99), (1, 0.0, 1.01), (1, 5.0, 2.99), (2, 0.0, 2.01), (2, 9.0, 9.0)]
+    ("number", "to", "at"),
+    [(0, -1.0, 0.0), (0, 5.0, 1.99), (1, 0.0, 1.01), (1, 5.0, 2.99), (2, 0.0, 2.01), (2, 9.0, 9.0)],
 )  # fmt: skip
 def test_a_key_stays_between_its_neighbours_and_one_drag_is_one_step(number: int, to: float, at: float) -> None:
     three = Timeline(tuple(Key(t, {"jawOpen": 0.1 * t}) for t in (1.0, 2.0, 3.0)))
@@ -207,7 +208,8 @@ def test_a_range_of_a_recording_is_kept_or_cut_out() -> None:
     with pytest.raises(ParameterError, match="no range"):
         desk.play.edit_take("keep")
     desk.play.edit_take("smooth")
-    assert desk.commands.now.take is not None and desk.commands.now.take.values[2, SMILE] == pytest.approx(0.2, abs=0.02)
+    smoothed = desk.commands.now.take
+    assert smoothed is not None and smoothed.values[2, SMILE] == pytest.approx(0.2, abs=0.02)
     with pytest.raises(ParameterError, match="no recording to edit"):
         Desk().play.edit_take("smooth")
 

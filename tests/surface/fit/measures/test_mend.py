@@ -198,7 +198,8 @@ def test_a_slit_hides_what_lies_on_its_other_side_as_far_as_it_goes() -> None:
 
 def test_a_shape_keeps_only_the_points_that_it_moves() -> None:
     part = net()
-    group = Group("jawOpen", np.array([7, 14, 35], np.int32), np.array([[0, 1.23456, 0], [0, 9, 0], [0, 0, -2.0]], np.float32))
+    moves = np.array([[0, 1.23456, 0], [0, 9, 0], [0, 0, -2.0]], np.float32)
+    group = Group("jawOpen", np.array([7, 14, 35], np.int32), moves)
     filled = mend._group_filled(part, group, np.arange(36) == 0)  # type: ignore[arg-type]
     assert filled.name == "jawOpen" and filled.ids.dtype == np.int32
     assert set(filled.ids.tolist()) == {0, 7, 14, 35}  # the corner goes with its neighbours, the others stay still

@@ -13,7 +13,16 @@ from surface.base.arrays import Floats
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.reports import picture as module
 from surface.fit.transfer.reports.picture import (
-    ASPECT, COLOURS, FAR_MM, FULL_MM, HEIGHT, PAPER, Frontal, draw_distances, draw_landmarks, frontal,
+    ASPECT,
+    COLOURS,
+    FAR_MM,
+    FULL_MM,
+    HEIGHT,
+    PAPER,
+    Frontal,
+    draw_distances,
+    draw_landmarks,
+    frontal,
 )  # fmt: skip
 from surface.fit.transfer.scan import make_scan
 from surface.fit.transfer.template import NAMES
@@ -52,9 +61,8 @@ def test_a_front_view_shows_the_box_in_its_middle_with_room_above_and_below(scal
     middle = 0.5 * (low + high)
     np.testing.assert_allclose(seen(middle), [0.5 * WIDTH, 0.5 * HEIGHT, 0.0], atol=1e-9)
     per_mm = HEIGHT / (1.25 * 200.0)
-    np.testing.assert_allclose(seen(middle + [10, 0, 0]) - seen(middle), [10 * per_mm, 0, 0], atol=1e-9)
-    np.testing.assert_allclose(seen(middle + [0, 10, 0]) - seen(middle), [0, -10 * per_mm, 0], atol=1e-9)
-    np.testing.assert_allclose(seen(middle + [0, 0, 10]) - seen(middle), [0, 0, 10 * per_mm], atol=1e-9)
+    found_steps = [seen(middle + step) - seen(middle) for step in 10.0 * np.eye(3)]
+    np.testing.assert_allclose(found_steps, 10.0 * per_mm * np.diag([1.0, -1.0, 1.0]), atol=1e-9)
 
 
 def test_a_pixel_is_the_foremost_place_of_the_scan_there() -> None:
@@ -90,7 +98,8 @@ def test_a_scan_is_drawn_at_its_pixels_on_paper_of_the_pictures_size() -> None:
 def test_light_comes_from_above_and_the_left_and_makes_surfaces_between_dark_and_bright() -> None:
     def tilted(x: float, y: float) -> int:
         """Grey of a square whose normal leans by so much to the right and upwards."""
-        scan = squares([[a, b, -x * a - y * b] for a, b in ((10.0, -40.0), (40.0, -40.0), (40.0, -10.0), (10.0, -10.0))])
+        places = [(a, b) for a, b, _ in square((10.0, 40.0), (10.0, 40.0))]
+        scan = squares([[a, b, -x * a - y * b] for a, b in places])
         red, green, blue = relief(scan)[25, 25].tolist()
         assert red == green == blue
         return int(red)

@@ -59,7 +59,11 @@ def test_landmarks_lie_in_the_scans_own_coordinates_and_are_so_far_from_the_head
     place = np.array([0.01, -0.02, 0.03])
     marks = {"chin": Mark(found.points(place), "given"), "nose_tip": Mark(np.zeros(3), "found", 0.7)}
     with pytest.MonkeyPatch.context() as patch:
-        own = {"chin": found.points(place) + [0.0, 3.0, 4.0], "nose_tip": np.zeros(3), "mouth_left": np.ones(3)}
+        own = {
+            "chin": found.points(place) + np.array([0.0, 3.0, 4.0]),
+            "nose_tip": np.zeros(3),
+            "mouth_left": np.ones(3),
+        }
         patch.setattr(module, "find_landmarks", lambda head, contacts: own)
         head: Any = SimpleNamespace(data=SimpleNamespace(contacts=[]))
         chin, nose = landmarks_of(head, marks, found)
@@ -93,7 +97,7 @@ def opening(*places: Any, border: Any = ()) -> list[str]:
 
 @pytest.mark.parametrize(("share", "off", "word"), [(0.6, 2.9, "a"), (0.4, 2.9, "closed"), (1.0, 3.1, "closed")])
 def test_a_rim_along_a_border_of_the_scan_is_a_hole(share: float, off: float, word: str) -> None:
-    border = LINE[: round(share * len(LINE))] + [0.0, off, 0.0]
+    border = LINE[: round(share * len(LINE))] + np.array([0.0, off, 0.0])
     if share < 1:
         border = border[border[:, 0] < LINE[round(share * len(LINE)) - 3, 0]]
     assert opening(border=(border,)) == [word] * 3
@@ -107,8 +111,10 @@ def behind(count: int, x: float = 0.0, y: float = 0.0, z: float = -10.0) -> Any:
     ("places", "goes_on"),
     [
         (behind(21), True), (behind(20), False),
-        (behind(21, z=-5.1), True), (behind(21, z=-4.9), False), (behind(21, z=-24.9), True), (behind(21, z=-25.1), False),
-        (behind(21, x=17.4), True), (behind(21, x=17.6), False), (behind(21, x=-17.4), True), (behind(21, x=-17.6), False),
+        (behind(21, z=-5.1), True), (behind(21, z=-4.9), False),
+        (behind(21, z=-24.9), True), (behind(21, z=-25.1), False),
+        (behind(21, x=17.4), True), (behind(21, x=17.6), False),
+        (behind(21, x=-17.4), True), (behind(21, x=-17.6), False),
         (behind(21, y=1.9), True), (behind(21, y=2.1), False), (behind(21, y=-1.9), True), (behind(21, y=-2.1), False),
     ],
 )  # fmt: skip
