@@ -59,11 +59,8 @@ def test_landmarks_lie_in_the_scans_own_coordinates_and_are_so_far_from_the_head
     place = np.array([0.01, -0.02, 0.03])
     marks = {"chin": Mark(found.points(place), "given"), "nose_tip": Mark(np.zeros(3), "found", 0.7)}
     with pytest.MonkeyPatch.context() as patch:
-        own = {
-            "chin": found.points(place) + np.array([0.0, 3.0, 4.0]),
-            "nose_tip": np.zeros(3),
-            "mouth_left": np.ones(3),
-        }
+        chin_of_head = found.points(place) + np.array([0.0, 3.0, 4.0])
+        own = {"chin": chin_of_head, "nose_tip": np.zeros(3), "mouth_left": np.ones(3)}
         patch.setattr(module, "find_landmarks", lambda head, contacts: own)
         head: Any = SimpleNamespace(data=SimpleNamespace(contacts=[]))
         chin, nose = landmarks_of(head, marks, found)
