@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -12,55 +11,21 @@ from controller.panels.session.commands import Commands
 from controller.panels.window.expressions import ExpressionButtons, _free_height
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.vocabulary import Vocabulary
+from tests.controller.panels.window.drawn import LETTER, LINE, Drawn, at
 
-LETTER, LINE = 7.0, 14.0  # of a letter that is drawn: its width, its height
 VOCABULARY = Vocabulary.load(PARAMETERS)
 
 
-def at(x: float, y: float) -> SimpleNamespace:
-    return SimpleNamespace(x=x, y=y)
+class Pressed(Drawn):
+    """One of its buttons is pressed."""
 
-
-class Drawn:
-    """Stands for a window library: notes calls, and answers as told."""
-
-    Col_ = SimpleNamespace(button="button")
-
-    def __init__(self, pressed: str = "") -> None:
-        self.pressed, self.calls = pressed, list[tuple[Any, ...]]()
-        self.ImVec2, self.ImVec4 = at, lambda *rgba: rgba
-
-    def calc_text_size(self, text: str) -> SimpleNamespace:
-        return at(LETTER * len(text), LINE)
-
-    def get_font_size(self) -> float:
-        return LINE
-
-    def get_window_draw_list(self) -> Drawn:
-        return self
-
-    def color_convert_float4_to_u32(self, rgba: tuple[float, ...]) -> int:
-        return 0
-
-    def get_style(self) -> SimpleNamespace:
-        return SimpleNamespace(frame_padding=at(4.0, 3.0), item_spacing=at(8.0, 4.0))
+    def __init__(self, pressed: str) -> None:
+        super().__init__()
+        self._pressed = pressed
 
     def button(self, label: str, *_: Any) -> bool:
         self.calls.append(("button", label))
-        return label == self.pressed
-
-    def get_content_region_avail(self) -> SimpleNamespace:
-        return at(1e4, 1e4)
-
-    def __getattr__(self, name: str) -> Any:
-        def note(*given: Any) -> Any:
-            self.calls.append((name, *given))
-            return at(0.0, 0.0)
-
-        return note
-
-    def named(self, name: str) -> list[tuple[Any, ...]]:
-        return [call[1:] for call in self.calls if call[0] == name]
+        return label == self._pressed
 
 
 @pytest.fixture
@@ -140,7 +105,7 @@ def test_the_shown_expression_has_the_colour_of_its_layer_and_a_pressed_one_is_s
     commands = Commands(lambda request: None)
     buttons = ExpressionButtons(VOCABULARY, commands, lambda: None)  # type: ignore[arg-type]
     commands.show("anger", 0.5)
-    drawn = Drawn(pressed="joy")
+    drawn = Pressed("joy")
     buttons._buttons(drawn, ["anger", "joy", "fear"])
     order = [call[0] if call[0] != "button" else call[1] for call in drawn.calls
              if call[0] in ("button", "push_style_color", "pop_style_color")]  # fmt: skip
