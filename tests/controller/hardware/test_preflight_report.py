@@ -79,9 +79,10 @@ def test_only_files_of_two_kinds_are_reports(tmp_path: Path) -> None:
 
 
 def test_a_report_that_cannot_be_written_leaves_nothing(preflight: Preflight, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
     with pytest.raises(ControllerError):
-        write_preflight(preflight, tmp_path / "none" / "a.toml")
-    assert not (tmp_path / "none").exists()
+        write_preflight(preflight, tmp_path / "file" / "a.toml")
+    assert (tmp_path / "file").read_text() == "mine"
 
 
 def rows(preflight: Preflight) -> list[list[str]]:
