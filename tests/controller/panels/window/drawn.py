@@ -13,13 +13,14 @@ def at(x: float, y: float) -> SimpleNamespace:
 
 
 class Drawn:
-    """Notes every call by its name. flags : any, as numbers that say nothing."""
+    """Notes every call by its name; no button is pressed but the one that is called ``pressed``."""
 
-    Col_ = SimpleNamespace(button=1, slider_grab=2)
+    Col_ = SimpleNamespace(button=1, slider_grab=2, text=3)
     TableFlags_ = SimpleNamespace(sizing_stretch_prop=1)
     TableColumnFlags_ = SimpleNamespace(width_fixed=1, width_stretch=2)
 
-    def __init__(self) -> None:
+    def __init__(self, pressed: str = "") -> None:
+        self.pressed = pressed
         self.calls = list[tuple[Any, ...]]()
         self.ImVec2, self.ImVec4 = at, lambda *rgba: rgba
 
@@ -50,6 +51,10 @@ class Drawn:
             return at(0.0, 0.0)
 
         return note
+
+    def button(self, label: str, *_: Any) -> bool:
+        self.calls.append(("button", label))
+        return label == self.pressed
 
     def named(self, *names: str) -> list[tuple[Any, ...]]:
         """What calls of these names were given, in their order."""

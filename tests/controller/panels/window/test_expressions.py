@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import pytest
 
 from controller.base.parameters import PARAMETERS
@@ -14,18 +12,6 @@ from controller.vocabulary.vocabulary import Vocabulary
 from tests.controller.panels.window.drawn import LETTER, LINE, Drawn, at
 
 VOCABULARY = Vocabulary.load(PARAMETERS)
-
-
-class Pressed(Drawn):
-    """One of its buttons is pressed."""
-
-    def __init__(self, pressed: str) -> None:
-        super().__init__()
-        self._pressed = pressed
-
-    def button(self, label: str, *_: Any) -> bool:
-        self.calls.append(("button", label))
-        return label == self._pressed
 
 
 @pytest.fixture
@@ -105,7 +91,7 @@ def test_the_shown_expression_has_the_colour_of_its_layer_and_a_pressed_one_is_s
     commands = Commands(lambda request: None)
     buttons = ExpressionButtons(VOCABULARY, commands, lambda: None)  # type: ignore[arg-type]
     commands.show("anger", 0.5)
-    drawn = Pressed("joy")
+    drawn = Drawn("joy")
     buttons._buttons(drawn, ["anger", "joy", "fear"])
     order = [call[0] if call[0] != "button" else call[1] for call in drawn.calls
              if call[0] in ("button", "push_style_color", "pop_style_color")]  # fmt: skip
