@@ -225,9 +225,10 @@ def _speaks(interval: Interval) -> bool:
 
 def _cues_of_sounds(tier: Sequence[Interval], visemes: Visemes) -> tuple[list[Cue], float]:
     """A cue for each sound, and silence between sounds that do not follow each other. Raises ParameterError."""
+    tier = sorted(tier, key=lambda each: each.start_s)
     weights = iter(visemes.sounds([each.text for each in tier if _speaks(each)], guess=True))
     rest, cues, end_s = visemes.weights(visemes.names[0]), list[Cue](), 0.0
-    for each in sorted(tier, key=lambda each: each.start_s):
+    for each in tier:
         if each.start_s > end_s + 1e-3:
             cues.append(Cue(end_s, rest))
         cues.append(Cue(each.start_s, next(weights) if _speaks(each) else rest))

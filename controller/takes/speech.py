@@ -73,7 +73,9 @@ def _mix(times: Floats, starts: Floats, ends: Floats, weights: Floats, hold: Flo
         dominance[near != here + step] = 0.0
         mixed += dominance[:, None] * weights[near]
         total += dominance
-    mixed /= np.where(total > 0.0, total, 1.0)[:, None]
+    beside = total == 0.0  # before the first sound and after the last, farther away than these reach
+    mixed[beside], total[beside] = weights[here[beside]], 1.0
+    mixed /= total[:, None]
     everything: Floats = _dominance(times, starts[0], ends[-1], 1.0)
     return mixed * np.minimum(1.0, everything)[:, None]
 

@@ -115,6 +115,7 @@ def test_a_faulty_term_is_named_with_its_key(tmp_path: Path, mix: str, fault: st
 
 def test_terms_are_described_for_people() -> None:
     plain, kept = TermSettings(by=-0.4), TermSettings.model_validate({"by": 2, "in": [0.25, 1]})
+    assert kept == TermSettings(by=2, within=(0.25, 1))
     curve = TermSettings(at=[0, 0.5, 1], gives=[0, 0, 1])
     found = [term.describe("jawOpen") for term in (plain, kept, curve)]
     assert found == ["-0.4 jawOpen", "+2 jawOpen in 0.25..1", "+jawOpen through 3 points"]

@@ -11,6 +11,7 @@ import pytest
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.anchors import SkinSamples, head_order, sample_skin, skin_points
+from controller.stage import pulling as module
 from controller.stage.pulling import Pin, PullSolver, lip_pairs
 from surface.head import Head
 from surface.spline.matrix import basis_rows
@@ -169,3 +170,103 @@ def test_where_the_chin_is_pulled_only_what_the_jaw_carries_is_let_go(bench: Ben
     assert set(np.round(weights[own] / (1.0 - share[own]), 9)) <= {0.25, 0.8} and not weights[~own].any()
     solver.solve([Pin(bench.near(BROW), bench.skin.rest[bench.near(BROW)], AHEAD)])
     assert set(solver._stay_weights.ravel()) <= {0.25, 0.8}
+
+
+def test_a_pin_counts_what_is_seen_of_a_way() -> None:
+    free, seen = Pin(0, np.array([1.0, 2.0, 3.0])), Pin(0, np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.0, -5.0]))
+    assert (free.weights(0.1) == np.eye(3)).all()
+    np.testing.assert_allclose(seen.weights(0.1), np.diag([1.0, 1.0, 0.1]))
+    aslant = Pin(0, np.zeros(3), np.array([3.0, 0.0, 4.0])).weights(0.25)
+    np.testing.assert_allclose(aslant @ [0.6, 0.0, 0.8], [0.15, 0.0, 0.2])
+    np.testing.assert_allclose(aslant @ [0.8, 0.0, -0.6], [0.8, 0.0, -0.6])
+    place = np.array([4.0, 6.0, 99.0])
+    assert seen.miss(place) == pytest.approx(5.0) and free.miss(place) == pytest.approx(np.hypot(5.0, 96.0))
+    assert Pin(0, np.zeros(3), np.zeros(3)).miss(np.array([0.0, 3.0, 4.0])) == pytest.approx(5.0)  # no line of sight
+
+
+def made(rest: list[list[float]], moves: dict[str, list[list[float]]], jaw: list[float] | None = None) -> SkinSamples:
+    """Samples that shapes, whose order is that of ``moves``, move evenly."""
+    by_shape = np.stack([np.array(each, float) for each in moves.values()], axis=2)
+    every = np.repeat(by_shape[..., None], 4, axis=3) / 4.0
+    follows = np.array(jaw or [0.0] * len(rest))
+    return SkinSamples("face", np.zeros((len(rest), 2)), np.array(rest, float), every, follows)
+
+
+def order_of(*names: str) -> np.ndarray:
+    return P.indices(names)
+
+
+def test_slopes_are_those_of_the_quarter_that_a_shape_is_in() -> None:
+    samples = made([[0, 0, 0]], {"jawOpen": [[0, -8, 0]], "browInnerUp": [[4, 0, 0]]})
+    samples.moves[0, 1, 0] = [-1.0, -2.0, -2.5, -2.5]
+    for value, slope in ((0.0, -4.0), (0.24, -4.0), (0.26, -8.0), (0.6, -10.0), (1.0, -10.0)):
+        found = module._slopes(samples, np.array([value, 0.5]))
+        np.testing.assert_allclose(found, [[[0.0, 4.0], [slope, 0.0], [0.0, 0.0]]])
+    np.testing.assert_allclose(module._reach(samples), [8.0, 4.0])
+    assert module._reach(samples.subset(slice(0, 0))).tolist() == [0.0, 0.0]
+
+
+def test_the_gap_goes_from_the_lower_lip_to_the_upper() -> None:
+    rims = np.array([[0, 5.0, 0], [1, 5, 0], [0, 1, 0], [1, 2, 0]])
+    np.testing.assert_allclose(module._gap(rims), [[0, 4, 0], [0, 3, 0]])
+
+
+def test_both_sides_are_tied_in_pairs_and_what_goes_aside_not_at_all() -> None:
+    names = ("mouthSmileLeft", "jawLeft", "browInnerUp", "mouthSmileRight", "mouthRight")
+    ties = module._ties(P, order_of(*names))
+    assert ties.shape == (5, 2)
+    assert {tuple(np.flatnonzero(column)) for column in ties.T} == {(0, 3), (2,)} and set(ties.ravel()) == {0.0, 1.0}
+
+
+def solver_of(samples: SkinSamples, *names: str, start: dict[str, float] | None = None, **options: bool) -> PullSolver:
+    values = P.neutral()
+    for name, value in (start or {}).items():
+        values[P.index(name)] = value
+    return PullSolver(samples, (samples.subset(slice(0, 0)), 0), order_of(*names), P, values, **options)
+
+
+def test_changes_are_bounded_by_what_is_left_of_each_range_and_tied_ones_by_both() -> None:
+    samples = made([[0, 0, 0]], {"a": [[1, 0, 0]], "b": [[1, 0, 0]]})
+    start = {"mouthSmileLeft": 0.25, "mouthSmileRight": 0.75}
+    free = solver_of(samples, "mouthSmileLeft", "mouthSmileRight", start=start)
+    assert free._low.tolist() == [-0.25, -0.75] and free._high.tolist() == [0.75, 0.25]
+    tied = solver_of(samples, "mouthSmileLeft", "mouthSmileRight", start=start, tied=True)
+    assert tied._low.tolist() == [-0.25] and tied._high.tolist() == [0.25]
+
+
+def test_points_near_a_pin_do_not_stay_and_its_other_side_does() -> None:
+    rest = [[60.0, 0, 0], [33.0, 0, 0], [31.0, 0, 0], [-59.0, 0, 0], [0, 0, 0], [10.0, 0, 0]]
+    samples = made(rest, {"a": [[1, 0, 0]] * 6})
+    solver = solver_of(samples, "mouthSmileLeft")
+    chosen = np.array([0])
+    assert solver._stay(chosen).tolist() == [2, 3, 4, 5]  # beyond 28 mm
+    assert solver._other_side(chosen).tolist() == [3]
+    assert solver._other_side(np.array([5])).tolist() == []  # its mirror image is as near as itself
+    assert solver_of(samples, "mouthSmileLeft", tied=True)._other_side(chosen).tolist() == []
+
+
+def test_only_shapes_that_are_at_home_at_a_pin_take_part() -> None:
+    """A shape that moves another place more than three times as far belongs there, and gaze takes no part at all."""
+    rest = [[40.0, 0, 0], [-40.0, 0, 0]]
+    names = ("mouthSmileLeft", "cheekPuff", "browInnerUp", "eyeLookUpLeft", "noseSneerLeft")
+    moves = {
+        "here": [[0, 5, 0], [0, 5, 0]], "nearly": [[0, 3.1, 0], [0, 10, 0]], "elsewhere": [[0, 2.9, 0], [0, 10, 0]],
+        "gaze": [[0, 9, 0], [0, 9, 0]], "hardly": [[0, 0.39, 0], [0, 0.39, 0]],
+    }  # fmt: skip
+    solver = solver_of(made(rest, moves), *names)
+    solver._prepare((0,))
+    assert solver._free.tolist() == [0, 1]
+    far = solver_of(made(rest, {"a": [[0, 1, 0], [0, 10, 0]], "b": [[0, 2, 0], [0, 10, 0]]}), *names[:2])
+    far._prepare((0,))
+    assert far._free.tolist() == [1]  # where none is at home, the one that is most so
+
+
+def test_a_pull_reaches_its_goal_by_the_shape_that_goes_there_and_says_what_is_missing() -> None:
+    rest = [[40.0, 0, 0], [-40.0, 0, 0], [0.0, 60, 0]]
+    samples = made(rest, {"up": [[0, 8, 0], [0, 0, 0], [0, 0, 0]], "aside": [[8, 0, 0], [8, 0, 0], [8, 0, 0]]})
+    solver = solver_of(samples, "mouthSmileLeft", "cheekPuff")
+    found = solver.solve([Pin(0, np.array([40.0, 6.0, 0.0]), np.array([0.0, 0, 1]))])
+    assert 5.1 / 8 < found[P.index("mouthSmileLeft")] < 6.1 / 8 and found[P.index("cheekPuff")] < 0.02
+    assert solver.missed_mm <= module.CLOSE_MM
+    found = solver.solve([Pin(0, np.array([40.0, 20.0, 0.0]), np.array([0.0, 0, 1]))])
+    assert found[P.index("mouthSmileLeft")] == pytest.approx(1.0) and solver.missed_mm == pytest.approx(12.0, abs=0.01)

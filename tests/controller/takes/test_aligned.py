@@ -145,6 +145,47 @@ def test_a_tier_of_any_name_that_holds_sounds_is_one_of_sounds(tmp_path: Path) -
     assert values[60, PUCKER] > 0.6 and values[10, ROLL] > 0.3
 
 
+def test_sounds_that_are_not_in_order_keep_their_times(tmp_path: Path) -> None:
+    later, earlier = (0.5, 1.0, "AA1"), (0.0, 0.5, "M")
+    values = read(tmp_path / "a.TextGrid", tier(later, earlier))
+    np.testing.assert_array_equal(values, read(tmp_path / "b.TextGrid", tier(earlier, later)))
+    assert values[20, ROLL] > 0.3 and values[70, JAW] > 0.5
+
+
+def test_a_gap_between_sounds_is_silent_and_one_by_rounding_is_none(tmp_path: Path) -> None:
+    whole = read(tmp_path / "a.TextGrid", tier((0.0, 0.5, "AA1"), (0.5, 1.0, "AA1")))
+    rounded = read(tmp_path / "b.TextGrid", tier((0.0, 0.4995, "AA1"), (0.5, 1.0, "AA1")))
+    np.testing.assert_allclose(whole[:, JAW], rounded[:, JAW], atol=1e-3)
+    gap = read(tmp_path / "c.TextGrid", tier((0.3, 0.5, "AA1"), (0.8, 1.0, "AA1")))
+    assert gap[65, JAW] < 0.05 and gap[5, JAW] < 0.05 < 0.4 < gap[45, JAW]
+
+
+def test_times_that_rounding_made_a_little_less_than_nothing_are_nothing(tmp_path: Path) -> None:
+    values = read(tmp_path / "a.TextGrid", tier((-1e-9, 0.5, "AA1")))
+    np.testing.assert_array_equal(values, read(tmp_path / "b.TextGrid", tier((0.0, 0.5, "AA1"))))
+    with pytest.raises(TakeError, match="its times are"):
+        read(tmp_path / "c.TextGrid", tier((-1e-3, 0.5, "AA1")))
+    with pytest.raises(TakeError, match="its times are"):
+        read(tmp_path / "d.TextGrid", tier((0.5, 0.4, "AA1")))
+
+
+def test_of_several_tiers_of_sounds_the_longest_counts(tmp_path: Path) -> None:
+    two = SHORT.replace('"words"', '"phone"').replace('"say ""mama"""', '"OW1"')
+    values = read(tmp_path / "a.TextGrid", two)
+    np.testing.assert_array_equal(values, read(tmp_path / "b.TextGrid", SHORT))
+
+
+def test_letters_of_a_word_last_as_long_as_their_sounds_usually_do(tmp_path: Path) -> None:
+    """Spelt over twice the time, every sound begins twice as late."""
+    one, two = (read(tmp_path / f"{k}.TextGrid", tier((0.0, k, "mama"), name="words"))[:, JAW] for k in (1.0, 2.0))
+    opening = [np.flatnonzero(np.diff((jaw > 0.3).astype(int)) == 1) for jaw in (one, two)]
+    assert len(opening[0]) == len(opening[1]) == 2
+    visemes = Visemes.load(P)
+    lengths = visemes.spell("mama") @ visemes.duration
+    starts = (np.cumsum(lengths) - lengths) / lengths.sum()
+    assert opening[1] == pytest.approx(200.0 * starts[[1, 3]], abs=12.0)
+
+
 def test_points_last_until_the_next(tmp_path: Path) -> None:
     points = '"ooTextFile"\n"TextGrid"\n0\n1\n<exists>\n1\n"TextTier"\n"phones"\n0\n1\n2\n0.2 "aa"\n0.6 "PP"\n'
     values = read(tmp_path / "a.TextGrid", points)

@@ -50,6 +50,51 @@ def test_sounds_reach_into_their_neighbours_without_jumps() -> None:
     assert np.all((values >= 0) & (values <= 1))
 
 
+def step(away: np.ndarray) -> np.ndarray:
+    """Perlin's step of the fifth degree, from 1 to 0."""
+    x = 1.0 - np.clip(away, 0.0, 1.0)
+    return x**3 * (6.0 * x**2 - 15.0 * x + 10.0)
+
+
+def test_a_sound_alone_rises_120_ms_before_and_falls_in_80_ms_after() -> None:
+    values = say((0.5, "aa"), end_s=1.0)[:, JAW]
+    time = np.arange(len(values)) / 100.0
+    assert time[-1] == pytest.approx(1.08, abs=0.011)  # until the mouth is closed
+    full = min(float(VISEMES.matrix[JAW] @ VISEMES.weights("aa")), 1.0)
+    away = np.maximum((0.5 - time) / 0.12, (time - 1.0) / 0.08)
+    np.testing.assert_allclose(values, full * step(away), atol=1e-9)
+
+
+def test_neighbours_share_a_moment_by_their_dominance_the_less_the_firmer_the_sound_there_holds() -> None:
+    names, starts, ends = ("aa", "PP", "O"), (0.2, 0.6, 0.7), (0.6, 0.7, 1.1)
+    values = say(*zip(starts, names, strict=True), end_s=1.1)
+    weights = np.stack([VISEMES.weights(name) for name in names])
+    hold = weights @ VISEMES.hold
+    for row in (30, 55, 59, 62, 65, 69, 72, 80):
+        time = row / 100.0
+        here = sum(time >= start - 1e-9 for start in starts) - 1
+        room = 1.0 - 0.85 * hold[here]
+        away = [max((a - time) / (0.12 * room), (time - b) / (0.08 * room)) for a, b in zip(starts, ends, strict=True)]
+        share = step(np.array(away)) * (0.2 + 0.8 * hold)
+        wanted = np.minimum(VISEMES.matrix @ (share / share.sum() @ weights), 1.0)
+        np.testing.assert_allclose(values[row], wanted, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("starts", "end_s", "why"),
+    [
+        ((), 1.0, "at least one sound"), ((0.5, 0.4), 1.0, "times that rise"), ((0.5,), 0.4, "times that rise"),
+        ((-0.1,), 1.0, "0 to 3600 s"), ((0.0,), 3600.1, "0 to 3600 s"), ((0.5, 0.5), 0.5, ""), ((0.0,), 3600.0, ""),
+    ],
+)  # fmt: skip
+def test_times_of_sounds_rise_within_an_hour(starts: tuple[float, ...], end_s: float, why: str) -> None:
+    if not why:
+        assert say(*((at, "aa") for at in starts), end_s=end_s).max() > 0.3
+        return
+    with pytest.raises(TakeError, match=why):
+        say(*((at, "aa") for at in starts), end_s=end_s)
+
+
 def test_rhubarb_tsv_and_json_agree(tmp_path: Path) -> None:
     shapes = [(0.00, "X"), (0.05, "D"), (0.27, "C"), (0.31, "B"), (0.43, "X")]
     ends = [t for t, _ in shapes[1:]] + [0.47]

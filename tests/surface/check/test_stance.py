@@ -117,6 +117,33 @@ def test_a_part_that_shows_its_back_is_named(way: str, material: str, radius: fl
     assert found == [f"part 'bad': its {shown} inwards, 100 % of what shows"] * named
 
 
+def tube(yaw: float, *, deep: float = 60.0, radius: float = 20.0):
+    """A tube that is open towards a viewer at ``yaw`` only, and a disc in it that shows him its back."""
+    angle = np.radians(yaw)
+    out, aside = np.array([np.sin(angle), 0, np.cos(angle)]), np.array([np.cos(angle), 0, -np.sin(angle)])
+    uv, triangles = plain.sheet((0.0, 1.0), (0.0, 1.0), 0.025)
+    turn = 2.0 * np.pi * uv[:, 0]
+    ring = np.cos(turn)[:, None] * aside + np.outer(np.sin(turn), [0, 1, 0])
+    wall = ring * (radius * np.minimum(1.0, 4.0 * (1.0 - uv[:, 1])))[:, None] - np.outer(uv[:, 1], (deep + 20.0) * out)
+    disc = ring * (0.9 * radius * uv[:, 1])[:, None] - deep * out
+    normals = np.tile(out, (len(uv), 1))
+    hull = plain.part("hull", wall, triangles, normals=ring)
+    back = triangles if yaw_faces(disc, triangles, out) < 0 else triangles[:, ::-1]
+    return hull, plain.part("disc", disc, back, normals=normals)
+
+
+def yaw_faces(points: np.ndarray, triangles: np.ndarray, way: np.ndarray) -> float:
+    """Whether triangles face a direction: more than 0."""
+    a, b, c = (points[triangles[:, k]] for k in range(3))
+    return float((np.cross(b - a, c - a) @ way).sum())
+
+
+@pytest.mark.parametrize(("yaw", "named"), [*((v, True) for v in (0, 38, -38, 90, -90, 180)), (135, False)])
+def test_a_head_is_looked_at_from_the_front_both_sides_and_behind(yaw: float, named: bool) -> None:
+    found = [f.text for f in stance.inside_out(plain.subject(*tube(yaw)))]
+    assert ["part 'disc': its triangles run inwards, 100 % of what shows"] * named == [t for t in found if "disc" in t]
+
+
 @pytest.mark.parametrize(("share", "named"), [(0.5, False), (0.7, True)])
 def test_a_part_may_show_some_of_its_back(share: float, named: bool) -> None:
     part = ball("face", 50.0, "skin")

@@ -115,3 +115,62 @@ def test_no_more_is_read_than_a_file_holds_and_a_cut_frame_is_left_out() -> None
     assert [len(sound.read(500)) for _ in range(3)] == [1000, 600, 0]
     assert SoundFormat(16000, 2, 2).samples(bytes(7)).tolist() == [0.0]
     assert len(open_sound(io.BytesIO(bytes(10)), "raw", 8000).read(100)) == 10
+
+
+@pytest.mark.parametrize("size", [0, 0xFFFFFFFF])
+@pytest.mark.parametrize(("whole", "goes_on"), [(0, True), (0xFFFFFFFF, True), (4000, False)])
+def test_samples_go_on_after_an_empty_chunk_only_where_the_file_has_no_length(
+    size: int, whole: int, goes_on: bool
+) -> None:
+    """A chunk that is as long as it can be goes on in any case."""
+    data = bytearray(wav(packed(2), 1, 16, size=size))
+    data[4:8] = struct.pack("<I", whole)
+    assert (len(heard(bytes(data))) == len(SOUND)) == (goes_on or size > 0)
+
+
+@pytest.mark.parametrize(
+    ("rate", "channels", "read"),
+    [(1000, 1, True), (999, 1, False), (384_000, 1, True), (384_001, 1, False), (16000, 32, True), (16000, 33, False)],
+)
+def test_rates_and_channels_have_bounds(rate: int, channels: int, read: bool) -> None:
+    data = wav(bytes(64 * channels), 1, 16, channels, rate)
+    if read:
+        assert len(heard(data)) == 32
+        return
+    with pytest.raises(TakeError, match="8 to 32 bit of 1000 to 384000 Hz and up to 32 channels"):
+        heard(data)
+
+
+def form(size: int) -> bytes:
+    """WAV whose format has so many bytes."""
+    layout = struct.pack("<HHIIHH", 1, 1, 16000, 32000, 2, 16)[:size].ljust(size, b"\0")
+    chunks = b"fmt " + struct.pack("<I", size) + layout + b"\0" * (size % 2) + b"data" + struct.pack("<I", 4) + bytes(4)
+    return b"RIFF" + struct.pack("<I", 4 + len(chunks)) + b"WAVE" + chunks
+
+
+@pytest.mark.parametrize(("size", "read"), [(14, False), (16, True), (17, True), (4096, True), (4098, False)])
+def test_a_format_has_a_length_within_bounds_and_its_padding_is_skipped(size: int, read: bool) -> None:
+    if read:
+        assert len(heard(form(size))) == 2
+        return
+    with pytest.raises(TakeError, match="its format has"):
+        heard(form(size))
+
+
+@pytest.mark.parametrize("size", [65536, 65537])
+def test_a_chunk_of_any_length_is_skipped(size: int) -> None:
+    before = b"JUNK" + struct.pack("<I", size) + bytes(size + size % 2)
+    np.testing.assert_allclose(heard(wav(packed(2), 1, 16, before=before)), SOUND, atol=1e-4)
+
+
+def test_a_width_that_no_frame_has_is_that_of_its_bits() -> None:
+    """A block that channels do not divide says nothing; 20 bits take 3 bytes."""
+    data = bytearray(wav(packed(3), 1, 24, 2))
+    data[32:36] = struct.pack("<HH", 5, 20)
+    np.testing.assert_allclose(heard(bytes(data)), SOUND.reshape(-1, 2).mean(axis=1), atol=1e-6)
+
+
+def test_each_channel_is_heard_alone_too() -> None:
+    form = SoundFormat(8000, 2, 1)
+    assert form.frame == 2
+    assert form.frames(bytes([128, 0, 255, 64, 9])).tolist() == [[0.0, -1.0], [127 / 128, -0.5]]

@@ -1,5 +1,6 @@
 """Eyes within the face's mesh: patches that turn or do not blink, islands in (u, v), and what is no eye."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -163,3 +164,16 @@ def test_clusters_end_at_what_is_near_and_the_nearest_comes_first() -> None:
     chosen[mesh.vertices[:, 0] > 10] = False
     assert len(module._clusters(mesh, skin(mesh), chosen, near | True, middle)) == 1
     assert module._clusters(mesh, skin(mesh) & False, chosen, near, middle) == []
+
+
+@pytest.mark.parametrize(("looks", "found"), [(4, 0.0), (2, 0.0), (1, 15.0), (0, 15.0)])
+def test_an_eye_is_told_by_how_it_turns_where_two_shapes_or_more_turn_it(looks: int, found: float) -> None:
+    """A ball that keeps still beside each eye lies nearer to the middle of what blinks."""
+    beside = CENTRES + np.array([0.0, 15.0, 0.0])
+    eyes = [looking(m, c, n[3:]) for (n, m), c in zip(pair(lambda c: shell(c, 7.0, reach=1.2)), CENTRES, strict=True)]
+    still = [(f"Still{k}", shell(c, 7.0, reach=1.2)) for k, c in enumerate(beside)]
+    made = joined([("Head", face()), *("EyeLeft", eyes[0]), ("EyeRight", eyes[1]), *still])
+    unknown = re.compile(f"eyeLook({'|'.join(('Up', 'Down', 'In', 'Out')[looks:])})(Left|Right)$")
+    mesh = replace(made, names=tuple(unknown.sub(r"other\1\2", n) if looks < 4 else n for n in made.names))
+    sides = shaped_sides(mesh, skin(mesh), beside + np.array([0.0, 0.0, 7.0]))
+    np.testing.assert_allclose([s.ball.centre for s in sides], CENTRES + np.array([0.0, found, 0.0]), atol=0.1)

@@ -58,6 +58,14 @@ def test_exact_names_win_over_others_and_sides_over_both():
     assert found.sources["mouthSmileLeft"] == [Source(3)] and found.sources["mouthSmileRight"] == [Source(4)]
 
 
+@pytest.mark.parametrize("names", [("Mouth_Open", "Jaw_Open"), ("Jaw_Open", "Mouth_Open")])
+def test_arkits_own_words_win_over_other_ways_to_say_the_same(names):
+    found = map_names(names)
+    assert found.sources["jawOpen"] == [Source(names.index("Jaw_Open"))] and found.spare == ("Mouth_Open",)
+    two = map_names(("Mouth_Open", "open_mouth"))
+    assert two.sources["jawOpen"] == [Source(0)]  # among other ways the file's order counts
+
+
 def test_a_shape_for_both_sides_is_cut_down_the_middle():
     mesh = slit_sheet()
     field = np.ones_like(mesh.deltas[:1])

@@ -57,6 +57,15 @@ def test_a_surface_that_touches_itself_in_a_vertex_comes_apart_there() -> None:
     assert len(own_corners(quads, every(quads)).vertex) == 5
 
 
+@pytest.mark.parametrize("faces", [[[0, 1, 2], [1, 0, 3]], [[0, 2, 3], [1, 3, 2]]])
+def test_two_faces_hang_together_by_any_edge_they_share(faces) -> None:
+    """By the edge of the lowest and by that of the highest vertices, too."""
+    mesh = mesh_of([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0.5]], faces)
+    island = own_corners(mesh, every(mesh))
+    np.testing.assert_array_equal(island.vertex[island.faces[:, :3]], faces)
+    assert len(island.vertex) == 4
+
+
 def test_neighbours_share_an_edge_and_its_length_is_that_in_space() -> None:
     mesh = sheet(3, 4, 0.05)
     one, two, length = neighbours(mesh, every(mesh))

@@ -141,6 +141,19 @@ def test_an_open_skin_that_looks_inwards_is_turned_and_a_flat_sheet_is_left():
     np.testing.assert_array_equal(repaired(back)[0].faces, back.faces)
 
 
+@pytest.mark.parametrize(("closed", "turned"), [(True, True), (False, False)])
+def test_beside_a_larger_surface_only_what_is_closed_is_turned(closed, turned):
+    large, small = box(), box(outwards=False)
+    faces = small.faces if closed else small.faces[:5]
+    both = FitMesh(
+        np.vstack([10.0 * large.vertices, small.vertices + 3.0]), np.vstack([large.faces, faces + 8]),
+        np.vstack([large.uv, small.uv]), np.vstack([large.faces, faces + 8]), (), np.zeros((0, 16, 3)),
+    )  # fmt: skip
+    got, notes = repaired(both)
+    np.testing.assert_array_equal(got.faces, np.vstack([large.faces, (faces[:, ::-1] if turned else faces) + 8]))
+    assert notes == [f"{len(faces)} faces looked inwards and were turned round"] * turned
+
+
 def test_triangles_and_quads_may_share_edges():
     vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 0], [1.5, 0.5, 1]])
     faces = np.array([[0, 1, 2, 3], [1, 2, 4, -1], [1, 5, 2, -1]])  # the second is wound the wrong way

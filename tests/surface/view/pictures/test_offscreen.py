@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from surface.base.errors import MissingPackage, ViewError
 from surface.head import Head
 from surface.view import Camera, Offscreen
 from surface.view.pictures.offscreen import NO_OPENGL_HINT, open_context
+from surface.view.scene.sampling import AdaptiveSampling
 
 OLD_OPENGL = """
 import sys
@@ -150,3 +152,34 @@ def test_a_frame_in_flight_is_the_only_one(gl: None) -> None:
         assert screen.target._pending is not None
         screen.finish()
         assert screen.target._pending is None
+
+
+class Counted:
+    """A context that counts how often the processor waits for all that was drawn."""
+
+    def __init__(self, ctx: Any) -> None:
+        self._ctx, self.waits = ctx, 0
+
+    def finish(self) -> None:
+        self.waits += 1
+        self._ctx.finish()
+
+    def __enter__(self) -> Any:
+        return self._ctx.__enter__()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._ctx, name)
+
+
+@pytest.mark.parametrize(("samples", "waits"), [(1, 2), (None, 0)])
+def test_in_software_a_frame_waits_for_the_last_one_unless_its_edges_were_smoothed(
+    gl: None, samples: int | None, waits: int
+) -> None:
+    """Smoothing the edges of a live picture has waited for it already."""
+    with Offscreen(BallHead(), (32, 32), samples=samples) as screen:
+        screen._fence, screen._sampling = None, AdaptiveSampling("full", samples, software=True)
+        screen.go_live()
+        screen.ctx = counted = Counted(screen.ctx)  # type: ignore[assignment]
+        for _ in range(2):
+            screen._frame(values(), None)
+        assert counted.waits == waits
