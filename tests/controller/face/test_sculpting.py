@@ -12,7 +12,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.face.point_editing import PointEditor
 from controller.face.skin_lines import even_line, knots_round, mirrored, uv_under
-from controller.face.skin_model import Screen
+from controller.face.skin_model import Screen, SkinModel, SkinModels
 from controller.panels.session.commands import Commands
 from controller.panels.session.own_groups import place_of, save_corrective, save_own_group
 from controller.panels.window.editing import MouseEditing
@@ -41,7 +41,7 @@ def editor(folder: Path) -> PointEditor:
 
 def ready(head: Head, folder: Path, light: tuple[LightPoints, ...] = ()) -> PointEditor:
     """An editor that is ready."""
-    found = PointEditor(head, lambda: Head.load(folder, light=light), P, light)
+    found = PointEditor(head, SkinModels(lambda: Head.load(folder), P), light)
     found.prepare()
     found._thread.join(60.0)
     assert found.ready
@@ -181,6 +181,26 @@ def test_an_added_point_pulls_the_skin_with_the_mouse_and_no_farther_than_it_rea
     group = found.group()
     assert len(group.ids) == 0 and group.light is not None and len(group.light_moves) == 1
     assert found.light_at((5.0, 5.0), FRONT, values) is None and found.take_light((5.0, 5.0), FRONT, values) is None
+
+
+def test_a_model_with_added_points_is_the_same_as_one_of_a_head_with_them(
+    editor: PointEditor, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loads: list[int] = []
+    models = SkinModels(lambda: loads.append(1) or Head.load(folder), P)  # type: ignore[func-returns-value]
+    light = editor.point_at(pixel(CHEEK), FRONT, P.neutral(), 9.0)
+    assert light is not None
+    plain, found, full = models.make(()), models.make((light,)), SkinModel(Head.load(folder, light=[light]), P)
+    assert loads == [1] and plain.with_light(()) is plain and found.skin is plain.skin
+    assert plain.surface.n == editor.own and found.surface.n == full.surface.n == editor.own + 1
+    values, moves = P.neutral(), np.zeros((editor.own + 1, 3))
+    values[[P.index("jawOpen"), P.index("mouthSmileLeft"), P.index("headYaw")]] = 0.7, 0.5, 0.2
+    moves[100:300, 1], moves[-1] = 2.0, [0.0, 3e4, 9e4]
+    uv = np.concatenate([light.centres, plain.skin.uv[::50]])
+    places = [model.places_of(uv, values, moves) for model in (found, full)]
+    assert np.abs(places[0] - places[1]).max() < 1e-3  # mm
+    assert np.abs(places[0] - plain.places_of(uv, values, moves[:-1])).max() > 1.0
+    np.testing.assert_allclose(found.basis @ moves, full.surface.basis_matrix(plain.skin.uv) @ moves, atol=1e-9)
 
 
 def test_added_points_on_both_sides_move_as_mirror_images(editor: PointEditor, folder: Path) -> None:
