@@ -20,7 +20,7 @@ from controller.body.body import Body
 from controller.face.face import head_indices
 from controller.face.overlays import Overlays
 from controller.face.point_editing import PointEditor
-from controller.face.skin_model import Screen
+from controller.face.skin_model import Screen, SkinModels
 from controller.panels.session.own_expressions import save_expression
 from controller.robot.anchors import anchor_places
 from controller.robot.robot import load_robot
@@ -51,7 +51,7 @@ def new_expression(folder: Path) -> tuple[Floats, Image.Image]:
     """Pull the face, save it as ``glee`` in ``folder``, and read it back; its weights (P,) and a picture."""
     place = find_config("heads", "ict")
     head = Head.load(place)
-    editor, values = PointEditor(head, lambda: Head.load(place), P), P.neutral()
+    editor, values = PointEditor(head, SkinModels(lambda: Head.load(place), P)), P.neutral()
     editor.prepare()
     screen = Screen(framed(Camera.front(), head), SIZE)
     for at, by in PULLS:

@@ -7,7 +7,7 @@ control points, which the user added to the head, are moved one by one. Independ
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from controller.base.parameters import Floats, Parameters
 from controller.face.sculpting import LightDrag, SculptDrag
 from controller.face.skin_lines import even_line, knots_round, mirrored
-from controller.face.skin_model import PART, Screen, turn_of
+from controller.face.skin_model import PART, Screen, SkinModels, turn_of
 from controller.face.skin_model import SkinModel as _Model
 from controller.stage.inverse import GroupMoves, save_group
 from controller.stage.pulling import Pin, PullSolver
@@ -35,17 +35,16 @@ class PointEditor:
 
     It samples a copy of the head, in a separate thread, when the user first picks a point.
 
-    head : the head that is drawn; sculpting moves its control points. copy : loads the same head again.
+    head : the head that is drawn; sculpting moves its control points. models : of the head without ``light``.
     light : the control points that the user has added, which are the head's last ones.
 
     Between the head's own control points and these there may be light ones that saved groups have added. They move with
     their groups alone: :attr:`moves` and :meth:`set_moves` leave them out.
     """
 
-    def __init__(
-        self, head: Head, copy: Callable[[], Head], parameters: Parameters, light: Sequence[LightPoints] = ()
-    ) -> None:
-        self.head, self._rig, self._parameters = head, head.part(PART).rig, parameters  # type: ignore[attr-defined]
+    def __init__(self, head: Head, models: SkinModels, light: Sequence[LightPoints] = ()) -> None:
+        self.head, self._rig = head, head.part(PART).rig  # type: ignore[attr-defined]
+        self._models, self._parameters = models, models.parameters
         self._rest, self.light = self._rig.rest.copy(), tuple(light)
         n, added = len(self._rest), sum(len(each) for each in light)
         self._free = np.arange(n) >= n - added  # the user's own, then also the head's own
@@ -60,7 +59,7 @@ class PointEditor:
         self._pins: dict[int, Floats] = {}
         self._settled = False
         self._last: int | None = None
-        self._thread = threading.Thread(target=self._prepare, args=(copy,), name="point editor", daemon=True)
+        self._thread = threading.Thread(target=self._prepare, name="point editor", daemon=True)
 
     @property
     def ready(self) -> bool:
@@ -128,14 +127,27 @@ class PointEditor:
         if away[point] > _PICK_PIXELS:
             return False
         self._last = point
+        if sculpt:
+            self._take_skin(model, point, pixel, screen, values, tied, falloff_mm)
+            return True
         offset = places[point] - screen.place(pixel, places[point])
-        self._held = SculptDrag(
-            model, point, places[point], offset, self._heavy, falloff_mm, tied=tied
-        ) if sculpt else _PointDrag(
+        self._held = _PointDrag(
             model, point, places[point], offset, self._parameters, values, model.shown(values, self._moves), self._pins,
             tied=tied,
         )  # fmt: skip
         return True
+
+    def _take_skin(
+        self, model: _Model, point: int, pixel: tuple[float, float], screen: Screen, values: Floats, tied: bool,
+        falloff_mm: float | None,
+    ) -> None:  # fmt: skip
+        """Take the very place of the skin under a pixel; beside its edge, the sampled point."""
+        uv = model.under(np.array([pixel]), screen, values, self._moves)
+        if not np.isfinite(uv).all():
+            uv = model.skin.uv[point : point + 1]
+        place = model.places_of(uv, values, self._moves)[0]
+        offset = place - screen.place(pixel, place)
+        self._held = SculptDrag(model, uv, place, offset, self._heavy, falloff_mm, tied=tied)
 
     def take_light(
         self, pixel: tuple[float, float], screen: Screen, values: Floats, *, tied: bool = False
@@ -184,7 +196,7 @@ class PointEditor:
         reach_mm : how far from its middle it moves the skin.
         """
         model = self._model
-        uv = np.zeros((0, 2)) if model is None else model.under(np.array([pixel]), screen, values)
+        uv = np.zeros((0, 2)) if model is None else model.under(np.array([pixel]), screen, values, self._moves)
         if model is None or not np.isfinite(uv).all():
             return None
         at = [uv, *([mirrored(model.surface, uv, *model.mesh_rest)] if tied and self._aside(model, uv) else [])]
@@ -202,7 +214,7 @@ class PointEditor:
         model = self._model
         if model is None:
             return None
-        line = even_line(model.surface, model.under(np.array(pixels), screen, values), width_mm)
+        line = even_line(model.surface, model.under(np.array(pixels), screen, values, self._moves), width_mm)
         if not len(line):
             return None
         other = tied and self._aside(model, line)
@@ -336,11 +348,8 @@ class PointEditor:
         """(m, 3) mm where the points are in the picture, and the head's rotation (3, 3)."""
         return model.turned(model.local(values, self._moves), values)
 
-    def _prepare(self, copy: Callable[[], Head]) -> None:
-        model = _Model(copy(), self._parameters)
-        solver = PullSolver(model.skin, model.lips, model.order, self._parameters, self._parameters.neutral())
-        solver.solve([Pin(0, model.skin.rest[0])])  # compile before the first drag needs it
-        self._model = model
+    def _prepare(self) -> None:
+        self._model = self._models.make(self.light)
 
 
 class _PointDrag:

@@ -5,7 +5,11 @@ Independent of the window library.
 
 from __future__ import annotations
 
+import threading
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +17,16 @@ from controller.base.parameters import Floats, Parameters
 from controller.face.skin_lines import uv_under
 from controller.robot.anchors import head_order, sample_skin, shapes_of, skin_points
 from controller.stage.inverse import SculptSolver
-from controller.stage.pulling import lip_pairs
+from controller.stage.pulling import Pin, PullSolver, lip_pairs
 from surface.head import Head
 from surface.head.model.data import PartData
+from surface.head.model.light import LightPoints, join_light, with_points
+from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import NAMES, read_pose, rotation
 from surface.view.scene.camera import Camera
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix  # start-up: only dragging needs it
 
 PART = "face"
 _POINTS = 900  # among the mesh's vertices, which lie close where the face has features
@@ -57,6 +66,7 @@ class SkinModel:
 
     def __init__(self, head: Head, parameters: Parameters) -> None:
         part = head.part(PART)
+        self.data: PartData = next(part for part in head.data.parts if part.name == PART)
         self.order = head_order(NAMES, parameters)
         self._head, self._all = head, head_order(head.parameters, parameters)
         self.skin = sample_skin(head, PART, np.concatenate([skin_points(head, PART, _POINTS, _SEED), _over_area(head)]))
@@ -71,6 +81,7 @@ class SkinModel:
         self.lips = lip_pairs(head, PART)
         self.pivot = np.array(head.data.neck.pivot)
         self._own = part.rig.own  # type: ignore[attr-defined]
+        self._mesh_basis: csr_matrix | None = None  # of all vertices: made where moved control points are drawn on
 
     def shown(self, values: Floats, moves: Floats) -> Floats:
         """(m, 3) mm that control points moved by hand, ``moves`` (n, 3), and a user's own groups add to a face (P,)."""
@@ -80,10 +91,16 @@ class SkinModel:
             moved[own.ids] += amounts[own.index] * own.moves
         return np.asarray(self.basis @ moved)
 
-    @property
-    def data(self) -> PartData:
-        """The part's data."""
-        return next(part for part in self._head.data.parts if part.name == PART)
+    def with_light(self, light: Sequence[LightPoints]) -> SkinModel:
+        """The model of the same head with control points added behind its own. Nothing is sampled again: they leave
+        the skin, and how shapes move it, as they are."""
+        if not light:
+            return self
+        found = copy(self)
+        found.data = with_points(self.data, join_light(light)[PART])
+        found.surface, found.jaw = make_surface(found.data), np.asarray(found.data.jaw, np.float64)
+        found.basis, found._mesh_basis = found.surface.basis_matrix(self.skin.uv), None
+        return found
 
     @property
     def mesh_rest(self) -> tuple[Floats, Floats]:
@@ -105,19 +122,48 @@ class SkinModel:
     def places_of(self, uv: Floats, values: Floats, moves: Floats) -> Floats:
         """(k, 3) mm where places ``uv`` (k, 2) are in the picture of a face (P,)."""
         index = self._head.parts.index(self._head.part(PART))
-        points = self._head.place_points(self._of_head(values))[0][index] + moves
-        return self.turned(np.asarray(self.surface.basis_matrix(uv) @ points), values)[0]
+        part = self._head.parts[index]
+        points = self._head.place_points(self._of_head(values))[0][index]
+        places = part.surface.basis_matrix(uv) @ points + self.surface.basis_matrix(uv) @ moves
+        return self.turned(np.asarray(places), values)[0]
 
-    def under(self, pixels: Floats, screen: Screen, values: Floats) -> Floats:
-        """(k, 2) which places lie under pixels (k, 2) in the picture of a face (P,); NaN for none."""
+    def under(self, pixels: Floats, screen: Screen, values: Floats, moves: Floats) -> Floats:
+        """(k, 2) which places lie under pixels (k, 2) in the picture of a face (P,) whose control points were moved by
+        hand, ``moves`` (n, 3); NaN for none."""
         self._head.pose(self._of_head(values))
-        part = self._head.part(PART)
-        count = len(part.mesh.uv)
-        own = part.mesh.triangles
-        return uv_under(pixels, screen.project(part.vertices[:count].astype(np.float64)), own, part.mesh.uv)
+        mesh, part = self._head.part(PART).mesh, self._head.part(PART)
+        places = part.vertices[: len(mesh.uv)].astype(np.float64)
+        if moves.any():
+            if self._mesh_basis is None:
+                self._mesh_basis = self.surface.basis_matrix(mesh.uv)
+            places += np.asarray(self._mesh_basis @ moves) @ turn_of(values[self.order]).T
+        return uv_under(pixels, screen.project(places), mesh.triangles, mesh.uv)
 
     def _of_head(self, values: Floats) -> Floats:
         return values[self._all]
+
+
+class SkinModels:
+    """The model of a head, made when it is first asked for, and the same with control points that were added.
+
+    copy : loads the head without them. May be asked from several threads.
+    """
+
+    def __init__(self, copy: Callable[[], Head], parameters: Parameters) -> None:
+        self.parameters, self._copy = parameters, copy
+        self._lock, self._model = threading.Lock(), None  # type: threading.Lock, SkinModel | None
+
+    def make(self, light: Sequence[LightPoints]) -> SkinModel:
+        """The model with these control points; the first one takes seconds."""
+        with self._lock:
+            self._model = self._model or self._first()
+        return self._model.with_light(light)
+
+    def _first(self) -> SkinModel:
+        model, parameters = SkinModel(self._copy(), self.parameters), self.parameters
+        solver = PullSolver(model.skin, model.lips, model.order, parameters, parameters.neutral())
+        solver.solve([Pin(0, model.skin.rest[0])])  # compile before the first drag needs it
+        return model
 
 
 def _over_area(head: Head) -> Floats:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 Side = Literal["left", "right", "bottom"]
 MAIN = "MainDockSpace"
-_WIDEST, _WIDEST_OF_TWO = 0.44, 0.4  # share of the window that a column takes, and each of two
-_SHARES: dict[Side, float] = {"left": 22.0, "right": 22.0, "bottom": 13.0}
+_WIDEST, _WIDEST_OF_TWO = 0.6, 0.4  # share of the window that a column takes at most, and each of two
+_SHARES: dict[Side, float] = {"left": 22.5, "right": 22.5, "bottom": 13.0}
 """Width of a column and height of a row, in heights of a line of text."""
 
 
@@ -64,9 +64,25 @@ class PictureArea:
     dropped: Callable[[Sequence[Path]], None] | None = None
 
 
-def text_scale(height: float, system: float) -> float:
-    """Factor on the size of text, for a window ``height`` points high; ``system`` : the desktop's own factor."""
-    return max(1.0, height / 1080.0 / max(system, 1.0))
+LINE = 16.0
+"""Height of a line of the runner's text, points, before it is scaled."""
+
+
+def text_scale(size: tuple[float, float], system: float, docks: Sequence[Dock] = ()) -> float:
+    """Factor on the size of text, for a window of ``size`` points; ``system`` : the desktop's own factor.
+
+    Text grows with the height of the window. Where that, or the desktop's factor, made it too large for the columns
+    beside the picture, it is smaller, so that nothing in them is cut; never smaller than without a factor.
+    """
+    system = max(system, 1.0)
+    wanted = max(1.0, size[1] / 1080.0 / system)
+    columns = {dock.side for dock in docks} & {"left", "right"}
+    most = min((size[0] * _widest(docks) / (_SHARES[side] * LINE * system) for side in columns), default=wanted)
+    return max(1.0 / system, min(wanted, most))
+
+
+def _widest(docks: Sequence[Dock]) -> float:
+    return _WIDEST_OF_TWO if {"left", "right"} <= {dock.side for dock in docks} else _WIDEST
 
 
 def add_docks(runner: Any, params: Any, docks: Sequence[Dock], size: tuple[float, float], line: float) -> None:
@@ -79,7 +95,7 @@ def add_docks(runner: Any, params: Any, docks: Sequence[Dock], size: tuple[float
     docking, rest = params.docking_params, 1.0
     docking.main_dock_space_node_flags = imgui.DockNodeFlags_.passthru_central_node
     sides = dict.fromkeys(dock.side for dock in docks)
-    widest = _WIDEST_OF_TWO if {"left", "right"} <= sides.keys() else _WIDEST
+    widest = _widest(docks)
     for side in sides:
         across = size[1] if side == "bottom" else size[0] * rest
         share = min(_SHARES[side] * line / across, widest)

@@ -15,7 +15,7 @@ import numpy as np
 
 from surface.base.errors import ViewError
 from surface.base.extras import importing
-from surface.view.docks import Dock, PictureArea, Remake, add_docks, find_area, show_docks, text_scale
+from surface.view.docks import LINE, Dock, PictureArea, Remake, add_docks, find_area, show_docks, text_scale
 from surface.view.draw.alternating import Alternating
 from surface.view.draw.placing import Box, Placing
 from surface.view.draw.renderer import Renderer
@@ -33,7 +33,6 @@ if TYPE_CHECKING:
     import moderngl
 
 _MINIMISED_S = 0.02
-_LINE = 16.0  # height of a line of the runner's text, points
 _SIZES = (
     "window_padding", "frame_padding", "item_spacing", "item_inner_spacing", "cell_padding", "indent_spacing",
     "scrollbar_size", "grab_min_size", "frame_rounding", "tab_rounding", "separator_text_padding",
@@ -106,8 +105,8 @@ def run_window(
     if docks and not kiosk:
         safe = [replace(dock, draw=window.as_callback(dock.draw)) for dock in docks]
         desktop = desktop_scale()
-        add_docks(hello_imgui, params, safe, size, _LINE * desktop * text_scale(size[1], desktop))
-        window.docked = True
+        add_docks(hello_imgui, params, safe, size, LINE * desktop * text_scale(size, desktop, safe))
+        window.docks = safe
     if kiosk:
         geometry = params.app_window_params.window_geometry
         geometry.full_screen_mode = hello_imgui.FullScreenMode.full_screen_desktop_resolution
@@ -151,7 +150,7 @@ class _Window:
     ) -> None:
         self._imgui, self._source, self._viewpoint = imgui, source, viewpoint
         self._make_renderer, self._quality = make_renderer, quality
-        self.kiosk = self.docked = False
+        self.kiosk, self.docks = False, list[Dock]()
         self.area = PictureArea()
         self.gui: Callable[[], None] | None = None
         self.seconds: float | None = None
@@ -277,7 +276,7 @@ class _Window:
         io = self._imgui.get_io()
         area = self.area
         area.left, area.top, area.width, area.height = 0.0, 0.0, io.display_size.x, io.display_size.y
-        if self.docked:
+        if self.docks:
             find_area(self._imgui, self.params.docking_params, area)
 
     def _picture(self, size: tuple[int, int]) -> moderngl.Framebuffer:
@@ -294,7 +293,8 @@ class _Window:
 
     def _scale(self, style: Any) -> None:
         """Let text, and all distances between and within widgets, grow with the window."""
-        scale = text_scale(self._imgui.get_io().display_size.y, style.font_scale_dpi)
+        size = self._imgui.get_io().display_size
+        scale = text_scale((size.x, size.y), style.font_scale_dpi, self.docks)
         if scale == self._scaled:
             return
         # from sizes as they were made: those of 4K, made smaller again, would be rounded ones
@@ -309,7 +309,7 @@ class _Window:
 
     def panels(self) -> None:
         """Mouse, keys and the caller's panels."""
-        if self.docked:
+        if self.docks:
             show_docks(self.params, shown=not self.area.bare)
             self._scale(self._imgui.get_style())
         if self.kiosk:

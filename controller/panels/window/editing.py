@@ -15,7 +15,7 @@ import numpy as np
 
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.face.point_editing import PointEditor
-from controller.face.skin_model import Screen
+from controller.face.skin_model import Screen, SkinModels
 from controller.panels.session.commands import Commands
 from surface.head import Head
 from surface.head.model.light import LightPoints
@@ -49,7 +49,8 @@ class Brush:
 class MouseEditing:
     """Drags points of the face with the mouse; called once a frame.
 
-    area : where the picture is. copy : loads the same head again. newest : the newest parameters (P,).
+    area : where the picture is. copy : loads the same head again, without the control points that were added here.
+    newest : the newest parameters (P,).
     parameters : of the stage; those of the base vocabulary without.
 
     Attributes
@@ -71,12 +72,14 @@ class MouseEditing:
         commands.show_moves = self._show_moves
         self.change(head)
 
-    def change(self, head: Head, light: Sequence[LightPoints] = ()) -> None:
+    def change(self, head: Head, light: Sequence[LightPoints] = (), *, same: bool = False) -> None:
         """Drag points of another head from now on; control points stay moved where it has as many.
 
-        light : the control points that the user has added to it.
+        light : the control points that the user has added to it. same : only these differ from the head before.
         """
-        self.editor = PointEditor(head, self._copy, self._parameters, light)
+        if not same:
+            self._models = SkinModels(self._copy, self._parameters)
+        self.editor = PointEditor(head, self._models, light)
         self._stroke = []
         self._eyes = head.data.eyes.mean(axis=0)
         if light or self.brush.tool != TOOLS[0]:

@@ -86,7 +86,7 @@ class WindowFace:
         self._mouse, self._looks = None, None  # type: tuple[MouseEditing | None, Looks | None]
         if stage is not None and not settings.kiosk:
             looks = Looks(stage, self._swap, self._panel.jobs)
-            self._looks, copy = looks, looks.load
+            self._looks, copy = looks, looks.load_plain
             self._panel.commands.show_light = looks.show_light
             self._panel.add_looks(looks, self._restart)
             self._panel.saving.reopen = partial(self._open_again, stage, options or PanelOptions())
@@ -165,7 +165,8 @@ class WindowFace:
         self._values.follow(head.parameters)
         self._viewpoint.reframe(framing_of(head))
         if self._mouse is not None:
-            self._mouse.change(head, self._looks.shown_light if self._looks is not None else ())
+            looks = self._looks
+            self._mouse.change(head, looks.shown_light if looks else (), same=looks is not None and looks.only_light)
         if self._overlays is not None:
             self._overlays.forget()
 

@@ -52,6 +52,7 @@ class Keys:
     def _help(self, imgui: Any) -> None:
         middle = imgui.get_main_viewport().get_center()
         imgui.set_next_window_pos(middle, imgui.Cond_.appearing, imgui.ImVec2(0.5, 0.5))
+        imgui.set_next_window_bg_alpha(1.0)  # else what is under it shows between the words
         flags = imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_docking
         shown, open_ = imgui.begin("keys", self.help_shown, flags)
         if shown and imgui.begin_table("##keys", 2):

@@ -35,6 +35,7 @@ class Looks:
     Attributes
     ----------
     light : control points that were added to the face. shown_light : those of the head that was loaded last.
+    only_light : whether that one differs in these alone from the head before.
     keep_light : makes these the added ones, where the user does not wait for others, or they cannot be loaded.
     """
 
@@ -43,7 +44,9 @@ class Looks:
         self.light: tuple[LightPoints, ...] = ()
         self.shown_light: tuple[LightPoints, ...] = ()
         self.keep_light: Callable[[], None] = lambda: None
+        self.only_light = False
         self._begin(stage)
+        self._drawn = (stage, self.first)
 
     def _begin(self, stage: Stage) -> None:
         face = stage.settings.face
@@ -54,16 +57,19 @@ class Looks:
     def turn_to(self, stage: Stage, look: Look | None) -> None:
         """Show another head of the stage, with a look that was chosen for it."""
         self._begin(stage)
-        self._load(self._stage(look or self.first), f"loading {stage.head.name}")
+        self._load(look or self.first, f"loading {stage.head.name}")
         self._shown = look or self.first
 
-    def _load(self, stage: Stage, title: str) -> None:
-        face, asked = stage.settings.face, self.light
+    def _load(self, look: Look, title: str) -> None:
+        of, stage, asked = self.stage, self._stage(look), self.light
+        face = stage.settings.face
         light = asked if stage.head == self.stage.head else ()
 
         def done(head: Head) -> None:
             if asked == self.light:  # else the next one is being loaded
                 self.shown_light = light
+                self.only_light = self._drawn[0] is of and self._drawn[1] == look
+                self._drawn = of, look
                 self._swap(head, face)
 
         given_up = self.keep_light if title == _CHANGING else lambda: None
@@ -73,7 +79,7 @@ class Looks:
         """Show the face with control points that were added to it."""
         self.light = light
         if light != self.shown_light:
-            self._load(self._stage(self._shown), _CHANGING)
+            self._load(self._shown, _CHANGING)
             return
         self._jobs.drop(_CHANGING)
 
@@ -87,7 +93,11 @@ class Looks:
             self._swap(None, stage.settings.face)
             return
         what = look.person or (look.head.name if look.head else "the head")
-        self._load(stage, f"loading {what}")
+        self._load(look, f"loading {what}")
+
+    def load_plain(self) -> Head:
+        """Load the head that is shown again, without the control points that were added to it."""
+        return self._stage(self._shown).load_head()
 
     def load(self) -> Head:
         """Load the head that is shown again, as it was."""

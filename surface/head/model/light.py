@@ -180,14 +180,24 @@ class Refined:
         return np.array(self._middles.ends, np.int64).reshape(-1, 2)
 
     def _refine(self, triangles: Ints) -> Ints:
-        """Triangles (t', 3) with shorter edges where light points reach, of (t, 3) over the mesh's own vertices."""
-        for _ in range(ROUNDS):
+        """Triangles (t', 3) with shorter edges where light points reach, of (t, 3) over the mesh's own vertices. Both
+        triangles of an edge that they reach are near; the others, which are most, are not looked at."""
+        near = self._near(self._uv[triangles])
+        others, triangles = triangles[~near], triangles[near]
+        for _ in range(ROUNDS if len(triangles) else 0):
             before = len(triangles)
             triangles = split_edges(triangles, self._is_long, self._middles)
             self._place()
             if len(triangles) == before:
                 break
-        return triangles
+        return np.concatenate([others, triangles])
+
+    def _near(self, places: Floats) -> np.ndarray:
+        """(t,) which of polygons (t, k, 2) lie, by their boxes, where all light points together reach."""
+        reach, centres = REACH * self._spans, self._own.centres
+        low, high = (centres - reach).min(axis=0), (centres + reach).max(axis=0)
+        near: np.ndarray = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
+        return near
 
     def _place(self) -> None:
         """Put vertices that were made since the last call onto the surface."""
@@ -201,10 +211,8 @@ class Refined:
         """(e,) which edges reach a light point and are longer than there is use for."""
         length = np.linalg.norm(self._places[edges[:, 0]] - self._places[edges[:, 1]], axis=1)
         ends = self._uv[edges]
-        low, high = ends.min(axis=1), ends.max(axis=1)
         reach, centres = REACH * self._spans, self._own.centres
-        box = (low < (centres + reach).max(axis=0)) & (high > (centres - reach).min(axis=0))
-        near = np.flatnonzero(box.all(axis=1) & (length > self._longest.min()))
+        near = np.flatnonzero(self._near(ends) & (length > self._longest.min()))
         out = np.zeros(len(edges), bool)
         for first in range(0, len(near), 4096):
             which = near[first : first + 4096]

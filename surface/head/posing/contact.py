@@ -8,6 +8,9 @@ sample is computed once, by least squares.
 
 from __future__ import annotations
 
+from collections import OrderedDict
+from hashlib import blake2b
+
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
@@ -32,6 +35,8 @@ REGULARISATION = (0.02, 0.05)  # for lips and lids: weight of moving no control 
 LEAST_WEIGHT = 0.004  # of a control point in a sample: those with less are left out of it
 FAR_MM = 18.0  # from every sample: points with large spans so far away would move brow and chin
 LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
+_MOST_FOUND = 12  # tables that are kept: those of two heads
+_FOUND: OrderedDict[bytes, tuple[Ints, Floats]] = OrderedDict()
 
 
 def height_limits(
@@ -226,7 +231,21 @@ def _nearest(points: Floats, others: Floats) -> Floats:
 
 def _inverse(start: Ints, ids: Ints, share: Floats, points: Floats, regularisation: float) -> tuple[Ints, Floats]:
     """Control points (k,) of ``points (n, 3)`` that reach the samples, and (s, k) how far each moves, in least squares,
-    per sample that is to move by 1. Points that mostly act elsewhere, or are far from every sample, are left out."""
+    per sample that is to move by 1; read-only. Points that mostly act elsewhere, or are far from every sample, are left
+    out. The same head loaded again, as with a control point added elsewhere, finds what was found before."""
+    reached = points[: int(ids.max()) + 1]
+    key = blake2b(b"".join(np.ascontiguousarray(each).tobytes() for each in (start, ids, share, reached))).digest()
+    known = key + str(regularisation).encode()
+    found = _FOUND.pop(known, None) or _find_inverse(start, ids, share, reached, regularisation)
+    _FOUND[known] = found
+    while len(_FOUND) > _MOST_FOUND:
+        _FOUND.popitem(last=False)
+    return found
+
+
+def _find_inverse(
+    start: Ints, ids: Ints, share: Floats, points: Floats, regularisation: float
+) -> tuple[Ints, Floats]:  # fmt: skip
     dense = np.zeros((len(start) - 1, int(ids.max()) + 1))
     np.add.at(dense, (np.repeat(np.arange(len(dense)), np.diff(start)), ids), share)
     used = np.flatnonzero(dense.max(axis=0) > LEAST_SHARE).astype(np.int64)
@@ -234,7 +253,10 @@ def _inverse(start: Ints, ids: Ints, share: Floats, points: Floats, regularisati
     dense = dense[:, used]
     normal = dense.T @ dense
     normal[np.diag_indices(len(used))] += regularisation
-    return used, np.ascontiguousarray(np.linalg.solve(normal, dense.T).T)
+    table = np.ascontiguousarray(np.linalg.solve(normal, dense.T).T)
+    for array in (used, table):
+        array.flags.writeable = False
+    return used, table
 
 
 def contact_rows(contact: Contact) -> int:

@@ -13,7 +13,7 @@ from controller.base.errors import ConfigError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.face.point_editing import PointEditor
-from controller.face.skin_model import Screen
+from controller.face.skin_model import Screen, SkinModels
 from controller.stage.inverse import load_group
 from controller.stage.stage import load_stage
 from controller.tools.check import check_anything
@@ -36,7 +36,7 @@ def head(folder: Path) -> Head:
 
 @pytest.fixture(scope="module")
 def handles(head: Head, folder: Path) -> PointEditor:
-    found = PointEditor(head, lambda: Head.load(folder), P)
+    found = PointEditor(head, SkinModels(lambda: Head.load(folder), P))
     assert not found.ready and not found.dragging
     found.prepare()
     found._thread.join(60.0)
@@ -67,7 +67,7 @@ def test_a_grab_counts_that_was_made_while_points_got_ready(
         return handles._model
 
     monkeypatch.setattr("controller.face.point_editing._Model", model)
-    editor = PointEditor(head, lambda: head, P)
+    editor = PointEditor(head, SkinModels(lambda: head, P))
     x, y = pixel(screen, CORNER)
     assert editor.take((x, y), screen, values) and editor.dragging
     assert editor.drag((x, y - 12), screen, values) == {} and not editor.settled

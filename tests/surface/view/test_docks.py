@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from surface.view.docks import Dock, add_docks, show_docks, text_scale
+from surface.view.docks import LINE, Dock, add_docks, show_docks, text_scale
 
 
 @pytest.mark.parametrize(
@@ -12,7 +12,7 @@ from surface.view.docks import Dock, add_docks, show_docks, text_scale
     [(600, 1.0, 1.0), (1080, 1.0, 1.0), (2160, 1.0, 2.0), (2160, 2.0, 1.0), (2160, 0.5, 2.0), (4320, 2.0, 2.0)],
 )
 def test_text_grows_with_the_window_but_not_twice(height: float, system: float, scale: float) -> None:
-    assert text_scale(height, system) == pytest.approx(scale)
+    assert text_scale((16 / 9 * height, height), system) == pytest.approx(scale)
 
 
 def params(docks: list[Dock], size: tuple[float, float]) -> object:
@@ -35,14 +35,27 @@ def test_panels_of_one_side_share_a_column_and_columns_are_equally_wide() -> Non
     assert [split.new_dock for split in splits] == ["left", "right"]
     left = splits[0].ratio * 2000
     right = splits[1].ratio * (2000 - left)  # the second is cut off what the first has left
-    assert left == pytest.approx(440, rel=1e-5) and right == pytest.approx(440, rel=1e-5)
+    assert left == pytest.approx(450, rel=1e-5) and right == pytest.approx(450, rel=1e-5)
     assert [window.dock_space_name for window in docking.dockable_windows] == ["left", "left", "right"]
     assert not any(window.can_be_closed for window in docking.dockable_windows)
 
 
 def test_one_column_is_wide_enough_for_its_titles_in_a_small_window() -> None:
     splits = params(DOCKS[:2], (800.0, 600.0)).docking_params.docking_splits  # type: ignore[attr-defined]
-    assert splits[0].ratio == pytest.approx(0.44)  # of seven titles, none is cut: looked at with text of 16 points
+    assert splits[0].ratio == pytest.approx(0.5625)  # 22.5 lines: of seven titles none is cut
+
+
+@pytest.mark.parametrize("size", [(640, 480), (800, 600), (1280, 720), (1920, 1080), (3840, 2160)])
+@pytest.mark.parametrize("system", [1.0, 1.5, 2.0, 3.0])
+def test_a_column_holds_as_many_letters_at_every_size_and_scale(size: tuple[float, float], system: float) -> None:
+    text = LINE * system * text_scale(size, system, DOCKS[:2])
+    assert text >= LINE  # never smaller than on a plain desktop
+    hello_imgui = pytest.importorskip("imgui_bundle").hello_imgui
+    found = hello_imgui.RunnerParams()
+    add_docks(hello_imgui, found, DOCKS[:2], size, text)
+    width = found.docking_params.docking_splits[0].ratio * size[0]
+    assert width >= 22.4 * text or text == LINE
+    assert width <= 0.61 * size[0]
 
 
 def test_panels_leave_room_for_the_face_in_a_small_window() -> None:

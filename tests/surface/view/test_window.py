@@ -404,7 +404,7 @@ told, area, frames = [], PictureArea(), [0]
 def panel():
     frames[0] += 1
     told[:] = [imgui.get_font_size(), imgui.get_window_size().x]
-run_window(BallHead(), lambda: values(), size=(1600, 900), docks=[Dock("a", "left", panel)], area=area,
+run_window(BallHead(), lambda: values(), size={size}, docks=[Dock("a", "left", panel)], area=area,
            keep_going=lambda: frames[0] < 8)
 print(json.dumps(told))
 """
@@ -418,8 +418,8 @@ print(json.dumps(told))
 def test_text_and_panels_are_twice_as_large_on_a_desktop_at_200_percent() -> None:
     here = Path(__file__).parents[1]
 
-    def told(dpi: int) -> list[float]:
-        program = SCALED.format(root=str(here.parents[1]), here=str(here), dpi=dpi)
+    def told(dpi: int, size: tuple[int, int] = (1600, 900)) -> list[float]:
+        program = SCALED.format(root=str(here.parents[1]), here=str(here), dpi=dpi, size=size)
         screen = "-screen 0 1600x1200x24 -noreset"  # else what xrdb has set is lost with it
         command = ["xvfb-run", "-a", "-s", screen, sys.executable, "-c", program]
         environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
@@ -430,4 +430,6 @@ def test_text_and_panels_are_twice_as_large_on_a_desktop_at_200_percent() -> Non
 
     plain, doubled = told(96), told(192)
     assert doubled[0] == pytest.approx(2 * plain[0], rel=0.02)
-    assert doubled[1] > 1.7 * plain[1]  # as wide as the window's share of panels allows
+    assert doubled[1] == pytest.approx(2 * plain[1], rel=0.02)
+    small = told(192, (800, 600))  # twice the text has no room here: it is as large as the panel holds its titles with
+    assert 1.3 * plain[0] < small[0] < doubled[0] and small[1] > 22.0 * small[0]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS
@@ -18,6 +20,7 @@ from controller.panels.window.drops import Drops
 from controller.panels.window.looks import Looks
 from controller.stage.stage import FaceSettings, load_stage
 from surface.head import Head
+from surface.head.model.light import LightPoints
 
 
 class Window:
@@ -110,3 +113,29 @@ def test_only_what_differs_is_loaded(window: Window) -> None:
     window.take()
     assert window.swapped[0][0] is None and window.swapped[1] == ("the head in ict", "robot", "maple")
     assert len(window.loaded) == 1
+
+
+def test_whether_only_added_points_differ_is_told(window: Window, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[int] = []
+    monkeypatch.setattr(
+        "controller.stage.stage.load_head", lambda *_, light=(), **__: given.append(len(light)) or "a head"
+    )
+    told: list[bool] = []
+    monkeypatch.setattr(window.looks, "_swap", lambda head, face: told.append(window.looks.only_light))
+
+    def wait() -> bool:
+        for job in list(window.jobs.running):
+            job.join(60.0)
+        window.jobs()
+        return told[-1]
+
+    one, two = (LightPoints("face", np.arange(5.0)[None] + k, np.arange(5.0)[None]) for k in range(2))
+    window.commands.show_light = window.looks.show_light
+    window.commands.add_points(one, np.zeros((1, 3)), 10)
+    assert wait() and window.looks.shown_light == (one,)
+    window.commands.appear(replace(window.looks.first, person="oak"))
+    assert not wait()
+    window.commands.add_points(two, np.zeros((1, 3)), 10)
+    assert wait() and window.looks.shown_light == (one, two) and given == [1, 1, 2]
+    window.looks.load_plain()
+    assert given[-1] == 0

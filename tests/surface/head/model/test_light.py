@@ -12,9 +12,10 @@ from scipy.interpolate import BSpline
 from controller.base.paths import find_config
 from surface.head import Head
 from surface.head.model.furrow import Furrow, even_moves, furrow_knots
-from surface.head.model.light import WEIGHT, LightPoints, with_light
+from surface.head.model.light import WEIGHT, LightPoints, Refined, with_light
 from surface.head.model.meshes import make_surface
 from surface.mesh.mesh import border_edges
+from surface.mesh.splitedges import split_edges
 
 PLACE = np.array([[45.0, -25.0, 85.0]])
 
@@ -139,3 +140,21 @@ def test_points_that_cannot_be_added_are_refused(plain: Head, light: LightPoints
 def test_no_points_leave_the_head_as_it_is(plain: Head) -> None:
     data, refined = with_light(plain.data, [])
     assert not refined and data.parts == plain.data.parts
+
+
+def test_only_triangles_that_points_reach_are_looked_at_and_all_of_these(
+    folder: Path, light: LightPoints, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[int] = []
+    monkeypatch.setattr(
+        "surface.head.model.light.split_edges",
+        lambda triangles, *words: looked.append(len(triangles)) or split_edges(triangles, *words),
+    )
+    one = Head.load(folder, light=[light]).part("face")
+    few = max(looked)
+    monkeypatch.setattr(Refined, "_near", lambda self, places: np.ones(len(places), bool))
+    two = Head.load(folder, light=[light]).part("face")
+    assert few < 0.2 * len(one.triangles) < max(looked)
+    assert one.vertices.tobytes() == two.vertices.tobytes()
+    for a, b in ((one.triangles, two.triangles), *((one.decimated[k], two.decimated[k]) for k in one.decimated)):
+        assert sorted(map(tuple, a.tolist())) == sorted(map(tuple, b.tolist()))

@@ -399,3 +399,20 @@ def test_a_seal_leaves_an_opening_that_stands_open_at_rest() -> None:
     points = surface.points.copy()
     ContactSolver(contact(), surface, small_head()).apply(AHEAD, points, 1.0)
     np.testing.assert_allclose(points, surface.points, atol=1e-6)
+
+
+def test_what_was_found_for_the_same_surface_is_used_again_and_for_another_found_anew(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    solved: list[float] = []
+    real = contact_module._find_inverse
+    monkeypatch.setattr(contact_module, "_FOUND", type(contact_module._FOUND)())
+    monkeypatch.setattr(contact_module, "_find_inverse", lambda *words: solved.append(words[-1]) or real(*words))
+    one, same, other = (EyeballClearance(lips(x), low_places(), np.zeros(3), 0.0) for x in (0.2, 0.2, 0.3))
+    assert len(solved) == 2 and one.table is same.table and not one.table.flags.writeable
+    assert other.table is not one.table
+    EyeballClearance(lips(0.2), low_places(), np.zeros(3), 1.0)
+    assert len(solved) == 3 and solved[-1] != solved[0]
+    for overlap in np.linspace(1.0, 2.0, 20):
+        EyeballClearance(lips(overlap), low_places(), np.zeros(3), 0.0)
+    assert len(contact_module._FOUND) == contact_module._MOST_FOUND
