@@ -107,6 +107,7 @@ class DenseErrors:
     samples : measured in every shape, both ways.
     sticking : by part and shape, (k, 2) in (u, v): vertices of the surface that are further from the mesh than a limit.
     turned : by part and shape, what of the surface is turned over.
+    corrected : shapes that correctives of the head change on purpose; they were measured without these.
     """
 
     parts: dict[str, dict[str, Both]]
@@ -117,12 +118,15 @@ class DenseErrors:
     samples: int
     sticking: dict[tuple[str, str], Floats] = field(default_factory=dict)
     turned: dict[tuple[str, str], Turned] = field(default_factory=dict)
+    corrected: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
         out = [f"greatest error {self.worst}"] if self.worst else []
         if self.worst_fold:
             out.append(f"in folds (nostrils, ear canals, corners), which are held only loosely: {self.worst_fold}")
+        if self.corrected:
+            out.append(f"changed on purpose by correctives, and measured without them: {', '.join(self.corrected)}")
         out += [f"not in the mesh, so not measured: {', '.join(self.added)}"] if self.added else []
         return out + (
             [f"faces of the mesh that no fitted part holds: {', '.join(self.left_out)}"] if self.left_out else []
