@@ -11,8 +11,8 @@ from surface.base.arrays import Bools, Floats
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
 from surface.check.subject import Subject, pose_of
-from surface.fit.measures.closest import ClosestTree
 from surface.fit.features.finish import PRODUCT
+from surface.fit.measures.closest import ClosestTree
 from surface.fit.measures.turned import TurnedFaces
 from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, Turned, errors_of
 from surface.fit.source.mesh import FitMesh, triangles

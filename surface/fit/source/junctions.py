@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -168,7 +169,7 @@ def _matched(chains: Chains, border: _Border) -> Chains:
 
 def _steps(edge: tuple[int, int], inner: list[int]) -> Iterator[tuple[int, int]]:
     line = [edge[0], *inner, edge[1]]
-    return zip(line, line[1:], strict=False)
+    return pairwise(line)
 
 
 def _split(mesh: FitMesh, chains: Chains) -> FitMesh:
@@ -233,7 +234,7 @@ def _cut(
         for p, q, apex in ((a, b, c), (b, c, a), (c, a, b)):
             if inner := chains.get((p[0], q[0])):
                 line = [p, *((w, uv.between((p[0], q[0]), (p[1], q[1]), w)) for w in inner), q]
-                stack += [(one, two, apex) for one, two in zip(line, line[1:], strict=False)]
+                stack += [(one, two, apex) for one, two in pairwise(line)]
                 break
         else:
             yield (a[0], b[0], c[0]), (a[1], b[1], c[1])

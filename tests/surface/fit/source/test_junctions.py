@@ -32,7 +32,7 @@ def sheets(
     """
     a, f = strip(low, (-10.0, 0.0), triangles=triangles)
     b, g = strip(high, (0.0, 10.0), triangles=triangles)
-    at = np.concatenate([a, b + [0.0, 0.0, apart]])
+    at = np.concatenate([a, b + np.array([0.0, 0.0, apart])])
     g = np.where(g < 0, -1, g + len(a))
     faces = np.concatenate([f, g])
     bend = np.interp(at[:, 0], low, low**2 / 100.0)
