@@ -194,7 +194,7 @@ def face_bounds(report: FitReport) -> str:
     """
     face = report.parts[0]
     if not face.neutral.measured:
-        return f"{face.name}: not measured: no sample of it lies outside folds"
+        return f"{face.name}: not measured: there are no samples of it"
     own = _bounded(report, face.neutral)
     own += [("shapes", face.mean_shape_rms, SHAPES_MM * report.scale)] if face.shapes else []
     fine = _bounded(report, face.detailed) + own[2:] if face.detailed and face.share >= MOST else own

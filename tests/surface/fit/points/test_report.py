@@ -49,7 +49,7 @@ def test_a_part_without_samples_was_not_measured():
     assert report.shapes == {} and report.mean_shape_rms == 0.0
     shown = measure("tooth", chart(np.array([True])), fitted(np.array([5.0]), np.ones((1, 1))), ("jawOpen",))
     assert not shown.shapes["jawOpen"].measured and np.isnan(shown.mean_shape_rms)
-    assert face_bounds(FitReport("h", [report], [])) == "tooth: not measured: no sample of it lies outside folds"
+    assert face_bounds(FitReport("h", [report], [])) == "tooth: not measured: there are no samples of it"
     assert plain({"a": [report.neutral.max, 1.0], "b": (2.0,)}) == {"a": [None, 1.0], "b": [2.0]}
 
 
