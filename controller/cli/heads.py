@@ -317,9 +317,8 @@ def _error_table(report: FitReport) -> Table:
     title = f"{report.name}: {report.points} control points, {len(report.parameters)} shapes"
     table = Table("part", "control points", "RMS", "99 %", "max", "mean RMS of shapes", title=title)
     for part in report.parts:
-        neutral = part.neutral
-        errors = [f"{value:.3f}" for value in (neutral.rms, neutral.p99, neutral.max, part.mean_shape_rms)]
-        table.add_row(part.name, str(part.points), *errors)
+        shapes = f"{part.mean_shape_rms:.3f}" if part.neutral.measured else "-"
+        table.add_row(part.name, str(part.points), *part.neutral.figures(), shapes)
     return table
 
 

@@ -37,6 +37,7 @@ from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
 from surface.fit.source.chart import Chart, make_chart
 from surface.fit.source.islands import Island, find_islands
+from surface.fit.source.junctions import joined_borders
 from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
@@ -134,9 +135,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
 
 
 def _repaired(loaded: Loaded) -> Loaded:
-    """The mesh as a manifold, and notes of what that took."""
-    mesh, notes = repaired(loaded.mesh)
-    return replace(loaded, mesh=mesh, notes=(*loaded.notes, *notes))
+    """The mesh as a manifold whose pieces share the edges along which they touch, and notes of what that took."""
+    shapes = dict(zip(loaded.mesh.names, loaded.mesh.deltas, strict=True))
+    mesh, joined = joined_borders(loaded.mesh, head_scale(loaded.mesh.vertices, shapes))
+    mesh, notes = repaired(mesh)
+    return replace(loaded, mesh=mesh, notes=(*loaded.notes, *joined, *notes))
 
 
 def _fit_parts(

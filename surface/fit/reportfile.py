@@ -16,7 +16,7 @@ from surface.base.arrays import Floats, Floats32
 from surface.base.errors import FitError, MissingPackage, ViewError
 from surface.base.progress import Progress
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
-from surface.fit.points.report import NEUTRAL, DenseErrors, Errors, FitReport, FitResult, FittedPart, face_bounds
+from surface.fit.points.report import NEUTRAL, DenseErrors, Errors, FitReport, FitResult, FittedPart, face_bounds, plain
 from surface.fit.source.chart import TILE
 from surface.head import Head
 
@@ -58,7 +58,12 @@ def _nets(result: FitResult) -> list[UniformNet]:
 
 
 def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
-    """The report as plain values."""
+    """The report as plain values; None for what could not be measured."""
+    table: dict[str, Any] = plain(_as_table(report, nets))
+    return table
+
+
+def _as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
     return {
         "format": FORMAT, "version": VERSION, "head": report.name, "scale": report.scale,
         "control_points": report.points, "parameters": report.parameters,
@@ -134,16 +139,18 @@ def _distance_lines(dense: DenseErrors) -> list[str]:
         "", "| part | way | RMS | 99 % | max | greatest of all shapes | in folds |", "|---|---|---|---|---|---|---|"
     ]  # fmt: skip
     for name, by_shape in dense.parts.items():
-        folds = max(b.folds.max for b in by_shape.values())
+        folds = max((b.folds.max for b in by_shape.values() if b.folds.measured), default=None)
         for way, words in (("to_mesh", "surface to mesh"), ("to_surface", "mesh to surface")):
-            most, shape = max((getattr(b, way).max, s) for s, b in by_shape.items())
+            far = {s: e.max for s, b in by_shape.items() if (e := getattr(b, way)).measured}
+            shape = max(far, key=lambda s: far[s], default=NEUTRAL)
+            most = f"{far[shape]:.3f} {shape}" if far else "-"
             neutral = _figures(getattr(by_shape[NEUTRAL], way))
-            lines.append(f"| {name} | {words} | {neutral} | {most:.3f} {shape} | {folds:.3f} |")
+            lines.append(f"| {name} | {words} | {neutral} | {most} | {'-' if folds is None else f'{folds:.3f}'} |")
     return lines
 
 
 def _figures(errors: Errors) -> str:
-    return f"{errors.rms:.3f} | {errors.p99:.3f} | {errors.max:.3f}"
+    return " | ".join(errors.figures())
 
 
 def _net_lines(nets: list[UniformNet]) -> list[str]:

@@ -25,6 +25,7 @@ from surface.head.posing.rig import SkinRig
 
 LIPS = Path(__file__).with_name("lips.toml")  # what parts the lips of a fitted head
 SETTLINGS = 4  # each halves what contacts still move at rest
+PRODUCT = "*"  # between the two shapes in the name of a corrective's group
 COLUMNS, ROWS, FADE_ROWS = 21, 10, 5
 FINE_U, FINE_V = 61, 49  # grid that columns are interpolated in, along and across an opening
 NAMES = ("left_lids", "right_lids", "lips")
@@ -87,7 +88,7 @@ def add_correctives(head: HeadData, wanted: list[dict[str, Any]]) -> HeadData:
         first, second = table["shapes"]
         gain = float(table.get("gain", 1.0))
         less = {table["unless"]: -gain} if "unless" in table else {}
-        rule = Rule(f"{first}*{second}", ({first: gain} | less, {second: gain} | less))
+        rule = Rule(f"{first}{PRODUCT}{second}", ({first: gain} | less, {second: gain} | less))
         parts = [_corrected(p, rule.group, table["subtract"]) for p in head.parts]
         head = replace(head, parts=parts, rules=[*head.rules, rule])
     return head
@@ -130,9 +131,10 @@ def find_contacts(
 
 
 def sample_places(surface: DCPSurface, loop: Floats, depth_mm: float, reach_mm: float) -> Floats:
-    """(2, COLUMNS, ROWS + FADE_ROWS, 2) in (u, v): from a hole's rim outwards at constant x, upper side first.
+    """(2, PRODUCT = "*"  # between the two shapes in the name of a corrective's group
+    COLUMNS, ROWS + FADE_ROWS, 2) in (u, v): from a hole's rim outwards at constant x, upper side first.
 
-    Rows go ``depth_mm`` along the skin, as far as the sides can meet, and FADE_ROWS further over ``reach_mm``.
+        Rows go ``depth_mm`` along the skin, as far as the sides can meet, and FADE_ROWS further over ``reach_mm``.
     """
     rim = surface.evaluate(loop)
     low, high = rim[:, 0].min(), rim[:, 0].max()

@@ -29,6 +29,7 @@ LASH_ROOT = (0.0145, 0.0188)  # how far outside the hole in the skin lower and u
 LASH_MM, LOWER_LASH_MM = 8.0, 3.2
 STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.2, 7)}  # fine enough for single hairs
 LASHES, LOWER_LASHES = 24, 14
+BESIDE = 0.15  # in radii of an eyeball: so near to their own surface half the control points that keep to it have to be
 BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
 
 
@@ -156,8 +157,22 @@ def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, rig: HeadRig) -> P
     return PartData(
         part.name, part.material, part.follows, fitted.points, np.ones(n),
         fitted.net.knots_u, fitted.net.knots_v, np.full((n, 2), 3), chart.loops, slits, part.budget, groups, share,
-        lid_share(fitted.points, rig.eyes, rig.radius) if skin and rig.radius > 0 else np.zeros(n),
+        _lid_share(part, fitted, rig) if skin and rig.radius > 0 else np.zeros(n),
     )  # fmt: skip
+
+
+def _lid_share(part: PartRecipe, fitted: Fitted, rig: HeadRig) -> Floats:
+    """How closely control points (n,) keep to the eyeballs, as lids do.
+
+    The net of a narrow strip, as of lashes, may have its control points far beside it: their own distance from an
+    eyeball says nothing of the strip's, and kept alike it would bend the strip in every blink. None of it keeps then.
+    """
+    share = lid_share(fitted.points, rig.eyes, rig.radius)
+    held = np.flatnonzero(share)
+    if part.material == "skin" or not len(held):
+        return share
+    away = np.linalg.norm(basis(fitted.net, fitted.net.centres) @ fitted.points - fitted.points, axis=1)
+    return share if np.median(away[held]) < BESIDE * rig.radius else np.zeros(len(share))
 
 
 def teeth_part(mesh: FitMesh, part: PartRecipe, rig: HeadRig) -> tuple[PartData, PartReport]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,13 +11,14 @@ from surface.base.arrays import Bools, Floats
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
 from surface.check.subject import Subject, pose_of
+from surface.fit.features.finish import PRODUCT
 from surface.fit.measures.closest import ClosestTree
 from surface.fit.measures.turned import TurnedFaces
 from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, Turned, errors_of
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.head import Head
 from surface.head.model.data import HeadData
-from surface.head.model.parameters import TONGUE_NEEDS
+from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
 
 
 class _Pair:
@@ -65,10 +67,12 @@ def measure_dense(
 ) -> DenseErrors:  # fmt: skip
     """Distances between a head and the mesh that it was fitted to, in neutral and with each of its shapes at 1.
 
-    The head is posed as it always is, with its jaw, eyes, contacts and wrinkles. Samples are all vertices and centres
+    The head is posed as it always is, with its jaw, eyes, contacts and wrinkles, but without correctives, which change
+    a shape of the mesh on purpose: what they change is said. Samples are all vertices and centres
     of triangles on both sides; each part is compared with the faces that it was fitted to, folds apart.
     sources : by parameter, the shapes of the mesh that add up to it. limit : mm, from which a vertex sticks out.
     """
+    head, changed = without_correctives(head)
     subject = Subject(Head(head))
     places = Places(subject, find_mouth(subject))
     numbers = {p.name: k for k, p in enumerate(subject.parts)}
@@ -95,7 +99,18 @@ def measure_dense(
     rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
     added = tuple(p.name for p in subject.parts if p.name not in found)
     samples = sum(len(r) for p in pairs for r in p.rest)
-    return DenseErrors(found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned)
+    return DenseErrors(
+        found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned,
+        tuple(n for n in changed if n in sources),
+    )  # fmt: skip
+
+
+def without_correctives(head: HeadData) -> tuple[HeadData, list[str]]:
+    """The head without its correctives, and the shapes that these change when they are shown alone."""
+    rules = [r for r in head.rules if PRODUCT in r.group]
+    pairs = [set(r.group.split(PRODUCT)) for r in rules]
+    changed = [n for n in SHAPES if any(pair <= {k for k, v in pose_of(n).items() if v} for pair in pairs)]
+    return replace(head, rules=[r for r in head.rules if r not in rules]), changed
 
 
 def _outside_folds(both: list[tuple[Floats, Bools]]) -> tuple[Errors, Errors]:

@@ -104,7 +104,8 @@ def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, 
 
 
 def _furthest(dense: DenseErrors) -> dict[tuple[str, str], float]:
-    return {(p, s): both.to_mesh.max for p, by_shape in dense.parts.items() for s, both in by_shape.items()}
+    every = (((p, s), both.to_mesh) for p, by_shape in dense.parts.items() for s, both in by_shape.items())
+    return {key: errors.max for key, errors in every if errors.measured}
 
 
 def _smoothed(head: HeadData, name: str, shape: str, dense: DenseErrors, rings: int) -> tuple[HeadData, int]:
@@ -181,6 +182,8 @@ def faults_of(dense: DenseErrors, parts: Sequence[FittedPart], scale: float) -> 
     out of it by far, or that is turned over."""
     shapes = dense.parts.get(parts[0].name, {}) if parts else {}
     out = []
+    if NEUTRAL in shapes and not (shapes[NEUTRAL].to_mesh.measured and shapes[NEUTRAL].to_surface.measured):
+        return ["nothing of the fitted face could be measured: all of it lies in folds"]
     if NEUTRAL in shapes and not all(x <= ASTRAY_MM * scale for x in _both(shapes[NEUTRAL], "p99")):
         most = max(_both(shapes[NEUTRAL], "p99"))
         out.append(f"the fitted face does not follow the mesh: a hundredth of it is {most:.0f} mm off or more")

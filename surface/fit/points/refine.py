@@ -115,7 +115,7 @@ def _mended(
 ) -> Fitted:  # fmt: skip
     """The fit without spikes between its samples; the errors that come with it are those of the chart's own samples."""
     within, held = chart, np.zeros((0, 2))
-    places, best, enough = places_of(chart, mesh), fitted, WORTH * _rms(chart, fitted)
+    places, best, enough = places_of(chart, mesh), fitted, WORTH * _rms(mesh, chart, fitted)
     count, most = len(places.uv) + 1, np.inf
     for factor in HOLDS:
         strays = _strays(mesh, chart, fitted, request.astray_mm)
@@ -128,24 +128,28 @@ def _mended(
         held = np.concatenate([held, places.uv[strays]])
         within = _with_samples(within, places.take(around(places, places.mix[np.flatnonzero(strays)])))
         fitted = _on(mesh, chart, _refined(mesh, within, fitted.net, request, Hold(held, factor), report))
-        if _rms(chart, fitted) <= enough:
+        if _rms(mesh, chart, fitted) <= enough:
             best = min(best, fitted, key=lambda f: _most(mesh, chart, f))
     off = dense_errors(mesh, chart, best.net, best.points, best.moves)
     far = np.maximum(off.neutral, off.worst) > FAR * request.astray_mm
     points, moves = bounded(mesh, chart, best.net, best.points, best.moves, far)
     put = _on(mesh, chart, replace(best, points=points, moves=moves))
-    return put if _most(mesh, chart, put) < off.most and _rms(chart, put) <= enough else best
+    better = _most(mesh, chart, put) < _most(mesh, chart, best) and _rms(mesh, chart, put) <= enough
+    return put if better else best
 
 
-def _rms(chart: Chart, fitted: Fitted) -> float:
-    """RMS (mm) of the neutral face at the chart's own samples outside folds."""
-    off = fitted.error[~chart.folded]
+def _rms(mesh: FitMesh, chart: Chart, fitted: Fitted) -> float:
+    """RMS (mm) of the neutral face outside folds, at the chart's samples and between them: where there are more points
+    than samples, these alone are met at the cost of what lies between."""
+    between = dense_errors(mesh, chart, fitted.net, fitted.points, fitted.moves[:0]).neutral
+    off = np.concatenate([fitted.error[~chart.folded], between[~places_of(chart, mesh).folded]])
     return float(np.sqrt((off**2).mean())) if len(off) else 0.0
 
 
 def _most(mesh: FitMesh, chart: Chart, fitted: Fitted) -> float:
-    """The largest error (mm) between the samples of a chart."""
-    return dense_errors(mesh, chart, fitted.net, fitted.points, fitted.moves).most
+    """The largest error (mm) of a chart in neutral and all shapes, at its samples and between them, outside folds."""
+    samples = np.vstack([fitted.error[None], fitted.shape_error])[:, ~chart.folded].max(initial=0.0)
+    return max(float(samples), dense_errors(mesh, chart, fitted.net, fitted.points, fitted.moves).most)
 
 
 def _strays(mesh: FitMesh, chart: Chart, fitted: Fitted, most_mm: float) -> Bools:

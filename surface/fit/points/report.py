@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -19,11 +21,23 @@ FINE, MOST, ALL = "where the mesh has the detail", 0.5, 0.99  # said of at least
 
 @dataclass(frozen=True)
 class Errors:
-    """Distances between samples of the mesh and the surface at the same (u, v), mm."""
+    """Distances between samples of the mesh and the surface at the same (u, v), mm; NaN where there are no samples."""
 
     rms: float
     p99: float
     max: float
+
+    @property
+    def measured(self) -> bool:
+        """Were there any samples?"""
+        return not math.isnan(self.max)
+
+    def figures(self) -> list[str]:
+        """RMS, 99 % and greatest in words; dashes where nothing was measured."""
+        return [f"{value:.3f}" if self.measured else "-" for value in (self.rms, self.p99, self.max)]
+
+
+NOT_MEASURED = Errors(math.nan, math.nan, math.nan)
 
 
 @dataclass(frozen=True)
@@ -46,7 +60,7 @@ class PartReport:
 
     @property
     def mean_shape_rms(self) -> float:
-        """Mean over shapes of their RMS, mm; 0 without shapes."""
+        """Mean over shapes of their RMS, mm; 0 without shapes, NaN where none could be measured."""
         return float(np.mean([e.rms for e in self.shapes.values()])) if self.shapes else 0.0
 
 
@@ -93,6 +107,7 @@ class DenseErrors:
     samples : measured in every shape, both ways.
     sticking : by part and shape, (k, 2) in (u, v): vertices of the surface that are further from the mesh than a limit.
     turned : by part and shape, what of the surface is turned over.
+    corrected : shapes that correctives of the head change on purpose; they were measured without these.
     """
 
     parts: dict[str, dict[str, Both]]
@@ -103,12 +118,15 @@ class DenseErrors:
     samples: int
     sticking: dict[tuple[str, str], Floats] = field(default_factory=dict)
     turned: dict[tuple[str, str], Turned] = field(default_factory=dict)
+    corrected: tuple[str, ...] = ()
 
     def lines(self) -> list[str]:
         """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
         out = [f"greatest error {self.worst}"] if self.worst else []
         if self.worst_fold:
             out.append(f"in folds (nostrils, ear canals, corners), which are held only loosely: {self.worst_fold}")
+        if self.corrected:
+            out.append(f"changed on purpose by correctives, and measured without them: {', '.join(self.corrected)}")
         out += [f"not in the mesh, so not measured: {', '.join(self.added)}"] if self.added else []
         return out + (
             [f"faces of the mesh that no fitted part holds: {', '.join(self.left_out)}"] if self.left_out else []
@@ -175,6 +193,8 @@ def face_bounds(report: FitReport) -> str:
     fit could follow: both figures are reported, and errors may be beyond the bounds there.
     """
     face = report.parts[0]
+    if not face.neutral.measured:
+        return f"{face.name}: not measured: there are no samples of it"
     own = _bounded(report, face.neutral)
     own += [("shapes", face.mean_shape_rms, SHAPES_MM * report.scale)] if face.shapes else []
     fine = _bounded(report, face.detailed) + own[2:] if face.detailed and face.share >= MOST else own
@@ -225,8 +245,17 @@ def measure(
     )  # fmt: skip
 
 
+def plain(value: Any) -> Any:
+    """Tables and lists with None for NaN, which JSON does not have."""
+    if isinstance(value, dict):
+        return {key: plain(v) for key, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
 def errors_of(distance: Floats) -> Errors:
-    """Figures of distances (m,), mm."""
+    """Figures of distances (m,), mm; :data:`NOT_MEASURED` of none, for 0 would be a perfect fit."""
     if not len(distance):
-        return Errors(0.0, 0.0, 0.0)
+        return NOT_MEASURED
     return Errors(float(np.sqrt((distance**2).mean())), float(np.percentile(distance, 99)), float(distance.max()))

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
 from surface.base.errors import FitError, MissingPackage
-from surface.fit.points.report import face_bounds
+from surface.fit.points.report import Errors, face_bounds, plain
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.reports.picture import Frontal, draw_distances, draw_landmarks, frontal
 from surface.fit.transfer.reports.report import TransferReport
@@ -52,7 +52,12 @@ def write_transfer_report(
 
 
 def as_table(report: TransferReport) -> dict[str, Any]:
-    """The report as plain values."""
+    """The report as plain values; None for what could not be measured."""
+    table: dict[str, Any] = plain(_as_table(report))
+    return table
+
+
+def _as_table(report: TransferReport) -> dict[str, Any]:
     return {
         "format": FORMAT, "version": VERSION, "head": report.fit.name, "expressions_from": report.source,
         "control_points": report.fit.points, "parameters": report.fit.parameters, "notes": report.fit.notes,
@@ -90,8 +95,8 @@ def as_markdown(report: TransferReport, pictures: list[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _row(errors: Any) -> str:
-    return f"{errors.rms:.3f} | {errors.p99:.3f} | {errors.max:.3f}"
+def _row(errors: Errors) -> str:
+    return " | ".join(errors.figures())
 
 
 def _draw(report: TransferReport, scan: Scan, head: HeadData, found: Similarity, folder: Path) -> list[str]:

@@ -124,6 +124,21 @@ def test_skin_has_groups_shares_and_slits_and_what_is_fixed_has_none(fitted):
     assert lids.max() > 0.0 > lids.min()
 
 
+def test_a_strip_whose_net_lies_far_beside_it_does_not_keep_to_the_eyeball(fitted):
+    """Kept at their own distances from the eyeball, such points would bend the strip in a blink. Nets that lie on their
+    surface, and the face in any case, go on keeping to it."""
+    mesh, chart, _ = fitted
+    fit = fit_chart(mesh, chart, FitRequest(600, coarse=0.1))
+    middle = fit.points[np.argmin(np.linalg.norm(fit.points[:, :2], axis=1))]
+    eyes = rig(np.array([middle - [0.0, 0.0, 12.0], middle - [200.0, 0.0, 12.0]]))
+    usual = skin_part(recipe(), chart, fit, eyes).lids
+    assert usual.max() > 0.9
+    np.testing.assert_array_equal(skin_part(recipe(material="lash"), chart, fit, eyes).lids, usual)
+    wild = replace(fit, points=fit.points + 16.0 * (-1.0) ** np.arange(len(fit.points))[:, None] * [1, 0, 0])
+    assert not skin_part(recipe(material="lash"), chart, wild, eyes).lids.any()
+    assert skin_part(recipe(), chart, wild, eyes).lids.any()
+
+
 def test_only_a_tongue_that_is_skin_gets_groups_to_put_it_out(fitted):
     _, chart, fit = fitted
     path = np.array([[-50.0, 0, 0, 10, 1, 1, 0], [0, 0, 0, 30, 1, 1, 0], [50, 0, 0, 60, 0.5, 0.5, 4]])

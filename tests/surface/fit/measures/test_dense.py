@@ -9,10 +9,14 @@ import numpy as np
 import pytest
 
 from surface.fit.measures.dense import measure_dense
+from surface.fit.measures.mend import faults_of
+from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import FitResult
 from surface.fit.reportfile import as_markdown, as_table
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import sources_of
+from surface.head.model.data import Group, Rule
+from surface.head.model.parameters import SHAPES
 
 
 def measured(result: FitResult, mesh: FitMesh, **changed: object):
@@ -69,9 +73,42 @@ def test_faces_that_no_part_holds_are_named(result: FitResult, mesh: FitMesh) ->
 
 
 @pytest.mark.slow
-def test_it_stands_in_both_reports(result: FitResult) -> None:
-    from surface.fit.points.nurbsnet import UniformNet
+def test_correctives_that_change_a_shape_on_purpose_are_left_out_and_named(result: FitResult, mesh: FitMesh) -> None:
+    """One takes a shape 9 mm further than the mesh does: that is no error of the fit, and is said."""
+    name = next(n for n in sources_of(mesh.names) if n in SHAPES)
+    part = result.head.parts[0]
+    everywhere = np.arange(len(part.points), dtype=np.int32)
+    moves = np.tile(np.array([[0.0, 0.0, 9.0]], np.float32), (len(part.points), 1))
+    own = f"{name}*{name}"
+    head = replace(
+        result.head, parts=[replace(part, groups=[*part.groups, Group(own, everywhere, moves)])],
+        rules=[*result.head.rules, Rule(own, ({name: 1.0}, {name: 1.0}))],
+    )  # fmt: skip
+    dense = measure_dense(head, mesh, sources_of(mesh.names), result.parts)
+    assert dense.worst == result.report.dense.worst and dense.corrected == (name,)
+    line = f"changed on purpose by correctives, and measured without them: {name}"
+    assert line in dense.lines() and line not in result.report.dense.lines()
+    other = replace(head, rules=[*result.head.rules, Rule(own.replace("*", "+"), ({name: 1.0}, {name: 1.0}))])
+    assert measure_dense(other, mesh, sources_of(mesh.names), result.parts).corrected == ()
 
+
+@pytest.mark.slow
+def test_what_lies_in_folds_as_a_whole_is_not_measured_instead_of_perfect(result: FitResult, mesh: FitMesh) -> None:
+    part = result.parts[0]
+    folded = replace(part, chart=replace(part.chart, folded=np.ones_like(part.chart.folded)))
+    dense = measure_dense(result.head, mesh, sources_of(mesh.names), [folded])
+    both = dense.parts[part.name]["neutral"]
+    assert not both.to_mesh.measured and not both.to_surface.measured and both.folds.max > 0.0
+    assert faults_of(dense, [folded], 1.0) == ["nothing of the fitted face could be measured: all of it lies in folds"]
+    report = replace(result.report, dense=dense)
+    nets = [UniformNet(100, 0.5), UniformNet(110, 0.9)]
+    table = json.loads(json.dumps(as_table(report, nets), allow_nan=False))
+    assert table["distances"]["parts"][part.name]["neutral"]["to_mesh"] == {"rms": None, "p99": None, "max": None}
+    assert f"| {part.name} | surface to mesh | - | - | - | - | " in as_markdown(report, nets, [])
+
+
+@pytest.mark.slow
+def test_it_stands_in_both_reports(result: FitResult) -> None:
     nets = [UniformNet(100, 0.5), UniformNet(110, 0.9)]
     table = json.loads(json.dumps(as_table(result.report, nets)))
     worst = table["distances"]["worst"]

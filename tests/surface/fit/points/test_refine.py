@@ -8,10 +8,12 @@ from slit_sheet import ROW, N, slit_sheet
 
 from surface.fit.points import refine
 from surface.fit.points.dense import dense_errors
+from surface.fit.points.net import coarse_places, net_at
 from surface.fit.points.refine import FitRequest, Fitted, Hold, fit_chart
 from surface.fit.points.solve import basis, fairness
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
+from surface.fit.source.mesh import FitMesh
 
 
 @pytest.fixture(scope="module")
@@ -67,13 +69,39 @@ def test_progress_never_falls(fitted):
 
 
 def test_the_rms_of_a_fit_leaves_folds_out(fitted):
-    _, chart, fit = fitted
+    mesh, chart, fit = fitted
     error = np.random.default_rng(0).uniform(0, 3, len(fit.error))
     folded = np.arange(len(error)) % 3 == 0
     kept = error[~folded]
     other = replace(fit, error=error)
-    assert refine._rms(replace(chart, folded=folded), other) == pytest.approx(np.sqrt((kept**2).mean()))
-    assert refine._rms(replace(chart, folded=folded | True), other) == 0.0
+    bare = replace(chart, between=None)
+    assert refine._rms(mesh, replace(bare, folded=folded), other) == pytest.approx(np.sqrt((kept**2).mean()))
+    assert refine._rms(mesh, replace(bare, folded=folded | True), other) == 0.0
+    dense = dense_errors(mesh, chart, fit.net, fit.points, fit.moves[:0]).neutral
+    both = np.concatenate([kept, dense])
+    assert refine._rms(mesh, replace(chart, folded=folded), other) == pytest.approx(np.sqrt((both**2).mean()))
+    between = replace(chart.between, folded=np.ones_like(chart.between.folded))
+    own = replace(chart, folded=folded, between=between)
+    assert refine._rms(mesh, own, other) == pytest.approx(np.sqrt((kept**2).mean()))
+
+
+def test_a_net_of_more_points_than_samples_is_mended_between_them():
+    """Coarse samples are met by any number of points; what stands between them must not."""
+    x, y = np.meshgrid(np.linspace(-50.0, 50.0, 7), np.linspace(-50.0, 50.0, 7))
+    rough = np.random.default_rng(4).uniform(-8.0, 8.0, x.size)
+    at = np.column_stack([x.ravel(), y.ravel(), rough])
+    rows = np.arange(49).reshape(7, 7)
+    faces = np.stack([rows[:-1, :-1], rows[:-1, 1:], rows[1:, 1:], rows[1:, :-1]], axis=-1).reshape(-1, 4)
+    mesh = FitMesh(at, faces, at[:, :2] / 100.0 + 0.5, faces.copy(), (), np.zeros((0, 49, 3)))
+    chart = make_chart(mesh, find_islands(mesh), doubt_slivers=True)
+    request = FitRequest(300, coarse=0.1, finest=0.3, neutral_mm=0.2, astray_mm=2.5)
+    first = refine._refined(
+        mesh, chart, net_at(coarse_places(chart.uv, 0.1), 0.1, chart.cuts, chart.uv), request, Hold(), lambda done: None
+    )
+    fit = fit_chart(mesh, chart, request)
+    spikes, left = (dense_errors(mesh, chart, f.net, f.points, f.moves).most for f in (first, fit))
+    assert len(first.net) > len(chart.uv) and rms(first.error) < 0.2 and spikes > 4.0
+    assert left < 0.7 * spikes
 
 
 def test_what_a_sample_needs_is_its_worst_error_in_what_is_good_enough(fitted):
@@ -128,7 +156,9 @@ def test_strays_are_places_too_far_off_and_those_beside_such_samples(fitted):
     rows[40] = 99.0
     folded = np.arange(len(rows)) == 40
     assert not refine._strays(mesh, replace(chart, folded=folded), replace(none, error=rows), 50.0).any()
-    assert refine._most(mesh, chart, fit) == dense.most
+    samples = max(fit.error[~chart.folded].max(), fit.shape_error[:, ~chart.folded].max())
+    assert refine._most(mesh, chart, fit) == max(dense.most, samples) > dense.most
+    assert refine._most(mesh, replace(chart, folded=np.ones_like(chart.folded)), fit) == dense.most
 
 
 def test_a_net_grows_by_a_share_where_it_is_needed_most(fitted):

@@ -7,7 +7,17 @@ import pytest
 
 from surface.fit.points.net import Net
 from surface.fit.points.refine import Fitted
-from surface.fit.points.report import P99_MM, RMS_MM, SHAPES_MM, Errors, FitReport, PartReport, face_bounds, measure
+from surface.fit.points.report import (
+    P99_MM,
+    RMS_MM,
+    SHAPES_MM,
+    Errors,
+    FitReport,
+    PartReport,
+    face_bounds,
+    measure,
+    plain,
+)
 from surface.fit.source.chart import Chart
 
 
@@ -32,9 +42,15 @@ def test_errors_are_measured_outside_folds():
     assert report.mean_shape_rms == pytest.approx((1.0 + np.sqrt(12.0)) / 2)
 
 
-def test_a_part_without_samples_or_shapes_has_no_errors():
+def test_a_part_without_samples_was_not_measured():
+    """0 would read as a perfect fit."""
     report = measure("tooth", chart(np.array([True])), fitted(np.array([5.0]), np.zeros((0, 1))), ())
-    assert report.neutral == Errors(0.0, 0.0, 0.0) and report.shapes == {} and report.mean_shape_rms == 0.0
+    assert not report.neutral.measured and report.neutral.figures() == ["-", "-", "-"]
+    assert report.shapes == {} and report.mean_shape_rms == 0.0
+    shown = measure("tooth", chart(np.array([True])), fitted(np.array([5.0]), np.ones((1, 1))), ("jawOpen",))
+    assert not shown.shapes["jawOpen"].measured and np.isnan(shown.mean_shape_rms)
+    assert face_bounds(FitReport("h", [report], [])) == "tooth: not measured: there are no samples of it"
+    assert plain({"a": [report.neutral.max, 1.0], "b": (2.0,)}) == {"a": [None, 1.0], "b": [2.0]}
 
 
 def face(rms: float, p99: float, shape: float | None) -> FitReport:
