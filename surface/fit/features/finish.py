@@ -12,7 +12,6 @@ import numpy as np
 from surface.base import files
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.fit.features.levelled import level_seams
 from surface.fit.features.rigging import DROOP, DROOP_RULE, LOW_RULE, drawn_back_tongue, lowered_tongue
 from surface.fit.features.wrinkles import add_wrinkles
 from surface.fit.points.recipe import Recipe
@@ -35,9 +34,7 @@ INSET = 0.03  # of the opening's width: place of its first column
 
 
 def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe: Recipe) -> HeadData:
-    """The head with wrinkles, contacts, correctives and level seams; its points at rest are those that contacts leave
-    unchanged."""
-    head = level_seams(head)
+    """The head with wrinkles, contacts and correctives; its points at rest are those that contacts leave unchanged."""
     face = next((p for p in head.parts if p.follows == "skin" and len(p.slits) and p.name in charts), None)
     if face is None:
         return head

@@ -18,17 +18,18 @@ SEAM = Seam("tube", "tube", *BORDERS)
 
 
 def clamped(count: int) -> list[float]:
-    return [0.0] * 3 + np.linspace(0, 1, count - 2).tolist() + [1.0] * 3
+    return [0.0] * 3 + np.linspace(0, 1, count - 2).tolist() + [1.0] * 3  # cubic
 
 
 def tube(dent_mm: float) -> PartData:
     """A skin round the y axis, 40 mm from it, whose points beside one border are ``dent_mm`` further out."""
     nu, nv = 26, 10
-    angle, height = np.meshgrid(np.linspace(0, 2 * np.pi, nu), np.linspace(-30, 30, nv), indexing="ij")
+    round_it, along = (np.array([np.mean(clamped(n)[i + 1 : i + 4]) for i in range(n)]) for n in (nu, nv))
+    angle, height = np.meshgrid(2 * np.pi * round_it, 60 * along - 30, indexing="ij")
     reach = np.full((nu, nv), 40.0)
     reach[1, 3:7] += dent_mm
     points = np.stack([reach * np.sin(angle), height, reach * np.cos(angle)], axis=-1)
-    s = DCPSurface.from_nurbs(3, 3, [0.0, *clamped(nu), 1.0], [0.0, *clamped(nv), 1.0], points)
+    s = DCPSurface.from_nurbs(3, 3, clamped(nu), clamped(nv), points)
     like = small_head().parts[0]
     square = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
     ku, kv = s.padded
