@@ -15,7 +15,7 @@ BUN = np.array([0.0, 98.0, -97.0])  # its middle, mm
 _OUT = unit(np.array([0.0, 0.42, -0.91]))  # where it points
 _RADII = np.array([29.0, 26.0, 22.0])  # half its width, its height, and along where it points
 GUIDES = 73
-LAYERS = (Layer(1.06, 0.50, 1.0, 4.0, 0.5), Layer(1.0, 0.78, 0.92, 4.0, 0.4), Layer(0.90, 1.25, 0.74, 4.0, 0.75))
+LAYERS = (Layer(1.06, 0.50, 1.0, 4.0, 0.5), Layer(1.0, 0.78, 0.92, 4.0, 0.4), Layer(0.90, 1.6, 0.74, 4.0, 0.75))
 BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 1.4, 0.82, 2.0))
 _TURNS = 0.62  # of a strand about the bun, from its base to its tip
 

@@ -17,7 +17,7 @@ TIPS_Y = -124.0  # mm
 OVER_EAR_MM = 8.5
 FRAYED = 0.09, 0.0  # of the width, at the face and behind
 LAYERS = (
-    Layer(1.07, 0.46, 1.0, 45.0, 0.1), Layer(1.0, 0.66, 0.92, 30.0, 0.1), Layer(0.88, 1.25, 0.74, 16.0),
+    Layer(1.07, 0.46, 1.0, 45.0, 0.1), Layer(1.0, 0.66, 0.92, 30.0, 0.1), Layer(0.88, 1.6, 0.74, 16.0),
 )  # fmt: skip
 
 
@@ -26,10 +26,10 @@ def long(skin: Skin) -> Style:
     line = Hairline(skin)
 
     def thickness(at: Floats) -> Floats:
-        return np.asarray(0.6 + _full(line, at))
+        return np.asarray(3.0 + _full(line, at))
 
     hanging = [patch for side in (1.0, -1.0) for patch in _curtain(skin, line, side)]
-    return Style([cap(skin, line, thickness, share=0.45, openness=0.55)], line, tuple(_inner_last(hanging)))
+    return Style([cap(skin, line, thickness, share=0.5, openness=0.55)], line, tuple(_inner_last(hanging)))
 
 
 def _full(line: Hairline, at: Floats) -> Floats:

@@ -13,7 +13,7 @@ from surface.fit.wardrobe.styles import Style, step, tangent
 CROWN = np.array([12.0, 132.0, -42.0])
 RING_RAD = 0.05  # from the crown, seen from the skull's middle: where guides begin
 GUIDES = 73
-LAYERS = (Layer(1.06, 0.46, 1.0, 34.0), Layer(1.0, 0.70, 0.92, 20.0), Layer(0.90, 1.25, 0.74, 12.0))
+LAYERS = (Layer(1.06, 0.46, 1.0, 34.0), Layer(1.0, 0.70, 0.92, 20.0), Layer(0.90, 1.6, 0.74, 12.0))
 
 
 def short(skin: Skin) -> Style:
@@ -23,7 +23,7 @@ def short(skin: Skin) -> Style:
 
     def thickness(at: Floats) -> Floats:
         full = 3.0 + 8.0 * _top(at) + 3.0 * _top(at) * step(at[:, 2], 30.0, 75.0) - 1.4 * step(-at[:, 1], -40.0, 50.0)
-        return np.asarray(0.9 + full * step(line.inside(at), -10.0, 26.0))
+        return np.asarray(1.8 + full * step(line.inside(at), -10.0, 26.0))
 
     def flow(at: Floats, normals: Floats, share: float) -> Floats:
         away = tangent(at - CROWN, normals)
