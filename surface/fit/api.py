@@ -19,6 +19,7 @@ from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
+from surface.fit.features.levelled import level_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.squints import shut_with_squints
@@ -114,6 +115,8 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         name, _provenance(recipe), _neck(mesh, recipe, loaded.marks), rig.eyes, rig.radius, rig.jaw,
         parts, find_seams(charts), paint, placement=loaded.placement,
     )  # fmt: skip
+    if recipe.parts:  # of other meshes nobody knows whether a crease is theirs
+        head = level_seams(head)
     head = finish_head(head, mesh, charts, recipe)
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
     if plan.found:

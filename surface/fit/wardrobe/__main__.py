@@ -11,8 +11,8 @@ from surface.fit.wardrobe.bun import bun
 from surface.fit.wardrobe.clothes import NECKS, garment
 from surface.fit.wardrobe.curls import afro, crop
 from surface.fit.wardrobe.long import long
+from surface.fit.wardrobe.short import short
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import short
 from surface.fit.wardrobe.write import beard_fields, cloth_fields, hair_fields, write_garment
 from surface.head import Head
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.locks import resampled
+from surface.fit.wardrobe.guides import resampled
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.skin import Skin
 from surface.fit.wardrobe.styles import step

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.fit.wardrobe.guides import Thickness
 from surface.fit.wardrobe.hairline import Hairline
-from surface.fit.wardrobe.locks import Thickness
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.skin import Skin
 from surface.fit.wardrobe.styles import Style, cap, step

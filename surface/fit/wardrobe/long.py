@@ -6,49 +6,98 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.hairline import Hairline
-from surface.fit.wardrobe.locks import Locks, grow, spread
-from surface.fit.wardrobe.skin import Skin, unit
-from surface.fit.wardrobe.styles import Style, cap, lock_patches, roots_inside, shades, step, tangent
+from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheets
+from surface.fit.wardrobe.skin import CENTRE, Skin, unit
+from surface.fit.wardrobe.styles import Style, cap, step, tangent
 
 PART_X = 14.0  # of the parting, mm
+ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
+TIPS_Y = -124.0  # mm
+OVER_EAR_MM = 8.5
+FRAYED = 0.09, 0.0  # of the width, at the face and behind
+LAYERS = (
+    Layer(1.07, 0.46, 1.0, 45.0, 0.1), Layer(1.0, 0.66, 0.92, 30.0, 0.1), Layer(0.88, 1.6, 0.74, 16.0),
+)  # fmt: skip
 
 
 def long(skin: Skin) -> Style:
     """Parted beside the middle, falling over the ears to the shoulders, with a slight wave."""
     line = Hairline(skin)
-    among = roots_inside(skin, line, 0.5)
-    _, y, z = among.T
-    upper = among[(y > 30.0 - 0.4 * z) | (z < -20.0)]
-    upper = upper[upper[:, 1] > 0.0]
-    close = (line.inside(upper) < 9.0) | ((np.abs(upper[:, 0] - PART_X) < 14.0) & (upper[:, 2] > -50.0))
-    roots = upper[spread(skin, upper, np.where(close, 8.0, 14.0), 8)]
-    random = np.random.default_rng(21)
-    layer = random.uniform(0.0, 1.0, len(roots))
 
     def thickness(at: Floats) -> Floats:
-        return np.asarray(1.8 + 8.0 * step(line.inside(at), -6.0, 34.0))
+        return np.asarray(3.0 + _full(line, at))
+
+    hanging = [patch for side in (1.0, -1.0) for patch in _curtain(skin, line, side)]
+    return Style([cap(skin, line, thickness, share=0.5, openness=0.55)], line, tuple(_inner_last(hanging)))
+
+
+def _full(line: Hairline, at: Floats) -> Floats:
+    """(n,) mm that hair adds over places (n, 3): less at the line, and at the parting."""
+    beside = step(np.abs(at[:, 0] - PART_X), 0.0, 30.0) + step(-at[:, 2], 30.0, 60.0)
+    return np.asarray(9.5 * step(line.inside(at), -8.0, 34.0) * (0.45 + 0.55 * np.minimum(beside, 1.0)))
+
+
+def _inner_last(hanging: list[Patches]) -> list[Patches]:
+    """Sheets of both sides, the outermost first."""
+    each = len(hanging) // 2
+    return [patch for pair in zip(hanging[:each], hanging[each:], strict=True) for patch in pair]
+
+
+def _at_ear(at: Floats) -> Floats:
+    """(n,) 1 over an ear, 0 away from it."""
+    x, y, z = np.abs(at[:, 0]), at[:, 1], at[:, 2]
+    return np.asarray(step(x, 62.0, 78.0) * step(-y, -66.0, -34.0) * step(-z, -50.0, -20.0))
+
+
+def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
+    """Sheets of the hair that falls to one side of the parting, from the face to the middle of the back."""
+    roots = _parting(skin, line)
+    roots[:, 0] += 0.4 * side
+    fan = np.concatenate([np.zeros(ALONG_PART), np.linspace(0.0, 1.0, FANNED + 1)[1:]])
+    back = np.concatenate([np.linspace(0.0, 1.0, ALONG_PART), np.ones(FANNED)])
+
+    def thickness(at: Floats) -> Floats:
+        return np.asarray(1.2 + _full(line, at) + OVER_EAR_MM * _at_ear(at))
 
     def flow(at: Floats, normals: Floats, share: float) -> Floats:
-        side = np.where(at[:, 0] > PART_X, 1.0, -1.0)
         front = step(at[:, 2], 0.0, 60.0)
-        # Away from the parting, back from the face, and down.
         falling = step(-at[:, 1], -105.0, -40.0)
-        wanted = np.column_stack([side * (1.0 - 0.85 * falling), -0.35 - 1.6 * falling, -0.55 * front - 0.25])
-        on_skull = tangent(wanted, normals)
+        aside = side * (1.0 - fan) * (1.0 - 0.85 * falling) - 0.012 * fan * at[:, 0]
+        forwards = (0.22 - 0.37 * back) * (1.0 - front) - 0.35 * front * back - 0.8 * fan * (1.0 - falling)
+        wanted = np.column_stack([aside, -0.3 - 1.6 * falling, forwards])
         free = step(-at[:, 1], -30.0, 10.0)[:, None]
-        wave = 0.10 * np.sin(at[:, 1] / 17.0 + 6.0 * layer)
-        down = unit(np.column_stack([0.05 * np.sign(at[:, 0]) + wave, -np.ones(len(at)), 0.02 + 0.0 * wave]))
-        return unit(on_skull * (1.0 - free) + down * free)
+        wave = 0.05 * np.sin(at[:, 1] / 19.0 + 9.0 * back)
+        down = unit(np.column_stack([-0.10 * side * (1.0 - fan) + wave, -np.ones(len(at)), 0.02 + 0.0 * wave]))
+        return unit(tangent(wanted, normals) * (1.0 - free) + down * free)
 
-    length = roots[:, 1] + 130.0 + 30.0 * layer + 36.0 * step(roots[:, 1], 60.0, 120.0) + 20.0
-    paths, normals = grow(
-        skin, roots, length, thickness, flow, lift=1.0 + 0.3 * layer, below=0.8, steps=26, stiff=0.6, slack=7.0,
-        ears=True,
-    )  # fmt: skip
-    width = (15.0 + 3.0 * step(roots[:, 1], 40.0, 100.0)) * random.uniform(0.8, 1.25, len(roots))
-    locks = Locks(paths, normals, width, shades(len(roots), 22), layer)
-    sway = np.full(len(roots), 0.75)
-    hanging = lock_patches(
-        locks, 8, (3, 10), (2, 6), sway, bulge=0.10, root=0.8, tip=0.5, edge_cover=0.6, fall_from=0.72,
-    )  # fmt: skip
-    return Style([cap(skin, line, thickness, share=0.78, openness=0.55)], line, (hanging,))
+    def slack(at: Floats) -> Floats:
+        return np.asarray(1.0 + 24.0 * step(-at[:, 1], -25.0, 10.0))
+
+    def cut(at: Floats) -> Floats:
+        return np.asarray(at[:, 1] - TIPS_Y - 14.0 * step(-at[:, 2], 10.0, 60.0))
+
+    order = slice(None) if side < 0.0 else slice(None, None, -1)  # so that the outside is outside
+    fan, back = fan[order], back[order]
+    length = np.full(len(roots), 430.0)
+    comb = Comb(roots[order], length, thickness, flow, cut, 7.0, 1.0, steps=72, stiff=0.6, slack=slack, ears=True)
+    return sheets(
+        skin,
+        comb,
+        LAYERS,
+        Weave((37, 16), (49, 25), (25, 13)),
+        seed=21,
+        sway=0.75,
+        frayed=FRAYED if side < 0.0 else FRAYED[::-1],
+    )
+
+
+def _parting(skin: Skin, line: Hairline) -> Floats:
+    """(ALONG_PART + FANNED, 3) places on the skin along the parting, from the line backwards, the last one again and
+    again."""
+    z = np.linspace(84.0, -62.0, 400)
+    toward = unit(np.column_stack([np.full(len(z), PART_X), np.full(len(z), 95.0), z]))
+    every = CENTRE + toward * skin.reach(toward)[:, None]
+    every = every[line.inside(every) > 1.0]
+    at = every[np.rint(np.linspace(0, len(every) - 1, ALONG_PART)).astype(int)]
+    return np.concatenate([at, np.repeat(at[-1:], FANNED, axis=0)])

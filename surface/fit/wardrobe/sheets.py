@@ -1,0 +1,161 @@
+"""Hair as sheets: smooth surfaces through guides, lines that strands follow from their roots to their tips.
+
+Several sheets lie one over the other. The outer ones leave gaps between strands, in which the inner, darker ones show;
+the innermost is closed. So the outline of the head is smooth and yet not cut with a knife, and strands are as long as
+the hair.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from surface.base.arrays import Floats
+from surface.fit.wardrobe.guides import Flow, Thickness, grow, resampled
+from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.skin import Skin, unit
+from surface.fit.wardrobe.styles import ACROSS, ALONG, step
+
+Depth = Callable[[Floats], Floats]
+"""How far along a guide a place (n, 3) is, mm: hair is cut where this is 0, and goes on where it is below."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """One sheet of hair.
+
+    share : of the hair's thickness at which it lies. cover : how much of it strands fill, from 0 to 1 and more; below
+    0.5 gaps are wider than strands. openness : how much light reaches it. fray_mm : of the length, along which strands
+    end one after the other. roots : how much less of the sheet its roots are.
+    """
+
+    share: float
+    cover: float
+    openness: float
+    fray_mm: float = 15.0
+    roots: float = 0.0
+
+
+@dataclass(frozen=True)
+class Comb:
+    """How hair is combed: where guides root (g, 3), in order, and the rest as in :func:`.guides.grow`.
+
+    cut : where guides end. ragged_mm : by how much their lengths differ, of all or of each (g,). wave_mm : how far
+    sheets bulge between locks.
+    """
+
+    roots: Floats
+    length: Floats
+    thickness: Thickness
+    flow: Flow
+    cut: Depth
+    ragged_mm: Floats | float = 6.0
+    wave_mm: float = 0.8
+    steps: int = 40
+    stiff: float = 0.5
+    slack: float | Thickness = 0.6
+    ears: bool = False
+
+
+@dataclass(frozen=True)
+class Weave:
+    """How finely a sheet is made: control points and vertices along u and v, and vertices of "fast"."""
+
+    points: tuple[int, int]
+    grid: tuple[int, int]
+    fast: tuple[int, int]
+
+
+def sheets(
+    skin: Skin, comb: Comb, layers: tuple[Layer, ...], weave: Weave, *, seed: int, closed: bool = False,
+    sway: float = 0.0, frayed: tuple[float, float] = (0.0, 0.0),
+) -> list[Patches]:  # fmt: skip
+    """Sheets along the guides of a comb, the outermost first.
+
+    closed : does the last guide meet the first? frayed : over which share of u strands grow sparse at either edge.
+    """
+    out = []
+    for k, layer in enumerate(layers):
+        random = np.random.default_rng(seed + 7 * k)
+        paths = _guides(skin, comb, layer, random, closed)
+        points = _evenly(paths, weave.points, closed)
+        out.append(sheet(points, layer, weave, random, closed, sway, frayed))
+    return out
+
+
+def _guides(skin: Skin, comb: Comb, layer: Layer, random: np.random.Generator, closed: bool) -> Floats:
+    """(g, k, 3) guides, cut to length, each a little further out or in than its neighbours."""
+    count = len(comb.roots)
+    lift = np.full(count, layer.share)
+    paths, normals = grow(
+        skin, comb.roots, comb.length, comb.thickness, comb.flow, lift=lift, steps=comb.steps, stiff=comb.stiff,
+        slack=comb.slack, ears=comb.ears, below=0.9 * layer.share,
+    )  # fmt: skip
+    ragged = comb.ragged_mm * _waves(count, random, closed)
+    far = np.array([comb.cut(row) for row in paths]) + ragged[:, None]  # falls along a guide
+    kept = resampled(np.array([_until(row, at) for row, at in zip(paths, far, strict=True)]), 24)
+    outward = resampled(np.array([_until(row, at) for row, at in zip(normals, far, strict=True)]), 24)
+    t = np.linspace(0.0, 1.0, 24)
+    bulge = comb.wave_mm * _waves(count, random, closed)[:, None] * step(t, 0.05, 0.35)
+    return np.asarray(kept + unit(outward) * bulge[..., None])
+
+
+def _until(row: Floats, far: Floats) -> Floats:
+    """(64, 3) rows (k, 3) up to where ``far`` first falls to 0, evenly by their number."""
+    below = np.flatnonzero(far <= 0.0)
+    end = len(row) - 1.0
+    if len(below) and below[0] > 0:
+        i = int(below[0])
+        end = i - 1 + far[i - 1] / max(far[i - 1] - far[i], 1e-9)
+    at = np.linspace(0.0, end, 64)
+    return np.column_stack([np.interp(at, np.arange(len(row)), row[:, c]) for c in range(3)])
+
+
+def _waves(count: int, random: np.random.Generator, closed: bool) -> Floats:
+    """(count,) smooth noise about 0, of deviation about 1: locks lie side by side."""
+    raw = random.standard_normal(count)
+    near = 0.5 * np.roll(raw, 1) + raw + 0.5 * np.roll(raw, -1)
+    if closed:
+        near[-1] = near[0]
+    return np.asarray(near / np.sqrt(1.5)).clip(-1.8, 1.8)
+
+
+def _evenly(paths: Floats, size: tuple[int, int], closed: bool) -> Floats:
+    """(nu, nv, 3) control points of a cubic surface near guides (g, k, 3)."""
+    nu, nv = size
+    rows = resampled(paths, nv)
+    at = np.linspace(0.0, 1.0, len(rows))
+    return np.asarray(CubicSpline(at, rows, axis=0)(np.linspace(0.0, 1.0, nu)))
+
+
+def sheet(
+    points: Floats, layer: Layer, weave: Weave, random: np.random.Generator, closed: bool, sway: float,
+    frayed: tuple[float, float] = (0.0, 0.0),
+) -> Patches:  # fmt: skip
+    """One sheet over control points (nu, nv, 3), whose strands run along v; see :func:`sheets`."""
+    (nu, nv), (gu, gv) = weave.points, weave.grid
+    t = np.broadcast_to(np.linspace(0, 1, gv), (gu, gv))
+    u = np.broadcast_to(np.linspace(0, 1, gu)[:, None], (gu, gv))
+    wide = np.linalg.norm(np.diff(points, axis=0), axis=2).sum(axis=0).max()
+    tiles = max(1.0, np.rint(wide * ACROSS)) if closed else wide * ACROSS
+    start = random.uniform(0.0, 1.0, 2)
+    locks = np.interp(u[:, 0], np.linspace(0, 1, 4 * nu), _waves(4 * nu, random, closed))[:, None]
+    lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    own = np.interp(u[:, 0], np.linspace(0, 1, nu), lengths)[:, None]
+    fray = np.minimum(layer.fray_mm * (1.0 - 0.3 * locks.clip(-1, 1)) / own, 0.9)
+    cover = layer.cover * (1.0 + 0.10 * locks) - (layer.cover + 0.1) * np.clip((t - 1.0 + fray) / fray, 0.0, 1.0)
+    for width, away in zip(frayed, (u, 1.0 - u), strict=True):
+        if width > 0.0:
+            cover = cover - (layer.cover - 0.1) * (1.0 - np.clip(away / width, 0.0, 1.0))
+    cover = cover - layer.roots * (1.0 - step(t, 0.0, 0.10))
+    opened = layer.openness * (0.86 + 0.14 * step(t, 0.0, 0.4)) * (1.0 + 0.05 * locks)
+    along = start[1] + float(np.median(lengths)) * ALONG * t
+    strands = np.stack([start[0] + tiles * u, along, cover, opened + 0.0 * t], axis=-1)
+    shade = 1.0 + 0.06 * locks + 0.0 * t
+    moved = np.broadcast_to(sway * np.linspace(0, 1, nv) ** 1.5, (nu, nv))
+    return Patches(
+        points[None], (3, 3), weave.grid, weave.fast, strands[None], (t**1.5)[None], shade[None], moved[None]
+    )  # fmt: skip
