@@ -53,7 +53,8 @@ _LONGEST_STEP_S = 0.1
 class Body:
     """Everything between the links and the servos of one head; publishes the parameters to ``mailbox``.
 
-    member : it is one of several heads, which :class:`controller.body.hall.Hall` ticks; None where it is alone.
+    member : set where this is one of several heads, all of which
+        :class:`controller.body.multi_head.MultiHeadBody` ticks; None where it is the only head.
 
     Attributes
     ----------

@@ -16,7 +16,7 @@ from controller.base.mailboxes import Mailbox
 from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.body import Body
-from controller.body.hall import Hall
+from controller.body.multi_head import MultiHeadBody
 from controller.body.nodes import open_node
 from controller.body.panel_requests import carry_out
 from controller.body.panel_state import PanelState
@@ -58,12 +58,12 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event,
         mailboxes.append(Mailbox.receive(pipe, len(parameters)))
         panel = Mailbox.receive(pipe, PanelState.size(parameters))
         panels.append(PanelState(panel, [layer.name for layer in by_priority(each.layers)], parameters))
-    body: Body | Hall
+    body: Body | MultiHeadBody
     if stage.heads:
-        body = Hall(stage, parameters, mailboxes, panels, orders.options)
+        body = MultiHeadBody(stage, parameters, mailboxes, panels, orders.options)
     else:
         body = Body(stage, parameters, mailboxes[0], orders.options)
-    bodies = body.bodies if isinstance(body, Hall) else [body]
+    bodies = body.bodies if isinstance(body, MultiHeadBody) else [body]
     node = open_node(stage, bodies)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
     with _logged(bodies[0].notes), ExitStack() as ending:
@@ -90,7 +90,7 @@ def _logged(notes: logging.Handler) -> Iterator[None]:
             root.removeHandler(handler)
 
 
-def _wait(body: Body | Hall, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
+def _wait(body: Body | MultiHeadBody, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
     """Serve main until it requests a stop or has ended, a signal arrives, or a bus failed for good."""
     finished = False
     while not stop.is_set():
@@ -104,7 +104,7 @@ def _wait(body: Body | Hall, pipe: Connection, stop: threading.Event, panel_stat
         body.check()
 
 
-def _handle(body: Body | Hall, pipe: Connection) -> bool:
+def _handle(body: Body | MultiHeadBody, pipe: Connection) -> bool:
     """Carry out a request of main or its panel; False when it requests a stop or has ended."""
     try:
         request = pipe.recv()
@@ -117,7 +117,7 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
         return True
     to = request.head if isinstance(request, messages.ToHead) else ""
     request = request.request if isinstance(request, messages.ToHead) else request
-    who = body.body_of(to) if isinstance(body, Hall) else body
+    who = body.body_of(to) if isinstance(body, MultiHeadBody) else body
     if isinstance(request, messages.AskDetails):
         _send(pipe, who.details())
         return True

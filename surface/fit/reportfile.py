@@ -1,4 +1,4 @@
-"""Write a fit's report: report.json, report.md, and pictures of the error on the face."""
+"""Write the report of a mesh fit: report.json, report.md, and pictures of the error on the face."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def write_report(result: FitResult, folder: str | Path, progress: Progress) -> N
 
 
 def _nets(result: FitResult) -> list[UniformNet]:
-    """The face's own net and uniform ones for its first and largest tile."""
+    """The control net of the face's first and largest tile, and uniform nets to compare it with."""
     face = result.parts[0]
     own = face.chart.uv[:, 0] < TILE / 2
     counted = own & ~face.chart.folded
@@ -82,7 +82,7 @@ def as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
 
 
 def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) -> str:
-    """The report to read: tables of errors, and what was guessed."""
+    """The report as Markdown: notes, and tables of errors."""
     lines = [f"# {report.name}: {report.points} control points, {len(report.parameters)} shapes", ""]
     lines += [f"- {note}" for note in [face_bounds(report), *report.notes]]
     lines += [f"- no shape for: {', '.join(report.missing)}"] if report.missing else []
@@ -98,7 +98,7 @@ def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) 
         ),
     ]
     lines += ["", *(f"![error]({name})" for name in pictures)]
-    lines += [LEGEND] if pictures else ["No OpenGL was there to draw the error."]
+    lines += [LEGEND] if pictures else ["The error was not drawn, because OpenGL is not available."]
     lines += ["", "## A uniform cubic NURBS net beside the face", "", *_net_lines(nets)]
     lines += _source_lines(report)
     for p in report.parts:
@@ -109,15 +109,15 @@ def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) 
 
 
 def _source_lines(report: FitReport) -> list[str]:
-    """Tables of the mesh's pieces and of the shapes that parameters were made of."""
+    """Tables of the mesh's pieces, and of the mesh's shapes that each parameter was made from."""
     lines = []
     if report.pieces:
         lines += ["", "## Pieces of the mesh", "", "| piece | kind |", "|---|---|"]
         lines += [f"| {_cell(name)} | {kind} |" for name, kind in report.pieces.items()]
     if report.shapes:
-        lines += ["", "## Shapes of the mesh", "", "| parameter | made of |", "|---|---|"]
+        lines += ["", "## Shapes of the mesh", "", "| parameter | made from |", "|---|---|"]
         lines += [f"| {p} | {_cell(', '.join(names))} |" for p, names in report.shapes.items()]
-    for title, names in (("empty", report.empty), ("understood, made from parameters", report.presets)):
+    for title, names in (("empty", report.empty), ("presets, made from parameters", report.presets)):
         lines += ["", f"{title}: {', '.join(names)}"] if names else []
     return lines
 
@@ -127,7 +127,7 @@ def _cell(text: str) -> str:
 
 
 def _distance_lines(dense: DenseErrors) -> list[str]:
-    """True distances of the posed head from the mesh and back: neutral of every part, and its worst shape each way."""
+    """Distances of the posed head from the mesh and back: for every part the neutral face, and the worst shape."""
     lines = ["", f"True distances of {dense.samples} samples in every shape, the head posed as it is drawn, mm.", ""]
     lines += [f"- {line}" for line in dense.lines()]
     lines += [
@@ -162,7 +162,7 @@ def _net_lines(nets: list[UniformNet]) -> list[str]:
 
 
 def _draw(result: FitResult, folder: Path) -> list[str]:
-    """Pictures of the error at rest and of each sample's worst shape; none without OpenGL."""
+    """Draw the error at rest, and at every sample that of its worst shape; returns no file names without OpenGL."""
     head = Head(result.head)
     for part in head.parts:
         kept = {k: v for k, v in part.attributes.items() if k == "eye_local"}
@@ -183,7 +183,7 @@ def _draw(result: FitResult, folder: Path) -> list[str]:
 
 
 def _colours(uv: Floats, part: FittedPart, error: Floats) -> Floats32:
-    """(m, 3) linear RGB of the error at vertices: the mean of the nearest samples; excluded ones violet."""
+    """(m, 3) linear RGB of the error at vertices, the mean over the nearest samples; violet where it is excluded."""
     nearest = cKDTree(part.chart.uv).query(uv, k=min(4, len(part.chart.uv)))[1].reshape(len(uv), -1)
     at = np.clip(error[nearest].mean(axis=1) / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)
     out = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=1)
@@ -193,7 +193,7 @@ def _colours(uv: Floats, part: FittedPart, error: Floats) -> Floats32:
 
 def _picture(head: Head, path: Path) -> None:
     """Front, three-quarter, profile, and from below into the nostrils."""
-    from surface.view.pictures.offscreen import Offscreen  # takes a moment to import; most fits draw nothing
+    from surface.view.pictures.offscreen import Offscreen  # slow to import, and most fits draw nothing
     from surface.view.pictures.sheet import compose, write_png
     from surface.view.scene.camera import Camera
     from surface.view.scene.framing import framed

@@ -1,4 +1,4 @@
-"""Parse, schedule and inject faults of a simulated bus: lost, late and corrupted replies, misbehaving servos and ports.
+"""Parse, schedule and inject faults of a simulated bus: lost, late and corrupt replies, faulty servos and ports.
 
 A fault is written ``kind[:ids][:value][:key=value ...]``, for example::
 
@@ -28,7 +28,7 @@ from typing import Any, NamedTuple
 from drivers.base.errors import DriverError
 
 LONGEST = 1e9
-"""No time and no number of steps is larger."""
+"""Largest time (s), count and number of steps that a fault may have."""
 
 
 class Kind(NamedTuple):

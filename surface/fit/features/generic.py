@@ -152,7 +152,7 @@ def _part(
     )  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth
-    recipe = PartRecipe(name, material, "skin", [], request, budget, doubt_slivers=True)
+    recipe = PartRecipe(name, material, "skin", [], request, budget, downweight_slivers=True)
     return recipe, [open_flat_holes(straighten_holes(i)) for i in lay_out(mesh, islands)]
 
 

@@ -17,7 +17,7 @@ from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, UNITS
 from surface.fit.transfer.align import Similarity, align, from_pairs
-from surface.fit.transfer.carry import carry
+from surface.fit.transfer.warp_head import carry
 from surface.fit.transfer.colours import with_colours
 from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.mirrored import alike, levelled, mirror_plane

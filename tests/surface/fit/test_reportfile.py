@@ -222,7 +222,7 @@ def test_pieces_and_shapes_stand_in_it(folder, result):
     )
     text = as_markdown(report, [UniformNet(9, 0.1), UniformNet(9, 0.2)], [])
     for words in ("| Hat\\|1 | hat, left out |", "| mouthSmileLeft | mouthSmile_L |", "empty: odd2",
-                  "understood, made from parameters: Joy"):  # fmt: skip
+                  "presets, made from parameters: Joy"):  # fmt: skip
         assert words in text
     assert kinds_line(report) == "pieces: skin (Head); hat, left out (Hat|1)" and kinds_line(result.report) == ""
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from small_head import all_points, part, small_head
 
-from surface.fit.transfer.carry import _with_points, settled, stretches
+from surface.fit.transfer.warp_head import _with_points, settled, stretches
 
 TURN = Rotation.from_euler("xyz", [20, -30, 40], degrees=True).as_matrix()
 
