@@ -255,7 +255,7 @@ def group_read(runs: tuple[Run, ...], fast: bool) -> GroupRead:
 
 
 def _restuffed(packet_in: list[int], change: Any) -> list[int]:
-    """A packet of the SDK (a list that begins with the header), its bytes from instruction to last parameter changed."""
+    """A packet of the SDK, a list that begins with the header, with ``change`` applied to its instruction and data."""
     length = packet_in[5] | packet_in[6] << 8
     body = change(bytes(packet_in[7 : 5 + length]))
     new = len(body) + 2

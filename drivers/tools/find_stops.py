@@ -262,7 +262,7 @@ class _Search:
         return None if second is None else [first, second]
 
     def _approach(self, side: int, end: int, speed_rad_s: float) -> int | None:
-        """Move towards ``end`` until the shaft stands still while the motor pushes: the step there, or None at ``end``."""
+        """Move towards ``end`` until the shaft stands still while the motor pushes; the step there, None at ``end``."""
         tick = self._table.rad_per_tick
         goal, seen, idle = float(self._position()), deque[tuple[float, int]](), list[float]()
         while True:

@@ -25,9 +25,9 @@ from surface.fit.features.squints import shut_with_squints
 from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.refusal import save_or_refuse
+from surface.fit.points.facets import facet_sag
 from surface.fit.points.importance import POINTS as MORE_POINTS
 from surface.fit.points.importance import with_importance
-from surface.fit.points.facets import facet_sag
 from surface.fit.points.lid_seating import close_lips, seat_lids
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart

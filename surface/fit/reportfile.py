@@ -28,7 +28,7 @@ LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more; violet
 
 
 def write_report(result: FitResult, folder: str | Path, progress: Progress) -> None:
-    """Write the report of a fit, complete or not at all. Raises FitError: the folder cannot be written to."""
+    """Write the report of a fit, completely or not at all. Raises FitError: the folder cannot be written to."""
     folder = Path(folder)
     nets = _nets(result)
     progress("report", 0.5)

@@ -183,7 +183,7 @@ def faults_of(dense: DenseErrors, parts: Sequence[FittedPart], scale: float) -> 
     out = []
     if NEUTRAL in shapes and not all(x <= ASTRAY_MM * scale for x in _both(shapes[NEUTRAL], "p99")):
         most = max(_both(shapes[NEUTRAL], "p99"))
-        out.append(f"the fitted face does not follow the mesh: a hundredth of it is {most:.0f} mm off or more")
+        out.append(f"the fitted face does not follow the mesh: 1 % of it is {most:.0f} mm away or more")
     far = [(max(_both(b, "max")), s == NEUTRAL, s) for s, b in shapes.items()]
     far = [x for x in far if not x[0] <= REFUSED_MM * scale]
     if far:

@@ -280,8 +280,8 @@ def _slice(at: Floats, z: float) -> Bools:
 
 
 def _stations(places: Floats, at: Floats, along: Floats, sign: float) -> Floats:
-    """(STATIONS * len(ACROSS), 2) stations in (u, v) on the tongue's upper side (``sign`` 1) or underside (-1), at each z
-    of ``along``, chosen from samples ``places (k, 2)`` with positions ``at (k, 3)``."""
+    """(STATIONS * len(ACROSS), 2) stations in (u, v) on the tongue's upper side (``sign`` 1) or underside (-1), at each
+    z of ``along``, chosen from samples ``places (k, 2)`` with positions ``at (k, 3)``."""
     out = []
     for z in along:
         here = at[_slice(at, z)]

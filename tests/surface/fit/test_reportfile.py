@@ -188,7 +188,7 @@ def result():
         patch.setattr("surface.fit.source.uvcheck.SQUEEZED_SHARE", 1.0)  # the pit stays squeezed: it is a fold
         patch.setattr("surface.fit.source.owncharts.UNEVEN", np.inf)
         with fewer_points():
-            return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken for mm",)), "sheet", lambda *_: None)
+            return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken to be mm",)), "sheet", lambda *_: None)
 
 
 @pytest.fixture(scope="module")
@@ -208,7 +208,7 @@ def test_the_figures_are_those_of_the_fit(folder, result):
     assert part["control_points"] == result.report.points and set(part["shapes_mm"]) == {"jawOpen", "mouthSmileLeft"}
     assert part["neutral_mm"]["rms"] == result.report.parts[0].neutral.rms
     assert table["left_out"] == ["odd"] and "tongueOut" in table["missing"]
-    assert {"unit taken for mm", MISSING} <= set(table["notes"])
+    assert {"unit taken to be mm", MISSING} <= set(table["notes"])
     assert part["excluded_samples"] == int(result.parts[0].chart.folded.sum())
 
 
@@ -230,7 +230,7 @@ def test_pieces_and_shapes_stand_in_it(folder, result):
 @pytest.mark.slow
 def test_it_can_be_read(folder):
     text = (folder / "report.md").read_text()
-    for words in ("left out, not ARKit's: odd", "| jawOpen |", "uniform cubic NURBS net", "unit taken for mm"):
+    for words in ("left out, not ARKit's: odd", "| jawOpen |", "uniform cubic NURBS net", "unit taken to be mm"):
         assert words in text
 
 

@@ -120,7 +120,7 @@ def _scale(
         why = f", {why}" if why else ""
         notes.append(f"no usual unit fits{why}: its eyes are taken to be {EYES_MM:.0f} mm apart (say --unit otherwise)")
         return usual / measure, ""
-    notes.append(f"unit taken for {guess}{', ' + why if why else ''}: {words(UNITS[guess])} (say --unit otherwise)")
+    notes.append(f"unit taken to be {guess}{', ' + why if why else ''}: {words(UNITS[guess])} (say --unit otherwise)")
     return UNITS[guess], guess
 
 

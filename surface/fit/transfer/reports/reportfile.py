@@ -1,4 +1,4 @@
-"""Write what a transfer found and made: report.json, report.md, and two pictures that need no OpenGL."""
+"""Write the report of a transfer: report.json, report.md, and two pictures, which need no OpenGL."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more from th
 def write_transfer_report(
     report: TransferReport, scan: Scan, head: HeadData, found: Similarity, folder: str | Path
 ) -> None:  # fmt: skip
-    """Write the report of a transfer, complete or not at all.
+    """Write the report of a transfer, completely or not at all.
 
-    scan : as read; found : from its coordinates to the frame of the head that the expressions come from.
+    scan : in its file's coordinates. found : maps these to the frame of the head that the expressions come from.
 
     Raises FitError: the folder cannot be written to.
     """
@@ -66,7 +66,7 @@ def as_table(report: TransferReport) -> dict[str, Any]:
 
 
 def as_markdown(report: TransferReport, pictures: list[str]) -> str:
-    """The report to read."""
+    """The report as Markdown."""
     fit = report.fit
     counts = f"{fit.points} control points, {len(fit.parameters)} shapes"
     title = f"# {fit.name}: the expressions of {report.source}, {counts}"
@@ -75,10 +75,10 @@ def as_markdown(report: TransferReport, pictures: list[str]) -> str:
     map_ = report.registration
     lines += [f"| scan, head: {p.samples} samples of {p.name} | {_row(p.neutral)} |" for p in fit.parts]
     lines.append(
-        f"| the map alone, scan: where the scan shows {100 * report.matched:.0f} % of the front | {_row(map_)} |"
+        f"| the map alone, scan: {100 * report.matched:.0f} % of the front, where it has a match | {_row(map_)} |"
     )
     lines += ["", *(f"![{name}]({name})" for name in pictures), *([LEGEND] if pictures else [])]
-    lines += ["", "## Landmarks", "", "| landmark | how | sure | place in the scan | the head's own, mm off |"]
+    lines += ["", "## Landmarks", "", "| landmark | how | confidence | place in the scan | off the head's, mm |"]
     lines += ["|---|---|---|---|---|"]
     for m in report.landmarks:
         place = ", ".join(f"{x:.5g}" for x in m.place)
@@ -95,7 +95,7 @@ def _row(errors: Any) -> str:
 
 
 def _draw(report: TransferReport, scan: Scan, head: HeadData, found: Similarity, folder: Path) -> list[str]:
-    """Pictures of the landmarks and of the scan's distance from the head; none without Pillow."""
+    """Draw the landmarks and the scan's distance from the head; returns no file names without Pillow."""
     places = np.array([m.place for m in report.landmarks])
     view = view_of(found, places)
     try:

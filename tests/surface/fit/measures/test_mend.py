@@ -90,7 +90,7 @@ def measured(*shapes: tuple[str, float, float], turned: float = 0.0) -> DenseErr
     ("dense", "scale", "said"),
     [
         (measured(("neutral", 3.9, 19.0), ("jawOpen", 9.0, 19.0), turned=99.0), 1.0, []),
-        (measured(("neutral", 4.1, 9.0)), 1.0, ["does not follow the mesh: a hundredth of it is 4 mm off or more"]),
+        (measured(("neutral", 4.1, 9.0)), 1.0, ["does not follow the mesh: 1 % of it is 4 mm away or more"]),
         (measured(("neutral", np.nan, 9.0)), 1.0, ["does not follow the mesh"]),
         (measured(("neutral", 1.0, 19.0), ("jawOpen", 1.0, 48.0)), 1.0, ["48 mm off the mesh with jawOpen = 1"]),
         (measured(("neutral", 1.0, 48.0), ("jawOpen", 1.0, 49.0)), 1.0, ["48 mm off the mesh at rest"]),
