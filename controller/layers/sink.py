@@ -165,7 +165,7 @@ class HeadSink(CommandSink, Protocol):
 
     @property
     def manner(self) -> str:
-        """How the face was told to behave: a manner, or ``auto``."""
+        """How the face was commanded to behave: a manner, or ``auto``."""
 
     @property
     def loudness(self) -> float:

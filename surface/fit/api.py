@@ -41,7 +41,7 @@ from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
-from surface.fit.source.naming.astray import right_shapes
+from surface.fit.source.naming.misnamed import correct_shapes
 from surface.fit.source.naming.shapes import to_arkit
 from surface.fit.source.placing.anatomy import Landmarks
 from surface.fit.source.placing.frame import head_scale
@@ -98,7 +98,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     else:
         loaded = _repaired(place(loaded))
         check_manifold(loaded.mesh, where)
-        recipe, (mesh, exchanged) = Recipe([]), right_shapes(to_arkit(loaded.mesh, loaded.named))
+        recipe, (mesh, exchanged) = Recipe([]), correct_shapes(to_arkit(loaded.mesh, loaded.named))
         plan = make_plan(mesh)
         plan.notes.extend(exchanged)
         mesh, seated = fit_lids(mesh, plan.found) if plan.found else (mesh, [])

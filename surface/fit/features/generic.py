@@ -104,7 +104,7 @@ def _pieces(mesh: FitMesh, gone: Bools | None = None) -> tuple[Ints, Floats]:
 
 
 def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats:
-    """How much of a face each piece is: its area, times the shapes that move it; little of it for hair and the like."""
+    """How much of a face each piece is: its area, times the shapes that move it; reduced for hair."""
     used = mesh.faces >= 0
     piece = np.zeros(len(mesh.vertices), np.int64)
     piece[mesh.faces[used]] = np.repeat(label, used.sum(axis=1))

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.base.extras import require
-from surface.fit.source.kinds import bare
+from surface.fit.source.kinds import skin_and_eyes
 from surface.fit.source.load import wanted_faces
 from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
 from surface.fit.source.textures import Samples as Colours
@@ -75,7 +75,7 @@ def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
     kind = path.suffix.lower()
     if kind in OWN:
         raw = OWN[kind](path)
-        kept, notes = bare(raw, wanted_faces(raw, without, str(path)))
+        kept, notes = skin_and_eyes(raw, wanted_faces(raw, without, str(path)))
         scan = make_scan(raw.vertices, triangles(raw.faces[kept]), str(path))
         return replace(scan, colours=scan_colours(raw, kept), notes=tuple(notes))
     if kind not in OTHERS:

@@ -145,7 +145,7 @@ def close_sides(seal, passes, tolerance, rows, apart, opening, push, sampling, w
 def part_sides(
     points, eye, axis, seal, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work
 ):  # fmt: skip
-    """Correct control points (n, 3) at an opening, of which ``seal``, 0..1, is closed first, until what is left is
+    """Correct control points (n, 3) at an opening, of which ``seal``, 0..1, is closed first, until the remainder is
     below ``tolerance``, mm, ``passes`` times at most; lids are moved onto the eyeball first, which opens them. Returns
     how many passes there were, 0 where the last answer still holds.
 
