@@ -30,7 +30,7 @@ class Player(Protocol):
 
     @property
     def name(self) -> str | None:
-        """Of the show that was begun last; None where there is none."""
+        """Of the show that was started last; None where there is none."""
 
     def abandon(self, now_ns: int) -> None:
         """End a show that failed, and give back what it moves."""

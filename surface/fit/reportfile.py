@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -13,37 +11,28 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats, Floats32
-from surface.base.errors import FitError, MissingPackage, ViewError
+from surface.base.errors import MissingPackage, ViewError
 from surface.base.progress import Progress
+from surface.fit.measures.error_colours import error_colours
+from surface.fit.measures.report_folder import report_folder
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import NEUTRAL, DenseErrors, Errors, FitReport, FitResult, FittedPart, face_bounds
 from surface.fit.source.chart import TILE
 from surface.head import Head
 
 FORMAT, VERSION = "omote fit report", 1
-FULL_MM = 1.0  # error at the end of the colour scale
-SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0.75, 0.24, 0.04], [0.55, 0.02, 0.02]])
 EXCLUDED = np.array([0.45, 0.05, 0.50])
 LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more; violet: inside folds, not counted"
 
 
 def write_report(result: FitResult, folder: str | Path, progress: Progress) -> None:
     """Write the report of a fit, completely or not at all. Raises FitError: the folder cannot be written to."""
-    folder = Path(folder)
     nets = _nets(result)
     progress("report", 0.5)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
-            new = Path(made)
-            pictures = _draw(result, new)
-            (new / "report.json").write_text(json.dumps(as_table(result.report, nets), indent=1), encoding="utf-8")
-            (new / "report.md").write_text(as_markdown(result.report, nets, pictures), encoding="utf-8")
-            folder.mkdir(exist_ok=True)
-            for file in new.iterdir():
-                shutil.move(file, folder / file.name)
-    except OSError as e:
-        raise FitError(f"{folder}: the report cannot be written ({e})", hint="choose another --report folder") from e
+    with report_folder(Path(folder)) as new:
+        pictures = _draw(result, new)
+        (new / "report.json").write_text(json.dumps(as_table(result.report, nets), indent=1), encoding="utf-8")
+        (new / "report.md").write_text(as_markdown(result.report, nets, pictures), encoding="utf-8")
     progress("report", 1.0)
 
 
@@ -185,8 +174,7 @@ def _draw(result: FitResult, folder: Path) -> list[str]:
 def _colours(uv: Floats, part: FittedPart, error: Floats) -> Floats32:
     """(m, 3) linear RGB of the error at vertices, the mean over the nearest samples; violet where it is excluded."""
     nearest = cKDTree(part.chart.uv).query(uv, k=min(4, len(part.chart.uv)))[1].reshape(len(uv), -1)
-    at = np.clip(error[nearest].mean(axis=1) / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)
-    out = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=1)
+    out = error_colours(error[nearest].mean(axis=1))
     out[part.chart.folded[nearest].mean(axis=1) > 0.5] = EXCLUDED
     return out.astype(np.float32)
 

@@ -1,8 +1,8 @@
 """Correct control points of a fitted head that the samples hardly determine: where the surface sticks out of the mesh,
 or is inside out.
 
-Such a point is moved to where its neighbours suggest, at rest or in one shape. A mend that does not bring the surface nearer to
-the mesh is taken back. What a face is refused for after that is reported by :func:`faults_of`.
+Such a point is moved to where its neighbours suggest, at rest or in one shape. A change that does not bring the surface
+nearer to the mesh is undone. :func:`faults_of` says why a face is refused after that.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ def _turned(dense: DenseErrors, scale: float) -> list[tuple[str, str, str]]:
 def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, str, str]], limit: float) -> bool:
     """Whether everything that was mended sticks out less, or less of it is inside out, and nothing else got worse.
 
-    limit : what sticks out by less than half of it, mm, may do so: points along a bent surface end a little off it.
+    limit : mm; parts may stick out by half of it, since points moved along a bent surface end a little beside it.
     """
     was, now = _furthest(before), _furthest(after)
     over, left = (
@@ -177,8 +177,8 @@ def _sees(part: PartData, place: Floats, others: Floats) -> Bools:
 
 
 def faults_of(dense: DenseErrors, parts: Sequence[FittedPart], scale: float) -> list[str]:
-    """Messages that say why a fitted head is refused: its face, the first part, does not follow the mesh, sticks far out
-    of it, or is inside out."""
+    """Messages that say why a fitted head is refused: its face, the first part, does not follow the mesh, sticks far
+    out of it, or is inside out."""
     shapes = dense.parts.get(parts[0].name, {}) if parts else {}
     out = []
     if NEUTRAL in shapes and not all(x <= ASTRAY_MM * scale for x in _both(shapes[NEUTRAL], "p99")):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from surface.base.arrays import Floats, Ints
 from surface.base.extras import importing
 from surface.check.raster import NOTHING, View
+from surface.fit.measures.error_colours import error_colours
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.scan import Scan
 from surface.fit.transfer.template import NAMES
@@ -27,8 +28,7 @@ LIGHT = np.array([-0.3, 0.5, 0.8]) / np.linalg.norm([-0.3, 0.5, 0.8])
 PAPER, DARK, BRIGHT = 236, 40, 225
 RING, TEXT = 5, 17
 COLOURS = {"given": (30, 90, 220), "found": (200, 30, 30), "carried": (230, 130, 0)}
-FULL_MM, FAR_MM = 1.0, 20.0  # error at the end of the colour scale; greater ones than the second are grey
-SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0.75, 0.24, 0.04], [0.55, 0.02, 0.02]])
+FAR_MM = 20.0  # greater errors are grey
 
 
 @dataclass(frozen=True)
@@ -113,8 +113,7 @@ def draw_distances(scan: Scan, view: Frontal, distance: Floats, path: Path) -> N
     with importing("a picture of errors", "PIL"):
         from PIL import Image as Pillow  # optional: the extra view
 
-    at = np.clip(distance / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)
-    colour = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=1) ** (1 / 2.2)
+    colour = error_colours(distance) ** (1 / 2.2)
     colour[distance > FAR_MM] = 0.5
     picture = _relief(view.pixels(scan.vertices), scan.triangles, round(ASPECT * HEIGHT), colour)
     Pillow.fromarray(picture).save(path, format="PNG")

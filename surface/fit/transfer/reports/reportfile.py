@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
-from surface.base.errors import FitError, MissingPackage
+from surface.base.errors import MissingPackage
+from surface.fit.measures.report_folder import report_folder
 from surface.fit.points.report import face_bounds
 from surface.fit.transfer.align import Similarity
+from surface.fit.transfer.reports.distances import distances_from, sample_head
 from surface.fit.transfer.reports.picture import Frontal, draw_distances, draw_landmarks, frontal
 from surface.fit.transfer.reports.report import TransferReport
-from surface.fit.transfer.scan import Scan, make_scan, sample
+from surface.fit.transfer.scan import Scan
 from surface.head import Head, HeadData
 
 FORMAT, VERSION = "omote transfer report", 1
-COUNT = 150_000  # samples of the head that distances are measured to
 PICTURES = ("landmarks.png", "error.png")
 LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more from the head; grey: more than 20 mm"
 
@@ -36,19 +34,10 @@ def write_transfer_report(
 
     Raises FitError: the folder cannot be written to.
     """
-    folder = Path(folder)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
-            new = Path(made)
-            pictures = _draw(report, scan, head, found, new)
-            (new / "report.json").write_text(json.dumps(as_table(report), indent=1), encoding="utf-8")
-            (new / "report.md").write_text(as_markdown(report, pictures), encoding="utf-8")
-            folder.mkdir(exist_ok=True)
-            for file in new.iterdir():
-                shutil.move(file, folder / file.name)
-    except OSError as e:
-        raise FitError(f"{folder}: the report cannot be written ({e})", hint="choose another --report folder") from e
+    with report_folder(Path(folder)) as new:
+        pictures = _draw(report, scan, head, found, new)
+        (new / "report.json").write_text(json.dumps(as_table(report), indent=1), encoding="utf-8")
+        (new / "report.md").write_text(as_markdown(report, pictures), encoding="utf-8")
 
 
 def as_table(report: TransferReport) -> dict[str, Any]:
@@ -116,15 +105,6 @@ def view_of(found: Similarity, places: Floats) -> Frontal:
 
 def _distances(scan: Scan, data: HeadData) -> Floats:
     """(t,) mm from the middle of each triangle of a scan to the nearest place of a head's skin or eyeballs."""
-    head = Head(data)
-    own = [p for p in head.parts if p.material in ("skin", "eye")]
-    first = np.cumsum([0, *(len(p.vertices) for p in own)])
-    faces = np.concatenate([p.triangles + k for p, k in zip(own, first, strict=False)]).astype(np.int64)
-    mine = sample(make_scan(np.concatenate([p.vertices for p in own]).astype(float), faces, data.name), COUNT)
-    placed = data.placement
     middle = scan.vertices[scan.triangles].mean(axis=1)
-    at = middle if placed is None else placed.points(middle)
-    far, near = cKDTree(mine.points).query(at)
-    off = np.abs(((at - mine.points[near]) * mine.normals[near]).sum(axis=1))
-    distance: Floats = np.where(far < 2.0, off, far)
-    return distance
+    at = middle if data.placement is None else data.placement.points(middle)
+    return distances_from(sample_head(Head(data)), at).mm

@@ -6,7 +6,7 @@ import made_face
 import numpy as np
 import pytest
 
-from surface.fit.transfer.reports import errors as module
+from surface.fit.transfer.reports import distances as module
 from surface.fit.transfer.reports.errors import distances, face_reports
 from surface.fit.transfer.scan import Samples
 
