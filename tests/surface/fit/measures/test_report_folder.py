@@ -26,8 +26,9 @@ def test_an_error_leaves_the_folder_as_it_was(tmp_path):
 
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(FitError, match="the report cannot be written") as caught, report_folder(tmp_path / "file" / "r"):
+    file = tmp_path / "file"
+    file.write_text("")
+    with pytest.raises(FitError, match="the report cannot be written") as caught, report_folder(file / "report"):
         pass
     assert "--report" in caught.value.hint
 
