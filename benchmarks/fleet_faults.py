@@ -1,7 +1,7 @@
 """A stage over Zenoh whose processes are killed, and whose network loses and delays: what the heads show meanwhile.
 
     python benchmarks/fleet_faults.py --kills 100             # of any role, at random, each started again
-    python benchmarks/fleet_faults.py --seconds 60            # a quiet hall: spread of one mark over the heads
+    python benchmarks/fleet_faults.py --seconds 60            # nothing fails: spread of one mark over the heads
     python benchmarks/fleet_faults.py --seconds 60 --loss 0.05 --delay-ms 50 --jitter-ms 20
 
 Two conductors, two processes of two heads each, and one that records, on one machine; with ``--loss`` or ``--delay-ms``
@@ -124,7 +124,7 @@ def disturb(pipe: Connection, listen: int, to: int, loss: float, delay_s: float,
 
 
 @dataclass
-class Hall:
+class Fleet:
     """The processes of a stage, by name; events are times (ns) and what was done."""
 
     endpoint: str
@@ -223,14 +223,14 @@ def mark_spreads(rows: np.ndarray) -> Floats:
     return np.array([1e-6 * (max(times) - min(times)) for times in whole])
 
 
-def judge(hall: Hall, table: Table) -> bool:
+def judge(fleet: Fleet, table: Table) -> bool:
     """Fill a table with what the heads showed; whether all bounds were kept."""
-    rows, sent = (_read(hall.folder, names) for names in (PROCESSES, CONDUCTORS))
+    rows, sent = (_read(fleet.folder, names) for names in (PROCESSES, CONDUCTORS))
     sent_s = sent_at(sent)
     limits = np.array([over_limits(life, sent_s) for head in range(len(HEADS)) for life in lives(rows, head)])
     back = sum(steps_back(rows, head) for head in range(len(HEADS)))
     checked, late = 0, 0
-    times = [at for at, _ in hall.events]
+    times = [at for at, _ in fleet.events]
     for at, following in zip(times, [*times[1:], int(rows["shown_ns"][-1])], strict=True):
         if following - at > IN_STEP_S * 1e9:
             checked += 1
@@ -263,17 +263,17 @@ def _read(folder: Path, names: Iterable[str]) -> np.ndarray:
     return rows[np.argsort(rows["shown_ns"], kind="stable")]
 
 
-def kill_at_random(hall: Hall, count: int, seed: int, until_s: float) -> int:
+def kill_at_random(fleet: Fleet, count: int, seed: int, until_s: float) -> int:
     """Kill, or stop and continue, and start again; returns how many events there were until the time was over."""
     numbers, done = random.Random(seed), 0
     while done < count and time.monotonic() < until_s:
-        name = numbers.choice(sorted(hall.running))
+        name = numbers.choice(sorted(fleet.running))
         if numbers.random() < 0.2:
-            hall.pause(name, numbers.uniform(0.05, 1.5))
+            fleet.pause(name, numbers.uniform(0.05, 1.5))
         else:
-            hall.kill(name)
+            fleet.kill(name)
             time.sleep(numbers.choice((0.0, numbers.uniform(0.0, 1.0))))
-            hall.begin(name)
+            fleet.begin(name)
         time.sleep(numbers.choice((0.0, IN_STEP_S + 0.3, IN_STEP_S + 1.0)))
         done += 1
     return done
@@ -299,19 +299,19 @@ def main() -> None:
         by = f"udp/127.0.0.1:{proxy}" if proxied else f"tcp/127.0.0.1:{tcp}"
         way = (options.loss, options.delay_ms * 1e-3, options.jitter_ms * 1e-3)
         between = start(disturb, proxy, udp, *way)[1] if proxied else None
-        hall = Hall(f"tcp/127.0.0.1:{tcp}", by, folder, shown_after)
+        fleet = Fleet(f"tcp/127.0.0.1:{tcp}", by, folder, shown_after)
         for name in (*CONDUCTORS, *PROCESSES, "recorder"):
-            hall.begin(name)
+            fleet.begin(name)
         time.sleep(3.0)
         end = time.monotonic() + options.seconds
-        done = kill_at_random(hall, options.kills, options.seed, end) if options.kills else 0
+        done = kill_at_random(fleet, options.kills, options.seed, end) if options.kills else 0
         time.sleep(max(IN_STEP_S + 1.0, 0.0 if done else end - time.monotonic()))
-        hall.end()
+        fleet.end()
         for pipe in filter(None, (between, hub)):
             pipe.send("end")
         title = f"{done} events, {100 * options.loss:g} % loss, {options.delay_ms:g} +- {options.jitter_ms:g} ms"
         table = Table("measured", "value", "", title=title, title_justify="left")
-        kept = judge(hall, table)
+        kept = judge(fleet, table)
     Console(width=110).print(table)
     sys.exit(not kept)
 
