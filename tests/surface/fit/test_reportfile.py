@@ -66,7 +66,7 @@ def test_every_figure_of_the_report_can_be_read() -> None:
     assert "## Shapes of lashes" not in lines
     plain = as_markdown(report_of(missing=(), left_out=()), NETS, [])
     assert "no shape for" not in plain and "left out" not in plain
-    assert "No OpenGL" in plain and "violet" not in plain
+    assert "OpenGL is not available" in plain and "violet" not in plain
 
 
 def test_a_report_replaces_an_older_one_and_folders_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

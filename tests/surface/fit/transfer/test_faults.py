@@ -45,8 +45,8 @@ def test_a_face_that_follows_its_scan_is_no_fault(source: Head) -> None:
     [
         (errors(4.2), 0.9, "does not follow the scan: 1 % of it is 4 mm away"),
         (errors(0.5), 0.2, "only 20 % of the face's front lies on the scan"),
-        (errors(0.0, samples=0), 0.9, "nothing of the face"),
-        ([], 0.0, "nothing of the face"),
+        (errors(0.0, samples=0), 0.9, "no part of the face"),
+        ([], 0.0, "no part of the face"),
     ],
 )
 def test_a_face_that_does_not_is_one(source: Head, parts: list[PartReport], matched: float, words: str) -> None:
