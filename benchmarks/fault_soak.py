@@ -35,7 +35,7 @@ FAMILIES = {"dynamixel": ("xl330-m288",), "feetech": ("sts3215",), "both protoco
 IDS = tuple(range(1, 9))
 CYCLE_S = 0.02
 SPEED_RAD_S = 6.0
-FAULT_S, CALM_S = (0.3, 2.5), 2.5
+FAULT_S, QUIET_S = (0.3, 2.5), 2.5
 """How long the faults of a group last, and how long nothing happens after them."""
 SETTLE_S = 2.5
 """Time in which a servo is driven again after its fault is over."""
@@ -130,7 +130,7 @@ class Head:
         begun, ends = self.clock(), 0.0
         for spec in group:
             ends = max(ends, self._inflict(spec))
-        while self.clock() < begun + ends + CALM_S + SETTLE_S:
+        while self.clock() < begun + ends + QUIET_S + SETTLE_S:
             self._cycle()
         self.result.groups += 1
         self._repair()

@@ -1,7 +1,7 @@
 """A stage over Zenoh whose processes are killed, and whose network loses and delays: what the heads show meanwhile.
 
     python benchmarks/fleet_faults.py --kills 100             # of any role, at random, each started again
-    python benchmarks/fleet_faults.py --seconds 60            # a quiet hall: spread of one mark over the heads
+    python benchmarks/fleet_faults.py --seconds 60            # nothing fails: spread of one mark over the heads
     python benchmarks/fleet_faults.py --seconds 60 --loss 0.05 --delay-ms 50 --jitter-ms 20
 
 A router, two conductors, two processes of two heads each, one that draws all heads, and one that records, on one
@@ -140,7 +140,7 @@ def disturb(pipe: Connection, listen: int, to: int, loss: float, delay_s: float,
 
 
 @dataclass
-class Hall:
+class Fleet:
     """The processes of a stage, by name; events are times (ns) and what was done.
 
     endpoint : of the router, which listens at ``datagrams`` too. heads_by : where heads find it, the proxy perhaps.
@@ -279,13 +279,13 @@ def mark_spreads(rows: np.ndarray) -> Floats:
     return np.array([1e-6 * (max(times) - min(times)) for times in whole])
 
 
-def judge(hall: Hall, table: Table) -> bool:
+def judge(fleet: Fleet, table: Table) -> bool:
     """Fill a table with what the heads showed; whether all bounds were kept."""
-    rows, sent = _read(hall.folder, SHOWING), Sent(_read(hall.folder, CONDUCTORS))
+    rows, sent = _read(fleet.folder, SHOWING), Sent(_read(fleet.folder, CONDUCTORS))
     places = range(len(PLACES))
     limits = np.array([over_limits(life, sent) for place in places for life in lives(rows, place)])
     back = sum(steps_back(rows, place) for place in places)
-    judged = judged_events(hall.events, int(rows["shown_ns"][-1]))
+    judged = judged_events(fleet.events, int(rows["shown_ns"][-1]))
     late = {(at, what): places for at, what in judged if (places := out_of_step(rows, at))}
     spreads = mark_spreads(rows)
     exact, conducted = rows["exact"].mean(), rows["conducted"].mean()
@@ -307,7 +307,7 @@ def judge(hall: Hall, table: Table) -> bool:
     for name, (value, kept) in found.items():
         table.add_row(name, str(value), "" if kept else "missed")
     for (at, what), those in late.items():
-        when_s = 1e-9 * (at - hall.events[0][0])
+        when_s = 1e-9 * (at - fleet.events[0][0])
         table.add_row(f"{what} ({when_s:.1f} s)", "\n".join(why_late(rows, at, place) for place in those))
     return all(kept for _, kept in found.values())
 
@@ -326,17 +326,17 @@ def _read(folder: Path, names: Iterable[str]) -> np.ndarray:
     return rows[np.argsort(rows["shown_ns"], kind="stable")]
 
 
-def kill_at_random(hall: Hall, count: int, seed: int, until_s: float) -> int:
+def kill_at_random(fleet: Fleet, count: int, seed: int, until_s: float) -> int:
     """Kill, or stop and continue, and start again; returns how many events there were until the time was over."""
     numbers, done = random.Random(seed), 0
     while done < count and time.monotonic() < until_s:
-        name = numbers.choice(sorted(hall.running))
+        name = numbers.choice(sorted(fleet.running))
         if numbers.random() < 0.25:
-            hall.pause(name, numbers.uniform(*(LONG_PAUSE_S if name in ("router", *CONDUCTORS) else PAUSE_S)))
+            fleet.pause(name, numbers.uniform(*(LONG_PAUSE_S if name in ("router", *CONDUCTORS) else PAUSE_S)))
         else:
-            hall.kill(name)
+            fleet.kill(name)
             time.sleep(numbers.choice((0.0, numbers.uniform(0.0, 1.0))))
-            hall.begin(name)
+            fleet.begin(name)
         time.sleep(numbers.choice((0.0, IN_STEP_S + 0.3, IN_STEP_S + 1.0)))
         done += 1
     return done
@@ -361,20 +361,20 @@ def main() -> None:
         by = f"udp/127.0.0.1:{proxy}" if proxied else f"tcp/127.0.0.1:{tcp}"
         way = (options.loss, options.delay_ms * 1e-3, options.jitter_ms * 1e-3)
         between = start(disturb, proxy, udp, *way)[1] if proxied else None
-        hall = Hall(f"tcp/127.0.0.1:{tcp}", f"udp/127.0.0.1:{udp}", by, folder, shown_after)
+        fleet = Fleet(f"tcp/127.0.0.1:{tcp}", f"udp/127.0.0.1:{udp}", by, folder, shown_after)
         for name in ("router", *CONDUCTORS, *SHOWING, "recorder"):
-            hall.begin(name)
+            fleet.begin(name)
         time.sleep(3.0)
         end = time.monotonic() + options.seconds
-        done = kill_at_random(hall, options.kills, options.seed, end) if options.kills else 0
+        done = kill_at_random(fleet, options.kills, options.seed, end) if options.kills else 0
         time.sleep(max(IN_STEP_S + 1.0, 0.0 if done else end - time.monotonic()))
-        hall.end()
+        fleet.end()
         if between is not None:
             between.send("end")
-        (folder / "events.json").write_text(json.dumps(hall.events))
+        (folder / "events.json").write_text(json.dumps(fleet.events))
         title = f"{done} events, {100 * options.loss:g} % loss, {options.delay_ms:g} +- {options.jitter_ms:g} ms"
         table = Table("measured", "value", "", title=title, title_justify="left")
-        kept = judge(hall, table)
+        kept = judge(fleet, table)
     Console(width=150).print(table)
     sys.exit(not kept)
 

@@ -31,7 +31,7 @@ RATE_HZ = 50
 SPEED_RAD_S = 6.0
 FAULT_EVERY_S = 8.0
 SPREAD = (0.7, 1.3)
-CALM_S = 3.0
+QUIET_S = 3.0
 OVER_S = 2.0
 """So long after a fault everything is as before."""
 GROWTH_MB = 5.0
@@ -117,17 +117,17 @@ class Head:
         self.bus = open_bus("dynamixel", specs, port=link, clock=self.clock, reboot_faulted=True, margin_s=0.01)
         self._sent: np.ndarray | None = None
         self._sent_s = 0.0
-        self._next_fault_s, self._calm_s = FAULT_EVERY_S, 0.0
+        self._next_fault_s, self._quiet_s = FAULT_EVERY_S, 0.0
         self._limp_since_s: float | None = None
         self._last_s = 0.0
-        self.result.apart = FAULT_EVERY_S * SPREAD[0] >= CALM_S + OVER_S
+        self.result.apart = FAULT_EVERY_S * SPREAD[0] >= QUIET_S + OVER_S
 
     def run(self, seconds: float) -> Soak:
         """Drive for so many simulated seconds, then stop and look."""
         self.bus.open()
         self.bus.start()
         tenth, before_mb = seconds / 10.0, 0.0
-        self._last_s = seconds - (CALM_S + OVER_S if self.result.apart else 0.0)  # so that each is over at the end
+        self._last_s = seconds - (QUIET_S + OVER_S if self.result.apart else 0.0)  # so that each is over at the end
         while self.clock() < seconds:
             if self.clock() > tenth and not before_mb:
                 before_mb = resident_mb()
@@ -203,7 +203,7 @@ class Head:
         elif spec.startswith("forget"):
             self.chain.servo(i).reboot(now)
         else:
-            ends = f":for={self.random.uniform(0.5, CALM_S):.1f}s"
+            ends = f":for={self.random.uniform(0.5, QUIET_S):.1f}s"
             self.chain.faults.add([part + ends for part in spec.split()], now)
 
     def _finish(self) -> None:

@@ -96,7 +96,7 @@ class _Requests(ABC):
         return self._ask("show", name=name)
 
     def show_action(self, action: str, to: float | str | None = None) -> Any:
-        """``play``, ``pause``, ``stop`` or ``seek`` the show that was begun last; ``to`` a mark or a time (s)."""
+        """``play``, ``pause``, ``stop`` or ``seek`` the show that was started last; ``to`` a mark or a time (s)."""
         return self._ask("show", action=action, to=to)
 
     def stop(self) -> Any:

@@ -69,14 +69,14 @@ def new_expression(folder: Path) -> tuple[Floats, Image.Image]:
 
 
 def smirk(folder: Path) -> tuple[dict[str, Any], Image.Image]:
-    """Pull one corner of the mouth in a window and save it without typing; what was told, and the window."""
-    told = take("smirk", folder)
-    return told, Image.open(folder / "saved.png").convert("RGB").resize(WINDOW, Image.Resampling.LANCZOS)
+    """Pull one corner of the mouth in a window and save it without typing; its report, and the window."""
+    report = take("smirk", folder)
+    return report, Image.open(folder / "saved.png").convert("RGB").resize(WINDOW, Image.Resampling.LANCZOS)
 
 
 def wrinkle(folder: Path) -> tuple[dict[str, Any], Image.Image]:
-    """Draw a fold in a window and save it as a slider; what was told, and the window with the face before and after."""
-    told = take("wrinkle", folder)
+    """Draw a fold in a window and save it as a slider; its report, and the window with the face before and after."""
+    report = take("wrinkle", folder)
     before, drawn, slider = (
         Image.open(folder / f"{name}.png").convert("RGB") for name in ("before", "drawn", "slider")
     )
@@ -86,7 +86,7 @@ def wrinkle(folder: Path) -> tuple[dict[str, Any], Image.Image]:
     out = Image.new("RGB", (max(window.width, row.width), window.height + row.height + 12), "#888")
     out.paste(window, (0, 0))
     out.paste(row, (0, window.height + 12))
-    return told, out
+    return report, out
 
 
 def servo_head(folder: Path) -> tuple[dict[str, float], Image.Image]:

@@ -1,7 +1,7 @@
 """Steps of docs/walkthroughs.md that are taken in a real window, with mouse and keys:
 ``xvfb-run -a -s "-screen 0 1280x720x24" python -m docs.window_steps STEPS FOLDER``.
 
-Writes pictures of the window to the folder, and what happened to ``told.json``.
+Writes pictures of the window, and a report of what happened, ``report.json``, to the folder.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def smirk(hands: Hands) -> Steps:
     yield from hands.tab("Faces")
     yield from hands.grab("smirk")
     yield from hands.click("save##word")
-    hands.told |= {"seconds": hands.seconds(), "message": hands.face._panel.saving.message}
+    hands.report |= {"seconds": hands.seconds(), "message": hands.face._panel.saving.message}
     yield from hands.frames(4)
     yield from hands.grab("saved")
 
@@ -58,24 +58,24 @@ def wrinkle(hands: Hands) -> Steps:
     yield from hands.frames(10)
     yield from hands.grab("drawn")
     drawn = skin(hands)
-    hands.told |= {"points": len(hands.face._panel.commands.now.light[0]), "deepest_mm": deepest(first, drawn)}
+    hands.report |= {"points": len(hands.face._panel.commands.now.light[0]), "deepest_mm": deepest(first, drawn)}
     paused_s = hands.began()  # taking it back and doing it again is no part of making it
     yield from with_ctrl(hands, "z")
     yield from hands.until(lambda: shown(hands) and not hands.face._mouse.editor.light, "the face without them")
-    hands.told["undone to the bit"] = same(first, skin(hands))
+    hands.report["undone to the bit"] = same(first, skin(hands))
     yield from with_ctrl(hands, "y")
     yield from hands.until(lambda: shown(hands) and bool(hands.face._mouse.editor.light), "them again")
-    hands.told["redone to the bit"] = same(drawn, skin(hands))
+    hands.report["redone to the bit"] = same(drawn, skin(hands))
     hands.began_s += hands.began() - paused_s
     yield from hands.tab("Faces")
     yield from hands.click("##kind")
     yield from hands.click("group##kind")
     yield from hands.click("save##word")
-    hands.told |= {"seconds": hands.seconds(), "message": hands.face._panel.saving.message}
-    yield from hands.until(lambda: hands.told["windows"] == 2, "the window with the slider")
+    hands.report |= {"seconds": hands.seconds(), "message": hands.face._panel.saving.message}
+    yield from hands.until(lambda: hands.report["windows"] == 2, "the window with the slider")
     name = hands.face._panel.commands.now.held
     yield from hands.until(lambda: all(hands.face._values.full[i] > 0.99 for i in name), "the fold")
-    hands.told["slider"] = [hands.face._panel._options.parameters.names[i] for i in name]
+    hands.report["slider"] = [hands.face._panel._options.parameters.names[i] for i in name]
     yield from hands.frames(20)
     yield from hands.tab("Sliders")
     hands.face._panel.sliders._search = "fold"
@@ -130,7 +130,7 @@ def deepest(before: np.ndarray, after: np.ndarray) -> float:
 
 
 def take(steps: str, folder: Path) -> dict[str, Any]:
-    """Take steps in a window on a display of their own; returns what they told. Raises SystemExit: no such display."""
+    """Take steps in a window on a virtual display; returns what they report. Raises SystemExit: there is no display."""
     if shutil.which("xvfb-run") is None:
         raise SystemExit("no virtual display here; Debian, Ubuntu: sudo apt-get install xvfb")
     screen = f"-screen 0 {DISPLAY[0]}x{DISPLAY[1]}x24"
@@ -141,8 +141,8 @@ def take(steps: str, folder: Path) -> dict[str, Any]:
     done = subprocess.run(command, cwd=root, env=environment, capture_output=True, text=True, timeout=LONGEST_S + 60)
     if done.returncode:
         raise RuntimeError(f"{steps}: {done.stdout[-2000:]}{done.stderr[-2000:]}")
-    told: dict[str, Any] = json.loads((folder / "told.json").read_text(encoding="utf-8"))
-    return told
+    report: dict[str, Any] = json.loads((folder / "report.json").read_text(encoding="utf-8"))
+    return report
 
 
 def main() -> None:
@@ -153,7 +153,7 @@ def main() -> None:
     try:
         hands.run(STEPS[steps], ["edit", "demo", "--seconds", f"{LONGEST_S:g}"])
     finally:
-        (folder / "told.json").write_text(json.dumps(hands.told), encoding="utf-8")
+        (folder / "report.json").write_text(json.dumps(hands.report), encoding="utf-8")
 
 
 if __name__ == "__main__":

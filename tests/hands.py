@@ -43,14 +43,14 @@ class Pointer:
 class Hands:
     """See the module.
 
-    folder : for pictures. told : what a script wants to tell whoever started it.
+    folder : for pictures. report : results that a script returns to the program that started it.
     """
 
     def __init__(self, folder: Path) -> None:
         from imgui_bundle import imgui
 
         self.imgui, self.folder, self.pointer = imgui, folder, Pointer()
-        self.told: dict[str, Any] = {"windows": 0}
+        self.report: dict[str, Any] = {"windows": 0}
         self.places: dict[str, tuple[float, float]] = {}
         self.face: Any = None
         self.began_s = time.monotonic()
@@ -75,7 +75,7 @@ class Hands:
 
         def gui(face: Any) -> None:
             if face is not self.face:
-                self.face, self.told["windows"] = face, self.told["windows"] + 1
+                self.face, self.report["windows"] = face, self.report["windows"] + 1
             real(face)
             if next(steps, steps) is steps:
                 face._ended = True

@@ -22,7 +22,7 @@ from websockets.sync.client import connect
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.body.body import Body
-from controller.body.hall import Hall
+from controller.body.multi_head import MultiHeadBody
 from controller.stage.stage import load_stage
 from surface.export.glb_web import web_glb
 from surface.head import Head
@@ -62,7 +62,7 @@ def robot(tmp_path: Path, head: Head | None = None) -> Iterator[tuple[Body, Any,
 
 
 @contextmanager
-def choir(tmp_path: Path) -> Iterator[tuple[Hall, str]]:
+def choir(tmp_path: Path) -> Iterator[tuple[MultiHeadBody, str]]:
     """Two heads behind one panel, and its address."""
     (tmp_path / "face.glb").write_bytes(web_glb(Head(small_head())))
     path = tmp_path / "choir.toml"
@@ -71,13 +71,13 @@ def choir(tmp_path: Path) -> Iterator[tuple[Hall, str]]:
         '[[heads]]\nname = "maple"\n[[heads]]\nname = "oak"\n'
     )
     with Mailbox.create(len(P)) as one, Mailbox.create(len(P)) as two:
-        hall = Hall(load_stage(str(path), P), P, [one, two])
-        hall.start()
+        several = MultiHeadBody(load_stage(str(path), P), P, [one, two])
+        several.start()
         try:
-            hall.begin()
-            yield hall, f"127.0.0.1:{hall.bodies[0].links[0]._link.port}"  # type: ignore[union-attr]
+            several.begin()
+            yield several, f"127.0.0.1:{several.bodies[0].links[0]._link.port}"  # type: ignore[union-attr]
         finally:
-            hall.stop()
+            several.stop()
 
 
 def moved(body: Body, name: str) -> float:
@@ -204,9 +204,9 @@ def flood_panel(where: str, ending: threading.Event | synchronize.Event) -> None
 @pytest.mark.slow
 @needs_chromium
 def test_of_several_heads_one_is_chosen_and_a_stop_is_for_all(tmp_path: Path) -> None:
-    with choir(tmp_path) as (hall, where), page(CHROMIUM or "") as browser:
+    with choir(tmp_path) as (several, where), page(CHROMIUM or "") as browser:
         open_panel(browser, where, 390, 844)
-        first, second = (body.state for body in hall.bodies)
+        first, second = (body.state for body in several.bodies)
         browser.evaluate("document.getElementById('tab-sliders').click()")
         browser.wait("[...document.getElementById('head').options].some((o) => o.value === 'oak')")
         # at once: before the slider has shown what it was moved to, whose place the other head's value takes

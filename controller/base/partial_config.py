@@ -48,7 +48,7 @@ class PartialConfig(Generic[Model]):
         return bool(found)
 
     def _placed(self, found: re.Match[str]) -> str:
-        """A place in what is left, as ``channels[1].map.deg[0]``, by the numbers of the whole file."""
+        """A place in the remaining table, such as ``channels[1].map.deg[0]``, with the indices of the whole file."""
         value: Any = self._rest
         parts = re.split(r"([.\[\]]+)", found[0])
         for i, part in enumerate(parts[::2]):

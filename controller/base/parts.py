@@ -16,8 +16,8 @@ log = logging.getLogger(__name__)
 
 PAUSES_S = (1.0, 2.0, 4.0, 8.0, 16.0)
 """Pauses before a part starts again; after one more failure it is switched off."""
-CALM_S = 60.0
-"""A failure so long after the one before counts as the first."""
+RESET_AFTER_S = 60.0
+"""A part that has not failed for this time starts again with the first pause."""
 
 
 class Part:
@@ -68,7 +68,7 @@ class Part:
 
     def fail(self, error: BaseException, now_s: float) -> float | None:
         """End the part and report why; returns after how long (s) it may start again, None where it is switched off."""
-        self._in_a_row = 1 if now_s - self._failed_s > CALM_S else self._in_a_row + 1
+        self._in_a_row = 1 if now_s - self._failed_s > RESET_AFTER_S else self._in_a_row + 1
         self.off = self._in_a_row > len(PAUSES_S) and not self._keep_trying
         self._failed_s, self._due_s = now_s, now_s if self._remedy else now_s + self.pause_s
         self.failed, self.failures, self.why = True, self.failures + 1, describe(error)

@@ -1,4 +1,4 @@
-"""Tells systemd that a program is ready, alive and stopping, by datagrams as sd_notify(3) describes them.
+"""Reports to systemd that a program is ready, alive or stopping, by datagrams as sd_notify(3) describes them.
 
 Outside of a service, where ``NOTIFY_SOCKET`` is not set, nothing is sent.
 """

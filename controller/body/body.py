@@ -53,7 +53,8 @@ _LONGEST_STEP_S = 0.1
 class Body:
     """Everything between the links and the servos of one head; publishes the parameters to ``mailbox``.
 
-    member : it is one of several heads, which :class:`controller.body.hall.Hall` ticks; None where it is alone.
+    member : set where this is one of several heads, all of which
+        :class:`controller.body.multi_head.MultiHeadBody` ticks; None where it is the only head.
 
     Attributes
     ----------
@@ -115,7 +116,7 @@ class Body:
         """What plays scripts and keeps their events; the show that the options or the stage name begins."""
         events = None
         if options.events is not None:
-            remedy = "what came before is in it; start again with -o where there is room"
+            remedy = "what came before is in it; start again with -o on a disk that has space"
             part = self.state.parts.add(Part(f"events {options.events}", remedy=remedy))
             events = EventLog(options.events, lsl=options.lsl, failed=lambda error: part.fail(error, time.monotonic()))
             self._closers.callback(events.close)
@@ -158,7 +159,7 @@ class Body:
 
     def _record(self, path: Path) -> None:
         seed, period_s = self.stage.settings.seed, self.stage.period_s
-        remedy = "what came before is in it; begin another with --record where there is room"
+        remedy = "what came before is in it; begin another with --record on a disk that has space"
         part = self.state.parts.add(Part(f"recording {path}", remedy=remedy))
         self._closers.enter_context(
             recorded(

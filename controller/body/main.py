@@ -17,7 +17,7 @@ from controller.base.parts import describe
 from controller.base.signals import termination_signals
 from controller.body import messages
 from controller.body.body import Body
-from controller.body.hall import Hall
+from controller.body.multi_head import MultiHeadBody
 from controller.body.nodes import open_node
 from controller.body.panel_requests import carry_out
 from controller.body.panel_state import PanelState
@@ -61,12 +61,12 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event,
         mailboxes.append(Mailbox.receive(pipe, len(parameters)))
         panel = Mailbox.receive(pipe, PanelState.size(parameters))
         panels.append(PanelState(panel, [layer.name for layer in by_priority(each.layers)], parameters))
-    body: Body | Hall
+    body: Body | MultiHeadBody
     if stage.heads:
-        body = Hall(stage, parameters, mailboxes, panels, orders.options)
+        body = MultiHeadBody(stage, parameters, mailboxes, panels, orders.options)
     else:
         body = Body(stage, parameters, mailboxes[0], orders.options)
-    bodies = body.bodies if isinstance(body, Hall) else [body]
+    bodies = body.bodies if isinstance(body, MultiHeadBody) else [body]
     node = open_node(stage, bodies)
     shorten_thread_switches()  # before torque: later garbage collections have few objects to check
     with _logged(bodies[0].notes), ExitStack() as ending:
@@ -93,7 +93,7 @@ def _logged(notes: logging.Handler) -> Iterator[None]:
             root.removeHandler(handler)
 
 
-def _wait(body: Body | Hall, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
+def _wait(body: Body | MultiHeadBody, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
     """Serve main until it requests a stop or has ended, a signal arrives, or a bus failed for good."""
     finished = False
     while not stop.is_set():
@@ -107,7 +107,7 @@ def _wait(body: Body | Hall, pipe: Connection, stop: threading.Event, panel_stat
         body.check()
 
 
-def _handle(body: Body | Hall, pipe: Connection) -> bool:
+def _handle(body: Body | MultiHeadBody, pipe: Connection) -> bool:
     """Carry out a request of main or its panel; False when it requests a stop or has ended."""
     try:
         request = pipe.recv()
@@ -121,7 +121,7 @@ def _handle(body: Body | Hall, pipe: Connection) -> bool:
     to = request.head if isinstance(request, messages.ToHead) else ""
     request = request.request if isinstance(request, messages.ToHead) else request
     try:
-        return _answer(request, body.body_of(to) if isinstance(body, Hall) else body, pipe)
+        return _answer(request, body.body_of(to) if isinstance(body, MultiHeadBody) else body, pipe)
     except Exception as error:  # nothing that a panel asks for ends the run
         trace = error if os.environ.get("OMOTE_DEBUG") else None
         log.error("panel: %s failed: %s; all else goes on", type(request).__name__, describe(error), exc_info=trace)

@@ -129,7 +129,7 @@ class PlayShow:
 
 @dataclass(frozen=True)
 class ControlShow:
-    """Main to body, from the panel: ``PLAY``, ``PAUSE`` or ``STOP`` the show that was begun last."""
+    """Main to body, from the panel: ``PLAY``, ``PAUSE`` or ``STOP`` the show that was started last."""
 
     what: Literal["PLAY", "PAUSE", "STOP"]
 

@@ -37,7 +37,7 @@ def landmarks(
     require("finding landmarks", "scipy", "PIL")
     # start-up: --help does without any of these
     from surface.fit.source.load import LoadOptions
-    from surface.fit.transfer.pick import pick_landmarks
+    from surface.fit.transfer.pick_landmarks import pick_landmarks
 
     options = LoadOptions(up=up, forward=forward, without=tuple(without or ()))
     with console.status("looking for the face") as status:

@@ -1,4 +1,7 @@
-"""Turns sticks, buttons and keys into what a panel asks for, by a file of ``configs/controls``; no devices here."""
+"""Maps the sticks and buttons of a gamepad, and keys, to requests of a panel, by a file of ``configs/controls``.
+
+Reading the devices is left to :mod:`controller.face.devices`.
+"""
 
 from __future__ import annotations
 
@@ -16,9 +19,9 @@ _STEP = 0.004
 
 
 class Controls:
-    """What is held by sticks, buttons and keys now; called once a frame.
+    """The parameters and expressions that sticks, buttons and keys request now; :meth:`update` is called once a frame.
 
-    files : what they do; of several, all count.
+    files : what each of them does. Of several files all count; where two name one button or key, the last one does.
     """
 
     def __init__(self, files: Collection[ControlsFile], parameters: Parameters) -> None:
@@ -32,13 +35,13 @@ class Controls:
 
     @property
     def keys(self) -> list[str]:
-        """Names of the keys that do anything."""
+        """Names of the keys that have an effect."""
         return [name.removeprefix("key ") for name in self._actions if name.startswith("key ")]
 
     def update(
         self, axes: Mapping[str, float], buttons: Collection[str], keys: Collection[str]
     ) -> Iterator[PanelRequest]:
-        """What changed: expressions of buttons that went down, parameters to hold and to give back.
+        """Requests for what changed: expressions of buttons that went down, parameters to hold and to release.
 
         axes : position of each, -1 to 1, those of triggers 0 to 1. buttons, keys : names of those that are down.
         """
@@ -51,7 +54,7 @@ class Controls:
         yield from self._hold(self._wanted(axes, down))
 
     def _wanted(self, axes: Mapping[str, float], down: Collection[str]) -> dict[int, float]:
-        """Values of all parameters that anything moves now, in range."""
+        """Values, within their ranges, of all parameters that sticks, buttons and keys move now."""
         wanted: dict[int, float] = {}
         for file in self._files:
             for name, weights in file.axes.items():

@@ -1,7 +1,9 @@
-"""Benchmark of ``omote bench bus --real PORT``: what a real bus carries. It only pings and reads: no torque, no goal.
+"""Benchmark behind ``omote bench bus --real PORT``: round trips and read rates of the servos on a real bus.
 
-The limit of the wire is counted as in :mod:`controller.tools.bench_bus`, without the goals: 14 + n bytes of request
-and 15 n of replies, or 8 + 8 n of a joint one, for n servos with Protocol 2.0.
+It only pings and reads: no torque is switched on and no goal is sent.
+
+The limit of the wire is computed as in :mod:`controller.tools.bench_bus`, without the goals: for n servos with Protocol
+2.0 a read takes 14 + n bytes of request, and 15 n bytes of replies or 8 + 8 n bytes of one joint reply.
 """
 
 from __future__ import annotations
@@ -24,10 +26,11 @@ from drivers.servos.bus import ServoBus
 from drivers.tables.tables import FEETECH, load_table
 
 RATES_HZ = (50.0, 100.0)
-ASKED_HZ = 0.99
-"""Share of the ticks in which every servo must answer for a rate to count as carried."""
+REQUIRED_SHARE = 0.99
+"""Share of the reads in which every servo must answer for a rate to count as reached."""
 PINGS = 100
 _REQUEST_2, _REPLY_2, _JOINT_2, _JOINT_EACH_2 = 14, 15, 8, 8
+"""Bytes of a request, of one reply, of a joint reply, and of each servo in a joint reply (Protocol 2.0)."""
 
 
 def find_servos(port: str, baud: int, protocols: Sequence[int]) -> list[ServoInfo]:
@@ -53,7 +56,7 @@ def _is_known(info: ServoInfo) -> bool:
 def bench_real_bus(
     port: str, baud: int, seconds: float, log: Log, protocols: Sequence[int] = (2, 1)
 ) -> list[tuple[str, list[Figure]]]:
-    """Tables of round trips and read rates of the servos on a port, measured for ``seconds`` each.
+    """Titled tables of round trips and read rates of the servos on a port; each rate is measured for ``seconds``.
 
     Raises PortError; NoReply where no servo answers.
     """
@@ -63,7 +66,7 @@ def bench_real_bus(
     kind = "feetech" if found[0].model.startswith(FEETECH) else "dynamixel"
     title = f"{len(specs)} servos on {port} at {baud} baud, read only"
     figures: list[Figure] = []
-    for fast, options in _manners(found):
+    for fast, options in _read_modes(found):
         with open_bus(kind, specs, port=port, baud=baud, feedback="position", slow_group=0, **options) as bus:
             if not figures:
                 log("round trips")
@@ -72,8 +75,11 @@ def bench_real_bus(
     return [(title, figures)]
 
 
-def _manners(found: Sequence[ServoInfo]) -> list[tuple[bool, dict[str, Any]]]:
-    """Options of plain reads, and of fast ones where every servo has them; all servos of Protocol 1.0 a cycle."""
+def _read_modes(found: Sequence[ServoInfo]) -> list[tuple[bool, dict[str, Any]]]:
+    """For each way of reading that the servos have, whether it is a fast read, and the bus options that select it.
+
+    Fast reads need Protocol 2.0 and firmware that has them. With Protocol 1.0 every cycle reads all servos.
+    """
     tables = [load_table(info.model_number, info.firmware) for info in found]
     if any(table.protocol == 1 for table in tables):
         return [(False, {"singles": len(found)})]
@@ -81,7 +87,7 @@ def _manners(found: Sequence[ServoInfo]) -> list[tuple[bool, dict[str, Any]]]:
 
 
 def _round_trips(bus: Bus) -> list[Figure]:
-    """Time of one read of one servo after the other, and what of it is the adapter's."""
+    """Time of reading one servo after the other, and how much of it the adapter adds."""
     times = Samples()
     for k in range(PINGS):
         began = time.perf_counter()
@@ -102,7 +108,7 @@ def _round_trips(bus: Bus) -> list[Figure]:
 
 def _rates(bus: Bus, baud: int, seconds: float, fast: bool, log: Log) -> list[Figure]:
     name = f"{'fast ' if fast else ''}reads of all"
-    log(f"{name}, as many as there can be")
+    log(f"{name}, as fast as possible")
     free = _measured(bus, seconds, 0.0)
     figures = [Figure(name, free.rate_hz, "Hz")]
     if limit := read_limit_hz([servo.model for servo in bus.servos], baud, fast):
@@ -112,8 +118,8 @@ def _rates(bus: Bus, baud: int, seconds: float, fast: bool, log: Log) -> list[Fi
         log(f"{name}, {rate:g} Hz")
         paced = _measured(bus, seconds, rate)
         share = paced.rate_hz / rate
-        reach = f">= {ASKED_HZ:.0%}"
-        figures.append(Figure(f"  complete at {rate:g} Hz", 100 * share, "%", reach, share >= ASKED_HZ))
+        reach = f">= {REQUIRED_SHARE:.0%}"
+        figures.append(Figure(f"  complete at {rate:g} Hz", 100 * share, "%", reach, share >= REQUIRED_SHARE))
     return figures
 
 
@@ -126,7 +132,7 @@ def _read(read: Callable[[], BusState], _: object) -> bool:
 
 
 def read_limit_hz(models: Sequence[str], baud: int, fast: bool) -> float | None:
-    """Reads a second of the positions of all servos that the wire allows; None where they are read one by one."""
+    """How often a second the wire allows all positions to be read; None where servos are read one by one."""
     n, tables = len(models), [load_table(model) for model in models]
     if all(table.protocol == 2 for table in tables):
         size = _REQUEST_2 + n + (_JOINT_2 + _JOINT_EACH_2 * n if fast else _REPLY_2 * n)

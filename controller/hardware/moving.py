@@ -69,12 +69,12 @@ class Sampler:
 
     def step(self, goal_rad: float) -> float:
         """Send a goal, wait, read; returns the position. Raises NotMoved where it must stop."""
-        begun = self.clock()
+        start_s = self.clock()
         sent = float(self.bus.write([goal_rad])[0])
-        self.sleep(max(0.0, begun + PERIOD_S - self.clock()))
+        self.sleep(max(0.0, start_s + PERIOD_S - self.clock()))
         state = self.bus.read()
         position = float(state.position_rad[0])
-        self.sent_s.append(begun)
+        self.sent_s.append(start_s)
         self.goals.append(sent)
         if state.fresh[0]:
             self.read_s.append(self.clock())

@@ -157,7 +157,7 @@ class _ChannelCheck:
             self._fault(f"is {found.model}, the file says {self._channel.model}")
             return False
         if not isinstance(bus, ServoBus):
-            findings.skipped = "this kind of bus tells nothing of its servos; look at it with omote calibrate"
+            findings.skipped = "this kind of bus reports nothing of its servos; check them with omote calibrate"
             return False
         own = bus.own_settings(spec.id)
         self._compare_state(found, own)

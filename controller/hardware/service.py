@@ -155,8 +155,8 @@ ExecStart={command}
 Restart=on-failure
 RestartSec=5
 
-# SIGTERM brings the servos to rest and switches them off; what is left after this time is killed, and then servos with
-# a bus watchdog stop by themselves.
+# SIGTERM brings the servos to rest and switches them off; processes that still run after this time are killed, and
+# then servos with a bus watchdog stop by themselves.
 KillMode=mixed
 KillSignal=SIGTERM
 TimeoutStartSec={start}

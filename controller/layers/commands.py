@@ -164,7 +164,7 @@ class CommandState:
 
     @property
     def manner(self) -> str:
-        """How the face was told to behave: a manner, or ``auto``."""
+        """How the face was commanded to behave: a manner, or ``auto``."""
         return self._sources.life.chosen or AUTO
 
     @property

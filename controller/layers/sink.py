@@ -30,7 +30,7 @@ class Player(Protocol):
 
     @property
     def name(self) -> str | None:
-        """Of the show that was begun last; None where there is none."""
+        """Of the show that was started last; None where there is none."""
 
     def abandon(self, now_ns: int) -> None:
         """End a show that failed, and give back what it moves."""
@@ -165,7 +165,7 @@ class HeadSink(CommandSink, Protocol):
 
     @property
     def manner(self) -> str:
-        """How the face was told to behave: a manner, or ``auto``."""
+        """How the face was commanded to behave: a manner, or ``auto``."""
 
     @property
     def loudness(self) -> float:

@@ -1,4 +1,4 @@
-"""Makes the face that the web panel shows, in a process of its own: it takes seconds that the servos must not wait."""
+"""Makes the face that the web panel shows, in a process of its own: it takes seconds, which servos must not wait."""
 
 from __future__ import annotations
 
@@ -20,22 +20,23 @@ _END_S = 5.0
 
 
 @contextmanager
-def face_in_the_making(
+def face_file_in_background(
     stage: Path, look: Mapping[str, object], identity: Mapping[str, float] | None, vocabularies: Sequence[Path] = ()
 ) -> Iterator[Path]:
-    """The path at which the face of a stage will appear; whatever is still at work ends with the context.
+    """Start to make the face of a stage; gives the path at which the file will appear. The context ends the process.
 
-    look, identity : what the command line puts over the stage's own. vocabularies : as of :func:`load_stage`.
+    look, identity : options of the command line, which replace the stage's own. vocabularies : as of
+        :func:`controller.stage.stage.load_stage`.
     """
     with tempfile.TemporaryDirectory(prefix="omote-web-", ignore_cleanup_errors=True) as folder:
         path = Path(folder) / "face.glb.gz"
-        orders = pickle.dumps((str(stage), dict(look), dict(identity or {}), str(path), list(vocabularies)))
+        arguments = pickle.dumps((str(stage), dict(look), dict(identity or {}), str(path), list(vocabularies)))
         command = [sys.executable, "-m", "controller.panels.web_face"]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, start_new_session=True)
         try:
             if process.stdin is not None:
                 with suppress(OSError):  # it has ended, and has said why
-                    process.stdin.write(orders)
+                    process.stdin.write(arguments)
                     process.stdin.close()
             yield path
         finally:
@@ -49,11 +50,11 @@ def face_in_the_making(
 def make_face(
     stage: str, look: Mapping[str, object], identity: Mapping[str, float], out: Path, vocabularies: Sequence[Path] = ()
 ) -> None:
-    """Write the face of a stage, compressed, whole or not at all.
+    """Write the face of a stage as a compressed GLB file, completely or not at all.
 
     Raises ConfigError, SurfaceError: the stage or its head cannot be read.
     """
-    # start-up: whoever only starts this process does without them
+    # imported here: the process that only starts this one does not need them, and they are slow to import
     from controller.base.parameters import PARAMETERS
     from controller.stage.stage import load_stage, with_picture
     from surface.export.glb_web import web_glb
@@ -68,9 +69,9 @@ def make_face(
 
 
 def main() -> None:
-    """Read orders from standard input and carry them out."""
-    orders: Any = pickle.loads(sys.stdin.buffer.read())
-    stage, look, identity, out, vocabularies = orders
+    """Read the arguments of :func:`make_face` from standard input and run it, with low priority."""
+    arguments: Any = pickle.loads(sys.stdin.buffer.read())
+    stage, look, identity, out, vocabularies = arguments
     os.nice(10)
     make_face(stage, look, identity, Path(out), vocabularies)
 

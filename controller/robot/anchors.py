@@ -216,7 +216,7 @@ class AnchorSolver:
         self._last = self._solve(self.shape_values(values), self._last)
         return self._last[self._returned]
 
-    def left_over(self, shapes: Floats) -> Floats:
+    def residual(self, shapes: Floats) -> Floats:
         """(m, 3) mm that the servos fall short of a face with shapes (s,)."""
         return self.skin.displacement(shapes) - (self.field @ self._solve(shapes)).reshape(-1, 3)
 
@@ -316,7 +316,7 @@ def residual_rows(
     most = np.linalg.norm(solver.skin.moves.sum(axis=3), axis=1).argmax(axis=1)  # the shape that moves a point most
     regions = np.array([parameters.regions[parameters.index(SHAPES[s])] for s in most])
     shapes = [solver.shape_values(face) for face in faces.values()]
-    moves = np.array([(solver.skin.displacement(each), solver.left_over(each)) for each in shapes])  # (f, 2, m, 3)
+    moves = np.array([(solver.skin.displacement(each), solver.residual(each)) for each in shapes])  # (f, 2, m, 3)
     for region in sorted(set(regions)):
         wanted, left = np.sqrt((moves[:, :, regions == region] ** 2).sum(axis=3).mean(axis=(0, 2)))
         yield region, float(wanted), float(left)

@@ -17,7 +17,7 @@ from controller.base.parameters import Flags, Floats, Indices, Parameters
 from controller.motion.motion import MotionLimiter
 from controller.robot.formulas import ChannelFormulas, parse_formula
 from controller.robot.linkages.kind import LinkageSettings
-from controller.robot.linkages.linked import LinkedChannels
+from controller.robot.linkages.linked_channels import LinkedChannels
 from controller.robot.settings import ChannelSettings
 from controller.robot.terms import curve_corners
 from drivers.base.bus import ServoSpec

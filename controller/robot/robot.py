@@ -1,4 +1,4 @@
-"""Reads robot files, cross-checks them, and fits them to the calibration that they name."""
+"""Reads robot files, checks references between their tables, and applies the calibration that they name."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
 
 
 def robot_parameters(robot: RobotSettings, path: Path, parameters: Parameters) -> Parameters:
-    """``parameters``, and behind them those of its own that the vocabularies of the robot in ``path`` add.
+    """``parameters``, followed by those that the vocabularies of the robot file ``path`` add.
 
-    Raises ConfigError: one cannot be found or is wrong.
+    Raises ConfigError: a vocabulary cannot be found, or it is wrong.
     """
     return parameters.with_files(find_config("vocabularies", name, beside=path) for name in robot.vocabularies)
 
@@ -59,7 +59,7 @@ def _repeated(robot: RobotSettings) -> list[str]:
 
 
 def _models(robot: RobotSettings) -> list[str]:
-    """Servo models that their bus does not drive, and pulses of servos that are no hobby servos."""
+    """Faults: servo models that their bus does not drive, and ``pulse`` of servos that are not hobby servos."""
     faults = []
     buses = {bus.name: bus for bus in robot.buses}
     for i, channel in enumerate(robot.channels):
@@ -108,7 +108,7 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
 
 
 def _rules(robot: RobotSettings) -> list[str]:
-    """Rules must name channels that exist, and pairs that share a bus."""
+    """Faults of rules that name unknown channels, or pairs of channels on different buses."""
     bus = {channel.name: channel.bus for channel in robot.channels}
     faults = [
         f"{key}: no channel called {name!r}{did_you_mean(name, bus)}"

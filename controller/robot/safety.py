@@ -18,7 +18,7 @@ from controller.base.parameters import Flags, Floats, Parameters
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.filters import SlowStart, TargetFilter
 from controller.robot.linkages.kind import LinkageSettings
-from controller.robot.linkages.linked import LinkedChannels
+from controller.robot.linkages.linked_channels import LinkedChannels
 from controller.robot.rules import AllowedRange, HeatRules, RuleCounter, RuleInput
 from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState

@@ -14,7 +14,7 @@ from drivers.base.bus import BusState
 def servo_states(loop: BusLoop) -> list[dict[str, Any]]:
     """One record a servo: names, limits and goal (degrees), what it reports (None where unknown), and what is wrong.
 
-    May be called from any thread; ``age_s`` tells how old a position is.
+    May be called from any thread; ``age_s`` is the age of a position.
     """
     state, goals = loop.measured(), np.degrees(loop.goals_rad)
     return [

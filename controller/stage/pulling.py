@@ -79,7 +79,7 @@ class Pin:
 def lip_pairs(head: Head, part: str) -> tuple[SkinSamples, int]:
     """Points of the upper lip's rim, then those of the lower one that each touches; and how many pairs there are.
 
-    None for a head that does not tell where its lips meet.
+    None for a head whose files do not say where its lips meet.
     """
     contact = next((each for each in head.data.contacts if each.part == part and each.eye < 0), None)
     rims = np.zeros((2, 0, 2)) if contact is None else contact.places[:, ::_EVERY, 0]

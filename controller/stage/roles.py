@@ -1,4 +1,4 @@
-"""The part of a stage that a process with a role runs."""
+"""Reduces a stage to what a process runs that has one role of several: conductor, head, face or recorder."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from controller.stage.zenoh import ROLES, ZenohSettings
 
 
 def with_role(settings: ZenohSettings, role: str | None, heads: Sequence[str]) -> ZenohSettings:
-    """The table with the options of a command line over it. Raises ConfigError: no such role."""
+    """The table ``[zenoh]`` with the role and heads of a command line. Raises ConfigError: no such role."""
     if role is not None and role not in ROLES:
         raise ConfigError(f"--role {role}: no such role{did_you_mean(role, ROLES)}", hint=f"roles: {', '.join(ROLES)}")
     wanted: dict[str, object] = {"role": role} if role is not None else {}
@@ -21,8 +21,9 @@ def with_role(settings: ZenohSettings, role: str | None, heads: Sequence[str]) -
 
 
 def for_role(stage: Stage, role: str | None = None, heads: Sequence[str] = ()) -> Stage:
-    """A stage as the process of its role runs it: only a conductor has links and plays things, only a ``head`` drives
-    servos, and of the heads those that are its own.
+    """A stage as the process with a role runs it, with only the heads that are its own.
+
+    Only a conductor has links and plays takes, shows and voices; only a ``head`` drives servos.
 
     Raises ConfigError: no such role or head, or the stage has no ``[zenoh]``.
     """

@@ -81,7 +81,7 @@ def check_identity(head: Path, wanted: Mapping[str, float]) -> None:
             there = ", ".join(known) or "none"
             raise ConfigError(
                 f"{head}: no identity {name!r}; there are {there}",
-                hint="omote fit --help tells how --identities adds some",
+                hint="omote fit --help describes how --identities adds some",
             )
 
 

@@ -23,7 +23,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 _Seconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
 _Name = Annotated[str, Field(pattern=r"^[!-)+-~]{1,64}$")]
-_CALM_S = 0.4  # of the way back to a neutral face, less where the pause is shorter
+_RETURN_S = 0.4  # time of the return to a neutral face, less where the pause is shorter
 MOST_TRIALS = 2000
 
 
@@ -96,8 +96,8 @@ def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> S
         end_s = at_s + settings.conditions[name].length_s
         trials.append(Trial(number, name, at_s, end_s))
         at_s = end_s + settings.pause_s
-    calm_s = min(_CALM_S, settings.pause_s)
-    steps = [step for trial in trials for step in _steps(trial, lines[trial.condition], calm_s)]
+    return_s = min(_RETURN_S, settings.pause_s)
+    steps = [step for trial in trials for step in _steps(trial, lines[trial.condition], return_s)]
     marks = {f"{trial.number}:{trial.condition}:{what}": at for trial in trials
              for what, at in (("begin", trial.begin_s), ("end", trial.end_s))}  # fmt: skip
     if len(steps) > MOST_STEPS:
@@ -117,10 +117,10 @@ def write_script(study: Study, path: Path) -> None:
         temporary.write_text(tomli_w.dumps(table), encoding="utf-8")
 
 
-def _steps(trial: Trial, lines: list[tuple[float, str]], calm_s: float) -> list[tuple[float, str]]:
-    """The lines of a trial at their times, and the way back to a neutral face at its end."""
+def _steps(trial: Trial, lines: list[tuple[float, str]], return_s: float) -> list[tuple[float, str]]:
+    """The lines of a trial at their times, and the return to a neutral face, in ``return_s``, at its end."""
     own = [(trial.begin_s + at_s, line) for at_s, line in lines if trial.begin_s + at_s <= trial.end_s]
-    return [*own, (trial.end_s, f"NEUTRAL {calm_s:g}")]
+    return [*own, (trial.end_s, f"NEUTRAL {return_s:g}")]
 
 
 def _order(settings: StudySettings, seed: int) -> list[str]:

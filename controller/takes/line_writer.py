@@ -46,7 +46,7 @@ class LineWriter:
         self._lines.append(line)
 
     def close(self) -> None:
-        """Write what is left and close the file."""
+        """Write the remaining lines and close the file."""
         self._stopping.set()
         self._thread.join(_CLOSE_S)  # a disk that does not answer must not keep the servos from stopping
 

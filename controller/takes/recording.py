@@ -135,8 +135,8 @@ class Replay:
         """Write the recorded parameters of this time to ``out`` : (P,); returns 0, for no command came."""
         if not self.ticks and self._next is not None:
             self._start_ns = now_ns, self._next[0]
-        begun, first = self._start_ns
-        while self._next is not None and self._next[0] - first <= now_ns - begun:
+        start_ns, first = self._start_ns
+        while self._next is not None and self._next[0] - first <= now_ns - start_ns:
             out[:] = self._next[1]
             self.played_s = (self._next[0] - first) * 1e-9
             self.ticks += 1

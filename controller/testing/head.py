@@ -69,7 +69,7 @@ class RobotHead:
             bus.forget()
 
     def never_beyond_limits(self) -> None:
-        """Assert that no servo was told to go, or went, beyond ``limit_deg`` of its channel.
+        """Assert that no servo got a goal, or moved, beyond ``limit_deg`` of its channel.
 
         Outputs of a board that takes no pulses are not looked at.
         """

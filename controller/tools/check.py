@@ -290,7 +290,7 @@ def _describe_robot(path: Path, known: _Known) -> Iterator[str]:
     if not robot.anchored_channels:
         return
     from controller.robot.anchors import load_anchors, residual_rows  # start-up: as Head
-    from controller.robot.suggest import described, suggest  # start-up: as Head
+    from controller.robot.suggest_servos import described, suggest_servos  # start-up: as Head
 
     anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), parameters, where=str(path))
     vocabulary = Vocabulary.load(parameters, more=known.more)
@@ -299,7 +299,7 @@ def _describe_robot(path: Path, known: _Known) -> Iterator[str]:
         return
     for region, wanted, left in residual_rows(anchors, emotions, parameters):
         yield f"  {region}: emotions move it {wanted:.1f} mm, the servos stay {left:.1f} mm behind (rms)"
-    yield from (f"  {described(found)}" for found in suggest(anchors, emotions, parameters))
+    yield from (f"  {described(found)}" for found in suggest_servos(anchors, emotions, parameters))
 
 
 _READERS: dict[file_kinds.FileKind, Callable[[Path, _Known], Iterator[str]]] = {

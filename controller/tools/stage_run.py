@@ -28,7 +28,7 @@ from controller.body.process import BodyProcess, deadline
 from controller.body.sources import Voice
 from controller.face.face import HeadlessFace, HeadValues, Recorder
 from controller.links.line.script import script_names
-from controller.panels.web_face import face_in_the_making
+from controller.panels.web_face import face_file_in_background
 from controller.stage.last import remember
 from controller.stage.stage import Stage, check_identity, heads_of, with_picture
 from controller.takes.reader import load_take
@@ -182,7 +182,7 @@ class StageRun:
             yield self._options
             return
         stage = self.stage
-        with face_in_the_making(stage.path, self._web_look, self._identity, stage.vocabularies) as face:
+        with face_file_in_background(stage.path, self._web_look, self._identity, stage.vocabularies) as face:
             yield replace(self._options, web=WebPanel(self._web, face))
 
     def _load_head(self, body: BodyProcess) -> tuple[HeadValues, Head]:

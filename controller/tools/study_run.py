@@ -1,4 +1,4 @@
-"""Runs a study: its stage with the study as the show, an event log, a recording and what was measured."""
+"""Runs a study: plays its conditions on a stage, and writes an event log, a recording and the measured latencies."""
 
 from __future__ import annotations
 
@@ -31,15 +31,16 @@ def run_study(
 ) -> dict[str, Any]:
     """Run a study; writes ``trials.csv``, ``events.csv``, ``run.rec``, ``report.json`` and ``study.toml`` to a folder.
 
-    seed : instead of the file's. lsl : send the marks as LSL markers. show : runs a stage for seconds.
+    seed : replaces the file's. lsl : also send the marks as LSL markers. show : runs a stage for so many seconds.
+    status : called with what is being done.
 
     Raises ConfigError: the study is wrong, or the folder holds one already. MissingPackage: ``lsl`` without pylsl;
     whatever the stage raises.
     """
-    if lsl:  # before there is a folder, which another try would be refused
+    if lsl:  # checked before the folder is made, since a second try into it would be refused
         require("sending markers of LSL", "pylsl")
     study = load_study(path, PARAMETERS, seed)
-    if os.path.exists(folder / "run.rec"):  # of Path it raises where the folder may not be looked into
+    if os.path.exists(folder / "run.rec"):  # Path.exists raises where the folder cannot be read
         raise ConfigError(f"{folder}: holds a study already", hint="choose another folder: -o participant-7")
     script = folder / "study.toml"
     write_script(study, script)  # makes the folder
@@ -58,7 +59,7 @@ def run_study(
 
 
 def measured(report: dict[str, Any]) -> dict[str, Any]:
-    """Latency of the face and of the servos, and how far these were from the wanted face, of a run's report."""
+    """From a run's report: latency of the face and of the servos, and how far the servos were from the wanted face."""
     face = report.get("face") or {}
     buses = report.get("buses", [])
     return {

@@ -24,7 +24,7 @@ class DriverError(Exception):
 
 
 class PluginError(DriverError):
-    """A kind of bus, link or the like that is not installed, or that cannot be loaded."""
+    """A plug-in, such as a kind of bus or link, that is not installed or cannot be loaded."""
 
 
 class PortError(DriverError):

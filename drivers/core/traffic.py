@@ -22,7 +22,7 @@ from drivers.tables.tables import ControlTable, Item, load_table
 TO, FROM = "->", "<-"
 ARROWS = {True: TO, False: FROM, None: "--"}
 MANY = 8
-"""Servos of a group that a line names; it counts the others."""
+"""Most servos of a group that a line names; of the others it gives the number."""
 
 
 @dataclass
@@ -39,14 +39,14 @@ class ServoTraffic:
 
 
 class Decoder(ABC):
-    """Turns bytes into lines; ``heard`` is what was received from each servo, by id."""
+    """Turns bytes into lines. ``heard`` : what was received from each servo, by id."""
 
     def __init__(self) -> None:
         self.heard: dict[int, ServoTraffic] = {}
 
     @abstractmethod
     def feed(self, sent: bool | None, data: bytes) -> list[str]:
-        """Lines completed by bytes; `sent` is True for bytes of the host, False for answers, None for unknown."""
+        """The lines that ``data`` completes. sent : True for bytes of the host, False for answers, None: not known."""
 
 
 class PacketDecoder(Decoder):
@@ -77,7 +77,7 @@ class PacketDecoder(Decoder):
 
     @abstractmethod
     def _frame(self, sent: bool | None, frame: bytes) -> list[str]:
-        """Lines on one frame, which the host sent, or received; None: it is not known which."""
+        """The lines that describe one frame. sent : as for :meth:`feed`."""
 
     def _count(self, servo: int, error: int) -> None:
         heard = self.heard.setdefault(servo, ServoTraffic())
@@ -99,7 +99,7 @@ class PacketDecoder(Decoder):
         return [item for item in table.values() if address <= item.address and item.end <= address + size]
 
     def _values(self, servo: int, address: int, data: bytes) -> str:
-        """Registers and their values as text; also keeps the values."""
+        """Registers and their values as text; the values are also stored in ``heard``."""
         items = self._items(servo, address, len(data))
         if not items:
             return f"{len(data)} bytes at {address}: {data.hex(' ')}"
@@ -108,7 +108,7 @@ class PacketDecoder(Decoder):
         return ", ".join(f"{name} = {value}" for name, value in values.items())
 
     def _data(self, servo: int, data: bytes) -> str:
-        """Data of an answer, by the request to the servo."""
+        """The data of an answer as text, decoded by the request that the servo answers."""
         address, size = self._asked.pop(servo, (-1, -1))
         if size == len(data):
             return self._values(servo, address, data)
@@ -138,7 +138,7 @@ class PacketDecoder(Decoder):
         return f"{name} {text}".rstrip()
 
     def _words(self, data: bytes) -> tuple[int, int]:
-        """Address and size at the beginning of parameters."""
+        """Address and size, with which the parameters of most instructions begin."""
         return int.from_bytes(data[: self.WORD], "little"), int.from_bytes(data[self.WORD : 2 * self.WORD], "little")
 
     def _read_group(self, group: list[tuple[int, int, int]]) -> None:
@@ -146,7 +146,7 @@ class PacketDecoder(Decoder):
         self._asked |= {servo: (address, size) for servo, address, size in group}
 
     def _sync_write(self, address: int, size: int, data: bytes) -> str:
-        """The register once, where all servos have it, and the value of each."""
+        """A group write as text: the register once, then the value for each servo."""
         rows = [data[at : at + size + 1] for at in range(0, len(data), size + 1)]
         area = self._area(rows[0][0], address, size)
         values = [f"{row[0]}: {self._values(row[0], address, row[1:]).replace(f'{area} = ', '')}" for row in rows]

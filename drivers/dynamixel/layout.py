@@ -10,14 +10,14 @@ from drivers.tables.tables import ControlTable, Item
 
 FULL = ("position", "velocity", "current")
 INDIRECT = (*FULL, "temperature", "hardware", "torque", "watchdog")
-"""What is read in one go where registers can be mapped side by side. The last four show that a servo lost its
-pointers: then it reads 0 in all of them, which no working servo does (see ``Telemetry``)."""
+"""What one request reads where indirect addresses can map registers side by side. The last four show that a servo has
+lost its indirect addresses: then all of them read 0, as on no working servo (see ``Telemetry``)."""
 DIRECTION_BIT = 10
 """XL-320: this bit of its speed is the direction, the rest the magnitude."""
 
 
 def item_of(table: ControlTable, name: str) -> Item | None:
-    """Register of a table by its short name, the load in place of a current that is not measured; None: no such."""
+    """Register of a table by its short name; None: there is none. The load replaces a current that is not measured."""
     item = layout.item_of(table, "load" if name == "current" and "Present Current" not in table else name)
     return replace(item, sign_bit=DIRECTION_BIT) if item and item.name == "Present Speed" else item
 
@@ -30,7 +30,7 @@ def layout_of(table: ControlTable, feedback: str = "full", indirect: Block | Non
     """Layout of a control table; ValueError where the model has no goal or no present position.
 
     feedback : ``"full"`` reads velocity and current with the position, ``"position"`` only the position.
-    indirect : block to read instead, through pointers that were set up before.
+    indirect : block to read instead, through indirect addresses that were set up before.
     """
     goal = _block(table, "goal")
     block = indirect or _block(table, *(FULL if feedback == "full" else FULL[:1]))
@@ -42,7 +42,7 @@ def layout_of(table: ControlTable, feedback: str = "full", indirect: Block | Non
 
 
 def _supply(table: ControlTable) -> Block:
-    """Voltage and temperature; with the register before them where both alone would be three bytes."""
+    """Voltage and temperature, and the register before them where both would be as long as a reply to a ping."""
     block, before = _block(table, "voltage", "temperature"), table.get("Position Trajectory")
     if before is None or block.size != 3:
         return block

@@ -153,7 +153,7 @@ class MixedBus(WireBus):
         """Switch off what the start of both halves switched on, where the second one failed."""
         for half in self._halves:
             if half._running:
-                with suppress(DriverError):  # the first error is told; stop() tries again
+                with suppress(DriverError):  # the first error is reported; stop() tries again
                     half._let_go()
 
     def _stop_halves(self) -> list[DriverError]:

@@ -1,7 +1,8 @@
-"""dynamixel-sdk's packet handler for Protocol 2.0 with its known faults overridden, and omote's group transactions.
+"""The packet handler of dynamixel-sdk for Protocol 2.0, its known faults corrected, and omote's group transactions.
 
-:class:`Port` (in drivers/servos/port.py) and :class:`Packets` are the SDK's handlers and can be given to any SDK
-code. What is overridden; each fault has a test in tests/drivers/dynamixel/test_sdk.py that shows it on the bare SDK:
+:class:`Port` (in drivers/servos/port.py) and :class:`Packets` are subclasses of the SDK's handlers and can be given to
+any code that uses the SDK. They correct these faults, each of which a test in tests/drivers/dynamixel/test_sdk.py shows
+in the unchanged SDK:
 
 ====  ========================================================================================================
 S1    transmitted packets are byte-stuffed (the SDK builds the stuffed packet and throws it away)
@@ -21,7 +22,7 @@ S13   goals are sent without waiting for a status packet
 S14   group reads keep what arrived; fast ones are decoded by position, each servo with its own CRC
 ====  ========================================================================================================
 
-What is the same in every protocol is in drivers/servos/exchange.py (S3 to S5, S13) and drivers/servos/port.py (S7, S9).
+Corrections for every protocol are in drivers/servos/exchange.py (S3 to S5, S13) and drivers/servos/port.py (S7, S9).
 S15 (``fastBulkRead`` mixes up ids and lengths) is avoided by never using it.
 """
 
@@ -69,7 +70,7 @@ class SdkExchanges(exchange.Exchanges[R]):
 
     @abstractmethod
     def _frame(self, reply: R) -> list[int]:
-        """A reply as the SDK returns packets."""
+        """A reply in the form in which the SDK returns packets."""
 
     def txPacket(self, port: Port, txpacket: list[int]) -> int:
         """Send a packet that the SDK makes, stuffed and with its checksum (S1, S3, S5, S11)."""
@@ -249,12 +250,12 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
 
 @lru_cache(maxsize=256)
 def group_read(runs: tuple[Run, ...], fast: bool) -> GroupRead:
-    """A group read, made once for the same servos and registers."""
+    """The group read of these servos and registers; cached."""
     return GroupRead(runs, fast)
 
 
 def _restuffed(packet_in: list[int], change: Any) -> list[int]:
-    """A packet of the SDK (a list from the header on) with its bytes from INST to last parameter changed."""
+    """A packet of the SDK, a list that begins with the header, with ``change`` applied to its instruction and data."""
     length = packet_in[5] | packet_in[6] << 8
     body = change(bytes(packet_in[7 : 5 + length]))
     new = len(body) + 2

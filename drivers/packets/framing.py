@@ -13,7 +13,7 @@ class FrameReader(ABC, Generic[P]):
 
     MARK : what every frame begins with.
     noise_bytes : bytes thrown away because they belong to no valid frame.
-    broken_frames : frames begun whose length or checksum was wrong.
+    broken_frames : frames whose length or checksum was wrong.
     """
 
     MARK: ClassVar[bytes]

@@ -33,10 +33,10 @@ REVERSE = 0x01
 
 @dataclass(frozen=True)
 class OwnSettings:
-    """What a servo's permanent registers say, angles as its specification counts them.
+    """Settings in a servo's permanent registers; angles are measured as its specification says.
 
-    low_rad, high_rad : its own limits of position. reverse : its drive mode turns its direction about, which omote
-    undoes at start. offset_ticks : its homing offset. least_voltage_v : below this supply it reports an error.
+    low_rad, high_rad : its own position limits. reverse : its drive mode reverses its direction, which omote undoes at
+    start. offset_ticks : its homing offset. least_voltage_v : below this supply it reports an error.
     """
 
     low_rad: float
@@ -57,9 +57,9 @@ class ServoBus(WireBus):
     _telemetry: Telemetry
     policy: Policy
     _to_switch_off: Sequence[int] | None = None
-    """Servos that a failed start left on; None: all may be on."""
+    """Ids of servos that a failed start left on; None: any of them may be on."""
     _held: Sequence[int] = ()
-    """Servos that held before the newest start."""
+    """Ids of servos that held with torque before the newest start."""
 
     # ------------------------------------------------------------------ hooks
 
@@ -69,10 +69,10 @@ class ServoBus(WireBus):
 
     @abstractmethod
     def _group(self, mapped: Mapping[int, Block]) -> None:
-        """Group the servos for reading; `mapped` are the blocks that are read through pointers, by id."""
+        """Group the servos for reading. mapped : by servo id, the blocks that are read through indirect addresses."""
 
     def _identified(self) -> None:
-        """Do what must be done between the identification of all servos and torque; nothing by default."""
+        """Called after all servos are identified, before torque is switched on; does nothing by default."""
 
     # ------------------------------------------------------------------ the port
 
@@ -109,12 +109,13 @@ class ServoBus(WireBus):
         return self._started(self._start_all(self.servos, self._startup()))
 
     def _bring_back(self) -> Floats:
-        """Start as many servos as can be, and leave out those that an error names."""
+        """Start as many servos as possible, leaving out those that an error names."""
         self._port.suspects.clear()
         chosen = list(self.servos)
         while chosen:
             try:
-                return self._started(self._start_all(chosen, self._startup(self._again(self.policy.reboot_faulted))))
+                startup = self._startup(self._restart_policy(self.policy.reboot_faulted))
+                return self._started(self._start_all(chosen, startup))
             except BusError as error:
                 named = [servo for servo in chosen if servo.id in error.servo_ids] or chosen
                 for servo in named:
@@ -122,8 +123,8 @@ class ServoBus(WireBus):
                 chosen = [servo for servo in chosen if servo not in named]
         return self._started(Started())
 
-    def _again(self, reboot_faulted: bool) -> Policy:
-        """The policy for servos that ran already: they may hold, and the others do not wait for them."""
+    def _restart_policy(self, reboot_faulted: bool) -> Policy:
+        """The policy for servos that ran before: those that hold go on holding, and the others do not wait for them."""
         return replace(self.policy, takeover="adopt", voltage_wait_s=0.0, reboot_faulted=reboot_faulted, partly=True)
 
     def _start_all(self, servos: Sequence[ServoSpec], startup: Startup[Any]) -> Started:
@@ -135,7 +136,7 @@ class ServoBus(WireBus):
         try:
             started = startup.bring_up(servos)
         except BaseException:
-            if startup.left_on and not startup.policy.partly:  # none was driven before
+            if startup.left_on and not startup.policy.partly:  # no servo of this bus was driven before
                 self._to_switch_off, self._unconfirmed = startup.left_on, True
             raise
         self._to_switch_off, self._held, self._unconfirmed = None, started.held, True
@@ -143,7 +144,7 @@ class ServoBus(WireBus):
         return started
 
     def _let_go(self) -> None:
-        """Switch off what the newest start switched on; servos that held before it go on, without a watchdog."""
+        """Switch off the servos that the newest start switched on; those that held before go on, without a watchdog."""
         self._to_switch_off = [servo for servo in self.ids if servo not in self._held]
         self._running, self._unconfirmed = False, True
         with self._losing():
@@ -151,7 +152,7 @@ class ServoBus(WireBus):
         self._unconfirmed = False
 
     def own_settings(self, servo: int) -> OwnSettings:
-        """What a servo's own registers say, of one that :meth:`discover` has found. Nothing is written.
+        """The settings of a servo that :meth:`discover` has found. Nothing is written.
 
         Raises NoReply, CorruptReply.
         """
@@ -173,11 +174,11 @@ class ServoBus(WireBus):
 
     @property
     def reply_delay_s(self) -> float | None:
-        """By how much most of the newest answers came after their time on the wire, seconds; None: not known."""
+        """Usual delay of the newest answers beyond their time on the wire, seconds; None: not known."""
         return self._port.delays.usual_s
 
     def slow_answers(self) -> tuple[str, str]:
-        """What of the adapter slows this bus down, and the command that mends it; each empty where nothing does."""
+        """How the adapter slows this bus down, and the command that mends it; both empty where it does not."""
         return slow_answers(self.path, latency_s(self.path), self.reply_delay_s)
 
     def _say_slow_answers(self) -> None:
@@ -186,24 +187,24 @@ class ServoBus(WireBus):
             log.warning("%s; try: %s", message, hint)
 
     def _started(self, started: Started) -> Floats:
-        """Keep what start-up found and did; returns where the servos are, (n,) rad, NaN for those not started."""
+        """Store what start-up found and did; returns the servos' angles (n,), rad, NaN for those not started."""
         self._group(started.mapped)
         self._use(started)
         here = np.array([started.ticks.get(servo, np.nan) for servo in self.ids])
         return self.scale.radians(here)
 
     def _join(self, index: int) -> float:
-        """Start one servo, without a reboot: the others would have to wait for it."""
+        """Start one servo without rebooting it, since the others would have to wait; returns its angle, rad."""
         servo = self.ids[index]
-        started = self._start_again([self.servos[index]], self._startup(self._again(reboot_faulted=False)))
+        started = self._start_again([self.servos[index]], self._startup(self._restart_policy(reboot_faulted=False)))
         return self._radians(index, started.ticks[servo])
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
-        """Bring servos back that switched off or were rebooted, where they are; ``ids`` None means all of them.
+        """Start servos again that switched off or were rebooted, at their present positions; ``ids`` None means all.
 
-        Servos that hold go on holding. Raises BusError where some stay off, after all others were brought back; see the
-        policy of the family's start-up for what is allowed. Those are sent no goals, and are tried again once a second
-        without a reboot, as after :meth:`reconnect`.
+        Servos that hold go on holding. Raises BusError where some stay off, after all others were started. What may be
+        done to a servo depends on the policy of the family's start-up. Those that stay off are sent no goals, and are
+        tried again once a second without a reboot, as after :meth:`reconnect`.
         """
         failed = self._recover(self.ids if ids is None else ids)
         if failed:
@@ -231,11 +232,11 @@ class ServoBus(WireBus):
         return failed
 
     def _for_recovery(self) -> Policy:
-        """The policy for servos of which some hold, and are not let go for the others."""
+        """The policy for servos of which some may hold: these are not switched off for the others."""
         return replace(self.policy, takeover="adopt", partly=True)
 
     def _start_again(self, chosen: Sequence[ServoSpec], startup: Startup[Any] | None = None) -> Started:
-        """Start some servos of a running bus."""
+        """Start some servos of a bus that runs already."""
         startup = startup or self._startup()
         startup.identify(chosen)
         started = startup.bring_up(chosen)
@@ -243,7 +244,7 @@ class ServoBus(WireBus):
         return started
 
     def _use(self, started: Started) -> None:
-        """Keep what start-up found and did."""
+        """Store what start-up found and did: limits, positions and writes to permanent registers."""
         self._report.eeprom_writes += started.eeprom
         for servo, (low, high) in started.limits.items():
             self.scale.narrow(self.ids.index(servo), low, high)
@@ -266,7 +267,7 @@ class ServoBus(WireBus):
         self._goals[index] = self.scale.tick(index, angle_rad)
 
     def _radians(self, index: int, ticks: int) -> float:
-        """The angle of one servo at a step."""
+        """The angle of one servo, rad, at an encoder step."""
         return float(self.scale.radians(np.full(len(self.ids), ticks))[index])
 
     def report(self) -> BusReport:

@@ -102,7 +102,7 @@ class Exchanges(ABC, Generic[R]):
         """One instruction to one servo and its reply of ``length`` data bytes.
 
         A servo that missed a deadline must first answer a greeting: its replies come in order, so a late one has
-        arrived by then. A request whose reply has as many bytes as that to a greeting cannot be told from a late one.
+        arrived by then. A reply with as many bytes as the one to a greeting cannot be distinguished from a late one.
         """
         if servo in port.suspects and code != self.greeting and not self.revive(port, servo):
             return Exchange({}, (servo,), False)

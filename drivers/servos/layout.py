@@ -1,4 +1,4 @@
-"""Register layout of servos: registers by short name, blocks read in one go, and groups of servos read together."""
+"""Register layout of servos: registers by short name, blocks of registers, and groups of servos read together."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def item_of(table: ControlTable, name: str) -> Item | None:
 
 @dataclass(frozen=True)
 class Block:
-    """Adjacent registers that are read in one go: `items` by short name (``"position"``, ``"velocity"``, ...)."""
+    """Adjacent registers that one request reads: `items` by short name (``"position"``, ``"velocity"``, ...)."""
 
     items: Mapping[str, Item]
 
@@ -71,7 +71,7 @@ class Block:
 
     @cached_property
     def size(self) -> int:
-        """Bytes to read. Never as many as the reply to a greeting has, see ``Exchanges.hello``."""
+        """Bytes to read. It never equals the size of a reply to a ping, see ``Exchanges.hello``."""
         return max(item.end for item in self.items.values()) - self.address
 
     @cached_property
@@ -98,7 +98,7 @@ class Block:
 
 
 def _signed(raw: NDArray[np.int64], sign_bit: int | None) -> NDArray[np.int64]:
-    """Values of magnitudes that have their sign in a bit."""
+    """Signed values of numbers whose sign is one bit and whose other bits are the magnitude."""
     if sign_bit is None:
         return raw
     magnitude = raw & ((1 << sign_bit) - 1)
@@ -123,7 +123,7 @@ class Layout:
     feedback : block read every cycle (or in turn, where servos are read one by one).
     slow : blocks read in turn: what is not in ``feedback``.
     manner : how a group is read, see ``Exchanges.read_group``; empty: one servo after the other.
-    indirect : ``feedback`` is read through pointers, which a servo forgets when it reboots.
+    indirect : ``feedback`` is read through indirect addresses, which a servo loses when it reboots.
     """
 
     goal: Block
@@ -158,7 +158,7 @@ class Group:
         self._slot = {servo: slot for slot, servo in enumerate(self.ids)}
 
     def slots(self, ids: Sequence[int]) -> slice | list[int]:
-        """Places of ids within the group; all of it as a slice, which is faster."""
+        """Rows of ids within the group; a slice for the whole group, which is faster."""
         return slice(None) if tuple(ids) == self.ids else [self._slot[servo] for servo in ids]
 
 
@@ -180,7 +180,10 @@ class ReadRequest(NamedTuple):
 
 
 def slow_requests(groups: Sequence[Group], size: int) -> list[ReadRequest]:
-    """All slow values, `size` servos at a time, or one where they are read one by one; none where `size` is 0."""
+    """Requests for all slow blocks of all groups, for `size` servos each; none where `size` is 0.
+
+    Servos that are read one by one get a request each.
+    """
     return [
         ReadRequest(group, block, group.ids[at : at + step])
         for group in groups

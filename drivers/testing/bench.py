@@ -174,7 +174,7 @@ class ServoBus(Bench[ServoRecord]):
         record = self._up_to_date()
         with self.chain.lock:
             faults = servochecks.beyond_limits(record, limits, self._serving.clock())
-        fail("servos went, or were told to go, beyond their limits:", faults)
+        fail("servos moved, or got goals, beyond their limits:", faults)
 
     def torque_off_at_exit(self) -> None:
         """Assert that every motor is off; to be called when the program has ended."""
@@ -220,7 +220,7 @@ class ServoBoard(Bench[BoardRecord]):
         """Assert that no target was beyond (low, high), for all channels or by channel; pulses in microseconds."""
         __tracebackhide__ = True
         record = self._up_to_date()
-        fail("channels were told to go beyond their limits:", boardchecks.beyond_limits(record, limits))
+        fail("channels got targets beyond their limits:", boardchecks.beyond_limits(record, limits))
 
     def torque_off_at_exit(self) -> None:
         """Assert that no channel puts out pulses; to be called when the program has ended."""

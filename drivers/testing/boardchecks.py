@@ -19,7 +19,7 @@ def beyond_limits(record: BoardRecord, limits: Limits) -> list[str]:
         low, high = limits.get(write.id, (-math.inf, math.inf)) if isinstance(limits, Mapping) else limits or (0, 0)
         if write.value is not None and not low <= write.value <= high:
             at = f"{write.register} = {write.value:g} at {write.time_s:.3f} s"
-            faults.append(f"channel {write.id} was told {at}; its limits are {low:g} to {high:g}")
+            faults.append(f"channel {write.id} got {at}; its limits are {low:g} to {high:g}")
     return faults
 
 

@@ -58,7 +58,7 @@ def _goals_out(record: ServoRecord, k: int, writes: Sequence[Write], low: float,
         here = servo.drive.to_register(place_at(record.pieces[k], record.start_s + write.time_s))
         if write.refused or not min(low, here) - 1 <= write.value <= max(high, here) + 1:
             note = f", which it refused ({write.refused})" if write.refused else ""
-            yield f"{name(servo)} was told {_said(write)}{note}; its limits are {low:g} to {high:g}"
+            yield f"{name(servo)} got {_said(write)}{note}; its limits are {low:g} to {high:g}"
 
 
 def _limits_of(servo: SimulatedServo, limits: Limits) -> tuple[float, float]:

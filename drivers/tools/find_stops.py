@@ -1,7 +1,7 @@
-"""Finds the end stops of one servo gently: it pushes with little current until it stands still, twice on each side.
+"""Finds the end stops of one servo: it turns with little current until it stands still, twice on each side.
 
 The current is limited by current-based position mode (Dynamixel with Goal Current) or by Torque Limit (Feetech STS).
-Whatever happens, the motor is off in the end and every register that was changed is as it was before.
+However the search ends, the motor is switched off and every register that was changed gets its old value back.
 """
 
 from __future__ import annotations
@@ -44,11 +44,11 @@ PUSH_RAD = math.radians(2.0)
 BACK_RAD = math.radians(4.0)
 """How far the shaft moves back between two approaches."""
 STILL_S, STILL_RAD = 0.25, math.radians(0.2)
-"""A shaft that moves no further than this in this time stands still."""
+"""A shaft that moves by no more than this angle in this time stands still."""
 PUSHING = 0.5
-"""Share of the limit of current above which the motor pushes."""
+"""Share of the current limit from which the motor counts as pushing."""
 IDLE_S, IDLE_STEPS = 1.5, 10
-"""A shaft that stands still so long, and for more steps than that, without pushing does not follow."""
+"""A shaft that stands still without pushing, for longer than this and for more steps, does not follow its goal."""
 PERIOD_S, WATCHDOG_STEPS = 0.02, 25
 NEAR_RAD = math.radians(1.0)
 
@@ -59,12 +59,12 @@ class StillOn(ServoFault):
 
 @dataclass(frozen=True)
 class Found:
-    """What a search found, angles as the servo's specification counts them, rad.
+    """The result of a search; angles in rad, measured as the servo's specification says.
 
-    low_rad, high_rad : where it stopped; None: there was no stop as far as the search went.
+    low_rad, high_rad : where it stopped; None: there was no stop within the reach of the search.
     spread_rad : greatest difference between two approaches of one stop.
     peak_current_a : the greatest current that was measured, A.
-    offset_ticks : the servo's homing offset, which is in all angles; 0 where the model has none.
+    offset_ticks : the servo's homing offset, which all angles include; 0 where the model has none.
     """
 
     low_rad: float | None
@@ -101,7 +101,7 @@ def find_stops(
 ) -> Found:
     """Find both stops of a servo whose motor is off, and switch it off again.
 
-    port, baud : where it is. servo : its model, zero and direction; its own limits do not count here.
+    port, baud : where it is connected. servo : its model, zero and direction; its limits are not used.
     reach_rad : lowest and highest angle that the search goes to.
     torque : share of the full current that it uses, above 0 and at most 0.5.
     progress : called with what is being done. margin_s : longest wait for a reply beyond its time on the wire.
@@ -162,7 +162,7 @@ class _Search:
         raise registers.error(WrongModel, message, "correct the configuration, or the servo's id", self._id)
 
     def run(self, low_rad: float, high_rad: float) -> Found:
-        """Check, search both sides, let go and put everything back."""
+        """Check the servo, search both sides, switch the motor off and restore its registers."""
         registers = self._registers
         if registers.get(self._id, "torque"):
             message = f"servo {registers.label(self._id)} holds with torque"
@@ -185,7 +185,7 @@ class _Search:
 
     @contextmanager
     def _watched(self) -> Iterator[None]:
-        """A process switches a servo without a bus watchdog off when this program is killed."""
+        """For a servo without a bus watchdog, run a process that switches it off when this program is killed."""
         link = self._port.link
         device = isinstance(link, SerialPort) and not link.path.startswith("memory://") and os.name == "posix"
         if not device or item_of(self._table, "watchdog") is not None:
@@ -199,7 +199,7 @@ class _Search:
             switch.dismiss()
 
     def _limit(self, offset: int) -> None:
-        """Limit current and speed; every value that differs is kept for `_put_back`."""
+        """Limit current and speed; `_put_back` restores every register that this changes."""
         if self._by_current:
             mode = self._registers.get(self._id, "drive_mode")
             self._change("drive_mode", mode & ~(REVERSE | TIME_PROFILE | TORQUE_BY_GOAL))
@@ -230,7 +230,7 @@ class _Search:
             self._registers.put(self._id, name, value)
 
     def _put_back(self) -> None:
-        """Switch the motor off, confirm it, and write back what was changed, the last first."""
+        """Switch the motor off, confirm it, and restore the changed registers, the last one first."""
         registers = self._registers
         for _ in range(6):
             with suppress(BusError):
@@ -249,7 +249,7 @@ class _Search:
     # ------------------------------------------------------------------ the search
 
     def _side(self, side: int, end: int, start: int) -> list[int] | None:
-        """Where the shaft stopped on one side, twice, in steps; None where it came to ``end`` without a stop."""
+        """The two steps where the shaft stopped on one side (-1 or 1); None: it reached ``end`` without a stop."""
         name = "lowest" if (side < 0) != self._servo.reverse else "highest"
         self._progress(f"{self._servo.name}: looking for the {name} stop")
         first = self._approach(side, end, FAST_RAD_S)
@@ -262,7 +262,7 @@ class _Search:
         return None if second is None else [first, second]
 
     def _approach(self, side: int, end: int, speed_rad_s: float) -> int | None:
-        """Move towards ``end`` until the shaft stands still and the motor pushes; the position, or None at the end."""
+        """Move towards ``end`` until the shaft stands still while the motor pushes; the step there, None at ``end``."""
         tick = self._table.rad_per_tick
         goal, seen, idle = float(self._position()), deque[tuple[float, int]](), list[float]()
         while True:
@@ -276,7 +276,7 @@ class _Search:
             lead, still = side * (goal - position), self._is_still(seen, now)
             if still and lead >= PUSH_RAD / tick and push >= PUSHING * self._allowed:
                 return position
-            # On a busy machine the goal takes long to get as far ahead as it may: before, a servo need not push.
+            # On a busy machine the goal is slow to get as far ahead as it may; until it is, the servo need not push.
             is_far = lead >= 0.99 * min(LEAD_RAD / tick, side * (end - position))
             idle = [*idle, now] if still and is_far else []
             if len(idle) > IDLE_STEPS and now - idle[0] > IDLE_S:
@@ -285,7 +285,7 @@ class _Search:
             goal = side * min(side * (position + side * ahead), side * end)
 
     def _is_still(self, seen: deque[tuple[float, int]], now: float) -> bool:
-        """Whether the positions of the last moments are enough and alike."""
+        """Whether the shaft has stood still for the last STILL_S; ``seen`` has (time in s, position in steps)."""
         ticks = [position for _, position in seen]
         long_enough = now - seen[0][0] > 0.7 * STILL_S
         return long_enough and (max(ticks) - min(ticks)) * self._table.rad_per_tick <= STILL_RAD
@@ -297,7 +297,7 @@ class _Search:
         return self._registers.error(ServoFault, message, hint, self._id)
 
     def _go(self, target: int) -> None:
-        """Move to a position; gives up after the time that it should take and two seconds."""
+        """Move to a position (steps); give up two seconds after the time that this should take."""
         tick = self._table.rad_per_tick
         goal = float(self._position())
         end_s = self._port.clock() + abs(target - goal) * tick / FAST_RAD_S + 2.0
@@ -308,7 +308,7 @@ class _Search:
                 return
 
     def _step(self, goal: int) -> tuple[int, int]:
-        """Send a goal, wait for the next moment; position and current (else load) afterwards, in steps."""
+        """Send a goal, wait for one period, and read position and current (or load), both in steps."""
         registers = self._registers
         registers.put_unanswered(self._id, "goal", goal)
         self._port.sleep(PERIOD_S)

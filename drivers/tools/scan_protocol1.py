@@ -20,16 +20,16 @@ from drivers.servos.port import Port
 from drivers.tables.tables import known_models, load_table
 
 PING_BYTES = 12
-"""Request and reply of a ping on the wire."""
+"""Bytes of a ping on the wire, request and reply together."""
 RETURN_DELAY_S = 0.0006
 """Longest time a servo takes before it answers, as they leave the factory (500 us) and a little more."""
 SLACK_S = 0.001
 WAIT_S = 0.03
-"""How long a last reply is waited for, beyond the adapter's latency timer: a busy host."""
+"""How long the last reply is waited for, beyond the adapter's latency timer, because the host may be busy."""
 TRIES = 3
 HEAD_BYTES = 6
 FEETECH_ID, DYNAMIXEL_ID = 5, 3
-"""Where either maker keeps the id; the model number is at 3 and at 0."""
+"""Addresses of the id in servos of either maker; that of the model number is 3 and 0."""
 
 
 class Heard(NamedTuple):
@@ -62,7 +62,7 @@ def registers_on(port: str | SerialPort, baud: int) -> Registers:
 
 
 def describe(link: SerialPort, servo: int) -> ServoInfo | None:
-    """What a servo is; None where it does not answer. An unknown model keeps its number and lacks all else."""
+    """Model and settings of a servo; None where it does not answer. Of an unknown model only the number is given."""
     registers = registers_on(link, link.baud)
     found = identity(registers, servo)
     return None if found is None else registers.info(servo, *found, lambda: load_table(*found))

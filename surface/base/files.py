@@ -103,7 +103,7 @@ def read_file(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> bytes:
     """All bytes of a regular file. Raises OSError, as :func:`open_file`."""
     with open_file(path, limit) as file:
         data = file.read(os.fstat(file.fileno()).st_size + 1)
-        while len(data) <= limit and (more := file.read(_CHUNK)):  # of the kernel, or growing: its size does not tell
+        while len(data) <= limit and (more := file.read(_CHUNK)):  # it grows, or is the kernel's
             data += more
     if len(data) > limit:
         raise OSError(errno.EFBIG, f"is larger than {limit >> 20} MB", os.fspath(path))

@@ -1,13 +1,13 @@
 """Decorators that compile kernels with numba and keep the compiled code on disk; importing this imports numba.
 
-Compiled code is kept beside the code it was made from, or in the user's cache folder where that cannot be written
-(``NUMBA_CACHE_DIR`` names another place). Where neither can, kernels are compiled in every process.
+Compiled code is kept beside its source file, or in the user's cache folder where the folder of the source cannot be
+written (``NUMBA_CACHE_DIR`` names another place). Where neither can be written, every process compiles its kernels.
 
-Numba compiles again when the file of a kernel changes. Here it also does when a file of the package changes that this
-one imports, directly or not, since kernels and constants from there are compiled into it.
+Numba compiles a kernel again when its source file changes. Here it also does so when a file changes that the source
+file imports, directly or through others, since kernels and constants of those files are compiled into it.
 
-One process at a time compiles a kernel; others that need it wait and load what was kept. Else all would spend the same
-time, and two that keep code for different types at once could each overwrite what the other one wrote.
+One process at a time compiles a kernel; others that need it wait, and load the code that the first one kept. Otherwise
+every process would spend the same time, and two that keep code for different types could overwrite each other's.
 """
 
 from __future__ import annotations
@@ -63,27 +63,32 @@ IMPORT = re.compile(r"^from[ ]+(\.*)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n#]*)", 
 
 
 def kernel(function: Callable[..., Any]) -> Any:
-    """Compile at the first call for each set of argument types, cache on disk, release the GIL."""
-    return _compiled(function, _nrt=True)  # else it takes what a lean caller has, and cannot allocate
+    """Compile a function at its first call for each set of argument types, keep the code on disk, release the GIL."""
+    return _compiled(
+        function, _nrt=True
+    )  # else it inherits the setting of a caller that is :func:`nonallocating`, and cannot allocate
 
 
-def lean(function: Callable[..., Any]) -> Any:
-    """As :func:`kernel`, for loops that allocate nothing: without numba's counts of references to arrays.
+def nonallocating(function: Callable[..., Any]) -> Any:
+    """As :func:`kernel`, for functions that allocate no array: numba then counts no references to arrays.
 
-    Those are calls that LLVM cannot look into, around every array that an inlined function takes; each of them makes
-    it write all vector registers to memory. Such code may take half of the time of a short loop.
+    Counting them takes two calls for every array that an inlined function is given. LLVM cannot inline these calls, so
+    it stores all vector registers before each of them, which may take half of the time of a short loop.
     """
     return _compiled(function, _nrt=False)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """As :func:`kernel`, and its code is put into the caller's."""
+    """As :func:`kernel`, and numba inlines the function wherever another kernel calls it."""
     return _compiled(function, inline="always")
 
 
 def merged(function: Callable[..., Any]) -> Any:
-    """As :func:`kernel`, and LLVM puts its code into the caller's: for calls with so many arrays that passing them on
-    takes longer than a small update. Unlike :func:`inlined`, it may return from within loops."""
+    """As :func:`kernel`, and LLVM inlines the function wherever another kernel calls it.
+
+    It is for functions of so many arrays that passing them takes longer than a small update does. Unlike a function
+    that is :func:`inlined`, one that is merged may return from within a loop.
+    """
     return _compiled(function, forceinline=True)
 
 
@@ -97,7 +102,10 @@ def _compiled(function: Callable[..., Any], signatures: Sequence[Any] = (), **op
     try:
         dispatcher.enable_caching()
     except RuntimeError:  # numba finds no folder that it may write to
-        _log_once("compiled code can be kept in no folder, so every start compiles it: set NUMBA_CACHE_DIR to one")
+        _log_once(
+            "no folder for compiled code can be written, so every start compiles all kernels: "
+            "set NUMBA_CACHE_DIR to a folder that can"
+        )
     else:
         _tolerate_full_disks(dispatcher._cache)
         _watch_imports(dispatcher)
@@ -110,7 +118,7 @@ def _compiled(function: Callable[..., Any], signatures: Sequence[Any] = (), **op
 
 
 def _tolerate_full_disks(kept: Any) -> None:
-    """Let a kernel run that could be compiled but not be kept."""
+    """Let a kernel run although its compiled code cannot be written to disk."""
     save = kept.save_overload
 
     def save_or_log(signature: Any, data: Any) -> None:
@@ -123,10 +131,10 @@ def _tolerate_full_disks(kept: Any) -> None:
 
 
 def _compile_in_one_process(dispatcher: Any) -> None:
-    """Let a kernel be looked for on disk, compiled and kept by one process at a time.
+    """Let one process at a time look for a kernel on disk, compile it and keep it.
 
-    Kernels call each other in no circle, so neither do processes wait for each other in one. Numba's own lock is taken
-    first: a thread that holds it may need the kernel that another thread of this process would hold.
+    No kernel calls itself through others, so processes cannot wait for each other in a circle. Numba's own lock is
+    taken first: a thread that holds it may need the kernel whose lock another thread of this process holds.
     """
     compile_or_load, name = dispatcher.compile, dispatcher._cache._cache_file._index_path
 
@@ -139,7 +147,10 @@ def _compile_in_one_process(dispatcher: Any) -> None:
 
 @contextmanager
 def _held(name: str) -> Iterator[None]:
-    """Hold a name until the end, as far as the system can; other processes of this installation wait for it."""
+    """Hold the lock of a name within the context; other processes of this installation wait for it.
+
+    Systems without such locks go on without one.
+    """
     descriptor, place = _lock_file(), zlib.crc32(name.encode()) >> 1  # a file's offset may have 31 bits
     if descriptor is None:
         yield
@@ -153,7 +164,7 @@ def _held(name: str) -> Iterator[None]:
 
 
 def _wait_for(descriptor: int, place: int) -> None:
-    """Take a byte's lock; go on without it where there are none, or where its holder seems to have been stopped."""
+    """Lock one byte of a file; give up where the file system has no locks, or after :data:`LONGEST_WAIT_S`."""
     end = time.monotonic() + LONGEST_WAIT_S
     while time.monotonic() < end:
         try:
@@ -167,9 +178,10 @@ def _wait_for(descriptor: int, place: int) -> None:
 
 @cache
 def _lock_file() -> int | None:
-    """Descriptor of a file whose bytes stand for kernels, beside compiled code; None where there can be none.
+    """Descriptor of the lock file beside the compiled code, one byte of which stands for each kernel.
 
-    It stays open: closing any descriptor of a file gives up all locks that a process holds in it.
+    None where there can be no such file. It stays open, because closing any descriptor of a file releases all locks
+    that the process holds in it.
     """
     if fcntl is None:
         return None
@@ -186,23 +198,23 @@ def _log_once(text: str) -> None:
 
 
 class _FirstCompilation(event.Listener):
-    """Says that a room's kernels are being compiled, which takes so long that a person would wonder."""
+    """Logs once for each package that its kernels are being compiled, which may take a minute."""
 
     def on_start(self, event: Any) -> None:
         """Called before numba compiles a function that it has not found on disk."""
-        room = event.data["dispatcher"].py_func.__module__.partition(".")[0]
-        if room != "numba":  # some of its own functions are compiled into kernels
-            _log_once(f"compiling the kernels of {room} for this machine: up to a minute, only once")
+        package = event.data["dispatcher"].py_func.__module__.partition(".")[0]
+        if package != "numba":  # some of its own functions are compiled into kernels
+            _log_once(f"compiling the kernels of {package} for this machine: up to a minute, only once")
 
     def on_end(self, event: Any) -> None:
-        """Nothing to say."""
+        """Required by numba; nothing is logged."""
 
 
 event.register("numba:compile", _FirstCompilation())  # type: ignore[no-untyped-call]
 
 
 def _watch_imports(dispatcher: Any) -> Any:
-    """Let changes of what a kernel's file imports invalidate its code on disk, too."""
+    """Compile a kernel again also when a file changes that its source file imports."""
     file = getattr(dispatcher._cache, "_cache_file", None)
     if file is not None:
         file._source_stamp = (file._source_stamp, _digest(Path(dispatcher.py_func.__code__.co_filename)))

@@ -1,8 +1,8 @@
-"""Holes: borders of the surface that nothing is sewn to.
+"""Find holes in a head's skin, and seams between parts that open in a pose.
 
-Border edges that run along another border are sewn. What is left makes loops. A sheet of skin has one outer border, its
-longest loop; the eyes and the mouth may be open, for eyeballs and lips fill them; every other loop is a hole. Borders
-that are sewn at rest and come apart in a pose are seams that open.
+Border edges that run along another border count as sewn to it. The other border edges form loops. The longest loop of
+a sheet of skin is its outer border. Those of the eyes and the mouth may be open, since eyeballs and lips fill them.
+Every other loop is a hole. A seam opens where borders that are sewn at rest come apart in a pose.
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from surface.check.subject import Subject, pose_of
 from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import border_edges
 
-SEWN_MM = 0.4  # borders nearer than this are one
-ALONG_MM = 1.2  # of border between two edges: those nearer along it are neighbours, and not sewn to each other
+SEWN_MM = 0.4  # distance within which two borders are sewn
+ALONG_MM = 1.2  # edges with less border than this between them are neighbours, and not sewn to each other
 WIDE_MM = 1.2  # least width of a hole: the diameter of a round one, twice the height of a slit
-APART_MM = 1.0  # of borders that are sewn at rest: a seam that opens
-SHEETS = ("skin", "mouth", "tongue")  # materials of which sheets are made that have to be closed
-END_MM = 40.0  # width of an opening that is where the mesh ends: a head without scalp under its hair
-SEEN = 0.1  # of a hole's area has to be seen from outside: the root of an ear lies under other skin
+APART_MM = 1.0  # distance between borders sewn at rest from which a seam is open
+SHEETS = ("skin", "mouth", "tongue")  # materials of the sheets that have to be closed
+END_MM = 40.0  # wider openings are where the mesh ends, as on a head without scalp under its hair
+SEEN = 0.1  # least share of a hole's area that is visible from outside: the root of an ear lies under other skin
 FACING = 0.3  # least cosine between a hole's outward normal and a viewer behind the head for it to face that viewer
-_ROWS = 512  # of distances between ends of edges at once
+_ROWS = 512  # rows of the matrix of distances that are computed at once
 CAP_STEPS = 60  # pixels over the cap of a hole
 VIEWS = ((0, 0), (60, 0), (-60, 0), (120, 0), (-120, 0), (180, 0), (0, -60), (0, 60))  # yaw and pitch, degrees
 MOUTH_REACH = 0.75  # in widths of the mouth, from its middle
@@ -42,9 +42,13 @@ EYE_REACH = 1.7  # in radii: a loop whose middle is so near to an eye's centre i
 def _nearest(
     middles: Any, own: Any, ends: Any, ids: Any, first: Any, beside: Any, reach: float, distance: Any, other: Any
 ) -> None:
-    """Distance (q,) of the middles of edges between vertices ``own (q, 2)`` from the nearest of edges ``ends (e, 2,
-    3)`` that shares none of its vertices ``ids (e, 2)`` with it, and which one that is; infinite and -1 beyond
-    ``reach``. Edge i has nothing to do with those of ``beside`` from ``first[i]`` to ``first[i + 1]``."""
+    """Find the nearest edge for the middle of each of q edges.
+
+    middles, own : (q, 3) middles of the q edges, and (q, 2) their vertices.
+    ends, ids : (e, 2, 3) ends of the edges that are searched, and (e, 2) their vertices. Those that share a vertex with
+        edge i are left out, and so are those of ``beside`` from ``first[i]`` to ``first[i + 1]``.
+    distance, other : (q,) filled with distance and number of the nearest edge; infinite and -1 beyond ``reach``.
+    """
     for i in range(len(middles)):
         best, found = reach * reach, -1
         p0, p1, p2 = middles[i, 0], middles[i, 1], middles[i, 2]
@@ -78,10 +82,11 @@ def _nearest(
 class Borders:
     """Border edges of all sheets.
 
-    part : (e,) number of the part; ends : (e, 2) vertices of it, those in one place as one; ids : (e, 2) the same, in
-        one count over all parts.
-    sewn : (e,); mate : (e,) the edge that each is sewn to, -1 for none.
-    first (e + 1,), beside : the edges that follow each one closely along its border, from ``first[i]`` on.
+    part : (e,) number of the part. ends : (e, 2) vertices of it, where vertices in one place are one. ids : (e, 2) the
+        same vertices, numbered over all parts.
+    sewn : (e,) whether it is sewn to another edge. mate : (e,) number of that edge, -1 for none.
+    first, beside : (e + 1,) and (k,); the neighbours of edge i along its border are ``beside`` from ``first[i]`` to
+        ``first[i + 1]``.
     """
 
     part: Ints
@@ -93,13 +98,13 @@ class Borders:
     beside: Ints
 
     def neighbours(self, rows: Ints) -> tuple[Ints, Ints]:
-        """``first`` and ``beside`` of some edges alone."""
+        """``first (k + 1,)`` and ``beside`` of only the edges ``rows (k,)``."""
         count = np.diff(self.first)[rows]
         first = np.append(0, np.cumsum(count))
         return first, self.beside[np.repeat(self.first[rows] - first[:-1], count) + np.arange(first[-1])]
 
     def at(self, vertices: list[Floats32]) -> Floats:
-        """(e, 2, 3) in a pose."""
+        """(e, 2, 3) ends of the edges, mm, for the posed vertices (v, 3) of every part."""
         out = np.empty((len(self.part), 2, 3))
         for k in np.unique(self.part):
             out[self.part == k] = vertices[k][self.ends[self.part == k]]
@@ -123,13 +128,16 @@ def find_borders(subject: Subject) -> Borders:
 
 
 def _none(edges: int) -> tuple[Ints, Ints]:
-    """Edges without any beside them."""
+    """``first`` and ``beside`` of edges without neighbours."""
     return np.zeros(edges + 1, np.int64), np.zeros(0, np.int64)
 
 
 def _beside(ids: Ints, length: Floats, reach: float) -> tuple[Ints, Ints]:
-    """``first (e + 1,)`` and ``beside`` of edges between vertices ``ids (e, 2)``: those that less than ``reach`` mm of
-    border lies between. A border of very short edges is near itself everywhere, and sewn to nothing."""
+    """``first (e + 1,)`` and ``beside (k,)`` of edges between vertices ``ids (e, 2)``, of ``length (e,)`` mm.
+
+    Neighbours are edges with less than ``reach`` mm of border between them. Without them a border of very short edges
+    would be sewn to itself, since it is near itself everywhere.
+    """
     names, ends = np.unique(ids, return_inverse=True)
     ends = np.ascontiguousarray(ends.reshape(-1, 2), np.int64)
     order = np.argsort(ends.ravel(), kind="stable")
@@ -199,7 +207,7 @@ def _near_along(
 
 
 def _welded(subject: Subject, number: int) -> Ints:
-    """(t, 3) triangles of a part over vertices of which those in one place are one; slivers of no area are dropped."""
+    """(t, 3) triangles of a part, where vertices in one place are one; triangles without area are dropped."""
     at, triangles = subject.rest[number], subject.parts[number].triangles
     _, first, same = np.unique(np.round(at / (1e-3 * subject.scale)), axis=0, return_index=True, return_inverse=True)
     corner = first[same.ravel()][triangles]
@@ -211,8 +219,8 @@ def _welded(subject: Subject, number: int) -> Ints:
 def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Borders) -> Iterator[Finding]:
     """Holes at rest, and seams that open in a pose.
 
-    Very wide ones are where the skin of a mesh ends, as under hair. They are warnings, and so are holes of smaller
-    parts of such a head, as the roots of its ears.
+    A very wide hole is where the skin of a mesh ends, as under hair. It is a warning, and so are the holes in smaller
+    parts of such a head, such as the roots of its ears.
     """
     at = borders.at(subject.rest)
     found = []
@@ -238,7 +246,7 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
     for name in subject.claimed:
         at = borders.at(subject.posed(pose_of(name)))
         middle = at.mean(axis=1)
-        way = middle - rest  # what moves as the border does that it is sewn to stays sewn
+        way = middle - rest  # an edge that moves as the edge does that it is sewn to stays sewn
         loose = np.linalg.norm(way - way[borders.mate], axis=1)[sewn] > 0.3 * APART_MM * subject.scale
         asked = sewn[loose]
         distance, mate = np.full(len(asked), np.inf), np.full(len(asked), -1, np.int64)
@@ -253,7 +261,7 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
 
 
 def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
-    """Edges of every chain that nothing is sewn to, less the outer border of each sheet."""
+    """Edges of every chain that is sewn to nothing, without the outer border of each sheet."""
     free, at = np.flatnonzero(~borders.sewn), borders.at(subject.rest)
     chains = _chains(_joined(borders, at, free, SEWN_MM * subject.scale))
     sheet = _sheets(subject, borders)
@@ -268,7 +276,7 @@ def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
 
 
 def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
-    """(k, 2) ends of some edges, of which those nearer than ``reach`` are one: a seam runs through the border there."""
+    """(k, 2) ends of the edges ``rows (k,)``; ends nearer than ``reach`` mm to each other, as at a seam, are one."""
     ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
     known = np.unique(ends, return_inverse=True)[1].reshape(-1)
     square = (points**2).sum(axis=1)
@@ -282,14 +290,14 @@ def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
 
 
 def _chains(ids: Ints) -> list[Ints]:
-    """Rows of edges (e, 2) that are connected, chain by chain."""
+    """Rows of edges (e, 2) of each connected component."""
     label = _components(ids, int(ids.max(initial=-1)) + 1)
     own = label[ids[:, 0]] if len(ids) else np.zeros(0, np.int64)
     return [np.flatnonzero(own == k) for k in np.unique(own)]
 
 
 def _sheets(subject: Subject, borders: Borders) -> Ints:
-    """(all vertices,) the number of the sheet that each belongs to: what triangles and seams connect."""
+    """(v,) number of the sheet that each vertex belongs to; triangles and seams connect the vertices of a sheet."""
     starts = np.cumsum([0, *(len(v) for v in subject.rest)])
     links = [_welded(subject, k)[:, [0, 1, 1, 2]].reshape(-1, 2) + starts[k] for k in np.unique(borders.part)]
     sewn = np.flatnonzero(borders.sewn)
@@ -298,7 +306,7 @@ def _sheets(subject: Subject, borders: Borders) -> Ints:
 
 
 def _components(links: Ints, count: int) -> Ints:
-    """(count,) the least number of the nodes that each is connected with."""
+    """(count,) for each node the least number in its connected component; ``links (k, 2)`` connect nodes."""
     label = np.arange(count)
     while len(links):
         least = np.minimum(label[links[:, 0]], label[links[:, 1]])
@@ -314,16 +322,19 @@ def _components(links: Ints, count: int) -> Ints:
 
 
 def _form(ends: Floats) -> tuple[Floats, float]:
-    """Middle (3,) and width of a loop, mm: four times its area by its length, which is the diameter of a circle and
-    twice the height of a slit."""
+    """Middle (3,) and width of a loop, mm. The width is four times the area divided by the length: the diameter of a
+    circle, and twice the height of a slit."""
     middle = ends.reshape(-1, 3).mean(axis=0)
     area = 0.5 * np.linalg.norm(np.cross(ends[:, 0] - middle, ends[:, 1] - middle).sum(axis=0))
     return middle, float(4.0 * area / max(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum(), 1e-9))
 
 
 def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
-    """Whether a cap over a loop of a part's border, edges (e, 2, 3), is seen from outside. From behind only holes of
-    skin that face the viewer count: heads without a scalp, and masks, show the inside of everything there."""
+    """Whether a cap over a loop of a part's border, edges (e, 2, 3), is visible from outside.
+
+    Seen from behind, only holes in skin that face the viewer count, because heads without a scalp and masks show the
+    inside of all their parts there.
+    """
     middle = ends.reshape(-1, 3).mean(axis=0)
     cap = np.concatenate([ends.reshape(-1, 3), middle[None]]).astype(np.float32)
     rows = np.arange(len(ends), dtype=np.int32)
@@ -345,7 +356,7 @@ def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
 
 
 def _in_openings(subject: Subject, mouth: Mouth | None, at: Floats) -> Bools:
-    """(m,) which of places (m, 3) belong to the rim of an eye, with an eyeball behind it, or of the mouth."""
+    """(m,) which of the places (m, 3) belong to the rim of the mouth, or of an eye that has an eyeball."""
     out = np.zeros(len(at), bool)
     if subject.eyes is not None:
         for side in (n for n in (0, 1) if subject.eye(n) is not None):

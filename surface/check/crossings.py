@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.base.jit import inlined, kernel
+from surface.base.jit import inlined, kernel, merged
 from surface.mesh.boxtree import LEAF, BoxTree
 
 ENCLOSED = 10.0  # times the depth that is looked for: how far away the back of the flesh may be that encloses a point
@@ -97,6 +97,24 @@ def _outside(j: Any, corners: Any, least: Any, most: Any) -> Any:
     return out
 
 
+@merged
+def _next_leaf(stack: Any, top: Any, low: Any, high: Any, leaves: Any, least: Any, most: Any) -> Any:
+    """First triangle of the next leaf whose box meets another one, or -1; and how many nodes are on the stack.
+
+    ``stack`` holds the nodes of the tree that are still to be searched.
+    """
+    while top > 0:
+        top -= 1
+        node = stack[top]
+        if _apart(node, low, high, least, most):
+            continue
+        if node >= leaves:
+            return (node - leaves) * LEAF, top
+        stack[top], stack[top + 1] = 2 * node, 2 * node + 1
+        top += 2
+    return -1, top
+
+
 @kernel
 def _search(
     rows: Any, ids: Any, kind: Any, meets: Any, moved: Any, corners: Any, low: Any, high: Any, leaves: int, out: Any
@@ -110,16 +128,10 @@ def _search(
             least[k] = min(corners[i, 0, k], corners[i, 1, k], corners[i, 2, k])
             most[k] = max(corners[i, 0, k], corners[i, 1, k], corners[i, 2, k])
         stack[0], top = 1, 1
-        while top > 0:
-            top -= 1
-            node = stack[top]
-            if _apart(node, low, high, least, most):
-                continue
-            if node < leaves:
-                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
-                top += 2
-                continue
-            first = (node - leaves) * LEAF
+        while True:
+            first, top = _next_leaf(stack, top, low, high, leaves, least, most)
+            if first < 0:
+                break
             for j in range(first, min(len(corners), first + LEAF)):
                 if j == i or (moved[j] and j < i) or not meets[kind[i], kind[j]] or _outside(j, corners, least, most):
                     continue
@@ -159,19 +171,13 @@ def _first_back(
         p, best, back = points[i], 1.0, False
         d0, d1, d2 = reach * ways[i, 0], reach * ways[i, 1], reach * ways[i, 2]
         stack[0], top = 1, 1
-        while top > 0:
-            top -= 1
-            node = stack[top]
+        while True:
             for k in range(3):
                 step = best * reach * ways[i, k]
                 least[k], most[k] = min(p[k], p[k] + step), max(p[k], p[k] + step)
-            if _apart(node, low, high, least, most):
-                continue
-            if node < leaves:
-                stack[top], stack[top + 1] = 2 * node, 2 * node + 1
-                top += 2
-                continue
-            first = (node - leaves) * LEAF
+            first, top = _next_leaf(stack, top, low, high, leaves, least, most)
+            if first < 0:
+                break
             for j in range(first, min(len(corners), first + LEAF)):
                 if not passed[kind[j]] or _outside(j, corners, least, most) or _has(ids, j, own[i]):
                     continue

@@ -33,7 +33,7 @@ SAID_MM = 1.0  # less is not said at the end of a fit
 AREA_MM2 = 10.0
 MOVED_MM = 0.1  # what moves less is where it was at rest
 VIEWS = ((0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (180.0, 0.0), (0.0, -40.0), (0.0, 40.0))
-STEP_MM = 0.8  # of a pixel of the pictures that tell what can be seen
+STEP_MM = 0.8  # of a pixel of the pictures that determine what is visible
 MOST_STEPS = 900  # of such a picture
 WORDS = {"skin": "itself", "eye": "the eyeball", "teeth": "the teeth"}
 

@@ -1,7 +1,7 @@
-"""Spikes: points that stick out of the surface on all sides, at rest or in a pose.
+"""Find spikes: points that stick out from the surface on all sides, at rest or in a pose.
 
-A vertex sticks out by the least height, along one direction, over everything on a ring round it at some millimetres.
-A ridge, as the rim of an ear or a lid, does not stick out: the ring meets the ridge again on either side.
+The height of a vertex is its least distance, along one direction, above the samples on a ring of some millimetres
+around it. A ridge, such as the rim of an ear or of a lid, has no height: the ring meets the ridge on either side.
 """
 
 from __future__ import annotations
@@ -20,23 +20,28 @@ from surface.check.places import Places
 from surface.check.subject import Subject
 from surface.head.model.parameters import SHAPES
 
-RINGS = {6.0: 0.55, 12.0: 0.45}  # radii of the rings, mm at usual size: most height at rest, in radii
-RING = (0.75, 1.3)  # its inner and outer edge, in radii
-OFF_RIM = 0.5  # of the radius: so near to a free border nothing is measured
-MOVED = 0.5  # most height of how far a pose moves a point, in radii; corners of mouth and eyes have up to 0.35
-MIRRORED = 0.8  # the same of what moves alike on both sides: a drawn mouth is small and purses by half its width
-PAIRED = 0.6  # of that height: what is so steep on the other side is its like
-MIRROR_MM = 10.0  # a horn or a pointed ear has its like on the other side, so near to its mirror image
-NOSE = 0.35  # of the distance between the eyes, about the middle: a nose may be as long as it likes
-SPACING = 0.6  # of the samples, in the ring's radius
-MOST_STEPS = 40  # along an edge: a triangle across half the face is wrong anyway
+RINGS = {6.0: 0.55, 12.0: 0.45}  # radius of a ring, mm on a head of usual size: greatest height at rest, in radii
+RING = (0.75, 1.3)  # inner and outer edge of a ring, in radii
+OFF_RIM = 0.5  # distance from a free border, in radii, within which no height is measured
+MOVED = 0.5  # greatest height in the displacements of a pose, in radii; corners of mouth and eyes have up to 0.35
+MIRRORED = 0.8  # the same where both sides move alike: a small drawn mouth purses by half its width
+PAIRED = 0.6  # least height at the mirror image, relative to the greatest allowed, for both sides to count as alike
+MIRROR_MM = 10.0  # greatest distance from the mirror image at which a horn or pointed ear counts as the other of a pair
+NOSE = 0.35  # half the width of the nose, in distances of the eyes: a nose may have any length
+SPACING = 0.6  # of the samples, in radii of the ring
+MOST_STEPS = 40  # samples along an edge: a triangle that needs more is wrong anyway
 
 
 @kernel
 def rings(points: Any, cells: Any, order: Any, start: Any, low: float, high: float, first: Any, out: Any) -> int:
-    """List the points between ``low`` and ``high`` mm from each of the first of points (m, 3), as many as ``first``
-    takes. All are sorted into cubes as wide as ``high``: ``cells (m, 3)``, and those of cube c are ``order`` from
-    ``start[c, 0]`` to ``start[c, 1]``. Fills ``out`` as far as it goes, and returns how many there are."""
+    """List the points of points (m, 3) between ``low`` and ``high`` mm from each of the first k.
+
+    cells : (m, 3) the cube of each point, ``high`` mm wide. order : (m,) points by cube; ``start[x, y, z]`` is where
+        those of a cube begin and end in it.
+    first : (k + 1,) filled with where each point's list begins in ``out``. out : filled as far as it is long enough.
+
+    Returns the length of all lists.
+    """
     used = 0
     nx, ny, nz = start.shape[0], start.shape[1], start.shape[2]
     for i in range(len(first) - 1):
@@ -58,8 +63,13 @@ def rings(points: Any, cells: Any, order: Any, start: Any, low: float, high: flo
 
 @kernel
 def heights(values: Any, start: Any, ring: Any, enough: float, out: Any) -> None:
-    """Least height ``out (k,)`` of each of the first k of values (m, 3) over those on its ring, along its mean way from
-    them; 0 where one of the ring is nearer than ``enough``, since the height is no greater than that."""
+    """Fill ``out (k,)`` with the height of each of the first k of values (m, 3) above those on its ring.
+
+    start, ring : those on the ring of value i are ``ring`` from ``start[i]`` to ``start[i + 1]``.
+
+    The height is measured along the mean direction from them to the value. It is 0 where one of them is nearer than
+    ``enough``, since the height cannot be greater than that distance.
+    """
     for i in range(len(out)):
         out[i] = 0.0
         x, y, z = 0.0, 0.0, 0.0
@@ -86,7 +96,7 @@ def heights(values: Any, start: Any, ring: Any, enough: float, out: Any) -> None
 
 @kernel
 def mix(rows: Any, corners: Any, share: Any, values: Any, out: Any) -> None:
-    """Fill ``rows`` of ``out (m, 3)`` with ``share (m, 3)`` of values (v, 3) at ``corners (m, 3)``."""
+    """Fill ``rows`` of ``out (m, 3)`` with means of values (v, 3) at ``corners (m, 3)``, weights ``share (m, 3)``."""
     for row in rows:
         for c in range(3):
             out[row, c] = 0.0
@@ -98,8 +108,8 @@ def mix(rows: Any, corners: Any, share: Any, values: Any, out: Any) -> None:
 class Samples:
     """Vertices and further places on large triangles of the skin, close enough for rings.
 
-    part : (m,) number of the part; corners : (m, 3) vertices of it; share : (m, 3) of each; the first ``vertices`` of
-    them are vertices.
+    part : (m,) number of the part. corners : (m, 3) vertices of it. share : (m, 3) weight of each corner.
+    vertices : how many samples are vertices; these come first.
     """
 
     part: Ints
@@ -108,7 +118,7 @@ class Samples:
     vertices: int
 
     def at(self, vertices: list[Floats32]) -> Floats:
-        """(m, 3) values at the samples from those of vertices (v, 3) of every part."""
+        """(m, 3) values at the samples, interpolated from those at the vertices (v, 3) of every part."""
         out = np.empty((len(self.part), 3))
         for k in np.unique(self.part):
             mix(np.flatnonzero(self.part == k), self.corners, self.share, vertices[k], out)
@@ -131,7 +141,7 @@ def find_samples(subject: Subject, spacing: float) -> Samples:
 
 
 def _filled(at: Floats, triangles: Ints, spacing: float) -> tuple[Ints, Floats]:
-    """Corners (m, 3) and shares (m, 3) of places inside triangles with edges longer than ``spacing``."""
+    """Corners (m, 3) and weights (m, 3) of places inside triangles that have edges longer than ``spacing`` mm."""
     corner = at[triangles]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
     steps = np.minimum(np.ceil(longest / spacing), MOST_STEPS).astype(int)
@@ -154,14 +164,14 @@ class Ring:
     ids: Ints
 
     def heights(self, values: Floats, enough: float = 0.0) -> Floats:
-        """(k,) how far each of the first k of values (m, 3) sticks out; 0 or right where it is less than ``enough``."""
+        """(k,) height of each of the first k of values (m, 3); it may be 0 where it is less than ``enough``."""
         out = np.zeros(len(self.start) - 1)
         heights(np.ascontiguousarray(values), self.start, self.ids, enough, out)
         return out
 
-    def high(self, points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
-        """``height (k,)`` of points (m, 3); 0 where it is below ``least`` or a rim, points (r, 3), is nearer than
-        ``off``: the corner of a border sticks out."""
+    def without_rims(self, points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
+        """``height (k,)`` of the first k of points (m, 3), 0 where it is below ``least``, and where a point of a free
+        border, ``rims (r, 3)``, is nearer than ``off`` mm: corners of a border always stick out."""
         rows = np.flatnonzero(height > least)
         out = np.zeros(len(height))
         for row in rows:
@@ -187,7 +197,7 @@ def find_rings(points: Floats, count: int, radius: float) -> Ring:
 
 
 def spikes(subject: Subject, places: Places, borders: Borders) -> Iterator[Finding]:
-    """The steepest spike at rest, and in the pose that has the highest."""
+    """The steepest spike at rest, and the steepest in any pose."""
     rims = borders.at(subject.rest)[~borders.sewn].reshape(-1, 3)
     found = [_spikes(subject, places, rims, r * subject.scale, steep) for r, steep in RINGS.items()]
     for kind in zip(*found, strict=True):
@@ -198,14 +208,14 @@ def spikes(subject: Subject, places: Places, borders: Borders) -> Iterator[Findi
 def _spikes(
     subject: Subject, places: Places, rims: Floats, radius: float, steep: float
 ) -> list[tuple[float, str] | None]:
-    """The steepest spike at rest, over ``steep``, and in a pose, over one ring: steepness and text."""
+    """For one ring the steepest spike at rest and in a pose, each as steepness and text; None where there is none."""
     samples = find_samples(subject, SPACING * radius)
     if not samples.vertices:
         return [None, None]
     at, off = samples.at(subject.rest), OFF_RIM * radius
     ring = find_rings(at, samples.vertices, radius)
-    height = ring.high(at, rims, ring.heights(at), PAIRED * steep * radius, off)
-    height[_usual(subject, at[: samples.vertices], height, places)] = 0.0
+    height = ring.without_rims(at, rims, ring.heights(at), PAIRED * steep * radius, off)
+    height[_allowed(subject, at[: samples.vertices], height, places)] = 0.0
     worst, best, name, where = int(height.argmax()), 0.0, "", 0
     for pose in (n for n in subject.claimed if n in SHAPES):
         moved = _moved(
@@ -227,17 +237,20 @@ def _spikes(
 def _moved(
     subject: Subject, places: Places, moves: Floats, ring: Ring, at: Floats, rims: Floats, radius: float, enough: float
 ) -> Floats:  # fmt: skip
-    """(k,) how far samples at (m, 3) stick out among moves (m, 3); 0 below ``enough`` or where both sides do alike."""
-    moved = ring.high(at, rims, ring.heights(moves, enough), enough, OFF_RIM * radius)
+    """(k,) heights in the displacements ``moves (m, 3)`` of samples at (m, 3), mm.
+
+    They are 0 below ``enough``, and where the other side of the face moves alike.
+    """
+    moved = ring.without_rims(at, rims, ring.heights(moves, enough), enough, OFF_RIM * radius)
     low = moved < MIRRORED * radius
     if (moved[low] > 0.0).any():
-        height = ring.high(at, rims, ring.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
-        moved[low & _alike(subject, at[: len(height)], height, places)] = 0.0
+        height = ring.without_rims(at, rims, ring.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
+        moved[low & _has_mirror_image(subject, at[: len(height)], height, places)] = 0.0
     return moved
 
 
-def _alike(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
-    """(k,) which samples at (k, 3) with a height (k,) above 0 have another one at their mirror image."""
+def _has_mirror_image(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
+    """(k,) which samples at (k, 3) with a height (k,) above 0 have another such sample near their mirror image."""
     middle, far = places.centre[0], MIRROR_MM * subject.scale
     out = np.zeros(len(at), bool)
     steep = np.flatnonzero(height)
@@ -248,10 +261,10 @@ def _alike(subject: Subject, at: Floats, height: Floats, places: Places) -> Bool
     return out
 
 
-def _usual(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
-    """(m,) which samples belong to what a head may have: the nose, and what sticks out on both sides alike."""
+def _allowed(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
+    """(m,) which samples may stick out: those of the nose, and those that have a mirror image."""
     middle, apart = places.centre[0], places.apart
     out: Bools = np.abs(at[:, 0] - middle) < NOSE * apart
     out &= (at[:, 2] > places.centre[2]) & (at[:, 1] < places.centre[1] + 0.3 * apart)
     out &= at[:, 1] > places.centre[1] - 0.9 * places.down * apart
-    return np.asarray(out | _alike(subject, at, height, places))
+    return np.asarray(out | _has_mirror_image(subject, at, height, places))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.jit import inlined, lean
+from surface.base.jit import inlined, nonallocating
 from surface.spline.lanes import (
     add,
     div,
@@ -255,7 +255,7 @@ def write_packed(
         e = end
 
 
-@lean
+@nonallocating
 def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
     """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored.
 
@@ -316,7 +316,7 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
                 tile += 1
 
 
-@lean
+@nonallocating
 def join_ranges(cells, total, cell_start, gap, out):
     """Vertex ranges of rising cells, joined where fewer than ``gap`` vertices lie between; returns their number."""
     count = 0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Floats32, Ints
-from surface.base.jit import lean
+from surface.base.jit import nonallocating
 
 from .apply import compute_cells
 from .binding import address_table
@@ -24,7 +24,7 @@ SLICE_BYTES = 200_000  # of weights: with what belongs to them, they fit a core'
 WEIGHT_BYTES = 12  # of a weight and of its derivatives in u and v
 
 
-@lean
+@nonallocating
 def compute_copies(tables, copies, cells, cuts, sign, local, scratch, starts):  # type: ignore[no-untyped-def]
     """Compute all ``cells`` of ``copies (k,)``, one slice ``cuts[i]`` to ``cuts[i + 1]`` after the other.
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.jit import inlined, kernel, lean
+from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import load
 
 from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
@@ -84,7 +84,7 @@ def find_affected(ids, delta, count, point_start, point_count, point_cell, hits,
     return total
 
 
-@lean
+@nonallocating
 def choose_recomputed(
     total, affected, hits, pull, differences, span, drift, rows, rows_at, slopes, limit, bias, most_drift, recomputed
 ):  # fmt: skip
@@ -122,7 +122,7 @@ def largest(local, rows):
     return most
 
 
-@lean
+@nonallocating
 def reach_along(points, k):
     """The least and the greatest of coordinate k of ``points (n, 3)``."""
     low, high = points[0, k], points[0, k]
@@ -131,7 +131,7 @@ def reach_along(points, k):
     return low, high
 
 
-@lean
+@nonallocating
 def measure(points, extent, afresh):
     """Fill ``extent`` for ``points (n, 3)``; returns whether origins are to be chosen again, as they are if ``afresh``.
 
@@ -154,7 +154,7 @@ def measure(points, extent, afresh):
     return True
 
 
-@lean
+@nonallocating
 def has_left(points, delta, count, extent):
     """Whether the surface has become so small, or moved so far, that the origins do not fit it any more.
 
@@ -170,7 +170,7 @@ def has_left(points, delta, count, extent):
     return measure(points, extent, False)
 
 
-@lean
+@nonallocating
 def update_cells(table, count, limit, bias, sign):
     """Bring all cells that the first ``count`` moved points reach up to date; returns how many there are."""
     arrays = arrays_of(table)
@@ -228,7 +228,7 @@ def update_cells(table, count, limit, bias, sign):
     return total
 
 
-@lean
+@nonallocating
 def first_invalid(ids, rows, relative, points, farthest):
     """The first row with an id out of range (as ``-1 - row``), or one that leads to a number that is not finite or
     beyond ``farthest`` (``row``); or VALID."""
@@ -244,7 +244,7 @@ def first_invalid(ids, rows, relative, points, farthest):
     return VALID
 
 
-@lean
+@nonallocating
 def store_positions(ids, rows, relative, points, moved_ids, delta):
     """Store new positions; ``moved_ids`` and ``delta`` get the points that really moved; returns their number."""
     count = 0
@@ -267,7 +267,7 @@ def store_positions(ids, rows, relative, points, moved_ids, delta):
     return count
 
 
-@lean
+@nonallocating
 def move_points(table, ids, rows, relative, most, limit, bias, gap, sign):
     """Move points and bring the mesh up to date: the whole of an update in one call.
 

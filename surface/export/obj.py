@@ -1,4 +1,4 @@
-"""Exporter of heads as Wavefront OBJ with materials, and one OBJ a shape in a folder beside it; millimetres."""
+"""Exports heads as Wavefront OBJ with materials, in millimetres; a folder beside it gets one OBJ for each shape."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
 
 
 def write_obj_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
-    """As :func:`write_obj`, in axes, origin and unit of the file that the head was fitted to."""
+    """As :func:`write_obj`, but in the axes, origin and unit of the file that the head was fitted to."""
     placement = placement_of(head)
     title = f"# {head.name}{_OWN} in the frame of its source"
     parts = export_parts(head, pose, shapes=not is_posed(head, pose))
@@ -36,7 +36,10 @@ def write_obj_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list
 
 
 def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
-    """Write the OBJ with its materials and its folder of shapes; nothing is replaced before all of it is complete."""
+    """Write the OBJ with its materials and its folder of shapes; nothing is replaced before all of it is complete.
+
+    Returns the paths.
+    """
     shapes = dict.fromkeys(name for part in parts for name in part.displacements)
     vertices, normals = (np.concatenate([getattr(p, key) for p in parts]) for key in ("vertices", "normals"))
     textures = [f"vt {u:.6f} {v:.6f}" for part in parts for u, v in part.uv.tolist()]
@@ -82,7 +85,7 @@ def _is_own(path: Path) -> bool:
 EXPORTER = Exporter(
     api=1,
     kind="obj",
-    title="the face at rest with its materials, and a folder beside it with one file a shape",
+    title="the face at rest with its materials, and a folder beside it with one file for each shape",
     suffixes=(".obj",),
     write=write_obj,
     write_in_file=write_obj_in_file,

@@ -26,9 +26,9 @@ from surface.fit.features.squints import shut_with_squints
 from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.refusal import save_or_refuse
-from surface.fit.points.care import POINTS as MORE_POINTS
-from surface.fit.points.care import with_care
 from surface.fit.points.facets import facet_sag
+from surface.fit.points.importance import POINTS as MORE_POINTS
+from surface.fit.points.importance import with_importance
 from surface.fit.points.lid_seating import close_lips, seat_lids
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart
@@ -43,7 +43,7 @@ from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
-from surface.fit.source.naming.astray import right_shapes
+from surface.fit.source.naming.misnamed import correct_shapes
 from surface.fit.source.naming.shapes import to_arkit
 from surface.fit.source.placing.anatomy import Landmarks
 from surface.fit.source.placing.frame import head_scale
@@ -100,7 +100,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     else:
         loaded = _repaired(place(loaded))
         check_manifold(loaded.mesh, where)
-        recipe, (mesh, exchanged) = Recipe([]), right_shapes(to_arkit(loaded.mesh, loaded.named))
+        recipe, (mesh, exchanged) = Recipe([]), correct_shapes(to_arkit(loaded.mesh, loaded.named))
         plan = make_plan(mesh)
         plan.notes.extend(exchanged)
         mesh, seated = fit_lids(mesh, plan.found) if plan.found else (mesh, [])
@@ -160,7 +160,7 @@ def _fit_parts(
         chart, step = part_chart(mesh, part, islands), part_of(progress, low, high)
         request = part.request
         if not parts and plan.found and plan.found.openings:
-            chart = with_care(chart, mesh, *plan.eyes)
+            chart = with_importance(chart, mesh, *plan.eyes)
             request = replace(request, points=request.points + len(plan.eyes[0]) * MORE_POINTS)
         fitted = fit_chart(mesh if part.follows == "skin" else still, chart, request, partial(step, part.name))
         fine = facet_sag(mesh, chart) <= RMS_MM * scale
@@ -188,7 +188,7 @@ def part_chart(mesh: FitMesh, part: PartRecipe, islands: list[Island]) -> Chart:
     """The chart of one part of a plan: its islands in tiles, or one skin around them."""
     if part.wrapped:
         return wrap_chart(mesh, islands)
-    return make_chart(mesh, islands, normalise=part.tiled, doubt_slivers=part.doubt_slivers)
+    return make_chart(mesh, islands, normalise=part.tiled, downweight_slivers=part.downweight_slivers)
 
 
 def prepare(mesh: FitMesh, recipe: Recipe) -> FitMesh:

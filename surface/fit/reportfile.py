@@ -1,10 +1,8 @@
-"""Write a fit's report: report.json, report.md, and pictures of the error on the face."""
+"""Write the report of a mesh fit: report.json, report.md, and pictures of the error on the face."""
 
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
@@ -13,42 +11,33 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats, Floats32
-from surface.base.errors import FitError, MissingPackage, ViewError
+from surface.base.errors import MissingPackage, ViewError
 from surface.base.progress import Progress
+from surface.fit.measures.error_colours import error_colours
+from surface.fit.measures.report_folder import report_folder
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import NEUTRAL, DenseErrors, Errors, FitReport, FitResult, FittedPart, face_bounds, plain
 from surface.fit.source.chart import TILE
 from surface.head import Head
 
 FORMAT, VERSION = "omote fit report", 1
-FULL_MM = 1.0  # error at the end of the colour scale
-SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0.75, 0.24, 0.04], [0.55, 0.02, 0.02]])
 EXCLUDED = np.array([0.45, 0.05, 0.50])
 LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more; violet: inside folds, not counted"
 
 
 def write_report(result: FitResult, folder: str | Path, progress: Progress) -> None:
-    """Write the report of a fit, complete or not at all. Raises FitError: the folder cannot be written to."""
-    folder = Path(folder)
+    """Write the report of a fit, completely or not at all. Raises FitError: the folder cannot be written to."""
     nets = _nets(result)
     progress("report", 0.5)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
-            new = Path(made)
-            pictures = _draw(result, new)
-            (new / "report.json").write_text(json.dumps(as_table(result.report, nets), indent=1), encoding="utf-8")
-            (new / "report.md").write_text(as_markdown(result.report, nets, pictures), encoding="utf-8")
-            folder.mkdir(exist_ok=True)
-            for file in new.iterdir():
-                shutil.move(file, folder / file.name)
-    except OSError as e:
-        raise FitError(f"{folder}: the report cannot be written ({e})", hint="choose another --report folder") from e
+    with report_folder(Path(folder)) as new:
+        pictures = _draw(result, new)
+        (new / "report.json").write_text(json.dumps(as_table(result.report, nets), indent=1), encoding="utf-8")
+        (new / "report.md").write_text(as_markdown(result.report, nets, pictures), encoding="utf-8")
     progress("report", 1.0)
 
 
 def _nets(result: FitResult) -> list[UniformNet]:
-    """The face's own net and uniform ones for its first and largest tile."""
+    """The control net of the face's first and largest tile, and uniform nets to compare it with."""
     face = result.parts[0]
     own = face.chart.uv[:, 0] < TILE / 2
     counted = own & ~face.chart.folded
@@ -87,7 +76,7 @@ def _as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
 
 
 def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) -> str:
-    """The report to read: tables of errors, and what was guessed."""
+    """The report as Markdown: notes, and tables of errors."""
     lines = [f"# {report.name}: {report.points} control points, {len(report.parameters)} shapes", ""]
     lines += [f"- {note}" for note in [face_bounds(report), *report.notes]]
     lines += [f"- no shape for: {', '.join(report.missing)}"] if report.missing else []
@@ -103,7 +92,7 @@ def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) 
         ),
     ]
     lines += ["", *(f"![error]({name})" for name in pictures)]
-    lines += [LEGEND] if pictures else ["No OpenGL was there to draw the error."]
+    lines += [LEGEND] if pictures else ["The error was not drawn, because OpenGL is not available."]
     lines += ["", "## A uniform cubic NURBS net beside the face", "", *_net_lines(nets)]
     lines += _source_lines(report)
     for p in report.parts:
@@ -114,15 +103,15 @@ def as_markdown(report: FitReport, nets: list[UniformNet], pictures: list[str]) 
 
 
 def _source_lines(report: FitReport) -> list[str]:
-    """Tables of the mesh's pieces and of the shapes that parameters were made of."""
+    """Tables of the mesh's pieces, and of the mesh's shapes that each parameter was made from."""
     lines = []
     if report.pieces:
         lines += ["", "## Pieces of the mesh", "", "| piece | kind |", "|---|---|"]
         lines += [f"| {_cell(name)} | {kind} |" for name, kind in report.pieces.items()]
     if report.shapes:
-        lines += ["", "## Shapes of the mesh", "", "| parameter | made of |", "|---|---|"]
+        lines += ["", "## Shapes of the mesh", "", "| parameter | made from |", "|---|---|"]
         lines += [f"| {p} | {_cell(', '.join(names))} |" for p, names in report.shapes.items()]
-    for title, names in (("empty", report.empty), ("understood, made from parameters", report.presets)):
+    for title, names in (("empty", report.empty), ("presets, made from parameters", report.presets)):
         lines += ["", f"{title}: {', '.join(names)}"] if names else []
     return lines
 
@@ -132,7 +121,7 @@ def _cell(text: str) -> str:
 
 
 def _distance_lines(dense: DenseErrors) -> list[str]:
-    """True distances of the posed head from the mesh and back: neutral of every part, and its worst shape each way."""
+    """Distances of the posed head from the mesh and back: for every part the neutral face, and the worst shape."""
     lines = ["", f"True distances of {dense.samples} samples in every shape, the head posed as it is drawn, mm.", ""]
     lines += [f"- {line}" for line in dense.lines()]
     lines += [
@@ -169,7 +158,7 @@ def _net_lines(nets: list[UniformNet]) -> list[str]:
 
 
 def _draw(result: FitResult, folder: Path) -> list[str]:
-    """Pictures of the error at rest and of each sample's worst shape; none without OpenGL."""
+    """Draw the error at rest, and at every sample that of its worst shape; returns no file names without OpenGL."""
     head = Head(result.head)
     for part in head.parts:
         kept = {k: v for k, v in part.attributes.items() if k == "eye_local"}
@@ -190,17 +179,16 @@ def _draw(result: FitResult, folder: Path) -> list[str]:
 
 
 def _colours(uv: Floats, part: FittedPart, error: Floats) -> Floats32:
-    """(m, 3) linear RGB of the error at vertices: the mean of the nearest samples; excluded ones violet."""
+    """(m, 3) linear RGB of the error at vertices, the mean over the nearest samples; violet where it is excluded."""
     nearest = cKDTree(part.chart.uv).query(uv, k=min(4, len(part.chart.uv)))[1].reshape(len(uv), -1)
-    at = np.clip(error[nearest].mean(axis=1) / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)
-    out = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=1)
+    out = error_colours(error[nearest].mean(axis=1))
     out[part.chart.folded[nearest].mean(axis=1) > 0.5] = EXCLUDED
     return out.astype(np.float32)
 
 
 def _picture(head: Head, path: Path) -> None:
     """Front, three-quarter, profile, and from below into the nostrils."""
-    from surface.view.pictures.offscreen import Offscreen  # takes a moment to import; most fits draw nothing
+    from surface.view.pictures.offscreen import Offscreen  # slow to import, and most fits draw nothing
     from surface.view.pictures.sheet import compose, write_png
     from surface.view.scene.camera import Camera
     from surface.view.scene.framing import framed

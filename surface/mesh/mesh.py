@@ -1,4 +1,4 @@
-"""Triangle meshes of DCP surfaces, with the lists of control points by cell (paper, 2.4)."""
+"""Triangle meshes of DCP surfaces, with the list of control points that reach each cell (paper, 2.4)."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ class Mesh:
     vertices, normals : (m, 3) float64, normals of unit length along S_u x S_v (opposite if ``flip``)
     triangles : (t, 3) int32, counter-clockwise seen from where the normals point
     uv : (m, 2) float64
-    side : (m,) int64, which limit a vertex takes: 1 from the left in u, 2 in v (vertices on slits)
+    side : (m,) int64, from which side a vertex on a slit evaluates the surface: bit 1 from the left in u, bit 2 in v
     cell : (m,) int32, rising: the vertices of a cell are consecutive
     cell_start : (c + 1,) int64, first vertex of every cell
     list_start : (c + 1,) int64, where every cell's list starts in ``list_ids``
     list_ids : (k,) int32 control points that reach a vertex of the cell
     leaves : how many leaf cells the quad tree had
-    flip : are normals and triangles reversed against S_u x S_v?
+    flip : whether normals and triangles are reversed against S_u x S_v
     structure : :attr:`surface.spline.controlpoints.ControlPoints.structure` of the surface it was made from; empty
         where that is not known
     """

@@ -94,7 +94,7 @@ class Chart:
 def read_complex(file: TsmFile, name: str) -> NamedSurface:
     """The surface of a T-mesh of any form; ``SurfaceFileError`` names the line."""
     mean = float(np.mean(list(file.edges.values())))
-    if mean < 1.0:  # charts are told apart by absolute distances; how large they are means nothing
+    if mean < 1.0:  # charts are distinguished by absolute distances; their size has no meaning
         file.edges = {edge: length / mean for edge, length in file.edges.items()}
     mesh = Complex(file)
     layouts = {face: Layout(mesh, face) for face in mesh.loops if not mesh.is_star(face)}

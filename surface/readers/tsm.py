@@ -1,10 +1,10 @@
 """Reader of T-splines in Rhino's and Fusion's text format ``.tsm`` (header ``#TS0200``).
 
-The n-th line of each kind is entity n; a kind alone is a deleted one::
+The n-th line of each kind describes entity n; a line with nothing but its kind stands for a deleted entity::
 
     f  link flag                                     face
     e  link interval                                 edge, knot interval along it
-    v  link COMPASS                                  vertex; that link leaves it to that side, in the vertex' own frame
+    v  link COMPASS                                  vertex; in its own frame the link leaves it in this direction
     l  previous next opposite vertex face edge turn  half-edge from vertex; turn at it: 0 left, 1 straight, 2 right
     ec edge 0                                        creased edge
     0m gvp vertex | 0m gv vertex                     what the grips, in order, belong to (gvp: the vertex' own)
@@ -34,12 +34,12 @@ from .tcharts import read_complex
 from .tlayout import STEP, directions
 from .tsmfile import COMPASS, HINT, Link, TsmFile, parse
 
-NEAR = 1e-9  # of the outline's size: knot intervals are sums of decimal numbers
+NEAR = 1e-9  # of the outline's size, within which knots are equal: they are sums of rounded decimal numbers
 
 
 @dataclass(frozen=True)
 class Anchor:
-    """Position of a grip: (u, v), and how many knots further in along each direction (-1, 0 or 1)."""
+    """Position of a grip: (u, v) of its vertex, and by how many knots it lies further in along u and v (-1, 0 or 1)."""
 
     uv: tuple[float, float]
     inward: tuple[int, int]
@@ -162,7 +162,7 @@ class TMesh:
             raise file.error(file.links[apart].line, why, HINT)
 
     def _place(self, number: int, direction: int, uv: tuple[float, float]) -> bool:
-        """Give a link its direction and its vertex a position; False if they had them."""
+        """Give a link its direction and its vertex a position; False if the link had a direction already."""
         link = self._file.links[number]
         known, size = self._direction.get(number), NEAR * sum(self._file.edges.values())
         distance = max(abs(a - b) for a, b in zip(self.uv.setdefault(link.vertex, uv), uv, strict=True))

@@ -1,4 +1,4 @@
-"""Parser of ``.tsm`` files (T-splines of Rhino and Fusion): lines of text as records with checked references."""
+"""Parses ``.tsm`` files (T-splines of Rhino and Fusion) into records, and checks the references between them."""
 
 from __future__ import annotations
 
@@ -32,16 +32,16 @@ class Link:
 
 @dataclass
 class TsmFile:
-    """Records by kind; the n-th line of a kind is number n, deleted ones are not kept.
+    """Records by kind. The n-th line of a kind has number n; deleted entities are left out.
 
     header : by keyword: its line and the rest of that line
-    links, edges : by number: link, knot interval
+    links, edges : by number: half-edge; knot interval
     vertices : by number: line, link, compass word
-    creases : line and edge number
-    grips : by number: line, [x, y, z, weight]
-    owners : line, whether it is the vertex' own grip, and vertex, of every grip in order, deleted ones too
-    extras : line, vertex, four counts, grips
-    missing : vertices whose extra grips are not those of a regular one, and the line that says so
+    creases : line and edge number of each
+    grips : by number: line and [x, y, z, weight] of each control point
+    owners : line, whether it is the vertex' own grip, and vertex, of every grip in order, deleted ones included
+    extras : line, vertex, four counts, grips of each list of extra grips
+    missing : line, by vertex, of extra grips that are not those of a regular vertex
     """
 
     location: Location
@@ -76,7 +76,7 @@ def parse(location: Location, text: str) -> TsmFile:
         elif kind:
             _add_other(out, number, kind, words)
     _check_links(out)
-    if not out.owners:  # then grips are those of the vertices, in order
+    if not out.owners:  # without a grip map, grip n belongs to vertex n
         out.owners = [(out.vertices.get(k, (1,))[0], k in out.vertices, k) for k in range(count["0g"])]
     _check_owners(out)
     if len(out.owners) != count["0g"]:
@@ -85,7 +85,7 @@ def parse(location: Location, text: str) -> TsmFile:
 
 
 def _add_entity(out: TsmFile, line: int, kind: str, number: int, words: list[str]) -> None:
-    """One line of a numbered kind; faces are not needed."""
+    """Add the record of one line of a numbered kind; faces are not needed."""
     if len(words) != FIELDS[kind]:
         raise out.error(line, f'"{kind}" needs {FIELDS[kind]} values, has {len(words)}')
     if kind == "l":
@@ -105,7 +105,7 @@ def _add_entity(out: TsmFile, line: int, kind: str, number: int, words: list[str
 
 
 def _add_other(out: TsmFile, line: int, kind: str, words: list[str]) -> None:
-    """Creases, grip maps and header lines; other lines are not needed."""
+    """Add the record of a crease, grip map or header line; other lines are not needed."""
     if kind == "ec":
         out.creases.append((line, _integers(out, line, words[:1] or ["nothing"])[0]))
     elif kind == "0m" and words[:1] in (["gv"], ["gvp"]):

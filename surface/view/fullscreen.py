@@ -43,7 +43,7 @@ def glfw_window() -> tuple[Any, Any]:
 
 
 def desktop_scale() -> float:
-    """The desktop's factor on sizes under X11, before there is a window that tells it; 1 elsewhere."""
+    """The desktop's factor on sizes under X11, before there is a window that reports it; 1 elsewhere."""
     try:
         import glfw  # optional, and after imgui_bundle, whose library it then uses
 

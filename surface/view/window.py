@@ -208,7 +208,7 @@ class _Window:
         self.area.remake = None
         try:
             self._make(ctx, wanted.make, wanted.quality)
-        except Exception as error:  # noqa: BLE001  the caller tells it
+        except Exception as error:  # noqa: BLE001  the caller reports it
             wanted.done(error)
             return
         for thing in before:

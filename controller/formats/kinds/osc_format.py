@@ -1,8 +1,7 @@
 """OSC faders: ``/omote/jawOpen 0.5``, one parameter for each address.
 
-The last part of an address is the name of a parameter, whatever stands before it, so that programs with addresses of
-their own, such as ``/avatar/parameters/JawOpen``, are read as well. Parameters that a packet does not name keep their
-value.
+Only the last part of an address counts: it names the parameter. So the addresses of other programs are understood, too,
+such as ``/avatar/parameters/JawOpen``. Parameters that a packet does not name keep their value.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ class OscDecoder:
         self._parameters, self._held = parameters, Held(parameters)
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame for a datagram with a parameter in it."""
+        """One frame for a datagram that sets a parameter or says that no face is seen; else none."""
         given: dict[int, float] = {}
         time_s: float | None = None
         for address, arguments in read_packet(message, self.refused):

@@ -1,8 +1,8 @@
 """Serves the line protocol on a serial port, in its own thread.
 
-Replies and streamed lines are written without waiting: a peer that does not read loses lines, which are counted, and
-never holds up the face. A port that vanishes is opened again when it comes back, and a subscription goes on then. Only
-its owner ends the thread: faults are logged and counted.
+Replies and streamed lines are written without waiting. A peer that does not read loses lines, which are counted, and
+does not delay the face. A port that disappears is opened again when it is back, and a subscription then goes on. Errors
+in the thread are logged and counted and do not end it; only :meth:`LineLink.stop` does.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class LineLink:
 
     Attributes
     ----------
-    connected : whether the port is there. reconnects : how often it came back.
+    connected : whether the port is open. reconnects : how often it was opened again after it had disappeared.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class LineLink:
         self._thread = threading.Thread(target=self._run, name=f"link {port}", daemon=True)
 
     def start(self) -> LineLink:
-        """Open the port and begin to listen. Raises PortError: the port cannot be opened; its subclasses say why."""
+        """Open the port and begin to listen. Raises PortError, whose subclass says why the port cannot be opened."""
         self._serial.open()
         self.connected = True
         self._thread.start()
@@ -66,8 +66,8 @@ class LineLink:
         self.connected = False
 
     def report(self) -> dict[str, object]:
-        """Counts: lines taken, refused (by code) and not answered, bytes, streamed and dropped lines, reconnects; rate
-        and jitter of what arrives.
+        """Counts of lines taken, refused (by code) and not answered, of bytes, of lines streamed and dropped, and of
+        reconnects; rate and jitter of arriving lines.
         """
         return {
             "port": self.port,

@@ -168,7 +168,7 @@ class Shows:
 
     @property
     def name(self) -> str | None:
-        """The script's name of the show that was begun last; None after its end by STOP or a failure."""
+        """The script's name of the show that was started last; None after its end by STOP or a failure."""
         show = self._show
         return None if show is None else show.script.name or "without a name"
 

@@ -141,7 +141,7 @@ class Life(Request):
 
 
 class Show(Message):
-    """Play a script by name; or pause, stop or go on with the one that was begun, or seek a mark or a time (s).
+    """Play a script by name; or pause, stop or go on with the one that was started, or seek a mark or a time (s).
 
     ``to`` is where to seek, so ``head`` says whom it is for.
     """

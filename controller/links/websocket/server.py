@@ -1,7 +1,7 @@
 """Serves WebSocket clients in a thread of its own.
 
-Every client has a task that takes its messages and one that sends to it. A client that does not read loses answers,
-which are counted, and gets fewer states; it holds up neither the face nor another client.
+Every client has one task that takes its messages and one that sends to it. A client that does not read loses answers,
+which are counted, and gets fewer states. It delays neither the face nor another client.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ log = logging.getLogger(__name__)
 _WAITING = 256
 """Answers that may wait for a client."""
 _RATE_HZ, _BURST = 1000.0, 2000.0
-"""Messages of a client that are taken, in the long run and at once."""
+"""Messages a second that are taken of a client in the long run, and the most that are taken at once."""
 _START_S, _STOP_S = 10.0, 3.0
 
 
@@ -51,16 +51,16 @@ def open_websocket(settings: WebSocketSettings, context: LinkContext) -> WebSock
 
 
 class WebSocketLink:
-    """A link that is open; clients come and go.
+    """A WebSocket server for any number of clients.
 
-    ``download_s`` : how long an answer to a client that is turned away may take.
+    ``download_s`` : longest time for sending a response to a client that is turned away.
     """
 
     download_s = 1.0
 
     def __init__(self, settings: WebSocketSettings, sink: CommandSink, token: str | None) -> None:
         self._settings, self._sink, self._token = settings, sink, token
-        package_version()  # kept from now on: when a client asks, there may be no file descriptor left to read it
+        package_version()  # cached here: when a client asks, there may be no file descriptor left to read it
         self._start_ns = time.monotonic_ns()
         self._clients: set[_Client] = set()
         self._served = 0
@@ -78,7 +78,7 @@ class WebSocketLink:
 
     @property
     def port(self) -> int:
-        """Where it listens; of port 0 in the settings, the one that was free."""
+        """The port it listens on; where the settings say 0, the free one that the system chose."""
         return self._port
 
     def start(self) -> None:
@@ -94,7 +94,7 @@ class WebSocketLink:
             ) from self._error
 
     def stop(self) -> None:
-        """Send all clients away and stop listening; may be called again."""
+        """Disconnect all clients and stop listening; a second call does nothing."""
         if self._thread.is_alive() and self._stopping is not None:
             self._loop.call_soon_threadsafe(self._stopping.set)
             self._thread.join(_STOP_S)
@@ -120,7 +120,7 @@ class WebSocketLink:
             self._loop.run_until_complete(self._serve())
         except Exception as error:
             if self._ready.is_set():
-                raise  # to the part of this link, which opens it again
+                raise  # whoever supervises this link opens it again
             self._error = error
         finally:
             self._ready.set()
@@ -142,10 +142,10 @@ class WebSocketLink:
             await self._leave()
 
     async def _leave(self) -> None:
-        """What is done before the server closes."""
+        """Called before the server closes; subclasses finish their work here."""
 
     def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
-        """None for who may connect; an answer that says why not for all others."""
+        """None for a client that may connect; for any other the response that says why not."""
         why = self._refusal(request)
         if why is None:
             return None
@@ -182,7 +182,7 @@ class WebSocketLink:
 
 
 class _Client:
-    """One connected client. ``unanswered`` : answers that it did not read in time. ``meter`` : of all clients."""
+    """One connected client. ``unanswered`` : answers lost because it did not read. ``meter`` : of all clients."""
 
     def __init__(self, connection: ServerConnection, sink: CommandSink, start_ns: int, meter: Meter) -> None:
         host, port = connection.remote_address[:2]
@@ -193,7 +193,7 @@ class _Client:
         self._budget, self._counted_s, self._warned_s = _BURST, time.monotonic(), 0.0
 
     async def talk(self) -> None:
-        """Until the client goes."""
+        """Serve the client until it disconnects."""
         sending = asyncio.create_task(self._send())
         try:
             async for text in self._connection:
@@ -225,9 +225,9 @@ class _Client:
         return True
 
     def _put(self, reply: Reply | None) -> None:
-        """Let an answer wait to be sent; None wakes the sender, which may have a new subscription."""
+        """Queue an answer to be sent; None only wakes the sender, which may have a new subscription to serve."""
         if reply is None and not self._waiting.empty():
-            return  # it wakes for what waits already, and the place is for an answer
+            return  # what waits already wakes it, and None would take the place of an answer
         try:
             self._waiting.put_nowait(reply)
         except asyncio.QueueFull:

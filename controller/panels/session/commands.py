@@ -17,7 +17,7 @@ from controller.takes.livelink import Take
 from controller.takes.timeline import Timeline
 from surface.head.model.light import LightPoints
 
-_CALM_S = 0.6
+_NEUTRAL_S = 0.6
 _NOTHING_SHOWN = Show("neutral", 1.0)
 
 
@@ -54,7 +54,7 @@ class History:
 
 
 class Commands:
-    """Changes what the user has set, tells the body, and takes changes back without limit.
+    """Changes what the user has set, sends it to the body, and undoes changes without limit.
 
     send : sends requests to the body. life : amount of idle motion at first.
     show_moves : draws the control points moved by (n, 3) mm, or where they were for None.
@@ -93,7 +93,7 @@ class Commands:
         return History(self.now, tuple(self._past), tuple(self._future))
 
     def carry_on(self, history: History) -> None:
-        """Go on with what was set in another window: tell the body, and take back and do again as there."""
+        """Continue with the history of another window: send its settings to the body; undo and redo work as there."""
         self._past, self._future = list(history.past), list(history.future)
         self._apply(history.now)
         self.end_step()
@@ -166,7 +166,7 @@ class Commands:
         self._remember()
         kept = {name: getattr(self.now, name) for name in ("life", "moves", "light", "look", "timeline", "take")}
         self.now = Settings(**kept)
-        self.send(Neutral(_CALM_S))
+        self.send(Neutral(_NEUTRAL_S))
 
     def change(self, to: Settings, step: Hashable = None) -> None:
         """Set everything that differs; changes with one ``step``, as of one drag, are taken back together."""

@@ -46,7 +46,7 @@ class Job:
     def _run(self) -> None:
         try:
             self._result = self._work(self)
-        except BaseException as error:  # noqa: BLE001  finish() tells it
+        except BaseException as error:  # noqa: BLE001  finish() reports it
             self._error = error
 
     @property
@@ -59,7 +59,7 @@ class Job:
         self._thread.join(limit_s)
 
     def finish(self, problems: Problems) -> None:
-        """Hand over the result, or tell the error; neither of a cancelled one."""
+        """Deliver the result, or report the error; neither for a cancelled job."""
         if self.replaced:
             return
         try:

@@ -18,7 +18,7 @@ class NextRun:
     """A stage to open.
 
     vocabularies : files that it has behind its own ones.
-    carried : what was set in the window, with what can be taken back; None begins anew. names : its parameters.
+    carried : what was set in the window, with its undo history; None: nothing was. names : its parameters.
     held : new parameters that are held besides.
     """
 

@@ -28,7 +28,7 @@ def save_expression(
 ) -> Floats:  # fmt: skip
     """Add the face ``values`` (P,) to a vocabulary file as an expression; returns its weights (P,), as written.
 
-    The rest of the file stays as it is, comments included; a file that is not there is begun. Values below 0.005 are
+    The rest of the file stays as it is, comments included; a missing file is created. Values below 0.005 are
     left out, the others are rounded to 3 decimals.
 
     known : the expressions that there are. earlier : files whose expressions those of this file may mix.

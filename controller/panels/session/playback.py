@@ -68,7 +68,7 @@ class Playback:
         if path != self._measured[0]:
             try:
                 self._measured = path, sound_length_s(path)
-            except ControllerError:  # telling it again in every frame would help nobody: playing it tells it
+            except ControllerError:  # playing reports it; reporting it again in every frame would be of no use
                 self._measured = path, 0.0
         return self._measured[1]
 

@@ -93,7 +93,7 @@ def _opened(path: Path) -> Iterator[Sound]:
 
 
 def _blocks(sound: Sound) -> Iterator[bytes]:
-    """What is left of a sound."""
+    """The remaining part of a sound."""
     while block := sound.read(_BLOCK):
         yield block
 

@@ -80,7 +80,7 @@ class Calibrating:
         self._jogged = {}
 
     def save(self, name: str) -> None:
-        """Write the calibrations; what cannot be written is told."""
+        """Write the calibrations; reports what cannot be written."""
 
         def write() -> None:
             paths = self._captures.save(name)

@@ -122,7 +122,7 @@ class MouseEditing:
         self._commands.look((float(point[0]), float(point[1]), float(point[2])), "gaze")
 
     def _use(self, imgui: Any, io: Any, pixel: tuple[float, float], screen: Screen, outside: bool) -> None:
-        """Use the tool where Ctrl and the mouse are pressed, and go on with what was begun."""
+        """Use the tool where Ctrl and the mouse are pressed, and continue an action that has begun."""
         tool, editor = self.brush.tool, self.editor
         sculpt = io.key_shift or tool == "pull the skin"
         if io.key_ctrl:
@@ -193,7 +193,7 @@ class MouseEditing:
         self.message = ""
 
     def _may_add(self) -> bool:
-        """Whether points can be added or taken out now; why not is told."""
+        """Whether points can be added or removed now; ``message`` says why not."""
         if not self.can_add:
             self.message = "points cannot be added here: open a stage with omote edit"
         elif not self.editor.ready:

@@ -28,7 +28,7 @@ class HeadChoice:
     """Chooses between heads; each keeps what was set of it, with its own undo.
 
     sources : in the order of the stage; empty for a stage of one head. values, state : what the window reads.
-    tell : sends requests to the body; one that is for no head by name is for the first.
+    tell : sends requests to the body; a request that names no head is for the first one.
 
     Attributes
     ----------

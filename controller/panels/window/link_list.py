@@ -10,7 +10,7 @@ from controller.panels.window.colours import AMBER, BRIGHT_GREEN, GREY
 
 
 class LinkList:
-    """Draws them; ``feed`` : what the body tells of them."""
+    """Draws them. feed : the body's reports on links."""
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed

@@ -55,7 +55,7 @@ class Words:
 class Saving:
     """Draws the name, the kind and the button.
 
-    newest : the newest parameters (P,). send : tells the body of a saved expression.
+    newest : the newest parameters (P,). send : reports a saved expression to the body.
 
     Attributes
     ----------
@@ -114,8 +114,8 @@ class Saving:
         imgui.text_wrapped(words)
 
     def save(self, name: str, kind: Kind | None = None) -> None:
-        """Save under a name, or one that omote chooses, as the chosen kind without ``kind``; what cannot be saved is
-        told."""
+        """Save under a name, or one that omote chooses, as the chosen kind without ``kind``; reports what cannot be
+        saved."""
         name = name.strip() or self.suggested(kind or self.kind)
         makers: dict[Kind, Callable[[str], str]] = {
             "expression": lambda name: self._expression(name, "user"),

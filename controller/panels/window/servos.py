@@ -12,13 +12,13 @@ from controller.panels.window.colours import AMBER, BRIGHT_GREEN, GREY, LAYERS, 
 
 _PLOT_LINES = 11.0
 _HOT_C = 60.0
-"""From here on a temperature is drawn in amber; what a model endures its own alarm tells."""
+"""Temperature from which on a value is drawn in amber; the limit of a model shows in its own alarm."""
 
 
 class ServoBars:
     """Draws them.
 
-    feed : what the body tells of them. below : draws more about the servos that were clicked.
+    feed : the body's reports on servos. below : draws more about the servos that were clicked.
     """
 
     def __init__(self, feed: Feed, below: Callable[[list[Mapping[str, Any]]], None] = lambda servos: None) -> None:

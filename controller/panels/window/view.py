@@ -53,7 +53,7 @@ class View:
             self.overlays()
 
     def toggle_show(self) -> None:
-        """Pause the show that plays, or let it go on; the first one begins where none was begun."""
+        """Pause the show that plays, or let it go on; the first one begins where none has begun."""
         if not self._show and self._shows:
             self._play(self._shows[0])
         elif self._show:

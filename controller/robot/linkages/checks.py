@@ -11,7 +11,7 @@ from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import Parameters, did_you_mean
 from controller.robot.formulas import formula_faults
 from controller.robot.linkages.kind import LINKAGES, LinkageSettings
-from controller.robot.linkages.linked import LinkedChannels, input_names
+from controller.robot.linkages.linked_channels import LinkedChannels, input_names
 from controller.robot.settings import ChannelSettings, RobotSettings
 from drivers.base.errors import PluginError
 

@@ -1,4 +1,4 @@
-"""Tells from the sound of a voice which viseme the lips show, every 10 ms.
+"""Estimates from the sound of a voice which viseme the lips show, every 10 ms.
 
 A frame of 25 ms is reduced to the energies of 24 bands that are equally wide in mel, relative to the voice's own
 loudness. The shape of the lips follows from these bands, where formants and friction stand, and from those shortly
@@ -38,7 +38,7 @@ _LEAST_POWER = 1e-14
 class LipModel:
     """The network: ``hidden`` (INPUTS + 1, h) and ``out`` (h + 1, n) float64, the last row of each added to its sums.
 
-    visemes : names of the n visemes that it tells apart.
+    visemes : names of the n visemes that it distinguishes.
     """
 
     visemes: tuple[str, ...]

@@ -87,7 +87,7 @@ class Sound:
 def open_sound(stream: IO[bytes], name: str, raw_hz: int | None = None) -> Sound:
     """Read a sound's header; ``raw_hz`` : frames per second of signed 16 bit mono PCM without one.
 
-    The stream need not be seekable, and its header need not tell the length. Raises TakeError, with ``name``: no WAV,
+    The stream need not be seekable, and its header need not have the length. Raises TakeError, with ``name``: no WAV,
     or a format that omote does not decode.
     """
     if raw_hz is not None:

@@ -84,7 +84,7 @@ class Ssc32(Board):
         """A group move: with T all channels arrive together, with S none is faster; False = not understood.
 
         A move of several channels takes as long as its slowest member, so that they arrive together; a channel without
-        pulses is where it is told at once.
+        pulses jumps to its target at once.
         """
         group = _GROUP.fullmatch(line)
         if group is None:

@@ -110,8 +110,8 @@ class TextBoard(Board):
             self.refused += 1
         elif packet.kind == "query" and self._answer is not None:
             named: dict[str, float | str] = {"ch": servo, "id": servo, "name": self._names[servo]}
-            told = dict.fromkeys(VALUES, self.values[servo] or 0.0)
-            return [(servo, self._answer.fill({**told, **named}).encode())]
+            values = dict.fromkeys(VALUES, self.values[servo] or 0.0)
+            return [(servo, self._answer.fill({**values, **named}).encode())]
         else:
             self.values[servo] = value if packet.kind == "move" else None
         return []

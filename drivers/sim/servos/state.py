@@ -27,7 +27,7 @@ TRIPPED = 0xFF
 WATCHDOG_STEP_S = 0.02
 HEALTH_PERIOD_S = 0.1
 BROWN_OUT_V = 2.5
-"""Supply below which a servo's processor stops: it receives nothing, and starts anew when the supply is back."""
+"""Supply below which a servo's processor stops: it receives nothing, and restarts when the supply is back."""
 INVERTER_OFF, TURNING_ON, RUNNING, TURNING_OFF, HARDWARE_FAULT = 2, 4, 5, 6, 8
 """Controller State of Y-series servos."""
 BOOT_S = 0.25

@@ -1,4 +1,4 @@
-"""Parse, schedule and inject faults of a simulated bus: lost, late and corrupted replies, misbehaving servos and ports.
+"""Parse, schedule and inject faults of a simulated bus: lost, late and corrupt replies, faulty servos and ports.
 
 A fault is written ``kind[:ids][:value][:key=value ...]``, for example::
 
@@ -29,7 +29,7 @@ from drivers.base.errors import DriverError
 from drivers.packets.packet import MAX_ID
 
 LONGEST = 1e9
-"""No time and no number of steps is larger."""
+"""Largest time (s), count and number of steps that a fault may have."""
 
 
 class Kind(NamedTuple):

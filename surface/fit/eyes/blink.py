@@ -63,7 +63,7 @@ def _angle(local: Floats) -> Floats:
 
 
 def _edges(local: Floats, edge: Ints, rest: Floats) -> _Edges:
-    """The edges of both lids where ``local (n, 3)`` are; upper and lower are told apart at rest, by the line between
+    """The edges of both lids where ``local (n, 3)`` are; upper and lower are distinguished at rest, by the line between
     the corners."""
     at_rest = rest[edge]
     first, last = at_rest[np.argmin(at_rest[:, 0])], at_rest[np.argmax(at_rest[:, 0])]

@@ -25,7 +25,7 @@ STEP = np.radians(2.5)  # width of the rings in which a texture of an eye is loo
 RINGS = 28
 WHITE = np.radians(45.0), np.radians(70.0)  # rings that are white in every texture
 BESIDE = np.radians(4.0), np.radians(16.0)  # from an iris's edge: textures are brightest there, as lids shade the rest
-CLEAR = 0.07  # difference, in roots of linear colours, that tells an iris from the white
+CLEAR = 0.07  # difference, in roots of linear colours, by which an iris differs from the white
 WITHIN = 0.42, 0.85  # of an iris: between pupil and rim
 FRONT = 0.3  # least z of the normals of faces whose colour is the skin's
 OPAQUE = 0.5
@@ -34,7 +34,7 @@ SKIN_RANGE, EYE_RANGE = (0.015, 0.85), (0.004, 0.80)  # linear: nothing on a fac
 
 @dataclass(frozen=True)
 class EyeColours:
-    """Linear RGB, None for what the mesh does not tell; iris_radius : in eyeball radii."""
+    """Linear RGB, None for colours that the mesh does not have. iris_radius : in eyeball radii."""
 
     iris: Floats | None
     white: Floats | None
@@ -42,7 +42,7 @@ class EyeColours:
 
 
 def skin_colour(mesh: FitMesh, skin: Bools) -> Floats | None:
-    """(3,) linear RGB of most of the skin (f,) that faces front; None where the mesh does not tell."""
+    """(3,) linear RGB of most of the skin (f,) that faces front; None where the mesh has no colours there."""
     ids = np.flatnonzero(skin)
     tri = mesh.vertices[mesh.faces[ids, :3]]
     normal = np.cross(tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0])
@@ -67,7 +67,7 @@ def _most(samples: Samples, chosen: Bools, limits: tuple[float, float]) -> Float
 
 
 def eye_colours(mesh: FitMesh, eyes: Eyes) -> list[EyeColours]:
-    """What the mesh tells of the left and the right eye."""
+    """The colours of the left and the right eye, as far as the mesh has them."""
     apart = float(np.linalg.norm(eyes.centres[0] - eyes.centres[1]))
     usual = eyes.iris / eyes.radius if eyes.iris > 0 else USUAL_IRIS * apart / eyes.radius
     usual = float(np.clip(usual, SMALLEST, LARGEST))

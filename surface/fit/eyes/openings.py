@@ -22,7 +22,7 @@ RINGS = 5  # of vertices around a hole, in which the lids' edges lie
 DEPTH, MOST_RINGS = 0.2, 60  # of a hole's width: on fine meshes edges lie in all rings that are so near; and no more
 SECTOR = 0.4  # of a vertex's share of the whole turn: how far aside of it the edge is looked for
 WIDE, CORNERS = 0.12, 0.15  # the least of that, rad: holes may be finer than skin; but not so near a corner, in widths
-TOLD = 0.97  # of a hole's distance from its middle: an edge that is no nearer is the hole itself
+NEARER = 0.97  # an edge must be nearer than this share of the hole's distance from its middle; else it is the hole
 FULL_WIDTH, FULL_HEIGHT = 0.40, 0.70  # least radius of an eyeball, in widths and heights of the opening it has to fill
 PRIOR = 6.0  # weight of the usual radius, in vertices of an edge
 SHAPES = ("eyeBlink", "eyeWide", "eyeSquint", "eyeLookUp", "eyeLookDown")  # that slide lids over the eyeball
@@ -96,7 +96,7 @@ def _edge(mesh: FitMesh, skin: Bools, hole: Ints) -> Ints:
     own, away = _polar(mesh.vertices[hole], middle)
     turn = np.abs((angle - own[:, None] + np.pi) % (2 * np.pi) - np.pi)
     beside = np.where(turn < _sectors(mesh.vertices[hole])[:, None], off, np.inf)
-    nearest = np.where(beside.min(axis=1) < TOLD * away, ids[beside.argmin(axis=1)], hole)
+    nearest = np.where(beside.min(axis=1) < NEARER * away, ids[beside.argmin(axis=1)], hole)
     return np.unique(nearest)
 
 

@@ -44,7 +44,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Side:
-    """One eye out of pieces: its faces, its sphere if it is round, the radius of its iris, mm, if a piece tells it."""
+    """One eye out of pieces: its faces, its sphere if it is round, the radius of its iris, mm, if a piece shows it."""
 
     faces: Ints
     ball: Ball | None

@@ -40,7 +40,7 @@ class Eyes:
     centres : (2, 3) about which they turn, left first, mm; radius : mm, 0 without eyes.
     faces : (f,) bool, faces of the mesh that are eyes and no skin.
     drawn : (f,) bool, those of ``faces`` that are no sockets. skin : (f,) bool, faces of the face.
-    iris : radius of the iris, mm; 0 where no piece tells.
+    iris : radius of the iris, mm; 0 where no piece shows it.
     openings : between the lids, left first; empty where they are not holes of the skin.
     notes : what was found, in words.
     """
@@ -107,7 +107,7 @@ def _without_margins(mesh: FitMesh, eyes: Eyes, middle: float, near: Floats | No
 
 
 def _piece_sides(mesh: FitMesh, middle: float, near: Floats | None, kept: Bools) -> tuple[list[Side], str, Bools]:
-    """Eyes that are pieces, what tells that they are, and all faces in them."""
+    """Eyes that are pieces, words on how they were recognised, and all faces in them."""
     sides = named_sides(mesh, middle)
     what = "pieces named as eyes"
     pieces = pieces_of(mesh, np.arange(len(mesh.faces)))

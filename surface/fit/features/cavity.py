@@ -1,5 +1,5 @@
-"""Tell which islands of a face line its mouth. They become a part of their own: what nobody sees from outside needs no
-control points of the face, and has the colour of a mouth.
+"""Determine which islands of a face line its mouth. They become a separate part: surfaces that nobody sees from outside
+need none of the face's control points, and have the colour of a mouth.
 """
 
 from __future__ import annotations

@@ -12,8 +12,8 @@ from surface.head.model.placement import Placement
 INSIDE = {"teeth": "teeth", "tongue": "tongue", "brow": "brows or hair", "lash": "lashes"}  # materials, in words
 CLOSING = ("eyeBlinkLeft", "eyeBlinkRight")
 NO_PLACE = (
-    "the head's place is not known: nothing tells where its eyes are; it stays where it is in the file, and cameras "
-    "look at its outline (shapes named eyeBlinkLeft and eyeBlinkRight, or two eyeballs, would tell)"
+    "the head's place is not known, because its eyes were not found; it stays where it is in the file, and cameras "
+    "look at its outline (shapes named eyeBlinkLeft and eyeBlinkRight, or two eyeballs, would show the eyes)"
 )
 NO_EYES = (
     "no eyes: no two balls in the mesh are eyes, so the head has none and its lids close over nothing (export the "

@@ -104,7 +104,7 @@ def _pieces(mesh: FitMesh, gone: Bools | None = None) -> tuple[Ints, Floats]:
 
 
 def _presence(mesh: FitMesh, label: Ints, sizes: Floats, scale: float) -> Floats:
-    """How much of a face each piece is: its area, times the shapes that move it; little of it for hair and the like."""
+    """How much of a face each piece is: its area, times the shapes that move it; reduced for hair."""
     used = mesh.faces >= 0
     piece = np.zeros(len(mesh.vertices), np.int64)
     piece[mesh.faces[used]] = np.repeat(label, used.sum(axis=1))
@@ -152,7 +152,7 @@ def _part(
     )  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth
-    recipe = PartRecipe(name, material, "skin", [], request, budget, doubt_slivers=True)
+    recipe = PartRecipe(name, material, "skin", [], request, budget, downweight_slivers=True)
     return recipe, [open_flat_holes(straighten_holes(i)) for i in lay_out(mesh, islands)]
 
 

@@ -1,7 +1,7 @@
-"""What becomes of the pieces of a mesh that are neither its face nor its eyeballs, by their kind and their size.
+"""Decide what becomes of the pieces of a mesh that are neither its face nor its eyeballs, by their kind and size.
 
-The rule of each kind is in ``surface/fit/source/kinds.toml``. Clothes and the like are left out before, when the mesh
-is loaded.
+The rule of each kind is in ``surface/fit/source/kinds.toml``. Clothes, hats and glasses were left out before, when the
+mesh was loaded.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ def by_object(mesh: FitMesh, label: Ints, pieces: list[int], scale: float) -> di
 
 
 def _by_colour(mesh: FitMesh, chosen: Bools, kind: Kind) -> Kind:
-    """What a piece inside the mouth is by its colour, where the mesh tells it: one object often holds teeth and tongue,
-    and as teeth all of it would be a white wall."""
+    """The kind of a piece inside the mouth by its colour, where the mesh has colours: one object often has both teeth
+    and tongue, and as teeth all of it would be white."""
     found = sample_colours(mesh, np.flatnonzero(chosen), steps=2) if kind.name in INNER else None
     if found is None:
         return kind

@@ -26,7 +26,7 @@ TILTS = ("jawForward", "jawLeft", "jawRight")
 
 
 def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: Ints, hinge: Floats) -> Jaw:
-    """The jaw's path out of the lower teeth, which are rigid: rotation about the hinge and what is left, a glide."""
+    """The jaw's path from the lower teeth, which are rigid: rotation about the hinge, and the remainder as a glide."""
     rest = mesh.vertices[teeth]
     if "jawOpen" not in sources or not len(teeth):
         return Jaw(tuple(hinge.tolist()), 0.0, (0.0, 0.0, 0.0))

@@ -13,7 +13,7 @@ from surface.check.places import Places
 from surface.check.subject import Subject, pose_of
 from surface.fit.features.finish import PRODUCT
 from surface.fit.measures.closest import ClosestTree
-from surface.fit.measures.turned import TurnedFaces
+from surface.fit.measures.inside_out import InsideOutFaces
 from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, Turned, errors_of
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.head import Head
@@ -31,7 +31,7 @@ class _Pair:
         self.name, self.number = part.name, number
         self._uv = np.asarray(subject.parts[number].uv, np.float64)
         faces = mesh.faces[faces_of(mesh, part)]
-        self.turned = TurnedFaces(part, subject.parts[number])
+        self.turned = InsideOutFaces(part, subject.parts[number])
         self._cut = subject.parts[number].triangles.astype(np.int64), triangles(faces)
         self._used = np.unique(self._cut[0]), np.unique(self._cut[1])
         at = subject.rest[number].astype(np.float64), mesh.vertices

@@ -1,8 +1,8 @@
-"""Mend what sticks out of a fitted head though the mesh has nothing there, and what is turned over: control points that
-the samples hardly hold.
+"""Correct control points of a fitted head that the samples hardly determine: where the surface sticks out of the mesh,
+or is inside out.
 
-Such a point is put where its neighbours say, at rest or in one shape. A mend that does not bring the surface nearer to
-the mesh is taken back. What a face is refused for after that is reported by :func:`faults_of`.
+Such a point is moved to where its neighbours suggest, at rest or in one shape. A change that does not bring the surface
+nearer to the mesh is undone. :func:`faults_of` says why a face is refused after that.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from surface.head.model.meshes import make_surface
 from surface.head.posing.contact import weights_at
 
 STICKS_OUT_MM = 6.0  # of a head of usual size: a surface so far from the mesh is mended
-TURNED_MM2 = 10.0  # of a head of usual size: so much surface that is turned over is mended
-REFUSED_MM, REFUSED_MM2 = 20.0, 100.0  # a face so far from the mesh, or of which so much is turned over, is refused
+TURNED_MM2 = 10.0  # area that is inside out, on a head of usual size, from which on it is mended
+REFUSED_MM, REFUSED_MM2 = 20.0, 100.0  # distance from the mesh, and area inside out, for which a face is refused
 ASTRAY_MM = 4.0  # and one of which at rest a hundredth is further from it
 ROUNDS = 3
 RINGS = (0, 1, 3)  # of neighbours that are put right with the points that hold a place, until it gets better
@@ -53,7 +53,7 @@ def mend_spikes(
                 break
         if not better:
             break
-        notes.append(f"mended: {moved} control points stuck out or were turned over: {_in_words(wanted)}")
+        notes.append(f"mended: {moved} control points stuck out or were inside out: {_in_words(wanted)}")
         head, dense = trial, after
     return head, dense, notes
 
@@ -84,15 +84,15 @@ def _wanted(dense: DenseErrors, limit: float) -> list[tuple[str, str, str]]:
 
 
 def _turned(dense: DenseErrors, scale: float) -> list[tuple[str, str, str]]:
-    """Parts and shapes that are turned over somewhere, and how much; of a part that is at rest only that."""
+    """Parts and shapes that are inside out somewhere, and how much; of a part that is so at rest only that."""
     far = {key: over.mm2 for key, over in dense.turned.items() if over.mm2 > TURNED_MM2 * scale**2}
     return [(p, s, f"{mm2:.0f} mm²") for (p, s), mm2 in far.items() if s == NEUTRAL or (p, NEUTRAL) not in far]
 
 
 def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, str, str]], limit: float) -> bool:
-    """Does everything that was mended stick out less, or is less of it turned over, and nothing else more?
+    """Whether everything that was mended sticks out less, or less of it is inside out, and nothing else got worse.
 
-    limit : what sticks out by less than half of it, mm, may do so: points along a bent surface end a little off it.
+    limit : mm; parts may stick out by half of it, since points moved along a bent surface end a little beside it.
     """
     was, now = _furthest(before), _furthest(after)
     over, left = (
@@ -178,15 +178,15 @@ def _sees(part: PartData, place: Floats, others: Floats) -> Bools:
 
 
 def faults_of(dense: DenseErrors, parts: Sequence[FittedPart], scale: float) -> list[str]:
-    """What a fitted head is refused for, in words: a face, the first part, that does not follow its mesh, that sticks
-    out of it by far, or that is turned over."""
+    """Messages that say why a fitted head is refused: its face, the first part, does not follow the mesh, sticks far
+    out of it, or is inside out."""
     shapes = dense.parts.get(parts[0].name, {}) if parts else {}
     out = []
     if NEUTRAL in shapes and not (shapes[NEUTRAL].to_mesh.measured and shapes[NEUTRAL].to_surface.measured):
         return ["nothing of the fitted face could be measured: all of it lies in folds"]
     if NEUTRAL in shapes and not all(x <= ASTRAY_MM * scale for x in _both(shapes[NEUTRAL], "p99")):
         most = max(_both(shapes[NEUTRAL], "p99"))
-        out.append(f"the fitted face does not follow the mesh: a hundredth of it is {most:.0f} mm off or more")
+        out.append(f"the fitted face does not follow the mesh: 1 % of it is {most:.0f} mm away or more")
     far = [(max(_both(b, "max")), s == NEUTRAL, s) for s, b in shapes.items()]
     far = [x for x in far if not x[0] <= REFUSED_MM * scale]
     if far:
@@ -196,7 +196,7 @@ def faults_of(dense: DenseErrors, parts: Sequence[FittedPart], scale: float) -> 
     over = {s: x.mm2 for (p, s), x in dense.turned.items() if shapes and p == parts[0].name}
     shape = max(over, key=lambda s: over[s], default=NEUTRAL)
     if over.get(shape, 0.0) > REFUSED_MM2 * scale**2:
-        out.append(f"{over[shape]:.0f} mm² of the fitted face are turned over {_when(shape)}")
+        out.append(f"{over[shape]:.0f} mm² of the fitted face are inside out {_when(shape)}")
     return out
 
 
@@ -218,7 +218,7 @@ def turned_faces(mesh: FitMesh) -> list[str]:
         if count:
             name = _name_of(mesh, island.vertex)
             flipped[name] = flipped.get(name, 0) + count
-    return [f"{n} faces{f' of {name!r}' if name else ''} are turned over in (u, v)" for name, n in flipped.items()]
+    return [f"{n} faces{f' of {name!r}' if name else ''} are flipped in (u, v)" for name, n in flipped.items()]
 
 
 def _name_of(mesh: FitMesh, vertices: Ints) -> str:

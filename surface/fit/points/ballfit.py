@@ -11,7 +11,7 @@ from surface.base.arrays import Floats
 ROUNDS = 40  # of reweighting; each about halves the influence of points off the sphere
 LOOSE = 0.005  # of the radius: no vertex of a mesh is nearer to a sphere than its facets are
 FRONT = np.cos(np.radians(60.0))  # an eye's front is within so many degrees of the axis along which it looks
-LEAST_TURN = np.radians(4.0)  # a shape that turns an eye by less does not tell the centre
+LEAST_TURN = np.radians(4.0)  # a shape that turns an eye by less does not determine the centre
 
 
 @dataclass(frozen=True)

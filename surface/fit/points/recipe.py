@@ -28,7 +28,7 @@ class PartRecipe:
     """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted.
 
     ``tiled`` : its islands are still to be put into tiles of their own; ``wrapped`` : one skin goes round all of them;
-    ``doubt_slivers`` : nothing is known of its faces' forms and sizes.
+    ``downweight_slivers`` : its faces may be of any form and size; see :func:`surface.fit.source.chart.make_chart`.
     """
 
     name: str
@@ -39,7 +39,7 @@ class PartRecipe:
     budget: tuple[int, float, int]
     tiled: bool = False
     wrapped: bool = False
-    doubt_slivers: bool = False
+    downweight_slivers: bool = False
 
     def holds(self, vertex: float) -> bool:
         """Is the vertex in one of the ranges?"""

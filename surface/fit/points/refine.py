@@ -174,8 +174,8 @@ def _with_samples(chart: Chart, places: Places) -> Chart:
         "folded": np.zeros(len(places.uv), bool),
     }  # fmt: skip
     joined: dict[str, Any] = {k: np.concatenate([getattr(chart, k), v]) for k, v in rows.items()}
-    if chart.care is not None:
-        joined["care"] = np.concatenate([chart.care, np.ones(len(places.uv))])
+    if chart.importance is not None:
+        joined["importance"] = np.concatenate([chart.importance, np.ones(len(places.uv))])
     return replace(chart, mix=vstack([chart.mix, places.mix]).tocsr(), **joined)
 
 
@@ -193,9 +193,11 @@ def _measured(net: Net, b: csr_matrix, targets: Floats, x: Floats) -> Fitted:
 def need(chart: Chart, fitted: Fitted, request: FitRequest) -> Floats:
     """(m,) error of each sample, 1 = just good enough; the worse of neutral and the worst shape."""
     worst = fitted.shape_error.max(axis=0) if len(fitted.shape_error) else np.zeros_like(fitted.error)
-    care = 1.0 if chart.care is None else chart.care
+    importance = 1.0 if chart.importance is None else chart.importance
     return (
-        care * np.minimum(chart.weight, 1.0) * np.maximum(fitted.error / request.neutral_mm, worst / request.shape_mm)
+        importance
+        * np.minimum(chart.weight, 1.0)
+        * np.maximum(fitted.error / request.neutral_mm, worst / request.shape_mm)
     )
 
 

@@ -106,7 +106,7 @@ class DenseErrors:
     added : parts of the head that the mesh does not have. left_out : pieces of the mesh that the head does not have.
     samples : measured in every shape, both ways.
     sticking : by part and shape, (k, 2) in (u, v): vertices of the surface that are further from the mesh than a limit.
-    turned : by part and shape, what of the surface is turned over.
+    turned : by part and shape, the area that is inside out.
     corrected : shapes that correctives of the head change on purpose; they were measured without these.
     """
 

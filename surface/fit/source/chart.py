@@ -1,7 +1,8 @@
-"""Make charts: one or more islands in their own (u, v) tiles, with samples to fit.
+"""Make charts: what a part of a mesh gives the surface fit, with every island in its own tile of (u, v).
 
-Samples of a chart are its mesh vertices, face centres and border edge centres. Each is a fixed mix of mesh vertices, so
-the neutral face and every shape are sampled by one sparse product.
+An island is a connected piece of the mesh's texture coordinates. Samples of a chart are its mesh vertices, face centres
+and centres of border edges. Each is a fixed linear combination of mesh vertices, so one sparse product samples the
+neutral face or any of its shapes.
 """
 
 from __future__ import annotations
@@ -17,15 +18,15 @@ from surface.fit.source.bends import slope_trust
 from surface.fit.source.islands import Island, boundary_loops
 from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, triangles
 
-TILE = 2.0  # distance between the tiles of two islands: supports of one cannot reach the next
-NARROW = 0.7  # a hole lower than this part of its width is a slit
-BORDER_WEIGHT = 8.0  # samples on a border hold the surface to its neighbour
-CLUTTER = (4.5, 7.0)  # stretch, in medians, where a fold of the mesh begins and where it is only held loosely
-CLUTTER_WEIGHT = 0.05
-INNER = np.array([4.0, 1.0, 1.0]) / 6.0  # of a triangle's corners: a place that is no sample
-QUARTER = np.array([0.75, 0.25])  # of an edge of the border
-THIRD = 0.4  # of the mesh's spacing: that of such places
-SLOPE_WEIGHT = 2.0  # of a face's slope, relative to a sample's position
+TILE = 2.0  # distance in u between the tiles of two islands: too far for control points to reach the next tile
+NARROW = 0.7  # a hole whose height is less than this part of its width is a slit
+BORDER_WEIGHT = 8.0  # of samples on a border, where the surface has to meet its neighbour
+FOLD_STRETCH = (4.5, 7.0)  # stretch, in medians of it, where a fold of the mesh begins and where it is complete
+FOLD_WEIGHT = 0.05  # of samples deep in a fold
+INNER = np.array([4.0, 1.0, 1.0]) / 6.0  # weights of a triangle's corners: a place of it where no sample lies
+QUARTER = np.array([0.75, 0.25])  # the same of an edge of the border
+THIRD = 0.4  # spacing of such places, relative to that of the mesh
+SLOPE_WEIGHT = 2.0  # of a face's slope, relative to that of a sample's position
 
 
 @dataclass(frozen=True)
@@ -39,8 +40,11 @@ class Cut:
 
 @dataclass(frozen=True)
 class Places:
-    """Places of a chart that are no samples: uv (d, 2), their mix (d, n) of the mesh's vertices, spacing (d, 2) of what
-    lies around them, and folded (d,), as in :class:`Chart`."""
+    """Places between the samples of a chart, where errors are measured.
+
+    uv : (d, 2). mix : (d, n) sparse, each as a combination of the mesh's n vertices. spacing : (d, 2), folded : (d,) as
+    in :class:`Chart`.
+    """
 
     uv: Floats
     mix: csr_matrix
@@ -48,24 +52,24 @@ class Places:
     folded: Bools
 
     def take(self, chosen: Bools) -> Places:
-        """Some of them, by a mask (d,)."""
+        """Those that a mask (d,) chooses."""
         rows = np.flatnonzero(chosen)
         return Places(self.uv[rows], self.mix[rows], self.spacing[rows], self.folded[rows])
 
 
 @dataclass(frozen=True)
 class Chart:
-    """Everything the fit needs of one part.
+    """What the surface fit needs to know of one part.
 
     uv : (m, 2) float64, the samples.
-    mix : (m, n) sparse, the samples out of the mesh's n vertices.
+    mix : (m, n) sparse, each sample as a combination of the mesh's n vertices.
     weight : (m,) float64, of each sample in least squares.
-    spacing : (m, 2) float64, distance of mesh vertices around each sample, in u and in v.
-    folded : (m,) bool, samples inside folds (nostrils, ear canals) that are not measured.
+    spacing : (m, 2) float64, distance between mesh vertices around each sample, in u and in v.
+    folded : (m,) bool, samples inside folds (nostrils, ear canals), where errors do not count.
     loops : closed polylines (k, 2) in (u, v); loop_vertices : the mesh vertex of each of their points.
-    cuts : slits of the chart; slopes : what the surface's derivatives should be, if wanted.
-    between : places all over the chart between its samples, for looking whether the surface strays there.
-    care : (m,) how much an error of each sample counts when control points are added; all alike without.
+    cuts : slits of the chart. slopes : derivatives that the surface should have; None: only positions are fitted.
+    between : places all over the chart where the surface is compared with the mesh between the samples.
+    importance : (m,) factor of each sample's error when control points are added; None: 1 for all.
     """
 
     uv: Floats
@@ -78,22 +82,24 @@ class Chart:
     cuts: list[Cut] = field(default_factory=list)
     slopes: Slopes | None = None
     between: Places | None = None
-    care: Floats | None = None
+    importance: Floats | None = None
 
     def hole_near(self, vertices: Floats, eye: Floats) -> int:
-        """Which of the loops has its rim, on a mesh's vertices (n, 3), nearest to an eyeball's centre (3,)."""
+        """Number of the loop whose mean, over mesh vertices (n, 3), is nearest to an eyeball's centre (3,)."""
         return int(np.argmin([np.linalg.norm(vertices[ids].mean(axis=0) - eye) for ids in self.loop_vertices]))
 
 
-def make_chart(mesh: FitMesh, islands: list[Island], *, normalise: bool = True, doubt_slivers: bool = False) -> Chart:
+def make_chart(
+    mesh: FitMesh, islands: list[Island], *, normalise: bool = True, downweight_slivers: bool = False
+) -> Chart:
     """Lay the islands side by side and sample them.
 
-    ``normalise=False`` keeps the mesh's own (u, v), for a single island that is known to fill the unit square.
-    ``doubt_slivers`` : faces may be of any form (see :func:`surface.fit.source.chart.face_slopes`), and large beside
-        what they bend round (see :func:`surface.fit.source.bends.slope_trust`).
+    normalise : False keeps the mesh's own (u, v), for a single island that is known to fill the unit square.
+    downweight_slivers : slopes count less at long thin faces (:func:`face_slopes`), and at faces that are large for the
+        curvature of what they show (:func:`surface.fit.source.bends.slope_trust`).
     """
     placed = [_place(island, k) if normalise else island for k, island in enumerate(islands)]
-    pieces = [_piece(mesh, island, doubt_slivers=doubt_slivers) for island in placed]
+    pieces = [_piece(mesh, island, downweight_slivers=downweight_slivers) for island in placed]
     rows: dict[str, Any] = {
         k: np.concatenate([getattr(p, k) for p in pieces]) for k in ("uv", "weight", "spacing", "folded")
     }
@@ -109,7 +115,7 @@ def join_places(parts: list[Places]) -> Places:
     return Places(uv, vstack([p.mix for p in parts]).tocsr(), spacing, folded)
 
 
-def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
+def _piece(mesh: FitMesh, island: Island, *, downweight_slivers: bool) -> Chart:
     """The chart of one island."""
     rows, on_border = _sample_rows(island)
     n = len(mesh.vertices)
@@ -118,23 +124,23 @@ def _piece(mesh: FitMesh, island: Island, *, doubt_slivers: bool) -> Chart:
     around = [loop for k, loop in enumerate(boundary_loops(island)) if k == 0 or _is_open(island.uv[loop])]
     return Chart(
         rows @ island.uv, rows @ identity(n, format="csr")[island.vertex],
-        _loosened(sampled) * np.where(on_border, BORDER_WEIGHT, 1.0), rows @ _spacing(island), sampled > 0.5,
+        _fold_weight(sampled) * np.where(on_border, BORDER_WEIGHT, 1.0), rows @ _spacing(island), sampled > 0.5,
         [island.uv[loop] for loop in around], [island.vertex[loop] for loop in around],
         [c for loop in around[1:] if (c := slit_of(island.uv[loop])) is not None],
-        _slopes(mesh, island, SLOPE_WEIGHT * _loosened(fold), doubt_slivers=doubt_slivers),
+        _slopes(mesh, island, SLOPE_WEIGHT * _fold_weight(fold), downweight_slivers=downweight_slivers),
         _between(island, n, fold),
     )  # fmt: skip
 
 
-def _slopes(mesh: FitMesh, island: Island, weight: Floats, *, doubt_slivers: bool) -> Slopes:
-    slopes = face_slopes(island, len(mesh.vertices), weight, doubt_slivers=doubt_slivers)
-    trust = slope_trust(mesh.vertices[island.vertex], island.faces) if doubt_slivers else 1.0
+def _slopes(mesh: FitMesh, island: Island, weight: Floats, *, downweight_slivers: bool) -> Slopes:
+    slopes = face_slopes(island, len(mesh.vertices), weight, downweight_slivers=downweight_slivers)
+    trust = slope_trust(mesh.vertices[island.vertex], island.faces) if downweight_slivers else 1.0
     return replace(slopes, weight=slopes.weight * trust)
 
 
 def _is_open(ring: Floats) -> bool:
-    """Has a loop (k, 2) at least three points that follow each other in different places? A rim of vertices that share
-    their texture coordinates is no hole in (u, v)."""
+    """Whether a loop (k, 2) is a hole in (u, v): at least three of its points differ from the one before. Vertices of a
+    rim may share their texture coordinates."""
     return int((ring != np.roll(ring, 1, axis=0)).any(axis=1).sum()) >= 3
 
 
@@ -150,14 +156,14 @@ def _between(island: Island, vertices: int, fold: Floats) -> Places:
 
 
 def _mix(corner: Ints, share: Floats, points: int) -> csr_matrix:
-    """(r, points) one share (k,) of each of the corners (r, k)."""
+    """(r, points) sparse rows with the weights ``share (k,)`` at the columns ``corner (r, k)``."""
     rows = np.repeat(np.arange(len(corner)), corner.shape[1])
     return csr_matrix((np.tile(share, len(corner)), (rows, corner.ravel())), shape=(len(corner), points))
 
 
-def _loosened(fold: Floats) -> Floats:
-    """Weights of points that lie in a fold by 0..1."""
-    return CLUTTER_WEIGHT + (1 - CLUTTER_WEIGHT) * (1 - fold)
+def _fold_weight(fold: Floats) -> Floats:
+    """Weights of points that lie in a fold by 0 (outside) to 1 (deep in it)."""
+    return FOLD_WEIGHT + (1 - FOLD_WEIGHT) * (1 - fold)
 
 
 def slit_of(loop: Floats) -> Cut | None:
@@ -203,14 +209,14 @@ def _spacing(island: Island) -> Floats:
 
 
 def _fold(mesh: FitMesh, island: Island) -> Floats:
-    """How deep each point lies in a fold, 0..1: where little of (u, v) holds much surface."""
+    """(m,) how deep each point lies in a fold, 0..1: where a small area of (u, v) holds much surface."""
     f = island.faces
     area3 = face_areas(mesh.vertices[island.vertex], f)
     area2 = face_areas(np.pad(island.uv, ((0, 0), (0, 1))), f)
     stretch = np.sqrt(area3 / np.maximum(area2, 1e-12))
     if not stretch.any():
         return np.zeros(len(island.uv))
-    low, high = np.array(CLUTTER) * np.median(stretch[stretch > 0])
+    low, high = np.array(FOLD_STRETCH) * np.median(stretch[stretch > 0])
     depth = np.clip((stretch - low) / (high - low), 0, 1)
     used = f >= 0
     total = np.bincount(f[used], np.repeat(depth, used.sum(axis=1)), len(island.uv))
@@ -219,7 +225,7 @@ def _fold(mesh: FitMesh, island: Island) -> Floats:
 
 @dataclass(frozen=True)
 class Slopes:
-    """Slopes at the faces of a chart.
+    """Derivatives that the surface should have at the faces of a chart.
 
     uv : (f, 2) face centres; span : (f, 2) a face's extent in u and in v.
     mix_u, mix_v : (f, n) sparse; times the mesh's n vertices: what a surface's S_u, S_v times span should be.
@@ -233,12 +239,12 @@ class Slopes:
     weight: Floats
 
 
-def face_slopes(island: Island, vertices: int, weight: Floats, *, doubt_slivers: bool = False) -> Slopes:
+def face_slopes(island: Island, vertices: int, weight: Floats, *, downweight_slivers: bool = False) -> Slopes:
     """Slopes of an island of a mesh with ``vertices`` vertices; ``weight (m,)`` of its points.
 
-    With ``doubt_slivers`` a face counts as far as its form decides its slope. Corners that lie nearly on one line in
-    (u, v) say next to nothing of the slope across it: their errors come out larger by the variance inflation factor
-    1 / (1 - r^2), r the correlation of u and v over them, and so the weight is multiplied by 1 - r^2.
+    With ``downweight_slivers`` a face counts as far as its form determines its slope. Corners that lie nearly on one
+    line in (u, v) hardly determine the slope across it: the variance is larger by the variance inflation factor
+    1 / (1 - r^2), with r the correlation of u and v over the corners, so the weight is multiplied by 1 - r^2.
     """
     used = island.faces >= 0
     corner = np.where(used, island.faces, 0)
@@ -252,7 +258,7 @@ def face_slopes(island: Island, vertices: int, weight: Floats, *, doubt_slivers:
     place, shape = (np.repeat(np.arange(len(corner)), 4), island.vertex[corner].ravel()), (len(corner), vertices)
     mix_u, mix_v = (csr_matrix(((gradient[..., i] * span[:, i, None]).ravel(), place), shape=shape) for i in (0, 1))
     decided = np.linalg.det(moments)  # above 0 also without extent in u or v, where full weight does no harm
-    trust = decided / np.maximum((span**2).prod(axis=1), decided) if doubt_slivers else np.ones(len(corner))
+    trust = decided / np.maximum((span**2).prod(axis=1), decided) if downweight_slivers else np.ones(len(corner))
     return Slopes(centre, span, mix_u, mix_v, trust * np.where(used, weight[corner], np.inf).min(axis=1))
 
 

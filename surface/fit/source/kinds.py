@@ -47,7 +47,7 @@ def kinds() -> dict[str, Kind]:
 
 
 def kind_of(name: str) -> Kind:
-    """The kind that a piece's name tells; skin where no word in it is known.
+    """The kind of a piece by its name; skin where no word in it is known.
 
     The material decides where it is anything but skin, then the object. What lies on a person, such as clothes, is
     skin nevertheless where its material says so in words.
@@ -68,7 +68,7 @@ def material_of(name: str) -> str:
 
 
 def kind_name(name: str) -> str:
-    """Name of the kind that a piece's name tells."""
+    """Name of the kind of a piece, by the piece's name."""
     return kind_of(name).name
 
 
@@ -77,10 +77,10 @@ def is_known(name: str) -> bool:
     return any(_said(part) is not None for part in name.split("/"))
 
 
-def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
-    """Which faces (f,) are a person's own, not clothes, hats, glasses or the like; and what the others are, in words.
+def without_clothes(mesh: FitMesh) -> tuple[Bools, list[str]]:
+    """Which faces (f,) belong to the person and not to clothes, hats or glasses; and notes on what was left out.
 
-    Names are not believed where shapes move the piece as they move the face, or where nothing would be left.
+    Names do not count where shapes move the piece as they move the face, or where nothing would be left.
     """
     kept, notes = np.ones(len(mesh.faces), bool), []
     out: dict[str, list[str]] = {}
@@ -98,9 +98,9 @@ def unworn(mesh: FitMesh) -> tuple[Bools, list[str]]:
     return kept, notes + [f"{kind} left out: {listed(names)}" for kind, names in out.items()]
 
 
-def bare(mesh: FitMesh | MeshData, kept: Bools) -> tuple[Bools, list[str]]:
-    """Which of the faces ``kept`` (f,) show a person's skin or eyes: what is worn, grows on the skin or lies in the
-    mouth does not; and what the others are, in words. Names are not believed where nothing would be left."""
+def skin_and_eyes(mesh: FitMesh | MeshData, kept: Bools) -> tuple[Bools, list[str]]:
+    """Which of the faces ``kept`` (f,) are skin or eyes, not clothes, hair or parts inside the mouth; and notes on what
+    was left out. Names do not count where nothing would remain."""
     own, out = kept.copy(), dict[str, list[str]]()
     for k, name in enumerate(mesh.pieces):
         kind, there = kind_of(name), kept & (mesh.piece == k)
@@ -147,7 +147,7 @@ def _entries() -> dict[str, str]:
 
 @cache
 def _said(name: str) -> str | None:
-    """The kind that words in one name tell: by the longest of them, of two the last; skin only where there is no other,
+    """The kind by the words in one name: the longest word counts, of two the last; skin only where there is no other,
     and scaffolding wherever it is named."""
     words = [w.lower() for w in WORDS.findall(name)]
     spans = [(i, j) for i in range(len(words)) for j in range(i + 1, min(i + LONGEST, len(words)) + 1)]

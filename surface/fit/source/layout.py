@@ -1,8 +1,8 @@
-"""Lay out islands of an unknown mesh so that they can be charts.
+"""Change the texture coordinates of an unknown mesh's islands so that control points can be fitted in them.
 
-A mirrored half that lies on the other one in (u, v) becomes a separate island. Every island is turned so that up on
-the head is up in (u, v), since slits run along u, and scaled so that, on average, lengths in (u, v) are lengths on the
-surface. Holes that are squeezed flat are opened, so that (u, v) is about as long across a lid as along it.
+Where one half of a face lies on the other one in (u, v), mirrored, it becomes an island of its own. Every island is
+turned so that up on the head is up in (u, v), since slits run along u. It is scaled so that, on average, lengths in
+(u, v) are lengths on the surface. Flat holes are opened, so that lengths across a lid are about right, too.
 """
 
 from __future__ import annotations
@@ -17,21 +17,21 @@ from surface.fit.source.islands import Island, boundary_loops, signed_areas
 from surface.fit.source.mesh import FitMesh, components, directed_edges
 from surface.head.model.parameters import smoothstep
 
-LARGE = 0.03  # of an island's area: what runs the other way round in (u, v) and is smaller is a fold, not a half
-TILT = 0.35  # rad; holes that are tilted more do not say what is level
-HIGH = 0.7  # of their width: nor do holes that are higher than this
-FLAT = 0.05  # sine of a slope below which a surface has no up
-SMALLEST = 0.12  # tiles are as large as their islands, but never smaller than this
-COLUMNS = 33  # places along a hole at which its middle is looked up
-INSIDE = 0.7  # of half its height: further from the middle a slit is too near to the rim
-OPEN = 0.4  # height over width that a flat hole gets
+LARGE = 0.03  # least area of a mirrored half, relative to its island; smaller areas of that orientation are folds
+TILT = 0.35  # rad; holes that are tilted more do not show what is level
+HIGH = 0.7  # height by width from which on holes do not show it either
+FLAT = 0.05  # sine of a slope below which a surface has no upward direction
+SMALLEST = 0.12  # least size of an island in its tile, relative to the largest island
+COLUMNS = 33  # places along a hole at which its middle line is computed
+INSIDE = 0.7  # greatest distance of a slit from the middle line of its hole, in half heights of the hole
+OPEN = 0.4  # height by width that a flat hole gets
 BAND = 2.0  # half the height of the band that is stretched most, in heights of the hole
-REACH_V = 2.0  # up and down from the hole, in its widths: where the stretching fades
-REACH_U = 1.2  # and to the sides
+REACH_V = 2.0  # distance above and below the hole over which the stretching fades, in its widths
+REACH_U = 1.2  # the same to the sides
 
 
 def separate(island: Island) -> list[Island]:
-    """The island without overlap: parts that run clockwise in (u, v) and those that run anticlockwise."""
+    """The island cut into islands without overlap: faces that are clockwise in (u, v), and anticlockwise ones."""
     area = signed_areas(island)
     one, two = _neighbours(island)
     same = (area[one] > 0) == (area[two] > 0)
@@ -74,7 +74,7 @@ def lay_out(mesh: FitMesh, islands: list[Island]) -> list[Island]:
 
 
 def _upright(mesh: FitMesh, island: Island) -> Island:
-    """Anticlockwise, up is up, in mm."""
+    """The island turned and scaled: faces anticlockwise in (u, v), up on the head along v, lengths in mm."""
     uv = island.uv * ([-1.0, 1.0] if signed_areas(island).sum() < 0 else [1.0, 1.0])
     slope, weight = _slopes(mesh, replace(island, uv=uv))
     total = max(float(weight.sum()), 1e-30)
@@ -86,7 +86,7 @@ def _upright(mesh: FitMesh, island: Island) -> Island:
 
 
 def _levelled(island: Island) -> Island:
-    """The island turned a little more, so that its flat holes, mouth and lids, lie along u as slits do."""
+    """The island turned a little more, so that its flat holes (mouth and lids) lie along u, as slits do."""
     tilt, length = [], []
     for loop in boundary_loops(island)[1:]:
         across = island.uv[loop] - island.uv[loop].mean(axis=0)
@@ -124,10 +124,10 @@ def _in_tile(island: Island, k: int, largest: float) -> Island:
 
 
 def straighten_holes(island: Island) -> Island:
-    """The island with v shifted so that the middle line of every slit keeps to one v, where it did not.
+    """The island with v shifted so that the middle line of every hole with a slit has one v.
 
-    A slit runs along u from one end of its hole to the other: where the hole is bent or tilted it would cut the skin
-    beside it. The shift fades up and down and to the sides; u is unchanged.
+    A slit runs along u from one end of its hole to the other. In a bent or tilted hole it would cut the skin beside the
+    hole. The shift fades with the distance from the hole; u is unchanged.
     """
     for loop in boundary_loops(island)[1:]:
         rim = island.uv[loop]
@@ -137,7 +137,7 @@ def straighten_holes(island: Island) -> Island:
 
 
 def _straightened(uv: Floats, rim: Floats) -> Floats:
-    """All points (m, 2), shifted so that the hole with this rim is straight; as they are where its slit stays in it."""
+    """All points (m, 2), shifted so that the hole with this rim is straight; unchanged where a slit fits into it."""
     low, high = rim.min(axis=0), rim.max(axis=0)
     width, level = float(high[0] - low[0]), 0.5 * float(low[1] + high[1])
     u = low[0] + width * np.linspace(0.0, 1.0, COLUMNS)
@@ -152,7 +152,7 @@ def _straightened(uv: Floats, rim: Floats) -> Floats:
 
 
 def middle_line(rim: Floats, u: Floats) -> tuple[Floats, Floats]:
-    """Middle and half the height in v of a hole with this rim (k, 2) at places ``u (n,)`` along it."""
+    """Middle (n,) and half height (n,) in v of a hole with this rim (k, 2), at places ``u (n,)`` along it."""
     start, end = rim, np.roll(rim, -1, axis=0)
     middle, half = np.empty(len(u)), np.empty(len(u))
     for k, at in enumerate(np.clip(u, rim[:, 0].min(), rim[:, 0].max())):
@@ -168,8 +168,8 @@ def middle_line(rim: Floats, u: Floats) -> tuple[Floats, Floats]:
 def open_flat_holes(island: Island) -> Island:
     """The island with v stretched about the centre lines of its flat holes.
 
-    Within a hole's width lines of constant v, and with them slits, stay straight; further away the stretching fades. u
-    is unchanged.
+    Within a hole's width, lines of constant v stay straight, and slits with them. The stretching fades with the
+    distance from the hole; u is unchanged.
     """
     shift = np.zeros(len(island.uv))
     for loop in boundary_loops(island)[1:]:

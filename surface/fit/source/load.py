@@ -10,7 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats
 from surface.base.errors import FitError
-from surface.fit.source.kinds import piece_kinds, unworn
+from surface.fit.source.kinds import piece_kinds, without_clothes
 from surface.fit.source.mesh import FitMesh, bare_where_damaged, check_mesh, renumbered
 from surface.fit.source.names import NameMap, map_names, read_names
 from surface.fit.source.naming.expressions import with_expressions
@@ -75,7 +75,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)} | {"materials": tinted(raw)})
     if options.without:
         mesh = keep_faces(mesh, wanted_faces(mesh, options.without, str(path)))
-    kept, notes = unworn(mesh)
+    kept, notes = without_clothes(mesh)
     pieces = piece_kinds(mesh, kept)
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
     mesh = bare_where_damaged(mesh)
@@ -92,8 +92,8 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
 
 
 def _shapes(mesh: FitMesh, named: NameMap) -> dict[str, Floats]:
-    """The mesh's displacements by ARKit's names, before left and right are known. Moods of the whole face tell no
-    place; vowels that stand in for a shape of the mouth do."""
+    """The mesh's displacements by ARKit's names, before left and right are known. Moods of the whole face do
+    not show a place; vowels that stand in for a shape of the mouth do."""
     sources = {
         n: [(s.index, s.side) for s in every if not s.region or n in VOWELS] for n, every in named.sources.items()
     }  # fmt: skip

@@ -50,7 +50,7 @@ class NameMap:
     stand_ins : parameters made from a vowel, a viseme or a mood.
     presets : such shapes that are understood but not needed, since their parameters have shapes of their own.
     spare : shapes that mean what another shape already does.
-    mouth, eyes : shapes that tell where those are; none where no shape does.
+    mouth, eyes : shapes that show where these are; empty where no shape does.
     """
 
     sources: dict[str, list[Source]]

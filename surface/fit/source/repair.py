@@ -190,9 +190,9 @@ def _split(mesh: FitMesh, sides: _Sides, pairs: Ints, affected: Bools) -> FitMes
         np.where(alike, x, y) for x, y in ((sides.start[q], sides.stop[q]), (sides.stop[q], sides.start[q]))
     )
     used = np.flatnonzero(mesh.faces.ravel() >= 0)
-    calm = used[~affected[used // 4]]
-    a = np.concatenate([sides.start[p], sides.stop[p], calm])
-    b = np.concatenate([to_start, to_stop, n + mesh.faces.ravel()[calm]])
+    unaffected = used[~affected[used // 4]]
+    a = np.concatenate([sides.start[p], sides.stop[p], unaffected])
+    b = np.concatenate([to_start, to_stop, n + mesh.faces.ravel()[unaffected]])
     size = n + len(mesh.vertices)
     label = connected_components(coo_matrix((np.ones(len(a)), (a, b)), shape=(size, size)), directed=False)[1][used]
     # numbered by the vertices that they were, so that a mesh keeps its order

@@ -206,7 +206,7 @@ def front_seams(mesh: FitMesh, islands: list[Island], faces: Ints) -> float:
 
 
 def _front(mesh: FitMesh, faces: Ints) -> Bools:
-    """(n,) vertices that look forwards, where most of the movement is; none where shapes do not tell."""
+    """(n,) vertices that look forwards, where most of the movement is; none where the shapes do not show it."""
     used = np.unique(mesh.faces[faces])
     used = used[used >= 0]
     moved = np.linalg.norm(mesh.deltas[:, used], axis=2).sum(axis=0)

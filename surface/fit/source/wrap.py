@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats, Ints
-from surface.fit.source.chart import BORDER_WEIGHT, CLUTTER_WEIGHT, Chart
+from surface.fit.source.chart import BORDER_WEIGHT, FOLD_WEIGHT, Chart
 from surface.fit.source.islands import Island
 from surface.fit.source.mesh import FitMesh, intersect, triangles
 
@@ -34,7 +34,7 @@ def wrap_chart(mesh: FitMesh, islands: list[Island]) -> Chart:
     spacing = np.tile([1.0 / (STATIONS + FAN - 1), (1.0 + 2.0 * OVERLAP) / (AROUND - 1)], (len(uv), 1))
     loop = np.array([[0.0, 0.0], [END, 0.0], [END, 1.0], [0.0, 1.0]])
     sewn = np.array([-1, -2, -2, -1])  # both long sides are one line
-    weight = np.where(uv[:, 0] == 1.0, BORDER_WEIGHT, np.where(which < 0, CLUTTER_WEIGHT, 1.0))
+    weight = np.where(uv[:, 0] == 1.0, BORDER_WEIGHT, np.where(which < 0, FOLD_WEIGHT, 1.0))
     return Chart(uv, mix, weight, spacing, which < 0, [loop], [sewn])
 
 

@@ -14,7 +14,7 @@ from surface.fit.features.findings import findings
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.anatomy import Eyes, Landmarks
 from surface.fit.surfaces.build import make_part, with_mesh
-from surface.fit.surfaces.carried import with_expressions
+from surface.fit.surfaces.expressions import with_expressions
 from surface.fit.surfaces.eyes import Eyeballs, find_eyeballs
 from surface.fit.surfaces.facing import seen
 from surface.fit.surfaces.groupfile import Context, add_group_files

@@ -1,4 +1,4 @@
-"""Eyeballs among the surfaces of a file: two balls of one size, so that gaze turns them."""
+"""Find the eyeballs among the surfaces of a file: two spheres of one size, side by side, which gaze shall turn."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from surface.base.arrays import Floats
 from surface.fit.source.kinds import kind_of
 from surface.fit.surfaces.pieces import Piece
 
-ROUND = 0.06  # root mean square distance of an eyeball's samples from a sphere, in radii
-COVER = 0.75  # extent of an eyeball along each axis, in radii: a front half shell has 1 along its depth
-SAME = 0.15  # two eyeballs differ in radius by no more than that
-APART = (2.2, 9.0)  # distance between two eyeballs, in radii
-ALIGNED = 0.35  # of that distance: how far they may differ in height and depth
-INSIDE = 1.3  # in radii: pieces that lie so near an eye's centre belong to it
+ROUND = 0.06  # most root mean square distance of an eyeball's samples from a sphere, in radii
+COVER = 0.75  # least extent of an eyeball along each axis, in radii: the front half of a sphere is 1 deep
+SAME = 0.15  # most difference between the radii of both eyeballs, in radii
+APART = (2.2, 9.0)  # least and most distance between both centres, in radii
+ALIGNED = 0.35  # most difference of both centres in height or depth, relative to their distance in x
+INSIDE = 1.3  # pieces that lie wholly within this distance from an eye's centre, in radii, belong to the eye
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def sphere(points: Floats) -> tuple[Floats, float, float]:
 
 
 def find_eyeballs(pieces: Sequence[Piece], points: Sequence[Floats]) -> Eyeballs | None:
-    """The two balls that are eyes; None where there are not exactly two that can be.
+    """The largest pair of spheres that can be eyes; None where there is none. Pieces named as eyes come first.
 
     points : samples (n, 3) of every piece, mm, in head axes.
     """
@@ -57,7 +57,7 @@ def find_eyeballs(pieces: Sequence[Piece], points: Sequence[Floats]) -> Eyeballs
 
 
 def _ball(points: Floats) -> tuple[Floats, float] | None:
-    """Centre and radius of samples that lie on most of a sphere."""
+    """Centre and radius of a sphere that samples (n, 3) cover most of; None where they do not."""
     centre, radius, off = sphere(points)
     if not off < ROUND * radius or not (np.ptp(points, axis=0) > COVER * radius).all():
         return None

@@ -90,7 +90,7 @@ def _named(items: list[NamedSurface], word: str, option: str, where: str) -> set
 
 
 def _own(items: list[NamedSurface]) -> tuple[list[NamedSurface], list[str]]:
-    """Surfaces that are not named as clothes or the like, and what the others are."""
+    """Surfaces that are not named as clothes, hats or glasses, and notes on the others."""
     out: dict[str, list[str]] = {}
     for item in items:
         if (kind := kind_of(item.name)).rule == "out":

@@ -1,4 +1,4 @@
-"""What making a head of surfaces found: parts, how exact each is, what was left out and what is missing."""
+"""The report on a head made from surfaces: its parts, how exact each is, what was left out and what is missing."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class SurfaceRow:
 
 @dataclass(frozen=True)
 class SurfaceReport:
-    """The whole head. parameters : shapes that move it; missing : those that do not; notes : in words."""
+    """The report on the head. parameters : shapes that move it. missing : shapes that do not. notes : messages."""
 
     name: str
     parts: list[SurfaceRow]
@@ -47,7 +47,7 @@ class SurfaceReport:
         fitted = [row for row in self.parts if row.deviation_mm > 0]
         exact = "every control point is the file's own: the surfaces are exact"
         lines = [exact] if not fitted else []
-        lines += [f"{row.name}: exact but near star points, there within {row.deviation_mm:.3f} mm" for row in fitted]
+        lines += [f"{row.name}: exact, except near star points: {row.deviation_mm:.3f} mm or less" for row in fitted]
         lines += self.notes
         if self.parameters and self.missing:
             lines.append(f"no group for {', '.join(self.missing)}: these parameters will not move this head")

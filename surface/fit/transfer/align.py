@@ -1,7 +1,8 @@
-"""Find where the face is in a scan of unknown axes, unit and place: similarity from the scan to a head's frame.
+"""Find the face in a scan of unknown axes, unit and origin: the similarity transform from the scan to a head's frame.
 
-From landmarks it is computed at once (Umeyama, 1991). Without them many starts, by axis and by size, are improved by
-iterated closest points with normals (Besl and McKay, 1992), and the one whose face lies nearest both ways is taken.
+From landmarks it is computed directly (Umeyama, 1991). Without landmarks, many starting transforms with different axes
+and sizes are refined by iterated closest points with normals (Besl and McKay, 1992). The result is the one for which
+the scan is nearest to the face and the face to the scan.
 """
 
 from __future__ import annotations
@@ -19,25 +20,26 @@ from surface.base.errors import FitError
 from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.template import Template
 
-COARSE, FINE = 350, 1500  # points of the template in a first and in a last search
-TARGETS = 12_000
-NORMAL = 0.12  # weight of normals in the search for closest points, in heights of the face
-SEEN = 0.03  # in heights of the face: width of a line of sight
-CLIP = 0.12  # in heights of the face: distances from here on count alike
-EXTENTS = (1.35, 1.8, 2.6, 3.3, 4.6, 16.5)  # heights of the face in the height of a mask, ..., a bust, a body
-BELOW_TOP = (0.25, 2.4)  # in heights of the face: where the tip of the nose may lie under the top of a mesh
-STEPS, LAST_STEPS, KEPT = 14, 40, 4
-GOOD, POOR = 0.085, 0.135  # scores: so good that nothing else is tried; so poor that there is no face
-SHARE = 0.75  # of the closest pairs count
+# Lengths are relative to the height of the face, from the chin to the bridge of the nose.
+COARSE, FINE = 350, 1500  # points of the template in the first and in the last search
+TARGETS = 12_000  # samples of the scan that are searched
+NORMAL = 0.12  # distance that a difference of normals by 1 counts as in the search for closest points
+SEEN = 0.03  # width of a line of sight
+CLIP = 0.12  # greater distances count as this one
+EXTENTS = (1.35, 1.8, 2.6, 3.3, 4.6, 16.5)  # heights of a mask, ..., a bust, a whole body
+BELOW_TOP = (0.25, 2.4)  # range in which the tip of the nose may lie below the top of a mesh
+STEPS, LAST_STEPS, KEPT = 14, 40, 4  # iterations of the first search, of the last one; starts that are refined there
+GOOD, POOR = 0.085, 0.135  # score below which the search ends; score above which there is no face
+SHARE = 0.75  # of the pairs of closest points, the nearest ones, that an iteration uses
 
 
 class NoFaceFound(FitError):
-    """Nothing in a scan is like the face that was looked for."""
+    """Nothing in a scan resembles a face."""
 
 
 @dataclass(frozen=True)
 class Similarity:
-    """Map p -> scale * turn @ p + shift. ``score``: mean distance both ways in heights of the face."""
+    """The map p -> scale * turn @ p + shift. ``score`` : mean distance both ways, in heights of the face."""
 
     turn: Floats
     scale: float
@@ -72,7 +74,7 @@ def face_region(template: Template) -> Bools:
 
 
 def thinned(points: Floats, count: int) -> Floats:
-    """About ``count`` rows of points (n, 3), one of each cube of a grid."""
+    """Indices of about ``count`` of the points (n, 3), one in each occupied cube of a grid."""
     size = float(np.ptp(points, axis=0).max())
     low, high = size / 400.0, size
     for _ in range(18):
@@ -83,7 +85,7 @@ def thinned(points: Floats, count: int) -> Floats:
 
 
 class Aligner:
-    """Searches a scan, given by samples of it, for the face of a template."""
+    """Searches the samples of a scan for the face of a template."""
 
     def __init__(self, template: Template, samples: Samples) -> None:
         front = np.flatnonzero(face_region(template))
@@ -98,7 +100,7 @@ class Aligner:
         found: list[Similarity] = []
         turns = list(axis_turns(up, forward))
         others = [t for t in tilted_turns() if _agrees(t, up, forward)]
-        for more in (turns[:1], turns[1:], others):  # most files have y up and z forward
+        for more in (turns[:1], turns[1:], others):  # y up and z forward first, as in most files
             if more and all(s.score > GOOD for s in found):
                 found.append(self._best(more))
         return min(found, key=lambda s: s.score)
@@ -109,7 +111,7 @@ class Aligner:
         return min((self.refine(s, self._fine, LAST_STEPS) for s in starts[:KEPT]), key=lambda s: s.score)
 
     def _starts(self, turn: Floats) -> Iterator[Similarity]:
-        """Starts with one rotation: by size of what is seen, the foremost point of the middle being the nose."""
+        """Starts with one rotation, one for each of :data:`EXTENTS`; the foremost point near the middle is the nose."""
         at = self._at @ turn.T
         top, height = at[:, 1].max(), float(np.ptp(at[:, 1]))
         tip = self._template.landmarks["nose_tip"]
@@ -125,7 +127,7 @@ class Aligner:
             yield Similarity(turn, scale, tip - scale * nose)
 
     def refine(self, start: Similarity, chosen: Floats, steps: int) -> Similarity:
-        """A start improved by iterated closest points, and its score."""
+        """A starting transform refined by iterated closest points, with its score."""
         p, n = self._template.points[chosen], self._template.normals[chosen]
         unit = self._height / start.scale
         tree = cKDTree(np.hstack([self._at, NORMAL * unit * self._out]))
@@ -141,7 +143,7 @@ class Aligner:
         return Similarity(now.turn, now.scale, now.shift, self.score(now, chosen))
 
     def score(self, found: Similarity, chosen: Floats) -> float:
-        """Mean distance from the template's face to the scan and back, in heights of the face; normals count, too."""
+        """Mean distance from the template's face to the scan and back, normals included, in heights of the face."""
         p, n, h = self._template.points[chosen], self._template.normals[chosen], self._height
         at, out = found.points(self._at), self._out @ found.turn.T
         own = np.hstack([p, NORMAL * h * n])
@@ -157,7 +159,10 @@ class Aligner:
 
 
 def foremost(points: Floats, size: float) -> Bools:
-    """(n,) which points (n, 3) are seen from the front: none is more than ``size`` before them nearby."""
+    """(n,) which points (n, 3) are visible from the front: no other point nearby is much further forward.
+
+    size : width of the columns in which points are compared.
+    """
     if not len(points):
         return np.zeros(0, bool)
     column = np.floor(points[:, :2] / size).astype(np.int64)
@@ -170,7 +175,7 @@ def foremost(points: Floats, size: float) -> Bools:
 
 
 def axis_turns(up: Floats | None, forward: Floats | None) -> Iterator[Floats]:
-    """Rotations (3, 3) that turn axes into axes, y up and z forward first."""
+    """The rotations (3, 3) that map axes to axes, the identity first, as far as they agree with known directions."""
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
             turn = np.zeros((3, 3))
@@ -180,13 +185,13 @@ def axis_turns(up: Floats | None, forward: Floats | None) -> Iterator[Floats]:
 
 
 def tilted_turns() -> Iterator[Floats]:
-    """Rotations between those of the axes: about 40 degrees apart."""
+    """Further rotations (3, 3), about 40 degrees apart, for scans that stand at an angle to the axes."""
     for q in Rotation.random(96, rng=np.random.default_rng(0)):
         yield q.as_matrix()
 
 
 def _agrees(turn: Floats, up: Floats | None, forward: Floats | None) -> bool:
-    """Does a rotation turn a known direction up, and one forward?"""
+    """Whether a rotation turns the known direction ``up`` to y and ``forward`` to z."""
     pairs = [(up, turn[1]), (forward, turn[2])]
     return all(wanted is None or float(row @ wanted) > 0.9 for wanted, row in pairs)
 
@@ -194,7 +199,7 @@ def _agrees(turn: Floats, up: Floats | None, forward: Floats | None) -> bool:
 def align(template: Template, samples: Samples, up: Floats | None, forward: Floats | None, where: str) -> Similarity:
     """The similarity from a scan to the template's frame.
 
-    Raises NoFaceFound: nothing in the scan is like a face.
+    Raises NoFaceFound: nothing in the scan resembles a face. ``where`` names the scan in the message.
     """
     found = Aligner(template, samples).search(up, forward)
     if found.score > POOR:

@@ -1,4 +1,4 @@
-"""From a bare mesh and a head with expressions to a head in the mesh's form with these expressions."""
+"""Make a head from a bare mesh and another head: the form of the mesh with the expressions of the head."""
 
 from __future__ import annotations
 
@@ -17,12 +17,10 @@ from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, UNITS
 from surface.fit.transfer.align import Similarity, align, from_pairs
-from surface.fit.transfer.carry import carry
 from surface.fit.transfer.colours import with_colours
+from surface.fit.transfer.faults import HINT, faults_of_transfer
 from surface.fit.transfer.lids import close_lids
-from surface.fit.transfer.mirrored import alike, levelled, mirror_plane
-from surface.fit.transfer.places import scaled
-from surface.fit.transfer.refused import HINT, faults_of_transfer
+from surface.fit.transfer.place_parts import scaled
 from surface.fit.transfer.register import STAGES, Matcher, register
 from surface.fit.transfer.reports.errors import face_reports
 from surface.fit.transfer.reports.gaps import measure_gaps
@@ -36,23 +34,26 @@ from surface.fit.transfer.reports.report import (
 )
 from surface.fit.transfer.reports.reportfile import write_transfer_report
 from surface.fit.transfer.scan import Scan, read_scan, sample
+from surface.fit.transfer.symmetry import levelled, mirror_plane, symmetrised
 from surface.fit.transfer.template import Template, make_template
+from surface.fit.transfer.warp_head import warp_head
 from surface.head import Head, HeadData
 from surface.head.model.file import check_writable
 from surface.head.model.placement import Placement
 
-MANY = 250_000  # samples of the head once it is found
-MARGIN = 0.35  # in heights of the face: around a head, what belongs to it
-USUAL = (0.7, 1.45)  # sizes, relative to the head the expressions come from, that heads of people have
-WRONG = 0.2  # in heights of the face: RMS of a face's landmarks off the head's own
-SWAPPED, MUCH = 0.04, 0.5  # the same where sides may be exchanged; share of it that is left by exchanging them
-LEAST_PICKED = 4  # landmarks that a scan is aligned by; with fewer its face is looked for
+MANY = 250_000  # samples of the scan's head once it is found
+MARGIN = 0.35  # around the head, in heights of the face: what lies within it belongs to the head
+USUAL = (0.7, 1.45)  # range of people's sizes, relative to the head that the expressions come from
+WRONG = 0.2  # greatest RMS distance of given landmarks from the head's own, in heights of the face
+SWAPPED, MUCH = 0.04, 0.5  # left and right are exchanged if that distance is above the first, and exchanging them
+# leaves less than the second share of it
+LEAST_PICKED = 4  # given landmarks that suffice to align a scan; with fewer its face is searched for
 
 
 @dataclass(frozen=True)
 class Transferred:
-    """A head in the form of a scan, and how well it fits. ``found`` leads from the scan to the frame of the report's
-    landmarks."""
+    """A head in the form of a scan, the report on it, and the transform ``found`` from the scan's coordinates to the
+    frame in which the scan was registered."""
 
     head: HeadData
     report: TransferReport
@@ -69,14 +70,14 @@ def transfer_head(
     mesh_path : .obj, .glb, .gltf, .vrm, .npz, .ply, .stl or .off; its own shapes and texture coordinates are not used.
     source : folder of the head that the expressions come from. out_dir : folder that gets head.toml and head.npz.
     landmarks : file of places on the mesh (see :func:`surface.fit.transfer.reports.landmarkfile.read_landmarks`).
-    options : ``unit``, ``up``, ``forward`` and ``without``; what is not given is found.
+    options : ``unit``, ``up``, ``forward`` and ``without`` are used; those that are not given are found.
     report_dir : folder that gets the report (see :mod:`surface.fit.transfer.reports.reportfile`).
-    force : write a head that does not follow the mesh, too.
+    force : write the head even where it does not follow the mesh.
 
     Raises FitError: the mesh or the landmarks cannot be read, no face was found, or the head has no eyes or openings;
-    nothing is written then. Or the head does not follow the mesh (:func:`faults_of_transfer`): it is written to
-    :func:`surface.fit.measures.refusal.refused_folder`, to be looked at.
-    HeadFileError: the head cannot be read, or a folder not be written to.
+    nothing is written then. FitError also where the head does not follow the mesh (:func:`faults_of_transfer`): then it
+    is written to :func:`surface.fit.measures.refusal.refused_folder`, so that it can be inspected.
+    HeadFileError: the head cannot be read, or a folder cannot be written to.
     """
     for folder in (out_dir, report_dir):
         check_writable(folder or out_dir)
@@ -92,7 +93,7 @@ def transfer_head(
 def transfer(
     scan: Scan, head: Head, name: str, picked: dict[str, Floats], options: LoadOptions, progress: Progress, where: str
 ) -> Transferred:  # fmt: skip
-    """As :func:`transfer_head`, in memory; ``picked`` are landmarks (3,) on the scan, ``where`` is its name."""
+    """As :func:`transfer_head`, in memory. picked : landmarks (3,) on the scan. where : names the scan in messages."""
     template = make_template(head, head.name)
     progress("face", 0.02)
     found = find_face(scan, template, picked, options, where)
@@ -101,17 +102,17 @@ def transfer(
     samples = sample(scan, MANY)
     progress("face", 0.15)
     done = register(template, samples, marks, lambda share: progress("face", 0.15 + 0.5 * share))
-    done = alike(done) if mirrored else done
+    done = symmetrised(done) if mirrored else done
     matcher = Matcher(samples)
     provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
-    carried = carry(head, template, done.warp, done.smooth, matcher, provenance, name)
+    warped = warp_head(head, template, done.warp, done.smooth, matcher, provenance, name)
     progress("lids", 0.75)
-    data, lid_notes = seat_drawn_lids(close_lids(carried, head.data))
-    changed = reseated(carried, data)
+    data, lid_notes = seat_drawn_lids(close_lids(warped, head.data))
+    changed = reseated(warped, data)
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
     notes += [*scan.notes, *lid_notes]
-    notes += ["both sides of the face are alike, and fitted alike"] if mirrored else []
+    notes += ["the face is symmetric, and was fitted symmetrically"] if mirrored else []
     if scan.colours is not None:
         data, colour_notes = with_colours(data, scan.colours)
         notes += colour_notes
@@ -134,7 +135,7 @@ def transfer(
 def find_face(
     scan: Scan, template: Template, picked: dict[str, Floats], options: LoadOptions, where: str
 ) -> Similarity:  # fmt: skip
-    """The similarity from the scan to the head's frame, by landmarks where there are enough, else by its form.
+    """The similarity from the scan to the head's frame, by landmarks where enough are given, else by the scan's form.
 
     Raises FitError: no face is there, or the landmarks or options are wrong.
     """
@@ -157,13 +158,13 @@ def find_face(
 
 
 def upright(scan: Scan, template: Template, found: Similarity) -> tuple[Similarity, bool]:
-    """The similarity by which a scan that mirrors itself does so in x = 0, and whether it does."""
+    """The similarity, turned so that a symmetric scan is symmetric about x = 0; and whether the scan is symmetric."""
     plane = mirror_plane(template, sample(in_frame(scan, template, found)))
     return (found, False) if plane is None else (levelled(found, plane), True)
 
 
 def _by_landmarks(picked: dict[str, Floats], template: Template) -> tuple[Similarity, float]:
-    """The similarity by landmarks, and how far off they are then (RMS, in heights of the face)."""
+    """The similarity by landmarks, and the RMS distance between both sets of them, in heights of the face."""
     own = np.array([template.landmarks[n] for n in picked])
     found = from_pairs(np.array(list(picked.values())), own)
     off = np.linalg.norm(found.points(np.array(list(picked.values()))) - own, axis=1)
@@ -171,9 +172,9 @@ def _by_landmarks(picked: dict[str, Floats], template: Template) -> tuple[Simila
 
 
 def direction(option: str, word: str) -> Floats:
-    """The unit vector (3,) of an axis.
+    """The unit vector (3,) of an axis that ``word`` names, as the value of a command line's ``option``.
 
-    Raises FitError: ``option`` names none.
+    Raises FitError: it names none.
     """
     if word not in AXES:
         raise FitError(f"{option} {word}: is not one of {', '.join(AXES)}", hint=f"{option} y")
@@ -197,7 +198,7 @@ def _placement(found: Similarity, factor: float, middle: Floats, unit: str) -> P
 
 
 def _true_size(found: Similarity, unit: str | None, picked: dict[str, Floats]) -> tuple[float, list[str]]:
-    """Factor from the head's frame to true millimetres, and what was found out, in words."""
+    """Factor from the head's frame to true millimetres, and notes for the report."""
     how = f"by {len(picked)} landmarks" if len(picked) >= LEAST_PICKED else f"by its form, score {found.score:.3f}"
     degrees = np.degrees(np.arccos(np.clip((np.trace(found.turn) - 1.0) / 2.0, -1.0, 1.0)))
     notes = [f"face found {how}; turned by {degrees:.0f} degrees"]
@@ -206,5 +207,8 @@ def _true_size(found: Similarity, unit: str | None, picked: dict[str, Floats]) -
     guess = min(UNITS, key=lambda u: abs(np.log(UNITS[u] / found.scale)))
     factor = UNITS[guess] / found.scale
     if USUAL[0] < factor < USUAL[1]:
-        return factor, [*notes, f"unit taken for {guess}: {factor:.2f} times the size of the head it is compared with"]
-    return 1.0, [*notes, "unit unknown: made as large as the head that its expressions come from (say --unit)"]
+        return factor, [
+            *notes,
+            f"unit taken to be {guess}: {factor:.2f} times the size of the head of the expressions",
+        ]
+    return 1.0, [*notes, "unit unknown: the head got the size of the head of the expressions (set --unit)"]

@@ -1,8 +1,8 @@
-"""The colours of a scan, of its vertices or its textures, as paint of the head that is made in its form.
+"""Transfer the colours of a scan, from its vertices or textures, to the paint of the head that is made from it.
 
-A head is painted in layers over (u, v). Where the scan shows a layer's place, its value becomes the one that gives the
-place the scan's colour; other layers keep their relation to the skin. So cheeks, lips and brows get the scan's own
-colours, and stay what a user may edit.
+A head's paint is a list of layers over (u, v), such as skin, cheeks, lips and brows. Where the scan shows the area of a
+layer, the layer gets the value that reproduces the scan's colour there. Other layers keep their relation to the skin.
+The result is still a list of layers, which a user can edit.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from surface.head.posing.paint import BASE, layer_field
 from surface.readers.meshdata import MeshData
 
 MANY = 300_000  # samples of a scan's colours
-PLAIN = 0.02  # standard deviation of colours that say nothing: one grey, or white, all over
-NEAR_MM = 2.0  # from a vertex of the head to the sample whose colour it has
-FRONT = 0.3  # least z of the normals of skin whose colour counts for all of it
-STRONG, LEAST = 0.6, 20  # field of a layer where its colour is taken from, and how many vertices that needs
-SHOWN = 0.3  # least amount by which a layer is taken to show
-EYE_REACH = (0.93, 1.12)  # in radii: samples so far from an eyeball's centre are its own
-WHITER = 0.75  # the saturation of an eye's white is at most so much of the skin's
-LEAST_EYE = 60  # samples
+PLAIN = 0.02  # standard deviation below which colours are one grey, or white, all over, and are not used
+NEAR_MM = 2.0  # greatest distance from a vertex of the head to the samples that give its colour
+FRONT = 0.3  # least z of the normals of the vertices whose median colour is that of the skin
+STRONG, LEAST = 0.6, 20  # strength of a layer at the vertices that give its colour; least number of such vertices
+SHOWN = 0.3  # least amount of a layer that its colour is computed with
+EYE_REACH = (0.93, 1.12)  # distance from an eyeball's centre, in radii, within which samples belong to the eyeball
+WHITER = 0.75  # greatest saturation of the white of an eye, relative to that of the skin
+LEAST_EYE = 60  # least number of samples on an eye
 
 
 def scan_colours(raw: MeshData, kept: Bools | None = None) -> Samples | None:
@@ -55,12 +55,12 @@ def scan_colours(raw: MeshData, kept: Bools | None = None) -> Samples | None:
 
 
 def moved(samples: Samples, turn: Floats, scale: float, shift: Floats) -> Samples:
-    """Samples with every point p at scale * turn @ p + shift."""
+    """The samples with every point p moved to scale * turn @ p + shift."""
     return replace(samples, points=scale * samples.points @ turn.T + shift)
 
 
 def with_colours(data: HeadData, samples: Samples) -> tuple[HeadData, list[str]]:
-    """A head in the place of a scan, painted with the scan's colours; and which were found, in words."""
+    """A head that lies on a scan, painted with the scan's colours; and notes for the report on which were found."""
     solid = samples.colour[:, 3] > 0.5
     tree, rgb = cKDTree(samples.points[solid]), np.sqrt(samples.colour[solid, :3])  # means of roots look right
     head = Head(data)
@@ -87,7 +87,7 @@ def _is_base(layer: dict[str, Any], part: str) -> bool:
 
 
 def _looked_up(points: Floats, tree: cKDTree, rgb: Floats) -> tuple[Floats, Bools]:
-    """(m, 3) linear colours of the scan at points (m, 3), and (m,) where it has any."""
+    """(m, 3) linear RGB of the scan at points (m, 3), and (m,) whether the scan has a colour there."""
     count = min(6, tree.n)
     off, near = tree.query(points, k=count, distance_upper_bound=NEAR_MM)
     off, near = np.asarray(off).reshape(-1, count), np.asarray(near).reshape(-1, count)
@@ -98,7 +98,7 @@ def _looked_up(points: Floats, tree: cKDTree, rgb: Floats) -> tuple[Floats, Bool
 
 
 def _front_colour(face: HeadPart, seen: Floats, known: Bools) -> Floats | None:
-    """(3,) the median colour of what of a face looks forward; None where the scan tells too little."""
+    """(3,) median colour of the vertices of a face that look forward; None where the scan covers too few of them."""
     chosen = known & (face.normals[:, 2] > FRONT)
     return np.clip(np.median(seen[chosen], axis=0), *SKIN_RANGE) if chosen.sum() >= LEAST else None
 
@@ -106,7 +106,11 @@ def _front_colour(face: HeadPart, seen: Floats, known: Bools) -> Floats | None:
 def _painted(
     part: HeadPart, layers: list[dict[str, Any]], skin: Floats, ratio: Floats, seen: Floats, known: Bools
 ) -> list[dict[str, Any]]:  # fmt: skip
-    """Layers of a part of skin whose albedo has the scan's colours where they are seen, else the skin's times ratio."""
+    """The layers of a part of skin, their albedo set to the scan's colours, or multiplied by ``ratio`` without any.
+
+    skin, ratio : (3,) colour of the skin, and its ratio to the old one. seen, known : (m, 3) and (m,), colours of the
+    scan at the part's vertices, and whether there is one.
+    """
     uv = part.uv.astype(float)
     at = np.tile(np.asarray(BASE["albedo"]), (len(uv), 1))
     out = [] if any(_is_base(la, part.name) for la in layers) else [_all_over(part.name, "albedo", skin)]
@@ -120,7 +124,7 @@ def _painted(
                 below = np.median(at[strong], axis=0)
                 wanted = np.median(seen[strong], axis=0)
                 value = below + (wanted - below) / max(amount, SHOWN)
-                if (value < SKIN_RANGE[0]).any() or (value > SKIN_RANGE[1]).any():  # no colour so strong: all of it
+                if (value < SKIN_RANGE[0]).any() or (value > SKIN_RANGE[1]).any():  # out of range: take the full colour
                     value, amount = wanted, 1.0
             else:
                 value = layer["value"] * ratio
@@ -134,7 +138,10 @@ def _painted(
 def _with_eyes(
     layers: list[dict[str, Any]], data: HeadData, samples: Samples, skin: Floats
 ) -> tuple[list[dict[str, Any]], list[str]]:  # fmt: skip
-    """Layers with the colours of eyes that the scan shows open; closed ones, as red as skin, tell nothing."""
+    """The layers with the colours of eyes that the scan shows open, and words for the report.
+
+    Closed eyes, whose samples are as red as skin, are left as they are.
+    """
     usual = USUAL_IRIS * float(np.linalg.norm(data.eyes[0] - data.eyes[1])) / data.eye_radius
     colours = []
     for side, name in enumerate(("left_eye", "right_eye")):

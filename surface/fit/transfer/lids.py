@@ -1,4 +1,7 @@
-"""Make blinks close again on eyes of another form: scale them, column by column, by what is left open."""
+"""Correct the blinks of a head whose eyes have got another form, so that they close the eyes again.
+
+Blinks are scaled column by column of the lids, according to the gap that is still open.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,12 @@ from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.rig import SkinRig
 
 SIDES = (("left_lids", "eyeBlinkLeft"), ("right_lids", "eyeBlinkRight"))
-TRIES, STEP, RANGE = 8, 0.8, (-0.3, 1.5)  # of scaling a blink; share of the gap per step; least and most change
-SHORT_MM = 1.0  # lids whose way is shorter than this, at the corners, are changed less
+TRIES, STEP, RANGE = 8, 0.8, (-0.3, 1.5)  # iterations; share of the gap closed in each; least and most change
+SHORT_MM = 1.0  # columns where the lids travel less than this, near the corners, are changed less
 
 
 def close_lids(head: HeadData, source: HeadData) -> HeadData:
-    """The head with blinks that leave no more open than those of the head its expressions come from."""
+    """The head with blinks that leave gaps no larger than in ``source``, the head that the expressions come from."""
     for contact, (name, shape) in ((c, s) for c in head.contacts for s in SIDES if c.name == s[0]):
         edges = _edges(head, contact)
         own = next(c for c in source.contacts if c.name == name)
@@ -42,16 +45,18 @@ def _face(head: HeadData, contact: Contact) -> PartData:
 
 
 def _edges(head: HeadData, contact: Contact) -> csr_matrix:
-    """Weights of the face's control points at the contact's samples."""
+    """Weights of the face's control points at the contact's samples, (samples, control points) sparse."""
     return make_surface(_face(head, contact)).basis_matrix(contact.places.reshape(-1, 2))
 
 
 def _gap(head: HeadData, contact: Contact, edges: csr_matrix, shape: str, value: float) -> tuple[Floats, Floats]:
-    """x of the columns of two lids at rest, and how far each pair is apart in a pose: the lowest place of the upper one
-    above the highest of the lower one, mm."""
+    """x of the columns of two lids at rest, and the gap of each column where ``shape`` has ``value``, both (k,) mm.
+
+    The gap is the height of the upper lid's lowest sample above the lower lid's highest one.
+    """
     face = _face(head, contact)
     values = np.array([value if n == shape else 0.0 for n in NAMES])
-    alone = replace(head, contacts=[contact])  # others are too far away to matter, and cost time
+    alone = replace(head, contacts=[contact])  # the other contacts are too far away to matter, and would cost time
     at = edges @ SkinRig(face, alone).apply(read_pose(values))
     rest = (edges @ face.points).reshape(*contact.places.shape[:3], 3)
     upper, lower = np.asarray(at).reshape(*contact.places.shape[:3], 3)
@@ -61,7 +66,7 @@ def _gap(head: HeadData, contact: Contact, edges: csr_matrix, shape: str, value:
 
 
 def _with_share(head: HeadData, shape: str, x: Floats, share: Floats) -> HeadData:
-    """The head with the groups of a shape enlarged by ``share`` at places ``x``."""
+    """The head with the displacements of a shape enlarged by ``share (k,)`` at ``x (k,)``, interpolated between."""
     order = np.argsort(x)
 
     def enlarged(part: PartData, g: Group) -> Group:

@@ -1,8 +1,9 @@
-"""Register a template to a scan without rigidity: iterated closest points whose map becomes less and less stiff.
+"""Non-rigid registration of a template to a scan: iterated closest points with a map of decreasing stiffness.
 
-As in Amberg et al. (2007), Optimal Step Nonrigid ICP: closest points are accepted by distance and normal and never at
-the scan's borders, so that holes pull nothing. The map is one of space (:mod:`surface.fit.transfer.warp`); trimesh's
-registrations move the vertices of a mesh one by one, and match holes' borders, too.
+As in Amberg et al. (2007), Optimal Step Nonrigid ICP, closest points are accepted by distance and normal, and never at
+the scan's borders, so that holes do not attract the surface. The map moves all of space
+(:mod:`surface.fit.transfer.warp`). The registrations of trimesh are not used, since they move each vertex by itself and
+match the borders of holes, too.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.transfer.align import thinned
-from surface.fit.transfer.places import placing
+from surface.fit.transfer.place_parts import fit_scale_shift
 from surface.fit.transfer.relief import Finder
 from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.template import Template
@@ -25,8 +26,12 @@ from surface.head.model.parameters import smoothstep
 
 @dataclass(frozen=True)
 class Stage:
-    """Iterations: stiffness of the map, farthest match in mm, how many; before them, landmarks are looked for up to
-    ``search`` mm away (0: they are not), each by itself if ``single``."""
+    """Some iterations with the same settings.
+
+    stiffness : of the map. farthest : greatest distance of a match, mm. steps : number of iterations.
+    search : before the iterations landmarks are searched for up to so many mm away; 0: they are not.
+    single : each landmark is searched for by itself.
+    """
 
     stiffness: float
     farthest: float
@@ -40,20 +45,21 @@ STAGES = (
     Stage(500.0, 10.0, 5, 4.0, True), Stage(200.0, 8.0, 5, 3.0, True), Stage(60.0, 6.0, 5),
 )  # fmt: skip
 FEATURE_MM, FEATURES, FACE, REST = 26.0, 800, 350, 260  # nodes near eyes, mouth and nose; on the face; elsewhere
-NORMAL_MM = 14.0  # weight of normals in the search for closest points
-LEAST_COSINE = 0.5  # of the normals of a match
+NORMAL_MM = 14.0  # distance that a difference of normals by 1 counts as in the search for closest points
+LEAST_COSINE = 0.5  # between the two normals of a match
 SMOOTH = 500.0  # least stiffness of the smooth map
-STILL = 0.002  # weight of a node without match, which keeps its place
-FAR, FAR_MM = 0.05, (12.0, 40.0)  # the same far from every match; where that begins and where it is complete
-LANDMARK, FOUND = 30.0, (10.0, 1.5)  # weights of a landmark that is given, of one that was found with others, alone
-SLIDE = 0.35  # share of a match along the surface; the rest goes along the normal only
+STILL = 0.002  # weight of a node without a match, which is kept in its place
+FAR, FAR_MM = 0.05, (12.0, 40.0)  # the same far from every match; distances where it begins and where it is complete
+LANDMARK, FOUND = 30.0, (10.0, 1.5)  # weight of a given landmark; of one found together with others, of one found alone
+SLIDE = 0.35  # how much of the tangential part of a match is used; the normal part is used fully
 
 
 @dataclass(frozen=True)
 class Mark:
-    """A landmark on a scan: its ``place (3,)``, who it is from, and how sure a found one is, 0..1.
+    """A landmark on a scan.
 
-    how : ``given`` by hand, ``found`` in the relief, or ``carried`` there by the map from its neighbours.
+    place : (3,). how : ``given`` by hand, ``found`` in the relief, or ``carried`` there by the map, which follows its
+    neighbours. sure : confidence in a found one, 0..1.
     """
 
     place: Floats
@@ -72,7 +78,7 @@ class Registered:
 
 @dataclass(frozen=True)
 class Matches:
-    """For every point: whether it has a match on the scan, and where it should go, (n, 3)."""
+    """For n points: ``found (n,)``, whether each has a match on the scan; ``goals (n, 3)``, where it should move."""
 
     found: Bools
     goals: Floats
@@ -86,7 +92,10 @@ class Matcher:
         self._tree = cKDTree(np.hstack([samples.points, NORMAL_MM * samples.normals]))
 
     def find(self, at: Floats, normals: Floats, farthest: float, slide: float) -> Matches:
-        """Matches for points (n, 3) with unit normals (n, 3), none farther than ``farthest`` mm."""
+        """Matches for points (n, 3) with unit normals (n, 3), none farther than ``farthest`` mm.
+
+        slide : 0..1, how much of the tangential part of the way to the match is used.
+        """
         _, near = self._tree.query(np.hstack([at, NORMAL_MM * normals]))
         there, out = self._samples.points[near], self._samples.normals[near]
         off = there - at
@@ -97,7 +106,7 @@ class Matcher:
 
 
 def choose_nodes(template: Template) -> Ints:
-    """Points of a template that carry the map: dense at eyes, mouth and nose, sparse elsewhere."""
+    """Indices of the template's points that are nodes of the map: dense at eyes, mouth and nose, sparse elsewhere."""
     marks = np.array([p for n, p in template.landmarks.items() if n != "chin"])
     distance = cKDTree(marks).query(template.points)[0]
     features = distance < FEATURE_MM
@@ -109,7 +118,7 @@ def choose_nodes(template: Template) -> Ints:
 class Registration:
     """Iterations from a template to the samples of a scan, which is aligned with it.
 
-    given : places (3,) on the scan by the template's names; the others are looked for by relief.
+    given : places (3,) of landmarks on the scan by the template's names; the others are searched for in the relief.
     """
 
     def __init__(self, template: Template, samples: Samples, given: dict[str, Floats]) -> None:
@@ -130,8 +139,8 @@ class Registration:
         self.warp = Warp(self._centres, np.vstack([points, self._goals]), still, STAGES[0].stiffness)
         self._stiffer = self.warp
 
-    def look(self, search: float, single: bool) -> None:
-        """Look for landmarks up to ``search`` mm from where the map has them now, each by itself if ``single``."""
+    def find_landmarks(self, search: float, single: bool) -> None:
+        """Search for landmarks up to ``search`` mm from where the map puts them now, each by itself if ``single``."""
         at = self.warp(np.vstack([self._template.points, self._marks]))
         marks = dict(zip(self._names, at[len(self._template.points) :], strict=True))
         find = self._finder.refine if single else self._finder.find
@@ -143,7 +152,7 @@ class Registration:
                 self._sure[name] = sure
 
     def marks(self) -> dict[str, Mark]:
-        """Every landmark where it was given or found, else where the map has it now."""
+        """Every landmark where it was given or found, else where the map puts it now."""
         carried = self.warp(self._marks)
         return {
             name: Mark(self._goals[k].copy(), "given") if name in self._given
@@ -152,12 +161,12 @@ class Registration:
             for k, name in enumerate(self._names)
         }  # fmt: skip
 
-    def hold(self) -> None:
-        """Keep nodes that will have no match where the map has them now."""
+    def keep_unmatched(self) -> None:
+        """From now on, nodes without a match stay where the present map puts them."""
         self._stiffer = self.warp
 
     def step(self, stiffness: float, farthest: float) -> None:
-        """One iteration: match, then the map that goes to the matches."""
+        """One iteration: match the nodes, then fit the map to the matches."""
         template, nodes = self._template, self._nodes
         at, out = self.warp.turned(template.points[nodes], template.normals[nodes])
         match = self._matcher.find(at, out, farthest, SLIDE)
@@ -168,12 +177,15 @@ class Registration:
         self.warp = Warp(self._centres, goals, np.append(weight, self._held), stiffness)
 
     def _unmatched(self, goals: Floats, weight: Floats, found: Bools) -> tuple[Floats, Floats]:
-        """Goals and weights of all nodes: those without a match stay where a stiffer map had them, and far from every
-        match, such as the back of a head of which only the face was scanned, follow it as a whole."""
+        """Goals (n, 3) and weights (n,) of all nodes.
+
+        Nodes without a match stay where a stiffer map put them. Those far from every match, such as the back of a head
+        of which only the face was scanned, follow the scale and shift of all matches.
+        """
         points = self._template.points[self._nodes]
         if found.sum() < 4:
             return points, weight
-        whole = placing(points[found], goals[found])
+        whole = fit_scale_shift(points[found], goals[found])
         far = smoothstep(cKDTree(points[found]).query(points)[0], *FAR_MM)[:, None]
         place = (1.0 - far) * self._stiffer(points) + far * whole.points(points)
         held = STILL + (FAR - STILL) * far[:, 0]
@@ -190,9 +202,9 @@ def register(
     run = Registration(template, samples, given)
     smooth = run.warp
     for k, stage in enumerate(STAGES):
-        run.hold()
+        run.keep_unmatched()
         if stage.search:
-            run.look(stage.search, stage.single)
+            run.find_landmarks(stage.search, stage.single)
         for _ in range(stage.steps):
             run.step(stage.stiffness, stage.farthest)
         if stage.stiffness >= SMOOTH:

@@ -1,8 +1,8 @@
-"""Find eyes, nose and mouth in a scan by their relief as seen from the front, whatever triangles it is made of.
+"""Find eyes, nose and mouth in a scan by its relief as seen from the front.
 
-Relief is depth less its own mean over some millimetres: lips, lids and wings of the nose remain of it, and it
-depends on neither light nor colour. Pieces of the template's relief are looked for in the scan's by normalised
-cross-correlation.
+Relief is the depth minus its mean over some millimetres. It shows lips, lids and wings of the nose, and depends neither
+on light and colour nor on the triangles of the scan. Patches of the template's relief are searched for in the scan's by
+normalised cross-correlation.
 """
 
 from __future__ import annotations
@@ -18,12 +18,12 @@ from surface.base.arrays import Floats
 from surface.fit.transfer.scan import Samples, spread
 from surface.fit.transfer.template import Template
 
-PIXEL_MM = 0.8
-FINE_MM, BROAD_MM = 1.0, 6.0  # standard deviations: what is averaged away, and what is taken for flat
-COUNT = 250_000
-LEAST_SCORE = 0.6  # of a correlation that counts
-SIGHT_MM = 1.6  # around a landmark: the foremost point of the scan there is its place
-CENTRED_MM = 16.0  # so much of a shift costs as much correlation as :data:`SHIFT_COST`
+PIXEL_MM = 0.8  # size of a pixel of the height maps
+FINE_MM, BROAD_MM = 1.0, 6.0  # standard deviation of the filter that removes noise; of the mean that is subtracted
+COUNT = 250_000  # samples of the template
+LEAST_SCORE = 0.6  # least correlation at which a landmark counts as found
+SIGHT_MM = 1.6  # radius around a landmark, seen from the front, in which the foremost point of the scan gives its depth
+CENTRED_MM = 16.0  # a shift by this distance lowers the score by :data:`SHIFT_COST`
 SHIFT_COST = 0.15
 FEATURES: tuple[tuple[tuple[str, ...], tuple[float, float]], ...] = (  # landmarks; half width and height, mm
     (("left_eye_inner", "left_eye_outer", "left_eye_upper", "left_eye_lower"), (20.0, 13.0)),
@@ -36,14 +36,14 @@ SINGLE = (
     "lower_lip", "left_eye_upper", "left_eye_lower", "right_eye_upper", "right_eye_lower",
 )  # fmt: skip
 SINGLE_MM = (8.0, 8.0)
-SUNK_MM = (0.0, 4.0)  # behind their place: eyeballs of people, and those of sculptures, which lie behind their lids
+SUNK_MM = (0.0, 4.0)  # how far eyeballs lie behind their usual place: those of people, and those of sculptures
 
 
 @dataclass(frozen=True)
 class Relief:
-    """Height map seen from the front, row by y, column by x: relief in mm, and where it is known, 0 or 1.
+    """A height map seen from the front; rows are y, columns are x.
 
-    origin : x and y of the first pixel's middle.
+    origin : (2,) x and y of the first pixel's middle, mm. relief : (h, w) mm. known : (h, w) 0 or 1.
     """
 
     origin: Floats
@@ -75,8 +75,11 @@ def make_relief(points: Floats, low: Floats, high: Floats) -> Relief:
 
 
 def correlate(small: Relief, large: Relief, place: Floats, half: tuple[float, float], search: float) -> Floats:
-    """(k, k) normalised cross-correlation of a piece of ``small`` about a place with ``large``, by shifts up to
-    ``search`` mm in y (rows) and x (columns); -1 where too little is known."""
+    """(k, k) normalised cross-correlation of a patch of ``small`` with ``large``, for shifts up to ``search`` mm.
+
+    Rows are shifts in y, columns in x; -1 where too little is known. place : (3,) middle of the patch. half : half its
+    width and height, mm.
+    """
     row, column = small.pixel(place)
     dy, dx = (max(2, round(h / PIXEL_MM)) for h in half[::-1])
     far = max(1, round(search / PIXEL_MM))
@@ -97,14 +100,14 @@ def correlate(small: Relief, large: Relief, place: Floats, half: tuple[float, fl
 
 
 def _cut(image: Floats, row: int, column: int, dy: int, dx: int) -> Floats:
-    """(2 dy + 1, 2 dx + 1) pixels of an image around a place, 0 outside."""
+    """(2 dy + 1, 2 dx + 1) pixels of an image around a pixel; 0 outside the image."""
     padded = np.pad(image, ((dy, dy), (dx, dx)))
     row, column = np.clip(row, 0, image.shape[0] - 1), np.clip(column, 0, image.shape[1] - 1)
     return padded[row : row + 2 * dy + 1, column : column + 2 * dx + 1]
 
 
 def _shift(score: Floats) -> tuple[Floats, float]:
-    """Shift (x, y) in mm of the best of a correlation's scores (k, k), small ones preferred, and that score."""
+    """Shift (x, y), mm, with the best of a correlation's scores (k, k), and that score; small shifts are preferred."""
     far = score.shape[0] // 2
     y, x = np.mgrid[-far : far + 1, -far : far + 1] * PIXEL_MM
     cost = score - SHIFT_COST * (x**2 + y**2) / CENTRED_MM**2
@@ -131,9 +134,10 @@ class Finder:
         self._eye, self._sunk = template.eye >= 0, SUNK_MM[0]
 
     def find(self, at: Floats, marks: dict[str, Floats], search: float) -> dict[str, tuple[Floats, float]]:
-        """Places (3,) of features' landmarks in the scan, and how sure each is, 0..1.
+        """Places (3,) of landmarks in the scan, with the confidence in each, 0..1; those of a feature together.
 
-        at : (n, 3) the template's points, and marks : its landmarks, as a map brings them near the scan.
+        at, marks : the template's points (n, 3), and its landmarks, where a map puts them near the scan.
+        search : greatest distance of a landmark from there, mm.
         """
         found: dict[str, tuple[Floats, float]] = {}
         eyes = {}
@@ -150,8 +154,10 @@ class Finder:
         return found
 
     def refine(self, at: Floats, marks: dict[str, Floats], search: float) -> dict[str, tuple[Floats, float]]:
-        """As :meth:`find`, but each landmark by itself; corners and edges of sunken eyes, which have another form than
-        lids that lie on a ball, are left where they were found together."""
+        """As :meth:`find`, but each landmark by itself.
+
+        Landmarks of sunken eyes are left out, because their lids have another form than lids that lie on an eyeball.
+        """
         own = self._relief_of(at, marks, self._sunk)
         found: dict[str, tuple[Floats, float]] = {}
         for name in (n for n in SINGLE if not (self._sunk and "_eye_" in n)):
@@ -167,7 +173,7 @@ class Finder:
         points = np.einsum("mk,mkc->mc", self._share, at[self._corners])
         tree = cKDTree(points[:, :2])
         self._behind = {}
-        for name, mark in marks.items():  # rims of lips and lids lie behind what is seen before them
+        for name, mark in marks.items():  # rims of lips and lids may lie behind what is visible there
             near = points[tree.query_ball_point(mark[:2], SIGHT_MM)]
             self._behind[name] = float(mark[2] - near[:, 2].max()) if len(near) else 0.0
         return make_relief(points, self._low, self._high)
@@ -176,7 +182,7 @@ class Finder:
         self, found: dict[str, tuple[Floats, float]], marks: dict[str, Floats], names: Sequence[str], shift: Floats,
         sure: float,
     ) -> None:  # fmt: skip
-        """Add landmarks, shifted, on the scan's surface; none where the correlation is poor or nothing is seen."""
+        """Add landmarks, shifted, on the scan's surface; none where the correlation is poor or there is no surface."""
         if sure < LEAST_SCORE:
             return
         for name in names:

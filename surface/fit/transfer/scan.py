@@ -1,4 +1,4 @@
-"""Read a bare mesh and sample its surface: any triangles will do, with holes, noise, loose pieces or none of it."""
+"""Read a bare mesh and sample its surface; the mesh may have holes, noise and loose pieces."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.base.extras import require
-from surface.fit.source.kinds import bare
+from surface.fit.source.kinds import skin_and_eyes
 from surface.fit.source.load import wanted_faces
 from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
 from surface.fit.source.textures import Samples as Colours
@@ -35,8 +35,8 @@ SAME = 1e-6  # of the mesh's size: vertices nearer than this are one
 class Scan:
     """Triangles of a bare mesh, in any unit and axes.
 
-    vertices : (n, 3); triangles : (t, 3); original : (m,) int64, for each vertex of the file its place in ``vertices``.
-    colours : samples of its colours; None where it has none. notes : what of the file is not in it, in words.
+    vertices : (n, 3). triangles : (t, 3). original : (m,) int64, for each vertex of the file its row in ``vertices``.
+    colours : samples of its colours; None where it has none. notes : messages on what was left out of the file.
     """
 
     vertices: Floats
@@ -46,12 +46,12 @@ class Scan:
     notes: tuple[str, ...] = ()
 
     def turned(self, turn: Floats, scale: float, shift: Floats) -> Scan:
-        """The scan with every vertex p at scale * turn @ p + shift."""
+        """The scan with every vertex p moved to scale * turn @ p + shift."""
         colours = None if self.colours is None else moved(self.colours, turn, scale, shift)
         return replace(self, vertices=scale * self.vertices @ turn.T + shift, colours=colours)
 
     def kept(self, faces: Bools) -> Scan:
-        """The scan with some of its triangles (t,)."""
+        """The scan with only the triangles that a mask (t,) chooses."""
         return replace(self, triangles=self.triangles[faces])
 
 
@@ -65,18 +65,17 @@ class Samples:
 
 
 def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
-    """Read a mesh of which only the form of the skin is wanted: pieces with the names of clothes, hair, teeth and the
-    like are left out.
+    """Read the skin of a mesh; pieces named as clothes, hair, teeth or other parts that are not skin are left out.
 
-    without : objects or materials to leave out; a part of the name will do.
+    without : further objects or materials to leave out, by any part of their name.
 
-    Raises FitError: the file is missing, damaged or too large, holds no triangle, or what is no finite number.
+    Raises FitError: the file is missing, damaged or too large, has no triangle, or has numbers that are not finite.
     """
     path = Path(path)
     kind = path.suffix.lower()
     if kind in OWN:
         raw = OWN[kind](path)
-        kept, notes = bare(raw, wanted_faces(raw, without, str(path)))
+        kept, notes = skin_and_eyes(raw, wanted_faces(raw, without, str(path)))
         scan = make_scan(raw.vertices, triangles(raw.faces[kept]), str(path))
         return replace(scan, colours=scan_colours(raw, kept), notes=tuple(notes))
     if kind not in OTHERS:
@@ -94,7 +93,7 @@ def _by_trimesh(path: Path, kind: str) -> tuple[Floats, Ints]:
 
     data = read_bytes(path)
     log = trimesh.util.log
-    was, log.disabled = log.disabled, True  # it prints what it gets over by itself, as normals that are no numbers
+    was, log.disabled = log.disabled, True  # it prints faults that do not matter here, such as invalid normals
     try:
         mesh = trimesh.load_mesh(BytesIO(data), file_type=kind[1:], process=False)
         return np.array(mesh.vertices, np.float64).reshape(-1, 3), np.array(mesh.faces, np.int64).reshape(-1, 3)
@@ -105,7 +104,7 @@ def _by_trimesh(path: Path, kind: str) -> tuple[Floats, Ints]:
 
 
 def make_scan(vertices: Floats, faces: Ints, where: str) -> Scan:
-    """A scan of triangles (t, 3): vertices in one place become one, triangles without area are left out.
+    """A scan of triangles (t, 3); vertices in one place are merged, triangles without area are left out.
 
     Raises FitError: see :func:`read_scan`.
     """
@@ -134,7 +133,7 @@ def _cross(points: Floats, faces: Ints) -> Floats:
 
 
 def borders_of(scan: Scan) -> tuple[Ints, Ints]:
-    """Directed edges, from and to, that only one triangle has."""
+    """The border of a scan: first and last vertex of every directed edge that only one triangle has."""
     a, b = directed_edges(np.column_stack([scan.triangles, np.full(len(scan.triangles), -1)]))
     n = len(scan.vertices)
     _, index, count = np.unique(np.minimum(a, b) * n + np.maximum(a, b), return_inverse=True, return_counts=True)
@@ -143,7 +142,7 @@ def borders_of(scan: Scan) -> tuple[Ints, Ints]:
 
 
 def spread(vertices: Floats, faces: Ints, count: int) -> tuple[Ints, Floats]:
-    """Places spread evenly over triangles, the same ones every time: triangle (count,) and shares of its corners."""
+    """Places spread evenly over triangles, the same in every call: triangle (count,), weights of corners (count, 3)."""
     area = np.linalg.norm(_cross(vertices, faces), axis=1)
     total = np.cumsum(area)
     random = np.random.default_rng(0)
@@ -153,7 +152,7 @@ def spread(vertices: Floats, faces: Ints, count: int) -> tuple[Ints, Floats]:
 
 
 def sample(scan: Scan, count: int = SAMPLES) -> Samples:
-    """Points spread evenly over a scan's surface; normals are smooth."""
+    """Points spread evenly over a scan's surface, with normals interpolated from those of the vertices."""
     face, share = spread(scan.vertices, scan.triangles, count)
     corners = scan.triangles[face]
     points = np.einsum("mk,mkc->mc", share, scan.vertices[corners])
@@ -167,7 +166,7 @@ def sample(scan: Scan, count: int = SAMPLES) -> Samples:
 
 
 def _border_line(scan: Scan, apart: float) -> Floats:
-    """Points (k, 3) along the border of a scan, none further than ``apart`` from the next."""
+    """Points (k, 3) along the border of a scan, at distances of at most ``apart``."""
     a, b = (scan.vertices[ids] for ids in borders_of(scan))
     pieces = np.ceil(np.linalg.norm(b - a, axis=1) / apart).astype(np.int64)
     edge = np.repeat(np.arange(len(a)), pieces)
@@ -178,7 +177,7 @@ def _border_line(scan: Scan, apart: float) -> Floats:
 
 
 def vertex_normals(scan: Scan) -> Floats:
-    """(n, 3) unit normals, means over the triangles around each vertex by their areas."""
+    """(n, 3) unit normals of the vertices, area-weighted means over the triangles around each."""
     cross = _cross(scan.vertices, scan.triangles)
     out = np.zeros_like(scan.vertices)
     for k in range(3):

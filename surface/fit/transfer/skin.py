@@ -1,4 +1,4 @@
-"""Bring a head's skin onto a scan: the map first, then the scan's own detail, lips closed, lids on the eyeballs."""
+"""Bring a head's skin onto a scan: by the map, then by the scan's own detail, with closed lips and seated lids."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ from surface.fit.transfer.warp import Warp
 from surface.head import Contact, Head, HeadPart
 from surface.head.model.parameters import smoothstep
 
-DETAIL_MM, PASSES = 5.0, 3  # of the scan, which the skin is moved by at most in one pass
-SMOOTH = 0.6  # of detail, against how closely it is followed
-FOLDED = 0.3  # cosine between a triangle that follows detail and the same one as the map has it: less is a fold
-UNFOLDINGS, STILL = 4, 0.1  # times that a pass lets go of folds; weight of skin there, which stays where the map has it
-RIM_MM = (1.5, 4.0)  # from the rim of an opening: nearer than the first the scan shows no skin, further all of it
-CLOSINGS = 12  # each leaves a share of the gap, for points farther away move less
-LIP_FADE_MM = (3.0, 16.0)  # from where lips meet: skin moves with them, does not move
-FAIR = 1e-3
-NEAR, NEAR_MM = 6, 12.0  # points of the skin that another part follows, and how far
+DETAIL_MM, PASSES = 5.0, 3  # greatest distance of the scan's detail that one pass follows; number of passes
+SMOOTH = 0.6  # weight of smoothness, relative to that of the detail
+FOLDED = 0.3  # least cosine between a triangle's normal before and after following detail; below it is a fold
+UNFOLDINGS, STILL = 4, 0.1  # attempts of a pass to remove folds; weight that keeps skin at folds where the map puts it
+RIM_MM = (1.5, 4.0)  # distance from the rim of an opening where detail of the scan begins to count, and counts fully
+CLOSINGS = 12  # iterations, because each one leaves a share of the gap
+LIP_FADE_MM = (3.0, 16.0)  # distance from the line of the lips up to which skin moves with them, and where it is still
+FAIR = 1e-3  # weight of fairness in the fit of control points
+NEAR, NEAR_MM = 6, 12.0  # nearest points of the skin that another part follows, and distance at which it no longer does
 
 
 @dataclass(frozen=True)
 class Ball:
-    """Eyeballs: centres (2, 3), left first, and radius."""
+    """Both eyeballs: centres (2, 3), left first, and radius, mm."""
 
     centres: Floats
     radius: float
@@ -41,7 +41,8 @@ class Ball:
 class Skin:
     """One part of skin as triangles: ``rest (n, 3)`` on the head it comes from, ``at (n, 3)`` on the scan.
 
-    ``points (k, 3)`` are the control points of its surface, set by :meth:`solve`. eyes : of the head it comes from.
+    points : (k, 3) control points of its surface, set by :meth:`solve`. rims : (r, 3) rims of all openings. eyes : the
+    eyeballs of the head it comes from.
     """
 
     def __init__(self, part: HeadPart, rims: Floats, warp: Warp, eyes: Ball) -> None:
@@ -51,13 +52,16 @@ class Skin:
         self.at = warp(self.rest)
         distance = cKDTree(rims).query(self.rest)[0] if len(rims) else np.full(n, np.inf)
         self.points = part.surface.points.copy()
-        # lids keep their own form: a scan's are one with its eyes, or lie inside an eyeball
+        # lids keep their own form, because those of a scan are joined to its eyes, or lie inside an eyeball
         self._seen = smoothstep(distance, *RIM_MM) * (1.0 - np.abs(lid_share(self.rest, eyes.centres, eyes.radius)))
         self._matrix = _laplacian(part.mesh.triangles, n)
 
     def follow(self, matcher: Matcher, scale: float) -> None:
-        """Move along normals to the scan where it has data; in between, and where that would fold the skin, as under
-        hair that hides an ear, as smoothly as the map did."""
+        """Move the skin along its normals to the scan where the scan has data, and interpolate smoothly elsewhere.
+
+        Skin that would fold, as under hair that hides an ear, is interpolated, too. scale : size of the new head,
+        relative to the one the skin comes from.
+        """
         mapped = self._facing(self.at)
         folds = np.zeros(len(self.at), bool)
         for _ in range(PASSES):
@@ -81,7 +85,10 @@ class Skin:
         return unit
 
     def _folded(self, at: Floats, mapped: Floats) -> Bools:
-        """(n,) vertices (n, 3) of triangles that are turned far from how the map has them, and their neighbours."""
+        """(n,) which vertices (n, 3) belong to folded triangles or are neighbours of one.
+
+        mapped : (t, 3) normals of the triangles as the map puts them.
+        """
         tri = self.mesh.triangles
         folded = np.zeros(len(at), bool)
         folded[tri[(self._facing(at) * mapped).sum(axis=1) < FOLDED]] = True
@@ -90,7 +97,7 @@ class Skin:
         return out
 
     def normals(self) -> Floats:
-        """(n, 3) unit normals of the skin as it lies."""
+        """(n, 3) unit normals of the skin's vertices."""
         tri = self.mesh.triangles
         cross = np.cross(self.at[tri[:, 1]] - self.at[tri[:, 0]], self.at[tri[:, 2]] - self.at[tri[:, 0]])
         out = np.zeros_like(self.at)
@@ -100,8 +107,7 @@ class Skin:
         return unit
 
     def solve(self) -> None:
-        """Find the control points that put the surface where the skin lies, in least squares; the skin then lies where
-        the surface does."""
+        """Fit the control points to the skin in least squares, and move the skin to the fitted surface."""
         s = self.surface
         net = Net(np.zeros((s.n, 4), np.int64), *s.padded)
         b = s.basis_matrix(self.mesh.uv, side=self.mesh.side)
@@ -122,9 +128,10 @@ def _laplacian(triangles: Ints, n: int) -> coo_matrix:
 
 
 def close_lips(skin: Skin, contact: Contact, scale: float) -> None:
-    """Take back what the scan's lips stand further apart than those of the head the skin comes from.
+    """Close the lips as far as they are closed on the head that the skin comes from; those of the scan may be parted.
 
-    Column by column the lowest place of the upper lip and the highest of the lower one are brought together again.
+    In every column of the contact the lowest sample of the upper lip and the highest of the lower lip are brought
+    together. scale : size of the new head, relative to the old one.
     """
     rows = contact.places.shape[2] * 2 // 3
     places, surface = contact.places[:, :, :rows], skin.surface
@@ -143,8 +150,8 @@ def close_lips(skin: Skin, contact: Contact, scale: float) -> None:
 
 
 def _lip_share(surface: DCPSurface, contact: Contact, lines: Floats) -> Floats:
-    """(n,) how far up each control point moves per millimetre that lips, meeting in ``lines (2, k, 3)``, are apart."""
-    uv = np.column_stack([k[:, 1:4].mean(axis=1) for k in surface.padded])  # in it, not in space, lips are apart
+    """(n,) how far up each control point moves for each millimetre between the lips, whose lines are (2, k, 3)."""
+    uv = np.column_stack([k[:, 1:4].mean(axis=1) for k in surface.padded])  # in space the lips touch
     side = np.stack([cKDTree(own.reshape(-1, 2)).query(uv)[0] for own in contact.places]).argmin(axis=0)
     distance = np.stack([cKDTree(line).query(surface.points)[0] for line in lines])
     fade = 1.0 - smoothstep(distance[side, np.arange(len(uv))], *LIP_FADE_MM)
@@ -153,8 +160,8 @@ def _lip_share(surface: DCPSurface, contact: Contact, lines: Floats) -> Floats:
 
 
 def _lip_lines(at: Floats) -> tuple[Floats, Floats]:
-    """(2, k, 3) where the columns of two lips, samples (2, k, m, 3), are nearest to each other, and (k,) how far they
-    are apart there."""
+    """For samples (2, k, m, 3) of both lips in k columns: (2, k, 3) those nearest to the other lip in every column, and
+    (k,) the height between them."""
     upper, lower = at
     k = np.arange(len(upper))
     lines = np.stack([upper[k, upper[..., 1].argmin(axis=1)], lower[k, lower[..., 1].argmax(axis=1)]])
@@ -162,9 +169,9 @@ def _lip_lines(at: Floats) -> tuple[Floats, Floats]:
     return lines, gap
 
 
-def seat(points: Floats, rest: Floats, old: Ball, new: Ball) -> Floats:
-    """Points (n, 3) moved to or from the new eyeballs until they are as high above them as ``rest (n, 3)`` above the
-    old ones, where that is low."""
+def seat_on_eyeballs(points: Floats, rest: Floats, old: Ball, new: Ball) -> Floats:
+    """Points (n, 3) of lids, moved along the radius of the new eyeballs until they are as high above these as ``rest
+    (n, 3)`` is above the old ones, in proportion. Points that are not near an eyeball stay."""
     share = lid_share(rest, old.centres, old.radius)
     side = (share < 0).astype(int)
     ratio = new.radius / old.radius
@@ -177,7 +184,7 @@ def seat(points: Floats, rest: Floats, old: Ball, new: Ball) -> Floats:
 
 
 def _followed(points: Floats, rest: Floats, moves: Floats) -> Floats:
-    """(m, 3) means of moves (n, 3) of the points ``rest`` around each of ``points (m, 3)``."""
+    """(m, 3) weighted means of the moves (n, 3) of the points ``rest (n, 3)`` nearest to each of ``points (m, 3)``."""
     distance, near = cKDTree(rest).query(points, k=NEAR)
     weight = 1.0 / (distance + 0.3) ** 2
     weight /= weight.sum(axis=1, keepdims=True)
@@ -186,7 +193,7 @@ def _followed(points: Floats, rest: Floats, moves: Floats) -> Floats:
 
 
 def follow_skin(points: Floats, skin: Skin, warp: Warp) -> Floats:
-    """Points (m, 3) of another part, moved by the map and, near the skin, by what the skin was moved further."""
+    """Points (m, 3) of another part, moved by the map and, near the skin, also by how far the skin left the map."""
     residual = skin.at - warp(skin.rest)
     nearest = cKDTree(skin.rest).query(points)[0]
     fade = 1.0 - smoothstep(nearest, 0.0, NEAR_MM)
@@ -195,17 +202,19 @@ def follow_skin(points: Floats, skin: Skin, warp: Warp) -> Floats:
 
 
 def behind_lids(points: Floats, skin: Skin, old: Ball, new: Ball) -> Floats:
-    """Points (n, 3) of what lines the lids from behind, on the new eyeballs as they lie on the old ones, and along them
-    moved as the skin ``skin`` near them is; so high above them as before, so that they stay behind the lids."""
+    """Points (n, 3) of the sockets behind the lids, moved with the eyeballs and, along their surface, with the skin.
 
-    def carried(at: Floats) -> Floats:
+    Their height above the eyeballs keeps its proportion, so that they stay behind the lids.
+    """
+
+    def with_eyeball(at: Floats) -> Floats:
         side = (at[:, 0] < old.centres[:, 0].mean()).astype(int)
         on: Floats = new.centres[side] + new.radius / old.radius * (at - old.centres[side])
         return on
 
     fade = 1.0 - smoothstep(cKDTree(skin.rest).query(points)[0], 0.0, NEAR_MM)
-    on = carried(points)
-    moved = on + fade[:, None] * _followed(points, skin.rest, skin.at - carried(skin.rest))
+    on = with_eyeball(points)
+    moved = on + fade[:, None] * _followed(points, skin.rest, skin.at - with_eyeball(skin.rest))
     centre = new.centres[(points[:, 0] < old.centres[:, 0].mean()).astype(int)]
     offset, height = moved - centre, np.linalg.norm(on - centre, axis=1)
     laid: Floats = centre + offset * (height / np.maximum(np.linalg.norm(offset, axis=1), 1e-9))[:, None]
@@ -213,7 +222,7 @@ def behind_lids(points: Floats, skin: Skin, old: Ball, new: Ball) -> Floats:
 
 
 def rims_of(head: Head) -> Floats:
-    """(m, 3) the rims of all openings of a head's face."""
+    """(m, 3) points of the rims of all openings of a head's face."""
     lips = [c for c in head.data.contacts if c.name == "lips"]
     part = next(p for p in head.data.parts if p.name == lips[0].part)
     surface: DCPSurface = head.part(part.name).surface

@@ -1,4 +1,4 @@
-"""A head as what a scanner would see of it: skin and fronts of the eyeballs, with its landmarks found by geometry."""
+"""Reduce a head to what a scanner would see of it, skin and fronts of the eyeballs, and find its landmarks."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ NAMES = (
     "right_eye_inner", "right_eye_outer", "right_eye_upper", "right_eye_lower", "mouth_left", "mouth_right",
     "upper_lip", "lower_lip",
 )  # fmt: skip
-EYE_FRONT = 0.3  # of the eyeball's radius: what lies further forward can be seen between the lids
+EYE_FRONT = 0.3  # distance before an eyeball's centre, in radii, from which on it can be visible between the lids
 
 
 @dataclass(frozen=True)
 class Template:
     """Points (n, 3), unit normals (n, 3) and triangles (t, 3) of a head at rest as seen from outside, mm.
 
-    face : (n,) does it belong to the skin with the openings? eye : (n,) 0 or 1 on an eyeball's front, else -1.
-    landmarks : places (3,) by the names of :data:`NAMES`; eyes (2, 3), radius.
+    face : (n,) whether a point belongs to the part of skin that has the openings. eye : (n,) 0 or 1 on the front of the
+    left or right eyeball, else -1.
+    landmarks : places (3,) by the names of :data:`NAMES`. eyes : (2, 3) centres of the eyeballs. radius : of both.
     """
 
     points: Floats
@@ -38,7 +39,7 @@ class Template:
 
     @property
     def height(self) -> float:
-        """From the chin to the bridge of the nose, mm: the measure of a head."""
+        """From the chin to the bridge of the nose, mm: the unit for lengths that depend on the size of a head."""
         return float(self.landmarks["nose_bridge"][1] - self.landmarks["chin"][1])
 
 
@@ -63,7 +64,7 @@ def make_template(head: Head, where: str) -> Template:
 
 
 def _seen(part: HeadPart, data: HeadData, face: str) -> tuple[Floats, Floats, Ints, Bools, Ints]:
-    """Points, normals, triangles of what can be seen of a part; whether each point is the face's, on which eyeball."""
+    """Points, normals and triangles of what is visible of a part, and their ``face`` and ``eye`` of a Template."""
     n, tri = len(part.vertices), part.triangles.astype(np.int64)
     side = ("left_eye", "right_eye").index(part.follows) if part.follows in ("left_eye", "right_eye") else -1
     if side >= 0:
@@ -77,7 +78,7 @@ def _seen(part: HeadPart, data: HeadData, face: str) -> tuple[Floats, Floats, In
 
 
 def find_landmarks(head: Head, contacts: dict[str, Contact]) -> dict[str, Floats]:
-    """The landmarks of a head at rest, out of the rims of its openings and its profile."""
+    """The landmarks of a head at rest, from the rims of its openings and its profile."""
     surface = head.part(contacts["lips"].part).surface
     rims = {n: surface.evaluate(c.places[:, :, 0].reshape(-1, 2)).reshape(2, -1, 3) for n, c in contacts.items()}
     out: dict[str, Floats] = {}

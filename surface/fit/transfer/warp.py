@@ -1,7 +1,7 @@
 """Smooth maps of space that bring the points of a template to where they belong on a scan.
 
-A map of space moves all that lies behind the skin along with it: lips stay closed and their linings, sockets and teeth
-stay where they belong, which a map of the skin alone does not ensure.
+A map of space also moves what lies behind the skin. Lips stay closed, and their inner sides, sockets and teeth stay
+behind them, which a map of only the skin would not ensure.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from scipy.linalg import solve
 from surface.base.arrays import Floats
 from surface.base.jit import kernel
 
-STEP_MM = 0.5  # of differences
+STEP_MM = 0.5  # of the central differences
 LEAST_WEIGHT = 1e-3
 
 
@@ -68,12 +68,12 @@ def fill_splines(centres: Any, out: Any) -> None:
 
 
 class Warp:
-    """Affine map plus thin-plate splines in space that moves points near to where they shall go.
+    """An affine map plus thin-plate splines in space, which moves points close to their goals.
 
     The smoothing spline of Wahba, "Spline Models for Observational Data" (1990), with r² log r: displacements are the
     splines' sum plus an affine map, the splines' weights being orthogonal to affine maps.
 
-    points, goals : (n, 3), mm. weight : (n,) how closely each is followed, relative to ``stiffness``.
+    points, goals : (n, 3), mm. weight : (n,) how closely each goal is reached, relative to ``stiffness``.
     """
 
     def __init__(self, points: Floats, goals: Floats, weight: Floats, stiffness: float) -> None:
@@ -96,7 +96,7 @@ class Warp:
         return moved
 
     def _affine(self, points: Floats) -> Floats:
-        """(m, 4) what an affine map takes, about the middle of the centres and in their size."""
+        """(m, 4) rows of ones and coordinates, about the middle of the centres and in units of their size."""
         return np.hstack([np.ones((len(points), 1)), (points - self._middle) / self._size])
 
     def jacobians(self, points: Floats, reach: float = STEP_MM) -> Floats:
@@ -106,7 +106,7 @@ class Warp:
         return np.stack(columns, axis=2)
 
     def turned(self, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
-        """Points (m, 3) moved, and unit normals (m, 3) of a surface through them as it lies then."""
+        """Points (m, 3) moved, and unit normals (m, 3) of the moved surface through them."""
         at: Floats = points + self._affine(points) @ self._map
         slopes = np.tile(np.eye(3) + self._map[1:].T / self._size, (len(points), 1, 1))
         add_slopes(np.ascontiguousarray(points, np.float64), self._centres, self._weights, at, slopes)

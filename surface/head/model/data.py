@@ -41,7 +41,7 @@ class PartData:
     closed_u, closed_v : (start, end) of a direction that is joined at its ends; None for one that is not.
     rect : (u0, u1, v0, v1) in which the part is drawn; None for the rectangle around ``loops``.
     flip : the outside is where S_v x S_u points, instead of S_u x S_v.
-    cuts : segments of (u, v) along which the mesh is cut; ``slits`` only tell where openings are.
+    cuts : segments of (u, v) along which the mesh is cut; ``slits`` only say where openings are.
     """
 
     name: str

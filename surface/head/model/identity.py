@@ -118,7 +118,7 @@ def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mappi
             there = ", ".join(known) or "none"
             raise HeadFileError(
                 f"{where}: no identity {name!r}; there are {there}",
-                hint="omote fit --help tells how --identities adds some",
+                hint="omote fit --help describes how --identities adds some",
             )
         if not (math.isfinite(amount) and 0.0 <= amount <= 1.0):
             raise HeadFileError(f"{where}: identity {name}: {amount:g} is not between 0 and 1", hint=f"{name}=0.6")

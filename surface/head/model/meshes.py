@@ -59,7 +59,7 @@ def domain_of(data: PartData) -> Domain:
     if data.rect is not None:
         return Domain(data.rect, data.loops, data.cuts)
     if not data.loops:
-        raise ValueError("has neither loops nor rect, so nothing tells where to draw it")
+        raise ValueError("has neither loops nor rect, which say where to draw it")
     every = np.concatenate(data.loops)
     (u0, v0), (u1, v1) = every.min(axis=0), every.max(axis=0)
     return Domain((u0, u1, v0, v1), data.loops, data.cuts)

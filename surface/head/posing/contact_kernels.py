@@ -8,7 +8,7 @@ from math import factorial
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
-from surface.base.jit import inlined, kernel, lean
+from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import add, fma_at, item, load, store3, zero
 
 # The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
@@ -52,7 +52,7 @@ def sum_rows(table, base, picks, first, end, by_pick, rows):  # type: ignore[no-
     return add(add(x0, x1), add(x2, x3)), add(add(y0, y1), add(y2, y3)), add(add(z0, z1), add(z2, z3))
 
 
-@lean
+@nonallocating
 def place_samples(
     start: Ints, ids: Ints, share: Floats32, local: Floats, around: bool, single: Floats32, room: Floats32, out: Floats
 ) -> None:  # fmt: skip
@@ -75,7 +75,7 @@ def place_samples(
             out[s, 3] = np.sqrt(a * a + b * b + c * c) if around else c
 
 
-@lean
+@nonallocating
 def angle(y: float, z: float) -> float:
     """The angle of (z, y) as np.arctan2(y, z), to 2e-8 rad, in a third of the time; Abramowitz and Stegun, 4.4.49."""
     a, b = abs(y), abs(z)
@@ -93,7 +93,7 @@ def angle(y: float, z: float) -> float:
     return -r if y < 0.0 else r
 
 
-@lean
+@nonallocating
 def trace_profiles(samples: Floats, rows: int, radius: float, out: Floats) -> None:
     """Profiles ``out (2, k, m, 3)`` of an opening's columns as (x, height, depth), from ``samples (s, 4)``, of which
     every column has ``rows``, m of them in its profile. Height is y, or, with a ``radius`` > 0, the arc above the
@@ -108,7 +108,7 @@ def trace_profiles(samples: Floats, rows: int, radius: float, out: Floats) -> No
                 out[side, k, j, 0], out[side, k, j, 1], out[side, k, j, 2] = sample[0], height, sample[3]
 
 
-@lean
+@nonallocating
 def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sign: float) -> float:
     """How far a profile's line reaches beyond ``height`` at ``depth``, towards ``sign``; -1e9 where it has none."""
     worst = -1e9
@@ -121,7 +121,7 @@ def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sig
     return worst
 
 
-@lean
+@nonallocating
 def deepest(heights: Floats, depths: Floats, others: Floats, at: Floats, sign: float, least: float) -> float:
     """How far two profiles, ``heights`` at ``depths`` and ``others`` at ``at``, overlap; -1e9 where that is no more
     than ``least`` at any depth."""
@@ -206,7 +206,7 @@ def find_closing(samples: Floats, seal: float, least: Floats, wanted: Floats, fi
     return most
 
 
-@lean
+@nonallocating
 def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) -> None:
     """How high ``samples (s, 4)``, as :func:`place_samples` gives them, lie above an eyeball of radius ``size``:
     ``heights (s,)``.
@@ -220,7 +220,7 @@ def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) ->
         heights[s] = depth - size * max(1.0, CORNEA_AT * along + np.sqrt(root))  # 1 beside the cornea and behind it
 
 
-@lean
+@nonallocating
 def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, gain: float, lifts: Floats) -> float:
     """How far samples at ``heights (s,)`` must be lifted or, below 0, laid down: ``lifts (s,)``.
 
@@ -263,7 +263,7 @@ def lift_points(ids: Ints, lifts: Floats, samples: Floats, table: Floats32, room
                 points[ids[k], c] += room[3 * (k - first) + c]
 
 
-@lean
+@nonallocating
 def turn_of(angle: float) -> tuple[float, float]:
     """Sine and cosine of an angle in rad; by Taylor's series where it is small, to 2e-15, in a tenth of the time."""
     if abs(angle) > 0.25:
@@ -274,7 +274,7 @@ def turn_of(angle: float) -> tuple[float, float]:
     return angle * s, c
 
 
-@lean
+@nonallocating
 def move_up(i: int, move: float, eye: Floats, radius: float, outward: bool, points: Floats) -> None:
     """Move point i of ``points (n, 3)`` up by ``move``, mm; with a ``radius`` round the eyeball at ``eye (3,)``, or
     away from its centre if ``outward``."""
@@ -311,7 +311,7 @@ def move_points(
         move_up(ids[k], moves[k], eye, radius, outward, points)
 
 
-@lean
+@nonallocating
 def follow_samples(
     ids: Ints, beside: Ints, share: Floats, push: Floats, size: int, eye: Floats, radius: float, points: Floats
 ) -> None:  # fmt: skip

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.jit import kernel, lean
+from surface.base.jit import kernel, nonallocating
 
 from .contact_kernels import (
     find_closing,
@@ -34,7 +34,7 @@ from .contact_kernels import (
 SEAL_PASSES = 2  # of bringing sides together: the second finds what bending left
 
 
-@lean
+@nonallocating
 def gather_near(points, near, eye, local):
     """Copy the points ``near (p,)`` of ``points (n, 3)``, relative to ``eye (3,)``, to ``local (p, 3)``."""
     for k in range(len(near)):
@@ -42,7 +42,7 @@ def gather_near(points, near, eye, local):
             local[k, c] = points[near[k], c] - eye[c]
 
 
-@lean
+@nonallocating
 def is_known(local, axis, seal, found, looked):
     """Whether points, axis and seal are those of the last answer; they are kept as those of the next one if not."""
     same = looked[3] == seal
@@ -71,7 +71,7 @@ def lift_once(axis, tolerance, sampling, limits, work):
     return error
 
 
-@lean
+@nonallocating
 def place_all(around, sampling, work):
     """Place the samples."""
     _, start, ids, share, _ = sampling
@@ -97,7 +97,7 @@ def clear_eyeball(points, eye, axis, passes, tolerance, sampling, limits, work):
     return error
 
 
-@lean
+@nonallocating
 def put_back(points, near, own, eye, local):
     """Write the moved ones of the points near an opening back to ``points (n, 3)``."""
     for k in range(len(own)):
@@ -145,7 +145,7 @@ def close_sides(seal, passes, tolerance, rows, apart, opening, push, sampling, w
 def part_sides(
     points, eye, axis, seal, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work
 ):  # fmt: skip
-    """Correct control points (n, 3) at an opening, of which ``seal``, 0..1, is closed first, until what is left is
+    """Correct control points (n, 3) at an opening, of which ``seal``, 0..1, is closed first, until the remainder is
     below ``tolerance``, mm, ``passes`` times at most; lids are moved onto the eyeball first, which opens them. Returns
     how many passes there were, 0 where the last answer still holds.
 
@@ -182,7 +182,7 @@ def part_sides(
     return done
 
 
-@lean
+@nonallocating
 def tell_moves(before, after, push):
     """Heights and depths of all samples of profiles ``after (2, c, m, 3)`` less those ``before``: ``push (4 c m,)``."""
     _, columns, rows, _ = before.shape

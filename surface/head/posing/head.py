@@ -38,7 +38,7 @@ class Head:
     Use :meth:`load`. One object belongs to one thread at a time.
 
     data : everything a head file holds; where : its path, for messages.
-    sway : of its hair; who draws a moving picture tells it the time.
+    sway : of its hair; a program that draws a moving picture gives it the time.
     own_groups : what :meth:`add_groups` added.
     """
 

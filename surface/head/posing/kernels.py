@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
-from surface.base.jit import inlined, kernel, lean
+from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import (
     add,
     div,
@@ -30,7 +30,7 @@ ONE, TINY = np.float32(1.0), np.float32(1e-30)
 AHEAD = 512  # numbers that are fetched before they are needed
 
 
-@lean
+@nonallocating
 def add_moves(
     amounts: Floats, start: Ints, tile: Ints, rows: Floats32, order: Ints, sums: Floats32, points: Floats
 ) -> None:
@@ -57,7 +57,7 @@ def add_moves(
             points[i, c] += sums[3 * k + c]
 
 
-@lean
+@nonallocating
 def mix_rows(amounts: Floats, rows: Floats32, rest: Floats, least: Floats, out: Floats) -> None:
     """Write ``rest (k,)`` plus ``amounts (g,) @ rows (g, k)``, nowhere less than ``least (k,)``, to ``out (k,)``."""
     for k in range(out.shape[0]):
@@ -81,7 +81,7 @@ def mapped(rows, at, linear, x0, y0, z0):  # type: ignore[no-untyped-def]
     )
 
 
-@lean
+@nonallocating
 def move_tile(
     rest: Floats32, rest_normals: Floats32, linear: Floats32, shift: Floats32, turn: Floats32, at: int,
     vertices: Floats32, normals: Floats32, to: int,
@@ -126,7 +126,7 @@ def move_rigid(
             out[whole + k], out_directions[whole + k] = own[2, k], own[3, k]
 
 
-@lean
+@nonallocating
 def place_vertices(
     start: Ints, ids: Ints, weights: Floats, points: Floats32, share: Floats32,
     turn: Floats, pivot: Floats, out: Floats,
@@ -150,7 +150,7 @@ def place_vertices(
         out[k, 2] = pivot[2] + cosine * c + sine * (x * b - y * a) + along * z
 
 
-@lean
+@nonallocating
 def swing_jaw(
     rest: Floats, share: Floats, turn: Floats, shift: Floats, full_turn: Floats, full_shift: Floats,
     amount: float, undo: Floats, points: Floats,
@@ -172,7 +172,7 @@ def swing_jaw(
             points[i, r] += share[i] * (arc + undo[i] * (line - arc))
 
 
-@lean
+@nonallocating
 def keep_on_eyeball(ids: Ints, eye: Floats, hold: Floats, radius: Floats, points: Floats) -> None:
     """Set the distance of points ``ids (k,)`` from ``eye (k, 3)`` to ``radius (k,)``, by the share ``hold (k,)``.
 
@@ -191,7 +191,7 @@ def keep_on_eyeball(ids: Ints, eye: Floats, hold: Floats, radius: Floats, points
         points[i, 2] += scale * z
 
 
-@lean
+@nonallocating
 def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at: Floats) -> None:
     """For every point of ``uv (m, 2)``: its distance from the polyline ``line (k, 2)``, and how far along it the
     nearest place lies, in the line's points; written to ``distance (m,)`` and ``at (m,)``."""
@@ -211,7 +211,7 @@ def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at
         distance[i] = np.sqrt(best)
 
 
-@lean
+@nonallocating
 def stitch_border(
     vertices: Floats32, normals: Floats32, to_vertices: Floats32, to_normals: Floats32, ids: Ints,
     low: Ints, high: Ints, share: Floats32,

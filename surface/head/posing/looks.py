@@ -16,7 +16,7 @@ LIP_FADE, LIP_COLOUR = 0.22, 0.75  # how much less lips darken than skin; share 
 
 
 def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
-    """Colour a head's parts; ``eyes (2, 3)`` are the centres of the eyeballs, mm, which tell where freckles grow."""
+    """Colour a head's parts; ``eyes (2, 3)`` are the centres of the eyeballs, mm, which decide where freckles are."""
     for part in parts:
         if part.material == "skin":
             _colour_skin(part, look)

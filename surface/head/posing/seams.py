@@ -1,7 +1,7 @@
 """Close seams: two parts of a head that meet in one border are drawn from two surfaces and must not show a crack.
 
 After every pose the second part's border vertices are put onto the first part's border edges, with its normals; slivers
-fill what is left between vertices that only the first part has and the edges of the second.
+fill the gaps between vertices that only the first part has and the edges of the second.
 """
 
 from __future__ import annotations

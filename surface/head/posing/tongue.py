@@ -1,8 +1,9 @@
-"""The tongue that is put out lies on the lower lip and over the lower teeth, and is pressed flat by the upper ones.
+"""Contact of a tongue that is put out: it rests on the lower lip and the lower teeth, below the upper teeth.
 
-Stations lie along its sides, some across each. How far one of the underside is too low is found against samples of the
-lower lip, as the lips' contact left them, and of the lower teeth; the tongue's cross-sections go up by it, soft along
-its length. Where its upper side meets the upper teeth then, it becomes thinner. It goes sideways with the lower lip.
+Stations are places on the tongue's upper and under side, several in each of its cross-sections. Stations of the
+underside are compared with samples of the lower lip, after the contact of the lips was solved, and of the lower teeth.
+Each cross-section is lifted by as much as its lowest station is too low, smoothed along the tongue. Where the upper
+side then meets the upper teeth, the tongue is made thinner. It also moves sideways with the lower lip.
 """
 
 # mypy: disable-error-code="call-arg"
@@ -11,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.base.jit import kernel, lean
+from surface.base.jit import kernel, nonallocating
 from surface.dcp import DCPSurface
 from surface.head.model.data import HeadData, PartData
 from surface.head.model.meshes import domain_of, make_surface
@@ -23,25 +24,27 @@ GRID = 56  # samples of the tongue and of the teeth along u and v, out of which 
 STATIONS, LENGTH_MM = 18, 55.0  # along the tongue, from its tip backwards
 ACROSS = (-0.9, -0.6, -0.3, 0.0, 0.3, 0.6, 0.9)  # places of a station, in half widths of the tongue there
 BIN_MM = 2.0  # width of the columns in which the highest samples of teeth are kept
-REACH_MM = 5.0  # from a station, seen from above: what is further away does not lift it
-CLEAR_MM, SOFT_MM = 0.6, 0.4  # between tongue and what it lies on; correction sets in so much earlier
-SLICE_MM = 2.5  # half the length of a slice in which its height and width are found
-BEND_MM = 16.0  # along the tongue, over which a rise fades
-SIDEWAYS = 1.1  # of the way of the lower lip to a side, which the tongue goes along: less, and the other corner cuts it
-PUT_OUT = (0.02, 0.3)  # tongueOut, from none to all of the correction: a tongue in the mouth lies as it was fitted
-BEYOND = (0.3, 0.5)  # tongueOut, over which it goes sideways: further in, it would go into the teeth beside it
+REACH_MM = 5.0  # horizontal distance from a station beyond which a sample does not lift it
+CLEAR_MM, SOFT_MM = 0.6, 0.4  # distance kept from what the tongue rests on; how much earlier the correction begins
+SLICE_MM = 2.5  # half the length of a slice in which the tongue's height and width are measured
+BEND_MM = 16.0  # distance along the tongue over which the lift of a station fades
+SIDEWAYS = 1.1  # how far the tongue follows the lower lip to a side: with less, the other corner of the mouth cuts it
+PUT_OUT = (0.02, 0.3)  # tongueOut where the correction begins and where it is complete: inside the mouth there is none
+BEYOND = (0.3, 0.5)  # tongueOut over which it begins to move sideways: further in, it would cut the teeth beside it
 PASSES = 3
 LEAST_SAMPLES, LEAST_MM = 50, 5.0  # of a part that is a tongue, and its length
 
 
-@lean
+@nonallocating
 def find_rise(
     under: Floats, below: Floats, reach: float, clear: float, soft: float, again: bool, rise: Floats
 ) -> float:  # fmt: skip
-    """How far stations ``under (s, 3)`` are too low, ``rise (s,)``, over points ``below (k, 3)``, by rising z, within
-    ``reach``, of which each counts less the further away it is, seen from above. Returns the farthest.
+    """Fill ``rise (s,)`` with how far stations ``under (s, 3)`` have to be lifted, and return the greatest of these.
 
-    ``again`` : stations have only been lifted since the last call, so those that were not too low are left out.
+    below : (k, 3) points that the stations have to stay above, sorted by rising z. Those further away than ``reach``,
+        measured horizontally, do not count, and nearer ones count less the further away they are.
+    clear, soft : distance to keep, and how much earlier lifting begins. All lengths are mm.
+    again : stations have only been lifted since the last call, so those that were not too low are left out.
     """
     most = 0.0
     for s in range(len(under)):
@@ -52,9 +55,9 @@ def find_rise(
     return most
 
 
-@lean
+@nonallocating
 def rise_of(x: float, y: float, z: float, below: Floats, reach: float, soft: float) -> float:
-    """How far one station at (x, y, z) is too low: :func:`find_rise`."""
+    """How far one station at (x, y, z) has to be lifted; see :func:`find_rise`."""
     most, scale = 0.0, 1.0 / (reach * reach)
     for k in range(np.searchsorted(below[:, 2], z - reach), len(below)):
         if below[k, 2] >= z + reach:
@@ -70,10 +73,14 @@ def rise_of(x: float, y: float, z: float, below: Floats, reach: float, soft: flo
     return most
 
 
-@lean
+@nonallocating
 def lift_sections(rise: Floats, fade: Floats, part: Floats, share: float, lift: Floats, points: Floats) -> None:
-    """Move points (n, 3) up by ``share`` times their ``part (n,)`` of the greatest ``rise (s k,)`` of k stations of
-    each of s cross-sections, times ``fade (s, n)``; ``lift (n,)`` is scratch space."""
+    """Move control points (n, 3) up by the rise of the cross-sections near them.
+
+    rise : (s k,) of k stations in each of s cross-sections; the greatest in each section counts.
+    fade : (s, n) how much of a section's rise a point takes; the greatest of these products is its lift.
+    part, share : (n,) and one factor, both 0..1, of that lift. lift : (n,) scratch space.
+    """
     across = len(rise) // len(fade)
     for i in range(len(points)):
         lift[i] = 0.0
@@ -88,10 +95,11 @@ def lift_sections(rise: Floats, fade: Floats, part: Floats, share: float, lift: 
         points[i, 1] += share * part[i] * lift[i]
 
 
-@lean
+@nonallocating
 def place_stations(start: Ints, ids: Ints, weights: Floats, sign: float, points: Floats, out: Floats) -> None:
-    """Stations ``out (s, 3)``: sums of ``weights`` times ``points (n, 3)``, as :func:`.contact.weights_at` gives them,
-    with y times ``sign``."""
+    """Fill ``out (s, 3)`` with the places of the stations, sums of ``weights`` times control points (n, 3), as
+    :func:`.contact.weights_at` lists them. ``sign`` multiplies y: -1 turns the tongue over, so that its upper side can
+    be treated as its underside."""
     for s in range(len(out)):
         x, y, z = 0.0, 0.0, 0.0
         for k in range(start[s], start[s + 1]):
@@ -105,8 +113,11 @@ def press(
     start: Ints, ids: Ints, weights: Floats, against: Floats, fade: Floats, part: Floats, sign: float, share: float,
     points: Floats,
 ) -> None:  # fmt: skip
-    """Move points (n, 3) away from what lies ``against (k, 3)``, by rising z and with y times ``sign``, the side of the
-    stations that the first three place; ``fade``, ``part`` and ``share`` as in :func:`lift_sections`."""
+    """Move control points (n, 3) of the tongue until its stations clear the points ``against (k, 3)``.
+
+    start, ids, weights, sign : as in :func:`place_stations`. against : sorted by rising z, y multiplied by ``sign``.
+    fade, part, share : as in :func:`lift_sections`.
+    """
     stations, rise, lift = np.zeros((len(start) - 1, 3)), np.zeros(len(start) - 1), np.zeros(len(points))
     for again in range(PASSES):
         place_stations(start, ids, weights, sign, points, stations)
@@ -115,11 +126,11 @@ def press(
         lift_sections(rise, fade, part, sign * share, lift, points)
 
 
-@lean
+@nonallocating
 def sort_by_depth(at: Floats, order: Ints, out: Floats) -> None:
-    """Copy points ``at (k, 3)`` to ``out (k, 3)`` by rising z; ``order (k,)`` is where each comes from.
+    """Copy points ``at (k, 3)`` to ``out (k, 3)`` by rising z; ``order (k,)`` becomes the row that each comes from.
 
-    It starts as the last call left it, which is nearly right from one frame of a motion to the next.
+    The search starts from the order of the last call, which is nearly right from one frame of a motion to the next.
     """
     for k in range(1, len(order)):
         i, j = order[k], k
@@ -132,10 +143,13 @@ def sort_by_depth(at: Floats, order: Ints, out: Floats) -> None:
             out[k, c] = at[order[k], c]
 
 
-@lean
+@nonallocating
 def go_aside(lip: Floats, sideways: Floats, share: float, points: Floats) -> None:
-    """Move points (n, 3) by ``share`` of the way along x from their mean, by ``sideways (n,)``, to that of the ``lip
-    (k, 3)``, each by its ``sideways``."""
+    """Move control points (n, 3) of the tongue along x towards the middle of the lower lip.
+
+    lip : (k, 3) its samples. sideways : (n,) 0..1, how much each point takes part, both in the mean of the tongue and
+    in the move. share : of the distance between both means.
+    """
     middle, own, total = 0.0, 0.0, 0.0
     for k in range(len(lip)):
         middle += lip[k, 0]
@@ -147,10 +161,10 @@ def go_aside(lip: Floats, sideways: Floats, share: float, points: Floats) -> Non
         points[i, 0] += aside * sideways[i]
 
 
-@lean
+@nonallocating
 def gather_below(lip: Floats, lower: Floats, linear: Floats, shift: Floats, out: Floats) -> None:
-    """Write samples of the ``lip (k, 3)``, and those of ``lower (m, 3)`` teeth by ``linear (3, 3)`` and ``shift (3,)``,
-    to ``out (k + m, 3)``."""
+    """Fill ``out (k + m, 3)`` with samples of the ``lip (k, 3)`` and of the ``lower (m, 3)`` teeth; the teeth are moved
+    with the jaw by ``linear (3, 3)`` and ``shift (3,)``."""
     for k in range(len(lip)):
         for c in range(3):
             out[k, c] = lip[k, c]
@@ -166,8 +180,11 @@ def gather_below(lip: Floats, lower: Floats, linear: Floats, shift: Floats, out:
 def rest_tongue(  # type: ignore[no-untyped-def]
     underside, upper_side, lip, lower, upper, linear, shift, fade, sideways, thick, share, aside, order, points
 ):  # fmt: skip
-    """The whole of :meth:`TongueRest.apply` in one call; the sides are what :func:`press` takes first, and ``aside`` is
-    the share of the lip's way to a side that the tongue goes along."""
+    """All steps of :meth:`TongueRest.apply` in one compiled call.
+
+    underside, upper_side : the stations of either side, as the first three parameters of :func:`press`.
+    aside : ``share`` of :func:`go_aside`. thick : (n,) 0 at the underside, 1 at the upper side.
+    """
     go_aside(lip, sideways, aside, points)
     at, below = np.empty((len(order), 3)), np.empty((len(order), 3))
     gather_below(lip, lower, linear, shift, at)
@@ -179,7 +196,7 @@ def rest_tongue(  # type: ignore[no-untyped-def]
 
 
 def tongue_rest(part: PartData, head: HeadData) -> TongueRest | None:
-    """The correction of a tongue; None for one that is too short to be told from a button, or has no surface."""
+    """The correction of a tongue; None for a part without a surface, or too short to have a direction."""
     surface = make_surface(part)
     places, at = _samples(part, surface)
     if len(at) < LEAST_SAMPLES or np.ptp(at[:, 2]) <= LEAST_MM:
@@ -190,8 +207,8 @@ def tongue_rest(part: PartData, head: HeadData) -> TongueRest | None:
 class TongueRest:
     """Keeps a part with the group tongueOut above the lower lip and the lower teeth, and below the upper teeth.
 
-    part : the tongue, and its surface; head : for its teeth. places : (k, 2) samples all over the tongue, in (u, v);
-    at : (k, 3) where they lie, mm.
+    part, surface : the tongue. head : has the teeth. places : (k, 2) samples all over the tongue, in (u, v).
+    at : (k, 3) the positions of these samples, mm.
     """
 
     def __init__(self, part: PartData, head: HeadData, surface: DCPSurface, places: Floats, at: Floats) -> None:
@@ -200,7 +217,7 @@ class TongueRest:
         along = at[:, 2].max() - np.linspace(1.0, length, STATIONS)
         self._sides = [weights_at(surface, _stations(places, at, along, sign)) for sign in (-1.0, 1.0)]
         away = np.abs(z[None] - along[:, None])
-        away[0, z > along[0]] = 0.0  # the tip goes as its first station
+        away[0, z > along[0]] = 0.0  # the tip moves with the first station
         self._fade = 1.0 - smoothstep(away / BEND_MM)
         self._sideways = smoothstep(z, along[0] - 0.7 * length, along[0])
         low, high = _thickness(at, z)
@@ -228,7 +245,7 @@ class TongueRest:
 
 
 def _eased(x: float, low: float, high: float) -> float:
-    """0 up to ``low``, 1 from ``high`` on, and soft between."""
+    """0 up to ``low``, 1 from ``high`` on, and smooth between."""
     t = min(max((x - low) / (high - low), 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
 
@@ -249,7 +266,7 @@ def _grid(part: PartData) -> Floats:
 
 
 def _samples(part: PartData, surface: DCPSurface) -> tuple[Floats, Floats]:
-    """(k, 2) places all over a part, in (u, v), and (k, 3) where they lie; without those that nothing covers."""
+    """(k, 2) places all over a part, in (u, v), and their positions (k, 3), mm; only where control points cover it."""
     places = _grid(part)
     at = surface.evaluate(places)
     covered = np.isfinite(at).all(axis=1)
@@ -257,14 +274,14 @@ def _samples(part: PartData, surface: DCPSurface) -> tuple[Floats, Floats]:
 
 
 def _slice(at: Floats, z: float) -> Bools:
-    """(k,) samples in a slice at z; where there are none, the nearest."""
+    """(k,) whether each sample lies in the slice at z; the nearest one always does."""
     away = np.abs(at[:, 2] - z)
     return away <= max(SLICE_MM, float(away.min()))
 
 
 def _stations(places: Floats, at: Floats, along: Floats, sign: float) -> Floats:
-    """(STATIONS * len(ACROSS), 2) places on the tongue's upper (1) or under (-1) side at z of ``along``, out of samples
-    at ``places (k, 2)``, which lie ``at (k, 3)``."""
+    """(STATIONS * len(ACROSS), 2) stations in (u, v) on the tongue's upper side (``sign`` 1) or underside (-1), at each
+    z of ``along``, chosen from samples ``places (k, 2)`` with positions ``at (k, 3)``."""
     out = []
     for z in along:
         here = at[_slice(at, z)]

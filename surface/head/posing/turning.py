@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32
-from surface.base.jit import inlined, kernel, lean
+from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import add, fma, load, load_x, load_y, load_z, mul, splat, store3, sub
 
 # coefficients of Taylor's series: of x**11 to x**3, and of x**12 to x**2
@@ -46,7 +46,7 @@ def turned(x, y, z, a, b, c, sine, rest):  # type: ignore[no-untyped-def]
     )
 
 
-@lean
+@nonallocating
 def turn_tile(
     vertices: Floats32, normals: Floats32, share: Floats32, axis: Floats32, half: float, pivot: Floats32, at: int,
     out_vertices: Floats32, out_normals: Floats32, to: int,

@@ -78,7 +78,7 @@ class QualityChoice:
         return self.drawn
 
     def end(self, seconds: float) -> None:
-        """End a frame that took so long to draw. Frames of a face at rest and of a dissolve tell nothing."""
+        """End a frame that took so long to draw. Frames of a face at rest and of a dissolve do not count."""
         if not self._moved or self.share < 1.0:
             return
         self._frames, self._spent_s = self._frames + 1, self._spent_s + seconds

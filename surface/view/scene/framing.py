@@ -79,8 +79,8 @@ def _inside(part: Any) -> np.ndarray:
 
 
 def _eyes(data: Any, skin: np.ndarray) -> tuple[np.ndarray, bool]:
-    """The middle of the eyes (3,): of the eyeballs, else behind what blinks, else below the crown; and whether the
-    eyes tell it."""
+    """The middle of the eyes (3,): of the eyeballs, else behind what blinks, else below the crown; and whether eyes
+    determine it."""
     if data.eye_radius > 0:
         return np.asarray(data.eyes, float).mean(axis=0), True
     lids = [m for name in BLINKS if (m := _moved(data, (name,))) is not None]

@@ -7,7 +7,7 @@ import itertools
 import pytest
 
 from controller.base.errors import ConfigError
-from controller.base.parts import CALM_S, PAUSES_S, Part, Parts, describe
+from controller.base.parts import PAUSES_S, RESET_AFTER_S, Part, Parts, describe
 
 
 def broken() -> None:
@@ -53,7 +53,7 @@ def test_pauses_grow_until_it_is_switched_off(caplog: pytest.LogCaptureFixture) 
 
 def test_a_failure_after_a_calm_time_counts_as_the_first() -> None:
     part = Part("voice")
-    assert [part.fail(OSError(), i * (CALM_S + 1.0)) for i in range(20)] == [PAUSES_S[0]] * 20
+    assert [part.fail(OSError(), i * (RESET_AFTER_S + 1.0)) for i in range(20)] == [PAUSES_S[0]] * 20
     keen = Part("link", keep_trying=True)
     pauses = [keen.fail(OSError(), i * 16.0) for i in range(9)]
     assert pauses == [*PAUSES_S, *[PAUSES_S[-1]] * 4] and not keen.off

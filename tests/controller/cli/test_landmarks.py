@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from controller.base.paths import find_config
 from controller.cli.app import make_app
 from controller.cli.console import console
-from surface.fit.transfer import pick
+from surface.fit.transfer import pick_landmarks
 
 PICTURE = Path("/" + "long" * 30) / "landmarks.png"
 
@@ -28,7 +28,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
         marks = {"chin": "found", "nose_tip": "kept", "mouth_left": "found"}
         return {name: SimpleNamespace(how=how) for name, how in marks.items()}, PICTURE
 
-    monkeypatch.setattr(pick, "pick_landmarks", search)
+    monkeypatch.setattr(pick_landmarks, "pick_landmarks", search)
     monkeypatch.setattr(console, "width", 80)
     return calls
 

@@ -41,7 +41,7 @@ def test_options_are_passed_on_and_all_is_told(calls: list[tuple], tmp_path: Pat
     assert calls == [(Path("a.3DM"), out, "mine", SurfaceOptions(), None)]
     words = " ".join(said.output.replace("│", " ").replace("┃", " ").split())
     assert "mine: 82 control points, 1 shapes" in words and "face object 3 skin skin 77" in words
-    assert "b: exact but near star points, there within 0.250 mm" in words and "a note [x]" in words
+    assert "b: exact, except near star points: 0.250 mm or less" in words and "a note [x]" in words
     assert "no group for cheekPuff: these parameters will not move this head" in words
     more = ["--name", "you", "--unit", "cm", "--up", "z", "--forward", "-y", "--without", "x", "--only", "a", "--only"]
     more += ["b", "--groups", "g.toml", "--strict", "--expressions-from", "ict", "--landmarks", "l.toml"]

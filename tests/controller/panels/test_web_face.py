@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from controller.base.errors import ConfigError
-from controller.panels.web_face import face_in_the_making, make_face
+from controller.panels.web_face import face_file_in_background, make_face
 from surface.head.model.file import save_data
 from tests.surface.small_head import part, small_head
 
@@ -47,7 +47,7 @@ def test_it_has_the_control_points_of_a_vocabulary_that_a_run_was_given(stage: P
 
 @pytest.mark.slow
 def test_it_appears_while_the_context_lasts_and_leaves_nothing(stage: Path) -> None:
-    with face_in_the_making(stage, {}, None) as path:
+    with face_file_in_background(stage, {}, None) as path:
         end = time.monotonic() + WAIT_S
         while not path.exists() and time.monotonic() < end:
             time.sleep(0.05)
@@ -56,6 +56,6 @@ def test_it_appears_while_the_context_lasts_and_leaves_nothing(stage: Path) -> N
 
 
 def test_a_run_that_ends_early_ends_it(stage: Path) -> None:
-    with face_in_the_making(stage, {}, None) as path:
+    with face_file_in_background(stage, {}, None) as path:
         pass
     assert not path.parent.exists()

@@ -27,7 +27,7 @@ from controller.robot.channels import build_table
 from controller.robot.following import Mirror
 from controller.robot.robot import load_robot
 from controller.robot.settings import RobotSettings
-from controller.robot.suggest import suggest
+from controller.robot.suggest_servos import suggest_servos
 from controller.tools.check import check_anything
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Head
@@ -195,8 +195,8 @@ def emotions() -> dict[str, np.ndarray]:
 
 def test_no_other_place_or_direction_would_help_more(solved: AnchorSolver) -> None:
     """Against every sampled point in many directions, tried one by one."""
-    best = next(suggest(solved, emotions(), P))
-    left = np.array([solved.left_over(solved.shape_values(face)) for face in emotions().values()])
+    best = next(suggest_servos(solved, emotions(), P))
+    left = np.array([solved.residual(solved.shape_values(face)) for face in emotions().values()])
     rng = np.random.default_rng(1)
     tried = []
     for j in rng.choice(len(solved.skin.rest), 120, replace=False):
@@ -215,7 +215,7 @@ def test_the_suggested_servo_leaves_no_more_than_was_said(
     tmp_path: Path, head: Head, solved: AnchorSolver, root: Path
 ) -> None:
     """Written into the robot's file and solved together with the others, within its travel."""
-    best = next(suggest(solved, emotions(), P))
+    best = next(suggest_servos(solved, emotions(), P))
     pull = best.pull_mm + 0.1
     channel = f"""
 [[channels]]
@@ -233,7 +233,7 @@ max_accel_deg_s2 = 3000
     (tmp_path / "robot.toml").write_text(text + channel)
     more = load_anchors(load_robot(tmp_path / "robot.toml", P), head, P)
     assert more is not None
-    left = np.array([more.left_over(more.shape_values(face)) for face in emotions().values()])
+    left = np.array([more.residual(more.shape_values(face)) for face in emotions().values()])
     near = np.linalg.norm(more.skin.rest - best.point, axis=1) < 15.0
     assert np.sqrt((left[:, near] ** 2).sum(axis=2).mean()) < 0.5 * (best.before_mm + best.after_mm)
 

@@ -15,7 +15,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.robot.channels import build_table
 from controller.robot.following import Mirror
 from controller.robot.linkages.kind import LINKAGES, read_linkage
-from controller.robot.linkages.linked import LinkedChannels
+from controller.robot.linkages.linked_channels import LinkedChannels
 from controller.robot.linkages.rods import Rods, turn
 from controller.robot.robot import load_robot
 from controller.robot.safety import GoalFilter

@@ -205,7 +205,7 @@ def test_limits_of_the_servo_and_of_the_test(bus: ServoBus) -> None:
     bus.never_beyond_limits((1000, 3000))
     bus.never_beyond_limits({2: (0, 1)})
     text = said(lambda: bus.never_beyond_limits({1: (1000, 2500)}))
-    assert re.search(r"servo 1 \(xl330-m288\) was told Goal Position = 2900 at .* its limits are 1000 to 2500", text)
+    assert re.search(r"servo 1 \(xl330-m288\) got Goal Position = 2900 at .* its limits are 1000 to 2500", text)
     assert re.search(r"moved to 2900 at .* beyond 2500", text)
     write(bus, 1, GOAL, 3001)
     assert "which it refused (data limit); its limits are 0 to 3000" in said(bus.never_beyond_limits)
@@ -263,7 +263,7 @@ def test_boards(board: ServoBoard) -> None:
     assert board.channels[2].value == 1700
     assert "channel 2 went from 1540 to 1700 at once at 0.02" in said(board.no_jump)
     board.never_beyond_limits((1000, 1700))
-    assert "channel 2 was told target_us = 1700 at" in said(lambda: board.never_beyond_limits({2: (1000, 1600)}))
+    assert "channel 2 got target_us = 1700 at" in said(lambda: board.never_beyond_limits({2: (1000, 1600)}))
     board.never_beyond_limits({3: (0, 1)})
     assert "channel 2 is still on with target_us = 1700, since 0.02" in said(board.torque_off_at_exit)
     target(board, 2, 0)
@@ -351,4 +351,4 @@ def test_goals_may_lead_back_from_outside_but_not_further_out(bus: ServoBus) -> 
     bus.step(1.0)
     bus.never_beyond_limits((0, 3000))
     write(bus, 1, GOAL, 3450)
-    assert "was told Goal Position = 3450" in said(lambda: bus.never_beyond_limits((0, 3000)))
+    assert "got Goal Position = 3450" in said(lambda: bus.never_beyond_limits((0, 3000)))

@@ -28,10 +28,10 @@ WRITES = (
     [
         ((1000.0, 2000.5), []),
         ((1001, 2000), [
-            "channel 1 was told target_us = 1000 at 0.500 s; its limits are 1001 to 2000",
-            "channel 2 was told target_us = 2000.5 at 1.250 s; its limits are 1001 to 2000",
+            "channel 1 got target_us = 1000 at 0.500 s; its limits are 1001 to 2000",
+            "channel 2 got target_us = 2000.5 at 1.250 s; its limits are 1001 to 2000",
         ]),
-        ({2: (0, 2000)}, ["channel 2 was told target_us = 2000.5 at 1.250 s; its limits are 0 to 2000"]),
+        ({2: (0, 2000)}, ["channel 2 got target_us = 2000.5 at 1.250 s; its limits are 0 to 2000"]),
         ({1: (1000, 1000)}, []),
     ],
 )  # fmt: skip

@@ -126,23 +126,23 @@ def test_kernels_run_on_a_full_disk(monkeypatch: pytest.MonkeyPatch, caplog: pyt
     assert "No space left on device" in caplog.text
 
 
-def test_a_lean_kernel_counts_no_references() -> None:
+def test_a_nonallocating_kernel_counts_no_references() -> None:
     def shifted(array):  # type: ignore[no-untyped-def]
         rest = array[1:]
         return rest[0] + array[0]
 
-    lean = jit.lean(shifted)
-    assert lean(np.array([1.0, 2.0])) == 3.0
-    lean.recompile()  # code that an earlier run has kept cannot be looked into
-    assert not any("call void @NRT_incref" in text for text in lean.inspect_llvm().values())
+    compiled = jit.nonallocating(shifted)
+    assert compiled(np.array([1.0, 2.0])) == 3.0
+    compiled.recompile()  # code that an earlier run has kept cannot be looked into
+    assert not any("call void @NRT_incref" in text for text in compiled.inspect_llvm().values())
 
 
-def test_a_lean_kernel_may_call_one_that_allocates() -> None:
+def test_a_nonallocating_kernel_may_call_one_that_allocates() -> None:
     @jit.kernel
     def allocating(array):  # type: ignore[no-untyped-def]
         return np.zeros(3).sum() + array[0]
 
-    assert jit.lean(lambda array: allocating(array[1:]) + array[0])(np.array([1.0, 2.0])) == 3.0
+    assert jit.nonallocating(lambda array: allocating(array[1:]) + array[0])(np.array([1.0, 2.0])) == 3.0
 
 
 TOGETHER = """

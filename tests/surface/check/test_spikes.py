@@ -94,9 +94,9 @@ def test_an_edge_is_filled_by_as_many_steps_as_it_needs_and_no_more_than_forty()
 
 def test_the_corner_of_a_border_is_no_spike() -> None:
     points, ring = np.array([[0.0, 0, 0], [9, 0, 0], [20, 0, 0]]), spikes.Ring(np.zeros(1), np.zeros(0))
-    high = ring.high(points, np.array([[2.0, 0, 0], [50, 0, 0]]), np.array([5.0, 4.0, 1.0]), 3.0, 2.5)
+    high = ring.without_rims(points, np.array([[2.0, 0, 0], [50, 0, 0]]), np.array([5.0, 4.0, 1.0]), 3.0, 2.5)
     assert high.tolist() == [0.0, 4.0, 0.0]
-    assert ring.high(points, np.zeros((0, 3)), np.array([5.0, 4.0, 1.0]), 3.0, 2.5).tolist() == [5.0, 4.0, 0.0]
+    assert ring.without_rims(points, np.zeros((0, 3)), np.array([5.0, 4.0, 1.0]), 3.0, 2.5).tolist() == [5.0, 4.0, 0.0]
 
 
 @pytest.mark.parametrize(("height", "named"), [(3.0, False), (3.6, True), (20.0, True)])
@@ -134,7 +134,7 @@ def test_what_has_its_like_on_the_other_side_is_no_spike() -> None:
 def test_a_nose_may_stick_out(x: float, y: float, z: float, usual: bool) -> None:
     """0.35 eye distances (22.3 mm) to each side, 0.3 (19.1 mm) up, and 0.9 of the way to the lips (60.7 mm) down."""
     head = plain.subject(cone(0.0, -30.0, 9.0))
-    found = spikes._usual(head, np.array([[x, y, z]]), np.array([5.0]), Places(head, None))
+    found = spikes._allowed(head, np.array([[x, y, z]]), np.array([5.0]), Places(head, None))
     assert found.tolist() == [usual]
 
 

@@ -16,9 +16,10 @@ from surface.base.errors import FitError, ViewError
 from surface.fit import reportfile
 from surface.fit.api import fit_mesh
 from surface.fit.eyes.search import MISSING
+from surface.fit.measures.error_colours import SCALE
 from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds, kinds_line
-from surface.fit.reportfile import EXCLUDED, SCALE, _colours, as_markdown, as_table, write_report
+from surface.fit.reportfile import EXCLUDED, _colours, as_markdown, as_table, write_report
 from surface.fit.source.load import Loaded
 from surface.fit.source.names import map_names
 from surface.head import Head
@@ -65,7 +66,7 @@ def test_every_figure_of_the_report_can_be_read() -> None:
     assert "## Shapes of lashes" not in lines
     plain = as_markdown(report_of(missing=(), left_out=()), NETS, [])
     assert "no shape for" not in plain and "left out" not in plain
-    assert "No OpenGL" in plain and "violet" not in plain
+    assert "OpenGL is not available" in plain and "violet" not in plain
 
 
 def test_a_report_replaces_an_older_one_and_folders_are_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -188,7 +189,7 @@ def result():
         patch.setattr("surface.fit.source.uvcheck.SQUEEZED_SHARE", 1.0)  # the pit stays squeezed: it is a fold
         patch.setattr("surface.fit.source.owncharts.UNEVEN", np.inf)
         with fewer_points():
-            return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken for mm",)), "sheet", lambda *_: None)
+            return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken to be mm",)), "sheet", lambda *_: None)
 
 
 @pytest.fixture(scope="module")
@@ -208,7 +209,7 @@ def test_the_figures_are_those_of_the_fit(folder, result):
     assert part["control_points"] == result.report.points and set(part["shapes_mm"]) == {"jawOpen", "mouthSmileLeft"}
     assert part["neutral_mm"]["rms"] == result.report.parts[0].neutral.rms
     assert table["left_out"] == ["odd"] and "tongueOut" in table["missing"]
-    assert {"unit taken for mm", MISSING} <= set(table["notes"])
+    assert {"unit taken to be mm", MISSING} <= set(table["notes"])
     assert part["excluded_samples"] == int(result.parts[0].chart.folded.sum())
 
 
@@ -222,7 +223,7 @@ def test_pieces_and_shapes_stand_in_it(folder, result):
     )
     text = as_markdown(report, [UniformNet(9, 0.1), UniformNet(9, 0.2)], [])
     for words in ("| Hat\\|1 | hat, left out |", "| mouthSmileLeft | mouthSmile_L |", "empty: odd2",
-                  "understood, made from parameters: Joy"):  # fmt: skip
+                  "presets, made from parameters: Joy"):  # fmt: skip
         assert words in text
     assert kinds_line(report) == "pieces: skin (Head); hat, left out (Hat|1)" and kinds_line(result.report) == ""
 
@@ -230,7 +231,7 @@ def test_pieces_and_shapes_stand_in_it(folder, result):
 @pytest.mark.slow
 def test_it_can_be_read(folder):
     text = (folder / "report.md").read_text()
-    for words in ("left out, not ARKit's: odd", "| jawOpen |", "uniform cubic NURBS net", "unit taken for mm"):
+    for words in ("left out, not ARKit's: odd", "| jawOpen |", "uniform cubic NURBS net", "unit taken to be mm"):
         assert words in text
 
 

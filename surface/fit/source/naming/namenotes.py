@@ -42,7 +42,7 @@ def _title(name: str, other: Iterable[str]) -> str:
 
 
 def _has_left(parameter: str, mapped: NameMap) -> bool:
-    """Whether this is a right side that the note of the left one tells of, too."""
+    """Whether this is a right side that the note on the left one also covers."""
     left = parameter.removesuffix("Right") + "Left"
     if not parameter.endswith("Right") or left not in mapped.stand_ins:
         return False

@@ -27,7 +27,7 @@ LEAST_BALL = 12  # vertices of an eyeball
 MOST_BALLS = 64  # pieces that look like eyeballs; of more, those with most vertices are compared
 COVER = 0.75  # extent of an eyeball's piece along each axis, in radii: a front half shell has 1 along its depth
 WIDEST, NARROWEST = 3.0, 0.33  # two eyeballs' distance, in distances of the lids
-SPREAD = 0.35  # of a lid's shape about its middle, in distances of the lids: a face-wide shape tells no eye
+SPREAD = 0.35  # of a lid's shape about its middle, in distances of the lids: a face-wide shape shows no eye
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Landmarks:
     """What is known of a face.
 
     mouth : (3,) middle of the lips; jaw : (3,) middle of what the opening jaw moves; left : (3,) unit vector from
-    shapes of the right side to those of the left. Each None where nothing tells it.
+    shapes of the right side to those of the left. Each is None where no shape shows it.
     """
 
     eyes: Eyes | None = None

@@ -1,4 +1,4 @@
-"""Cut a head from its body: what is left is a bust, as the shipped head is one."""
+"""Cut a head from its body, so that a bust remains, like the shipped head."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ def _by_form(vertices: Floats, faces: Ints, marks: Landmarks, notes: list[str]) 
     eyes = Eyes(face.at(EYES_AT + HALF_APART), True, True, "the form of the face")
     if marks.eyes is not None and np.linalg.norm(marks.eyes.middle - eyes.middle) < 0.5 * eyes.apart:
         eyes = replace(marks.eyes, centres=in_order(marks.eyes.centres, eyes.centres), sided=True)
-    notes.append("the face was found by its form: no shapes of lids and lips tell where it is")
+    notes.append("the face was found by its form: no shapes of lids and lips show where it is")
     return replace(marks, eyes=eyes, mouth=face.at(MOUTH_AT))
 
 
@@ -120,7 +120,7 @@ def _scale(
         why = f", {why}" if why else ""
         notes.append(f"no usual unit fits{why}: its eyes are taken to be {EYES_MM:.0f} mm apart (say --unit otherwise)")
         return usual / measure, ""
-    notes.append(f"unit taken for {guess}{', ' + why if why else ''}: {words(UNITS[guess])} (say --unit otherwise)")
+    notes.append(f"unit taken to be {guess}{', ' + why if why else ''}: {words(UNITS[guess])} (say --unit otherwise)")
     return UNITS[guess], guess
 
 

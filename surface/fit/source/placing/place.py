@@ -33,7 +33,7 @@ class HeadSize:
 
 
 def place(loaded: Loaded) -> Loaded:
-    """The mesh with its head in its place and without a body; unchanged where no eyes tell the place.
+    """The mesh with its head in its place and without a body; unchanged where no eyes were found.
 
     loaded : in mm and head axes, as :func:`surface.fit.source.load.load_mesh` returns it.
     """

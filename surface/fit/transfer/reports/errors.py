@@ -1,4 +1,4 @@
-"""Measure how far a head at rest is from the scan it was made for, where the scan shows the face's front."""
+"""Measure the distance of a head at rest from the scan it was made from, on the front of the face."""
 
 from __future__ import annotations
 
@@ -9,23 +9,23 @@ from surface.base.arrays import Floats
 from surface.fit.points.report import PartReport, errors_of
 from surface.fit.transfer.align import face_region, foremost
 from surface.fit.transfer.register import LEAST_COSINE
-from surface.fit.transfer.scan import Samples, make_scan, sample
+from surface.fit.transfer.reports.distances import CLOSE_MM, distances_from, sample_head
+from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Head, HeadData
 
-REACH_MM, SEEN_MM = 20.0, 3.0  # of the face: what lies further away is hair, or clothes; width of a line of sight
-NEAR_MM = 6.0  # beside the face's own front, as it is seen: what lies further off is an ear, or a crown
-EYES = 1.6  # in radii from an eyeball's axis: eyes and lids
-COUNT = 150_000
+REACH_MM, SEEN_MM = 20.0, 3.0  # samples further from the face are hair or clothes; width of a line of sight
+NEAR_MM = 6.0  # samples that lie further beside the front of the face, seen from the front, are ears or the crown
+EYES = 1.6  # distance from an eyeball's axis, in radii, within which samples belong to eyes and lids
 
 
 def face_reports(data: HeadData, template: Template, warp: Warp, samples: Samples) -> list[PartReport]:
-    """Distances from the scan's samples on the front of the face to the nearest skin or eyeball of the head, whose
-    control points are counted together; and those of eyes and lids by themselves.
+    """Distances from the scan's samples on the front of the face to the nearest skin or eyeball of the head.
 
-    Eyeballs of the head are balls of its own size, and lids lie on them, whatever a scan has there: flat, carved,
-    closed or noisy eyes. Their distances are reported, and are no errors of the face's skin.
+    The first report is of the face, the second of eyes and lids. The head always has spherical eyeballs with lids that
+    lie on them, whereas a scan may have flat, carved, closed or noisy eyes. So distances at the eyes are reported
+    separately and do not count as errors of the face. The first report also has the number of all control points.
     """
     at, own = distances(Head(data), warp(template.points[face_region(template)]), samples)
     off = np.linalg.norm(at[:, None, :2] - data.eyes[:, :2], axis=2).min(axis=1)
@@ -36,12 +36,8 @@ def face_reports(data: HeadData, template: Template, warp: Warp, samples: Sample
 
 
 def distances(head: Head, front: Floats, samples: Samples) -> tuple[Floats, Floats]:
-    """Samples (m, 3) of the scan that are seen from the front, near the points ``front``, and how far each is from the
-    head's own surface, (m,) mm."""
-    own = [p for p in head.parts if p.material in ("skin", "eye")]
-    first = np.cumsum([0, *(len(p.vertices) for p in own)])
-    faces = np.concatenate([p.triangles + k for p, k in zip(own, first, strict=False)]).astype(np.int64)
-    mine = sample(make_scan(np.concatenate([p.vertices for p in own]).astype(float), faces, head.name), COUNT)
+    """Samples (m, 3) of the scan that are visible from the front near the points ``front (k, 3)``, and their distances
+    (m,) from the head's surface, mm."""
     at, low, high = samples.points, front.min(axis=0), front.max(axis=0)
     high[2] += REACH_MM
     inside = ((at > low) & (at < high)).all(axis=1) & (samples.normals[:, 2] > 0.2)
@@ -49,9 +45,8 @@ def distances(head: Head, front: Floats, samples: Samples) -> tuple[Floats, Floa
     inside &= ~samples.border
     inside[inside] = cKDTree(front[:, :2]).query(at[inside, :2], distance_upper_bound=NEAR_MM)[0] < NEAR_MM
     at = at[inside]
-    far, near = cKDTree(mine.points).query(at)
-    off = np.abs(((at - mine.points[near]) * mine.normals[near]).sum(axis=1))
-    same = (mine.normals[near] * samples.normals[inside]).sum(axis=1) > LEAST_COSINE
-    distance: Floats = np.where(far < 2.0, off, far)
-    counted = (same | (far > 2.0)) & (distance < REACH_MM)
-    return at[counted], distance[counted]
+    own = sample_head(head)
+    found = distances_from(own, at)
+    same = (own.normals[found.nearest] * samples.normals[inside]).sum(axis=1) > LEAST_COSINE
+    counted = (same | (found.to_sample > CLOSE_MM)) & (found.mm < REACH_MM)
+    return at[counted], found.mm[counted]

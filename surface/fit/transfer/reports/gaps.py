@@ -1,4 +1,4 @@
-"""How far lips and lids of a head stand open where they should be closed, as it is drawn."""
+"""Measure how far the lips and lids of a head are open in poses that should close them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from surface.check.mouth import find_mouth, lips_gap
 from surface.check.subject import Subject
 from surface.head import Head, HeadData
 
-MOST_MM = 0.5  # on a head of usual size
+MOST_MM = 0.5  # greatest gap that counts as closed, on a head of usual size
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
 
 
@@ -28,9 +28,9 @@ class Gap:
 
 
 def measure_gaps(data: HeadData) -> list[Gap]:
-    """Gaps of lips at rest and where mouthClose shuts them over an open jaw, and of the lids in a blink.
+    """Gaps of the lips at rest and where mouthClose closes them over an open jaw, and of the lids in a blink.
 
-    Seen from the front in pictures of 0.15 mm a pixel, of the triangles that are drawn.
+    They are measured in pictures from the front, 0.15 mm a pixel, of the triangles that are drawn.
     """
     subject = Subject(Head(data))
     most = MOST_MM * max(subject.scale, 1.0)

@@ -1,4 +1,4 @@
-"""Read landmarks that somebody picked on a mesh: TOML, JSON, or MeshLab's picked points (.pp).
+"""Read landmarks that a user picked on a mesh: TOML, JSON, or MeshLab's picked points (.pp).
 
 A value is a place in the mesh's coordinates, a vertex, or a pixel of the picture that ``omote landmarks`` drew.
 """
@@ -21,8 +21,8 @@ from surface.fit.transfer.reports.picture import Frontal
 from surface.fit.transfer.scan import Scan
 from surface.fit.transfer.template import NAMES
 
-FAR = 0.05  # of a mesh's size: a landmark further from it was picked on another mesh, or in another unit
-LARGEST = 1e12  # of a number in a file: further out lies nothing
+FAR = 0.05  # distance from the mesh, relative to its size, from which a landmark belongs to another mesh or unit
+LARGEST = 1e12  # greatest absolute value of a number in a file
 EXAMPLE = "nose_tip = [0.0, 1.2, 9.8], or nose_tip = 3512 for a vertex, counted from 0"
 
 _Table = tuple[dict[str, Any], Frontal | None]
@@ -86,7 +86,7 @@ def _view(table: Any, path: Path) -> Frontal:
 
 
 def _read_picked(path: Path) -> _Table:
-    """Points that MeshLab's tool PickPoints saved; those that are not active are left out."""
+    """Points that MeshLab's tool PickPoints saved, without those that are not active."""
     with files.reading(path, FitError, hint="save it again in MeshLab: Edit, PickPoints"):
         text = files.read_file(path, files.TEXT_LIMIT)
         if b"<!ENTITY" in text:
@@ -113,7 +113,7 @@ def _number(text: str | None) -> float:
 
 
 def _place(value: Any, scan: Scan, view: Frontal | None, where: str) -> Floats:
-    """Where one landmark is."""
+    """The place (3,) that the value of one landmark describes. Raises FitError, which begins with ``where``."""
     if isinstance(value, Mapping) and "pixel" in value:
         return _at_pixel(value["pixel"], scan, view, where)
     if isinstance(value, Mapping):
@@ -129,7 +129,7 @@ def _place(value: Any, scan: Scan, view: Frontal | None, where: str) -> Floats:
 
 
 def _are_numbers(value: Any, count: int) -> bool:
-    """Is a value a list of so many usable numbers?"""
+    """Whether a value is a list of ``count`` usable numbers."""
     numbers = isinstance(value, list) and len(value) == count
     return numbers and all(isinstance(x, int | float) and not isinstance(x, bool) and abs(x) <= LARGEST for x in value)
 

@@ -1,4 +1,4 @@
-"""Pictures of a scan with numbered landmarks, drawn without OpenGL; and places by their pixels."""
+"""Draw a scan with numbered landmarks or with its errors, without OpenGL; find the place of a pixel in the picture."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from surface.base.arrays import Floats, Ints
 from surface.base.extras import importing
 from surface.check.raster import NOTHING, View
+from surface.fit.measures.error_colours import error_colours
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.scan import Scan
 from surface.fit.transfer.template import NAMES
@@ -22,19 +23,21 @@ if TYPE_CHECKING:
 
 HEIGHT = 900  # pixels
 ASPECT = 0.9  # width of one view by its height
-ROOM = 1.25  # of the face's height that a picture shows above and below it
+MARGIN = 1.25  # height of a picture, relative to that of the face
 LIGHT = np.array([-0.3, 0.5, 0.8]) / np.linalg.norm([-0.3, 0.5, 0.8])
 PAPER, DARK, BRIGHT = 236, 40, 225
 RING, TEXT = 5, 17
 COLOURS = {"given": (30, 90, 220), "found": (200, 30, 30), "carried": (230, 130, 0)}
-FULL_MM, FAR_MM = 1.0, 20.0  # errors at the end of the colour scale; what is not compared
-SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0.75, 0.24, 0.04], [0.55, 0.02, 0.02]])
+FAR_MM = 20.0  # greater errors are grey
 
 
 @dataclass(frozen=True)
 class Frontal:
-    """The front view of a scan: a place of the file at ``scale * turn @ place + shift`` has its column and row, counted
-    from the upper left pixel's middle, in the first two of these numbers, and in the third how near it is."""
+    """The front view of a scan, which maps a place in the file's coordinates to ``scale * turn @ place + shift``.
+
+    The first coordinate of the result is the column, the negative of the second is the row, both counted from the
+    middle of the upper left pixel; the third is larger for nearer places.
+    """
 
     turn: Floats
     scale: float
@@ -69,7 +72,7 @@ def _depth(at: Floats, pixel: Floats) -> Floats:
 
 def frontal(found: Similarity, low: Floats, high: Floats) -> Frontal:
     """The front view of a scan that shows what lies, in the head's frame, between two corners (3,)."""
-    middle, tall = 0.5 * (low + high), ROOM * float(high[1] - low[1])
+    middle, tall = 0.5 * (low + high), MARGIN * float(high[1] - low[1])
     scale = HEIGHT / tall
     corner = np.array([0.5 * ASPECT * HEIGHT, -0.5 * HEIGHT, 0.0])
     return Frontal(found.turn, scale * found.scale, scale * (found.shift - middle) + corner)
@@ -110,15 +113,14 @@ def draw_distances(scan: Scan, view: Frontal, distance: Floats, path: Path) -> N
     with importing("a picture of errors", "PIL"):
         from PIL import Image as Pillow  # optional: the extra view
 
-    at = np.clip(distance / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)
-    colour = np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=1) ** (1 / 2.2)
+    colour = error_colours(distance) ** (1 / 2.2)
     colour[distance > FAR_MM] = 0.5
     picture = _relief(view.pixels(scan.vertices), scan.triangles, round(ASPECT * HEIGHT), colour)
     Pillow.fromarray(picture).save(path, format="PNG")
 
 
 def _foremost(pixels: Floats, width: int) -> Floats:
-    """(3,) the nearest of pixels (m, 3) that the picture shows; the nearest of all if it shows none."""
+    """(3,) the nearest of pixels (m, 3) that lie in the picture, or the nearest of all if none does."""
     shown = (pixels[:, :2] > 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < HEIGHT)
     own = pixels[shown] if shown.any() else pixels
     nearest: Floats = own[own[:, 2].argmax()]

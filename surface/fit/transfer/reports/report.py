@@ -1,4 +1,4 @@
-"""What a transfer found in a scan and made of it: landmarks, openings, shapes that were changed, gaps, errors."""
+"""The report of a transfer: landmarks, openings, changed shapes, gaps and errors."""
 
 from __future__ import annotations
 
@@ -16,17 +16,21 @@ from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.template import Template, find_landmarks
 from surface.head import Contact, Group, Head, HeadData
 
-HOLE_MM, INSIDE_MM, DEPTH_MM = 3.0, 5.0, 25.0  # a border so near a rim; what lies so far behind a line, and no further
-SHARE = 0.5  # of a rim that lies at a border: there is a hole
-LEAST_INSIDE = 20  # samples of the scan behind the line of the lips: the skin goes on into the mouth
-CHANGED = 0.01  # a share by which a shape is larger: it was changed
+HOLE_MM = 3.0  # distance from a border of the scan within which the rim of an opening lies at a hole
+INSIDE_MM, DEPTH_MM = 5.0, 25.0  # range behind the line of the lips in which samples lie inside the mouth
+SHARE = 0.5  # least share of a rim at a hole for the whole opening to be one
+LEAST_INSIDE = 20  # samples inside the mouth from which on the scan continues into it
+CHANGED = 0.01  # relative change of a displacement from which on its shape counts as changed
 OPENINGS = (("mouth", "lips"), ("left eye", "left_lids"), ("right eye", "right_lids"))
 
 
 @dataclass(frozen=True)
 class Found:
-    """A landmark: how it was found and how sure, 0..1; its place in the scan's own coordinates; and how far from there
-    the head's own landmark lies now, mm."""
+    """A landmark on the scan.
+
+    how, sure : as in :class:`surface.fit.transfer.register.Mark`. place : in the scan's own coordinates. off_mm :
+    distance of the head's landmark from it.
+    """
 
     name: str
     how: str
@@ -37,12 +41,13 @@ class Found:
 
 @dataclass(frozen=True)
 class TransferReport:
-    """All of it.
+    """The report of a transfer.
 
-    source : the head that the expressions come from. registration : of the face's front after the map, from the scan's
-    surface, where it shows any; ``matched`` is the share of the front where it does.
-    openings : what the scan had in the place of mouth and eyes. reseated : by shape, least and greatest factor of its
-    displacements beside those that the map alone gives.
+    fit : parts, their errors, notes and faults. source : name of the head that the expressions come from.
+    registration : distances of the face's front, after the map, from the scan. matched : share of the front that has a
+    match on the scan.
+    openings : what the scan has in the place of mouth and eyes, in words. reseated : by shape, least and greatest
+    factor by which displacements were changed after the map, so that lids lie on the eyeballs and close.
     """
 
     fit: FitReport
@@ -67,7 +72,7 @@ def registration_errors(
 
 
 def landmarks_of(head: Head, marks: dict[str, Mark], found: Similarity) -> list[Found]:
-    """The landmarks of a scan; ``head`` and ``marks`` lie in the frame to which ``found`` leads from the file's."""
+    """The landmarks of a scan. head, marks : in the frame that ``found`` maps the file's coordinates to."""
     own = find_landmarks(head, {c.name: c for c in head.data.contacts})
     out = []
     for name, mark in marks.items():
@@ -77,7 +82,7 @@ def landmarks_of(head: Head, marks: dict[str, Mark], found: Similarity) -> list[
 
 
 def openings_of(head: Head, samples: Samples) -> dict[str, str]:
-    """What a scan has where the head, which lies on it, has openings."""
+    """What a scan has at the openings of the head that lies on it, in words by opening."""
     contacts = {c.name: c for c in head.data.contacts}
     return {title: _opening(head, contacts[name], samples) for title, name in OPENINGS}
 
@@ -87,13 +92,13 @@ def _opening(head: Head, contact: Contact, samples: Samples) -> str:
     border = samples.points[samples.border]
     if len(border) and (cKDTree(border).query(rims)[0] < HOLE_MM).mean() > SHARE:
         return "a hole in the scan"
-    if contact.eye < 0 and _goes_on(rims, samples.points):
-        return "open: the scan goes on into it"
-    return "closed in the scan: cut open along the line that was found"
+    if contact.eye < 0 and _continues_inside(rims, samples.points):
+        return "open: the scan continues into it"
+    return "closed in the scan: it was cut open along the line of the landmarks"
 
 
-def _goes_on(rims: Floats, points: Floats) -> bool:
-    """Does a scan (m, 3) lie behind the rims (k, 3) of the lips, too?"""
+def _continues_inside(rims: Floats, points: Floats) -> bool:
+    """Whether samples (m, 3) of a scan also lie behind the rims (k, 3) of the lips."""
     low, high = rims.min(axis=0), rims.max(axis=0)
     middle = np.abs(points[:, 0] - 0.5 * (low[0] + high[0])) < 0.35 * (high[0] - low[0])
     level = (points[:, 1] > low[1] - 2.0) & (points[:, 1] < high[1] + 2.0)
@@ -102,7 +107,7 @@ def _goes_on(rims: Floats, points: Floats) -> bool:
 
 
 def reseated(before: HeadData, after: HeadData) -> dict[str, tuple[float, float]]:
-    """Shapes whose displacements differ between two states of a head, and by which factors."""
+    """Shapes whose displacements differ between two versions of a head, with the least and greatest factor."""
     out: dict[str, tuple[float, float]] = {}
     for old, new in zip(before.parts, after.parts, strict=True):
         moves = {g.name: g for g in old.groups}
@@ -115,7 +120,7 @@ def reseated(before: HeadData, after: HeadData) -> dict[str, tuple[float, float]
 
 
 def _factors(old: Group | None, new: Group) -> Floats:
-    """Lengths of displacements relative to those before, of points that move by a tenth of the greatest at least."""
+    """Lengths of displacements relative to those before, for points that move at least a tenth of the greatest."""
     if old is None or len(old.ids) != len(new.ids) or not np.array_equal(old.ids, new.ids):
         return np.zeros(0)
     a, b = (np.linalg.norm(g.moves.astype(float), axis=1) for g in (old, new))

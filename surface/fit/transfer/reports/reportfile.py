@@ -1,28 +1,26 @@
-"""Write what a transfer found and made: report.json, report.md, and two pictures that need no OpenGL."""
+"""Write the report of a transfer: report.json, report.md, and two pictures, which need no OpenGL."""
 
 from __future__ import annotations
 
 import json
-import shutil
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
-from surface.base.errors import FitError, MissingPackage
+from surface.base.errors import MissingPackage
+from surface.fit.measures.report_folder import report_folder
 from surface.fit.points.report import Errors, face_bounds, plain
 from surface.fit.transfer.align import Similarity
+from surface.fit.transfer.reports.distances import distances_from, sample_head
 from surface.fit.transfer.reports.picture import Frontal, draw_distances, draw_landmarks, frontal
 from surface.fit.transfer.reports.report import TransferReport
-from surface.fit.transfer.scan import Scan, make_scan, sample
+from surface.fit.transfer.scan import Scan
 from surface.head import Head, HeadData
 
 FORMAT, VERSION = "omote transfer report", 1
-COUNT = 150_000  # samples of the head that distances are measured to
 PICTURES = ("landmarks.png", "error.png")
 LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more from the head; grey: more than 20 mm"
 
@@ -30,25 +28,16 @@ LEGEND = "blue 0, green 0.25, yellow 0.5, orange 0.75, red 1 mm and more from th
 def write_transfer_report(
     report: TransferReport, scan: Scan, head: HeadData, found: Similarity, folder: str | Path
 ) -> None:  # fmt: skip
-    """Write the report of a transfer, complete or not at all.
+    """Write the report of a transfer, completely or not at all.
 
-    scan : as read; found : from its coordinates to the frame of the head that the expressions come from.
+    scan : in its file's coordinates. found : maps these to the frame of the head that the expressions come from.
 
     Raises FitError: the folder cannot be written to.
     """
-    folder = Path(folder)
-    try:
-        folder.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
-            new = Path(made)
-            pictures = _draw(report, scan, head, found, new)
-            (new / "report.json").write_text(json.dumps(as_table(report), indent=1), encoding="utf-8")
-            (new / "report.md").write_text(as_markdown(report, pictures), encoding="utf-8")
-            folder.mkdir(exist_ok=True)
-            for file in new.iterdir():
-                shutil.move(file, folder / file.name)
-    except OSError as e:
-        raise FitError(f"{folder}: the report cannot be written ({e})", hint="choose another --report folder") from e
+    with report_folder(Path(folder)) as new:
+        pictures = _draw(report, scan, head, found, new)
+        (new / "report.json").write_text(json.dumps(as_table(report), indent=1), encoding="utf-8")
+        (new / "report.md").write_text(as_markdown(report, pictures), encoding="utf-8")
 
 
 def as_table(report: TransferReport) -> dict[str, Any]:
@@ -71,7 +60,7 @@ def _as_table(report: TransferReport) -> dict[str, Any]:
 
 
 def as_markdown(report: TransferReport, pictures: list[str]) -> str:
-    """The report to read."""
+    """The report as Markdown."""
     fit = report.fit
     counts = f"{fit.points} control points, {len(fit.parameters)} shapes"
     title = f"# {fit.name}: the expressions of {report.source}, {counts}"
@@ -80,10 +69,10 @@ def as_markdown(report: TransferReport, pictures: list[str]) -> str:
     map_ = report.registration
     lines += [f"| scan, head: {p.samples} samples of {p.name} | {_row(p.neutral)} |" for p in fit.parts]
     lines.append(
-        f"| the map alone, scan: where the scan shows {100 * report.matched:.0f} % of the front | {_row(map_)} |"
+        f"| the map alone, scan: {100 * report.matched:.0f} % of the front, where it has a match | {_row(map_)} |"
     )
     lines += ["", *(f"![{name}]({name})" for name in pictures), *([LEGEND] if pictures else [])]
-    lines += ["", "## Landmarks", "", "| landmark | how | sure | place in the scan | the head's own, mm off |"]
+    lines += ["", "## Landmarks", "", "| landmark | how | confidence | place in the scan | off the head's, mm |"]
     lines += ["|---|---|---|---|---|"]
     for m in report.landmarks:
         place = ", ".join(f"{x:.5g}" for x in m.place)
@@ -100,7 +89,7 @@ def _row(errors: Errors) -> str:
 
 
 def _draw(report: TransferReport, scan: Scan, head: HeadData, found: Similarity, folder: Path) -> list[str]:
-    """Pictures of the landmarks and of the scan's distance from the head; none without Pillow."""
+    """Draw the landmarks and the scan's distance from the head; returns no file names without Pillow."""
     places = np.array([m.place for m in report.landmarks])
     view = view_of(found, places)
     try:
@@ -121,15 +110,6 @@ def view_of(found: Similarity, places: Floats) -> Frontal:
 
 def _distances(scan: Scan, data: HeadData) -> Floats:
     """(t,) mm from the middle of each triangle of a scan to the nearest place of a head's skin or eyeballs."""
-    head = Head(data)
-    own = [p for p in head.parts if p.material in ("skin", "eye")]
-    first = np.cumsum([0, *(len(p.vertices) for p in own)])
-    faces = np.concatenate([p.triangles + k for p, k in zip(own, first, strict=False)]).astype(np.int64)
-    mine = sample(make_scan(np.concatenate([p.vertices for p in own]).astype(float), faces, data.name), COUNT)
-    placed = data.placement
     middle = scan.vertices[scan.triangles].mean(axis=1)
-    at = middle if placed is None else placed.points(middle)
-    far, near = cKDTree(mine.points).query(at)
-    off = np.abs(((at - mine.points[near]) * mine.normals[near]).sum(axis=1))
-    distance: Floats = np.where(far < 2.0, off, far)
-    return distance
+    at = middle if data.placement is None else data.placement.points(middle)
+    return distances_from(sample_head(Head(data)), at).mm

@@ -90,11 +90,11 @@ def measured(*shapes: tuple[str, float, float], turned: float = 0.0) -> DenseErr
     ("dense", "scale", "said"),
     [
         (measured(("neutral", 3.9, 19.0), ("jawOpen", 9.0, 19.0), turned=99.0), 1.0, []),
-        (measured(("neutral", 4.1, 9.0)), 1.0, ["does not follow the mesh: a hundredth of it is 4 mm off or more"]),
+        (measured(("neutral", 4.1, 9.0)), 1.0, ["does not follow the mesh: 1 % of it is 4 mm away or more"]),
         (measured(("neutral", np.nan, 9.0)), 1.0, ["does not follow the mesh"]),
         (measured(("neutral", 1.0, 19.0), ("jawOpen", 1.0, 48.0)), 1.0, ["48 mm off the mesh with jawOpen = 1"]),
         (measured(("neutral", 1.0, 48.0), ("jawOpen", 1.0, 49.0)), 1.0, ["48 mm off the mesh at rest"]),
-        (measured(("neutral", 1.0, 1.0), turned=101.0), 1.0, ["101 mm² of the fitted face are turned over with jaw"]),
+        (measured(("neutral", 1.0, 1.0), turned=101.0), 1.0, ["101 mm² of the fitted face are inside out with jaw"]),
         (measured(("neutral", 7.0, 39.0), turned=390.0), 2.0, []),
         (measured(("neutral", 9.0, 41.0), turned=410.0), 2.0, ["does not follow", "41 mm off", "410 mm²"]),
     ],
@@ -242,7 +242,7 @@ def test_faces_turned_over_in_the_texture_are_counted(mesh: FitMesh) -> None:
     inner = int(np.argmin(np.linalg.norm(uv - [0.25, 0.25], axis=1)))
     uv[inner] += [0.09, 0.0]
     (note,) = turned_faces(replace(mesh, uv=uv))
-    assert note.endswith("are turned over in (u, v)") and 1 <= int(note.split()[0]) <= 4
+    assert note.endswith("are flipped in (u, v)") and 1 <= int(note.split()[0]) <= 4
 
 
 def test_faces_without_texture_coordinates_are_not_turned_over(mesh: FitMesh) -> None:

@@ -41,7 +41,9 @@ def test_slopes_count_half_where_the_mesh_bends_by_so_much() -> None:
 
 def test_charts_of_unknown_meshes_trust_bent_faces_less() -> None:
     mesh = slit_sheet()
-    kept, less = (make_chart(mesh, find_islands(mesh), normalise=False, doubt_slivers=d).slopes for d in (False, True))
+    kept, less = (
+        make_chart(mesh, find_islands(mesh), normalise=False, downweight_slivers=d).slopes for d in (False, True)
+    )
     trust = slope_trust(mesh.vertices, mesh.faces)
     assert trust.min() < 0.97
     np.testing.assert_allclose(less.weight, kept.weight * trust, rtol=1e-9)

@@ -93,7 +93,7 @@ def sliver_sheet() -> FitMesh:
 def test_slivers_in_uv_say_little_of_the_slope_across_them():
     mesh = sliver_sheet()
     (island,) = find_islands(mesh)
-    s = face_slopes(island, len(mesh.vertices), np.ones(len(island.uv)), doubt_slivers=True)
+    s = face_slopes(island, len(mesh.vertices), np.ones(len(island.uv)), downweight_slivers=True)
     assert s.weight[-2] < 1e-3  # the sliver; half a square that is left has 1 - r^2 = 3/4
     np.testing.assert_allclose(s.weight[-1], 0.75, atol=1e-6)
     np.testing.assert_allclose(np.median(s.weight), 1.0, atol=1e-6)
@@ -102,7 +102,7 @@ def test_slivers_in_uv_say_little_of_the_slope_across_them():
 @pytest.mark.parametrize("squeezed", [[0.0, 1.0], [1.0, 0.0], [0.0, 0.0]])
 def test_faces_without_extent_in_uv_have_finite_slopes(squeezed):
     flat = Island(ISLAND.vertex, ISLAND.uv * squeezed, ISLAND.faces)
-    s = face_slopes(flat, len(MESH.vertices), np.ones(len(flat.uv)), doubt_slivers=True)
+    s = face_slopes(flat, len(MESH.vertices), np.ones(len(flat.uv)), downweight_slivers=True)
     assert s.weight.min() >= 0 and s.weight.max() <= 1
     assert np.isfinite(s.mix_u.data).all() and np.isfinite(s.mix_v.data).all()
 
@@ -111,7 +111,7 @@ def test_a_sliver_in_uv_raises_no_spike():
     mesh = sliver_sheet()
     worst = []
     for doubt in (True, False):
-        chart = make_chart(mesh, find_islands(mesh), normalise=False, doubt_slivers=doubt)
+        chart = make_chart(mesh, find_islands(mesh), normalise=False, downweight_slivers=doubt)
         worst.append(fit_chart(mesh, chart, FitRequest(200, coarse=0.2, astray_mm=np.inf)).error.max())
     assert worst[0] < 1.0 < 3.0 < worst[1]
 
@@ -132,7 +132,7 @@ def test_a_fold_begins_at_four_and_a_half_times_the_usual_stretch_and_is_full_at
     fold = chart_module._fold(mesh, island).reshape(-1, 4)
     wanted = np.clip((np.array(stretches) - 9.0) / 5.0, 0.0, 1.0)
     np.testing.assert_allclose(fold, np.tile(wanted[:, None], (1, 4)), atol=1e-9)
-    weights = chart_module._loosened(wanted)
+    weights = chart_module._fold_weight(wanted)
     np.testing.assert_allclose(weights, 1.0 - 0.95 * wanted)
 
 

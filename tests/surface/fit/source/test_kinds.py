@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from slit_sheet import slit_sheet
 
-from surface.fit.source.kinds import is_known, kind_name, kind_of, kinds, listed, material_of, unworn
+from surface.fit.source.kinds import is_known, kind_name, kind_of, kinds, listed, material_of, without_clothes
 from surface.fit.source.mesh import FitMesh
 
 NAMES = {
@@ -71,24 +71,27 @@ def two_pieces(name: str, moves: float) -> FitMesh:
 
 def test_what_is_worn_is_left_out_and_said():
     mesh = two_pieces("Jacket", 1.0)
-    kept, notes = unworn(mesh)
+    kept, notes = without_clothes(mesh)
     np.testing.assert_array_equal(kept, mesh.piece == 0)
     assert notes == ["clothes left out: 'Jacket'"]
     piece, names = np.minimum(np.arange(len(mesh.faces)) // 8, 9), ("face", *["Shirt", "Boots"] * 4, "x")
     many = replace(mesh, piece=piece, pieces=names, names=(), deltas=mesh.deltas[:0])
     shirts = "'Shirt', 'Shirt', 'Shirt', 'Shirt'"
-    assert unworn(many)[1] == [f"clothes left out: {shirts}", f"boots left out: {shirts.replace('Shirt', 'Boots')}"]
+    assert without_clothes(many)[1] == [
+        f"clothes left out: {shirts}",
+        f"boots left out: {shirts.replace('Shirt', 'Boots')}",
+    ]
     assert listed(list("abcdef")) == "'a', 'b', 'c', 'd' and 2 more"
-    assert unworn(two_pieces("Hair", 1.0))[0].all() and unworn(two_pieces("neck", 1.0))[1] == []
+    assert without_clothes(two_pieces("Hair", 1.0))[0].all() and without_clothes(two_pieces("neck", 1.0))[1] == []
 
 
 def test_names_are_not_believed_against_what_shapes_do():
-    kept, notes = unworn(two_pieces("Hoodie", 8.0))
+    kept, notes = without_clothes(two_pieces("Hoodie", 8.0))
     assert kept.all() and notes == ["'Hoodie': named as clothes, but shapes move it: kept as skin"]
     mesh = two_pieces("Hat", 0.0)
-    kept, notes = unworn(replace(mesh, pieces=("Mask_Shirt", "Hat"), names=(), deltas=mesh.deltas[:0]))
+    kept, notes = without_clothes(replace(mesh, pieces=("Mask_Shirt", "Hat"), names=(), deltas=mesh.deltas[:0]))
     assert kept.all() and notes == []  # nothing would be left
 
 
 def test_meshes_without_pieces_are_kept():
-    assert unworn(slit_sheet())[0].all()
+    assert without_clothes(slit_sheet())[0].all()

@@ -30,7 +30,7 @@ def test_a_told_unit_is_taken(tmp_path, unit, factor):
 
 def test_a_guessed_unit_is_said(tmp_path):
     assert load_mesh(write_npz(tmp_path / "m.npz", slit_sheet())).notes == (
-        "unit taken for mm: all of it is 200 mm high (say --unit otherwise)",
+        "unit taken to be mm: all of it is 200 mm high (say --unit otherwise)",
     )
 
 

@@ -92,7 +92,7 @@ def test_a_decimated_face_with_cylindrical_coordinates_is_fitted_without_spikes(
 def check_no_spikes(mesh: FitMesh, island: Island, points: int) -> None:
     """Fit an island; nowhere, samples or not, may it move further than the mesh does around."""
     request = FitRequest(points, neutral_mm=0.25, shape_mm=0.45, finest=0.9, astray_mm=1.8, spare=60)
-    fitted = fit_chart(mesh, make_chart(mesh, [island], normalise=False, doubt_slivers=True), request)
+    fitted = fit_chart(mesh, make_chart(mesh, [island], normalise=False, downweight_slivers=True), request)
     uv, corner, _ = uv_traps.strewn(island)
     rows = basis(fitted.net, uv)
     for move, delta in zip(fitted.moves, mesh.deltas, strict=True):

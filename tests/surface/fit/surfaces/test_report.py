@@ -24,7 +24,7 @@ def test_exact_surfaces_are_said_to_be_and_others_where_they_are_not() -> None:
     ]  # fmt: skip
     lines = report(SKIN, STARS, parameters=("jawOpen",), missing=("a", "b")).lines()
     assert lines == [
-        "back: exact but near star points, there within 0.013 mm", "a note",
+        "back: exact, except near star points: 0.013 mm or less", "a note",
         "no group for a, b: these parameters will not move this head",
     ]  # fmt: skip
 

@@ -113,8 +113,8 @@ def test_in_the_heads_frame_only_what_is_near_a_head_is_kept(face, scan) -> None
 @pytest.mark.parametrize(
     ("scale", "unit", "factor", "words"),
     [
-        (1000.0, None, 1.0, "unit taken for m: 1.00 times"), (1.0, None, 1.0, "unit taken for mm"),
-        (800.0, None, 1.25, "unit taken for m: 1.25 times"), (1000 / 1.4, None, 1.4, "1.40 times"),
+        (1000.0, None, 1.0, "unit taken to be m: 1.00 times"), (1.0, None, 1.0, "unit taken to be mm"),
+        (800.0, None, 1.25, "unit taken to be m: 1.25 times"), (1000 / 1.4, None, 1.4, "1.40 times"),
         (1000 / 0.75, None, 0.75, "0.75 times"), (1000 / 1.5, None, 1.0, "unit unknown"),
         (0.2, None, 1.0, "unit unknown"), (1000 / 0.65, None, 1.0, "unit unknown"),
         (8.0, "cm", 1.25, None), (8.0, "m", 125.0, None),

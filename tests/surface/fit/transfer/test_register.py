@@ -152,7 +152,7 @@ def test_landmarks_that_are_found_pull_as_much_as_they_are_sure_unless_they_are_
             return result
 
     run._finder = Found()
-    run.look(4.5, single)
+    run.find_landmarks(4.5, single)
     at, marks, search, alone = heard[0]
     assert alone == single and search == 4.5
     np.testing.assert_array_equal(at, face.points)
@@ -164,7 +164,7 @@ def test_landmarks_that_are_found_pull_as_much_as_they_are_sure_unless_they_are_
     assert weight[k["nose_tip"]] == pytest.approx(0.25 * weight[k["mouth_left"]])
     assert weight[k["chin"]] > weight[k["mouth_left"]] >= 1
     alone_weight = weight[k["mouth_left"]]
-    run.look(4.5, not single)
+    run.find_landmarks(4.5, not single)
     run.step(1.0, 5.0)
     other = run.warp.weight[k["mouth_left"]]
     assert (alone_weight < other) == single  # one by itself is less sure
@@ -186,13 +186,13 @@ def test_stages_follow_each_other_and_the_smooth_map_is_the_last_stiff_one(monke
         def __init__(self, *_) -> None:
             self.warp = "start"
 
-        def hold(self) -> None:
+        def keep_unmatched(self) -> None:
             heard.append("hold")
 
         def marks(self) -> dict[str, object]:
             return {"chin": self.warp}
 
-        def look(self, search, single) -> None:
+        def find_landmarks(self, search, single) -> None:
             heard.append((search, single))
 
         def step(self, stiffness, farthest) -> None:

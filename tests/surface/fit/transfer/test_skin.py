@@ -9,7 +9,7 @@ from small_head import sheet
 from surface.fit.transfer import skin as module
 from surface.fit.transfer.register import Matcher, Matches
 from surface.fit.transfer.scan import Samples
-from surface.fit.transfer.skin import Ball, Skin, follow_skin, rims_of, seat
+from surface.fit.transfer.skin import Ball, Skin, follow_skin, rims_of, seat_on_eyeballs
 from surface.head import Contact
 
 OLD = Ball(np.array([[30.0, 0, 0], [-30.0, 0, 0]]), 12.0)
@@ -116,12 +116,12 @@ def test_lids_are_seated_as_high_above_the_new_eyeballs_as_above_the_old(radius:
     for side in (0, 1):
         rest = OLD.centres[side] + (12.0 + 0.5) * DIRECTIONS
         moved = new.centres[side] + radius * (1.0 + 0.2 * np.abs(DIRECTIONS[:, :1])) * DIRECTIONS
-        seated = seat(moved, rest, OLD, new)
+        seated = seat_on_eyeballs(moved, rest, OLD, new)
         np.testing.assert_allclose(np.linalg.norm(seated - new.centres[side], axis=1), radius * 12.5 / 12, rtol=0.01)
         along = (seated - new.centres[side]) / np.linalg.norm(seated - new.centres[side], axis=1, keepdims=True)
         np.testing.assert_allclose(along, DIRECTIONS, atol=1e-9)
     far = np.array([[0.0, -80.0, 60.0]])
-    np.testing.assert_array_equal(seat(far + 7.0, far, OLD, new), far + 7.0)
+    np.testing.assert_array_equal(seat_on_eyeballs(far + 7.0, far, OLD, new), far + 7.0)
 
 
 def two_lips(columns: int = 9, gap: float = 0.0):

@@ -171,7 +171,7 @@ def test_the_skin_has_the_scans_colour(made):
 def test_unit_and_turn_are_said(made):
     _, report, _ = made
     notes = " ".join(report.fit.notes)
-    assert "unit taken for m" in notes and "by its form" in notes
+    assert "unit taken to be m" in notes and "by its form" in notes
 
 
 def landmark_table(shipped: Head, turn: np.ndarray = TURN, mirror: bool = False) -> str:

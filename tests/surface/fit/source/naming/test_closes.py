@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.naming.astray import closing
 from surface.fit.source.naming.closes import made_close
+from surface.fit.source.naming.misnamed import closing
 
 LIPS, CHIN = -40.0, -80.0  # y, mm
 

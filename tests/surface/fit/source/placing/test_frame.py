@@ -102,7 +102,7 @@ def test_a_height_near_a_heads_tells_the_unit_and_is_noted(unit):
     frame = find_frame(unit * vertices, {})
     assert frame.scale == pytest.approx(1 / unit)
     (note,) = frame.notes
-    assert note.endswith("all of it is 200 mm high (say --unit otherwise)") and note.startswith("unit taken for ")
+    assert note.endswith("all of it is 200 mm high (say --unit otherwise)") and note.startswith("unit taken to be ")
 
 
 @pytest.mark.parametrize("unit", [0.001, 1.0])
@@ -135,7 +135,7 @@ def scaled(measure, by_user=None, convention=NONE, *, eyes=True):
 def test_a_unit_is_guessed_by_eyes_as_people_have_them(measure, unit):
     scale, name, (note,) = scaled(measure)
     assert name == unit and scale == frame.UNITS[unit]
-    assert note == f"unit taken for {unit}: its eyes are {scale * measure:.3g} mm apart (say --unit otherwise)"
+    assert note == f"unit taken to be {unit}: its eyes are {scale * measure:.3g} mm apart (say --unit otherwise)"
 
 
 def test_where_no_unit_fits_eyes_are_taken_for_usual_ones():
@@ -160,7 +160,7 @@ def test_a_unit_that_the_format_defines_is_taken_unless_eyes_contradict():
     scale, name, (note,) = scaled(6.5, convention=GLTF)
     assert (scale, name) == (10.0, "cm")
     assert note.startswith(
-        "unit taken for cm, although glTF defines m, since then its eyes are 6.5e+03 mm apart: its eyes are 65 mm"
+        "unit taken to be cm, although glTF defines m, since then its eyes are 6.5e+03 mm apart: its eyes are 65 mm"
     )
     _, name, (note,) = scaled(14.0, convention=GLTF)
     assert name == "" and note.startswith("no usual unit fits, although glTF defines m")

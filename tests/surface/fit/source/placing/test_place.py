@@ -26,7 +26,7 @@ def test_any_unit_and_axes_come_to_the_same_place(k, unit):
     assert got.placement.unit == unit
     np.testing.assert_allclose(got.mesh.vertices, HEAD.vertices, atol=0.01)
     np.testing.assert_allclose(got.mesh.deltas, HEAD.deltas, atol=0.01)
-    assert any("unit taken for" in note for note in got.notes)
+    assert any("unit taken to be" in note for note in got.notes)
     assert any("turned: up is" in note for note in got.notes) == (not np.array_equal(SQUARE[k], np.eye(3)))
 
 

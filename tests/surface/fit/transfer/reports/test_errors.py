@@ -6,6 +6,7 @@ import made_face
 import numpy as np
 import pytest
 
+from surface.fit.transfer.reports import distances as distances_module
 from surface.fit.transfer.reports import errors as module
 from surface.fit.transfer.reports.errors import distances, face_reports
 from surface.fit.transfer.scan import Samples
@@ -16,7 +17,7 @@ FRONT = np.array([[x, y, -5.0 + 65 * ((x + y) % 20 > 0)] for x in range(-40, 41,
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch):
-    monkeypatch.setattr(module, "COUNT", 20_000)
+    monkeypatch.setattr(distances_module, "COUNT", 20_000)
 
 
 def wall(name="face", material="skin", z=0.0, follows="skin"):

@@ -1,6 +1,6 @@
-"""Where a fitted surface is turned over: its triangles face the other way than the mesh does at the same (u, v).
+"""Find where a fitted surface is inside out: its triangles face the other way than the mesh does at the same (u, v).
 
-Distances do not tell: a fold as deep as the lips' own, or a strip that runs back on itself, stays near the mesh.
+Distances do not show this: a fold as deep as the lips' own, or a strip that runs back on itself, stays near the mesh.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ OPPOSED = -0.2  # cosine between normals
 SURE = 0.5  # of the usual weight: faces in folds and slivers do not say which way the surface goes
 
 
-class TurnedFaces:
+class InsideOutFaces:
     """The triangles of one part of a head, and the faces of the mesh about each in (u, v)."""
 
     def __init__(self, fitted: FittedPart, part: HeadPart) -> None:
@@ -34,7 +34,7 @@ class TurnedFaces:
         self._mix = slopes.mix_u, slopes.mix_v
 
     def find(self, surface: Floats, mesh: Floats) -> tuple[float, Floats]:
-        """Area (mm²) of what is turned over where vertices of the part (m, 3) and of the mesh (n, 3) are, and its
+        """Area (mm²) of what is inside out where vertices of the part (m, 3) and of the mesh (n, 3) are, and its
         places (k, 2) in (u, v)."""
         if not len(self._triangles):
             return 0.0, self._uv

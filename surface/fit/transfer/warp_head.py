@@ -1,4 +1,4 @@
-"""Carry a head over to a scan: every part, group, contact and pivot of it in the form of the scan."""
+"""Give a head the form of a scan: its parts, groups, contacts and pivots are moved by the registration's map."""
 
 from __future__ import annotations
 
@@ -7,28 +7,28 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.transfer.places import place_eyes, place_jaw, place_neck, place_teeth
+from surface.fit.transfer.place_parts import place_eyes, place_jaw, place_neck, place_teeth
 from surface.fit.transfer.register import Matcher
-from surface.fit.transfer.skin import Ball, Skin, behind_lids, close_lips, follow_skin, rims_of, seat
+from surface.fit.transfer.skin import Ball, Skin, behind_lids, close_lips, follow_skin, rims_of, seat_on_eyeballs
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Group, Head, HeadData, PartData
 from surface.head.model.parameters import read_pose
 from surface.head.posing.rig import SkinRig
 
-REACH_MM = 3.0  # to either side: over so much skin the turn and stretch of a displacement are measured
-STRETCH = (0.6, 1.6)  # least and most of a displacement
+REACH_MM = 3.0  # distance to either side over which rotation and stretch of a displacement are measured
+STRETCH = (0.6, 1.6)  # least and greatest stretch of a displacement
 RIGID = ("teeth", "gums", "tongue")
 SOCKETS = "sockets"
-SETTLINGS = 2
+CONTACT_PASSES = 2
 
 
-def carry(
+def warp_head(
     head: Head, template: Template, warp: Warp, smooth: Warp, matcher: Matcher, provenance: dict[str, str], name: str
 ) -> HeadData:  # fmt: skip
-    """The head as a map of space and the scan's detail make it.
+    """The head in the form that a map of space and the scan's detail give it.
 
-    smooth : a stiffer map, which displacements are turned and stretched by.
+    smooth : a stiffer map, by which displacements are rotated and stretched. matcher : finds the scan's detail.
     """
     data = head.data
     old, new = Ball(data.eyes, data.eye_radius), Ball(*place_eyes(template, warp))
@@ -48,22 +48,22 @@ def carry(
         elif part.name == SOCKETS:
             points = behind_lids(part.points, face, old, new)
         else:
-            points = seat(follow_skin(part.points, face, warp), part.points, old, new)
+            points = seat_on_eyeballs(follow_skin(part.points, face, warp), part.points, old, new)
         linear = np.tile(teeth.scale * np.eye(3), (len(points), 1, 1))
         if part.material not in RIGID and part.follows == "skin":
             linear = stretches(smooth, part.points)
         parts.append(_with_points(part, points, linear))
     scale = new.radius / old.radius
-    carried = replace(
+    warped = replace(
         data, name=name, provenance=provenance, neck=place_neck(data, template, warp), eyes=new.centres,
         eye_radius=new.radius, jaw=place_jaw(data, warp), parts=parts,
         contacts=[replace(c, reach_mm=scale * c.reach_mm) for c in data.contacts],
     )  # fmt: skip
-    return settled(carried)
+    return with_contacts_solved(warped)
 
 
 def _skins(head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball) -> dict[str, Skin]:
-    """The parts that are seen as skin, on the scan."""
+    """The visible parts of skin, moved onto the scan; by name."""
     rims, scale = rims_of(head), new.radius / old.radius
     lips = next(c for c in head.data.contacts if c.name == "lips")
     out = {}
@@ -71,7 +71,7 @@ def _skins(head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball) -> di
         if part.follows == "skin" and part.material == "skin" and part.name != SOCKETS:
             skin = Skin(part, rims, warp, old)
             skin.follow(matcher, scale)
-            skin.at = seat(skin.at, skin.rest, old, new)
+            skin.at = seat_on_eyeballs(skin.at, skin.rest, old, new)
             skin.solve()
             if part.name == lips.part:
                 close_lips(skin, lips, scale)
@@ -80,7 +80,7 @@ def _skins(head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball) -> di
 
 
 def stretches(warp: Warp, points: Floats) -> Floats:
-    """(n, 3, 3) how displacements at points are turned and stretched: the map's derivatives, without folds."""
+    """(n, 3, 3) matrices that rotate and stretch displacements: the map's derivatives, without reflections."""
     u, size, vt = np.linalg.svd(warp.jacobians(points, REACH_MM))
     sign = np.linalg.det(u @ vt)
     u[sign < 0, :, 2] *= -1.0
@@ -89,7 +89,7 @@ def stretches(warp: Warp, points: Floats) -> Floats:
 
 
 def _with_points(part: PartData, points: Floats, linear: Floats) -> PartData:
-    """The part with its control points elsewhere, its displacements turned by ``linear (n, 3, 3)``."""
+    """The part with control points at ``points (n, 3)``, its displacements multiplied by ``linear (n, 3, 3)``."""
     groups = []
     for g in part.groups:
         moves = np.einsum("nij,nj->ni", linear[g.ids], g.moves)
@@ -97,10 +97,10 @@ def _with_points(part: PartData, points: Floats, linear: Floats) -> PartData:
     return replace(part, points=points, groups=groups)
 
 
-def settled(head: HeadData) -> HeadData:
-    """The head with its points at rest where its contacts leave them."""
+def with_contacts_solved(head: HeadData) -> HeadData:
+    """The head with its points at rest where solving its contacts at rest puts them."""
     rest = read_pose(np.zeros(59))
-    for _ in range(SETTLINGS):
+    for _ in range(CONTACT_PASSES):
         points = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
         head = replace(head, parts=[replace(p, points=at) for p, at in zip(head.parts, points, strict=True)])
     return head

@@ -1,4 +1,7 @@
-"""Linkages of a bus's channels: from parameters to their inputs, and by their geometry to angles of their servos."""
+"""Channels that a linkage joins, such as the two servos of a differential: from parameters to their servo angles.
+
+Parameters give the inputs of a linkage, such as roll and pitch; its geometry gives the angles of its servos.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +18,11 @@ from controller.robot.terms import TermSettings
 
 @dataclass
 class LinkedChannels:
-    """One linkage.
+    """The channels of one linkage.
 
-    name : of the linkage. at : (n,) its channels. needs : (k,) parameters that its inputs follow.
-    outside : whether the last inputs lay where it cannot go. times : how often they went there.
+    name : of the linkage. at : (n,) indices of its channels on the bus. needs : (k,) indices of the parameters that its
+    inputs follow.
+    outside : whether the linkage cannot reach the last inputs. times : how often inputs became unreachable.
     """
 
     name: str
@@ -40,7 +44,7 @@ class LinkedChannels:
         return cls(settings.name, at, needs, made, inputs)
 
     def __call__(self, values: Floats) -> Floats:
-        """(n,) degrees of its channels before their map, for parameters (p,); NaN where an input has no value."""
+        """(n,) degrees of its channels before their map, for parameters (p,); all NaN where an input has no value."""
         given = values.tolist()
         inputs = np.array([each(given) for each in self.inputs])
         if not np.isfinite(inputs).all():
@@ -52,7 +56,7 @@ class LinkedChannels:
 
 
 def input_names(settings: LinkageSettings) -> list[tuple[str, str]]:
-    """Key and name of every parameter that the inputs of a linkage follow."""
+    """For every parameter that the inputs of a linkage follow: the key in the robot file, and the parameter's name."""
     return [(f"inputs.{key}", name) for key, each in settings.inputs.items() for name in _named(each)]
 
 
@@ -61,7 +65,7 @@ def _named(given: str | dict[str, TermSettings]) -> tuple[str, ...]:
 
 
 def _input(given: str | dict[str, TermSettings], parameters: Parameters) -> Compiled:
-    """What an input is worth for a list of parameters."""
+    """The function that computes an input from a list of parameter values."""
     if isinstance(given, str):
         formula: Formula = parse_formula(given)
         return formula.compiled(parameters)

@@ -19,8 +19,8 @@ from controller.stage.stage import Stage
 from drivers.base.priority import request_realtime
 
 
-class Hall:
-    """Several bodies, ticked together; the same calls as :class:`controller.body.body.Body`.
+class MultiHeadBody:
+    """The bodies of several heads, ticked together; it has the same methods as :class:`controller.body.body.Body`.
 
     mailboxes, panels : one for each head of the stage, in its order.
 
@@ -52,7 +52,7 @@ class Hall:
 
     @property
     def state(self) -> CommandState:
-        """The layers of the first head, who hears what is meant for nobody else."""
+        """The layers of the first head, which takes every command that names no head."""
         return self.bodies[0].state
 
     def body_of(self, name: str) -> Body:
@@ -66,11 +66,11 @@ class Hall:
 
     @property
     def finished(self) -> bool:
-        """True once there is nothing left to play."""
+        """Whether every take, show and voice has been played to its end."""
         return self.bodies[0].finished
 
     def start(self) -> None:
-        """Bring all servos up and hold them where they are. Raises DriverError; what was up is shut down again."""
+        """Start all servos and hold them where they are. Raises DriverError; those already started are stopped then."""
         started: list[Body] = []
         try:
             for body in self.bodies:
@@ -83,17 +83,20 @@ class Hall:
             raise
 
     def begin(self) -> None:
-        """Let the servos follow, and open the links. Raises what a head's link raises that has nothing else."""
+        """Let the servos follow the faces, and open the links.
+
+        Raises the error of a link that cannot be opened where its head has nothing else to follow.
+        """
         for body in self.bodies:
             body.begin()
 
     def publish(self, panel_state: object = None) -> None:
-        """Write the state of every head for its panel."""
+        """Write the state of every head to the mailbox of its panel."""
         for body, panel in zip(self.bodies, self._panels, strict=False):
             body.publish(panel)
 
     def check(self) -> None:
-        """Raise the error that ended a loop, or the only thing there was to play."""
+        """Raise the error that ended the control loop, or that ended the only thing that a head had to play."""
         if self._error is not None:
             raise self._error
         for body in self.bodies:
@@ -109,7 +112,7 @@ class Hall:
             raise errors[0]
 
     def report(self) -> dict[str, object]:
-        """As that of one body; links, buses and parts say of which head they are."""
+        """The report of a body for all heads; every link, bus and part also names its head."""
         reports = [(body.state.name, body.report()) for body in self.bodies]
         lists = {
             key: [{"head": name, **each} for name, report in reports for each in report[key]]  # type: ignore[attr-defined]
@@ -127,7 +130,7 @@ class Hall:
             self._error = error
 
     def tick(self, now_ns: int, step_s: float) -> None:
-        """One step of every head, and of their turns."""
+        """One step of every head, after one of the turn-taking between them."""
         if self.heads.turns is not None:
             self.heads.turns.tick(now_ns)
         for body in self.bodies:

@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from surface.fit.transfer.align import Similarity
-from surface.fit.transfer.mirrored import FLIP, MirroredWarp, alike, levelled, mirror_plane
 from surface.fit.transfer.register import Mark, Registered
 from surface.fit.transfer.scan import Samples
+from surface.fit.transfer.symmetry import FLIP, MirroredWarp, levelled, mirror_plane, symmetrised
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 
@@ -96,7 +96,7 @@ def test_landmarks_of_both_sides_become_alike_unless_given(warp: Warp) -> None:
         "mouth_right": Mark(np.array([-24.0, -44.0, 85.0]), "found", 0.5),
         "nose_tip": Mark(np.array([1.0, 0.0, 110.0]), "found", 1.0),
     }
-    made = alike(Registered(warp, warp, marks)).marks
+    made = symmetrised(Registered(warp, warp, marks)).marks
     np.testing.assert_allclose(made["left_eye_upper"].place, [31.0, 41.0, 80.5])
     np.testing.assert_allclose(made["right_eye_upper"].place, [-31.0, 41.0, 80.5])
     np.testing.assert_allclose(made["nose_tip"].place, [0.0, 0.0, 110.0])

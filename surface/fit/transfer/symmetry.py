@@ -1,7 +1,8 @@
-"""Scans that mirror themselves: turned until their plane is the head's, and registered alike on both sides.
+"""Detect scans that are mirror-symmetric, turn them into the head's plane of symmetry, and symmetrise the registration.
 
-A registration follows either side of a face by itself, and where a scan says little, as at lids without eyes, both end
-a millimetre apart. A sculpt or an avatar is the same on both sides; a scan of a person is not, and stays as it is.
+A registration follows each side of a face independently. Where a scan has little detail, as at lids without eyes, both
+sides end up a millimetre apart. A sculpt or an avatar is usually symmetric, so its registration can be, too. A scan of
+a person is not symmetric and is left as it is.
 """
 
 from __future__ import annotations
@@ -18,31 +19,34 @@ from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 
-ALIKE = 0.004  # in heights of the face: RMS of the distance between both sides of a scan that counts as mirrored
-KEPT, MOST = 0.9, 0.97  # share of the samples that the plane is found by, and that have to be alike: hair need not
-STEPS, CHECKED = 12, 4000  # of the search for the plane; samples that are mirrored
-TILTED = np.radians(12.0)  # the plane of a face that was found is no further off than this
+SYMMETRIC = 0.004  # greatest RMS distance between both sides of a symmetric scan, in heights of the face
+KEPT, MOST = 0.9, 0.97  # share of the samples that find the plane, and that have to be symmetric: hair need not be
+STEPS, CHECKED = 12, 4000  # iterations of the search for the plane; samples that are mirrored
+TILTED = np.radians(12.0)  # greatest angle between the plane and the one that the alignment has found
 FLIP = np.array([-1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane by its unit normal (3,), which points to the left, and a point (3,) of it."""
+    """A plane, given by its unit normal (3,), which points to the subject's left, and a point (3,) of it."""
 
     normal: Floats
     centre: Floats
 
     def mirrored(self, rows: Floats, *, directions: bool = False) -> Floats:
-        """Points or directions (m, 3) on the other side."""
+        """Points or directions (m, 3) mirrored in the plane."""
         off = (rows if directions else rows - self.centre) @ self.normal
         out: Floats = rows - 2.0 * np.outer(off, self.normal)
         return out
 
 
 def mirror_plane(template: Template, samples: Samples) -> Plane | None:
-    """The plane in which the samples of a scan, which is aligned with a template, mirror themselves near its face; None
-    where they do not. Iterated closest points, as for the planes of heads (:mod:`surface.fit.source.placing.symmetry`),
-    by distances from the surface, since samples of both sides do not meet."""
+    """The plane of symmetry of a scan near its face; None where the scan is not symmetric.
+
+    The scan is aligned with the template. The plane is found by iterated closest points, as in
+    :mod:`surface.fit.source.placing.symmetry`, but by distances along normals, since the samples of both sides do not
+    coincide.
+    """
     front = template.points[template.face]
     low, high = front.min(axis=0), front.max(axis=0)
     rows = np.flatnonzero(((samples.points > low) & (samples.points < high)).all(axis=1))
@@ -57,23 +61,23 @@ def mirror_plane(template: Template, samples: Samples) -> Plane | None:
         if plane.normal[0] < np.cos(TILTED):
             return None
     off = np.sort(np.abs(_off(plane, tree, samples, checked)[0]))[: int(MOST * len(checked))]
-    return plane if float(np.sqrt((off**2).mean())) < ALIKE * template.height else None
+    return plane if float(np.sqrt((off**2).mean())) < SYMMETRIC * template.height else None
 
 
 def _off(plane: Plane, tree: cKDTree, samples: Samples, rows: Ints) -> tuple[Floats, Ints]:
-    """Distances (m,) of mirrored samples from the surface at the samples nearest to them, and these (m,)."""
+    """Distances (m,) of mirrored samples from the surface, along the nearest sample's normal; and its number (m,)."""
     at = plane.mirrored(samples.points[rows])
     near = tree.query(at)[1]
     return ((at - samples.points[near]) * samples.normals[near]).sum(axis=1), near
 
 
 def _nearer(plane: Plane, tree: cKDTree, samples: Samples, rows: Ints) -> Plane:
-    """The plane turned about its vertical and its sagittal axis, and moved along its normal, in least squares."""
+    """A least-squares step: the plane turned about its vertical and its sagittal axis and moved along its normal."""
     off, near = _off(plane, tree, samples, rows)
     out, local = samples.normals[near], samples.points[rows] - plane.centre
     across = local @ plane.normal
     kept = np.abs(off) <= np.quantile(np.abs(off), KEPT)
-    axes = np.eye(3)[1:]  # a turn of the normal towards them
+    axes = np.eye(3)[1:]  # the normal is turned towards these
     axes = axes - np.outer(axes @ plane.normal, plane.normal)
     columns = [2.0 * (out @ plane.normal)]  # of the centre, along the normal
     columns += [-2.0 * ((local @ w) * (out @ plane.normal) + across * (out @ w)) for w in axes]
@@ -94,7 +98,7 @@ def levelled(found: Similarity, plane: Plane) -> Similarity:
 
 
 class MirroredWarp(Warp):
-    """The mean of a map of space and of the one that does the same on the other side of x = 0."""
+    """The mean of a map of space and of its mirror image in x = 0."""
 
     def __init__(self, warp: Warp) -> None:
         self._warp = warp
@@ -105,20 +109,20 @@ class MirroredWarp(Warp):
         return moved
 
     def turned(self, points: Floats, normals: Floats) -> tuple[Floats, Floats]:
-        """Points (m, 3) moved, and unit normals (m, 3) of a surface through them as it lies then."""
+        """Points (m, 3) moved, and unit normals (m, 3) of the moved surface through them."""
         (at, out), (there, back) = (self._warp.turned(side * points, side * normals) for side in (np.ones(3), FLIP))
         mean = out + FLIP * back
         unit: Floats = mean / np.maximum(np.linalg.norm(mean, axis=1), 1e-12)[:, None]
         return 0.5 * (at + FLIP * there), unit
 
 
-def alike(done: Registered) -> Registered:
-    """A registration that is the same on both sides."""
+def symmetrised(done: Registered) -> Registered:
+    """The registration made symmetric about x = 0."""
     return Registered(MirroredWarp(done.warp), MirroredWarp(done.smooth), {n: _mark(done, n) for n in done.marks})
 
 
 def _mark(done: Registered, name: str) -> Mark:
-    """A landmark that was found, at the mean of its place and of that of its fellow on the other side, mirrored."""
+    """A landmark at the mean of its place and the mirror image of its counterpart; given ones stay as they are."""
     own = done.marks[name]
     pairs = (("left", "right"), ("right", "left"))
     other = done.marks.get(next((name.replace(a, b) for a, b in pairs if a in name), name), own)

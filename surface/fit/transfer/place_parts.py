@@ -1,4 +1,4 @@
-"""Where the parts of a head come to lie that are no skin: eyeballs, teeth, the jaw's hinge and the neck."""
+"""Place the parts of a head that are not skin in a new form: eyeballs, teeth, the jaw's hinge and the neck."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Group, Head, HeadData, Jaw, Neck, PartData
 
-EYE_RADII = 1.5  # around an eyeball: skin that shows where it is
+EYE_RADII = 1.5  # distance from an eyeball's centre, in radii, within which skin determines its new place
 TEETH = ("teeth", "gums", "tongue")
-FRONT_MM = 4.0  # behind the foremost teeth: how fast those further back count less for where all are placed
+FRONT_MM = 4.0  # distance behind the foremost teeth over which the weight of teeth in their placing falls to 1/e
 
 
 @dataclass(frozen=True)
-class Placing:
-    """Map p -> scale * p + shift: uniform scale without rotation, so that what turns about x still does."""
+class ScaleShift:
+    """The map p -> scale * p + shift. It has no rotation, so that the jaw still turns about x."""
 
     scale: float
     shift: Floats
@@ -29,52 +29,52 @@ class Placing:
         return moved
 
 
-def placing(points: Floats, goals: Floats, weight: Floats | None = None) -> Placing:
-    """The placing that brings points (n, 3) nearest to goals (n, 3)."""
+def fit_scale_shift(points: Floats, goals: Floats, weight: Floats | None = None) -> ScaleShift:
+    """The scale and shift that bring points (n, 3) nearest to goals (n, 3), in least squares with weights (n,)."""
     w = np.ones(len(points)) if weight is None else weight
     w = w / w.sum()
     a0, b0 = w @ points, w @ goals
     a, b = points - a0, goals - b0
     scale = float((w @ (a * b).sum(axis=1)) / max(float(w @ (a * a).sum(axis=1)), 1e-12))
-    return Placing(scale, b0 - scale * a0)
+    return ScaleShift(scale, b0 - scale * a0)
 
 
 def place_eyes(template: Template, warp: Warp) -> tuple[Floats, float]:
-    """Centres (2, 3) and radius of the eyeballs, out of the lids around each and its own front, where they go."""
+    """New centres (2, 3) and radius of the eyeballs, from where the map puts their fronts and the lids around them."""
     found = []
     for side, eye in enumerate(template.eyes):
         own = template.eye == side
         around = template.face & (np.linalg.norm(template.points - eye, axis=1) < EYE_RADII * template.radius)
         points = template.points[own | around]
-        found.append(placing(points, warp(points)))
+        found.append(fit_scale_shift(points, warp(points)))
     radius = template.radius * float(np.mean([p.scale for p in found]))
     centres = []
     for side, (eye, place) in enumerate(zip(template.eyes, found, strict=True)):
         front = template.points[template.eye == side]
-        out = (front - eye) / template.radius  # the mean eyeball touches its front where the map puts it
+        out = (front - eye) / template.radius  # in the mean, the ball touches its front where the map puts the front
         centre = place.points(eye)
         centre[2] = float(np.mean((warp(front) - radius * out)[:, 2]))
         centres.append(centre)
     return np.array(centres), radius
 
 
-def place_teeth(head: Head, warp: Warp) -> Placing:
-    """How teeth, gums and tongue move: as one, in size by where the map puts all of them, in place by where it puts
-    their front: lips that are pressed together lie close before it."""
+def place_teeth(head: Head, warp: Warp) -> ScaleShift:
+    """How teeth, gums and tongue move, all together. Where the map puts all of them gives their size, and where it puts
+    their front gives their place, because closed lips lie directly before it."""
     points = [p.vertices for p in head.parts if p.material in TEETH]
     if not points:
         points = [p.vertices for p in head.parts if p.material == "mouth"] or [head.parts[0].vertices]
     at = np.concatenate(points).astype(float)[::7]
     goals = warp(at)
-    scale = placing(at, goals).scale
+    scale = fit_scale_shift(at, goals).scale
     front = np.exp((at[:, 2] - at[:, 2].max()) / FRONT_MM)
-    return Placing(scale, (front / front.sum()) @ (goals - scale * at))
+    return ScaleShift(scale, (front / front.sum()) @ (goals - scale * at))
 
 
 def place_jaw(data: HeadData, warp: Warp) -> Jaw:
-    """The jaw's path after the map: hinge, glide and tilts as the skin that follows the jaw is moved and scaled."""
+    """The jaw's motion in the new form: its hinge, glide and tilts are moved and scaled as the skin that follows it."""
     face = max((p for p in data.parts if p.follows == "skin"), key=lambda p: float(p.jaw.sum()))
-    place = placing(face.points, warp(face.points), face.jaw + 1e-6)
+    place = fit_scale_shift(face.points, warp(face.points), face.jaw + 1e-6)
     centre = place.points(np.array(data.jaw.centre))
     glide = place.scale * np.array(data.jaw.glide)
     tilts = {}
@@ -85,16 +85,16 @@ def place_jaw(data: HeadData, warp: Warp) -> Jaw:
 
 
 def place_neck(data: HeadData, template: Template, warp: Warp) -> Neck:
-    """The neck's pivot and bend after the map."""
+    """The neck's pivot and bend in the new form."""
     points = template.points[::5]
-    place, neck = placing(points, warp(points)), data.neck
+    place, neck = fit_scale_shift(points, warp(points)), data.neck
     x, y, z = place.points(np.array(neck.pivot)).tolist()
     lift = float(place.shift[1] + neck.slope * place.shift[2])
     return Neck((x, y, z), neck.slope, place.scale * neck.still + lift, place.scale * neck.whole + lift)
 
 
 def scaled(data: HeadData, factor: float, middle: Floats) -> HeadData:
-    """A head enlarged about a place; its budget, in mm, stays."""
+    """A head enlarged by ``factor`` about ``middle (3,)``; the error allowed for its triangles (mm) stays the same."""
 
     def moved(p: Floats) -> Floats:
         out: Floats = middle + factor * (p - middle)

@@ -1,4 +1,4 @@
-"""controller.body.hall: several heads of one stage in this process."""
+"""controller.body.multi_head: several heads of one stage in this process."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ import pytest
 from controller.base.errors import ConfigError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
-from controller.body.hall import Hall
 from controller.body.messages import RunOptions
+from controller.body.multi_head import MultiHeadBody
 from controller.layers.commands import CommandState
 from controller.stage.dry_run import dry_run
 from controller.stage.stage import Stage, heads_of, load_stage
@@ -44,10 +44,10 @@ def stage_of(tmp_path: Path, text: str = TWO) -> Stage:
 
 
 @contextmanager
-def hall_of(stage: Stage, options: RunOptions = RunOptions()) -> Iterator[tuple[Hall, list[Mailbox]]]:
+def running_heads(stage: Stage, options: RunOptions = RunOptions()) -> Iterator[tuple[MultiHeadBody, list[Mailbox]]]:
     with ExitStack() as stack:
         boxes = [stack.enter_context(Mailbox.create(len(P))) for _ in stage.heads]
-        yield Hall(stage, P, boxes, options=options), boxes
+        yield MultiHeadBody(stage, P, boxes, options=options), boxes
 
 
 def until(condition: Callable[[], object]) -> None:
@@ -58,11 +58,11 @@ def until(condition: Callable[[], object]) -> None:
     raise AssertionError("waited in vain")
 
 
-def ticked(hall: Hall, boxes: list[Mailbox], count: int) -> np.ndarray:
+def ticked(several: MultiHeadBody, boxes: list[Mailbox], count: int) -> np.ndarray:
     """(count, heads, P) what is published, tick by tick."""
     rows, out = [], np.zeros(len(P))
     for k in range(1, count + 1):
-        hall.tick(10**9 + k * 10**7, 0.01)
+        several.tick(10**9 + k * 10**7, 0.01)
         row = []
         for box in boxes:
             box.read(out)
@@ -73,10 +73,10 @@ def ticked(hall: Hall, boxes: list[Mailbox], count: int) -> np.ndarray:
 
 def test_every_head_moves_as_it_would_alone(tmp_path: Path) -> None:
     stage = stage_of(tmp_path)
-    with hall_of(stage) as (hall, boxes):
-        hall.heads.find("both").set_parameters([JAW], [0.7], 1)
-        hall.heads.find("oak").expression("happiness", 1.0, None, 1)
-        found = ticked(hall, boxes, 150)
+    with running_heads(stage) as (several, boxes):
+        several.heads.find("both").set_parameters([JAW], [0.7], 1)
+        several.heads.find("oak").expression("happiness", 1.0, None, 1)
+        found = ticked(several, boxes, 150)
     for i, (own, smiles) in enumerate(zip(heads_of(stage), (False, True), strict=True)):
         alone, out = own.state(P), P.neutral()
         alone.live(1.0, 0, "auto")
@@ -95,20 +95,20 @@ def test_servos_links_and_reports_belong_to_their_heads(tmp_path: Path) -> None:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     text = TWO.replace("[groups]", more.replace(":0", f":{port}") + "[groups]")
-    with hall_of(stage_of(tmp_path, text)) as (hall, _):
-        hall.start()
+    with running_heads(stage_of(tmp_path, text)) as (several, _):
+        several.start()
         try:
-            hall.begin()
+            several.begin()
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
                 sender.sendto(b'{"jawOpen": 0.5}', ("127.0.0.1", port))
-            until(lambda: hall.bodies[1].newest()[0][JAW] > 0.4)
-            assert hall.bodies[0].newest()[0][JAW] < 0.1
-            hall.check()
-            hall.state.stop_latch.stop("test", time.monotonic_ns())
-            until(lambda: not any(loop.bus.running for loop in hall.bodies[1].buses))
-            report = json.loads(json.dumps(hall.report()))
+            until(lambda: several.bodies[1].newest()[0][JAW] > 0.4)
+            assert several.bodies[0].newest()[0][JAW] < 0.1
+            several.check()
+            several.state.stop_latch.stop("test", time.monotonic_ns())
+            until(lambda: not any(loop.bus.running for loop in several.bodies[1].buses))
+            report = json.loads(json.dumps(several.report()))
         finally:
-            hall.stop()
+            several.stop()
     assert [bus["name"] for bus in report["buses"]] == ["oak/head"] and report["buses"][0]["head"] == "oak"
     assert [(link["head"], link["accepted"]) for link in report["links"]] == [("oak", 1)]
     assert [head["head"] for head in report["heads"]] == ["maple", "oak"]
@@ -121,10 +121,10 @@ def test_json_faces_go_to_whom_they_name(tmp_path: Path) -> None:
     text = TWO.replace('["head24"]', "[]").replace("liveliness = 1.0", "liveliness = 0.0")
     stage = stage_of(tmp_path, text + f'[[links]]\nkind = "json"\nlisten = "udp:127.0.0.1:{port}"\n')
     smile = P.index("mouthSmileLeft")
-    with hall_of(stage) as (hall, _):
-        hall.start()
+    with running_heads(stage) as (several, _):
+        several.start()
         try:
-            hall.begin()
+            several.begin()
             with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
                 sender.connect(("127.0.0.1", port))
                 for message in (
@@ -133,30 +133,30 @@ def test_json_faces_go_to_whom_they_name(tmp_path: Path) -> None:
                     {"to": "nobody", "jawOpen": 1.0},
                 ):
                     sender.send(json.dumps(message).encode())
-                maple, oak = (body.newest for body in hall.bodies)
+                maple, oak = (body.newest for body in several.bodies)
                 until(lambda: oak()[0][JAW] > 0.45 and maple()[0][smile] > 0.55)
                 assert maple()[0][JAW] == 0.0 and oak()[0][smile] == 0.0
                 sender.send(b'{"to": "both", "jawOpen": 0.9}')
                 until(lambda: min(maple()[0][JAW], oak()[0][JAW]) > 0.85)
-            (link,) = hall.report()["links"]  # type: ignore[misc]
+            (link,) = several.report()["links"]  # type: ignore[misc]
             until(lambda: link["refused"] == {"for a head that is not here": 1})
         finally:
-            hall.stop()
+            several.stop()
 
 
 def test_what_stands_at_the_top_of_a_stage_is_the_first_heads_who_can_pass_it_on(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text('name = "s"\nsteps = ["0.0 @oak SET jawOpen 1", "0.0 SET jawOpen 0.4"]\n')
     stage = stage_of(tmp_path, TWO.replace('name = "two"', 'name = "two"\nshow = "s.toml"'))
-    with hall_of(stage, RunOptions(record=tmp_path / "a.rec")) as (hall, boxes):
-        for body in hall.bodies:
+    with running_heads(stage, RunOptions(record=tmp_path / "a.rec")) as (several, boxes):
+        for body in several.bodies:
             body._begun.set()
-        ticked(hall, boxes, 3)
-        assert [state.held()[JAW] for state in (body.state for body in hall.bodies)] == [0.4, 1.0]
-        shows = hall.state.shows
+        ticked(several, boxes, 3)
+        assert [state.held()[JAW] for state in (body.state for body in several.bodies)] == [0.4, 1.0]
+        shows = several.state.shows
         assert shows is not None
         shows.abandon(2 * 10**9)
-        assert [state.held() for state in (body.state for body in hall.bodies)] == [{}, {}]
-        for body in hall.bodies:
+        assert [state.held() for state in (body.state for body in several.bodies)] == [{}, {}]
+        for body in several.bodies:
             body._closers.close()
     assert sorted(path.name for path in tmp_path.glob("*.rec")) == ["a-maple.rec", "a-oak.rec"]
 

@@ -1,4 +1,4 @@
-"""Find landmarks on a bare mesh and write them into a file, with a picture, to be corrected by hand."""
+"""Find landmarks on a bare mesh, and write a file and a picture of them that a user can correct by hand."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from surface.base.progress import Progress, no_progress
 from surface.fit.source.load import LoadOptions
 from surface.fit.transfer.align import NoFaceFound, Similarity
 from surface.fit.transfer.api import direction, find_face, in_frame, upright
-from surface.fit.transfer.mirrored import alike
 from surface.fit.transfer.register import Mark, register
 from surface.fit.transfer.reports.landmarkfile import read_landmarks
 from surface.fit.transfer.reports.picture import Frontal, draw_landmarks, frontal
 from surface.fit.transfer.reports.reportfile import view_of
 from surface.fit.transfer.scan import Scan, read_scan, sample
+from surface.fit.transfer.symmetry import symmetrised
 from surface.fit.transfer.template import NAMES, make_template
 from surface.head import Head
 
@@ -38,14 +38,14 @@ def pick_landmarks(
 ) -> tuple[dict[str, Mark], Path]:  # fmt: skip
     """Find the landmarks of a face and write them, and beside the file a picture of the same name that ends in .png.
 
-    mesh_path, options : as of :func:`surface.fit.transfer.api.transfer_head`. source : folder of a head of which the
-    face has the form. out : .toml. keep : the landmarks that ``out`` has are kept, and only the others found.
+    mesh_path, options : as for :func:`surface.fit.transfer.api.transfer_head`. source : folder of a head whose face the
+    mesh is compared with. out : a .toml file. keep : only find the landmarks that ``out`` does not have yet.
 
     Returns the landmarks in the mesh's own coordinates, and the picture's path.
 
-    Raises NoFaceFound: no face was found in the mesh; the picture shows it as it stands then, and ``out`` has lines to
-    be filled in. FitError: the mesh cannot be read, ``out`` is there and not to be kept, or it or the picture cannot be
-    written; MissingPackage: Pillow is not installed. Nothing is written then.
+    Raises NoFaceFound: no face was found in the mesh; then the picture shows the mesh in its own axes, and ``out`` has
+    lines to be filled in. FitError: the mesh cannot be read, ``out`` exists and ``keep`` is False, or a file cannot be
+    written; MissingPackage: Pillow is not installed. After these two nothing is written.
     """
     if out.suffix.lower() != ".toml":
         raise FitError(f"{out}: landmarks are written as TOML", hint=f"-o {out.with_suffix('.toml')}")
@@ -67,7 +67,7 @@ def pick_landmarks(
     report("face", 0.25)
     samples, held = sample(in_frame(scan, template, found), MANY), {n: found.points(p) for n, p in given.items()}
     done = register(template, samples, held, lambda share: report("landmarks", 0.25 + 0.7 * share))
-    done = alike(done) if mirrored else done
+    done = symmetrised(done) if mirrored else done
     marks = {n: Mark(_in_file(found, m), m.how, m.sure) for n, m in done.marks.items()}
     view = view_of(found, np.array([m.place for m in marks.values()]))
     return marks, _write(Path(mesh_path), out, scan, view, marks)
@@ -79,7 +79,7 @@ def _in_file(found: Similarity, mark: Mark) -> Floats:
 
 
 def as_it_stands(scan: Scan, options: LoadOptions) -> Frontal:
-    """The front view of a scan by the axes that are given, else y up and z forward; of a body its upper part."""
+    """The front view of a scan by the given axes, else with y up and z forward; of a whole body only the upper part."""
     up = direction("--up", options.up or "y")
     forward = direction("--forward", options.forward or ("z" if abs(up[2]) < 0.5 else "-y"))
     turn = np.array([np.cross(up, forward), up, forward])
@@ -95,7 +95,7 @@ def as_it_stands(scan: Scan, options: LoadOptions) -> Frontal:
 def _write(
     mesh: Path, out: Path, scan: Scan, view: Frontal, marks: Mapping[str, Mark], wanted: Sequence[str] = ()
 ) -> Path:  # fmt: skip
-    """Write file and picture, both or none."""
+    """Write file and picture, both or none; returns the picture's path. ``wanted`` : as for :func:`as_toml`."""
     picture = out.with_suffix(".png")
     new = {path: path.with_name(f".{path.name}.new") for path in (picture, out)}
     try:
@@ -112,7 +112,7 @@ def _write(
 
 
 def as_toml(mesh: Path, out: Path, view: Frontal, marks: Mapping[str, Mark], wanted: Sequence[str] = ()) -> str:
-    """The text of a file of landmarks, with what to do with it; ``wanted`` get lines to be filled in."""
+    """The text of a file of landmarks, with instructions. ``wanted`` : landmarks that get a line to be filled in."""
     digits = max(0, 2 - int(np.floor(np.log10(1.0 / view.scale))))  # a hundredth of a pixel
     lines = [
         f"# Landmarks of {mesh.name}; the numbers are those in {out.with_suffix('.png').name}.",

@@ -11,7 +11,7 @@ from surface.base.errors import FitError
 from surface.fit.points.report import Errors, FitReport, PartReport
 from surface.fit.transfer import api
 from surface.fit.transfer.align import Similarity
-from surface.fit.transfer.refused import faults_of_transfer, turned_over
+from surface.fit.transfer.faults import faults_of_transfer, turned_over
 from surface.head import Head
 
 AREA = 40.0 * 40.0  # mm² of the small head's first patch, seen from the front
@@ -43,10 +43,10 @@ def test_a_face_that_follows_its_scan_is_no_fault(source: Head) -> None:
 @pytest.mark.parametrize(
     ("parts", "matched", "words"),
     [
-        (errors(4.2), 0.9, "does not follow the scan: a hundredth of it is 4 mm off"),
+        (errors(4.2), 0.9, "does not follow the scan: 1 % of it is 4 mm away"),
         (errors(0.5), 0.2, "only 20 % of the face's front lies on the scan"),
-        (errors(0.0, samples=0), 0.9, "nothing of the face"),
-        ([], 0.0, "nothing of the face"),
+        (errors(0.0, samples=0), 0.9, "no part of the face"),
+        ([], 0.0, "no part of the face"),
     ],
 )
 def test_a_face_that_does_not_is_one(source: Head, parts: list[PartReport], matched: float, words: str) -> None:
@@ -62,7 +62,7 @@ def test_what_is_turned_over_is_measured_against_the_head_it_was_made_from(sourc
     whole = folded(1.0)
     assert turned_over(whole, source) == pytest.approx(AREA, rel=0.15)
     (fault,) = faults_of_transfer(errors(0.5), 0.9, whole, source)
-    assert "mm² of the face are turned over at rest" in fault
+    assert "mm² of the face are inside out at rest" in fault
 
 
 def test_a_refused_transfer_lies_beside_its_place_unless_forced(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:

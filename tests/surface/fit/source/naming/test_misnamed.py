@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.naming.astray import closing, right_shapes, right_sides
+from surface.fit.source.naming.misnamed import closing, correct_shapes, correct_sides
 
 NONE = np.zeros((0, 4), np.int64)
 
@@ -18,19 +18,19 @@ def mesh(**sideways: float) -> FitMesh:
 @pytest.mark.parametrize(("left", "right"), [("mouthLeft", "mouthRight"), ("jawLeft", "jawRight")])
 def test_a_pair_that_goes_astray_is_exchanged(left: str, right: str) -> None:
     given = mesh(**{left: -3.0, "jawOpen": -9.0, right: 3.0})
-    made, notes = right_sides(given)
+    made, notes = correct_sides(given)
     assert made.names == (right, "jawOpen", left) and made.deltas is given.deltas
     assert notes == [f"{left} and {right} go to the other side in the file (left is the subject's): exchanged"]
 
 
 @pytest.mark.parametrize(("left", "right"), [(3.0, -3.0), (-3.0, -3.0), (-0.3, 0.3), (0.0, 0.0), (-3.0, 0.1)])
 def test_a_pair_that_goes_right_or_does_not_say_stays(left: float, right: float) -> None:
-    made, notes = right_sides(mesh(mouthLeft=left, mouthRight=right))
+    made, notes = correct_sides(mesh(mouthLeft=left, mouthRight=right))
     assert made.names == ("mouthLeft", "mouthRight") and notes == []
 
 
 def test_one_side_alone_stays() -> None:
-    assert right_sides(mesh(mouthLeft=-3.0))[0].names == ("mouthLeft",)
+    assert correct_sides(mesh(mouthLeft=-3.0))[0].names == ("mouthLeft",)
 
 
 def jaw(opens: float, closes: float) -> FitMesh:
@@ -45,7 +45,7 @@ def test_a_mouth_close_that_closes_no_open_jaw_is_left_out(opens: float, closes:
     given = jaw(opens, closes)
     made, notes = closing(given)
     assert ("mouthClose" in made.names) == stays and len(notes) == (not stays)
-    assert right_shapes(given)[0].names == made.names
+    assert correct_shapes(given)[0].names == made.names
     for name in ("jawOpen", "cheekPuff"):
         k, m = given.names.index(name), made.names.index(name)
         np.testing.assert_array_equal(made.deltas[m], given.deltas[k])

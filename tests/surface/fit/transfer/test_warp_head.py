@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from small_head import all_points, part, small_head
 
-from surface.fit.transfer.carry import _with_points, settled, stretches
+from surface.fit.transfer.warp_head import _with_points, stretches, with_contacts_solved
 
 TURN = Rotation.from_euler("xyz", [20, -30, 40], degrees=True).as_matrix()
 
@@ -53,5 +53,5 @@ def test_a_part_gets_other_points_and_turned_displacements() -> None:
 
 def test_a_head_whose_contacts_touch_nothing_is_settled_as_it_is() -> None:
     head = small_head()
-    for before, after in zip(head.parts, settled(head).parts, strict=True):
+    for before, after in zip(head.parts, with_contacts_solved(head).parts, strict=True):
         np.testing.assert_allclose(after.points, before.points, atol=1e-9)

@@ -1,6 +1,7 @@
-"""Shapes that do something else than their names say: exchanged or made anew, and said.
+"""Correct shapes that do not do what their names say, with a note on each.
 
-Those that take mouth or jaw to a side and go to the other one, and a ``mouthClose`` that closes no open jaw.
+Shapes that move mouth or jaw to the wrong side are exchanged; a ``mouthClose`` that does not close an open jaw is
+replaced.
 """
 
 from __future__ import annotations
@@ -18,9 +19,9 @@ CLOSES = 0.25  # of the way of jawOpen: a mouthClose that moves nothing so far o
 SURE = 0.2  # of a shape's motion that goes sideways: less does not say where it goes
 
 
-def right_shapes(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
-    """A mesh in head space with shapes that do what their names say, and what was changed, in words."""
-    mesh, sides = right_sides(mesh)
+def correct_shapes(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
+    """A mesh in head space with shapes that do what their names say, and notes on what was changed."""
+    mesh, sides = correct_sides(mesh)
     mesh, closes = closing(mesh)
     return mesh, [*sides, *closes]
 
@@ -53,7 +54,7 @@ def _delta(mesh: FitMesh, name: str) -> Floats:
     return delta
 
 
-def right_sides(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
+def correct_sides(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
     """A mesh in head space with such shapes under the names of the sides that they go to, and what was exchanged, in
     words. Left is the subject's, +x. Only pairs are exchanged of which both go astray."""
     names, notes = list(mesh.names), []

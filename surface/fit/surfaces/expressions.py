@@ -1,9 +1,9 @@
-"""Expressions of another head on surfaces that stay as they are.
+"""Transfer the expressions of a head to surfaces read from a file, whose form stays as it is.
 
-The other head is given the surfaces' form first (:mod:`surface.fit.transfer`). Then every displacement field of its
-skin is read off at samples of the surfaces, by the nearest place whose normal agrees, and the displacements of the
-surfaces' own control points are those whose surface comes nearest to it in least squares. Control points that the
-samples leave undetermined follow the mean of the field over their subdomains.
+The other head has been given the form of the surfaces before (:mod:`surface.fit.transfer`). Each of its expressions is
+a displacement field over its skin. The field is sampled on the surfaces, at the nearest places of the skin that have a
+similar normal, and then fitted in least squares by displacements of the surfaces' own control points. Control points
+that the samples do not determine take the weighted mean of the field over their subdomain.
 """
 
 from __future__ import annotations
@@ -24,20 +24,20 @@ from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import SHAPES, smoothstep
 from surface.head.posing.head import Head
 
-NORMAL_MM = 14.0  # weight of normals in the search for the nearest place
-FINER = 8.0  # samples than for placing: where a surface is flat its control points need some, too
-NEAR = 4  # places that a field is read off at
-FAR_MM = (12.0, 35.0)  # from the other head's skin: nearer all of a displacement is taken, further none
-PULL = 1e-2  # of the mean over a subdomain, against the samples in it
-LEAST_MM, LEAST_GROUP_MM = 0.01, 0.25  # displacements, and groups, that are left out
-SHOWN = 0.5  # of a group of a rule, as a wrinkle's: surfaces that cannot show so much of it do without
+NORMAL_MM = 14.0  # distance that a difference of normals by 1 counts as in the search for the nearest places
+FINER = 8.0  # divides the chord error of the sampling, so that the control points of flat surfaces get samples, too
+NEAR = 4  # places of the skin whose displacements are averaged at a sample
+FAR_MM = (12.0, 35.0)  # distance from the other head's skin where displacements begin to fade, and where they are 0
+PULL = 1e-2  # weight of the mean over a subdomain, relative to that of the samples in it
+LEAST_MM, LEAST_GROUP_MM = 0.01, 0.25  # shorter displacements are dropped, and groups without any longer than this
+SHOWN = 0.5  # least share of a rule's group, such as a wrinkle, that the surfaces must reproduce to keep the group
 
 
 @dataclass(frozen=True)
 class Fields:
     """Displacements of a head's skin at ``points (m, 3)`` with unit ``normals (m, 3)``, mm.
 
-    values : (m, c), those of the groups ``names``, three columns each, and the share of the jaw's rotation.
+    values : (m, c), three columns for each of the groups ``names``, then one for the share of the jaw's rotation.
     """
 
     points: Floats
@@ -58,7 +58,7 @@ class Fields:
 
 
 def skin_fields(head: HeadData) -> Fields:
-    """The fields of all parts of a head that are seen as skin, at rest."""
+    """The displacement fields of all groups over the visible skin of a head at rest."""
     made = Head(head)
     skins = [p for p in head.parts if p.follows == "skin" and p.material == "skin" and p.name != "sockets"]
     names = tuple(dict.fromkeys(g.name for p in skins for g in p.groups))
@@ -74,7 +74,7 @@ def skin_fields(head: HeadData) -> Fields:
 
 
 def _dense(part: PartData, names: tuple[str, ...]) -> Floats:
-    """(n, 3 g + 1) displacements of all groups of some names, 0 for those that the part lacks, and the jaw's share."""
+    """(n, 3 g + 1) displacements by the g groups ``names``, 0 for groups that the part lacks, and the jaw's share."""
     out = np.zeros((len(part.points), 3 * len(names) + 1))
     place = {name: 3 * k for k, name in enumerate(names)}
     for group in part.groups:
@@ -85,9 +85,9 @@ def _dense(part: PartData, names: tuple[str, ...]) -> Floats:
 
 
 def with_expressions(head: HeadData, pieces: Sequence[Piece], other: HeadData) -> HeadData:
-    """The head with the groups, the rules and the jaw of another that has its form.
+    """The head with the groups, rules, jaw and neck of another head that has the same form.
 
-    pieces : those that ``head.parts`` are made of, in the same order.
+    pieces : the surfaces that ``head.parts`` were made from, in the same order.
     """
     fields = skin_fields(other)
     fitted = [
@@ -106,15 +106,19 @@ def with_expressions(head: HeadData, pieces: Sequence[Piece], other: HeadData) -
 
 @dataclass(frozen=True)
 class FittedFields:
-    """Values (n, c) of control points; squared sums (c,) of the field over the samples, and of what is left of it."""
+    """A least-squares fit of fields.
+
+    values : (n, c) of the control points. whole : (c,) sum of squares of the field over the samples.
+    residual : (c,) sum of squares of what the fit does not reproduce.
+    """
 
     values: Floats
     whole: Floats
-    left: Floats
+    residual: Floats
 
 
 def fit_fields(part: PartData, piece: Piece, fields: Fields) -> FittedFields:
-    """The values of a part's control points whose surface comes nearest to the fields at the piece's samples."""
+    """The least-squares fit of fields by a part's control points, at samples of the surface it was made from."""
     mesh, surface = replace(piece, chord=piece.chord / FINER).mesh, make_surface(part)
     sign = -1.0 if part.flip else 1.0
     points, su, sv = surface.derivatives(mesh.uv, side=mesh.side)
@@ -149,20 +153,20 @@ def solve_fields(basis: csr_matrix, weight: Floats, wanted: Floats) -> FittedFie
     pull = PULL * reach + 1e-9 * max(float(reach.max()), 1e-12)
     normal = (basis.T @ weighted + diags(pull)).tocsc()
     values = splu(normal).solve(weighted.T @ wanted + pull[:, None] * mean)
-    left = (weight[:, None] * (basis @ values - wanted) ** 2).sum(axis=0)
-    return FittedFields(values, (weight[:, None] * wanted**2).sum(axis=0), left)
+    residual = (weight[:, None] * (basis @ values - wanted) ** 2).sum(axis=0)
+    return FittedFields(values, (weight[:, None] * wanted**2).sum(axis=0), residual)
 
 
 def _shown(fields: Fields, fitted: Sequence[FittedFields]) -> set[str]:
-    """Names of the groups that the surfaces can show: all shapes, and of the others those that most remains of."""
-    whole, left = (sum(getattr(f, key) for f in fitted) for key in ("whole", "left"))
-    by_group = np.stack([np.asarray(rows)[:-1].reshape(-1, 3).sum(axis=1) for rows in (whole, left)])
+    """Names of the groups to keep: all shapes, and those other groups that the surfaces reproduce well enough."""
+    whole, residual = (sum(getattr(f, key) for f in fitted) for key in ("whole", "residual"))
+    by_group = np.stack([np.asarray(rows)[:-1].reshape(-1, 3).sum(axis=1) for rows in (whole, residual)])
     shown = by_group[1] < (1.0 - SHOWN) * by_group[0]
     return {name for name, good in zip(fields.names, shown, strict=True) if good or name in SHAPES}
 
 
 def _moved(part: PartData, values: Floats, names: tuple[str, ...], kept: set[str]) -> PartData:
-    """The part with groups and its share of the jaw."""
+    """The part with the fitted groups ``kept`` and its share of the jaw's rotation."""
     groups = list(part.groups)
     for k, name in enumerate(names):
         moves = values[:, 3 * k : 3 * k + 3]

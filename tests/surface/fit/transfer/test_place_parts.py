@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from small_head import small_head
 
-from surface.fit.transfer.places import place_eyes, place_jaw, place_neck, place_teeth, placing, scaled
+from surface.fit.transfer.place_parts import fit_scale_shift, place_eyes, place_jaw, place_neck, place_teeth, scaled
 from surface.head import Contact, HeadData
 from surface.head.posing.rig import jaw_path
 
@@ -31,18 +31,18 @@ def data(**other) -> HeadData:
 
 def test_a_placing_is_the_best_uniform_scale_and_shift() -> None:
     goals = enlarged(POINTS)
-    found = placing(POINTS, goals)
+    found = fit_scale_shift(POINTS, goals)
     assert found.scale == pytest.approx(SCALE)
     np.testing.assert_allclose(found.points(POINTS[:4]), goals[:4])
     weight = np.ones(50)
     weight[:5] = 0.0
     goals[:5] = 99.0
-    np.testing.assert_allclose(placing(POINTS, goals, weight).shift, SHIFT)
+    np.testing.assert_allclose(fit_scale_shift(POINTS, goals, weight).shift, SHIFT)
     noisy = goals + np.random.default_rng(1).normal(size=(50, 3))
-    best = placing(POINTS, noisy)
+    best = fit_scale_shift(POINTS, noisy)
     x = np.linalg.lstsq(np.column_stack([POINTS.ravel(), *(np.tile(e, 50) for e in np.eye(3))]), noisy.ravel())[0]
     np.testing.assert_allclose([best.scale, *best.shift], x)
-    alone = placing(np.zeros((1, 3)), np.ones((1, 3)))
+    alone = fit_scale_shift(np.zeros((1, 3)), np.ones((1, 3)))
     np.testing.assert_allclose(alone.points(np.zeros(3)), [1, 1, 1])
 
 

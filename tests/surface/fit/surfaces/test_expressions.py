@@ -10,7 +10,7 @@ from relief import named, relief
 from scipy.sparse import csr_matrix
 
 from surface.fit.surfaces import SurfaceOptions, head_of
-from surface.fit.surfaces.carried import skin_fields, solve_fields, with_expressions
+from surface.fit.surfaces.expressions import skin_fields, solve_fields, with_expressions
 from surface.fit.surfaces.pieces import make_pieces
 from surface.head import Group, HeadData, Jaw, Rule
 
@@ -70,4 +70,6 @@ def test_undetermined_points_follow_the_mean_over_their_subdomain() -> None:
     basis = csr_matrix(np.array([[0.5, 0.5, 0.0], [0.5, 0.5, 0.0], [0.0, 0.0, 0.0]]))
     found = solve_fields(basis, np.ones(3), np.array([[2.0], [2.0], [0.0]]))
     assert found.values[:2].ravel() == pytest.approx([2.0, 2.0])
-    assert abs(found.values[2, 0]) < 1e-6 and found.left[0] == pytest.approx(0.0, abs=1e-9) and found.whole[0] == 8.0
+    assert (
+        abs(found.values[2, 0]) < 1e-6 and found.residual[0] == pytest.approx(0.0, abs=1e-9) and found.whole[0] == 8.0
+    )

@@ -1,10 +1,10 @@
-"""Where a further servo would help a robot most: the place and direction on the skin that take up most of what is left.
+"""Suggest where a further servo would help a robot most: the point and the direction that reduce the error most.
 
-What a servo adds to the skin is its direction times the share that falls off around its point, as for anchors
-(:func:`controller.robot.anchors.servo_field`). The servos of the robot leave some displacement L of the skin in each of
-some faces. For one face, the best pull of a further servo follows by least squares; of all directions at a point, the
-best is the first eigenvector of the sum of v v^T over the faces, where v is the sum of L weighed by the shares. Every
-sampled point is tried.
+A servo moves the skin along its direction, by a share that falls off around its point, as for anchors
+(:func:`controller.robot.anchors.servo_field`). The residual of a face is the displacement of the skin that the robot's
+servos do not reach. For one face the best pull of a further servo is the least-squares one. Of all directions at a
+point the best is the first eigenvector of the sum of v v^T over the faces, where v is the sum of the residual weighted
+by the shares. Every sampled point of the skin is tried.
 """
 
 from __future__ import annotations
@@ -19,17 +19,18 @@ from controller.robot.anchors import AnchorSolver, falloff
 from surface.head.model.parameters import SHAPES
 
 REACH_MM = 15.0
-"""Reach of the servos that are tried, that of an anchor which names none."""
-_LEAST_MM = 0.05  # by which the skin it reaches must come closer
+"""Reach of the servos that are tried; anchors that name no reach have the same."""
+_LEAST_MM = 0.05  # least improvement (rms, within its reach) for a servo to be suggested
 
 
 @dataclass(frozen=True)
 class Suggestion:
     """A further servo.
 
-    point : (3,) mm. direction : (3,) of length 1. pull_mm : most it has to pull, either way. region : of the face.
-    before_mm, after_mm : what is left of the motion of the skin within its reach, rms over the faces.
-    skin_before_mm, skin_after_mm : the same of the whole skin.
+    point : (3,) mm. direction : (3,) unit vector. pull_mm : greatest pull that it needs, either way.
+    region : of the face.
+    before_mm, after_mm : residual of the skin within its reach, without and with it, rms over the faces.
+    skin_before_mm, skin_after_mm : the same for the whole skin.
     """
 
     point: Floats
@@ -42,11 +43,14 @@ class Suggestion:
     skin_after_mm: float
 
 
-def suggest(
+def suggest_servos(
     solver: AnchorSolver, faces: Mapping[str, Floats], parameters: Parameters, count: int = 2
 ) -> Iterator[Suggestion]:
-    """Further servos, the best first, each beside those before it, for faces (p,); none that would hardly help."""
-    left = np.array([solver.left_over(solver.shape_values(face)) for face in faces.values()])  # (f, m, 3)
+    """Up to ``count`` further servos for faces, each given by its parameters (p,).
+
+    The best comes first; each is found with those before it in place. Servos that would hardly help are left out.
+    """
+    left = np.array([solver.residual(solver.shape_values(face)) for face in faces.values()])  # (f, m, 3)
     shares = np.array(
         [falloff(solver.skin, at, jaw, REACH_MM) for at, jaw in zip(solver.skin.rest, solver.skin.jaw, strict=True)]
     )  # fmt: skip  (m, m)
@@ -67,7 +71,7 @@ def suggest(
 
 
 def _best(shares: Floats, left: Floats) -> tuple[int, Floats]:
-    """The point and the direction that take up most: the largest eigenvalue over the squares of the shares."""
+    """Number of the point, and direction (3,), that reduce the residuals ``left (f, m, 3)`` most."""
     weighed = np.einsum("jm,fmc->jfc", shares, left)
     matrices = np.einsum("jfc,jfd->jcd", weighed, weighed)
     values, vectors = np.linalg.eigh(matrices)
@@ -78,7 +82,7 @@ def _best(shares: Floats, left: Floats) -> tuple[int, Floats]:
 
 
 def _pulls(share: Floats, direction: Floats, left: Floats) -> Floats:
-    """(f,) mm: the pull that takes up most of what is left of each face."""
+    """(f,) mm, the least-squares pull for the residual of each face."""
     pulls: Floats = np.einsum("m,fmc,c->f", share, left, direction) / max(float((share**2).sum()), 1e-9)
     return pulls
 
@@ -88,13 +92,13 @@ def _rms(moves: Floats) -> float:
 
 
 def _regions(solver: AnchorSolver, parameters: Parameters) -> list[str]:
-    """The region of each point: of the shape that moves it most."""
+    """The region of each point: that of the shape that moves it most."""
     most = np.linalg.norm(solver.skin.moves.sum(axis=3), axis=1).argmax(axis=1)
     return [parameters.regions[parameters.index(SHAPES[s])] for s in most]
 
 
 def described(found: Suggestion) -> str:
-    """A suggestion in one line, with the keys of an anchor."""
+    """A suggestion in one line, in which point and direction are written as the keys of an anchor."""
     point, direction = ([round(float(x), digits) for x in each] for each, digits in
                         ((found.point, 1), (found.direction, 2)))  # fmt: skip
     return (
