@@ -11,6 +11,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from surface.base.files import open_file
+
 _LONGEST_STEM = 100
 """Characters of a file's name that the temporary name repeats, so that it is not longer than a name may be."""
 
@@ -50,7 +52,7 @@ def _copying_into(path: Path) -> Iterator[Path]:
         temporary = Path(folder) / f"content{path.suffix}"
         temporary.touch()
         yield temporary
-        with temporary.open("rb") as content, path.open("wb") as device:
+        with open_file(temporary) as content, path.open("wb") as device:
             shutil.copyfileobj(content, device)
 
 
