@@ -107,7 +107,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         plan.notes.extend(seated)
     sources = sources_of(mesh.names)
     rig = HeadRig(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
-    parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress)
+    parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress, comb=not loaded.exported)
     charts = {p.name: p.chart for p in fitted_parts}
     paint = make_paint(recipe.paint, charts, mesh)
     paint += paint_layers(mesh, plan.found, parts) if plan.found else []
@@ -146,9 +146,10 @@ def _repaired(loaded: Loaded) -> Loaded:
 
 
 def _fit_parts(
-    mesh: FitMesh, recipe: Recipe, plan: Plan, rig: HeadRig, progress: Progress
+    mesh: FitMesh, recipe: Recipe, plan: Plan, rig: HeadRig, progress: Progress, *, comb: bool = True
 ) -> tuple[list[PartData], list[PartReport], list[FittedPart]]:  # fmt: skip
-    """Every chart of the plan, teeth, hair and eyeballs; progress counts control points."""
+    """Every chart of the plan, teeth, hair and eyeballs; progress counts control points. comb : cut strips of lashes
+    into hairs where no texture draws these; an exported head has them, or has none."""
     parts: list[PartData] = []
     reports, fitted_parts = [], []
     ends = np.cumsum([0, *(p.request.points for p, _ in plan.parts)]) / max(
@@ -169,7 +170,7 @@ def _fit_parts(
             plan.notes.append(f"{part.name}: left out: it cannot be fitted, {report.neutral.rms:.1f} mm RMS")
             continue
         parts.append(skin_part(part, chart, fitted, rig))
-        if part.material == "lash" and not recipe.parts and rig.radius > 0:
+        if comb and part.material == "lash" and not recipe.parts and rig.radius > 0:
             parts[-1] = combed(parts[-1], mesh, islands, rig.eyes, scale)
         reports.append(report)
         fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))

@@ -17,7 +17,7 @@ from surface.fit.source.naming.expressions import with_expressions
 from surface.fit.source.naming.namenotes import name_notes
 from surface.fit.source.naming.shapes import empty_shapes, share_of
 from surface.fit.source.placing.anatomy import Eyes, Landmarks
-from surface.fit.source.placing.conventions import convention_of
+from surface.fit.source.placing.conventions import convention_of, is_export
 from surface.fit.source.placing.frame import Frame, find_frame
 from surface.fit.source.placing.orient import shapes_of_sides
 from surface.fit.source.textures import tinted
@@ -53,7 +53,7 @@ class Loaded:
     """A mesh in head space, which of its shapes make ARKit's, and what was guessed.
 
     placement : from the file's coordinates; marks : landmarks in head space.
-    pieces : the file's objects and what kind each is.
+    pieces : the file's objects and what kind each is. exported : omote wrote the file, with outlines as they are drawn.
     """
 
     mesh: FitMesh
@@ -62,6 +62,7 @@ class Loaded:
     placement: Placement = field(default_factory=Placement)
     marks: Landmarks = field(default_factory=Landmarks)
     pieces: dict[str, str] = field(default_factory=dict)
+    exported: bool = False
 
 
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
@@ -88,7 +89,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     )  # fmt: skip
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
     every = (*frame.notes, *notes, *name_notes(mesh.names, named, other))
-    return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces)
+    return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces, is_export(path))
 
 
 def _shapes(mesh: FitMesh, named: NameMap) -> dict[str, Floats]:

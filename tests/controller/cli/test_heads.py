@@ -17,7 +17,7 @@ from controller.base.parameters import PARAMETERS
 from controller.cli.app import make_app
 from controller.cli.console import console
 from surface.base.errors import ExportError, FitError, HeadFileError, ViewError
-from surface.fit.points.report import DenseErrors, Spot
+from surface.fit.points.report import DenseErrors, Errors, Spot
 from surface.fit.source.load import LoadOptions
 from surface.head.model.file import save_data
 from tests.surface.small_head import part, small_head
@@ -109,7 +109,7 @@ class Terminal(io.StringIO):
 @pytest.fixture
 def fitted(monkeypatch):
     """Calls of the fit, in place of fitting: what it was given, and a report that a test may change."""
-    neutral = SimpleNamespace(rms=0.1234, p99=0.5678, max=1.2345)
+    neutral = Errors(rms=0.1234, p99=0.5678, max=1.2345)
     part = SimpleNamespace(name="face", points=77, neutral=neutral, mean_shape_rms=0.0456)
     report = SimpleNamespace(name="me", points=123, parameters=["a", "b"], parts=[part], missing=[], left_out=[],
                              notes=["a note [x]"], dense=None, pieces={}, faults=())  # fmt: skip

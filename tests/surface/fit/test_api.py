@@ -11,14 +11,18 @@ from surface.base.errors import FitError
 from surface.fit import api, fit_head
 from surface.fit.api import eyes_of, fit_mesh, part_chart, prepare, recipe_plan
 from surface.fit.eyes.lids import gazes_of
+from surface.fit.features.generic import Plan
+from surface.fit.features.pieces import HeadRig
 from surface.fit.points.recipe import PartRecipe, Recipe
 from surface.fit.points.refine import FitRequest
 from surface.fit.points.report import FitResult
 from surface.fit.points.strength import Strength
+from surface.fit.source.islands import find_islands
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names
 from surface.head import Head
+from surface.head.model.data import Jaw
 
 
 @pytest.fixture(scope="module")
@@ -199,3 +203,25 @@ def test_a_part_that_cannot_be_fitted_is_left_out_by_name_and_the_face_never_is(
         assert [part.name for part in result.report.parts] == parts
         assert [p.name for p in result.head.parts if p.follows == "skin"] == parts
         assert any("brow_1: left out: it cannot be fitted" in note for note in result.report.notes) == (most == 0.0)
+
+
+@pytest.mark.parametrize("exported", [False, True])
+def test_lashes_of_an_exported_head_are_not_cut_into_hairs_again(monkeypatch, exported):
+    """A solid lash of a drawn character stays solid when its head is exported and fitted again."""
+    mesh, cut, combs = slit_sheet(), [], []
+    plan = Plan(
+        [(replace(part("lash_1", []), material="lash"), find_islands(mesh))], (np.zeros((2, 3)), 12.0), np.zeros(3), []
+    )
+    rig = HeadRig({}, Jaw((0.0, 0.0, 0.0), 0.0, (0.0, 0.0, 0.0)), np.array([[0.0, 0, 20], [9, 0, 20]]), 12.0)
+    monkeypatch.setattr(api, "combed", lambda own, *_: cut.append(own.name) or own)
+
+    def fit_parts(*arguments, comb):
+        combs.append(comb)
+        raise RuntimeError("far enough")
+
+    api._fit_parts(mesh, Recipe([]), plan, rig, lambda *_: None, comb=not exported)
+    assert cut == ([] if exported else ["lash_1"])
+    monkeypatch.setattr(api, "_fit_parts", fit_parts)
+    with pytest.raises(RuntimeError, match="far enough"):
+        fit_mesh(Loaded(mesh, map_names(mesh.names), exported=exported), "me", lambda *_: None)
+    assert combs == [not exported]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from surface.readers.gltf import Gltf
 from surface.readers.meshdata import read_bytes
 
-OMOTE_OBJ = "written by omote; millimetres, y up, z forward"  # in the first line of OBJ files that omote exports
+WRITTEN = "written by omote"  # in the first line of OBJ files that omote exports
+OMOTE_OBJ = f"{WRITTEN}; millimetres, y up, z forward"  # in that of those in the head's own frame
 
 
 @dataclass(frozen=True)
@@ -36,10 +38,22 @@ def convention_of(path: Path) -> Convention:
     return Convention()
 
 
+def is_export(path: Path) -> bool:
+    """Whether omote exported a mesh file. Raises FitError: a glTF file is damaged."""
+    kind = path.suffix.lower()
+    if kind in (".glb", ".gltf"):
+        return _is_own(Gltf(path).document.get("asset"))
+    return kind == ".obj" and path.is_file() and WRITTEN in _first_line(path)
+
+
+def _is_own(asset: Any) -> bool:
+    return isinstance(asset, dict) and asset.get("generator") == "omote"
+
+
 def _gltf(path: Path) -> Convention:
     document = Gltf(path).document
     asset, extensions = document.get("asset"), document.get("extensions")
-    if isinstance(asset, dict) and asset.get("generator") == "omote" and isinstance(asset.get("extras"), dict):
+    if isinstance(asset, dict) and _is_own(asset) and isinstance(asset.get("extras"), dict):
         frame = asset["extras"].get("frame")
         if frame == "file":  # exported in the frame of another file, of which glTF's definition may be untrue
             return Convention()
