@@ -127,14 +127,27 @@ class PointEditor:
         if away[point] > _PICK_PIXELS:
             return False
         self._last = point
+        if sculpt:
+            self._take_skin(model, point, pixel, screen, values, tied, falloff_mm)
+            return True
         offset = places[point] - screen.place(pixel, places[point])
-        self._held = SculptDrag(
-            model, point, places[point], offset, self._heavy, falloff_mm, tied=tied
-        ) if sculpt else _PointDrag(
+        self._held = _PointDrag(
             model, point, places[point], offset, self._parameters, values, model.shown(values, self._moves), self._pins,
             tied=tied,
         )  # fmt: skip
         return True
+
+    def _take_skin(
+        self, model: _Model, point: int, pixel: tuple[float, float], screen: Screen, values: Floats, tied: bool,
+        falloff_mm: float | None,
+    ) -> None:  # fmt: skip
+        """Take the very place of the skin under a pixel; beside its edge, the sampled point."""
+        uv = model.under(np.array([pixel]), screen, values, self._moves)
+        if not np.isfinite(uv).all():
+            uv = model.skin.uv[point : point + 1]
+        place = model.places_of(uv, values, self._moves)[0]
+        offset = place - screen.place(pixel, place)
+        self._held = SculptDrag(model, uv, place, offset, self._heavy, falloff_mm, tied=tied)
 
     def take_light(
         self, pixel: tuple[float, float], screen: Screen, values: Floats, *, tied: bool = False
@@ -183,7 +196,7 @@ class PointEditor:
         reach_mm : how far from its middle it moves the skin.
         """
         model = self._model
-        uv = np.zeros((0, 2)) if model is None else model.under(np.array([pixel]), screen, values)
+        uv = np.zeros((0, 2)) if model is None else model.under(np.array([pixel]), screen, values, self._moves)
         if model is None or not np.isfinite(uv).all():
             return None
         at = [uv, *([mirrored(model.surface, uv, *model.mesh_rest)] if tied and self._aside(model, uv) else [])]
@@ -201,7 +214,7 @@ class PointEditor:
         model = self._model
         if model is None:
             return None
-        line = even_line(model.surface, model.under(np.array(pixels), screen, values), width_mm)
+        line = even_line(model.surface, model.under(np.array(pixels), screen, values, self._moves), width_mm)
         if not len(line):
             return None
         other = tied and self._aside(model, line)

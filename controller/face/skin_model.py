@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -23,6 +24,9 @@ from surface.head.model.light import LightPoints, join_light, with_points
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import NAMES, read_pose, rotation
 from surface.view.scene.camera import Camera
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix  # start-up: only dragging needs it
 
 PART = "face"
 _POINTS = 900  # among the mesh's vertices, which lie close where the face has features
@@ -77,6 +81,7 @@ class SkinModel:
         self.lips = lip_pairs(head, PART)
         self.pivot = np.array(head.data.neck.pivot)
         self._own = part.rig.own  # type: ignore[attr-defined]
+        self._mesh_basis: csr_matrix | None = None  # of all vertices: made where moved control points are drawn on
 
     def shown(self, values: Floats, moves: Floats) -> Floats:
         """(m, 3) mm that control points moved by hand, ``moves`` (n, 3), and a user's own groups add to a face (P,)."""
@@ -94,7 +99,7 @@ class SkinModel:
         found = copy(self)
         found.data = with_points(self.data, join_light(light)[PART])
         found.surface, found.jaw = make_surface(found.data), np.asarray(found.data.jaw, np.float64)
-        found.basis = found.surface.basis_matrix(self.skin.uv)
+        found.basis, found._mesh_basis = found.surface.basis_matrix(self.skin.uv), None
         return found
 
     @property
@@ -122,13 +127,17 @@ class SkinModel:
         places = part.surface.basis_matrix(uv) @ points + self.surface.basis_matrix(uv) @ moves
         return self.turned(np.asarray(places), values)[0]
 
-    def under(self, pixels: Floats, screen: Screen, values: Floats) -> Floats:
-        """(k, 2) which places lie under pixels (k, 2) in the picture of a face (P,); NaN for none."""
+    def under(self, pixels: Floats, screen: Screen, values: Floats, moves: Floats) -> Floats:
+        """(k, 2) which places lie under pixels (k, 2) in the picture of a face (P,) whose control points were moved by
+        hand, ``moves`` (n, 3); NaN for none."""
         self._head.pose(self._of_head(values))
-        part = self._head.part(PART)
-        count = len(part.mesh.uv)
-        own = part.mesh.triangles
-        return uv_under(pixels, screen.project(part.vertices[:count].astype(np.float64)), own, part.mesh.uv)
+        mesh, part = self._head.part(PART).mesh, self._head.part(PART)
+        places = part.vertices[: len(mesh.uv)].astype(np.float64)
+        if moves.any():
+            if self._mesh_basis is None:
+                self._mesh_basis = self.surface.basis_matrix(mesh.uv)
+            places += np.asarray(self._mesh_basis @ moves) @ turn_of(values[self.order]).T
+        return uv_under(pixels, screen.project(places), mesh.triangles, mesh.uv)
 
     def _of_head(self, values: Floats) -> Floats:
         return values[self._all]

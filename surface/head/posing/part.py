@@ -135,6 +135,7 @@ class SkinPart(HeadPart):
         super().__init__(data, mesh, surface, attributes)
         self.rig, self._version = SkinRig(data, head, drivers), 0
         self.deformation = Deformation(surface, mesh)
+        self._at_rest = self.rig.invalidations
         self._straight = True  # does the deformation write to the part's own arrays?
         self.deformation.write_to(self.vertices, self.normals)
         self._share[:] = head.neck.share(self.vertices.astype(np.float64))
@@ -154,11 +155,19 @@ class SkinPart(HeadPart):
         if self._version != self.rig.version:
             self._version = self.rig.version
             self.deformation.set_points(points)
+            self._forget_rounding()
             ranges = self.deformation.changed
         self.changed = [(0, len(self._share))] if turned else ranges
         if not turn.none:
             for rows in self.changed:
                 turn.rotate(self.deformation, self._share, rows, self.vertices, self.normals)
+
+    def _forget_rounding(self) -> None:
+        """Sum anew where the points at rest have changed, so that who puts them back gets the very same vertices: their
+        differences, added one after the other, leave some rounding."""
+        if self._at_rest != self.rig.invalidations:
+            self._at_rest = self.rig.invalidations
+            self.deformation.refresh()
 
     def append(self, like: Ints, triangles: NDArray[np.int32]) -> None:
         super().append(like, triangles)
