@@ -29,7 +29,8 @@ function stop() {
   if (!robot.stop()) note("Not connected: the robot is stopped as soon as it is heard", 10);
 }
 
-$("stop").addEventListener("click", stop);
+$("stop").addEventListener("pointerdown", stop);  // pressing is enough, as with the button of a machine
+$("stop").addEventListener("click", stop);  // keys and screen readers
 $("start").addEventListener("click", () => { robot.stopping = false; robot.act({ type: "start" }); });
 $("neutral").addEventListener("click", () => { mood.place(0, 0); robot.act({ type: "neutral" }); });
 $("release").addEventListener("click", () => robot.act({ type: "release" }));
