@@ -55,6 +55,18 @@ def desktop_scale() -> float:
         return 1.0
 
 
+def opened_size(size: tuple[float, float], desktop: float) -> tuple[float, float]:
+    """The size of a window that was asked for in ``size`` points: the runner makes it larger by the desktop's factor,
+    but no larger than the monitor."""
+    try:
+        import glfw  # optional, and after imgui_bundle, whose library it then uses
+
+        monitor = glfw.get_video_mode(glfw.get_primary_monitor()).size if desktop > 1.0 else size
+    except Exception:  # noqa: BLE001  no GLFW, or no monitor: as large as it was asked for
+        monitor = size
+    return min(size[0] * desktop, max(monitor[0], 1)), min(size[1] * desktop, max(monitor[1], 1))
+
+
 def _nearest(glfw: Any, window: tuple[int, int, int, int]) -> Any:
     """The monitor that holds most of a window."""
     left, top, width, height = window

@@ -20,7 +20,7 @@ from surface.view.draw.alternating import Alternating
 from surface.view.draw.placing import Box, Placing
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import read_pixels
-from surface.view.fullscreen import desktop_scale, glfw_window
+from surface.view.fullscreen import desktop_scale, glfw_window, opened_size
 from surface.view.live import LiveDrawing
 from surface.view.scene.camera import Camera
 from surface.view.scene.choice import LEVELS, QualityChoice
@@ -105,7 +105,8 @@ def run_window(
     if docks and not kiosk:
         safe = [replace(dock, draw=window.as_callback(dock.draw)) for dock in docks]
         desktop = desktop_scale()
-        add_docks(hello_imgui, params, safe, size, LINE * desktop * text_scale(size, desktop, safe))
+        opened = opened_size(size, desktop)
+        add_docks(hello_imgui, params, safe, opened, LINE * desktop * text_scale(opened, desktop, safe))
         window.docks = safe
     if kiosk:
         geometry = params.app_window_params.window_geometry

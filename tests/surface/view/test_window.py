@@ -418,10 +418,10 @@ print(json.dumps(told))
 def test_text_and_panels_are_twice_as_large_on_a_desktop_at_200_percent() -> None:
     here = Path(__file__).parents[1]
 
-    def told(dpi: int, size: tuple[int, int] = (1600, 900)) -> list[float]:
+    def told(dpi: int, size: tuple[int, int] = (800, 450), screen: str = "1600x1200") -> list[float]:
         program = SCALED.format(root=str(here.parents[1]), here=str(here), dpi=dpi, size=size)
-        screen = "-screen 0 1600x1200x24 -noreset"  # else what xrdb has set is lost with it
-        command = ["xvfb-run", "-a", "-s", screen, sys.executable, "-c", program]
+        server = f"-screen 0 {screen}x24 -noreset"  # else what xrdb has set is lost with it
+        command = ["xvfb-run", "-a", "-s", server, sys.executable, "-c", program]
         environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
         assert done.returncode == 0, done.stderr
@@ -431,5 +431,5 @@ def test_text_and_panels_are_twice_as_large_on_a_desktop_at_200_percent() -> Non
     plain, doubled = told(96), told(192)
     assert doubled[0] == pytest.approx(2 * plain[0], rel=0.02)
     assert doubled[1] == pytest.approx(2 * plain[1], rel=0.02)
-    small = told(192, (800, 600))  # twice the text has no room here: it is as large as the panel holds its titles with
+    small = told(192, (800, 600), "800x600")  # no room for twice the window, nor for twice the text in the panel
     assert 1.3 * plain[0] < small[0] < doubled[0] and small[1] > 22.0 * small[0]
