@@ -333,7 +333,7 @@ def test_all_find_each_other_again_when_the_router_comes_back(tmp_path: Path) ->
     with ExitStack() as stack:
         hub = stack.enter_context(ExitStack())
         endpoint = hub.enter_context(router())
-        first = stack.enter_context(Running(endpoint, "conductor", **more))
+        first = stack.enter_context(Running(endpoint, "conductor", heads=("maple", *MANY), **more))
         heads = [stack.enter_context(Running(endpoint, role, seed=5, heads=names, **more))
                  for role, names in (("head", ("maple",)), ("face", MANY))]  # fmt: skip
         second = stack.enter_context(Running(endpoint, "conductor", seed=9, heads=("maple", *MANY), **more))
