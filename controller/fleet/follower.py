@@ -85,6 +85,13 @@ class Follower:
             return None
         return self.header.time_ns + self._delay_ns - self.offset_ns
 
+    def shows_theirs(self, now_s: float) -> bool:
+        """Whether exactly a conductor's faces are shown, and will be at a tick before ``now_s``."""
+        return self.conducted and self.exact and not self._is_lost(now_s)
+
+    def _is_lost(self, now_s: float) -> bool:
+        return now_s - self._heard_s > self._patience_s
+
     def lead(self, token: Token) -> None:
         """Conduct by oneself: nobody with a lower token is followed from now on."""
         with self._lock:
@@ -104,7 +111,7 @@ class Follower:
         if newest is not None:
             self._heard_s = now_s
             self._turn_to(*newest)
-        elif self.conducted and (leads or now_s - self._heard_s > self._patience_s):
+        elif self.conducted and (leads or self._is_lost(now_s)):
             self.conducted = False
             self._pass_to(own)
         elif not self._begun:

@@ -65,6 +65,7 @@ class Node:
         delay_ns = 0 if self.conducts else round(settings.delay_ms * 1e6)
         self.followers = {name: Follower(parameters, 2.0 * lease_s, delay_ns) for name in heads}
         self._rests = {name: i for i, name in enumerate(heads)}  # those who stand by take turns
+        self._resting = dict.fromkeys(heads, False)
         self._recordings = {}
         if settings.role == "recorder":
             self._recordings = {name: Recording(beside.parent, settings.record, name, parameters) for name in heads}
@@ -93,7 +94,8 @@ class Node:
         follower = self.followers[head]
         conducting = self._conducting if self._conducting is not None and self._conducting.tick(now_ns) else None
         if conducting is not None:
-            follower.lead(self.lease.token)
+            if not self._resting[head]:  # else it goes over to its own layers at the next tick, when they are mixed
+                follower.lead(self.lease.token)
         else:
             follower.offset_ns = self._clocks.offset_ns(follower.highest.holder)
         theirs = follower.step(now_ns, step_s, values.copy(), values)
@@ -110,10 +112,11 @@ class Node:
         """Whether a head's own layers are not needed at this tick: it shows exactly what a conductor sends. One that
         stands by keeps them up to date at every fifth tick, to go on from there. Called once a tick."""
         follower = self.followers[head]
-        if not (follower.conducted and follower.exact):
-            return False
-        self._rests[head] += 1
-        return not self.conducts or self._rests[head] % _STANDBY_TICKS != 0
+        self._resting[head] = follower.shows_theirs(time.monotonic()) and not self.lease.active
+        if self._resting[head] and self.conducts:
+            self._rests[head] += 1
+            self._resting[head] = self._rests[head] % _STANDBY_TICKS != 0
+        return self._resting[head]
 
     def close(self) -> None:
         """Leave the others: a conductor's lease ends by itself."""

@@ -107,10 +107,14 @@ class Running:
                 self.rows[name].append(values)
                 self.exact[name].append(follower.exact and follower.conducted)  # not who shows exactly its own life
 
+    def stop(self) -> None:
+        """Tick no more."""
+        self._stopping.set()
+        self._thread.join()
+
     def __enter__(self) -> Running:
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._stopping.set()
-        self._thread.join()
+        self.stop()
         self.node.close()

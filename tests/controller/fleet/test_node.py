@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -171,7 +171,8 @@ def test_a_conductor_that_dies_or_is_stopped_is_replaced_and_nobody_obeys_it_aga
         with Running(hub, "conductor", seed=9, **more) as second, Running(hub, "head", seed=5, **more) as head:
             until(joined(head))
             until(lambda: JAW in second.states["maple"].held())
-            assert not second.node.lease.active  # it stands by, and knows what was commanded before it came
+            if second.node.lease.active:  # else it stands by, and knows what was commanded before it came
+                first, second = second, first
             first.states["maple"].expression("anger", 1.0, None, time.monotonic_ns())
             until(lambda: second.states["maple"].status()["expression"] == "anger")
             begin, stopped = len(head.rows["maple"]), time.monotonic()
@@ -188,6 +189,32 @@ def test_a_conductor_that_dies_or_is_stopped_is_replaced_and_nobody_obeys_it_aga
                 head
             )  # of one tick; none is a jump, ticks of a busy machine differ
             assert head.rows["maple"][-1][JAW] > 0.6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("role", ["head", "conductor"])
+def test_own_layers_are_mixed_before_a_head_goes_over_to_them(hub: str, tmp_path: Path, role: str) -> None:
+    """Also where the tick at which the conductor is missed is so long that it would have gone over within it."""
+    more = {"folder": tmp_path, "prefix": f"over{role}", "lease_ms": 1000.0}
+    with Running(hub, "conductor", **more) as first:
+        first.states["maple"].set_parameters([JAW], [0.9], time.monotonic_ns())
+        with Running(hub, role, seed=9, **more) as other:
+            until(lambda: other.node.followers["maple"].conducted and other.rows["maple"][-1][JAW] > 0.85)
+            other.stop()
+            first.stop()
+            node, state, follower = other.node, other.states["maple"], other.node.followers["maple"]
+            state.neutral(0.1, time.monotonic_ns())
+            values, shown = other.rows["maple"][-1].copy(), list[np.ndarray]()
+            for step_s in (*[0.01] * 60, *[2.5] * (role == "head"), *[0.02] * 100):
+                time.sleep(step_s)
+                now = time.monotonic_ns()
+                if not node.rests("maple"):
+                    state.tick(now, step_s, values)
+                node.relay("maple", now, step_s, values, 0)
+                shown.append(values.copy())
+            assert not follower.conducted and follower.exact
+    within = np.abs(np.diff(np.array(shown)[60:], axis=0))[:, JAW] / 0.02
+    assert within.max() < P.max_speed[JAW] * 1.01
 
 
 def test_one_that_stands_by_asks_what_was_commanded_until_it_is_answered(hub: str, tmp_path: Path) -> None:
@@ -266,9 +293,9 @@ class Far:
         now = time.monotonic_ns() + self._ahead_ns
         query.reply(query.key_expr, json.dumps([now, now, self._token.holder]))
 
-    def conduct(self, seconds: float) -> None:
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
+    def conduct_until(self, condition: Callable[[], bool]) -> None:
+        end = time.monotonic() + 60.0
+        while time.monotonic() < end and not condition():
             self.sequence += 1
             values, now = P.neutral(), time.monotonic_ns()
             values[JAW] = 0.3 + 1e-4 * self.sequence + 1e-6 * self._token.fence
@@ -289,13 +316,15 @@ def test_heads_follow_conductors_on_machines_whose_clocks_have_nothing_in_common
         for fence, ahead_ns in ((1, day_ns), (2, -day_ns), (3, 7 * day_ns)):
             far = Far(session, "clocks", Token(fence, fence), ahead_ns)
             begin = len(head.rows["maple"])
-            far.conduct(3.0)
+            far.conduct_until(lambda begin=begin: sum(head.exact["maple"][begin:]) > 100)  # type: ignore[misc]
             exact = [(at, row) for at, row, own in zip(head.times[begin:], head.rows["maple"][begin:],
                      head.exact["maple"][begin:], strict=False) if own and row.tobytes() in far.sent_ns]  # fmt: skip
             far.close()
             waits = [1e-6 * (at - far.sent_ns[row.tobytes()]) for at, row in exact]
-            assert len(waits) > 50 and delay_ms - 1.0 < np.percentile(waits, 20) < delay_ms + 30.0, waits[:5]
-            assert abs(head.node.report()["clock_offset_ms"] * 1e6 - ahead_ns) < 50e6
+            assert len(waits) > 50
+            off_ms = 1e3 * slowest(head)
+            assert delay_ms - 1.0 - off_ms < np.percentile(waits, 20) < delay_ms + 20.0 + off_ms, waits[:5]
+            assert abs(head.node.report()["clock_offset_ms"] * 1e6 - ahead_ns) < 1e6 * (20.0 + off_ms)
 
 
 @pytest.mark.slow
@@ -304,7 +333,7 @@ def test_all_find_each_other_again_when_the_router_comes_back(tmp_path: Path) ->
     with ExitStack() as stack:
         hub = stack.enter_context(ExitStack())
         endpoint = hub.enter_context(router())
-        first = stack.enter_context(Running(endpoint, "conductor", **more))
+        first = stack.enter_context(Running(endpoint, "conductor", heads=("maple", *MANY), **more))
         heads = [stack.enter_context(Running(endpoint, role, seed=5, heads=names, **more))
                  for role, names in (("head", ("maple",)), ("face", MANY))]  # fmt: skip
         second = stack.enter_context(Running(endpoint, "conductor", seed=9, heads=("maple", *MANY), **more))
@@ -318,7 +347,9 @@ def test_all_find_each_other_again_when_the_router_comes_back(tmp_path: Path) ->
         with router(endpoint=endpoint):
             back = time.monotonic()
             until(lambda: all(f.conducted and f.highest >= before for f in followers))
-            assert time.monotonic() - back < 3.0  # 0.5 s where nothing else runs
+            assert time.monotonic() - back < 3.0 + 10.0 * slowest(
+                first, second, *heads
+            )  # 0.5 s where nothing else runs
             until(joined(*heads))
             until(lambda: [first.node.lease.active, second.node.lease.active].count(True) == 1)
             until(lambda: len({follower.highest for follower in followers}) == 1)

@@ -112,7 +112,7 @@ def test_each_half_of_a_cut_network_has_a_conductor_and_one_is_left_when_it_is_w
             before = max(near.obeys, far.obeys)
             cable.cut()
             until(lambda: near.obeys.holder == first.holder and far.obeys.holder == other.holder)  # each its own half's
-            assert first.active and other.active and near.obeys != far.obeys
+            until(lambda: first.active and other.active and near.obeys != far.obeys)
             until(joined(near.head, far.head))
             assert max(near.obeys, far.obeys) > before
             cable.mend()

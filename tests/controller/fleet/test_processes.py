@@ -129,7 +129,7 @@ def test_a_stopped_conductor_is_replaced_and_does_not_come_back_while_servos_go_
     assert reports["first"]["buses"] == []  # who conducts drives no servos
     heads = reports["head"]["zenoh"]["heads"]  # type: ignore[index]
     assert list(heads) == ["maple"] and heads["maple"]["taken"] > 100
-    terms = reports["second"]["zenoh"]["terms"]  # type: ignore[index]
-    assert terms >= 1
-    if terms == 1:  # a pause of a busy machine can cost the second its lease, too
-        assert reports["first"]["zenoh"]["lost"] >= 1 and not reports["first"]["zenoh"]["conducting"]  # type: ignore[index]
+    one, two = (reports[name]["zenoh"] for name in ("first", "second"))
+    assert two["terms"] >= 1  # type: ignore[index]
+    if (two["terms"], two["lost"]) == (1, 0):  # type: ignore[index]  # a busy machine can cost the second its lease, too
+        assert one["lost"] >= 1 and not one["conducting"]  # type: ignore[index]
