@@ -10,7 +10,7 @@ from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import config_dir
 from controller.face.still import Still
-from controller.stage.persons import linear, mixed_identity, mixed_look, parse_person, read_persons
+from controller.stage.persons import PersonSettings, linear, mixed_identity, mixed_look, parse_person, read_persons
 from controller.stage.stage import load_stage
 from controller.tools.check import check_anything
 
@@ -87,3 +87,9 @@ def test_faults_are_told(tmp_path: Path, text: str, fault: str) -> None:
 def test_nobody_of_that_name() -> None:
     with pytest.raises(ConfigError, match="no person 'mapel', did you mean 'maple'"):
         Still.parse([], [], look={"person": "mapel"})
+
+
+def test_a_person_of_whom_nothing_is_said_has_a_usual_skin_and_wears_nothing() -> None:
+    look = PersonSettings(name="anybody").look()
+    assert (look.melanin, look.blood, look.redness, look.freckles, look.age) == (0.2, 0.0, 1.0, 0.0, 0.0)
+    assert (look.lips, look.iris, look.brow, look.brow_strength, look.worn) == (None, None, None, 1.0, ())

@@ -7,16 +7,19 @@ import socket
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import FrozenInstanceError
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 import serial
 from typer.testing import CliRunner
 
 from controller.base.errors import ConfigError
+from controller.tools import simulate
 from controller.tools.simulate import Serving, robot_bus
 from controller.tools.traffic_files import read_traffic
 
@@ -172,3 +175,36 @@ def test_faults_come_by_time_and_traffic_is_recorded_and_served_again(tmp_path: 
     with served("record", str(record), "--link", str(link)), serial.Serial(str(link), 1_000_000, timeout=10) as port:
         port.write(ping)
         assert port.read(14) == answer
+
+
+def test_a_watched_bus_is_drawn_while_it_is_served_and_no_longer(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[object] = []
+
+    class View:
+        """Draws until it is told to end."""
+
+        def __init__(self, title: str, rows: Any, decoder: Any, console: Any) -> None:
+            self.tap = "its tap"
+            seen.append(title)
+
+        def run(self, goes_on: Callable[[], bool]) -> None:
+            end_s = time.monotonic() + 10.0
+            seen.append(goes_on())
+            while goes_on() and time.monotonic() < end_s:
+                time.sleep(0.01)
+            seen.append(time.monotonic() < end_s)
+
+    def serve(line: Any, link: Any, ready: Any, *, on_server: Callable[[Any], None], **options: Any) -> None:
+        server = SimpleNamespace(port=SimpleNamespace(path="/dev/pts/9"), line=line, tap=None)
+        on_server(server)
+        end_s = time.monotonic() + 10.0
+        while len(seen) < 2 and time.monotonic() < end_s:
+            time.sleep(0.01)
+        seen.append("served")
+
+    monkeypatch.setattr(simulate, "BusView", View)
+    monkeypatch.setattr(simulate, "serve", serve)
+    line: Any = SimpleNamespace(faults=SimpleNamespace(add=lambda faults, now_s: None))
+    wire: Any = SimpleNamespace(baud=1_000_000)
+    simulate._serve(line, wire, Serving(watch=True), None, None)  # type: ignore[arg-type]
+    assert seen == ["simulated bus on /dev/pts/9", True, "served", True]

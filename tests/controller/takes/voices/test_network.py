@@ -111,6 +111,11 @@ def test_tones_keep_their_pitch_and_those_too_high_vanish(rate: int, wanted: int
         ({"names": "a,b"}, "none of its names is a parameter"),
         ({"sample_rate": "fast"}, "sample_rate = 'fast', which is not 4000 to 192000"),
         ({"fps": "0"}, "fps = '0', which is not 1 to 240"),
+        ({"fps": "0.9"}, "which is not 1 to 240"),
+        ({"fps": "240.1"}, "which is not 1 to 240"),
+        ({"sample_rate": "3999"}, "which is not 4000 to 192000"),
+        ({"sample_rate": "192001"}, "which is not 4000 to 192000"),
+        ({"fps": 99 * "x"}, f"fps = '{40 * 'x'}', which is not"),
     ],
 )
 def test_a_network_of_another_sort_is_told(tmp_path: Path, said: dict[str, str], told: str) -> None:

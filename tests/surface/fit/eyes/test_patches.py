@@ -172,7 +172,7 @@ def test_an_eye_is_told_by_how_it_turns_where_two_shapes_or_more_turn_it(looks: 
     beside = CENTRES + np.array([0.0, 15.0, 0.0])
     eyes = [looking(m, c, n[3:]) for (n, m), c in zip(pair(lambda c: shell(c, 7.0, reach=1.2)), CENTRES, strict=True)]
     still = [(f"Still{k}", shell(c, 7.0, reach=1.2)) for k, c in enumerate(beside)]
-    made = joined([("Head", face()), *("EyeLeft", eyes[0]), ("EyeRight", eyes[1]), *still])
+    made = joined([("Head", face()), ("EyeLeft", eyes[0]), ("EyeRight", eyes[1]), *still])
     unknown = re.compile(f"eyeLook({'|'.join(('Up', 'Down', 'In', 'Out')[looks:])})(Left|Right)$")
     mesh = replace(made, names=tuple(unknown.sub(r"other\1\2", n) if looks < 4 else n for n in made.names))
     sides = shaped_sides(mesh, skin(mesh), beside + np.array([0.0, 0.0, 7.0]))

@@ -9,7 +9,7 @@ from small_head import small_head
 
 from surface.base.errors import FitError
 from surface.fit.points.report import Errors, FitReport, PartReport
-from surface.fit.transfer import api
+from surface.fit.transfer import api, refused
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.faults import faults_of_transfer, turned_over
 from surface.head import Head
@@ -63,6 +63,13 @@ def test_what_is_turned_over_is_measured_against_the_head_it_was_made_from(sourc
     assert turned_over(whole, source) == pytest.approx(AREA, rel=0.15)
     (fault,) = faults_of_transfer(errors(0.5), 0.9, whole, source)
     assert "mm² of the face are inside out at rest" in fault
+
+
+def test_triangles_without_area_are_turned_nowhere() -> None:
+    part = SimpleNamespace(triangles=np.array([[0, 1, 2], [0, 1, 1], [0, 2, 1]]))
+    normals, area = refused._normals(part, np.array([[0.0, 0, 0], [3, 0, 0], [0, 4, 0]]))  # type: ignore[arg-type]
+    np.testing.assert_allclose(normals, [[0, 0, 1], [0, 0, 0], [0, 0, -1]])
+    np.testing.assert_allclose(area, [6.0, 0.0, 6.0])
 
 
 def test_a_refused_transfer_lies_beside_its_place_unless_forced(tmp_path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from surface.fit.wardrobe.skin import CENTRE, EAR_X_MM, EAR_Y_MM, EAR_Z_MM, Skin, unit
+from surface.fit.wardrobe.skin import CENTRE, Skin, unit
 from tests.surface.fit.wardrobe.made_skin import Form, half, skin_of, whole_skin
 
 
@@ -35,7 +35,7 @@ def test_normals_look_outwards_or_inwards_as_the_parts_triangles_run(flip: bool)
 
 def test_ears_are_a_box_on_either_side_and_inner_skin_above_the_neck_does_not_count(skin: Skin) -> None:
     is_bare = np.isin(np.arange(len(skin.points)), skin.bare)
-    low, high = np.array([EAR_X_MM, EAR_Y_MM[0], EAR_Z_MM[0]]), np.array([np.inf, EAR_Y_MM[1], EAR_Z_MM[1]])
+    low, high = np.array([79.0, -22.0, -34.0]), np.array([np.inf, 46.0, 26.0])
     at = np.abs(skin.points * [1.0, 0.0, 0.0]) + skin.points * [0.0, 1.0, 1.0]
     ear = ((at > low) & (at < high)).all(axis=1)
     assert not is_bare[ear].any()
@@ -94,3 +94,5 @@ def test_anchors_and_offsets_lead_back_to_the_points(skin: Skin) -> None:
 def test_unit_keeps_directions_and_leaves_nothing_undefined() -> None:
     np.testing.assert_allclose(unit(np.array([[3.0, 0.0, 4.0], [0.0, -2.0, 0.0]])), [[0.6, 0, 0.8], [0, -1, 0]])
     assert (unit(np.zeros((1, 3))) == 0).all()
+    many = np.random.default_rng(0).normal(size=(2, 4, 3))
+    np.testing.assert_allclose(np.linalg.norm(unit(many), axis=2), 1.0)
