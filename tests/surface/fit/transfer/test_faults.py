@@ -9,7 +9,7 @@ from small_head import small_head
 
 from surface.base.errors import FitError
 from surface.fit.points.report import Errors, FitReport, PartReport
-from surface.fit.transfer import api, refused
+from surface.fit.transfer import api, faults
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.faults import faults_of_transfer, turned_over
 from surface.head import Head
@@ -67,7 +67,7 @@ def test_what_is_turned_over_is_measured_against_the_head_it_was_made_from(sourc
 
 def test_triangles_without_area_are_turned_nowhere() -> None:
     part = SimpleNamespace(triangles=np.array([[0, 1, 2], [0, 1, 1], [0, 2, 1]]))
-    normals, area = refused._normals(part, np.array([[0.0, 0, 0], [3, 0, 0], [0, 4, 0]]))  # type: ignore[arg-type]
+    normals, area = faults._normals(part, np.array([[0.0, 0, 0], [3, 0, 0], [0, 4, 0]]))  # type: ignore[arg-type]
     np.testing.assert_allclose(normals, [[0, 0, 1], [0, 0, 0], [0, 0, -1]])
     np.testing.assert_allclose(area, [6.0, 0.0, 6.0])
 

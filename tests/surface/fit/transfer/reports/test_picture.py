@@ -10,13 +10,13 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from surface.base.arrays import Floats
+from surface.fit.measures.error_colours import FULL_MM, SCALE
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.reports import picture as module
 from surface.fit.transfer.reports.picture import (
     ASPECT,
     COLOURS,
     FAR_MM,
-    FULL_MM,
     HEIGHT,
     PAPER,
     Frontal,
@@ -128,7 +128,7 @@ def test_distances_have_the_colours_of_the_legend(tmp_path: Path) -> None:
     assert len(set(seen[7])) == 1  # grey
     shade = 40 + 185 * 0.8 / np.linalg.norm([0.3, 0.5, 0.8])
     np.testing.assert_allclose(seen[0], shade * np.array([0.16, 0.28, 0.55]) ** (1 / 2.2), atol=1.01)
-    half = module.SCALE[:2].mean(axis=0)
+    half = SCALE[:2].mean(axis=0)
     draw_distances(scan, PLAIN, np.full(2 * len(off), 0.125), path)
     np.testing.assert_allclose(pixels(path)[35, 35], shade * half ** (1 / 2.2), atol=1.01)
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS as P
-from controller.robot import suggest as module
+from controller.robot import suggest_servos as module
 from controller.robot.anchors import falloff
-from controller.robot.suggest import REACH_MM, described, suggest
+from controller.robot.suggest_servos import REACH_MM, described, suggest_servos
 from surface.head.model.parameters import SHAPES
 
 REST = np.array([[x, y, 0.0] for x in range(-40, 41, 8) for y in range(-40, 41, 8)], float)
@@ -42,7 +42,7 @@ LOW, HIGH = (int(np.flatnonzero((REST[:, :2] == at).all(axis=1))[0]) for at in (
 
 def test_the_servo_that_is_missing_is_found_with_its_place_direction_and_pull() -> None:
     left = [pulled(LOW, [0.0, 1.2, 1.6]), pulled(LOW, [0.0, -3.0, -4.0]), 0 * REST]
-    (found,) = suggest(solver_of(*left), faces(3), P, 1)
+    (found,) = suggest_servos(solver_of(*left), faces(3), P, 1)
     np.testing.assert_allclose(found.point, REST[LOW])
     np.testing.assert_allclose(np.abs(found.direction), [0.0, 0.6, 0.8], atol=1e-9)
     assert (found.direction * [0.0, -0.6, -0.8]).sum() == pytest.approx(1.0)  # the way that most of it goes
@@ -56,7 +56,7 @@ def test_the_servo_that_is_missing_is_found_with_its_place_direction_and_pull() 
 
 def test_each_further_one_is_beside_those_before_it_and_the_best_comes_first() -> None:
     left = pulled(LOW, [0.0, 2.0, 0.0]) + pulled(HIGH, [0.0, 0.0, 5.0])
-    every = list(suggest(solver_of(left), faces(1), P, 5))
+    every = list(suggest_servos(solver_of(left), faces(1), P, 5))
     assert len(every) == 2  # what would hardly help is none
     np.testing.assert_allclose([each.point for each in every], REST[[HIGH, LOW]])
     assert [each.region for each in every] == [P.regions[P.index(n)] for n in ("browDownLeft", "jawOpen")]
@@ -67,12 +67,12 @@ def test_each_further_one_is_beside_those_before_it_and_the_best_comes_first() -
 def test_a_servo_that_hardly_helps_is_none(by: float, helps: bool) -> None:
     unit = _gain(1.0)
     left = pulled(LOW, [0.0, by * 0.05 / unit, 0.0])
-    assert bool(list(suggest(solver_of(left), faces(1), P, 1))) == helps
+    assert bool(list(suggest_servos(solver_of(left), faces(1), P, 1))) == helps
 
 
 def _gain(pull: float) -> float:
     """By how much the skin within its reach comes closer for a pull of 1 mm."""
-    (found,) = suggest(solver_of(pulled(LOW, [0.0, pull, 0.0])), faces(1), P, 1)
+    (found,) = suggest_servos(solver_of(pulled(LOW, [0.0, pull, 0.0])), faces(1), P, 1)
     return found.before_mm - found.after_mm
 
 
