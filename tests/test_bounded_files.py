@@ -23,6 +23,7 @@ ALLOWED = {
     "controller/face/face.py": "the kernel's counters",
     "controller/tools/bench_bus.py": "shipped stages, and reports that it wrote itself",
     "drivers/boards/hobby.py": "omote's own tables",
+    "drivers/sim/serving/simulated.py": "the kernel's counters",
     "drivers/port/serialport.py": "the kernel's settings of a port",
     "drivers/tables/manual.py": "omote's own tables",
     "drivers/tables/tables.py": "omote's own tables, and those of dynamixel-sdk",

@@ -11,8 +11,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from surface.base.files import open_file
-
 _LONGEST_STEM = 100
 """Characters of a file's name that the temporary name repeats, so that it is not longer than a name may be."""
 
@@ -48,6 +46,8 @@ def replacing(path: Path) -> Iterator[Path]:
 @contextmanager
 def _copying_into(path: Path) -> Iterator[Path]:
     """A path to write to; what was written there is copied into a device or a pipe when the block ends well."""
+    from surface.base.files import open_file  # it comes with numpy, and the command line starts without
+
     with tempfile.TemporaryDirectory() as folder:
         temporary = Path(folder) / f"content{path.suffix}"
         temporary.touch()

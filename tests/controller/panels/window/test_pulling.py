@@ -57,7 +57,7 @@ def pull(hands: Hands, vertex: int, by: tuple[float, float], still: float = 0.02
     began, first, frames = time.monotonic(), hands.imgui.get_frame_count(), 30
     for k in range(1, frames + 1):
         yield from hands.move(x + by[0] * k / frames, y + by[1] * k / frames)
-    hands.told["frames_s"] = (hands.imgui.get_frame_count() - first) / (time.monotonic() - began)
+    hands.report["frames_s"] = (hands.imgui.get_frame_count() - first) / (time.monotonic() - began)
     before = skin(hands)
     for _ in range(400):
         yield from hands.frames(6)
@@ -65,7 +65,7 @@ def pull(hands: Hands, vertex: int, by: tuple[float, float], still: float = 0.02
         if np.abs(after - before).max() < still and not hands.face._mouse.editor._asked:
             break
         before = after
-    hands.told["left_mm"] = left_mm(hands, vertex, goal)
+    hands.report["left_mm"] = left_mm(hands, vertex, goal)
     yield from hands.press(down=False)
     yield from hands.key(hands.imgui.Key.mod_ctrl, down=False)
     yield from hands.frames(6)
@@ -79,7 +79,7 @@ def undo(hands: Hands) -> Steps:
 
 
 def script(hands: Hands) -> Steps:
-    told = hands.told
+    told = hands.report
     yield from hands.frames(10)
     yield from hands.tap(hands.imgui.Key.n)
     yield from hands.frames(10)
@@ -120,7 +120,7 @@ def main() -> None:
     try:
         hands.run(script, ["edit", str(folder / "stage.toml"), "--seconds", "230"])
     finally:
-        (folder / "told.json").write_text(json.dumps(hands.told), encoding="utf-8")
+        (folder / "told.json").write_text(json.dumps(hands.report), encoding="utf-8")
 
 
 @pytest.mark.slow

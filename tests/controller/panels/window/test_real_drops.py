@@ -35,15 +35,15 @@ def script(hands: Hands) -> Steps:
     yield from hands.until(lambda: hands.face._values.full[jaw] > 0.1, "the take on the face")
     yield from drop(hands, folder / "head")
     yield from hands.until(lambda: hands.face._head is not first, "the dropped head")
-    hands.told["head"] = str(panel.commands.now.look.head)
+    hands.report["head"] = str(panel.commands.now.look.head)
     yield from drop(hands, folder / "m.obj")
-    hands.told["jobs"] = [job.title for job in panel.jobs.running]
+    hands.report["jobs"] = [job.title for job in panel.jobs.running]
     yield from hands.click("cancel##fitting m.obj")
     yield from hands.until(lambda: not panel.jobs.running, "the end of the cancelled job")
     yield from drop(hands, folder / "nothing.doc")
-    hands.told["problems"] = [each.text for each in panel.problems.unread]
+    hands.report["problems"] = [each.text for each in panel.problems.unread]
     yield from drop(hands, folder / "other.toml")
-    yield from hands.until(lambda: hands.told["windows"] == 2, "the dropped stage")
+    yield from hands.until(lambda: hands.report["windows"] == 2, "the dropped stage")
     yield from hands.frames(5)
 
 
@@ -54,7 +54,7 @@ def main() -> None:
     try:
         hands.run(script, ["run", str(folder / "stage.toml"), "--seconds", "200"])
     finally:
-        (folder / "told.json").write_text(json.dumps(hands.told), encoding="utf-8")
+        (folder / "told.json").write_text(json.dumps(hands.report), encoding="utf-8")
 
 
 @pytest.mark.slow

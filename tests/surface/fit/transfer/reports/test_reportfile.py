@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from surface.base.errors import FitError
 from surface.fit.points.report import Errors, FitReport, PartReport
 from surface.fit.transfer.align import Similarity
+from surface.fit.transfer.reports import distances
 from surface.fit.transfer.reports import reportfile as module
 from surface.fit.transfer.reports.gaps import Gap
 from surface.fit.transfer.reports.report import Found, TransferReport
@@ -61,7 +62,7 @@ def test_the_text_says_what_the_table_has() -> None:
     assert lines[2].startswith("- face: ") and lines[3] == "- guessed the unit"
     for row in (
         "| scan, head: 5000 samples of face | 0.200 | 0.700 | 1.500 |",
-        "| the map alone, scan: where the scan shows 87 % of the front | 0.300 | 0.900 | 2.000 |",
+        "| the map alone, scan: 87 % of the front, where it has a match | 0.300 | 0.900 | 2.000 |",
         "![landmarks.png](landmarks.png)", module.LEGEND,
         "| chin | given | 1.00 | 0.125, -2, 3 | 1.3 |", "- mouth: a hole in the scan",
         "- eyeBlinkLeft: 0.91 to 1.10 times", "- lips, at rest: closed, 0.10 mm of at most 0.50",
@@ -100,7 +101,7 @@ def head_of(*parts: tuple[str, float, float]) -> Any:
 @pytest.fixture(autouse=True)
 def plain_heads(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "Head", lambda data: data)
-    monkeypatch.setattr(module, "COUNT", 20_000)
+    monkeypatch.setattr(distances, "COUNT", 20_000)
 
 
 def test_a_distance_is_along_the_normal_near_the_head_and_to_the_nearest_place_farther_off() -> None:
