@@ -24,7 +24,7 @@ def solver_of(*left: np.ndarray) -> Any:
     moves[REST[:, 1] < 0, 1, JAW] = -1.0
     moves[REST[:, 1] >= 0, 1, BROW] = -1.0
     skin = SimpleNamespace(rest=REST, jaw=np.zeros(len(REST)), moves=moves, part="face")
-    return SimpleNamespace(skin=skin, shape_values=lambda face: int(face[0]), left_over=lambda number: left[number])
+    return SimpleNamespace(skin=skin, shape_values=lambda face: int(face[0]), residual=lambda number: left[number])
 
 
 def faces(count: int) -> dict[str, Any]:
