@@ -160,6 +160,10 @@ class WireBus(Bus):
         if not self.is_open:
             raise self._error(PortLost, f"port {self.path} is not open", "call open()")
 
+    def _raise_if_stopped(self) -> None:
+        if not self._running:
+            raise BusError(f"the bus on {self.path} is not started", hint="call start()", port=self.path)
+
     def _error(self, kind: type[E], message: str, hint: str = "", indices: Iterable[int] | None = None) -> E:
         """An error of this port that concerns some servos, by default all."""
         ids = self.ids if indices is None else tuple(self.ids[index] for index in indices)
@@ -218,8 +222,7 @@ class WireBus(Bus):
         wanted = np.asarray(angle_rad, dtype=np.float64)
         if wanted.shape != (len(self.servos),):
             raise ValueError(f"angle_rad: shape {wanted.shape}, expected {(len(self.servos),)}")
-        if not self._running:
-            raise BusError(f"the bus on {self.path} is not started", hint="call start()", port=self.path)
+        self._raise_if_stopped()
         self._raise_if_lost()  # not _losing(): the wire waits for every line between a reply and the next goals
         try:
             now = self._clock()

@@ -178,6 +178,28 @@ def test_a_motor_that_does_not_run_in_time_is_switched_off_again() -> None:
         assert not wire.servo(2).torque
 
 
+@pytest.mark.parametrize("name", Y_MODELS)
+def test_one_that_holds_is_released_and_started(name: str) -> None:
+    """It refuses goals and torque until its brake is closed."""
+    wire = head(name, takeover="release")
+    wire.servo(1).put("Torque Enable", 1)
+    wire.clock.sleep(1.0)
+    with wire.bus() as bus:
+        bus.start()
+        settle(bus, [0.1, 0.1], 1e-3)
+
+
+def test_one_that_does_not_let_go_in_time_is_not_started() -> None:
+    wire = head("ym070-210-a051", takeover="release")
+    wire.servo(1).put("Torque Enable", 1)
+    wire.clock.sleep(1.0)
+    wire.servo(1).put("Brake Delay", 4_000)
+    with wire.bus() as bus:
+        with pytest.raises(ServoFault, match=r'"neck".* is not off 3 s after'):
+            bus.start()
+        assert not wire.servo(2).torque
+
+
 @pytest.mark.parametrize("register", ["Electronic GearRatio Numerator", "Electronic GearRatio Denominator"])
 def test_another_electronic_gear_is_refused_before_anything_moves(register: str) -> None:
     wire = head("ym070-210-r051")
