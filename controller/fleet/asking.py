@@ -12,6 +12,7 @@ from controller.base.errors import LinkError
 from controller.fleet import journal
 from controller.fleet.lease import Lease, Token
 from controller.fleet.offset import Clocks
+from controller.fleet.payload import MOST
 from controller.fleet.wire import ALL, Wire
 from controller.layers.commands import CommandState
 
@@ -57,7 +58,9 @@ class Asking:
                 return
             try:
                 received, answered, holder = map(int, json.loads(reply.ok.payload.to_bytes()))
-            except (ValueError, TypeError):
+                if not -MOST <= received <= answered <= MOST:
+                    raise ValueError("no time of a clock")
+            except (ValueError, TypeError, OverflowError):
                 self._wire.refuse(LinkError("a time that is not the JSON it should be"))
             else:
                 self._clocks.add(holder, asked, received, answered, arrived)

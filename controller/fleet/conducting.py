@@ -12,7 +12,7 @@ from controller.base.errors import LinkError
 from controller.base.parameters import Floats
 from controller.fleet import journal
 from controller.fleet.lease import Lease, Token
-from controller.fleet.payload import Header, Payloads
+from controller.fleet.payload import MOST, Header, Payloads
 from controller.fleet.sending import FaceSender
 from controller.fleet.wire import ALL, Wire, header_of
 from controller.layers.commands import CommandState
@@ -82,8 +82,10 @@ class Conducting:
         try:
             fence, holder = json.loads(sample.payload.to_bytes())["token"]
             token = Token(int(fence), int(holder))
-        except (ValueError, TypeError, KeyError) as error:
+        except (ValueError, TypeError, KeyError, OverflowError) as error:
             raise LinkError("a state that is not the JSON it should be") from error
+        if token.fence > MOST:
+            raise LinkError("a state with a fence that no conductor has")
         self._lease.hear(token, time.monotonic(), alive=False)
 
     def _tell_time(self, query: zenoh.Query) -> None:

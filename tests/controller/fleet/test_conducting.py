@@ -1,4 +1,4 @@
-"""controller.fleet.conducting: what Zenoh's threads bring at once does not mix."""
+"""controller.fleet.conducting: what Zenoh's threads bring at once does not mix, and no message ends a run."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from controller.base.errors import LinkError
 from controller.base.parameters import PARAMETERS as P
 from controller.fleet.conducting import Conducting
 from controller.fleet.lease import Lease
@@ -48,11 +49,27 @@ def message(text: bytes, replies: list[bytes]) -> Any:
     return SimpleNamespace(payload=payload, key_expr="", reply=lambda _, data: replies.append(data))
 
 
+def conducting(heads: dict[str, CommandState], wire: FakeWire, lease: Lease) -> Conducting:
+    return Conducting(wire, heads, Payloads(P), lease, 0.2, Counter())  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("fence", ["18446744073709551616", "18446744073709551615", "1e999", "1" + 400 * "0"])
+def test_a_state_with_a_fence_that_no_header_holds_is_refused(fence: str) -> None:
+    """Its successor's header could not be packed, which ended the conductor's run."""
+    wire, lease = FakeWire(), Lease(1, 0.2, 0.0, 0.0)
+    conductor = conducting({"maple": CommandState(P, seed=1)}, wire, lease)
+    with pytest.raises(LinkError):
+        wire.heard["_/state"](message(b'{"token": [' + fence.encode() + b", 5]}", []))
+    assert not conductor.tick(150_000_000)
+    assert conductor.tick(300_000_000)
+    assert lease.token.fence == 1
+
+
 def test_a_stop_that_comes_in_the_middle_of_a_question_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands and questions of a head come in two threads: here one comes while the other's line is taken apart."""
     state, wire, replies = CommandState(P, seed=1), FakeWire(), list[bytes]()
     lease = Lease(1, 0.2, 0.0, 0.0)
-    Conducting(wire, {"maple": state}, Payloads(P), lease, 0.2, Counter())  # type: ignore[arg-type]
+    conducting({"maple": state}, wire, lease)
     assert lease.tick(0.15) is False
     assert lease.tick(0.3)
     take, waiting = LineDecoder._take, [b"STOP"]
