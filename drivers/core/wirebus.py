@@ -27,6 +27,8 @@ E = TypeVar("E", bound=DriverError)
 
 JOIN_S = 1.0
 """Time between two attempts to start servos that were left out, one of them at a time."""
+JOIN_REST = 10.0
+"""After an attempt that failed, none is made for so many times as long as it took: all servos wait for each."""
 FAR_RAD = 0.4
 """How far from its last goal a servo may stand that comes back and is simply driven on."""
 
@@ -280,7 +282,8 @@ class WireBus(Bus):
 
     def _let_join(self, waiting: Sequence[int]) -> None:
         """Try to start one of the servos that were left out and answer, each in its turn."""
-        self._join_s = self._clock() + JOIN_S
+        begun_s = self._clock()
+        self._join_s = begun_s + JOIN_S
         if not waiting:
             return
         index = min(waiting, key=lambda each: (each <= self._tried, each))
@@ -289,6 +292,8 @@ class WireBus(Bus):
             here = self._join(index)
         except BusError as error:
             self._leave_out(index, error)
+            now_s = self._clock()
+            self._join_s = max(self._join_s, now_s + JOIN_REST * (now_s - begun_s))
             return
         self._drive_again(index, here)
 
