@@ -12,6 +12,7 @@ from controller.base.errors import LinkError
 from controller.fleet import journal
 from controller.fleet.lease import Lease, Token
 from controller.fleet.offset import Clocks
+from controller.fleet.payload import MOST
 from controller.fleet.wire import ALL, Wire
 from controller.layers.commands import CommandState
 
@@ -57,7 +58,9 @@ class Asking:
                 return
             try:
                 received, answered, holder = map(int, json.loads(reply.ok.payload.to_bytes()))
-            except (ValueError, TypeError):
+                if not -MOST <= received <= answered <= MOST:
+                    raise ValueError("no time of a clock")
+            except (ValueError, TypeError, OverflowError):
                 self._wire.refuse(LinkError("a time that is not the JSON it should be"))
             else:
                 self._clocks.add(holder, asked, received, answered, arrived)
@@ -78,7 +81,13 @@ class Asking:
         def heard(reply: zenoh.Reply) -> None:
             if reply.ok is None or self._lease.active or self._restored.get(name) == conductor:
                 return
-            found = json.loads(reply.ok.payload.to_bytes())
+            try:
+                found = json.loads(reply.ok.payload.to_bytes())
+            except ValueError:
+                found = None
+            if not isinstance(found, dict):
+                self._wire.refuse(LinkError("a state that is not the JSON it should be"))
+                return
             if not found.get("conducting"):
                 return
             if self._events.get(name, 0) != events and self._crossed[name] < _CROSSED:
@@ -86,7 +95,7 @@ class Asking:
                 return
             self._restored[name], self._crossed[name] = conductor, 0
             try:
-                journal.restore(found["commanded"], self._heads[name], time.monotonic_ns())
+                journal.restore(found.get("commanded", {}), self._heads[name], time.monotonic_ns())
             except LinkError as error:
                 self._wire.refuse(error)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from controller.base.errors import LinkError
 from controller.base.parameters import Floats
-from controller.fleet.payload import ENCODINGS, VERSION, Payloads
+from controller.fleet.payload import ENCODINGS, MOST, VERSION, Payloads
 
 _HEAD = struct.Struct("<HHI")
 _ROW = np.dtype([("sequence", "<u8"), ("stamp", "<i8"), ("length", "<u4")])
@@ -60,6 +60,8 @@ class Batches:
         ends = first + np.cumsum(rows["length"], dtype=np.int64)
         if len(data) != (ends[-1] if len(ends) else first):
             raise LinkError("a batch of faces whose lengths do not add up")
+        if ((rows["stamp"] < -MOST) | (rows["stamp"] > MOST)).any():
+            raise LinkError("a batch of faces with a time that no clock has")
         values = self._values(data, of, first, rows["length"], ends)
         return map(Face, names, rows["sequence"].tolist(), rows["stamp"].tolist(), values)
 

@@ -12,7 +12,7 @@ from controller.base.errors import LinkError
 from controller.base.parameters import Floats
 from controller.fleet import journal
 from controller.fleet.lease import Lease, Token
-from controller.fleet.payload import Header, Payloads
+from controller.fleet.payload import MOST, Header, Payloads
 from controller.fleet.sending import FaceSender
 from controller.fleet.wire import ALL, Wire, header_of
 from controller.layers.commands import CommandState
@@ -39,7 +39,6 @@ class Conducting:
         self._events = events
         self._wire, self._heads, self._lease, self._every_s = wire, heads, lease, lease_s / _BEATS
         self._beat_s, self._term = -1.0, 0
-        self._lines = {name: LineSession(state, 0, name=f"zenoh {name}") for name, state in heads.items()}
         self.sender = FaceSender(wire.outlets(heads, "parameters"), wire.outlet(ALL, "faces"), payloads, self._header)
         wire.hear(ALL, "lease", self._hear_lease)
         wire.hear(ALL, "state", self._hear_state)
@@ -83,8 +82,10 @@ class Conducting:
         try:
             fence, holder = json.loads(sample.payload.to_bytes())["token"]
             token = Token(int(fence), int(holder))
-        except (ValueError, TypeError, KeyError) as error:
+        except (ValueError, TypeError, KeyError, OverflowError) as error:
             raise LinkError("a state that is not the JSON it should be") from error
+        if token.fence > MOST:
+            raise LinkError("a state with a fence that no conductor has")
         self._lease.hear(token, time.monotonic(), alive=False)
 
     def _tell_time(self, query: zenoh.Query) -> None:
@@ -92,23 +93,31 @@ class Conducting:
         if self._lease.active:
             query.reply(query.key_expr, json.dumps([received, time.monotonic_ns(), self._lease.holder]))
 
+    def _lines_of(self, head: str) -> LineSession:
+        """What takes lines for a head in one of Zenoh's threads; with another one's lines it would mix them up."""
+        return LineSession(self._heads[head], 0, name=f"zenoh {head}")
+
     def _command_of(self, head: str) -> Callable[[zenoh.Sample], None]:
+        lines = self._lines_of(head)
+
         def act(sample: zenoh.Sample) -> None:
-            self._do(head, sample.payload.to_bytes())
+            self._do(lines, sample.payload.to_bytes())
 
         return act
 
-    def _do(self, head: str, data: bytes) -> bytes:
+    def _do(self, lines: LineSession, data: bytes) -> bytes:
         """Carry out lines of a command for a head; only who conducts does. STOP works in any case."""
         line = data[:4096].rstrip(b"\r\n") + b"\n"
         if not self._lease.active and b"STOP" not in line.upper():
             return b""
-        return self._lines[head].feed(line, time.monotonic_ns())
+        return lines.feed(line, time.monotonic_ns())
 
     def _question_of(self, head: str) -> Callable[[zenoh.Query], None]:
+        lines = self._lines_of(head)
+
         def call(query: zenoh.Query) -> None:
             if query.payload is not None and self._lease.active:
-                query.reply(query.key_expr, self._do(head, query.payload.to_bytes()))
+                query.reply(query.key_expr, self._do(lines, query.payload.to_bytes()))
 
         return call
 

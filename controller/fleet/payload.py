@@ -27,6 +27,9 @@ _HEADER = struct.Struct("<BBHQQQqq")
 _COUNT = struct.Struct("<H")
 _STOPPED = 1
 _MOST_BYTES = 65_536
+MOST = 1 << 61
+"""Greatest fence, and greatest time of a clock (ns, 73 years), of a message that is not refused: what is computed with
+them stays within 64 bits."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,8 @@ class Header:
         version, flags, _, fence, holder, sequence, time_ns, stamp_ns = _HEADER.unpack(data)
         if version != VERSION:
             raise LinkError(f"version {version} of the header is not understood", hint="pip install --upgrade omote")
+        if fence > MOST or not -MOST <= time_ns <= MOST or not -MOST <= stamp_ns <= MOST:
+            raise LinkError("a header with a number that no conductor has")
         return cls(Token(fence, holder), sequence, time_ns, stamp_ns, bool(flags & _STOPPED))
 
 

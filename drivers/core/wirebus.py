@@ -27,6 +27,8 @@ E = TypeVar("E", bound=DriverError)
 
 JOIN_S = 1.0
 """Time between two attempts to start servos that were left out, one of them at a time."""
+JOIN_REST = 10.0
+"""After an attempt that failed, none is made for so many times as long as it took: all servos wait for each."""
 FAR_RAD = 0.4
 """How far from its last goal a servo may stand that comes back and is simply driven on."""
 
@@ -160,6 +162,10 @@ class WireBus(Bus):
         if not self.is_open:
             raise self._error(PortLost, f"port {self.path} is not open", "call open()")
 
+    def _raise_if_stopped(self) -> None:
+        if not self._running:
+            raise BusError(f"the bus on {self.path} is not started", hint="call start()", port=self.path)
+
     def _error(self, kind: type[E], message: str, hint: str = "", indices: Iterable[int] | None = None) -> E:
         """An error of this port that concerns some servos, by default all."""
         ids = self.ids if indices is None else tuple(self.ids[index] for index in indices)
@@ -218,8 +224,7 @@ class WireBus(Bus):
         wanted = np.asarray(angle_rad, dtype=np.float64)
         if wanted.shape != (len(self.servos),):
             raise ValueError(f"angle_rad: shape {wanted.shape}, expected {(len(self.servos),)}")
-        if not self._running:
-            raise BusError(f"the bus on {self.path} is not started", hint="call start()", port=self.path)
+        self._raise_if_stopped()
         self._raise_if_lost()  # not _losing(): the wire waits for every line between a reply and the next goals
         try:
             now = self._clock()
@@ -277,7 +282,8 @@ class WireBus(Bus):
 
     def _let_join(self, waiting: Sequence[int]) -> None:
         """Try to start one of the servos that were left out and answer, each in its turn."""
-        self._join_s = self._clock() + JOIN_S
+        begun_s = self._clock()
+        self._join_s = begun_s + JOIN_S
         if not waiting:
             return
         index = min(waiting, key=lambda each: (each <= self._tried, each))
@@ -286,6 +292,8 @@ class WireBus(Bus):
             here = self._join(index)
         except BusError as error:
             self._leave_out(index, error)
+            now_s = self._clock()
+            self._join_s = max(self._join_s, now_s + JOIN_REST * (now_s - begun_s))
             return
         self._drive_again(index, here)
 

@@ -128,6 +128,7 @@ class MixedBus(WireBus):
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that switched off or were rebooted; see the drivers of both protocols."""
+        self._raise_if_stopped()
         failed: dict[int, BusError] = {}
         with self._losing():
             for half in self._halves:

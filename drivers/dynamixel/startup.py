@@ -28,6 +28,7 @@ ERROR_CLEAR = b"\x02ERCL"
 """Parameters of Clear that end an error (e-Manual, Y-series, Error Clear Packet)."""
 TURNING_ON, RUNNING, TURNING_OFF = 4, 5, 6
 """Values of Controller State: the motor is being switched on, takes goals, is being switched off."""
+NOT_OFF = (TURNING_ON, RUNNING, TURNING_OFF)
 STATE_S = 3.0
 """Longest time to switch a motor on or off that has a brake, or stops first."""
 EEPROM_TRIES = 10
@@ -66,7 +67,11 @@ class Startup(startup.Startup[StatusPacket]):
         return reply.params[0] | reply.params[1] << 8, reply.params[2]
 
     def _release(self, servo: int) -> None:
+        """Switch one servo off; while it stops and closes its brake it refuses goals and torque, so wait for that."""
         self.registers.put(servo, "torque", 0)
+        if self._with_state([servo], NOT_OFF.__contains__):
+            message = f"servo {self.registers.label(servo)} is not off {STATE_S:g} s after its torque was switched off"
+            raise self.registers.error(ServoFault, message, "look at its Controller State and Brake Delay", servo)
 
     def _slack(self, turn: int) -> float:
         return OUT_OF_TURN_TICKS
@@ -104,7 +109,7 @@ class Startup(startup.Startup[StatusPacket]):
             self._with_state([servo], lambda state: state in (TURNING_ON, TURNING_OFF))
             if registers.get(servo, "torque", tries=1):
                 registers.put(servo, "torque", 0, tries=1)
-            settled = not self._with_state([servo], lambda state: state in (TURNING_ON, RUNNING, TURNING_OFF))
+            settled = not self._with_state([servo], NOT_OFF.__contains__)
             return settled and registers.get(servo, "torque", tries=1) == 0
         except BusError:
             return False

@@ -204,8 +204,10 @@ class ServoBus(WireBus):
 
         Servos that hold go on holding. Raises BusError where some stay off, after all others were started. What may be
         done to a servo depends on the policy of the family's start-up. Those that stay off are sent no goals, and are
-        tried again once a second without a reboot, as after :meth:`reconnect`.
+        tried again once a second without a reboot, as after :meth:`reconnect`. Raises BusError, too, where the bus is
+        not started: nothing would switch the servos off again.
         """
+        self._raise_if_stopped()
         failed = self._recover(self.ids if ids is None else ids)
         if failed:
             raise merge_errors(failed)

@@ -6,13 +6,14 @@ import os
 import secrets
 import shutil
 import stat
+import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_LONGEST_STEM = 100
-"""Characters of a file's name that the temporary name repeats, so that it is not longer than a name may be."""
+_LONGEST_STEM = 50
+"""Characters of a file's name, of four bytes at most, that the temporary name repeats: names have 255 bytes at most."""
 
 
 @contextmanager
@@ -20,13 +21,15 @@ def replacing(path: Path) -> Iterator[Path]:
     """A path to write to; what was written there replaces the file ``path`` when the block ends well.
 
     Links are followed and stay links, and a file that is replaced keeps its permissions and, where the system allows
-    it, its owner. A device or a pipe, as ``/dev/stdout``, is never replaced: what was written is copied into it.
+    it, its owner. A device or a pipe is never replaced: what was written is copied into it. Neither is the file into
+    which standard output or error goes, as ``/dev/stdout`` after ``>>``: what was written follows what is in it.
 
     Raises OSError: the folder or the file cannot be written; ``path`` stays as it was.
     """
     old = _status(path)
-    if old is not None and not stat.S_ISREG(old.st_mode) and not stat.S_ISDIR(old.st_mode):
-        with _copying_into(path) as temporary:
+    stream = None if old is None else _stream_into(old)
+    if stream is not None or (old is not None and not stat.S_ISREG(old.st_mode) and not stat.S_ISDIR(old.st_mode)):
+        with _copying_into(path, stream) as temporary:
             yield temporary
         return
     target = Path(os.path.realpath(path))
@@ -44,16 +47,33 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 @contextmanager
-def _copying_into(path: Path) -> Iterator[Path]:
-    """A path to write to; what was written there is copied into a device or a pipe when the block ends well."""
+def _copying_into(path: Path, stream: int | None) -> Iterator[Path]:
+    """A path to write to; what was written there is copied into a device or a pipe, or into the descriptor ``stream``
+    that is open already, when the block ends well."""
     from surface.base.files import open_file  # it comes with numpy, and the command line starts without
 
     with tempfile.TemporaryDirectory() as folder:
         temporary = Path(folder) / f"content{path.suffix}"
         temporary.touch()
         yield temporary
-        with open_file(temporary) as content, path.open("wb") as device:
-            shutil.copyfileobj(content, device)
+        if stream is not None:
+            for printed in (sys.stdout, sys.stderr):
+                if printed is not None:
+                    printed.flush()  # what was printed before comes before
+        with (
+            open_file(temporary) as content,
+            path.open("wb") if stream is None else os.fdopen(os.dup(stream), "wb") as to,
+        ):
+            shutil.copyfileobj(content, to)
+
+
+def _stream_into(file: os.stat_result) -> int | None:
+    """The descriptor of standard output or error where that goes into a file; None for any other file."""
+    for stream in (1, 2):
+        with suppress(OSError):  # it is closed
+            if os.path.samestat(file, os.fstat(stream)):
+                return stream
+    return None
 
 
 def _status(path: Path) -> os.stat_result | None:

@@ -58,6 +58,17 @@ def test_a_damaged_face_is_refused(data: bytes, kind: str) -> None:
         Payloads(P).decode(data[:100], "text/plain")
 
 
+LARGEST = 2**63 - 1
+
+
+@pytest.mark.parametrize("header", [Header(Token(2**64 - 1, 5), 1, 1), Header(Token(1, 5), 1, LARGEST),
+                                    Header(Token(1, 5), 1, 1, -LARGEST - 1)])  # fmt: skip
+def test_a_header_is_refused_with_which_computing_would_leave_64_bits(header: Header) -> None:
+    """As the fence of the next conductor, and the time of a command by one's own clock."""
+    with pytest.raises(LinkError, match="no conductor has"):
+        Header.decode(header.encode())
+
+
 def test_values_are_kept_in_their_ranges_and_unknown_names_are_left_out() -> None:
     data = json.dumps({"version": 1, "parameters": {"jawOpen": 3.0, "antenna": 1.0}}).encode()
     values = Payloads(P).decode(data, "application/json")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,18 @@ def test_what_was_added_plays_again_from_its_first_face_on(tmp_path: Path) -> No
     assert values[:, P.index("jawOpen")].tolist() == [0.1, 1 / 3]  # to the last digit
     take = load_take(recording.path, P)
     assert take.duration_s == pytest.approx(0.25)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full, a device that is always full")
+def test_a_full_disk_ends_the_recording_with_one_message(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    (tmp_path / "show-maple.csv").symlink_to("/dev/full")
+    recording = Recording(tmp_path, "show", "maple", P)
+    for at in range(5):
+        recording.add(at, P.neutral())
+        time.sleep(0.3)
+    recording.close()
+    (said,) = [record.getMessage() for record in caplog.records]
+    assert said.startswith(str(tmp_path / "show-maple.csv")) and "No space left on device" in said
 
 
 def test_a_place_that_cannot_be_written_is_named(tmp_path: Path) -> None:

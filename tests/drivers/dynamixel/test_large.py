@@ -178,6 +178,51 @@ def test_a_motor_that_does_not_run_in_time_is_switched_off_again() -> None:
         assert not wire.servo(2).torque
 
 
+@pytest.mark.parametrize("name", Y_MODELS)
+def test_one_that_holds_is_released_and_started(name: str) -> None:
+    """It refuses goals and torque until its brake is closed."""
+    wire = head(name, takeover="release")
+    wire.servo(1).put("Torque Enable", 1)
+    wire.clock.sleep(1.0)
+    with wire.bus() as bus:
+        bus.start()
+        settle(bus, [0.1, 0.1], 1e-3)
+
+
+def test_one_that_does_not_let_go_in_time_is_not_started() -> None:
+    wire = head("ym070-210-a051", takeover="release")
+    wire.servo(1).put("Torque Enable", 1)
+    wire.clock.sleep(1.0)
+    wire.servo(1).put("Brake Delay", 4_000)
+    with wire.bus() as bus:
+        with pytest.raises(ServoFault, match=r'"neck".* is not off 3 s after'):
+            bus.start()
+        assert not wire.servo(2).torque
+
+
+def test_the_others_seldom_wait_for_one_that_does_not_run() -> None:
+    """Each try to start it takes seconds, in which nobody gets goals."""
+    wire = head("ym070-210-a051")
+    with wire.bus() as bus:
+        bus.start()
+        bus.read()
+        wire.servo(1).put("Torque Enable", 0)
+        wire.clock.sleep(1.0)
+        wire.servo(1).put("Brake Delay", 4_000)
+        with pytest.raises(ServoFault, match="do not run"):
+            bus.recover([1])
+        begun, waited = wire.clock(), 0.0
+        while wire.clock() - begun < 200.0:
+            before = wire.clock()
+            bus.write([0.1, 0.1])
+            bus.read()
+            waited += wire.clock() - before if wire.clock() - before > 1.0 else 0.0
+            wire.clock.sleep(0.1)
+        assert 0.0 < waited < 0.15 * (wire.clock() - begun)
+        wire.servo(1).put("Brake Delay", 20)
+        read_until(bus, lambda state: bool(bus.driven.all()), 100.0)
+
+
 @pytest.mark.parametrize("register", ["Electronic GearRatio Numerator", "Electronic GearRatio Denominator"])
 def test_another_electronic_gear_is_refused_before_anything_moves(register: str) -> None:
     wire = head("ym070-210-r051")

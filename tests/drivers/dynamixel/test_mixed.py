@@ -10,7 +10,7 @@ import pytest
 
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
-from drivers.base.errors import NoReply, ServoFault, WrongModel
+from drivers.base.errors import BusError, NoReply, ServoFault, WrongModel
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import read_until, settle
 
@@ -120,6 +120,12 @@ def test_counters_are_those_of_both_halves(wire: VirtualBus, bus: Bus) -> None:
     assert any("Return Delay Time" in line and "id 3" in line for line in report.eeprom_writes)
     wire.clear()
     read_until(bus, lambda state: bool(state.fresh.all()))
+
+
+def test_nothing_is_recovered_before_the_start(wire: VirtualBus) -> None:
+    with make(wire) as bus, pytest.raises(BusError, match="is not started"):
+        bus.recover()
+    assert not any(torques(wire))
 
 
 def test_a_servo_of_either_half_is_recovered_where_it_is(wire: VirtualBus, bus: Bus) -> None:

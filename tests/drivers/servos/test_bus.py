@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import Bus
-from drivers.base.errors import NoReply, PortLost, ServoFault
+from drivers.base.errors import BusError, NoReply, PortLost, ServoFault
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import SERVOS, read_until, settle
 
@@ -66,6 +66,14 @@ def test_recovering_nobody_in_particular_means_all(wire: VirtualBus, bus: Bus) -
     bus.recover()
     assert [wire.servo(servo.id).torque for servo in SERVOS] == [True] * 3
     assert read_until(bus, lambda state: bool(state.torque.all())).torque.all()
+
+
+def test_a_bus_that_is_not_started_recovers_nobody(wire: VirtualBus, bus: Bus) -> None:
+    """Nothing would switch them off again, as stop() of a stopped bus does nothing."""
+    bus.stop()
+    with pytest.raises(BusError, match="is not started"):
+        bus.recover()
+    assert [wire.servo(servo.id).torque for servo in SERVOS] == [False] * 3
 
 
 def test_what_does_not_answer_cannot_be_recovered(wire: VirtualBus, bus: Bus) -> None:

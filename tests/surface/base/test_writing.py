@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import stat
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -98,6 +100,33 @@ def test_a_name_as_long_as_a_name_may_be(tmp_path: Path) -> None:
     path = tmp_path / ("n" * 250 + ".json")
     write(path, "new")
     assert path.read_text() == "new"
+
+
+@posix
+def test_a_long_name_of_characters_of_many_bytes(tmp_path: Path) -> None:
+    path = tmp_path / ("表" * 80 + ".json")
+    write(path, "new")
+    assert path.read_text() == "new"
+
+
+PRINTS = """
+from pathlib import Path
+from surface.base.writing import replacing
+print("before")
+with replacing(Path("/dev/stdout")) as temporary:
+    temporary.write_text("report\\n")
+print("after")
+"""
+
+
+@posix
+@pytest.mark.parametrize(("mode", "kept"), [("a", "old\n"), ("w", "")])
+def test_a_file_into_which_standard_output_goes_keeps_what_is_in_it(tmp_path: Path, mode: str, kept: str) -> None:
+    path = tmp_path / "log.txt"
+    path.write_text("old\n")
+    with path.open(mode) as output:
+        subprocess.run([sys.executable, "-c", PRINTS], stdout=output, check=True)
+    assert path.read_text() == f"{kept}before\nreport\nafter\n"
 
 
 def test_a_folder_is_no_file(tmp_path: Path) -> None:

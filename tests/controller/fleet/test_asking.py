@@ -1,0 +1,38 @@
+"""controller.fleet.asking: answers that no conductor gives are refused."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from controller.fleet.asking import Asking
+from controller.fleet.lease import Lease, Token
+from controller.fleet.offset import Clocks
+
+
+@pytest.mark.parametrize("answer", [b"[1, 2]", b"[1e999, 2, 5]", b"[%d, %d, 5]" % (2**63, 2**63), b"[2, 1, 5]", b"{}"])
+def test_a_time_that_no_clock_has_is_refused(answer: bytes) -> None:
+    """With a huge one the time of a command left 64 bits, which ended the head's run."""
+    heard, refused, clocks = list[Any](), list[Exception](), Clocks()
+    session = SimpleNamespace(get=lambda key, act, timeout: heard.append(act))
+    wire = SimpleNamespace(session=session, key=lambda head, what: what, refuse=refused.append)
+    Asking(wire, clocks, Lease(1, 0.2, 0.0, 0.0), {}, {}).ask()  # type: ignore[arg-type]
+    heard[0](SimpleNamespace(ok=SimpleNamespace(payload=SimpleNamespace(to_bytes=lambda: answer))))
+    assert len(refused) == 1
+    assert clocks.answers(5) == 0
+    heard[0](SimpleNamespace(ok=SimpleNamespace(payload=SimpleNamespace(to_bytes=lambda: b"[1, 2, 5]"))))
+    assert len(refused) == 1
+
+
+@pytest.mark.parametrize("answer", [b"[1]", b"5", b"{", b"\xff", b'{"conducting": true}'])
+def test_a_state_that_is_no_conductors_is_refused(answer: bytes) -> None:
+    asked, refused = dict[str, Any](), list[Exception]()
+    session = SimpleNamespace(get=lambda key, act, timeout: asked.update({key: act}))
+    wire = SimpleNamespace(session=session, key=lambda head, what: what, refuse=refused.append)
+    lease = Lease(1, 0.2, 0.0, 0.0)
+    lease.hear(Token(1, 7), 0.0)
+    Asking(wire, Clocks(), lease, {"maple": None}, {}).ask()  # type: ignore[arg-type, dict-item]
+    asked["state"](SimpleNamespace(ok=SimpleNamespace(payload=SimpleNamespace(to_bytes=lambda: answer))))
+    assert len(refused) == 1
