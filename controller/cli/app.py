@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from typer import Typer  # start-up: Ctrl-C ends it quietly while all this still loads
 
 _AGAIN_S = 0.01
+_LONGEST_LINE = 600
+"""Characters of a line of a message; a file has fifty faults at most."""
 WEB = "127.0.0.1:8080"
 """Where ``--web`` without an address serves the web panel."""
 
@@ -85,6 +87,16 @@ def make_app(only: str = "") -> Typer:
     return app
 
 
+def _shortened(text: str) -> str:
+    """A message without the middles of very long lines: a name from a damaged file may have megabytes."""
+    half = _LONGEST_LINE // 2
+    return "\n".join(
+        line if len(line) <= _LONGEST_LINE
+        else f"{line[:half]} ... ({len(line) - 2 * half} more characters) ... {line[-half:]}"
+        for line in text.split("\n")
+    )  # fmt: skip
+
+
 def report_error(error: BaseException, remark: str = "") -> None:
     """Print what failed and what to do next on standard error."""
     # start-up: Ctrl-C ends it quietly from main() on
@@ -93,9 +105,10 @@ def report_error(error: BaseException, remark: str = "") -> None:
 
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with suppress(OSError):  # where standard error cannot be written either, the exit code says it
-        console.print(Text.assemble(("error:", "bold red"), f" {error}" if str(error) else f" {type(error).__name__}"))
+        message = _shortened(str(error)) or type(error).__name__
+        console.print(Text.assemble(("error:", "bold red"), f" {message}"))
         if hint := getattr(error, "hint", ""):
-            console.print(Text.assemble(("try:", "bold"), f" {hint}"))
+            console.print(Text.assemble(("try:", "bold"), f" {_shortened(hint)}"))
         if remark:
             console.print(Text(remark, "dim"))
 

@@ -364,6 +364,15 @@ def test_messages_show_what_was_typed(capsys: pytest.CaptureFixture[str]) -> Non
     assert capsys.readouterr().err == f"error: {typed}\ntry: {typed}\n"
 
 
+def test_a_name_of_megabytes_is_shortened_in_its_middle(capsys: pytest.CaptureFixture[str]) -> None:
+    report_error(ConfigError(f"a.toml: 2 faults\n  {'x' * 600}\n  {'y' * 2_000_000}.step", hint="z" * 601))
+    first, second, third, hint = capsys.readouterr().err.splitlines()
+    assert first == "error: a.toml: 2 faults"
+    assert second.startswith("  xx") and second.endswith(" ... (2 more characters) ... " + "x" * 300)
+    assert third == f"  {'y' * 298} ... (1999407 more characters) ... {'y' * 295}.step"
+    assert hint.endswith(" ... (1 more characters) ... " + "z" * 300)
+
+
 def test_no_words_show_the_help_and_short_help_works(omote: Omote) -> None:
     for words in ((), ("-h",), ("--help",)):
         said = omote(*words)
