@@ -93,7 +93,7 @@ def test_a_net_of_more_points_than_samples_is_mended_between_them():
     rows = np.arange(49).reshape(7, 7)
     faces = np.stack([rows[:-1, :-1], rows[:-1, 1:], rows[1:, 1:], rows[1:, :-1]], axis=-1).reshape(-1, 4)
     mesh = FitMesh(at, faces, at[:, :2] / 100.0 + 0.5, faces.copy(), (), np.zeros((0, 49, 3)))
-    chart = make_chart(mesh, find_islands(mesh), doubt_slivers=True)
+    chart = make_chart(mesh, find_islands(mesh), downweight_slivers=True)
     request = FitRequest(300, coarse=0.1, finest=0.3, neutral_mm=0.2, astray_mm=2.5)
     first = refine._refined(
         mesh, chart, net_at(coarse_places(chart.uv, 0.1), 0.1, chart.cuts, chart.uv), request, Hold(), lambda done: None
