@@ -13,8 +13,8 @@ from pathlib import Path
 
 from surface.base.files import open_file
 
-_LONGEST_STEM = 100
-"""Characters of a file's name that the temporary name repeats, so that it is not longer than a name may be."""
+_LONGEST_STEM, _LONGEST_SUFFIX = 40, 16
+"""Characters of a file's name that the temporary name repeats: of four bytes each, they fit into the 255 of a name."""
 
 
 @contextmanager
@@ -32,7 +32,8 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
         return
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{path.stem[:_LONGEST_STEM]}-{secrets.token_hex(6)}{path.suffix}")
+    suffix = path.suffix if len(path.suffix) <= _LONGEST_SUFFIX else ""
+    temporary = target.with_name(f".{path.stem[:_LONGEST_STEM]}-{secrets.token_hex(6)}{suffix}")
     try:
         # created with the permissions that the system gives new files
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
