@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_LONGEST_STEM = 50
-"""Characters of a file's name, of four bytes at most, that the temporary name repeats: names have 255 bytes at most."""
+_LONGEST_STEM, _LONGEST_SUFFIX = 40, 16
+"""Characters of a file's name that the temporary name repeats: of four bytes each, they fit into the 255 of a name."""
 
 
 @contextmanager
@@ -33,7 +33,8 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
         return
     target = Path(os.path.realpath(path))
-    temporary = target.with_name(f".{path.stem[:_LONGEST_STEM]}-{secrets.token_hex(6)}{path.suffix}")
+    suffix = path.suffix if len(path.suffix) <= _LONGEST_SUFFIX else ""
+    temporary = target.with_name(f".{path.stem[:_LONGEST_STEM]}-{secrets.token_hex(6)}{suffix}")
     try:
         # created with the permissions that the system gives new files
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))

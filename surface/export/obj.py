@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -10,6 +11,7 @@ import numpy as np
 
 from surface.base.arrays import Floats32
 from surface.base.files import open_file
+from surface.base.writing import replacing
 from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
 from surface.export.shapes import ExportPart, export_parts, is_posed
@@ -56,8 +58,11 @@ def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
         for name in shapes:
             moves = np.concatenate([p.displacements.get(name, np.zeros_like(p.vertices)) for p in parts])
             _write(made[2] / f"{name}.obj", [title, *_moved_rows(rows, vertices, moves), *textures, *faces])
+        if shapes:
+            folder.mkdir(exist_ok=True)
         for new in made[:2]:  # everything is complete: replace the old
-            new.replace(path.parent / new.name)
+            with replacing(path.parent / new.name) as beside:
+                shutil.copyfile(new, beside)
         if shapes:
             _replace_shapes(made[2], folder)
     return [path, path.with_suffix(".mtl"), *([folder] if shapes else [])]
@@ -65,7 +70,6 @@ def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
 
 def _replace_shapes(new: Path, folder: Path) -> None:
     """Move new shapes into their folder, and remove older ones that omote wrote there; other files in it stay."""
-    folder.mkdir(exist_ok=True)
     for old in folder.glob("*.obj"):
         if _is_own(old):
             old.unlink()

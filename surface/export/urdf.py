@@ -9,6 +9,7 @@ strips of hair, which are seen from both sides, have both.
 
 from __future__ import annotations
 
+import shutil
 import tempfile
 import xml.etree.ElementTree as ET
 from collections.abc import Mapping
@@ -18,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
+from surface.base.writing import replacing
 from surface.export.exporter import Exporter
 from surface.export.shapes import ExportPart, export_parts, unit
 from surface.export.textures import eye_rings, materials
@@ -80,7 +82,9 @@ def write_urdf(
             corners = (piece.corners() - origins[piece.link]) @ ROS_AXES.T * 1e-3
             (made / piece.file).write_bytes(_stl(corners.astype(np.float32)))
         meshes = [(made / piece.file).replace(folder / piece.file) for piece in pieces]
-        return [(made / path.name).replace(path), *meshes]
+        with replacing(path) as beside:
+            shutil.copyfile(made / path.name, beside)
+        return [path, *meshes]
 
 
 def _pieces(head: Head, pose: Mapping[str, float]) -> list[Piece]:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress, part_of
 from surface.check.overlaps import overlap_notes
 from surface.fit.eyes.colours import paint_layers
@@ -41,7 +42,7 @@ from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.junctions import joined_borders
 from surface.fit.source.layout import open_flat_holes
 from surface.fit.source.load import Loaded, LoadOptions, load_mesh
-from surface.fit.source.mesh import FitMesh, check_manifold, is_mapped
+from surface.fit.source.mesh import SMALL, FitMesh, check_manifold, is_mapped
 from surface.fit.source.names import sources_of
 from surface.fit.source.naming.misnamed import correct_shapes
 from surface.fit.source.naming.shapes import to_arkit
@@ -98,7 +99,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         mesh = prepare(loaded.mesh, recipe)
         plan = recipe_plan(mesh, recipe)
     else:
-        loaded = _repaired(place(loaded))
+        loaded = _repaired(place(loaded), where)
         check_manifold(loaded.mesh, where)
         recipe, (mesh, exchanged) = Recipe([]), correct_shapes(to_arkit(loaded.mesh, loaded.named))
         plan = make_plan(mesh)
@@ -137,10 +138,15 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     return FitResult(head, report, fitted_parts)
 
 
-def _repaired(loaded: Loaded) -> Loaded:
-    """The mesh as a manifold whose pieces share the edges along which they touch, and notes of what that took."""
-    shapes = dict(zip(loaded.mesh.names, loaded.mesh.deltas, strict=True))
-    mesh, joined = joined_borders(loaded.mesh, head_scale(loaded.mesh.vertices, shapes))
+def _repaired(loaded: Loaded, where: str) -> Loaded:
+    """The mesh as a manifold whose pieces share the edges along which they touch, and notes of what that took.
+
+    Raises FitError: the mesh has no height, by which all lengths are judged.
+    """
+    scale = head_scale(loaded.mesh.vertices, dict(zip(loaded.mesh.names, loaded.mesh.deltas, strict=True)))
+    if not scale > SMALL:
+        raise FitError(f"{where}: lies flat: it has no height", hint="say with --up which axis points up, as --up z")
+    mesh, joined = joined_borders(loaded.mesh, scale)
     mesh, notes = repaired(mesh)
     return replace(loaded, mesh=mesh, notes=(*loaded.notes, *joined, *notes))
 

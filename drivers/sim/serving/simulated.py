@@ -237,10 +237,13 @@ class SimulatedBus:
     @property
     def processor_s(self) -> float | None:
         """Processor time that its child process has used, s; None where there is none, or the system does not tell."""
-        if self._child is None or not os.path.exists(f"/proc/{self._child.pid}/stat"):
+        if self._child is None:
             return None
-        with open(f"/proc/{self._child.pid}/stat", encoding="ascii", errors="replace") as file:
-            fields = file.read().rpartition(")")[2].split()
+        try:
+            with open(f"/proc/{self._child.pid}/stat", encoding="ascii", errors="replace") as file:
+                fields = file.read().rpartition(")")[2].split()
+        except OSError:  # it has ended, or the system has no such file
+            return None
         return (int(fields[11]) + int(fields[12])) / float(os.sysconf("SC_CLK_TCK"))
 
     def _start_child(self) -> None:

@@ -131,10 +131,9 @@ def find_contacts(
 
 
 def sample_places(surface: DCPSurface, loop: Floats, depth_mm: float, reach_mm: float) -> Floats:
-    """(2, PRODUCT = "*"  # between the two shapes in the name of a corrective's group
-    COLUMNS, ROWS + FADE_ROWS, 2) in (u, v): from a hole's rim outwards at constant x, upper side first.
+    """(2, COLUMNS, ROWS + FADE_ROWS, 2) in (u, v): from a hole's rim outwards at constant x, upper side first.
 
-        Rows go ``depth_mm`` along the skin, as far as the sides can meet, and FADE_ROWS further over ``reach_mm``.
+    Rows go ``depth_mm`` along the skin, as far as the sides can meet, and FADE_ROWS further over ``reach_mm``.
     """
     rim = surface.evaluate(loop)
     low, high = rim[:, 0].min(), rim[:, 0].max()

@@ -98,9 +98,9 @@ def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, 
     over, left = (
         {key: both.mm2 for key, both in d.turned.items() if key in {w[:2] for w in wanted}} for d in (before, after)
     )
-    gained = all(now[w[:2]] < 0.8 * was[w[:2]] for w in wanted if w[2].endswith("mm"))
+    gained = all(now.get(w[:2], np.inf) < 0.8 * was[w[:2]] for w in wanted if w[2].endswith("mm"))
     gained &= sum(left.values()) <= 0.5 * sum(over.values()) or not any(w[2].endswith("²") for w in wanted)
-    return gained and max(now.values()) <= max(*was.values(), 0.5 * limit)
+    return gained and max(now.values(), default=0.0) <= max([0.5 * limit, *was.values()])
 
 
 def _furthest(dense: DenseErrors) -> dict[tuple[str, str], float]:

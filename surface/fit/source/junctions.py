@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import chain, pairwise
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -23,6 +23,9 @@ from surface.fit.source.mesh import FitMesh, directed_edges, renumbered
 
 NEAR_MM = 0.15  # of a head of usual size: borders so near to each other, at rest and in every shape, are one
 SHEETS = ("skin", "mouth", "tongue")  # materials of what is joined: hairs, lashes and teeth only stand on the skin
+BALL, MOST_BALLS = 20.0, 128  # width of the balls along an edge in which vertices are sought, in NEAR_MM, and how many
+NEIGHBOURS = 33  # a point with the nearest ones that it is compared with: a mesh may have thousands in one place
+_EDGES = 4096  # edges that are looked at in one go
 
 Chains = dict[tuple[int, int], list[int]]  # directed border edge -> the vertices on it, in order
 
@@ -73,11 +76,11 @@ def _welded(mesh: FitMesh, near: float) -> tuple[FitMesh, int]:
     """The mesh with vertices of borders that stay within ``near`` mm of each other as one, and how many went."""
     border = _border(mesh)
     ids = border.vertices()
-    pairs = ids[cKDTree(mesh.vertices[ids]).query_pairs(near, output_type="ndarray")]
+    pairs = ids[_near_pairs(mesh.vertices[ids], near)]
     low, high = _pieces(mesh, border)
     pairs = pairs[_may_meet(mesh, border, pairs[:, 0], low[pairs[:, 1]], high[pairs[:, 1]])]
-    apart = mesh.deltas[:, pairs[:, 0]] - mesh.deltas[:, pairs[:, 1]]
-    pairs = pairs[np.linalg.norm(apart, axis=2).max(axis=0, initial=0.0) <= near]
+    for moves in mesh.deltas:
+        pairs = pairs[np.linalg.norm(moves[pairs[:, 0]] - moves[pairs[:, 1]], axis=1) <= near]
     n = len(mesh.vertices)
     while len(pairs):
         label = connected_components(coo_matrix((np.ones(len(pairs)), pairs.T), shape=(n, n)), directed=False)[1]
@@ -89,6 +92,17 @@ def _welded(mesh: FitMesh, near: float) -> tuple[FitMesh, int]:
             return replace(mesh, vertices=mesh.vertices[used], deltas=mesh.deltas[:, used], faces=faces), n - len(first)
         pairs = pairs[~crowded]
     return mesh, 0
+
+
+def _near_pairs(at: Floats, near: float) -> Ints:
+    """(k, 2) pairs of points (m, 3) within ``near`` of each other; of many in one place only some of the pairs."""
+    distance, other = cKDTree(at).query(
+        at, k=np.arange(1, NEIGHBOURS + 1), distance_upper_bound=np.nextafter(near, np.inf)
+    )
+    own = np.broadcast_to(np.arange(len(at))[:, None], other.shape)
+    close = np.isfinite(distance) & (own != other)
+    pairs: Ints = np.unique(np.sort(np.column_stack([own[close], other[close]]), axis=1), axis=0)
+    return pairs.astype(np.int64)
 
 
 def _crowded(faces: Ints, n: int) -> Ints:
@@ -124,26 +138,46 @@ def _pieces(mesh: FitMesh, border: _Border) -> tuple[Ints, Ints]:
 
 def _chains(mesh: FitMesh, border: _Border, near: float) -> Chains:
     """For every border edge the vertices of other borders that lie on it at rest and in every shape."""
-    ids = border.vertices()
-    a, b = mesh.vertices[border.start], mesh.vertices[border.stop]
-    length = np.linalg.norm(b - a, axis=1)
-    found = cKDTree(mesh.vertices[ids]).query_ball_point(0.5 * (a + b), 0.5 * length + near)
-    edge = np.repeat(np.arange(len(found)), [len(f) for f in found])
-    vertex = ids[np.concatenate([np.asarray(f, np.int64) for f in found])] if len(edge) else ids[:0]
+    ids, out = border.vertices(), Chains()
+    tree = cKDTree(mesh.vertices[ids])
+    length = np.linalg.norm(mesh.vertices[border.stop] - mesh.vertices[border.start], axis=1)
+    long = np.flatnonzero(length > 2.0 * near)  # others have no place that is not at one of their ends
+    for first in range(0, len(long), _EDGES):
+        edge, row = _around(mesh.vertices, border, long[first : first + _EDGES], tree, near)
+        _add_chains(out, mesh, border, edge, ids[row], near)
+    return out
+
+
+def _around(at: Floats, border: _Border, rows: Ints, tree: cKDTree, near: float) -> tuple[Ints, Ints]:
+    """(k,), (k,) pairs of one of the border edges ``rows`` and a point of the tree, of all that are within ``near`` of
+    each other and some more: the points in balls strung along the edges."""
+    start, along = at[border.start[rows]], at[border.stop[rows]] - at[border.start[rows]]
+    length = np.linalg.norm(along, axis=1)
+    count = np.clip(np.ceil(length / max(BALL * near, 1e-9)), 1, MOST_BALLS).astype(np.int64)
+    edge = np.repeat(np.arange(len(rows)), count)
+    share = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[edge]
+    found = tree.query_ball_point(start[edge] + share[:, None] * along[edge], 0.5 * (length / count)[edge] + near)
+    size = [len(f) for f in found]
+    point = np.fromiter(chain.from_iterable(found), np.int64, sum(size))
+    key = np.unique(np.repeat(edge, size) * tree.n + point)
+    return rows[key // max(tree.n, 1)], key % max(tree.n, 1)
+
+
+def _add_chains(out: Chains, mesh: FitMesh, border: _Border, edge: Ints, vertex: Ints, near: float) -> None:
+    """Add to ``out``, of pairs (k,) of an edge and a vertex, those where the vertex lies on the edge."""
     own = (mesh.faces[border.face[edge]] == vertex[:, None]).any(axis=1)
     edge, vertex = edge[~own], vertex[~own]
     meets = _may_meet(mesh, border, vertex, border.piece[edge], border.piece[edge])
     edge, vertex = edge[meets], vertex[meets]
     share = _share(mesh.vertices, border, edge, vertex)
-    inside = (share * length[edge] > near) & ((1.0 - share) * length[edge] > near)
+    length = np.linalg.norm(mesh.vertices[border.stop[edge]] - mesh.vertices[border.start[edge]], axis=1)
+    inside = (share * length > near) & ((1.0 - share) * length > near)
     for at in (mesh.vertices, *mesh.deltas):
         line = at[border.start[edge]] + share[:, None] * (at[border.stop[edge]] - at[border.start[edge]])
         inside &= np.linalg.norm(at[vertex] - line, axis=1) <= near
-    out: Chains = {}
     for k in np.lexsort((share, edge)):
         if inside[k]:
             out.setdefault((int(border.start[edge[k]]), int(border.stop[edge[k]])), []).append(int(vertex[k]))
-    return out
 
 
 def _share(at: Floats, border: _Border, edge: Ints, vertex: Ints) -> Floats:

@@ -95,20 +95,23 @@ class Aligner:
         chosen = np.linspace(0, len(samples.points) - 1, min(TARGETS, len(samples.points))).astype(int)
         self._at, self._out = samples.points[chosen], samples.normals[chosen]
 
-    def search(self, up: Floats | None, forward: Floats | None) -> Similarity:
-        """The best similarity from the scan to the template; ``up`` and ``forward`` are directions, if known."""
+    def search(self, up: Floats | None, forward: Floats | None) -> Similarity | None:
+        """The best similarity from the scan to the template; ``up`` and ``forward`` are directions, if known. None
+        where the scan has no height in any of them."""
         found: list[Similarity] = []
         turns = list(axis_turns(up, forward))
         others = [t for t in tilted_turns() if _agrees(t, up, forward)]
         for more in (turns[:1], turns[1:], others):  # y up and z forward first, as in most files
-            if more and all(s.score > GOOD for s in found):
-                found.append(self._best(more))
-        return min(found, key=lambda s: s.score)
+            if more and all(s.score > GOOD for s in found) and (best := self._best(more)) is not None:
+                found.append(best)
+        return min(found, key=lambda s: s.score, default=None)
 
-    def _best(self, turns: list[Floats]) -> Similarity:
+    def _best(self, turns: list[Floats]) -> Similarity | None:
+        """The best of the similarities that start with some rotations; None where none has a start."""
         starts = [self.refine(s, self._coarse, STEPS) for turn in turns for s in self._starts(turn)]
         starts.sort(key=lambda s: s.score)
-        return min((self.refine(s, self._fine, LAST_STEPS) for s in starts[:KEPT]), key=lambda s: s.score)
+        refined = (self.refine(s, self._fine, LAST_STEPS) for s in starts[:KEPT])
+        return min(refined, key=lambda s: s.score, default=None)
 
     def _starts(self, turn: Floats) -> Iterator[Similarity]:
         """Starts with one rotation, one for each of :data:`EXTENTS`; the foremost point near the middle is the nose."""
@@ -202,7 +205,7 @@ def align(template: Template, samples: Samples, up: Floats | None, forward: Floa
     Raises NoFaceFound: nothing in the scan resembles a face. ``where`` names the scan in the message.
     """
     found = Aligner(template, samples).search(up, forward)
-    if found.score > POOR:
+    if found is None or found.score > POOR:
         hint = (
             f"say where it is: omote landmarks {where} -o landmarks.toml draws a picture to take nose_tip, chin and "
             "the corners of eyes and mouth from, for --landmarks landmarks.toml"

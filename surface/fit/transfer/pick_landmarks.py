@@ -24,6 +24,7 @@ from surface.fit.transfer.template import NAMES, make_template
 from surface.head import Head
 
 MANY = 250_000  # samples of the head once it is found
+LEAST_HEIGHT = 1e-6  # of a mesh that can be drawn, relative to its size
 SLENDER, TOP = (
     3.0,
     0.35,
@@ -59,7 +60,7 @@ def pick_landmarks(
     try:
         found = find_face(scan, template, given, options, str(mesh_path))
     except NoFaceFound as e:
-        view = as_it_stands(scan, options)
+        view = as_it_stands(scan, options, str(mesh_path))
         picture = _write(Path(mesh_path), out, scan, view, {n: Mark(p, "given") for n, p in given.items()}, BY_HAND)
         hint = f"look at {picture}, give their pixels in {out}, and then omote landmarks {mesh_path} -o {out} --keep"
         raise NoFaceFound(f"{e}; {out} has lines for landmarks by hand", hint=hint) from e
@@ -78,13 +79,18 @@ def _in_file(found: Similarity, mark: Mark) -> Floats:
     return place
 
 
-def as_it_stands(scan: Scan, options: LoadOptions) -> Frontal:
-    """The front view of a scan by the given axes, else with y up and z forward; of a whole body only the upper part."""
+def as_it_stands(scan: Scan, options: LoadOptions, where: str) -> Frontal:
+    """The front view of a scan by the given axes, else with y up and z forward; of a whole body only the upper part.
+
+    Raises FitError: it has no height.
+    """
     up = direction("--up", options.up or "y")
     forward = direction("--forward", options.forward or ("z" if abs(up[2]) < 0.5 else "-y"))
     turn = np.array([np.cross(up, forward), up, forward])
     at = scan.vertices[np.unique(scan.triangles)] @ turn.T
     low, high = at.min(axis=0), at.max(axis=0)
+    if not high[1] - low[1] > LEAST_HEIGHT * (high - low).max():
+        raise FitError(f"{where}: lies flat: it has no height", hint="say with --up which axis points up, as --up z")
     if high[1] - low[1] > SLENDER * (high[2] - low[2]):
         low[1] = high[1] - TOP * (high[1] - low[1])
         above = at[at[:, 1] > low[1]]

@@ -122,8 +122,10 @@ def make_scan(vertices: Floats, faces: Ints, where: str) -> Scan:
         raise FitError(f"{where}: all vertices are in one place", hint="export the scan again")
     _, first, original = np.unique(np.round(vertices / (SAME * size)), axis=0, return_index=True, return_inverse=True)
     points, faces = vertices[first], original.reshape(-1)[faces]
-    area = np.linalg.norm(_cross(points, faces), axis=1)
-    return Scan(points, faces[area > (SAME * size) ** 2], original.reshape(-1))
+    whole = np.linalg.norm(_cross(points, faces), axis=1) > (SAME * size) ** 2
+    if not whole.any():
+        raise FitError(f"{where}: all faces are without area", hint="export the scan again")
+    return Scan(points, faces[whole], original.reshape(-1))
 
 
 def _cross(points: Floats, faces: Ints) -> Floats:

@@ -20,7 +20,7 @@ from surface.fit.wardrobe.skin import Skin, unit
 from surface.fit.wardrobe.styles import ACROSS, ALONG, step
 
 Depth = Callable[[Floats], Floats]
-"""How far along a guide a place (n, 3) is, mm: hair is cut where this is 0, and goes on where it is below."""
+"""How much of a guide is left at places (n, 3), mm: hair is cut where this first falls to 0."""
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,19 @@ def test_a_failure_leaves_the_old_file_and_nothing_else(tmp_path: Path) -> None:
     assert path.read_text() == "old" and list(tmp_path.iterdir()) == [path]
 
 
+@pytest.mark.parametrize(
+    "name", ["顔" * 83 + ".json", "a" * 250 + ".json", "take." + "b" * 250, "😀" * 60 + "." + "😀" * 3]
+)
+def test_names_may_be_as_long_as_the_file_system_takes_them(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    try:
+        path.write_text("old")
+    except OSError:
+        pytest.skip("the file system takes no such name")
+    write(path, "new")
+    assert path.read_text() == "new" and list(tmp_path.iterdir()) == [path]
+
+
 @posix
 def test_a_pipe_stays_a_pipe_and_gets_the_content(tmp_path: Path) -> None:
     path, got = tmp_path / "pipe.json", list[str]()

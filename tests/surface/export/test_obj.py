@@ -1,9 +1,12 @@
 """surface.export.obj: trimesh and a few lines of parsing read what was written."""
 
+import os
+
 import numpy as np
 import pytest
 from small_head import small_head
 
+from surface.base.errors import ExportError
 from surface.export import export_head
 from surface.export.shapes import export_parts
 from surface.head import Head
@@ -94,3 +97,26 @@ def test_trimesh_reads_the_same_triangles(tmp_path, head):
     assert area == pytest.approx(wanted, rel=1e-5)
     rest = np.concatenate([p.vertices for p in head.parts])
     np.testing.assert_allclose(scene.bounds, [rest.min(axis=0), rest.max(axis=0)], atol=1e-4)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links and permissions of POSIX")
+def test_links_stay_links_and_files_keep_their_permissions(tmp_path, head):
+    kept = tmp_path / "kept"
+    kept.mkdir()
+    for name in ("h.obj", "h.mtl"):
+        (kept / name).write_text("old")
+        (kept / name).chmod(0o640)
+        (tmp_path / name).symlink_to(kept / name)
+    export_head(head, tmp_path / "h.obj")
+    for name in ("h.obj", "h.mtl"):
+        assert (tmp_path / name).is_symlink() and (kept / name).read_text() != "old"
+        assert (kept / name).stat().st_mode & 0o777 == 0o640
+    assert sorted(p.name for p in kept.iterdir()) == ["h.mtl", "h.obj"]
+
+
+def test_where_shapes_cannot_be_written_the_old_files_stay(tmp_path, head):
+    (tmp_path / "h.obj").write_text("old")
+    (tmp_path / "h_shapes").write_text("a file in the way")
+    with pytest.raises(ExportError, match="cannot be written"):
+        export_head(head, tmp_path / "h.obj")
+    assert (tmp_path / "h.obj").read_text() == "old" and not (tmp_path / "h.mtl").exists()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import xml.etree.ElementTree as ET
 from pathlib import Path
 
@@ -119,3 +120,12 @@ def test_strips_of_hair_have_a_front_on_both_sides_of_the_face(written: list[Pat
         for side in (mesh.triangles_center[:, 1] > 0.0, mesh.triangles_center[:, 1] < 0.0):
             forward = (mesh.face_normals[side, 0] > 0.0).mean()
             assert 0.45 < forward < 0.55
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links of POSIX")
+def test_a_link_stays_a_link(head: Head, tmp_path: Path) -> None:
+    (tmp_path / "kept").mkdir()
+    real = tmp_path / "kept" / "robot.urdf"
+    (tmp_path / "head.urdf").symlink_to(real)
+    write_urdf(head, tmp_path / "head.urdf", {})
+    assert (tmp_path / "head.urdf").is_symlink() and ET.parse(real).getroot().tag == "robot"

@@ -225,3 +225,12 @@ def test_lashes_of_an_exported_head_are_not_cut_into_hairs_again(monkeypatch, ex
     with pytest.raises(RuntimeError, match="far enough"):
         fit_mesh(Loaded(mesh, map_names(mesh.names), exported=exported), "me", lambda *_: None)
     assert combs == [not exported]
+
+
+def test_a_mesh_without_height_is_refused(tmp_path):
+    """Its size is 0, by which everything would be divided."""
+    path = tmp_path / "flat.obj"
+    path.write_text("v 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3 4\n")
+    with pytest.raises(FitError, match=r"flat\.obj: lies flat: it has no height") as caught:
+        fit_head(path, tmp_path / "head", name="flat")
+    assert "--up" in caught.value.hint and list(tmp_path.iterdir()) == [path]

@@ -151,6 +151,17 @@ def test_points_along_a_bent_surface_may_end_a_little_off_it() -> None:
         assert mend._is_better(after, before, wanted, 6.0) == better
 
 
+def test_a_face_of_which_nothing_was_measured_is_mended_by_what_is_inside_out() -> None:
+    """All of it lies in folds."""
+
+    def unmeasured(mm2: float) -> DenseErrors:
+        return replace(over(neutral=mm2), parts={})
+
+    wanted = [("face", "neutral", "40 mm²")]
+    assert mend._is_better(unmeasured(20.0), unmeasured(40.0), wanted, 6.0)
+    assert not mend._is_better(unmeasured(20.1), unmeasured(40.0), wanted, 6.0)
+
+
 def net(count: int = 6, slits: tuple[tuple[float, float, float], ...] = ()) -> SimpleNamespace:
     """As much of a part as points are filled by: a square net over (u, v), 0..1."""
     u, v = (a.ravel() for a in np.meshgrid(*2 * [np.linspace(0, 1, count)], indexing="ij"))

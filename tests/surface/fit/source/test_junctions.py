@@ -1,5 +1,6 @@
 """surface.fit.source.junctions: borders that lie on each other get shared edges, lips that only touch do not."""
 
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -125,3 +126,46 @@ def test_where_welding_would_crowd_an_edge_it_is_left_out():
     mesh.deltas[:] = 0.0
     joined, notes = joined_borders(mesh)
     assert notes == [] and len(joined.vertices) == 16
+
+
+def loose(corners: np.ndarray) -> FitMesh:
+    """A mesh of triangles (t, 3, 3) or quads (t, 4, 3) that share no vertex, of two pieces by turns."""
+    count, size = corners.shape[:2]
+    faces = np.full((count, 4), -1)
+    faces[:, :size] = np.arange(count * size).reshape(count, size)
+    bare = np.zeros((0, 2)), np.full((count, 4), -1), (), np.zeros((0, count * size, 3))
+    return FitMesh(corners.reshape(-1, 3), faces, *bare, np.arange(count) % 2, ("face/skin", "back/skin"))
+
+
+def strands(count: int) -> FitMesh:
+    """Strips as long as a head and 0.5 mm wide, all over it, that do not touch."""
+    y = np.array([[0.0, 0.0], [0.5, 0.0], [0.5, 150.0], [0.0, 150.0]])
+    k = np.arange(count)
+    at = np.column_stack([np.zeros(count), np.zeros(count), k % 50]) + (k // 50)[:, None] * [2.0, 0.0, 0.0]
+    return loose(at[:, None] + np.pad(y, ((0, 0), (0, 1))))
+
+
+@pytest.mark.parametrize("mesh", [strands(3000), loose(np.zeros((3000, 3, 3)))])
+def test_many_long_edges_and_many_vertices_in_one_place_take_little_memory(mesh):
+    tracemalloc.start()
+    try:
+        joined, notes = joined_borders(mesh)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert joined is mesh and notes == []
+    assert most < 200e6
+
+
+@pytest.mark.parametrize("triangles", [0, 1, 2])
+def test_meshes_of_hardly_anything_stay_as_they_are(triangles):
+    corners = np.arange(triangles)[:, None, None] * 5.0 + np.eye(3)
+    mesh = loose(corners)
+    assert joined_borders(mesh) == (mesh, [])
+
+
+def test_long_edges_are_split_at_every_vertex():
+    """An edge that is longer than all balls along it together would be if they had their usual width."""
+    many = np.append(np.arange(0.0, 2000.0, 7.3), 2000.0)
+    mesh = sheets(np.array([0.0, 2000.0]), many)
+    assert open_edges(joined_borders(mesh)[0]) == pytest.approx(4000.0 + 40.0)

@@ -21,6 +21,7 @@ from surface.fit.transfer.align import (
     thinned,
     tilted_turns,
 )
+from surface.fit.transfer.scan import Samples
 
 TURN = Rotation.from_euler("xyz", [12, -8, 20], degrees=True).as_matrix()
 POINTS = np.random.default_rng(0).normal(size=(30, 3)) * [9.0, 5.0, 3.0]
@@ -174,6 +175,7 @@ def test_a_scan_of_any_size_and_place_is_found_and_its_score_says_so(face) -> No
     tilt = Rotation.from_euler("xyz", [8, -6, 5], degrees=True).as_matrix()
     moved = replace(made, points=0.001 * made.points @ tilt + shift, normals=made.normals @ tilt)
     found = Aligner(face, moved).search(Y, Z)
+    assert found is not None
     assert found.scale == pytest.approx(1000, rel=0.02) and found.score < module.GOOD
     assert np.linalg.norm(found.points(moved.points) - made.points, axis=1).mean() < 3.0
 
@@ -217,3 +219,12 @@ def test_a_poor_score_is_no_face(face, monkeypatch) -> None:
     with pytest.raises(FitError, match=r"x\.ply: no face") as caught:
         align(face, made_face.samples(100), None, None, "x.ply")
     assert "--landmarks" in str(caught.value.hint)
+
+
+@pytest.mark.parametrize(("up", "forward"), [(Y, Z), (Y, None), (None, None)])
+def test_a_sheet_that_lies_flat_has_no_face(face, up, forward) -> None:
+    x, z = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, 12), np.linspace(0, 1, 12)))
+    points = np.column_stack([x, 0.0 * x, z])
+    flat = Samples(points, np.tile(Y, (len(x), 1)), np.zeros(len(x), bool))
+    with pytest.raises(FitError, match=r"flat\.obj: no face was found"):
+        align(face, flat, up, forward, "flat.obj")

@@ -102,6 +102,14 @@ def test_nothing_is_overwritten_unasked_and_files_are_toml(scan_file, known, tmp
     assert not list(tmp_path.glob(".marks*"))
 
 
+def test_a_sheet_that_lies_flat_is_refused():
+    flat = make_scan(np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 1]]), np.array([[0, 1, 2]]), "flat.obj")
+    with pytest.raises(FitError, match=r"flat\.obj: lies flat") as caught:
+        pick_landmarks.as_it_stands(flat, LoadOptions(), "flat.obj")
+    assert "--up" in caught.value.hint
+    pick_landmarks.as_it_stands(flat, LoadOptions(up="z", forward="y"), "flat.obj")
+
+
 def test_a_scan_shows_nothing_beside_it(face):
     scan = make_scan(face.points, face.triangles, "x")
     view = pick_landmarks.view_of(Similarity(np.eye(3), 1.0, np.zeros(3)), np.array(list(face.landmarks.values())))

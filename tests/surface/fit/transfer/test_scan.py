@@ -57,6 +57,7 @@ def test_an_obj_file_needs_no_texture_coordinates_and_objects_can_be_left_out(tm
         ("a.ply", "ply\nformat ascii 1.0\nelement vertex 9\n", "damaged"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no faces"),
         ("a.obj", "v 2 2 2\nv 2 2 2\nv 2 2 2\nf 1 2 3\n", "in one place"),
+        ("a.obj", "v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n", "without area"),
     ],
 )
 def test_what_is_no_scan_is_refused_by_name(tmp_path, name, text, message):
