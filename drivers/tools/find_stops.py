@@ -22,6 +22,7 @@ from drivers.core.scale import Scale
 from drivers.dynamixel.registers import Registers as Registers2
 from drivers.dynamixel.sdk import Packets
 from drivers.dynamixel.startup import MAX_OFFSET, REVERSE, TIME_PROFILE, TORQUE_BY_GOAL
+from drivers.dynamixel.telemetry import TRIPPED_VALUES
 from drivers.port.serialport import SerialPort
 from drivers.protocol1.exchange import Exchanges
 from drivers.protocol1.registers import Registers as Registers1
@@ -210,8 +211,7 @@ class _Search:
             self._change("goal_current", self._allowed)
             self._change("speed_limit", self._steps("speed_limit", 2.0 * FAST_RAD_S))
             self._change("accel_limit", 0)
-            self._registers.put(self._id, "watchdog", 0)
-            self._registers.put(self._id, "watchdog", WATCHDOG_STEPS)
+            self._arm()
             return
         full = item_of(self._table, "torque_limit").maximum or 1000  # type: ignore[union-attr]
         self._allowed = max(round(self._torque * full), 1)
@@ -280,7 +280,9 @@ class _Search:
             is_far = lead >= 0.99 * min(LEAD_RAD / tick, side * (end - position))
             idle = [*idle, now] if still and is_far else []
             if len(idle) > IDLE_STEPS and now - idle[0] > IDLE_S:
-                raise self._stuck()
+                if not self._rearmed():
+                    raise self._stuck()
+                idle.clear()
             ahead = min(side * (goal - position) + speed_rad_s * PERIOD_S / tick, LEAD_RAD / tick)
             goal = side * min(side * (position + side * ahead), side * end)
 
@@ -289,6 +291,17 @@ class _Search:
         ticks = [position for _, position in seen]
         long_enough = now - seen[0][0] > 0.7 * STILL_S
         return long_enough and (max(ticks) - min(ticks)) * self._table.rad_per_tick <= STILL_RAD
+
+    def _rearmed(self) -> bool:
+        """Whether the bus watchdog had tripped, since the computer was busy for half a second: goals count again."""
+        if item_of(self._table, "watchdog") is None or self._registers.get(self._id, "watchdog") not in TRIPPED_VALUES:
+            return False
+        self._arm()
+        return True
+
+    def _arm(self) -> None:
+        self._registers.put(self._id, "watchdog", 0)
+        self._registers.put(self._id, "watchdog", WATCHDOG_STEPS)
 
     def _stuck(self) -> DriverError:
         label = self._registers.label(self._id)
@@ -306,6 +319,7 @@ class _Search:
             position, _ = self._step(round(goal))
             if abs(position - target) * tick < NEAR_RAD:
                 return
+        self._rearmed()
 
     def _step(self, goal: int) -> tuple[int, int]:
         """Send a goal, wait for one period, and read position and current (or load), both in steps."""

@@ -66,7 +66,7 @@ def test_a_grab_counts_that_was_made_while_points_got_ready(
         assert ready.wait(60.0)
         return handles._model
 
-    monkeypatch.setattr("controller.face.point_editing._Model", model)
+    monkeypatch.setattr("controller.face.skin_model.SkinModel", model)
     editor = PointEditor(head, SkinModels(lambda: head, P))
     x, y = pixel(screen, CORNER)
     assert editor.take((x, y), screen, values) and editor.dragging

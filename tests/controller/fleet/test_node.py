@@ -197,6 +197,7 @@ def test_own_layers_are_mixed_before_a_head_goes_over_to_them(hub: str, tmp_path
     """Also where the tick at which the conductor is missed is so long that it would have gone over within it."""
     more = {"folder": tmp_path, "prefix": f"over{role}", "lease_ms": 1000.0}
     with Running(hub, "conductor", **more) as first:
+        until(lambda: first.node.lease.active)
         first.states["maple"].set_parameters([JAW], [0.9], time.monotonic_ns())
         with Running(hub, role, seed=9, **more) as other:
             until(lambda: other.node.followers["maple"].conducted and other.rows["maple"][-1][JAW] > 0.85)

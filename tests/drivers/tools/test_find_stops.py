@@ -66,6 +66,18 @@ def test_both_stops_are_found_within_a_degree_and_all_is_as_before(model: str, r
     assert bus.servo(3).position_ticks == pytest.approx(here, abs=25)
 
 
+@pytest.mark.parametrize("model", ["xl330-m288", "xm430-w350"])
+def test_a_watchdog_that_trips_while_the_computer_is_busy_is_armed_again(model: str) -> None:
+    spec = servo(model)
+    bus = wire(spec)
+    before = registers(bus)
+    found = search(bus, spec, progress=lambda text: bus.clock.sleep(1.0))
+    assert found.low_rad is not None and found.high_rad is not None
+    stops = [math.degrees(found.low_rad), math.degrees(found.high_rad)]
+    assert stops == pytest.approx([angle_deg(step) for step in STOPS], abs=1.0)
+    assert not bus.servo(3).torque and registers(bus) == before
+
+
 def test_the_current_stays_at_the_limit_that_was_asked_for() -> None:
     spec = servo("xm430-w350")
     bus = wire(spec)
