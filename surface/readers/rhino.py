@@ -28,12 +28,14 @@ from .common import LeaveOut, Location, NamedSurface, read_bytes
 from .trimloops import TrimEdge, loop_over, polyline
 
 PATIENCE_S, BYTES_PER_S = 0.7, 20e6  # of processor time, and how much more for large files
+MOST_BYTES, GROWTH = 300_000_000, 40  # of memory, and how much more for each byte of the file, which may be compressed
 TRIAL = """
 import sys, rhino3dm
 try:
-    import signal
+    import resource, signal
     signal.setitimer(signal.ITIMER_PROF, float(sys.argv[1]))
-except (ImportError, AttributeError):
+    resource.setrlimit(resource.RLIMIT_DATA, (int(sys.argv[2]), int(sys.argv[2])))
+except (ImportError, AttributeError, OSError, ValueError):
     pass
 sys.exit(rhino3dm.File3dm.FromByteArray(sys.stdin.buffer.read()) is None)
 """
@@ -69,10 +71,11 @@ def _refuse(error: SurfaceFileError) -> None:
 
 def _is_readable(data: bytes) -> bool:
     """Whether openNURBS comes to an end with it: damaged files can keep it busy for ever, and nothing but the end of
-    its process stops it. So another process reads it first, within a limit of processor time.
+    its process stops it, and others make it ask for gigabytes. So another process reads it first, within limits of
+    processor time and memory.
     """
     seconds = PATIENCE_S + len(data) / BYTES_PER_S
-    command = [sys.executable, "-P", "-c", TRIAL, str(seconds)]
+    command = [sys.executable, "-P", "-c", TRIAL, str(seconds), str(MOST_BYTES + GROWTH * len(data))]
     try:
         trial = subprocess.run(command, input=data, capture_output=True, timeout=30 * seconds, check=False)
     except subprocess.TimeoutExpired:

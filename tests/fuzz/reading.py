@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -73,6 +74,12 @@ def quickened() -> Iterator[None]:
         yield
 
 
+def _data_bytes() -> int:
+    """Bytes of memory that this process has of its own (proc(5), VmData in kB)."""
+    lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmData"))
+
+
 def _tried_in_fork(data: bytes) -> bool:
     """As the reader's own trial, in a process that need not start the interpreter."""
     import rhino3dm
@@ -82,6 +89,8 @@ def _tried_in_fork(data: bytes) -> bool:
         code = 1
         try:
             signal.setitimer(signal.ITIMER_PROF, rhino.PATIENCE_S + len(data) / rhino.BYTES_PER_S)
+            most = _data_bytes() + rhino.MOST_BYTES + rhino.GROWTH * len(data)
+            resource.setrlimit(resource.RLIMIT_DATA, (most, most))
             code = int(rhino3dm.File3dm.FromByteArray(data) is None)
         finally:
             os._exit(code)

@@ -266,6 +266,18 @@ def test_what_keeps_opennurbs_busy_is_refused_within_a_limit(
         read_surface(tmp_path / "a.3dm")
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems do not bound the memory of a process so")
+def test_what_makes_opennurbs_ask_for_gigabytes_is_refused_within_a_limit(
+    tmp_path: Path, rhino: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    saved(tmp_path, rhino, net(rhino))
+    assert read_surface(tmp_path / "a.3dm")
+    asks = "held = bytes(int(sys.argv[2]) + 1)\n"
+    monkeypatch.setattr(reader, "TRIAL", reader.TRIAL.replace("sys.exit", asks + "sys.exit"))
+    with pytest.raises(SurfaceFileError, match="is no openNURBS file, or a damaged one"):
+        read_surface(tmp_path / "a.3dm")
+
+
 def test_a_crash_of_opennurbs_ends_only_the_trial(tmp_path: Path, rhino: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     saved(tmp_path, rhino, net(rhino))
     monkeypatch.setattr(reader, "TRIAL", "import os; os.abort()")
