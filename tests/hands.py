@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import ctypes.util
+import json
 import os
 import sys
 import time
@@ -174,3 +175,16 @@ class Hands:
 
         yield from self.frames(3)
         ImageGrab.grab(xdisplay=os.environ["DISPLAY"]).save(self.folder / f"{name}.png")
+
+
+def run_script(script: Callable[[Hands], Steps], *words: str) -> None:
+    """Run a script in the window of a command, in the process of that window, in the folder ``OMOTE_TEST_FOLDER``.
+
+    What it reports goes to report.json there, also where it fails.
+    """
+    os.chdir(folder := Path(os.environ["OMOTE_TEST_FOLDER"]))
+    hands = Hands(folder)
+    try:
+        hands.run(script, words)
+    finally:
+        Path("report.json").write_text(json.dumps(hands.report), encoding="utf-8")

@@ -20,16 +20,19 @@ if TYPE_CHECKING:
     import zenoh  # optional: the extra zenoh
 
 _CLOCK_S, _OFTEN_S = 1.0, 0.1
-"""Between two questions for the time: of a clock that is known, and of one that is new."""
+"""Seconds between two questions for the time: of a clock that is known, and of one that is new."""
 _KNOWN = 8
-"""After so many answers a clock is known."""
+"""Answers after which a clock is known."""
 _CROSSED = 3
-"""So often an answer is left out because a command came while it was under way, which it may not have in it."""
+"""Most answers in a row that are left out because a command came while they were under way, which they may lack."""
 
 
 class Asking:
-    """Of a process that follows. heads : into whose layers what was commanded is taken over; none for who never
-    conducts. events : how many commands of each were heard as they took effect."""
+    """The questions of a process that follows a conductor.
+
+    heads : layers by the name of the head, which take over what was commanded; empty for a process that never
+    conducts. events : how many commands of each head were heard as they took effect.
+    """
 
     def __init__(
         self, wire: Wire, clocks: Clocks, lease: Lease, heads: Mapping[str, CommandState], events: Mapping[str, int]

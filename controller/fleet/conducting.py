@@ -1,4 +1,4 @@
-"""What a conductor does beside mixing: it holds the lease, sends faces, takes commands and tells what took effect."""
+"""What a conductor does beside mixing: it holds the lease, sends faces, takes commands and reports what took effect."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _BEATS = 5
 
 
 class Conducting:
-    """Of a process that conducts, or stands by to do so.
+    """The lease, faces and commands of a process that conducts, or stands by to do so.
 
     heads : the layers by name. events : counts commands of another conductor that were heard as they took effect, by
     head.
@@ -67,7 +67,7 @@ class Conducting:
         self.sender.send(head, now_ns, values, stamp_ns)
 
     def close(self) -> None:
-        """Tell nothing any more."""
+        """Report no more commands."""
         for state in self._heads.values():
             state.on_event = None
 

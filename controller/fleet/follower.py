@@ -18,7 +18,7 @@ _SHARE = 0.6
 the sources themselves; the limiter behind it holds them in any case."""
 _SHORTEST_S = 0.3
 _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
-"""Of the minimum-jerk curve over one second."""
+"""Greatest speed (1/s) and acceleration (1/s²) of the minimum-jerk curve from 0 to 1 over one second."""
 _GAP_NS, _STEP_NS = 45_000_000, 110_000_000
 """What comes after a longer gap in which faces were lost, or was mixed after a longer step, is not shown at once: it
 can be far away by then."""

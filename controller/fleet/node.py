@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 _STANDBY_TICKS = 5
 _STATE_S, _HOUSE_S = 0.2, 0.05
 _FIRST_S = 1.0
-"""So much longer one waits that has just started, before it conducts."""
+"""Seconds that a process which has just started waits longer before it conducts."""
 _MARGIN_NS = 2_000_000
 """So long after a face is due it is shown: a conductor's ticks begin late now and then, and a face that is due a little
 after a tick would wait for the next one."""

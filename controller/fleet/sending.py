@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import zenoh  # optional: the extra zenoh
 
 FEW = 3
-"""So many heads, or fewer, are sent whether or not somebody is known to listen."""
+"""Most heads of a stage whose faces are sent whether or not somebody is known to listen."""
 FIRST_S = 3.0
 """So long after it has begun to conduct, a process sends everything whether or not somebody is known to listen."""
 Heading = Callable[[int, int, int], Header]

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 _CONNECT_MS = 20_000
 """A client waits so long for its router; afterwards whoever started it hears what is missing."""
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
-"""Between two tries to reach a router that has gone; Zenoh's own would grow to 4 s."""
+"""Longest pause between two tries to reach a router that has gone; Zenoh's own would grow to 4 s."""
 _OPEN_MS = 2_000
-"""So long a router may take to greet; Zenoh's own 10 s are lost on one that takes a connection while it ends."""
+"""Longest time that a router may take to greet; Zenoh's 10 s are lost on one that takes a connection while it ends."""
 _NO_ROUTER_HINT = "start a router there, as zenohd -l tcp/0.0.0.0:7447, or correct [zenoh] connect"
 
 

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 class States:
-    """Of the heads of a process, whose layers are ``heads`` and whose faces come through ``followers``."""
+    """The states of the heads of a process, whose layers are ``heads`` and whose faces come through ``followers``."""
 
     def __init__(
         self, wire: Wire, settings: ZenohSettings, heads: Mapping[str, CommandState],

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 from controller.base.paths import config_dir
@@ -115,7 +114,7 @@ class Looks:
         return with_picture(stage, wanted)
 
 
-def person_names(beside: Path | None = None) -> list[str]:
+def person_names() -> list[str]:
     """Names of the shipped persons."""
     return sorted(path.stem for path in (config_dir() / "persons").glob("*.toml"))
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import time
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.controller.panels.window.test_face import on_a_display, shown
-from tests.hands import Hands, Steps
+from tests.hands import Hands, Steps, run_script
 
 STAGE = 'name = "small"\n[face]\nsize = [960, 720]\nquality = "fast"\n'
 PROGRAM = "from tests.controller.panels.window.test_pulling import main; main()"
@@ -114,13 +113,7 @@ def script(hands: Hands) -> Steps:
 
 def main() -> None:
     """Run in the process of the window."""
-    folder = Path(os.environ["OMOTE_TEST_FOLDER"])
-    os.chdir(folder)
-    hands = Hands(folder)
-    try:
-        hands.run(script, ["edit", str(folder / "stage.toml"), "--seconds", "230"])
-    finally:
-        (folder / "told.json").write_text(json.dumps(hands.report), encoding="utf-8")
+    run_script(script, "edit", "stage.toml", "--seconds", "230")
 
 
 @pytest.mark.slow
@@ -132,7 +125,7 @@ def test_what_is_grabbed_follows_the_pointer_on_one_side_or_both_and_is_undone_t
     monkeypatch.setenv("OMOTE_TEST_FOLDER", str(tmp_path))
     monkeypatch.setenv("OMOTE_STATE", str(tmp_path / "state"))
     shown(PROGRAM)
-    told = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
+    told = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert told["face"] < 1.0  # mm between the pointer and the grabbed point
     for name in ("one", "both"):
         found = told[name]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import shutil
 import subprocess
 import sys
@@ -13,7 +12,7 @@ import pytest
 
 from controller.base.paths import find_config
 from tests.controller.panels.window.test_face import on_a_display, shown
-from tests.hands import Hands, Steps
+from tests.hands import Hands, Steps, run_script
 
 STAGE = 'name = "{name}"\n[face]\nsize = [640, 480]\nquality = "fast"\n'
 PROGRAM = "from tests.controller.panels.window.test_real_drops import main; main()"
@@ -49,12 +48,7 @@ def script(hands: Hands) -> Steps:
 
 def main() -> None:
     """Run in the process of the window."""
-    folder = Path(os.environ["OMOTE_TEST_FOLDER"])
-    hands = Hands(folder)
-    try:
-        hands.run(script, ["run", str(folder / "stage.toml"), "--seconds", "200"])
-    finally:
-        (folder / "told.json").write_text(json.dumps(hands.report), encoding="utf-8")
+    run_script(script, "run", "stage.toml", "--seconds", "200")
 
 
 @pytest.mark.slow
@@ -69,7 +63,7 @@ def test_what_another_program_drops_on_the_window_is_loaded(tmp_path: Path, monk
     monkeypatch.setenv("OMOTE_TEST_FOLDER", str(tmp_path))
     monkeypatch.setenv("OMOTE_STATE", str(tmp_path / "state"))
     shown(PROGRAM)
-    told = json.loads((tmp_path / "told.json").read_text(encoding="utf-8"))
+    told = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert told["windows"] == 2 and told["head"] == str(tmp_path / "head")
     assert told["jobs"] == ["fitting m.obj"]
     (problem,) = told["problems"]  # of the last file alone: what is cancelled is no problem
