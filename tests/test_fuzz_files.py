@@ -16,11 +16,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.fuzz import structures
 from tests.fuzz.corpus import Kind
 from tests.fuzz.files import Fuzzer, Turn, turns_of
 from tests.fuzz.guided import Target
 from tests.fuzz.mutators import mutate
-from tests.fuzz.structures import change_tree, damage_arrays
+from tests.fuzz.structures import change_tree, damage_arrays, damage_tree
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_S = 0.4
@@ -133,6 +134,17 @@ def test_structures_stay_sound_and_the_same_seed_gives_the_same_damage() -> None
     assert sound > 100
     tree = json.loads(data)
     assert change_tree(tree, random.Random(1)) != tree == json.loads(data)
+
+
+def test_copies_of_copies_do_not_fill_the_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    data = json.dumps({"a": [["x" * 3000]]}).encode()
+
+    def longest() -> int:
+        return max(len(damage_tree(data, random.Random(k)) or b"") for k in range(500))
+
+    assert longest() > 1_000_000  # a list with a thousand copies
+    monkeypatch.setattr(structures, "LARGEST", 100_000)
+    assert longest() < 200_000
 
 
 def test_arrays_of_every_shape_can_be_damaged() -> None:

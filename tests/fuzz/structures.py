@@ -26,6 +26,8 @@ VALUES: tuple[Any, ...] = (
     *([], [[]], [0] * 300, [[0.0, 0.0]], ["x"], [1, "x"], {}, {"x": 1}, {"": {}}),
 )
 NOTHING: Any = object()
+LARGEST = 8_000_000
+"""Characters of a damaged file, about: thousands of copies of thousands of copies would fill the memory."""
 
 
 def change_tree(tree: Any, draw: random.Random, values: tuple[Any, ...] = VALUES) -> Any:
@@ -56,6 +58,19 @@ def _places(tree: Any) -> list[tuple[Any, Any]]:
         found += [(each, key) for key in keys]
         left += [each[key] for key in keys]
     return found
+
+
+def _size(tree: Any) -> int:
+    """About how many characters a tree takes when it is written."""
+    size, left = 0, [tree]
+    while left and size <= LARGEST:
+        each = left.pop()
+        if isinstance(each, dict):
+            left += [*each.keys(), *each.values()]
+        elif isinstance(each, list):
+            left += each
+        size += len(each) if isinstance(each, str) else 8
+    return size
 
 
 def _changed(old: Any, draw: random.Random, values: tuple[Any, ...], places: list[tuple[Any, Any]]) -> Any:
@@ -115,7 +130,10 @@ def damage_tree(data: bytes, draw: random.Random) -> bytes | None:
     if write is None:
         return None
     for _ in range(draw.choice((1, 1, 1, 2, 3))):
-        tree = change_tree(tree, draw)
+        changed = change_tree(tree, draw)
+        if _size(changed) > LARGEST:
+            break
+        tree = changed
     try:
         return write(tree)
     except (TypeError, ValueError, AttributeError):  # TOML cannot say it
