@@ -105,6 +105,16 @@ def measure_dense(
     )  # fmt: skip
 
 
+def with_fit_alone(
+    dense: DenseErrors, head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart]
+) -> DenseErrors:  # fmt: skip
+    """The errors of a head, and the greatest of what was fitted alone, without contacts; arguments as of
+    :func:`measure_dense`."""
+    if not head.contacts:
+        return dense
+    return replace(dense, apart=measure_dense(replace(head, contacts=[]), mesh, sources, parts).worst)
+
+
 def without_correctives(head: HeadData) -> tuple[HeadData, list[str]]:
     """The head without its correctives, and the shapes that these change when they are shown alone."""
     rules = [r for r in head.rules if PRODUCT in r.group]

@@ -108,6 +108,8 @@ class DenseErrors:
     sticking : by part and shape, (k, 2) in (u, v): vertices of the surface that are further from the mesh than a limit.
     turned : by part and shape, the area that is inside out.
     corrected : shapes that correctives of the head change on purpose; they were measured without these.
+    apart : the greatest outside folds without contacts, which move lips, lids and tongue on purpose where the mesh's
+        pass through each other or an eyeball.
     """
 
     parts: dict[str, dict[str, Both]]
@@ -119,10 +121,13 @@ class DenseErrors:
     sticking: dict[tuple[str, str], Floats] = field(default_factory=dict)
     turned: dict[tuple[str, str], Turned] = field(default_factory=dict)
     corrected: tuple[str, ...] = ()
+    apart: Spot | None = None
 
     def lines(self) -> list[str]:
         """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
         out = [f"greatest error {self.worst}"] if self.worst else []
+        if self.worst and self.apart and self.apart.mm < self.worst.mm:
+            out.append(f"without contacts, which keep lips, lids and tongue from passing through: {self.apart}")
         if self.worst_fold:
             out.append(f"in folds (nostrils, ear canals, corners), which are held only loosely: {self.worst_fold}")
         if self.corrected:

@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surface.fit.measures.dense import measure_dense
+from surface.fit.api import fit_mesh
+from surface.fit.measures.dense import measure_dense, with_fit_alone
 from surface.fit.measures.mend import faults_of
 from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import FitResult
 from surface.fit.reportfile import as_markdown, as_table
+from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
-from surface.fit.source.names import sources_of
+from surface.fit.source.names import map_names, sources_of
 from surface.head.model.data import Group, Rule
 from surface.head.model.parameters import SHAPES
 
@@ -115,3 +117,21 @@ def test_it_stands_in_both_reports(result: FitResult) -> None:
     text = as_markdown(result.report, nets, [])
     assert f"greatest error {worst['mm']:.2f} mm: " in text and worst["place"] in text
     assert "| surface to mesh |" in text and "| mesh to surface |" in text
+
+
+@pytest.mark.slow
+def test_what_contacts_move_on_purpose_is_told_from_errors_of_the_fit(mesh: FitMesh) -> None:
+    """The lower lip of a shape goes up through the upper one; contacts keep them apart, the fit follows the mesh."""
+    through = -2.0 * mesh.deltas[:1]
+    crossing = replace(mesh, names=(*mesh.names, "mouthShrugLower"), deltas=np.concatenate([mesh.deltas, through]))
+    dense = fit_mesh(Loaded(crossing, map_names(crossing.names)), "sheet", lambda part, done: None).report.dense
+    assert dense.worst.shape == "mouthShrugLower" and dense.worst.mm > 3.0
+    assert dense.apart.mm < 0.4 * dense.worst.mm
+    assert dense.lines()[1] == f"without contacts, which keep lips, lids and tongue from passing through: {dense.apart}"
+
+
+@pytest.mark.slow
+def test_without_contacts_there_is_one_greatest_error(result: FitResult, mesh: FitMesh) -> None:
+    dense, head = result.report.dense, replace(result.head, contacts=[])
+    assert with_fit_alone(dense, head, mesh, sources_of(mesh.names), result.parts) is dense
+    assert not any("without contacts" in line for line in dense.lines())
