@@ -28,10 +28,10 @@ WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT2": 4, "MAT3": 9, "M
 # change colours, light, sound, bones or tables of other programs, and leave the mesh as it is.
 REFUSED = {
     "KHR_draco_mesh_compression": ("Draco compression", "uncompress it: npx @gltf-transform/cli cp IN.glb OUT.glb"),
-    "EXT_meshopt_compression": ("meshopt compression", "uncompress it: npx gltfpack -noq -i IN.glb -o OUT.glb"),
-    "KHR_meshopt_compression": ("meshopt compression", "uncompress it: npx gltfpack -noq -i IN.glb -o OUT.glb"),
     "EXT_mesh_gpu_instancing": ("copies of one mesh", "export every copy as a mesh of its own"),
 }
+MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
+UNCOMPRESS = "uncompress it: npx gltfpack -noq -i IN.glb -o OUT.glb"
 MOST_ELEMENTS = 4_000_000  # of one accessor
 MOST_ITEMS = 10_000  # nodes, accessors and so on
 
@@ -47,6 +47,7 @@ class Gltf:
     def __init__(self, path: Path) -> None:
         self.path = path
         self._buffers: dict[int, bytes] = {}
+        self._unpacked: dict[int, bytes] = {}
         raw = read_bytes(path)
         binary = raw.startswith(MAGIC)
         if not binary and raw.lstrip()[:1] != b"{":
@@ -164,11 +165,7 @@ class Gltf:
         index = table["bufferView"]
         view = self.item("bufferViews", index, name)
         where = f"bufferViews[{index}]"
-        start = self._length(view, "byteOffset", where, 0)
-        size = self._length(view, "byteLength", where)
-        data = self._buffer(view.get("buffer"), where)
-        if start + size > len(data):
-            raise self.error(where, f"ends at byte {start + size}, but the buffer has {len(data)}: it is cut short")
+        data, start, size = self._span(view, index, where)
         offset, each = self._length(table, "byteOffset", name, 0), kind.itemsize * width
         stride = self._length(view, "byteStride", where, 0) or each
         if stride < each or (count and offset + stride * (count - 1) + each > size):
@@ -207,12 +204,43 @@ class Gltf:
 
     def view_bytes(self, index: Any, where: str) -> bytes:
         """The bytes of a buffer view."""
-        view, name = self.item("bufferViews", index, where), f"bufferViews[{index}]"
-        start, size = self._length(view, "byteOffset", name, 0), self._length(view, "byteLength", name)
-        data = self._buffer(view.get("buffer"), name)
-        if start + size > len(data):
-            raise self.error(name, f"ends at byte {start + size}, but the buffer has {len(data)}: it is cut short")
+        data, start, size = self._span(self.item("bufferViews", index, where), index, f"bufferViews[{index}]")
         return data[start : start + size]
+
+    def _span(self, view: dict[str, Any], index: int, where: str) -> tuple[bytes, int, int]:
+        """Bytes that hold a buffer view, where in them it starts, and its length."""
+        extensions = self.value(view, "extensions", dict, where, {})
+        for name in MESHOPT:
+            if name in extensions:
+                data = self._decompressed(self.value(extensions, name, dict, where), index, f"{where}.{name}")
+                return data, 0, len(data)
+        return self._stored(view, where)
+
+    def _stored(self, view: dict[str, Any], where: str) -> tuple[bytes, int, int]:
+        """The buffer that a view lies in, where in it the view starts, and its length."""
+        start, size = self._length(view, "byteOffset", where, 0), self._length(view, "byteLength", where)
+        data = self._buffer(view.get("buffer"), where)
+        if start + size > len(data):
+            raise self.error(where, f"ends at byte {start + size}, but the buffer has {len(data)}: it is cut short")
+        return data, start, size
+
+    def _decompressed(self, packed: dict[str, Any], index: int, where: str) -> bytes:
+        """The bytes of a buffer view that meshopt has compressed."""
+        if index in self._unpacked:
+            return self._unpacked[index]
+        count, stride = self._length(packed, "count", where), self._length(packed, "byteStride", where)
+        if count > MOST_ELEMENTS or count * stride + sum(map(len, self._unpacked.values())) > DATA_LIMIT:
+            raise self.error(where, f"holds {count} elements of {stride} bytes: too many", "export the head alone")
+        data, start, size = self._stored(packed, where)
+        mode = self.value(packed, "mode", str, where)
+        filtered = self.value(packed, "filter", str, where, "NONE")
+        from surface.readers.meshopt import decode_view  # most files need no numba to be read
+
+        try:
+            self._unpacked[index] = decode_view(data[start : start + size], mode, filtered, count, stride)
+        except ValueError as e:
+            raise self.error(where, str(e), UNCOMPRESS) from e
+        return self._unpacked[index]
 
     def _load(self, uri: Any, where: str, index: int) -> bytes:
         """The bytes of a buffer: the binary chunk, a data URI, or a file in the folder of this one."""

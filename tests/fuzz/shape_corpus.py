@@ -20,7 +20,7 @@ from surface.readers.plain import write_surfaces
 from tests.fuzz import scans
 from tests.fuzz.kind import FIT, FIT_S, Kind
 from tests.fuzz.reading import reports
-from tests.surface.meshfiles import GlbBuilder, glb, write_obj
+from tests.surface.meshfiles import GlbBuilder, glb, meshopt_compressed, write_obj
 from tests.surface.readers.test_gismo import geometry, hierarchy, tensor
 from tests.surface.readers.test_tsm import Writer, cells
 from tests.surface.small_head import sheet
@@ -91,11 +91,12 @@ def _meshes(folder: Path) -> list[Kind]:
         names=np.array(grid.names), deltas=grid.deltas,
     )  # fmt: skip
     small = glb(replace(grid))
+    glbs = [small.bytes(), glb(grid, sparse=True).bytes(), meshopt_compressed(small).bytes()]
     whole, shape = (folder / "mesh.obj").read_bytes(), (folder / "shapes" / "jawOpen.obj").read_bytes()
     read = reports(load_mesh)
     return [
         Kind("obj", "mesh.obj", [whole], read, words=FIT, most_s=FIT_S),
-        Kind("glb", "mesh.glb", [small.bytes(), glb(grid, sparse=True).bytes()], read, words=FIT, most_s=FIT_S),
+        Kind("glb", "mesh.glb", glbs, read, words=FIT, most_s=FIT_S),
         Kind("gltf", "mesh.gltf", [_gltf(small), _gltf(glb(grid, sparse=True))], read, words=FIT, most_s=FIT_S),
         Kind("npz", "mesh.npz", [(folder / "mesh.npz").read_bytes()], read, words=FIT, most_s=FIT_S),
         Kind("shape", "shapes/jawOpen.obj", [shape], reports(_with_shapes), {"mesh.obj": whole},
