@@ -86,15 +86,14 @@ class Openings:
 
     def __init__(self, parts: Sequence[ViewPart], read: Read = lambda part, ids: part.vertices[ids]) -> None:
         self._read = read
-        self._skin = max((p for p in parts if p.material == "skin"), key=lambda p: len(p.vertices), default=None)
-        loops = boundary_loops(self._skin.triangles) if self._skin is not None else []
+        self._skin, loops = _face_of(parts)
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
         self.lip_tint = lip_tint(self._skin)
         area = np.array(_FALLBACK_AREA)
         if self._lips is not None and self._skin is not None:
             area = vector_area(self._read(self._skin, self._lips.loop))
-        self._shut_area, self._outward = _SHUT * float(np.linalg.norm(area)), 1.0 if area[2] > 0 else -1.0
+        self._shut_area = _SHUT * float(np.linalg.norm(area))
         self.refresh()
 
     def read_vertices(self) -> dict[str, np.ndarray]:
@@ -172,7 +171,7 @@ class Openings:
         if self._lips is None or self._skin is None:
             return
         ring = self._read(self._skin, self._lips.loop)
-        area = vector_area(ring) * self._outward
+        area = -vector_area(ring)  # the edge of a hole runs clockwise, seen from where its triangles face to
         size = max(math.hypot(*area), 1e-6)
         first, *_, last = self._read(self._skin, self._lips.upper)
         self._mouth = {
@@ -180,6 +179,21 @@ class Openings:
             "opening_area": area * (max(size - self._shut_area, 20.0) / size),
             "opening_side": (last - first) * _SLIDE,
         }
+
+
+def _face_of(parts: Sequence[ViewPart]) -> tuple[ViewPart | None, list[np.ndarray]]:
+    """The skin that holds the most lids, of several the one with the most vertices, and the loops of its holes; None
+    without skin."""
+    eyes = [fit_sphere(np.asarray(p.vertices, float)) for p in parts if p.material == "eye"]
+
+    def held(skin: ViewPart) -> int:
+        near = (nearest_loop(loops[skin.name], skin.vertices, at, _LID_REACH * radius) for at, radius in eyes)
+        return sum(loop is not None for loop in near)
+
+    skins = [p for p in parts if p.material == "skin"]
+    loops = {p.name: boundary_loops(p.triangles) for p in skins}
+    face = max(skins, key=lambda p: (held(p), len(p.vertices)), default=None)
+    return face, [] if face is None else loops[face.name]
 
 
 def _lids(loop: np.ndarray, vertices: np.ndarray, centre: np.ndarray) -> Aperture:

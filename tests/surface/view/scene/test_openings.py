@@ -235,6 +235,28 @@ def test_the_mouths_opening_is_where_its_lips_are(head: BallHead) -> None:
     assert np.linalg.norm(openings.mouth()["opening_area"]) == pytest.approx(max(shut / 9, 20.0), rel=1e-4)
 
 
+def test_lips_that_pass_each_other_at_rest_do_not_turn_the_opening_round(head: BallHead) -> None:
+    face = part(head, "face")
+    lips = Openings(head.parts)._lips
+    assert lips is not None
+    open_lips = face.vertices.copy()
+    middle = face.vertices[lips.loop, 1].mean()
+    face.vertices[lips.loop, 1] = 2 * middle - face.vertices[lips.loop, 1]
+    openings = Openings(head.parts)
+    face.vertices[:] = open_lips
+    openings.refresh()
+    assert openings.mouth()["opening_area"][2] > 0.9 * np.linalg.norm(openings.mouth()["opening_area"])
+
+
+def test_the_face_is_the_skin_with_the_lids_not_the_largest(head: BallHead) -> None:
+    back = skin()
+    back.name = "back"
+    back.vertices = np.concatenate([back.vertices, np.tile(back.vertices[:1], (10_000, 1))]) - [0.0, 0.0, 200.0]
+    openings = Openings([back, *head.parts])
+    assert openings.eye(part(head, "left_eye"))["lids"] == 1.0 and openings._lips is not None
+    assert set(openings.read_vertices()) >= {"face", *EYES}
+
+
 def test_without_lips_a_mouth_is_open_a_little() -> None:
     assert Openings([]).mouth() == {
         "opening_centre": (0.0, -35.0, 110.0), "opening_area": (0.0, 0.0, 250.0), "opening_side": (18.0, 0.0, 0.0),
