@@ -4,8 +4,8 @@ Run ``python benchmarks/pose_bound.py [--head ict] [--rounds 60]``. A parameter 
 The first table supposes that an engine knew beforehand which branches of the lists move by more than a millionth of the
 head: it says which share of all weights it would still have to read, and how many vertices really move. The second
 takes the times of what is then left: placing control points with all their corrections, and the sums of these branches
-alone. They are timed in turn with whole poses, with warm caches and after other memory was written, and each is the
-least of all rounds, a mean over the steps. The third says why less is not known beforehand: how many weights are left
+alone. They are timed in turn with whole poses, with warm caches and after other memory was written; each is the mean
+over the steps of the least of all rounds. The third says why less is not known beforehand: how many weights are left
 where displacements below a tenth of a millimetre are cut off, and how far a step moves the control points near each
 contact. Times are from one run on one machine.
 """
@@ -47,8 +47,12 @@ def rising(head: Head, name: str) -> list[Floats]:
 
 
 def placed(head: Head, values: Floats) -> list[Floats]:
-    """(m, 3) vertices of the deforming parts in a pose, without what seams add."""
-    head.pose(values)
+    """(m, 3) vertices of the deforming parts in a pose, before seams are closed."""
+    pose = head.read_pose(values)
+    _, turn = head.place_pose(pose, {})
+    for part in skins(head):
+        part.pose(pose, turn)
+        part.deformation.refresh()  # seams have written to some vertices
     return [part.vertices[: len(part.mesh.vertices)].copy() for part in skins(head)]
 
 
@@ -126,7 +130,9 @@ def reached(head: Head, name: str, least_mm: float) -> float:
     for part, data in zip(skins(head), (p for p in head.data.parts if p.follows == "skin"), strict=True):
         ids = [g.ids[np.linalg.norm(g.moves, axis=1) > least_mm] for g in data.groups if g.name == name]
         lists, which = part.deformation.lists, np.unique(np.concatenate([*ids, np.zeros(0, np.int32)])).astype(np.int64)
-        cells = [lists.point_cell[s : s + n] for s, n in zip(lists.point_start[which], lists.point_count[which], strict=True)]
+        cells = [
+            lists.point_cell[s : s + n] for s, n in zip(lists.point_start[which], lists.point_count[which], strict=True)
+        ]
         branches.append(np.unique(np.concatenate([*cells, np.zeros(0, np.int32)])))
     return share_of_weights(head, branches)
 
@@ -144,6 +150,7 @@ def contact_steps(head: Head, name: str) -> dict[str, float]:
 
 
 def foresight_table(head: Head, console: Console) -> None:
+    """Shares of weights and vertices, from the least to the greatest of all steps."""
     table = Table("step of", "weights to read", "vertices that move", title="with perfect foresight, of all")
     for name in NAMES:
         weights, vertices, _ = zip(*foresight(head, name), strict=True)
@@ -152,19 +159,20 @@ def foresight_table(head: Head, console: Console) -> None:
 
 
 def time_table(head: Head, rounds: int, console: Console) -> None:
-    table = Table("step of", "caches", "whole pose, ms", "placing points", "sums", "both, ms", "goal, ms", title="least times")
+    """Least times of a pose, and what is left of it with perfect foresight."""
+    columns = ("step of", "caches", "pose, ms", "placing points", "sums", "both, ms", "goal, ms")
+    table = Table(*columns, title="least times, and their parts of the whole pose")
     for name in NAMES:
         for caches, flushed in (("warm", 0), ("cold", FLUSHED_BYTES)):
             whole, placing, sums = least_times(head, name, rounds if not flushed else max(rounds // 4, 1), flushed)
-            table.add_row(
-                name, caches, f"{whole:.2f}", f"{placing:.2f} ({placing / whole:.2f})", f"{sums:.2f} ({sums / whole:.2f})",
-                f"{placing + sums:.2f}", f"{GOAL_MS}",
-            )  # fmt: skip
+            parts = [f"{part:.2f} ({part / whole:.2f})" for part in (placing, sums)]
+            table.add_row(name, caches, f"{whole:.2f}", *parts, f"{placing + sums:.2f}", f"{GOAL_MS}")
     console.print(table)
 
 
 def unknown_table(head: Head, console: Console) -> None:
-    title = f"weights that groups reach, and without displacements below {FADED_MM} mm; moves near contacts, mm a step"
+    """What is not known before control points are placed."""
+    title = f"weights that a group reaches, and without moves below {FADED_MM} mm; moves near contacts, mm a step"
     contacts = [c.name for c in head.data.contacts]
     table = Table("step of", "weights", "without", *contacts, title=title)
     for name in NAMES:

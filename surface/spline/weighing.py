@@ -90,10 +90,10 @@ def _inside(knots, i, x):
 @kernel
 def _surely_reaches(knots_u, knots_v, i, uv):
     """Whether one of the places ``uv (m, 2)`` lies well inside the subdomain of point i."""
-    for j in range(uv.shape[0]):
-        if _inside(knots_u, i, uv[j, 0]) and _inside(knots_v, i, uv[j, 1]):
-            return True
-    return False
+    j = 0
+    while j < uv.shape[0] and not (_inside(knots_u, i, uv[j, 0]) and _inside(knots_v, i, uv[j, 1])):
+        j += 1
+    return j < uv.shape[0]
 
 
 @kernel
