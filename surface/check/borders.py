@@ -9,14 +9,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Floats32, Ints
-from surface.base.jit import kernel
+from surface.check.cells import joined_nearer
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import Mouth
+from surface.check.network import Network
 from surface.check.places import Places
 from surface.check.raster import View, turned
 from surface.check.subject import Subject, pose_of
@@ -31,51 +31,10 @@ SHEETS = ("skin", "mouth", "tongue")  # materials of the sheets that have to be 
 END_MM = 40.0  # wider openings are where the mesh ends, as on a head without scalp under its hair
 SEEN = 0.1  # least share of a hole's area that is visible from outside: the root of an ear lies under other skin
 FACING = 0.3  # least cosine between a hole's outward normal and a viewer behind the head for it to face that viewer
-_ROWS = 512  # rows of the matrix of distances that are computed at once
 CAP_STEPS = 60  # pixels over the cap of a hole
 VIEWS = ((0, 0), (60, 0), (-60, 0), (120, 0), (-120, 0), (180, 0), (0, -60), (0, 60))  # yaw and pitch, degrees
 MOUTH_REACH = 0.75  # in widths of the mouth, from its middle
 EYE_REACH = 1.7  # in radii: a loop whose middle is so near to an eye's centre is its opening
-
-
-@kernel
-def _nearest(
-    middles: Any, own: Any, ends: Any, ids: Any, first: Any, beside: Any, reach: float, distance: Any, other: Any
-) -> None:
-    """Find the nearest edge for the middle of each of q edges.
-
-    middles, own : (q, 3) middles of the q edges, and (q, 2) their vertices.
-    ends, ids : (e, 2, 3) ends of the edges that are searched, and (e, 2) their vertices. Those that share a vertex with
-        edge i are left out, and so are those of ``beside`` from ``first[i]`` to ``first[i + 1]``.
-    distance, other : (q,) filled with distance and number of the nearest edge; infinite and -1 beyond ``reach``.
-    """
-    for i in range(len(middles)):
-        best, found = reach * reach, -1
-        p0, p1, p2 = middles[i, 0], middles[i, 1], middles[i, 2]
-        for j in range(len(ends)):
-            a, b = ends[j, 0], ends[j, 1]
-            if min(a[0], b[0]) - p0 > reach or p0 - max(a[0], b[0]) > reach:
-                continue
-            if min(a[1], b[1]) - p1 > reach or p1 - max(a[1], b[1]) > reach:
-                continue
-            if ids[j, 0] == own[i, 0] or ids[j, 0] == own[i, 1] or ids[j, 1] == own[i, 0] or ids[j, 1] == own[i, 1]:
-                continue
-            near = False
-            for k in range(first[i], first[i + 1]):
-                near |= beside[k] == j
-            if near:
-                continue
-            d0, d1, d2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-            length = d0 * d0 + d1 * d1 + d2 * d2
-            t = 0.0
-            if length > 0.0:
-                t = ((p0 - a[0]) * d0 + (p1 - a[1]) * d1 + (p2 - a[2]) * d2) / length
-                t = min(1.0, max(0.0, t))
-            w0, w1, w2 = a[0] + t * d0 - p0, a[1] + t * d1 - p1, a[2] + t * d2 - p2
-            square = w0 * w0 + w1 * w1 + w2 * w2
-            if square < best:
-                best, found = square, j
-        distance[i], other[i] = np.sqrt(best) if found >= 0 else np.inf, found
 
 
 @dataclass(frozen=True)
@@ -85,8 +44,7 @@ class Borders:
     part : (e,) number of the part. ends : (e, 2) vertices of it, where vertices in one place are one. ids : (e, 2) the
         same vertices, numbered over all parts.
     sewn : (e,) whether it is sewn to another edge. mate : (e,) number of that edge, -1 for none.
-    first, beside : (e + 1,) and (k,); the neighbours of edge i along its border are ``beside`` from ``first[i]`` to
-        ``first[i + 1]``.
+    network : ways along the edges at rest.
     """
 
     part: Ints
@@ -94,21 +52,19 @@ class Borders:
     ids: Ints
     sewn: Bools
     mate: Ints
-    first: Ints
-    beside: Ints
-
-    def neighbours(self, rows: Ints) -> tuple[Ints, Ints]:
-        """``first (k + 1,)`` and ``beside`` of only the edges ``rows (k,)``."""
-        count = np.diff(self.first)[rows]
-        first = np.append(0, np.cumsum(count))
-        return first, self.beside[np.repeat(self.first[rows] - first[:-1], count) + np.arange(first[-1])]
+    network: Network
 
     def at(self, vertices: list[Floats32]) -> Floats:
         """(e, 2, 3) ends of the edges, mm, for the posed vertices (v, 3) of every part."""
-        out = np.empty((len(self.part), 2, 3))
-        for k in np.unique(self.part):
-            out[self.part == k] = vertices[k][self.ends[self.part == k]]
-        return out
+        return _ends_at(self.part, self.ends, vertices)
+
+
+def _ends_at(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
+    """(e, 2, 3) as :meth:`Borders.at` gives them."""
+    out = np.empty((len(part), 2, 3))
+    for k in np.unique(part):
+        out[part == k] = vertices[k][ends[part == k]]
+    return out
 
 
 def find_borders(subject: Subject) -> Borders:
@@ -119,91 +75,14 @@ def find_borders(subject: Subject) -> Borders:
     part = np.concatenate([np.full(len(e), k) for k, e in pairs] or [np.zeros(0, int)]).astype(np.int64)
     ends = np.concatenate([e for _, e in pairs] or [np.zeros((0, 2), int)]).astype(np.int64)
     ids = ends + starts[part][:, None]
-    found = Borders(part, ends, ids, np.zeros(len(part), bool), np.full(len(part), -1), *_none(len(part)))
-    at = found.at(subject.rest)
-    first, beside = _beside(ids, np.linalg.norm(at[:, 1] - at[:, 0], axis=1), ALONG_MM * subject.scale)
-    distance, mate = np.full(len(part), np.inf), np.full(len(part), -1, np.int64)
-    _nearest(at.mean(axis=1), ids, at, ids, first, beside, SEWN_MM * subject.scale, distance, mate)
-    return Borders(part, ends, ids, mate >= 0, mate, first, beside)
-
-
-def _none(edges: int) -> tuple[Ints, Ints]:
-    """``first`` and ``beside`` of edges without neighbours."""
-    return np.zeros(edges + 1, np.int64), np.zeros(0, np.int64)
-
-
-def _beside(ids: Ints, length: Floats, reach: float) -> tuple[Ints, Ints]:
-    """``first (e + 1,)`` and ``beside (k,)`` of edges between vertices ``ids (e, 2)``, of ``length (e,)`` mm.
-
-    Neighbours are edges with less than ``reach`` mm of border between them. Without them a border of very short edges
-    would be sewn to itself, since it is near itself everywhere.
-    """
-    names, ends = np.unique(ids, return_inverse=True)
-    ends = np.ascontiguousarray(ends.reshape(-1, 2), np.int64)
-    order = np.argsort(ends.ravel(), kind="stable")
-    start = np.searchsorted(ends.ravel()[order], np.arange(len(names) + 1)).astype(np.int64)
-    edge, far = order // 2, ends[:, ::-1].ravel()[order]
-    first, long = np.zeros(len(ends) + 1, np.int64), np.asarray(length, np.float64)
-    count = _near_along(start, edge, far, ends, long, reach, first, np.zeros(0, np.int64))
-    beside = np.zeros(count, np.int64)
-    _near_along(start, edge, far, ends, long, reach, first, beside)
-    return first, beside
-
-
-@kernel
-def _ways(
-    ends: Any, start: Any, edge: Any, far: Any, length: Any, reach: float,
-    way: Any, waits: Any, queue: Any, reached: Any,
-) -> int:  # fmt: skip
-    """Write to ``way (v,)``, infinite before, the lengths of the shortest ways below ``reach`` from two vertices
-    ``ends (2,)``, and to ``reached`` the vertices that have one; returns how many. Others as in :func:`_near_along`.
-
-    Ways are corrected from a queue until nothing changes (Moore's algorithm).
-    """
-    head, size, found = 0, 2, 2
-    for side in range(2):
-        way[ends[side]], waits[ends[side]], queue[side], reached[side] = 0.0, True, ends[side], ends[side]
-    while size > 0:
-        v = queue[head]
-        head, size, waits[v] = (head + 1) % len(queue), size - 1, False
-        for k in range(start[v], start[v + 1]):
-            w, along = far[k], way[v] + length[edge[k]]
-            if along < reach and along < way[w]:
-                if way[w] == np.inf:
-                    reached[found], found = w, found + 1
-                way[w] = along
-                if not waits[w]:
-                    queue[(head + size) % len(queue)], waits[w], size = w, True, size + 1
-    return found
-
-
-@kernel
-def _near_along(
-    start: Any, edge: Any, far: Any, ends: Any, length: Any, reach: float, first: Any, beside: Any
-) -> int:  # fmt: skip
-    """Write to ``beside``, as far as there is room, for each edge between vertices ``ends (e, 2)`` those to which a way
-    along edges of ``length (e,)`` is shorter than ``reach``, without those that share a vertex with it; of edge i they
-    begin at ``first[i]``. Vertex v has the edges ``edge[start[v]]`` to ``edge[start[v + 1]]``, which end at ``far``.
-    Returns how many there are."""
-    count, total = len(start) - 1, 0
-    way, waits = np.full(count, np.inf), np.zeros(count, np.bool_)
-    queue, reached, noted = np.zeros(count, np.int64), np.zeros(count, np.int64), np.full(len(ends), -1)
-    for i in range(len(ends)):
-        first[i] = total
-        a, b = ends[i]
-        for v in reached[: _ways(ends[i], start, edge, far, length, reach, way, waits, queue, reached)]:
-            way[v] = np.inf
-            for j in edge[start[v] : start[v + 1]]:
-                joined = ends[j, 0] == a or ends[j, 0] == b or ends[j, 1] == a or ends[j, 1] == b
-                if noted[j] != i and not joined:
-                    noted[j] = i
-                    if total < len(beside):
-                        beside[total] = j
-                    total += 1
-        if total <= len(beside):
-            beside[first[i] : total].sort()
-    first[len(ends)] = total
-    return total
+    none = Borders(
+        part, ends, ids, np.zeros(len(part), bool), np.full(len(part), -1), Network(ids, np.zeros(len(part)))
+    )
+    at = none.at(subject.rest)
+    network = Network(ids, np.linalg.norm(at[:, 1] - at[:, 0], axis=1))
+    reach, along = SEWN_MM * subject.scale, ALONG_MM * subject.scale
+    _, mate = network.nearest(at, np.arange(len(part)), reach, along)
+    return Borders(part, ends, ids, mate >= 0, mate, network)
 
 
 def _welded(subject: Subject, number: int) -> Ints:
@@ -240,7 +119,7 @@ def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Border
 def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, places: Places) -> Iterator[Finding]:
     """The seam that opens furthest, with the pose in which it does."""
     worst, where, pose = 0.0, np.zeros(3), ""
-    reach = 4.0 * APART_MM * subject.scale
+    reach, along = 4.0 * APART_MM * subject.scale, ALONG_MM * subject.scale
     rest = borders.at(subject.rest).mean(axis=1)
     sewn = np.flatnonzero(borders.sewn & ~_in_openings(subject, mouth, rest))
     for name in subject.claimed:
@@ -249,8 +128,7 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
         way = middle - rest  # an edge that moves as the edge does that it is sewn to stays sewn
         loose = np.linalg.norm(way - way[borders.mate], axis=1)[sewn] > 0.3 * APART_MM * subject.scale
         asked = sewn[loose]
-        distance, mate = np.full(len(asked), np.inf), np.full(len(asked), -1, np.int64)
-        _nearest(middle[asked], borders.ids[asked], at, borders.ids, *borders.neighbours(asked), reach, distance, mate)
+        distance, _ = borders.network.nearest(at, asked, reach, along)
         apart = np.minimum(distance, reach)
         if len(apart) and apart.max() > worst:
             worst, where, pose = float(apart.max()), rest[asked[apart.argmax()]], name
@@ -279,14 +157,7 @@ def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
     """(k, 2) ends of the edges ``rows (k,)``; ends nearer than ``reach`` mm to each other, as at a seam, are one."""
     ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
     known = np.unique(ends, return_inverse=True)[1].reshape(-1)
-    square = (points**2).sum(axis=1)
-    pairs = [np.zeros((0, 2), np.int64)]
-    for first in range(0, len(points), _ROWS):
-        own = slice(first, first + _ROWS)
-        near = square[own, None] + square - 2.0 * points[own] @ points.T < reach**2
-        pairs.append(np.argwhere(near) + np.array([first, 0]))
-    links = known[np.concatenate(pairs)]
-    return _components(links, int(known.max(initial=-1)) + 1)[known].reshape(-1, 2)
+    return joined_nearer(points, known, reach).reshape(-1, 2)
 
 
 def _chains(ids: Ints) -> list[Ints]:

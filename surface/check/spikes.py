@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Floats32, Ints
-from surface.base.jit import kernel
+from surface.base.jit import kernel, nonallocating
 from surface.check.borders import Borders
+from surface.check.cells import any_nearer, sort_into_cells
 from surface.check.findings import AGAIN, Finding
 from surface.check.places import Places
 from surface.check.subject import Subject
@@ -29,69 +30,85 @@ PAIRED = 0.6  # least height at the mirror image, relative to the greatest allow
 MIRROR_MM = 10.0  # greatest distance from the mirror image at which a horn or pointed ear counts as the other of a pair
 NOSE = 0.35  # half the width of the nose, in distances of the eyes: a nose may have any length
 SPACING = 0.6  # of the samples, in radii of the ring
+MOST_LISTED = 1 << 25  # samples on all rings together; the shipped head has 3 million
 MOST_STEPS = 40  # samples along an edge: a triangle that needs more is wrong anyway
 
 
-@kernel
-def rings(points: Any, cells: Any, order: Any, start: Any, low: float, high: float, first: Any, out: Any) -> int:
-    """List the points of points (m, 3) between ``low`` and ``high`` mm from each of the first k.
-
-    cells : (m, 3) the cube of each point, ``high`` mm wide. order : (m,) points by cube; ``start[x, y, z]`` is where
-        those of a cube begin and end in it.
-    first : (k + 1,) filled with where each point's list begins in ``out``. out : filled as far as it is long enough.
-
-    Returns the length of all lists.
-    """
-    used = 0
-    nx, ny, nz = start.shape[0], start.shape[1], start.shape[2]
-    for i in range(len(first) - 1):
-        first[i] = used
-        for x in range(max(0, cells[i, 0] - 1), min(nx, cells[i, 0] + 2)):
-            for y in range(max(0, cells[i, 1] - 1), min(ny, cells[i, 1] + 2)):
-                for z in range(max(0, cells[i, 2] - 1), min(nz, cells[i, 2] + 2)):
-                    for k in range(start[x, y, z, 0], start[x, y, z, 1]):
-                        j = order[k]
-                        a, b, c = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
-                        square = a * a + b * b + c * c
-                        if low * low <= square <= high * high:
-                            if used < len(out):
-                                out[used] = j
-                            used += 1
-    first[len(first) - 1] = used
-    return used
-
-
-@kernel
-def heights(values: Any, start: Any, ring: Any, enough: float, out: Any) -> None:
+@nonallocating
+def ring_heights(points: Any, own: Any, first: Any, last: Any, order: Any, ring: Any, values: Any, enough: float,
+                 out: Any) -> None:  # fmt: skip
     """Fill ``out (k,)`` with the height of each of the first k of values (m, 3) above those on its ring.
 
-    start, ring : those on the ring of value i are ``ring`` from ``start[i]`` to ``start[i + 1]``.
+    The ring of value i holds the values of all points (m, 3) between ``ring (2,)`` mm from point i. All of these, and
+    perhaps others, are those of ``order`` from ``first[own[i], c]`` to ``last[own[i], c]``, for every column c.
 
     The height is measured along the mean direction from them to the value. It is 0 where one of them is nearer than
     ``enough``, since the height cannot be greater than that distance.
     """
     for i in range(len(out)):
-        out[i] = 0.0
-        x, y, z = 0.0, 0.0, 0.0
-        low = False
-        for k in range(start[i], start[i + 1]):
-            dx, dy, dz = (
-                values[i, 0] - values[ring[k], 0], values[i, 1] - values[ring[k], 1], values[i, 2] - values[ring[k], 2],
-            )  # fmt: skip
-            if dx * dx + dy * dy + dz * dz < enough * enough:
-                low = True
-                break
-            x, y, z = x + dx, y + dy, z + dz
+        near = first[own[i]], last[own[i]], order
+        x, y, z = _way_from_ring(points, i, *near, ring, values, enough)
         length = np.sqrt(x * x + y * y + z * z)
-        if low or length < 1e-9:
-            continue
-        x, y, z = x / length, y / length, z / length
-        least = np.inf
-        for k in range(start[i], start[i + 1]):
-            j = ring[k]
-            dx, dy, dz = values[i, 0] - values[j, 0], values[i, 1] - values[j, 1], values[i, 2] - values[j, 2]
-            least = min(least, dx * x + dy * y + dz * z)
-        out[i] = least
+        out[i] = 0.0
+        if length >= 1e-9:
+            out[i] = _least_along(points, i, *near, ring, values, x / length, y / length, z / length)
+
+
+@nonallocating
+def _way_from_ring(
+    points: Any, i: int, first: Any, last: Any, order: Any, ring: Any, values: Any, enough: float
+) -> Any:
+    """Sum of the ways to value i from those on its ring; none at all where one of them is nearer than ``enough``."""
+    x, y, z = 0.0, 0.0, 0.0
+    for column in range(len(first)):
+        for e in range(first[column], last[column]):
+            j = order[e]
+            if on_ring(points, i, j, ring):
+                dx, dy, dz = values[i, 0] - values[j, 0], values[i, 1] - values[j, 1], values[i, 2] - values[j, 2]
+                if dx * dx + dy * dy + dz * dz < enough * enough:
+                    return 0.0, 0.0, 0.0
+                x, y, z = x + dx, y + dy, z + dz
+    return x, y, z
+
+
+@nonallocating
+def _least_along(
+    points: Any, i: int, first: Any, last: Any, order: Any, ring: Any, values: Any, x: float, y: float, z: float
+) -> Any:  # fmt: skip
+    """The least height of value i above one on its ring, along the unit vector (x, y, z)."""
+    least = np.inf
+    for column in range(len(first)):
+        for e in range(first[column], last[column]):
+            j = order[e]
+            if on_ring(points, i, j, ring):
+                dx, dy, dz = values[i, 0] - values[j, 0], values[i, 1] - values[j, 1], values[i, 2] - values[j, 2]
+                least = min(least, dx * x + dy * y + dz * z)
+    return least
+
+
+@nonallocating
+def on_ring(points: Any, i: int, j: int, ring: Any) -> Any:
+    """Whether point j is between ``ring (2,)`` mm from point i."""
+    a, b, c = points[i, 0] - points[j, 0], points[i, 1] - points[j, 1], points[i, 2] - points[j, 2]
+    square = a * a + b * b + c * c
+    return ring[0] * ring[0] <= square <= ring[1] * ring[1]
+
+
+@nonallocating
+def list_rings(points: Any, own: Any, first: Any, last: Any, order: Any, ring: Any, begin: Any, out: Any) -> int:
+    """Write the rings of the first k points to ``out``, as far as it is long enough, and to ``begin (k + 1,)`` where
+    each begins there; returns the length of all. Others as in :func:`ring_heights`."""
+    used = 0
+    for i in range(len(begin) - 1):
+        begin[i] = used
+        for column in range(9):
+            for e in range(first[own[i], column], last[own[i], column]):
+                if on_ring(points, i, order[e], ring):
+                    if used < len(out):
+                        out[used] = order[e]
+                    used += 1
+    begin[len(begin) - 1] = used
+    return used
 
 
 @kernel
@@ -156,44 +173,40 @@ def _filled(at: Floats, triangles: Ints, spacing: float) -> tuple[Ints, Floats]:
     return np.concatenate(corners), np.concatenate(shares)
 
 
-@dataclass(frozen=True)
-class Ring:
-    """Samples round every vertex at rest: those of vertex i are ``ids`` from ``start[i]`` to ``start[i + 1]``."""
+class Rings:
+    """Samples round each of the first ``count`` of points (m, 3), between two distances from it.
 
-    start: Ints
-    ids: Ints
+    They are listed, unless the lists would be longer than :data:`MOST_LISTED`: these grow with the square of how
+    densely samples lie. Then they are searched for at every question.
+    """
+
+    def __init__(self, points: Floats, count: int, radius: float) -> None:
+        self._points, self._count, self._ring = np.ascontiguousarray(points), count, np.multiply(RING, radius)
+        cells = sort_into_cells(self._points, self._ring[1])
+        near = cells.own, *cells.columns(), cells.order
+        begin, ids = np.zeros(count + 1, np.int64), np.zeros(0, np.int64)
+        used = list_rings(self._points, *near, self._ring, begin, ids)
+        if used <= MOST_LISTED:
+            ids = np.zeros(used, np.int64)
+            list_rings(self._points, *near, self._ring, begin, ids)
+            near = np.arange(count), begin[:-1, None], begin[1:, None], ids
+        self._near = near
 
     def heights(self, values: Floats, enough: float = 0.0) -> Floats:
         """(k,) height of each of the first k of values (m, 3); it may be 0 where it is less than ``enough``."""
-        out = np.zeros(len(self.start) - 1)
-        heights(np.ascontiguousarray(values), self.start, self.ids, enough, out)
-        return out
-
-    def without_rims(self, points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
-        """``height (k,)`` of the first k of points (m, 3), 0 where it is below ``least``, and where a point of a free
-        border, ``rims (r, 3)``, is nearer than ``off`` mm: corners of a border always stick out."""
-        rows = np.flatnonzero(height > least)
-        out = np.zeros(len(height))
-        for row in rows:
-            if not (np.linalg.norm(rims - points[row], axis=1) < off).any():
-                out[row] = height[row]
+        out = np.zeros(self._count)
+        ring_heights(self._points, *self._near, self._ring, np.ascontiguousarray(values), enough, out)
         return out
 
 
-def find_rings(points: Floats, count: int, radius: float) -> Ring:
-    """The rings of the first ``count`` of points (m, 3)."""
-    low, high = RING[0] * radius, RING[1] * radius
-    cells = np.floor((points - points.min(axis=0)) / high).astype(np.int64)
-    shape = tuple(int(n) for n in cells.max(axis=0) + 1)
-    flat = np.ravel_multi_index(tuple(cells.T), shape)
-    order = np.argsort(flat, kind="stable")
-    edges = np.searchsorted(flat[order], np.arange(int(np.prod(shape)) + 1))
-    start = np.stack([edges[:-1], edges[1:]], axis=1).reshape(*shape, 2)
-    begin, ids = np.zeros(count + 1, np.int64), np.zeros(0, np.int64)
-    used = rings(points, cells, order, start, low, high, begin, ids)
-    ids = np.zeros(used, np.int64)
-    rings(points, cells, order, start, low, high, begin, ids)
-    return Ring(begin, ids)
+def without_rims(points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
+    """``height (k,)`` of the first k of points (m, 3), 0 where it is below ``least``, and where a point of a free
+    border, ``rims (r, 3)``, is nearer than ``off`` mm: corners of a border always stick out."""
+    rows = np.flatnonzero(height > least)
+    rows = rows[~any_nearer(points[rows], rims, off)]
+    out = np.zeros(len(height))
+    out[rows] = height[rows]
+    return out
 
 
 def spikes(subject: Subject, places: Places, borders: Borders) -> Iterator[Finding]:
@@ -213,13 +226,13 @@ def _spikes(
     if not samples.vertices:
         return [None, None]
     at, off = samples.at(subject.rest), OFF_RIM * radius
-    ring = find_rings(at, samples.vertices, radius)
-    height = ring.without_rims(at, rims, ring.heights(at), PAIRED * steep * radius, off)
+    rings = Rings(at, samples.vertices, radius)
+    height = without_rims(at, rims, rings.heights(at), PAIRED * steep * radius, off)
     height[_allowed(subject, at[: samples.vertices], height, places)] = 0.0
     worst, best, name, where = int(height.argmax()), 0.0, "", 0
     for pose in (n for n in subject.claimed if n in SHAPES):
         moved = _moved(
-            subject, places, samples.at(subject.moves(pose)), ring, at, rims, radius, max(best, MOVED * radius)
+            subject, places, samples.at(subject.moves(pose)), rings, at, rims, radius, max(best, MOVED * radius)
         )
         if moved.max() > best:
             best, name, where = float(moved.max()), pose, int(moved.argmax())
@@ -235,16 +248,17 @@ def _spikes(
 
 
 def _moved(
-    subject: Subject, places: Places, moves: Floats, ring: Ring, at: Floats, rims: Floats, radius: float, enough: float
+    subject: Subject, places: Places, moves: Floats, rings: Rings, at: Floats, rims: Floats, radius: float,
+    enough: float,
 ) -> Floats:  # fmt: skip
     """(k,) heights in the displacements ``moves (m, 3)`` of samples at (m, 3), mm.
 
     They are 0 below ``enough``, and where the other side of the face moves alike.
     """
-    moved = ring.without_rims(at, rims, ring.heights(moves, enough), enough, OFF_RIM * radius)
+    moved = without_rims(at, rims, rings.heights(moves, enough), enough, OFF_RIM * radius)
     low = moved < MIRRORED * radius
     if (moved[low] > 0.0).any():
-        height = ring.without_rims(at, rims, ring.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
+        height = without_rims(at, rims, rings.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
         moved[low & _has_mirror_image(subject, at[: len(height)], height, places)] = 0.0
     return moved
 

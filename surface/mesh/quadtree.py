@@ -121,12 +121,10 @@ def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
     """Split the parents of every split cell's edge neighbours, from the finest level up; then collect leaves."""
     split = [np.unique(codes(lattice, level, cells)) for level, cells in enumerate(inner)]
     for level in range(len(split) - 1, 0, -1):
-        cells = _decode(lattice, level, split[level])
-        around = (cells[:, None, :] + NEIGHBOURS).reshape(-1, 2)
-        code = codes(lattice, level, around)
-        around = _decode(lattice, level, code[code >= 0])
-        parents = codes(lattice, level - 1, around // 2)
-        split[level - 1] = np.union1d(split[level - 1], parents[~contains(split[level - 1], parents)])
+        parents = codes(lattice, level - 1, _parents_around(_decode(lattice, level, split[level])))
+        missing = np.unique(parents[(parents >= 0) & ~contains(split[level - 1], parents)])
+        if len(missing):
+            split[level - 1] = np.union1d(split[level - 1], missing)
     levels, found = [], []
     cells = lattice.roots
     for level in range(len(split) + 1):
@@ -136,6 +134,15 @@ def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
         levels.append(np.full(len(found[-1]), level))
         cells = children(cells[is_inner])
     return Leaves(np.concatenate(levels), np.concatenate(found)), split
+
+
+def _parents_around(cells: Ints) -> Ints:
+    """(3 n, 2) the parents of cells (n, 2) and of their edge neighbours: two of the four have the same parent."""
+    own = cells // 2
+    beside = 2 * (cells % 2) - 1  # towards the neighbours that have another one
+    steps = beside[:, None, :] * np.array([[0, 0], [1, 0], [0, 1]])
+    out: Ints = (own[:, None, :] + steps).reshape(-1, 2)
+    return out
 
 
 def quarter(lattice: Lattice, leaves: Leaves, inner: list[Ints], which: Ints) -> tuple[Leaves, list[Ints]]:

@@ -169,10 +169,13 @@ class SplitTests:
         corner = cells << shift
         grid = np.array([[0, 0], [1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [0, 2], [1, 2], [2, 2]]) * (step // 2)
         x, y = corner[:, :1] + grid[:, 0], corner[:, 1:] + grid[:, 1]
-        uv = self.lattice.uv(x, y)
-        side = inner_side(uv, uv[:, 4], self.domain)
+        side = np.zeros(x.shape, dtype=np.int64)
+        if self.domain.slits:
+            uv = self.lattice.uv(x, y)
+            side = inner_side(uv, uv[:, 4], self.domain)
         first, back = keys.number(self.lattice.key(x, y) * 4 + side)
-        corners = self.surface.sample(uv.reshape(-1, 2)[first], side.reshape(-1)[first])[2][back]
+        places = self.lattice.uv(x.reshape(-1)[first], y.reshape(-1)[first])  # neighbours share most samples
+        corners = self.surface.sample(places, side.reshape(-1)[first])[2][back]
         worst = _chord_errors(corners)
         self._add_anchors(level, cells, corners, worst)
         held = np.isfinite(corners[:, :, 0])

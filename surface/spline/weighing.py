@@ -12,6 +12,8 @@ from surface.base.jit import kernel
 
 from .kernels import along, distinct
 
+INSIDE = 1e-9  # of a subdomain's width: a function of degree 9 is greater than 1e-90 there
+
 
 @kernel
 def _put_row(value, slope, at, rows, row, tiles, numbers):
@@ -77,8 +79,29 @@ def fill_blocks(
 
 
 @kernel
+def _inside(knots, i, x):
+    """Whether ``x`` lies so far inside the knots of point i that its blending function cannot vanish there, not even
+    by rounding."""
+    low, high = knots[i, 0], knots[i, knots.shape[1] - 1]
+    margin = INSIDE * (high - low)
+    return x > low + margin and x < high - margin
+
+
+@kernel
+def _surely_reaches(knots_u, knots_v, i, uv):
+    """Whether one of the places ``uv (m, 2)`` lies well inside the subdomain of point i."""
+    j = 0
+    while j < uv.shape[0] and not (_inside(knots_u, i, uv[j, 0]) and _inside(knots_v, i, uv[j, 1])):
+        j += 1
+    return j < uv.shape[0]
+
+
+@kernel
 def mark_reaching(knots_u, knots_v, pu, pv, uv, side, cell_start, list_start, list_ids, reach):
-    """Say in ``reach (k,)`` which listed points have a weight, or a derivative of one, at a vertex of their cell."""
+    """Say in ``reach (k,)`` which listed points have a weight, or a derivative of one, at a vertex of their cell.
+
+    Blending functions are computed only for points whose subdomain has no vertex well inside.
+    """
     work, widest = np.zeros(12), 1
     for c in range(cell_start.shape[0] - 1):
         widest = max(widest, cell_start[c + 1] - cell_start[c])
@@ -88,9 +111,15 @@ def mark_reaching(knots_u, knots_v, pu, pv, uv, side, cell_start, list_start, li
     for c in range(cell_start.shape[0] - 1):
         first, size = cell_start[c], cell_start[c + 1] - cell_start[c]
         cell_uv, sides = uv[first : first + size], side[first : first + size]
-        many_u, many_v = distinct(cell_uv, sides, 0, values_u, at_u), distinct(cell_uv, sides, 1, values_v, at_v)
+        many_u, many_v = 0, 0
         for q in range(list_start[c], list_start[c + 1]):
             i = list_ids[q]
+            reach[q] = _surely_reaches(knots_u, knots_v, i, cell_uv)
+            if reach[q]:
+                continue
+            if many_u == 0:
+                many_u = distinct(cell_uv, sides, 0, values_u, at_u)
+                many_v = distinct(cell_uv, sides, 1, values_v, at_v)
             found = along(knots_u, i, pu[i], values_u, many_u, True, work, along_u)
             found = found and along(knots_v, i, pv[i], values_v, many_v, True, work, along_v)
             reach[q] = found and _combine(along_u, along_v, at_u, at_v, size, 1.0, numbers)

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations, pairwise
-from time import process_time
-
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
@@ -12,6 +9,7 @@ from scipy.sparse.csgraph import connected_components
 
 from surface.check import borders
 from surface.check.mouth import Mouth
+from surface.check.network import Network
 from surface.check.places import Places
 from surface.check.subject import Subject
 from tests.surface.check import plain
@@ -34,50 +32,6 @@ def texts(head: Subject, mouth: Mouth | None = None) -> list[str]:
     return [f.text for f in borders.holes(head, mouth, Places(head, None), borders.find_borders(head))]
 
 
-def brute(middle: np.ndarray, ends: np.ndarray) -> float:
-    """Distance of a point from an edge (2, 3), by a fine walk along it."""
-    along = np.linspace(0.0, 1.0, 4001)[:, None]
-    return float(np.linalg.norm(ends[0] + along * (ends[1] - ends[0]) - middle, axis=1).min())
-
-
-@pytest.mark.parametrize("reach", [0.8, 3.0])
-def test_the_nearest_edge_that_shares_no_vertex(reach: float) -> None:
-    random = np.random.default_rng(4)
-    points = random.uniform(0.0, 4.0, (24, 3))
-    ids = np.array([random.choice(24, 2, replace=False) for _ in range(14)])
-    ends = points[ids]
-    ends[3, 1] = ends[3, 0]  # an edge of no length
-    middles = ends.mean(axis=1)
-    distance, other = np.zeros(14), np.zeros(14, np.int64)
-    borders._nearest(middles, ids, ends, ids, *borders._none(14), reach, distance, other)
-    for i in range(14):
-        away = [np.inf if set(ids[j]) & set(ids[i]) else brute(middles[i], ends[j]) for j in range(14)]
-        best = int(np.argmin(away))
-        if away[best] < reach:
-            assert other[i] == best and distance[i] == pytest.approx(away[best], abs=2e-3)
-        else:
-            assert other[i] == -1 and distance[i] == np.inf
-
-
-def test_a_long_edge_is_found_from_its_far_end() -> None:
-    """From more than ten times the reach away along either axis."""
-    ids, own = np.array([[0, 1]]), np.array([[2, 3]])
-    for far in ([15.0, 0, 0], [0, 15.0, 0], [-15.0, 0, 0], [0, -15.0, 0]):
-        ends, middle = np.array([[[0.0, 0, 0], far]]), np.array([[0.0, 0.0, 0.5]]) + far
-        distance, other = np.zeros(1), np.zeros(1, np.int64)
-        borders._nearest(middle, own, ends, ids, *borders._none(1), 1.0, distance, other)
-        assert other[0] == 0 and distance[0] == pytest.approx(0.5)
-
-
-def test_a_long_edge_counts_where_it_passes_and_not_only_at_its_first_end() -> None:
-    ends = np.array([[[-60.0, 0.0, 0.0], [0.3, 0.0, 0.0]], [[900.0, 0.2, 0.0], [-900.0, 0.2, 0.0]]])
-    middle, own = np.array([[0.0, 0.1, 0.0]]), np.array([[8, 9]])
-    for edge in ends[:, None]:
-        distance, other = np.zeros(1), np.zeros(1, np.int64)
-        borders._nearest(middle, own, edge, np.array([[0, 1]]), *borders._none(1), 0.4, distance, other)
-        assert (distance[0], other[0]) == (pytest.approx(0.1), 0)
-
-
 @pytest.mark.parametrize(("count", "width"), [(400, 20.0), (4, 20.0 / np.sqrt(2.0))])
 def test_the_width_of_a_loop_is_the_diameter_of_a_circle_and_the_side_of_a_square(count: int, width: float) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, count + 1)
@@ -89,19 +43,6 @@ def test_the_width_of_a_slit_is_twice_its_height() -> None:
     corners = np.array([[0.0, 0, 0], [1000, 0, 0], [1000, 1, 0], [0, 1, 0]])
     slit = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
     assert borders._form(slit)[1] == pytest.approx(2.0, rel=2e-3)
-
-
-def test_ends_are_joined_in_any_number() -> None:
-    """More than are compared at once: each edge's ends are near one of another edge."""
-    count = 1500
-    at = np.zeros((count, 2, 3))
-    at[:, 0, 0], at[:, 1, 0] = np.arange(count), np.arange(count) + 0.9
-    ids = np.arange(2 * count).reshape(-1, 2)
-    found = borders.Borders(
-        np.zeros(count, int), ids, ids, np.zeros(count, bool), np.full(count, -1), *borders._none(count)
-    )
-    joined = borders._joined(found, at, np.arange(count), 0.2)
-    assert (joined[1:, 0] == joined[:-1, 1]).all() and len(np.unique(joined)) == count + 1
 
 
 @pytest.mark.parametrize(("gap", "scale", "sewn"), [(0.3, 1, True), (0.5, 1, False), (0.7, 2, True), (0.9, 2, False)])
@@ -216,9 +157,8 @@ def test_a_seam_that_slides_along_itself_stays_shut() -> None:
     found = texts(head)  # but for its ends, from which the neighbour has slid away
     assert len(found) == 1 and "4.0 mm or more" in found[0]
     kept = borders.find_borders(head)
-    distance, mate = np.zeros(len(kept.part)), np.zeros(len(kept.part), np.int64)
     at = kept.at(head.posed({"mouthLeft": 1.0}))
-    borders._nearest(at.mean(axis=1), kept.ids, at, kept.ids, kept.first, kept.beside, 4.0, distance, mate)
+    distance, _ = kept.network.nearest(at, np.arange(len(kept.part)), 4.0, 1.2)
     inner = kept.sewn & (np.abs(at.mean(axis=1)[:, 1]) < 30.0)
     assert distance[inner].max() < 1e-3
 
@@ -241,7 +181,9 @@ def test_chains_are_edges_that_share_ends() -> None:
 def test_ends_that_lie_together_are_one() -> None:
     at = np.array([[[0.0, 0, 0], [5, 0, 0]], [[5.2, 0, 0], [9, 0, 0]], [[9.5, 0, 0], [12, 0, 0]]]) + 30.0
     pairs = np.array([[4, 7], [9, 2], [11, 3]])
-    found = borders.Borders(np.zeros(3), pairs, pairs, np.zeros(3, bool), np.full(3, -1), *borders._none(3))
+    found = borders.Borders(
+        np.zeros(3, int), pairs, pairs, np.zeros(3, bool), np.full(3, -1), Network(pairs, np.zeros(3))
+    )
     joined = borders._joined(found, at, np.arange(3), 0.4)
     assert joined[0, 1] == joined[1, 0] and len(set(joined.ravel().tolist())) == 5
     assert len(borders._joined(found, at, np.array([0, 2]), 0.4)) == 2
@@ -276,13 +218,6 @@ def test_a_border_of_very_short_edges_is_not_sewn_to_itself(length: float) -> No
     assert len(list(borders._loops(head, found))) == 0 and texts(head) == []
 
 
-def test_edges_beside_each_other_are_those_with_little_border_between() -> None:
-    ids = np.array([[0, 1], [1, 2], [2, 3], [3, 4], [4, 5], [7, 8]])
-    first, beside = borders._beside(ids, np.array([5.0, 0.4, 0.4, 0.5, 5.0, 0.1]), 1.0)
-    rows = [beside[a:b].tolist() for a, b in pairwise(first)]
-    assert rows == [[2, 3], [3, 4], [0, 4], [0, 1], [1, 2], []]
-
-
 def behind(part: str) -> Subject:
     """A sheet of skin with a hole, in front of or behind a whole one."""
     hole = holed((8, 28), (40, 52), 0.0 if part == "front" else -20.0)
@@ -304,22 +239,3 @@ def test_where_the_skin_of_a_mesh_ends_is_a_warning() -> None:
         head = plain.subject(plain.part("face", points, faces), lobe, eyes=ABOVE)
         found = list(borders.holes(head, None, Places(head, None), borders.find_borders(head)))
         assert [f.warning for f in found] == [warned] * len(found) and len(found) == 1 + warned
-
-
-def test_borders_of_many_short_edges_take_no_time() -> None:
-    """Ways along them are not enumerated: where every vertex has an edge to every other one there are thousands of
-    millions, and a line has as many as pairs of edges."""
-    tangle, line = np.array(list(combinations(range(9), 2))), np.column_stack([np.arange(2000), np.arange(1, 2001)])
-    begin_s = process_time()
-    first, beside = borders._beside(tangle, np.full(len(tangle), 0.01), 1.0)
-    rows = [set(beside[a:b].tolist()) for a, b in pairwise(first)]
-    assert all({j for j, other in enumerate(tangle) if not set(other) & set(own)} == row
-               for own, row in zip(tangle, rows, strict=True))  # fmt: skip
-    first, beside = borders._beside(line, np.full(len(line), 1e-4), 1.0)
-    assert len(beside) == 2000 * 1999 - 2 * 1999
-    assert process_time() - begin_s < 30.0  # a new machine compiles it first
-
-
-def test_without_borders_nothing_is_beside_anything() -> None:
-    first, beside = borders._beside(np.zeros((0, 2), np.int64), np.zeros(0), 1.0)
-    assert first.tolist() == [0] and not len(beside)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -26,48 +28,79 @@ def texts(*parts, **options: object) -> list[str]:
     return [f.text for f in spikes.spikes(head, Places(head, None), find_borders(head))]
 
 
+def around(points: np.ndarray, i: int) -> np.ndarray:
+    """The points between 4.5 and 7.8 mm from point i, 0.75 and 1.3 times 6 mm, by scipy's tree."""
+    near = np.array(sorted(cKDTree(points).query_ball_point(points[i], 7.8 + 1e-9)))
+    return near[np.linalg.norm(points[near] - points[i], axis=1) >= 4.5 - 1e-12]
+
+
+@pytest.mark.parametrize("listed", [True, False])
 @pytest.mark.parametrize("count", [40, 90])
-def test_rings_are_all_points_between_two_distances(count: int) -> None:
-    points = np.random.default_rng(1).uniform(-9.0, 9.0, (90, 3))
-    points[:3] = [[0, 0, 0], [4.5, 0, 0], [0, 7.8, 0]]  # 0.75 and 1.3 times 6, which still belong
-    ring = spikes.find_rings(points, count, 6.0)
-    away = np.linalg.norm(points[:, None] - points, axis=2)
-    tree = cKDTree(points)
-    assert len(ring.start) == count + 1
+def test_a_height_is_the_least_along_the_mean_way_from_the_ring(
+    count: int, listed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rng = np.random.default_rng(1)
+    points, values = rng.uniform(-9.0, 9.0, (90, 3)), rng.normal(size=(90, 3))
+    points[:3] = [[0, 0, 0], [4.5, 0, 0], [0, 7.8, 0]]  # which still belong to the ring
+    points[-1] = [900.0, 0.0, 0.0]  # nothing is round it
+    values[:9] *= 9.0
+    if not listed:
+        monkeypatch.setattr(spikes, "MOST_LISTED", 0)
+    out = spikes.Rings(points, count, 6.0).heights(values)
+    assert len(out) == count and {1, 2} <= set(around(points, 0))
     for i in range(count):
-        own = ring.ids[ring.start[i] : ring.start[i + 1]]
-        near = {j for j in tree.query_ball_point(points[i], 7.8 + 1e-9) if away[i, j] >= 4.5 - 1e-12}
-        assert set(own.tolist()) == near and len(own) == len(near)
+        ring = values[around(points, i)]
+        if not len(ring):
+            assert out[i] == 0.0 and i == 89
+            continue
+        way = (values[i] - ring).sum(axis=0)
+        assert out[i] == pytest.approx(((values[i] - ring) @ (way / np.linalg.norm(way))).min())
+    assert (out[:9] > 5.0).any()
 
 
-def test_a_height_is_the_least_along_the_mean_way_from_the_ring() -> None:
-    values = np.random.default_rng(2).normal(size=(9, 3))
-    ring, start = np.array([3, 4, 5, 6, 7, 8, 1, 2]), np.array([0, 4, 6, 6])
-    values[0] += 9.0
-    out = np.full(3, -1.0)
-    spikes.heights(values, start, ring, 0.0, out)
-    for i in range(2):
-        way = (values[i] - values[ring[start[i] : start[i + 1]]]).sum(axis=0)
-        least = ((values[i] - values[ring[start[i] : start[i + 1]]]) @ (way / np.linalg.norm(way))).min()
-        assert out[i] == pytest.approx(least)
-    assert out[0] > 5.0 and out[2] == 0.0  # nothing is round the third
+def test_rings_as_lists_and_searched_for_give_the_very_same_heights(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(5)
+    points, values = rng.uniform(-20.0, 20.0, (600, 3)), rng.normal(size=(600, 3))
+    listed = spikes.Rings(points, 500, 6.0)
+    monkeypatch.setattr(spikes, "MOST_LISTED", 10)
+    searched = spikes.Rings(points, 500, 6.0)
+    for enough in (0.0, 1.0):
+        np.testing.assert_array_equal(searched.heights(values, enough), listed.heights(values, enough))
+
+
+def test_rings_take_memory_for_their_points_however_far_apart_and_however_dense_these_are() -> None:
+    """One far away once took a grid of all space between, 400,000 cubes along each axis; 12,000 in one place are near
+    each other, 24 million pairs."""
+    rng = np.random.default_rng(6)
+    dense = rng.normal(size=(12_000, 3))
+    dense *= rng.uniform(4.0, 5.0, (12_000, 1)) / np.linalg.norm(dense, axis=1)[:, None]
+    points = np.vstack([dense, [[3e6, 3e6, 3e6]]])
+    tracemalloc.start()
+    try:
+        rings = spikes.Rings(points, 12_001, 6.0)
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert len(rings.heights(points)) == 12_001
+    assert most < 100e6
 
 
 def test_heights_of_what_the_ring_is_too_near_to_are_left_out_and_the_others_are_the_same() -> None:
     rng = np.random.default_rng(3)
-    ring = spikes.Ring(np.arange(0, 401, 4), rng.integers(100, 200, 400))
-    values = rng.normal(size=(200, 3)) * np.where(np.arange(200) < 100, 4.0, 1.0)[:, None]
-    every = ring.heights(values)
+    points = rng.uniform(-12.0, 12.0, (200, 3))
+    rings = spikes.Rings(points, 100, 6.0)
+    values = rng.normal(size=(200, 3)) * np.where(rng.random(200) < 0.2, 9.0, 0.7)[:, None]
+    every = rings.heights(values)
     for enough in (0.5, 2.0, 4.0):
-        some = ring.heights(values, enough)
+        some = rings.heights(values, enough)
         assert (every > enough).any()
         np.testing.assert_array_equal(some[every >= enough], every[every >= enough])
         assert set(some[every < enough]) <= {0.0, *every[every < enough]} and (some[every < enough] == 0.0).any()
 
 
 def test_nothing_sticks_out_where_the_ring_lies_round_it_evenly() -> None:
-    values = np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
-    assert spikes.Ring(np.array([0, 4]), np.array([1, 2, 3, 4])).heights(values).tolist() == [0.0]
+    values = 5.0 * np.array([[0.0, 0, 0], [1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])
+    assert spikes.Rings(values, 1, 6.0).heights(values).tolist() == [0.0]
 
 
 def test_samples_are_all_vertices_in_use_and_places_on_large_triangles() -> None:
@@ -93,10 +126,14 @@ def test_an_edge_is_filled_by_as_many_steps_as_it_needs_and_no_more_than_forty()
 
 
 def test_the_corner_of_a_border_is_no_spike() -> None:
-    points, ring = np.array([[0.0, 0, 0], [9, 0, 0], [20, 0, 0]]), spikes.Ring(np.zeros(1), np.zeros(0))
-    high = ring.without_rims(points, np.array([[2.0, 0, 0], [50, 0, 0]]), np.array([5.0, 4.0, 1.0]), 3.0, 2.5)
+    points = np.array([[0.0, 0, 0], [9, 0, 0], [20, 0, 0]])
+    high = spikes.without_rims(points, np.array([[2.0, 0, 0], [50, 0, 0]]), np.array([5.0, 4.0, 1.0]), 3.0, 2.5)
     assert high.tolist() == [0.0, 4.0, 0.0]
-    assert ring.without_rims(points, np.zeros((0, 3)), np.array([5.0, 4.0, 1.0]), 3.0, 2.5).tolist() == [5.0, 4.0, 0.0]
+    assert spikes.without_rims(points, np.zeros((0, 3)), np.array([5.0, 4.0, 1.0]), 3.0, 2.5).tolist() == [
+        5.0,
+        4.0,
+        0.0,
+    ]
 
 
 @pytest.mark.parametrize(("height", "named"), [(3.0, False), (3.6, True), (20.0, True)])

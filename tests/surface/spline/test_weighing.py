@@ -9,6 +9,8 @@ from scipy.interpolate import BSpline
 
 from surface import DCPSurface, Domain, Mesh, Slit
 from surface.deform.lists import Basis, Lists, build_lists, write_rows
+from surface.spline import weighing
+from surface.spline.blends import blend1
 
 
 def weighted_torus() -> DCPSurface:
@@ -94,3 +96,32 @@ def test_rows_written_again_are_those_of_the_lists_and_say_where_they_vanish() -
     for i in range(len(basis.weights)):
         write_rows(basis, lists, mesh, i, *lists.entries_of(i))
     assert np.allclose(lists.value, 2 * before[0], rtol=1e-6) and np.allclose(lists.slope, 2 * before[1], rtol=1e-6)
+
+
+@pytest.mark.parametrize("degree", [0, 1, 3, 9])
+def test_what_surely_reaches_a_place_has_a_weight_there_however_uneven_its_knots_are(degree: int) -> None:
+    """Knots that lie at either end but for one, and any number of them at each end."""
+    for low in range(1, degree + 2):
+        knots = np.array([[0.0] * low + [1.0] * (degree + 2 - low)])
+        for x in (0.0, 2e-9, 0.3, 1.0 - 2e-9, 1.0):
+            surely = weighing._surely_reaches(knots, knots, 0, np.array([[x, x]]))
+            assert surely == (0.0 < x < 1.0)
+            if surely:
+                assert float(BSpline.basis_element(knots[0], extrapolate=False)(x)) > 1e-90
+                assert blend1(knots, 0, degree, x, 0, np.zeros(12))[0] > 1e-90
+
+
+def test_marks_are_those_of_the_weights_themselves() -> None:
+    surface = shapes.scattered(60, 4, degrees=(1, 4))
+    mesh = surface.tessellate(chord_error=0.5, max_depth=3, domain=Domain((0, 1, 0, 1)))
+    cells = len(mesh.cell_start) - 1
+    ids = np.tile(np.arange(surface.n, dtype=np.int32), cells)
+    reach = np.zeros(len(ids), np.bool_)
+    weighing.mark_reaching(
+        *surface.arrays()[:4], mesh.uv.copy(), mesh.side.copy(), mesh.cell_start.copy(),
+        surface.n * np.arange(cells + 1), ids, reach,
+    )  # fmt: skip
+    for i in range(surface.n):
+        kinds = [np.abs(kind) > 0 for kind in expected(surface, mesh, i, range(1))]
+        any_kind = np.logical_or.reduceat(kinds[0] | kinds[1] | kinds[2], mesh.cell_start[:-1])
+        np.testing.assert_array_equal(reach.reshape(cells, -1)[:, i], any_kind)
