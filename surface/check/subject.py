@@ -74,9 +74,10 @@ class Subject:
 
     @cached_property
     def skin(self) -> Ints:
-        """Numbers of the parts that are skin, the one with the most vertices first."""
+        """Numbers of the parts that are skin, the face first: the one with lids or lips, of others the largest."""
         found = [k for k, p in enumerate(self.parts) if p.material == "skin"]
-        return np.array(sorted(found, key=lambda k: -len(self.rest[k])), np.int64)
+        opened = {contact.part for contact in self.head.data.contacts}
+        return np.array(sorted(found, key=lambda k: (self.parts[k].name not in opened, -len(self.rest[k]))), np.int64)
 
     @cached_property
     def eyes(self) -> Floats | None:

@@ -39,7 +39,7 @@ class PlainHead:
         groups = [[Group(n, np.arange(len(m), dtype=np.int32), m) for n, m in p.moves.items()] for p in parts]
         self.data = SimpleNamespace(
             parts=[SimpleNamespace(groups=g) for g in groups], jaw=SimpleNamespace(angle_rad=jaw),
-            eyes=np.zeros((2, 3)) if eyes is None else eyes, eye_radius=0.0 if eyes is None else radius,
+            eyes=np.zeros((2, 3)) if eyes is None else eyes, eye_radius=0.0 if eyes is None else radius, contacts=[],
         )  # fmt: skip
         self.posed = 0
 

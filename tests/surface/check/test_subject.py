@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,15 @@ def test_skin_is_sorted_by_its_vertices_and_pictures_leave_hair_out() -> None:
     assert drawn[1] is None and drawn[2] is not None
     assert drawn[2][0] is head.rest[2] and drawn[2][1] is head.parts[2].triangles
     assert head.shapes(head.rest, without=("skin",))[1] is not None
+
+
+def test_the_skin_with_lids_or_lips_is_the_face_whatever_its_size() -> None:
+    back = plain.part("back", *plain.sheet((-90, 90), (-200, 90), 5.0))
+    head = plain.subject(back, skin())
+    assert head.skin.tolist() == [0, 1]
+    head = plain.subject(back, skin())
+    head.head.data.contacts.append(SimpleNamespace(part="face"))
+    assert head.skin.tolist() == [1, 0]
 
 
 def test_a_head_is_measured_by_its_eyes_and_without_them_by_its_height() -> None:
