@@ -47,6 +47,7 @@ def test_who_listens_routes_and_who_only_connects_is_a_client(table: dict[str, A
         ("tcp/0.0.0.0:7447", True),
         ("quic/[::]:7447", True),
         ("tcp/192.168.1.5:7447", True),
+        ("tcp/128.0.0.1:7447", True),
         ("tcp/localhost.example.org:7447", True),
         ("tcp/1127.0.0.1:7447", True),
     ],

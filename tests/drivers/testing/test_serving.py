@@ -46,7 +46,11 @@ def test_stepped_time_passes_only_when_it_is_stepped() -> None:
 def test_a_step_lets_the_far_end_do_what_is_due() -> None:
     serving = make_stepped()
     serving.fault(["mute:1:at=1s"])
-    serving.step(0.5)
+    assert serving.line.faults.active == []
+    serving.step(1.0)
+    assert [fault.kind for fault in serving.line.faults.active] == ["mute"]  # though nobody wrote or read
+    serving.clear(None)
+    serving.fault(["mute:1:at=1s"])
     assert len(ping(serving)) == ANSWER
     serving.step(1.0)
     assert ping(serving) == b""

@@ -1,4 +1,4 @@
-"""Sums over packed weights against the same sums term by term in float64, and the order in which vertices are written."""
+"""Sums over packed weights against the same sums term by term in float64, and where vertices are written."""
 
 from __future__ import annotations
 

@@ -116,7 +116,7 @@ def test_angles_are_between_a_half_turn_back_and_a_half_turn_on() -> None:
         assert not outside and -180.0 <= angle < 180.0
         found.append(angle)
     tips = ends_of_horns(rods, np.array([found[0]]))
-    assert np.linalg.norm(plate + [[-1.5, 0, 0]] - tips) == pytest.approx(rods.rod_mm[0])
+    assert np.linalg.norm(plate - [1.5, 0.0, 0.0] - tips) == pytest.approx(rods.rod_mm[0])
 
 
 def test_as_far_as_rods_reach_is_found_to_a_ten_millionth() -> None:
