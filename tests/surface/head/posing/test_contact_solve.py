@@ -24,7 +24,7 @@ class Samples:
     def __init__(self, places: np.ndarray, *, radius: float, own: np.ndarray | None = None, gain: float = 1.0,
                  least: float = 1.0, most: float = 1e9, hold: float = 0.0) -> None:  # fmt: skip
         s = len(places)
-        self.eye, self.places = np.array([3.0, -2.0, 5.0]), places
+        self.eye, self.places = np.array([0.1, -0.7, 5.3]), places
         self.near = 2 * np.arange(s) + 1  # every second point is near
         self.points = np.full((2 * s + 1, 3), 77.0)
         self.points[self.near] = places + self.eye
@@ -85,6 +85,7 @@ def test_points_that_rest_are_brought_back_as_firmly_as_they_are_held() -> None:
 def test_an_error_within_the_tolerance_leaves_every_bit() -> None:
     samples = Samples(before_the_eye([12.95, 14.0]), radius=RADIUS)
     before = samples.points.copy()
+    assert ((before[samples.near] - samples.eye) + samples.eye != before[samples.near]).any()  # what moving would round
     assert samples.clear(3, 0.06) == pytest.approx(0.05, abs=1e-5)
     np.testing.assert_array_equal(samples.points, before)
 
