@@ -164,6 +164,7 @@ def test_a_kind_that_is_named_leaves_the_chosen_one(tmp_path: Path) -> None:
     desk.saving.save("")
     assert [(each.name, each.kind) for each in desk.sent] == [("face_1", "user"), ("gesture_1", "gesture")]
     assert desk.saving.kind == "gesture"
+    assert [desk.words.vocabulary[name].kind for name in ("face_1", "gesture_1")] == ["user", "gesture"]
 
 
 @pytest.mark.parametrize(
