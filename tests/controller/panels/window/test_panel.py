@@ -170,6 +170,10 @@ def test_buttons_that_can_do_nothing_are_off(screen: Screen, monkeypatch: pytest
     screen.click(draw, *places.at["undo##top"])
     screen.click(draw, *places.at["redo##top"])
     assert sent == [Show("anger", 1.0), Show("neutral", 1.0), Show("anger", 1.0)]
+    off, real = list[bool](), screen.imgui.begin_disabled
+    monkeypatch.setattr(screen.imgui, "begin_disabled", lambda disabled: (off.append(disabled), real(disabled)))
+    screen.frame(draw)
+    assert off[:3] == [False, True, False]  # undo, redo, neutral
 
 
 def test_a_look_that_cannot_be_shown_is_a_problem_and_files_can_be_dropped() -> None:
