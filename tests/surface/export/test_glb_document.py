@@ -227,3 +227,13 @@ def test_a_user_s_own_groups_have_the_weights_of_the_pose():
         document = Document(head, export_parts(head), pose).content
         (mesh,) = [each for each in document["meshes"] if "dimple" in each.get("extras", {}).get("targetNames", ())]
         assert mesh["weights"][mesh["extras"]["targetNames"].index("dimple")] == pytest.approx(weight)
+
+
+@pytest.mark.parametrize(("moved", "sparse"), [(0, False), (1, True), (4, True), (5, False), (10, False)])
+def test_displacements_are_sparse_where_less_than_half_of_the_vertices_move(moved, sparse):
+    document = Document(Head(small_head()), [], {})
+    rows = np.zeros((10, 3), np.float32)
+    rows[:moved] = [1.0, 2.0, 3.0]
+    accessor = document.accessors[document._target(rows, bounds=True)]
+    assert ("sparse" in accessor, "bufferView" in accessor) == (sparse, not sparse)
+    assert accessor["count"] == 10 and accessor["max"] == rows.max(axis=0).tolist()
