@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from controller.base.clock import Clock
 from controller.base.errors import ControllerError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS
@@ -198,3 +199,33 @@ def test_pictures_are_kept_at_the_time_since_the_run_began(tmp_path: Path) -> No
         face.close()
     assert 0.0 <= recorder.times_s[0] < 60.0 and recorder.times_s == sorted(recorder.times_s)
     assert len(recorder.times_s) == 3
+
+
+def test_a_picture_that_took_too_long_is_followed_by_the_next_at_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At 10 frames a second, a frame of 250 ms: nothing waits for the end of the third period."""
+    now_ns, began = [0], list[int]()
+
+    def sleep(seconds: float) -> None:
+        now_ns[0] += round(seconds * 1e9)
+
+    class Fake(Clock):
+        def __init__(self, rate_hz: float, *, prompt: bool = False) -> None:
+            super().__init__(rate_hz, now_ns=lambda: now_ns[0], sleep_s=sleep, prompt=prompt)
+
+    def values() -> np.ndarray:
+        began.append(now_ns[0])
+        now_ns[0] += 250_000_000 if len(began) == 2 else 1_000_000
+        return np.zeros(len(head.parameters))
+
+    monkeypatch.setattr("controller.face.face.Clock", Fake)
+    save_data(tmp_path, small_head())
+    head = Head.load(tmp_path)
+    face = HeadlessFace(head, FaceSettings(size=(32, 32), fps=10, evaluator="cpu"), values)
+    rounds = iter([True] * 4 + [False])
+    try:
+        face.run(lambda: next(rounds))
+    finally:
+        face.close()
+    assert began == [0, 100_000_000, 350_000_000, 450_000_000]

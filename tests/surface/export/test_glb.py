@@ -1,190 +1,14 @@
-"""surface.export.glb: trimesh and a decoder of a few lines read what was written."""
-
-import io
-import json
-import struct
-from dataclasses import replace
+"""surface.export.glb: weights of a pose, and trimesh reads what was written."""
 
 import numpy as np
 import pytest
-from shapes import hills
-from small_head import all_points, part, small_head
+from small_head import part, small_head
 
+from surface.base.errors import ExportError
 from surface.export import export_head
-from surface.export.glb_document import materials, png_bytes
-from surface.export.shapes import export_parts
+from surface.export.glb import write_glb, write_web_glb
 from surface.head import Head
-from surface.head.model.data import Group
-
-
-class Decoded:
-    """A .glb by the letter of the specification, for float and uint32 accessors."""
-
-    def __init__(self, path) -> None:
-        raw = path.read_bytes()
-        size = struct.unpack_from("<I", raw, 12)[0]
-        self.document, self.data = json.loads(raw[20 : 20 + size]), raw[28 + size :]
-
-    def view(self, index: int, dtype: str) -> np.ndarray:
-        view = self.document["bufferViews"][index]
-        assert view["buffer"] == 0
-        return np.frombuffer(self.data[view["byteOffset"] :][: view["byteLength"]], dtype)
-
-    def accessor(self, index: int) -> np.ndarray:
-        a = self.document["accessors"][index]
-        dtype, width = {5126: "<f4", 5125: "<u4"}[a["componentType"]], {"SCALAR": 1, "VEC2": 2, "VEC3": 3}[a["type"]]
-        out = np.zeros((a["count"], width), dtype)
-        if "bufferView" in a:
-            out = self.view(a["bufferView"], dtype).reshape(-1, width).copy()
-        if "sparse" in a:
-            s = a["sparse"]
-            assert s["indices"]["componentType"] == 5125
-            ids = self.view(s["indices"]["bufferView"], "<u4")
-            assert len(ids) == s["count"] and (np.diff(ids.astype(int)) > 0).all()
-            out[ids] = self.view(s["values"]["bufferView"], dtype).reshape(-1, width)
-        if "min" in a:
-            assert a["min"] == out.min(axis=0).tolist() and a["max"] == out.max(axis=0).tolist()
-        return out
-
-
-def exported(tmp_path, head: Head, pose=None) -> Decoded:
-    (path,) = export_head(head, tmp_path / "h.glb", pose)
-    return Decoded(path)
-
-
-def test_every_number_of_every_part_is_there_in_metres(tmp_path):
-    head = Head(small_head())
-    file = exported(tmp_path, head)
-    for mesh, wanted in zip(file.document["meshes"], export_parts(head), strict=True):
-        (primitive,) = mesh["primitives"]
-        got = {key: file.accessor(index) for key, index in primitive["attributes"].items()}
-        np.testing.assert_allclose(got["POSITION"], 0.001 * wanted.vertices, atol=1e-8)
-        np.testing.assert_allclose(got["NORMAL"], wanted.normals, atol=1e-6)
-        np.testing.assert_allclose(got["TEXCOORD_0"], wanted.uv * [1, -1] + [0, 1], atol=1e-7)
-        assert ("COLOR_0" in got) == (wanted.colours is not None)
-        if wanted.colours is not None:
-            np.testing.assert_array_equal(got["COLOR_0"], wanted.colours)
-        assert file.accessor(primitive["indices"]).reshape(-1, 3).tolist() == wanted.triangles.tolist()
-        assert primitive["mode"] == 4
-        targets = {"POSITION": wanted.displacements, "NORMAL": wanted.normal_changes}
-        names = mesh.get("extras", {}).get("targetNames", [])
-        assert names == list(wanted.displacements)
-        for name, target in zip(names, primitive.get("targets", []), strict=True):
-            for key, scale in (("POSITION", 0.001), ("NORMAL", 1.0)):
-                np.testing.assert_allclose(file.accessor(target[key]), scale * targets[key][name], atol=1e-7)
-
-
-def test_targets_are_sparse_where_less_than_half_moves(tmp_path):
-    head = Head(small_head())
-    file = exported(tmp_path, head)
-    for mesh, wanted in zip(file.document["meshes"], export_parts(head), strict=True):
-        for name, target in zip(wanted.displacements, mesh["primitives"][0].get("targets", []), strict=True):
-            share = wanted.displacements[name].any(axis=1).mean()
-            entry = file.document["accessors"][target["POSITION"]]
-            assert ("sparse" in entry) == (share < 0.5) and ("bufferView" in entry) == (share >= 0.5)
-            assert {"min", "max"} <= set(entry)
-            assert "min" not in file.document["accessors"][target["NORMAL"]]
-
-
-@pytest.mark.parametrize(("first", "sparse"), [(15, True), (60, False)])
-def test_a_small_share_of_the_vertices_is_stored_as_such(tmp_path, first, sparse):
-    """A fine sheet of which the points before ``first`` of 100 move."""
-    surface = hills(10, 60.0)
-    ku, kv = surface.padded
-    ids = np.arange(first, dtype=np.int32)
-    moved = [Group("mouthPucker", ids, np.tile(np.float32([0, 0, 5]), (len(ids), 1)))]
-    fields = {"points": surface.points.copy(), "weights": surface.weights.copy(), "knots_u": ku, "knots_v": kv}
-    fields |= {"degrees": np.stack(surface.degrees, axis=1), "jaw": np.zeros(100), "lids": np.zeros(100)}
-    head = Head(small_head(parts=[replace(part("a", -40, groups=moved), **fields)], seams=[], paint=[]))
-    file, (wanted,) = exported(tmp_path, head), export_parts(head)
-    (target,) = file.document["meshes"][0]["primitives"][0]["targets"]
-    share = wanted.displacements["mouthPucker"].any(axis=1).mean()
-    assert 0.1 < share < 0.9 and (share < 0.5) == sparse
-    entry = file.document["accessors"][target["POSITION"]]
-    assert ("sparse" in entry) == sparse and entry["count"] == len(wanted.vertices)
-    np.testing.assert_allclose(
-        file.accessor(target["POSITION"]), 0.001 * wanted.displacements["mouthPucker"], atol=1e-8
-    )
-
-
-def test_a_normal_that_never_changes_is_a_whole_accessor_of_zeros(tmp_path):
-    moved = [all_points("mouthPucker", (0, 0, 5))]
-    file = exported(tmp_path, Head(small_head(parts=[part("a", -40, groups=moved)], seams=[])))
-    (target,) = file.document["meshes"][0]["primitives"][0]["targets"]
-    assert not file.accessor(target["NORMAL"]).any()
-    assert "bufferView" in file.document["accessors"][target["NORMAL"]]
-
-
-def test_views_of_vertices_and_indices_say_so_and_begin_at_multiples_of_four(tmp_path):
-    file = exported(tmp_path, Head(small_head()))
-    views, accessors = file.document["bufferViews"], file.document["accessors"]
-    primitive = file.document["meshes"][0]["primitives"][0]
-    assert {views[accessors[i]["bufferView"]]["target"] for i in primitive["attributes"].values()} == {34962}
-    assert views[accessors[primitive["indices"]]["bufferView"]]["target"] == 34963
-    assert all(view["byteOffset"] % 4 == 0 for view in views)
-    ends = [view["byteOffset"] + view["byteLength"] for view in views]
-    assert all(0 <= view["byteOffset"] - end < 4 for view, end in zip(views[1:], ends, strict=False))
-    assert file.document["buffers"] == [{"byteLength": len(file.data)}] and len(file.data) % 4 == 0
-
-
-def test_materials_are_those_of_the_table_once_each(tmp_path):
-    file = exported(tmp_path, Head(small_head()))
-    by_name = {m["name"]: m for m in file.document["materials"]}
-    assert list(by_name) == ["skin_painted", "skin"]
-    painted, plain = (m["pbrMetallicRoughness"] for m in by_name.values())
-    assert painted["baseColorFactor"] == [1, 1, 1, 1] and plain["baseColorFactor"] == [0.60, 0.37, 0.28, 1.0]
-    assert painted["roughnessFactor"] == plain["roughnessFactor"] == 0.55
-    assert painted["metallicFactor"] == 0.0 and not by_name["skin"]["doubleSided"]
-    used = [m["primitives"][0]["material"] for m in file.document["meshes"]]
-    assert used == [0, 1, 1]
-    assert "images" not in file.document and "baseColorTexture" not in plain
-
-
-def made_of(material: str, *names: str) -> Head:
-    parts = [part(name, 50 * k - 40) for k, name in enumerate(names)]
-    for one in parts:
-        object.__setattr__(one, "material", material)
-    return Head(small_head(parts=parts, seams=[], paint=[]))
-
-
-def test_eyes_share_one_texture_with_pupil_iris_and_white(tmp_path):
-    image = pytest.importorskip("PIL.Image", reason="needs Pillow (extra view)")
-    file = exported(tmp_path, made_of("eye", "l", "r"))
-    (texture,), (picture,), (sampler,) = (file.document[key] for key in ("textures", "images", "samplers"))
-    assert texture == {"source": 0, "sampler": 0} and picture["mimeType"] == "image/png"
-    assert sampler == {"magFilter": 9729, "minFilter": 9729, "wrapS": 10497, "wrapT": 33071}
-    (material,) = file.document["materials"]
-    assert material["pbrMetallicRoughness"]["baseColorTexture"] == {"index": 0}
-    pixels = np.asarray(image.open(io.BytesIO(file.view(picture["bufferView"], "u1").tobytes())))
-    assert pixels.shape == (256, 4, 3) and (pixels == pixels[:, :1]).all()
-    stops = materials()["eye_texture"]
-    for stop in stops:
-        row = int(np.clip(round((1.0 - stop["v"]) * 256 - 0.5), 0, 255))
-        inside = [s["colour"] for s in stops if abs(s["v"] - stop["v"]) < 1e-9]
-        if len(inside) == 1 and 0.0 < stop["v"] < 1.0:
-            near = pixels[max(row - 1, 0) : row + 2, 0].astype(int)
-            assert (near.min(axis=0) - 40 <= 255 * np.array(stop["colour"])).all()
-            assert (near.max(axis=0) + 40 >= 255 * np.array(stop["colour"])).all()
-    first, last = (min if end == 0 else max for end in (0, 1))
-    top, bottom = (pick(stops, key=lambda s: s["v"])["colour"] for pick in (last, first))
-    np.testing.assert_allclose(pixels[0, 0], 255 * np.array(top), atol=3)
-    np.testing.assert_allclose(pixels[-1, 0], 255 * np.array(bottom), atol=3)
-
-
-@pytest.mark.parametrize(("material", "two_sided"), [("mouth", True), ("teeth", False), ("velvet", False)])
-def test_back_faces_and_materials_that_are_unknown(tmp_path, material, two_sided):
-    (made,) = exported(tmp_path, made_of(material, "a")).document["materials"]
-    assert made["name"] == material and made["doubleSided"] == two_sided
-    table = materials().get(material, materials()["skin"])
-    assert made["pbrMetallicRoughness"]["baseColorFactor"] == [*table["colour"], 1.0]
-
-
-def test_the_source_of_the_head_is_named(tmp_path):
-    plain = exported(tmp_path, Head(small_head())).document["asset"]
-    assert plain == {"version": "2.0", "generator": "omote", "extras": {"made": "for tests"}}
-    source = {"source_name": "CommandState", "year": 2020, "source_licence": "MIT"}
-    asset = exported(tmp_path, Head(small_head(provenance=source))).document["asset"]
-    assert asset["copyright"] == "CommandState; MIT" and asset["extras"]["year"] == "2020"
+from tests.surface.export.test_glb_document import exported
 
 
 def test_weights_hold_the_pose_and_zero_angles_are_allowed(tmp_path):
@@ -207,10 +31,11 @@ def test_trimesh_reads_the_same_triangles(tmp_path):
         np.testing.assert_allclose(1000 * mesh.vertices, own.vertices, atol=1e-3)
 
 
-def test_a_png_of_every_size_is_what_pillow_reads():
-    image = pytest.importorskip("PIL.Image", reason="needs Pillow (extra view)")
-    for shape in ((1, 1, 3), (5, 7, 3), (300, 2, 3)):
-        picture = np.random.default_rng(0).integers(0, 256, shape, np.uint8)
-        got = image.open(io.BytesIO(png_bytes(picture)))
-        assert (got.format, got.mode) == ("PNG", "RGB")
-        np.testing.assert_array_equal(np.asarray(got), picture)
+def test_angles_are_no_weights_and_files_for_the_web_have_no_pose(tmp_path):
+    head, path = Head(small_head()), tmp_path / "h.glb"
+    with pytest.raises(ExportError, match="headYaw: angles are no morph targets") as caught:
+        write_glb(head, path, {"jawOpen": 0.5, "headYaw": 0.1})
+    assert caught.value.hint == "export an .obj in this pose"
+    with pytest.raises(ExportError, match="is written at rest"):
+        write_web_glb(head, path, {"jawOpen": 0.5})
+    assert not path.exists()

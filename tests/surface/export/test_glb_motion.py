@@ -13,7 +13,7 @@ from surface.base.errors import ExportError
 from surface.export import Animation, export_head
 from surface.head import Head
 from surface.head.model.parameters import NAMES, SHAPES
-from tests.surface.export.test_glb import Decoded
+from tests.surface.export.test_glb_document import Decoded
 
 TIMES = np.array([0.0, 0.1, 0.25, 0.5])
 

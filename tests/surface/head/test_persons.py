@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +10,7 @@ from scipy.spatial import cKDTree
 
 from surface.base.errors import HeadFileError
 from surface.head import Head
-from surface.head.model.file import load_data
 from surface.head.model.look import Look, Worn
-from surface.head.model.wardrobe import outline, read_garment, with_garments
 from surface.view import Camera, Offscreen
 
 CONFIGS = Path(__file__).resolve().parents[3] / "configs"
@@ -118,54 +115,6 @@ def test_no_hole_opens_between_hair_and_skin(dressed: Head, gl: None) -> None:
 def test_what_is_worn_must_be_there_and_fit(tmp_path: Path) -> None:
     with pytest.raises(HeadFileError, match="missing"):
         Head.load(ICT, None, Look(worn=(Worn(tmp_path / "hat.npz", GREY),)))
-
-
-def test_a_garment_knows_the_head_it_was_made_for() -> None:
-    garment = read_garment(Worn(WARDROBE / "hair-crop.npz", GREY))
-    head = load_data(ICT)
-    assert garment.fit == outline(head, garment.anchors)
-    face = head.parts[0]
-    moved = replace(face, points=face.points + 1.0)
-    assert outline(replace(head, parts=[moved, *head.parts[1:]]), garment.anchors) == garment.fit, "any identity"
-    other = replace(head, parts=[replace(face, loops=[loop * 0.99 for loop in face.loops]), *head.parts[1:]])
-    with pytest.raises(HeadFileError, match="hair-crop was made for another head"):
-        with_garments(other, (garment,), "there")
-    assert len(with_garments(other, (replace(garment, fit=None),), "there").parts) == len(head.parts) + 1
-
-
-@pytest.mark.parametrize("key", ["hair/follow", "hair/strands", "hair/fast"])
-def test_a_garment_whose_arrays_do_not_belong_together_is_refused_by_its_path(tmp_path: Path, key: str) -> None:
-    with np.load(WARDROBE / "hair-crop.npz") as file:
-        arrays = dict(file)
-    wrong = arrays[key] + 5000 if key == "hair/fast" else arrays[key][:5]
-    np.savez(tmp_path / "cut.npz", **arrays | {key: wrong})
-    with pytest.raises(HeadFileError, match=rf"cut\.npz: .*{key}"):
-        read_garment(Worn(tmp_path / "cut.npz", GREY))
-
-
-def test_points_of_a_garment_lie_on_parts_that_it_names(tmp_path: Path) -> None:
-    with np.load(WARDROBE / "hair-crop.npz") as file:
-        arrays = dict(file)
-    np.savez(tmp_path / "far.npz", **arrays | {"hair/anchor": arrays["hair/anchor"] + 7.0})
-    with pytest.raises(HeadFileError, match=r"far\.npz: .*hair/anchor"):
-        read_garment(Worn(tmp_path / "far.npz", GREY))
-
-
-@pytest.mark.parametrize("names", [np.arange(12).reshape(4, 3), np.array(["a" * 200]), np.array(["a"] * 100)])
-def test_names_in_a_garment_are_bounded(tmp_path: Path, names: np.ndarray) -> None:
-    with np.load(WARDROBE / "hair-crop.npz") as file:
-        arrays = dict(file)
-    np.savez(tmp_path / "named.npz", **arrays | {"anchors": names})
-    with pytest.raises(HeadFileError, match=r"named\.npz: anchors is no list of at most"):
-        read_garment(Worn(tmp_path / "named.npz", GREY))
-
-
-def test_a_garment_with_the_mesh_of_another_is_refused(tmp_path: Path) -> None:
-    with np.load(WARDROBE / "hair-crop.npz") as file:
-        arrays = dict(file)
-    np.savez(tmp_path / "other.npz", **arrays | {"hair/mesh_made": arrays["hair/mesh_made"] + 1.0})
-    with pytest.raises(HeadFileError, match=r"other\.npz: is damaged: hair/strands"):
-        Head.load(ICT, None, Look(worn=(Worn(tmp_path / "other.npz", GREY),)))
 
 
 @pytest.mark.slow

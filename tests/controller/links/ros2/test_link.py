@@ -14,7 +14,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 zenoh = pytest.importorskip("zenoh", reason="pip install 'omote[ros2]'")
@@ -27,7 +26,6 @@ from controller.links.kind import LinkContext  # noqa: E402
 from controller.links.links import open_links, read_link  # noqa: E402
 from controller.links.ros2 import session as session_module  # noqa: E402
 from controller.links.ros2.definitions import UNITS, message_types  # noqa: E402
-from controller.links.ros2.faces import ActionUnits, HeadJoints  # noqa: E402
 from controller.links.ros2.wire import attachment  # noqa: E402
 from tests.controller.fleet.nodes import free_port, router, until  # noqa: E402
 
@@ -298,33 +296,10 @@ def test_the_domain_of_the_environment_counts(monkeypatch: pytest.MonkeyPatch) -
         Ros2Settings().check()
 
 
-def test_damaged_intensities_count_as_nothing() -> None:
-    units, given = ActionUnits(P), np.full(UNITS, np.nan)
-    given[26], given[12] = np.inf, -5.0
-    face = units.face(given)
-    assert np.isfinite(face).all() and face[JAW] == 0.5 and face[P.index("mouthSmileLeft")] == 0.0
-    assert units.read(face)[26] > 0.9
-
-
-def test_angles_of_joints_are_those_of_full_scale(root: Path) -> None:
-    joints = HeadJoints(P, root / "configs" / "heads" / "ict")
-    yaw, jaw = joints.names.index("headYaw"), joints.names.index("jawOpen")
-    ones = joints.angles(np.ones(len(P)))
-    assert np.degrees(ones[yaw]) == pytest.approx(60.0) and 20.0 < np.degrees(ones[jaw]) < 30.0
-    assert joints.values(0.3 * ones) == pytest.approx(0.3)
-    assert joints.values(9.0 * ones) == pytest.approx(1.0) and joints.values(-9.0 * ones)[jaw] == 0.0
-
-
 def test_a_key_names_domain_topic_type_and_hash() -> None:
     topic = message_types("jazzy").topic("/maple/command", "std_msgs/msg/String")
     kind = "7/maple/command/std_msgs::msg::dds_::String_/"
     assert topic.key(7) == kind + topic.type_hash and topic.key(7, any_hash=True) == kind + "*"
-
-
-def test_the_jaw_goes_to_neither_side_where_no_side_is_said() -> None:
-    units, given = ActionUnits(P), np.zeros(UNITS)
-    given[30] = 1.0
-    assert not units.face(given).any()
 
 
 def test_what_travels_with_a_message_is_read_by_the_other_side() -> None:

@@ -7,9 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,19 +15,15 @@ import pytest
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
-from controller.body.messages import ControlShow, Hold, Learn, Neutral, PlayShow, Show, StartServos, StopServos
+from controller.body.messages import Hold, Neutral, Show
 from controller.body.panel_state import PanelState
 from controller.layers.commands import CommandState
-from controller.panels.session.next_run import NextRun, carried_to
-from controller.panels.window.editing import MouseEditing
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.robot.channels import build_table
 from controller.robot.following import FollowingStatistics, MeasuredFace
 from controller.robot.robot import load_robot
-from controller.stage.stage import Stage, load_stage
 from controller.vocabulary.vocabulary import Vocabulary
 from drivers.base.bus import BusState
-from surface.view.docks import PictureArea
 from tests.controller.panels.window.screen import Places, Screen, drawn
 
 on_a_display = pytest.mark.skipif(
@@ -129,13 +123,6 @@ def test_points_are_dragged_with_the_mouse() -> None:
     assert told["reshaped"] is True
 
 
-@pytest.fixture
-def screen() -> Iterator[Screen]:
-    found = Screen()
-    yield found
-    found.imgui.destroy_context(found.context)
-
-
 def test_the_panel_sends_what_its_widgets_ask_for(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
     places, sent, values = Places(screen.imgui, monkeypatch), [], PARAMETERS.neutral()
     panel = Panel(lambda: values, sent.append)
@@ -226,154 +213,3 @@ def test_the_panel_shows_who_holds_a_parameter_and_how_far_the_servos_are(
         screen.click(draw, *places.at["jaw   servos 3.0 deg away###jaw"])
         screen.frame(draw)
     assert places.formats["##jawOpen"] == "%.2f  manual"
-
-
-def test_the_panel_stops_and_starts_the_servos_and_says_who_stopped_them(
-    screen: Screen, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    places, sent, state = Places(screen.imgui, monkeypatch), [], CommandState(PARAMETERS)
-    with Mailbox.create(PanelState.size(PARAMETERS)) as mailbox:
-        body = PanelState(mailbox, state.layer_names(), PARAMETERS)
-        panel = Panel(PARAMETERS.neutral, sent.append, PanelState(mailbox, state.layer_names(), PARAMETERS))
-        draw = drawn(panel, "View")
-        body.publish(state, None)
-        for _ in range(3):
-            screen.frame(draw)
-        assert "START servos" not in places.at and not any("stopped" in text for text in places.texts)
-        screen.click(draw, *places.at["STOP servos"])
-        assert sent == [StopServos()]
-        state.stop_latch.stop("line /dev/ttyUSB0", 5)
-        body.publish(state, None)
-        for _ in range(2):
-            screen.frame(draw)
-        assert "servos stopped by line /dev/ttyUSB0" in places.texts
-        screen.click(draw, *places.at["START servos"])
-        assert sent == [StopServos(), StartServos()]
-
-
-def test_keys_do_what_the_help_says(screen: Screen) -> None:
-    sent: list[Any] = []
-    panel = Panel(PARAMETERS.neutral, sent.append, options=PanelOptions(shows=("tour",)))
-    imgui, draw = screen.imgui, drawn(panel, "View")
-
-    def press(*keys: Any) -> None:
-        for down in (True, False):
-            for key in keys:
-                screen.io.add_key_event(key, down)
-            screen.frame(draw)
-
-    key = imgui.Key
-    screen.frame(draw)
-    press(key.space)
-    press(key.space)
-    press(key.space)
-    assert sent == [PlayShow("tour"), ControlShow("PAUSE"), ControlShow("PLAY")]
-    press(key.escape)
-    assert sent[-1] == StopServos()
-    press(key.n)
-    assert isinstance(sent[-1], Neutral)
-    press(key.f)
-    assert panel.area.bare
-    panel.commands.show("anger", 1.0)
-    press(key.mod_ctrl, key.z)
-    assert sent[-1] == Show("neutral", 1.0)
-    press(key.mod_ctrl, key.y)
-    assert sent[-1] == Show("anger", 1.0)
-    press(key.h)
-    assert panel.keys.help_shown
-    press(key.r)
-    assert panel.capture.recording
-
-
-@pytest.fixture(scope="module")
-def stage() -> Stage:
-    return load_stage("demo", PARAMETERS)
-
-
-def sculpted(stage: Stage, panel: Panel) -> MouseEditing:
-    """Points of the face with three control points of the left cheek moved."""
-    head = stage.load_head()
-    mouse = MouseEditing(head, stage.load_head, PARAMETERS.neutral, panel.commands, PictureArea())
-    near = np.argsort(np.linalg.norm(mouse.editor._rest - [45.0, -30.0, 85.0], axis=1))[:3]
-    moves = np.zeros_like(mouse.editor._rest)
-    moves[near] = [0.0, 0.0, 4.0]
-    panel.commands.move(moves)
-    panel.saving.editor = mouse.find_editor
-    return mouse
-
-
-def panel_of(values: np.ndarray, folder: Path, sent: list[Any]) -> Panel:
-    return Panel(lambda: values, sent.append, options=PanelOptions(folder=folder))
-
-
-def test_moved_skin_is_saved_as_a_group_that_is_a_slider_a_button_and_a_word(stage: Stage, tmp_path: Path) -> None:
-    panel = panel_of(PARAMETERS.neutral(), tmp_path, [])
-    mouse, asked = sculpted(stage, panel), []
-    panel.saving.reopen = lambda history, held: asked.append((history, held))
-    panel.saving.save("dimple", "group")
-    assert panel.saving.message == f"wrote dimple to {tmp_path / 'mine.toml'}"
-    history, held = asked[0]
-    assert history.now.moves is None and history.past[-1].moves is not None and held == {"dimple": 1.0}
-    again = load_stage("demo", PARAMETERS, [tmp_path / "mine.toml"])
-    dimple = again.parameters.index("dimple")
-    assert again.parameters.regions[dimple] == "mouth" and again.vocabulary["dimple"].weights[dimple] == 1.0
-    later = carried_to(NextRun(stage.path, (), history, PARAMETERS.names, held), again.parameters)
-    assert later is not None and later.now.held == {dimple: 1.0}
-    head, shown = again.load_head(), mouse.editor.head
-    shown.pose(shown.values({}))
-    head.pose(head.values({"dimple": 1.0}))
-    assert np.abs(head.part("face").vertices - shown.part("face").vertices).max() < 1e-3
-    head.pose(head.values({}))
-    assert np.abs(head.part("face").vertices - shown.part("face").vertices).max() > 0.2
-
-
-def test_moved_skin_is_saved_as_a_corrective_of_the_present_face(stage: Stage, tmp_path: Path) -> None:
-    values = PARAMETERS.neutral()
-    panel = panel_of(values, tmp_path, [])
-    mouse = sculpted(stage, panel)
-    panel.saving.save("fold", "corrective")
-    assert "none of its shapes is strong" in panel.saving.message and not (tmp_path / "fold.json").exists()
-    values[PARAMETERS.indices(["mouthSmileLeft", "jawOpen"])] = 0.8, 0.5
-    panel.saving.save("fold", "corrective")
-    again = load_stage("demo", PARAMETERS, [tmp_path / "mine.toml"])
-    assert again.parameters.point_groups["fold"].times == ("jawOpen", "mouthSmileLeft")
-    head, shown, face = again.load_head(), mouse.editor.head, {"mouthSmileLeft": 0.8, "jawOpen": 0.5}
-    shown.pose(shown.values(face))
-    head.pose(head.values({**face, "fold": float(again.parameters.rest[again.parameters.index("fold")])}))
-    assert (
-        np.abs(head.part("face").vertices - shown.part("face").vertices).max() < 0.2
-    )  # the jaw turns skin moved at rest
-
-
-def test_a_gesture_and_an_anchor_are_saved(stage: Stage, tmp_path: Path) -> None:
-    values, sent = PARAMETERS.neutral(), []
-    values[PARAMETERS.index("mouthSmileLeft")] = 0.7
-    panel = panel_of(values, tmp_path, sent)
-    mouse = sculpted(stage, panel)
-    panel.saving.save("wry", "gesture")
-    assert sent[-1] == Learn("wry", tuple(np.round(values, 3)), "gesture")
-    assert Vocabulary.load(PARAMETERS, more=[tmp_path / "mine.toml"])["wry"].kind == "gesture"
-    panel.saving.save("corner", "anchor")
-    assert "no point was pulled" in panel.saving.message
-    mouse.editor.prepare()
-    mouse.editor._thread.join(60.0)
-    model = mouse.editor._model
-    assert model is not None
-    mouse.editor._last = int(np.argmin(np.linalg.norm(model.skin.rest - [28.6, -34.0, 102.0], axis=1)))
-    panel.saving.save("corner", "anchor")
-    robot = load_robot(tmp_path / "corner-anchor.toml", PARAMETERS)
-    anchor = robot.channels[0].anchor
-    assert anchor is not None and anchor.unit_direction[1] > 0.5 and robot.channels[0].map.at[1] > 3.0
-
-
-@pytest.mark.parametrize("kind", ["group", "corrective", "anchor"])
-def test_what_cannot_be_saved_is_told_with_the_next_step(kind: Any, stage: Stage, tmp_path: Path) -> None:
-    panel = panel_of(PARAMETERS.neutral(), tmp_path, [])
-    panel.saving.save("x", kind)
-    assert panel.saving.message == "nothing can be dragged here; omote edit"
-    head = stage.load_head()
-    mouse = MouseEditing(head, stage.load_head, PARAMETERS.neutral, panel.commands, PictureArea())
-    panel.saving.editor = mouse.find_editor
-    panel.saving.save("x", kind)
-    assert "Ctrl" in panel.saving.message or "show the face" in panel.saving.message
-    assert not list(tmp_path.iterdir())

@@ -162,3 +162,45 @@ def test_triangles_and_quads_may_share_edges():
     check_manifold(got, "m")
     assert len(got.vertices) == 8 and (got.faces[1:, 3] == -1).all()
     np.testing.assert_allclose(np.sort(got.vertices[got.faces[0]], axis=0), np.sort(vertices[:4], axis=0))
+
+
+def cap(half_deg: float, size: float) -> FitMesh:
+    """A round cap of a sphere of this radius that reaches so far from its pole, looking inwards."""
+    rings, around = 24, 48
+    polar, angle = np.radians(half_deg) * np.arange(1, rings + 1) / rings, 2 * np.pi * np.arange(around) / around
+    ring = np.stack(
+        [
+            np.outer(np.sin(polar), np.cos(angle)),
+            np.outer(np.sin(polar), np.sin(angle)),
+            np.outer(np.cos(polar), np.ones(around)),
+        ],
+        axis=-1,
+    ).reshape(-1, 3)
+    vertices = size * np.concatenate([[[0.0, 0.0, 1.0]], ring])
+    here = np.arange(around)
+    there = (here + 1) % around
+    faces = [[0, 1 + b, 1 + a, -1] for a, b in zip(here, there, strict=True)]
+    for k in range(rings - 1):
+        low, high = 1 + k * around, 1 + (k + 1) * around
+        faces += [[low + a, low + b, high + b, high + a] for a, b in zip(here, there, strict=True)]
+    rows = np.array(faces)
+    return FitMesh(vertices, rows, vertices[:, :2], rows.copy(), (), np.zeros((0, len(vertices), 3)))
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e4])
+@pytest.mark.parametrize(("half_deg", "turned"), [(8.0, False), (14.0, False), (17.0, True), (80.0, True)])
+def test_a_skin_is_inside_out_where_a_fifth_of_its_area_looks_to_its_middle_whatever_its_size(
+    half_deg: float, turned: bool, size: float
+) -> None:
+    """Mean of the cosine between normals and directions from the middle, weighted by area and distance: of a cap of
+    half-angle a, (1 - h^2) / m, with h = (1 + cos a) / 2 the height of its middle and m the mean distance from it, in
+    radii; below 0.2 it is too flat to say."""
+    mesh = cap(half_deg, size)
+    h = (1.0 + np.cos(np.radians(half_deg))) / 2.0
+    heights = np.linspace(np.cos(np.radians(half_deg)), 1.0, 20_001)  # of equal areas (Archimedes)
+    distance = np.sqrt(1.0 - heights**2 + (heights - h) ** 2).mean()
+    assert bool((1.0 - h**2) / distance > 0.2) is turned
+    got, notes = repaired(mesh)
+    assert bool(notes) is turned
+    a, b, c = (got.vertices[got.faces[0, k]] for k in range(3))
+    assert bool(np.cross(b - a, c - a)[2] > 0.0) is turned

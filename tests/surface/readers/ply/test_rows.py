@@ -121,3 +121,75 @@ def test_what_trimesh_writes_is_read(tmp_path: Path, encoding: str) -> None:
     assert (np.diff(starts) == 3).all()
     assert flat.reshape(-1, 3).tolist() == mesh.faces.tolist()
     assert file.elements["vertex"].columns("x", "y", "z") == pytest.approx(mesh.vertices, abs=1e-6)
+
+
+def test_every_type_of_number_has_its_size_and_both_its_names(tmp_path: Path) -> None:
+    """Turk's names and those of the sizes, in both byte orders; numpy packs the row."""
+    kinds = ["char", "uchar", "short", "ushort", "int", "uint", "float", "double"]
+    sized = ["int8", "uint8", "int16", "uint16", "int32", "uint32", "float32", "float64"]
+    codes = ["i1", "u1", "i2", "u2", "i4", "u4", "f4", "f8"]
+    for names in (kinds, sized):
+        for order, form in (("<", "binary_little_endian"), (">", "binary_big_endian")):
+            row = np.array([(-7, 250, -30_000, 60_000, -70_000, 4_000_000_000, 0.5, 1e-300)],
+                           [(f"p{k}", order + code) for k, code in enumerate(codes)])  # fmt: skip
+            lines = [f"property {name} p{k}" for k, name in enumerate(names)]
+            head = "\n".join(["ply", f"format {form} 1.0", "element e 1", *lines, "end_header", ""])
+            (tmp_path / "a.ply").write_bytes(head.encode() + row.tobytes())
+            found = PlyFile(tmp_path / "a.ply").elements["e"].numbers
+            assert [found[f"p{k}"][0] for k in range(8)] == list(row[0])
+
+
+@pytest.mark.parametrize("lengths", [[3, 3, 3], [3, 0, 4], [0, 0, 0], []])
+def test_rows_with_lists_of_even_and_of_uneven_lengths_are_read_alike(tmp_path: Path, lengths: list[int]) -> None:
+    """With a number before and after the list, and another element behind."""
+    rng = np.random.default_rng(sum(lengths))
+    rows = [rng.integers(0, 1000, n).tolist() for n in lengths]
+    head = (f"ply\nformat {{}} 1.0\nelement face {len(rows)}\nproperty uchar kind\nproperty list ushort int v\n"
+            "property float size\nelement last 1\nproperty int x\nend_header\n")  # fmt: skip
+    data = b"".join(struct.pack(f">BH{len(row)}if", k, len(row), *row, 0.25 * k) for k, row in enumerate(rows))
+    binary_file = head.format("binary_big_endian").encode() + data + struct.pack(">i", -42)
+    words = [f"{k} {len(row)} {' '.join(map(str, row))} {0.25 * k}" for k, row in enumerate(rows)]
+    text_file = head.format("ascii").encode() + "\n".join([*words, "-42\n"]).encode()
+    for content in (binary_file, text_file):
+        (tmp_path / "a.ply").write_bytes(content)
+        face, last = PlyFile(tmp_path / "a.ply").elements.values()
+        flat, starts = face.lists["v"]
+        assert flat.tolist() == [x for row in rows for x in row]
+        assert starts.tolist() == np.cumsum([0, *lengths]).tolist()
+        assert face.numbers["kind"].tolist() == list(range(len(rows)))
+        assert face.numbers["size"].tolist() == [0.25 * k for k in range(len(rows))]
+        assert last.numbers["x"].tolist() == [-42]
+
+
+def test_more_properties_than_any_file_has_are_refused(tmp_path: Path) -> None:
+    for count, good in ((64, True), (65, False)):
+        lines = "".join(f"property int p{k}\n" for k in range(count))
+        (tmp_path / "a.ply").write_text(f"ply\nformat ascii 1.0\nelement e 0\n{lines}end_header\n")
+        if good:
+            assert len(PlyFile(tmp_path / "a.ply").elements["e"].properties) == 64
+        else:
+            with pytest.raises(FitError, match="property 'p64' is out of place"):
+                PlyFile(tmp_path / "a.ply")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("plx\nformat ascii 1.0\nend_header\n", "it does not begin with ply"),
+        ("ply\nformat ascii 1.0\n", "it has no end_header"),
+        ("ply\nformat ascii 1.0\nend_header", "it has no end_header"),
+        ("ply\nelement e 0\nend_header\n", "it names no format"),
+        ("ply\nformat middle_endian 1.0\nend_header\n", "'format middle_endian 1.0' is no line of it"),
+        ("ply\nformat ascii 1.0\nelement e 2\nproperty int x\nend_header\n1\n", "element e: the file is cut short"),
+        (
+            "ply\nformat ascii 1.0\nelement e 1\nproperty int x\nend_header\none\n",
+            "element e: is damaged: a word in it",
+        ),
+        ("ply\nformat ascii 1.0\nproperty int x\nend_header\n", "property 'x' is out of place"),
+    ],
+)
+def test_a_damaged_file_is_named_with_what_to_do(tmp_path: Path, content: str, said: str) -> None:
+    (tmp_path / "a.ply").write_text(content)
+    with pytest.raises(FitError) as caught:
+        PlyFile(tmp_path / "a.ply")
+    assert said in str(caught.value) and caught.value.hint == "save the mesh again as .ply or .obj"

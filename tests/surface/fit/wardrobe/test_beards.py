@@ -1,0 +1,97 @@
+"""surface.fit.wardrobe.beards: where beards grow, and shells over the skin there."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from surface.fit.wardrobe import beards as module
+from surface.fit.wardrobe.beards import BEARDS, field, garment, inside
+from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.skin import Skin
+from tests.surface.fit.wardrobe.invariants import asymmetry, check_patches, heights, points_of
+from tests.surface.fit.wardrobe.made_skin import lower_face
+
+
+def test_beards_grow_on_chin_jaw_and_upper_lip_and_not_on_the_lips_or_above() -> None:
+    grows = np.array([[0.0, -75, 95], [45, -55, 70], [-45, -55, 70], [0, -19, 105]])
+    bare = np.array([[0.0, -33, 100], [0, 20, 110], [30, 60, 90], [0, -110, 60], [0, -40, -80], [55, 10, 75]])
+    assert (inside(grows) > 0.0).all() and (inside(bare) < 0.0).all()
+    rng = np.random.default_rng(1)
+    places = np.column_stack([rng.uniform(-80, 80, 200), rng.uniform(-110, 40, 200), rng.uniform(25, 110, 200)])
+    np.testing.assert_allclose(inside(places), inside(places * [-1.0, 1.0, 1.0]))  # alike on both sides
+
+
+def test_how_far_inside_grows_by_the_millimetres_from_the_nearest_line() -> None:
+    """In front, between the line of the chin and the lips."""
+    y = np.linspace(-93.0, -86.0, 15)
+    column = np.column_stack([0 * y, y, np.full(15, 90.0)])
+    np.testing.assert_allclose(np.diff(inside(column)), np.diff(y))
+
+
+@pytest.fixture(scope="module")
+def face() -> Skin:
+    """The lower half of a face, whose samples take less time."""
+    return lower_face()
+
+
+@pytest.fixture(scope="module")
+def made(face: Skin) -> dict[str, list[Patches]]:
+    """Patches of every beard."""
+    return {name: garment(face, beard) for name, beard in BEARDS.items()}
+
+
+@pytest.fixture(params=BEARDS)
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+def test_there_are_two_patches_of_each_shell_outside_of_the_skin(
+    name: str, face: Skin, made: dict[str, list[Patches]]
+) -> None:
+    beard, patches = BEARDS[name], made[name]
+    check_patches(patches)
+    assert len(patches) == 2 * len(beard.shells)
+    over = heights(face, points_of(patches))
+    # where the ears of this head are, which are left out of its samples, a few lie below them
+    assert np.quantile(over, 0.1) > -1.5 and over.max() < 2.0 * (beard.thick + beard.chin) + 6.0
+    assert all(patch.follow == 1.0 and not patch.sway.any() for patch in patches)
+    assert asymmetry(points_of(patches), 0.8) < 6.0
+
+
+def test_outer_shells_lie_over_inner_ones(name: str, face: Skin, made: dict[str, list[Patches]]) -> None:
+    for outer, inner in zip(made[name][:-2], made[name][2:], strict=True):
+        over = [heights(face, patch.points.reshape(-1, 3)).mean() for patch in (outer, inner)]
+        assert over[0] > over[1]
+
+
+def test_the_full_beard_is_thicker_than_the_short_one(face: Skin, made: dict[str, list[Patches]]) -> None:
+    full, short = (heights(face, points_of(made[name])).max() for name in ("beard-full", "beard-short"))
+    assert full > short + 2.0
+
+
+def test_skin_between_hairs_has_the_beard_s_colour_where_it_grows(name: str, skin: Skin) -> None:
+    cover, beard = field(skin, BEARDS[name]), BEARDS[name]
+    assert cover.shape == (len(skin.points),) and not cover[skin.part != 0].any()
+    own = skin.part == 0
+    deep = inside(skin.points)
+    np.testing.assert_allclose(cover[own & (deep > 7.0)], beard.cover)
+    assert not cover[deep < -3.0].any() and cover.max() <= beard.cover
+
+
+def test_values_between_the_places_of_a_grid_are_straight() -> None:
+    grid = np.random.default_rng(2).normal(size=(4, 5, 3))
+    np.testing.assert_allclose(module._between(grid, np.arange(4.0), np.arange(5.0)), grid)
+    found = module._between(grid, np.array([1.25]), np.array([3.5]))[0, 0]
+    rows = 0.75 * grid[1] + 0.25 * grid[2]
+    np.testing.assert_allclose(found, 0.5 * rows[3] + 0.5 * rows[4])
+
+
+def test_a_level_ray_leaves_the_skin_where_it_is(skin: Skin) -> None:
+    for angle in (-0.8, 0.0, 0.5):
+        direction = np.array([np.sin(angle), 0.0, np.cos(angle)])
+        found = module._outermost(skin, -70.0, direction)
+        assert found[1] == -70.0
+        off = found - [0.0, -70.0, 20.0]
+        np.testing.assert_allclose(off, (off @ direction) * direction, atol=1e-9)
+        assert abs(heights(skin, found[None])[0]) < 4.0

@@ -1,0 +1,59 @@
+"""surface.fit.wardrobe.long: a cap, and sheets that hang on both sides of a parting."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from surface.fit.wardrobe import long as module
+from surface.fit.wardrobe.long import ALONG_PART, FANNED, LAYERS, PART_X, TIPS_Y, long
+from surface.fit.wardrobe.skin import Skin
+from surface.fit.wardrobe.styles import Style
+from tests.surface.fit.wardrobe.invariants import check_patches, heights, points_of
+
+
+@pytest.fixture(scope="module")
+def style(skin: Skin) -> Style:
+    return long(skin)
+
+
+def test_there_is_a_cap_and_a_sheet_of_each_layer_on_either_side(style: Style, skin: Skin) -> None:
+    check_patches([*style.patches, *style.hanging])
+    assert len(style.patches) == 1 and len(style.hanging) == 2 * len(LAYERS)
+    assert heights(skin, points_of(style.patches)).min() > 0.0
+    over = heights(skin, points_of(style.hanging))
+    assert over.min() > -2.5
+
+
+def test_sheets_fall_from_the_parting_to_the_shoulders(style: Style) -> None:
+    for patch in style.hanging:
+        roots, tips = patch.points[0, :, 0], patch.points[0, :, -1]
+        np.testing.assert_allclose(roots[:, 0], PART_X, atol=12.0)
+        assert roots[:, 1].min() > 60.0 and np.median(tips[:, 1]) < TIPS_Y + 60.0
+        assert (patch.sway[0, :, -1] > 0.5).all() and not patch.sway[0, :, 0].any()
+
+
+def test_sheets_of_both_sides_lie_on_their_sides_the_outermost_first(style: Style) -> None:
+    middle = [float(patch.points[0, :, 6:, 0].mean()) for patch in style.hanging]
+    assert all(a > PART_X > b for a, b in zip(middle[::2], middle[1::2], strict=True))
+    wide = [np.abs(patch.points[0, :, 4:8, 0] - PART_X).mean() for patch in style.hanging]
+    assert wide[0] > wide[4] and wide[1] > wide[5]
+
+
+def test_the_parting_goes_from_the_line_backwards_and_fans_out_at_its_end(skin: Skin, style: Style) -> None:
+    roots = module._parting(skin, style.hairline)
+    assert roots.shape == (ALONG_PART + FANNED, 3)
+    assert (np.diff(roots[:ALONG_PART, 2]) < 0.0).all() and style.hairline.inside(roots).min() > 1.0
+    np.testing.assert_array_equal(roots[ALONG_PART:], np.tile(roots[ALONG_PART - 1], (FANNED, 1)))
+    assert np.abs(heights(skin, roots)).max() < 2.5
+
+
+def test_hair_over_an_ear_stands_off_there_alone() -> None:
+    at = np.array([[80.0, 14.0, -4.0], [-80.0, 14.0, -4.0], [40.0, 14.0, 80.0], [80.0, 110.0, -4.0]])
+    over = module._at_ear(at)
+    assert over[0] == over[1] > 0.5 and over[2] == 0.0 and module._at_ear(at * [0.5, 1, 1]).max() == 0.0
+
+
+def test_pairs_of_sheets_are_sorted_outermost_first() -> None:
+    sheets = list("abcABC")
+    assert module._inner_last(sheets) == list("aAbBcC")  # type: ignore[arg-type,comparison-overlap]
