@@ -16,7 +16,7 @@ from surface.base.errors import FitError, ViewError
 from surface.fit import reportfile
 from surface.fit.api import fit_mesh
 from surface.fit.eyes.search import MISSING
-from surface.fit.measures.error_colours import SCALE
+from surface.base.error_colours import SCALE
 from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds, kinds_line
 from surface.fit.reportfile import EXCLUDED, _colours, as_markdown, as_table, write_report
