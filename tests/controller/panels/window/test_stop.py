@@ -145,7 +145,10 @@ def clicked(hands: Hands, name: str) -> Steps:
     yield from hands.until(lambda: bool(panel._stopped_by), f"the stop, {name}", 20.0)
     yield from hands.press(down=False)
     hands.report[name] = red_at(hands, panel.stop.box)
-    yield from hands.tap(hands.imgui.Key.escape)  # closes a menu; the servos are stopped already
+    area = hands.face._area
+    yield from hands.move(area.left + 0.9 * area.width, area.top + 0.1 * area.height)  # closes a menu that lies over it
+    yield from hands.press(down=True)
+    yield from hands.press(down=False)
     yield from hands.click("START servos")
     yield from hands.until(lambda: not panel._stopped_by, f"the start, {name}", 20.0)
 
@@ -172,7 +175,7 @@ def main() -> None:
 @on_a_display
 @pytest.mark.parametrize(
     ("width", "height", "dpi"),
-    [(640, 480, 96), (640, 480, 192), (1280, 720, 192), (3840, 2160, 96), (3840, 2160, 192)],
+    [(640, 480, 96), (640, 480, 192), (1280, 720, 192), (3840, 2160, 192)],
 )
 def test_one_click_stops_whatever_lies_over_the_button(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, width: int, height: int, dpi: int
