@@ -1,10 +1,10 @@
-"""How smoothly the face follows a pointer that pulls it, and how near: ``python -m benchmarks.pulling [--size 1280x720]``.
+"""How smoothly the face follows a pointer that pulls it, and how near: ``python -m benchmarks.pulling``.
 
-A real window of ``omote run`` on a virtual display, drawn in software. The pointer takes hold of a point of the face and
-moves a little each frame, as a hand does; then it rests. Each row says frames a second while it moved, processor time a
-frame (all threads; the thread that draws), how far the point is from the pointer at the end, and what a frame is made
-of, in milliseconds of the clock and of the thread that draws. Run it with nothing else on the machine; the limit is 30
-frames a second and 1 mm. Needs xvfb-run.
+A real window of ``omote run`` on a virtual display, 1280 x 720 without ``--size``, drawn in software. The pointer takes
+hold of a point of the face and moves a little each frame, as a hand does; then it rests. Each row says frames a second
+while it moved, processor time a frame (of all threads; of the thread that draws), how far the point is from the pointer
+at the end, and what a frame is made of, in milliseconds of the clock and of the thread that draws. Run it with nothing
+else on the machine; the limits are 30 frames a second and 1 mm. Needs xvfb-run.
 """
 
 from __future__ import annotations

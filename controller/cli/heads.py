@@ -171,7 +171,9 @@ def fit(
     identities: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Identity modes of the mesh (.npz): adds named variations.")
     ] = None,
-    keep: Annotated[bool, typer.Option("--keep", help="Keep the head that is there: measure it again, and add --identities.")] = False,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep the head that is there: measure it again, and add --identities.")
+    ] = False,
     expressions_from: Annotated[
         str | None,
         typer.Option(

@@ -110,7 +110,9 @@ def measure_head(head: str | Path, mesh_path: str | Path, options: LoadOptions =
     known = np.concatenate([np.zeros(0), *errors.values()])
     off = float(np.sqrt(np.nanmean(known**2))) if np.isfinite(known).any() else np.inf
     if off > OTHER_MESH_MM * head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True))):
-        why = f"{head}: was not fitted to {mesh_path}: " + (f"{off:.1f} mm RMS from it" if errors else "no part is in it")
+        why = f"{head}: was not fitted to {mesh_path}: " + (
+            f"{off:.1f} mm RMS from it" if errors else "no part is in it"
+        )
         raise FitError(why, hint="name the mesh and the options that the head was made with")
     drop_fit_error(head)  # may be of other triangles
     write_fit_error(head, errors, Head(data).parts)

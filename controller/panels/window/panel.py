@@ -75,8 +75,8 @@ class Panel:
 
     Attributes
     ----------
-    stop : the button that stops the servos. heads : the choice between several heads; None for one. sculpt : draws what the mouse does to the face; None for
-        nothing.
+    stop : the button that stops the servos. heads : the choice between several heads; None for one.
+    sculpt : draws what the mouse does to the face; None for nothing.
     """
 
     def __init__(

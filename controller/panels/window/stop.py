@@ -51,7 +51,9 @@ class StopButton:
 
     def leave_room(self, imgui: Any) -> None:
         """Make room for it where the next widget of a window shall be."""
-        imgui.invisible_button(LABEL, imgui.ImVec2(-1.0, _LINES * imgui.get_font_size()))  # no place to drag a window by
+        imgui.invisible_button(
+            LABEL, imgui.ImVec2(-1.0, _LINES * imgui.get_font_size())
+        )  # no place to drag a window by
         low, high, draw = imgui.get_item_rect_min(), imgui.get_item_rect_max(), imgui.get_window_draw_list()
         seen = draw.get_clip_rect_min(), draw.get_clip_rect_max()
         box = Box(low.x, low.y, high.x, high.y)
@@ -74,10 +76,10 @@ class StopButton:
     def _draw(self, imgui: Any, *, over: bool) -> None:
         down = over and imgui.get_io().mouse_down[0]
         light = _DARKER if down else _BRIGHTER if over else 1.0
-        colour = (*(min(light * each, 1.0) for each in RED[:3]), 1.0)
+        red, green, blue = (min(light * each, 1.0) for each in RED[:3])
         draw, box, text = imgui.get_foreground_draw_list(), self.box, imgui.calc_text_size(LABEL)
         corners = imgui.ImVec2(box.left, box.top), imgui.ImVec2(box.right, box.bottom)
-        draw.add_rect_filled(*corners, packed(imgui, colour), imgui.get_style().frame_rounding)
+        draw.add_rect_filled(*corners, packed(imgui, (red, green, blue, 1.0)), imgui.get_style().frame_rounding)
         draw.add_rect(*corners, packed(imgui, (1.0, 1.0, 1.0, 0.35)), imgui.get_style().frame_rounding)
         at = (box.left + box.right - text.x) / 2, (box.top + box.bottom - text.y) / 2
         draw.add_text(imgui.ImVec2(*at), packed(imgui, (1.0, 1.0, 1.0, 1.0)), LABEL)

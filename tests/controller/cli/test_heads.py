@@ -179,7 +179,10 @@ def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path, monkey
     measured = {"face": np.array([0.1, 0.3, np.nan]), "back": np.array([2.0])}
     monkeypatch.setattr("surface.fit.api.measure_head", lambda *given: calls.append(("measured", *given)) or measured)
     said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out), "--keep", "--identities", "i.npz"])
-    assert said.output.endswith("identities: broad, long\n") and [call[0] for call in calls] == ["measured", "identities"]
+    assert said.output.endswith("identities: broad, long\n") and [call[0] for call in calls] == [
+        "measured",
+        "identities",
+    ]
     assert "face 2 0.224 0.298 0.300" in " ".join(said.output.replace("\u2502", " ").split())
 
 

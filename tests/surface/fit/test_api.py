@@ -102,7 +102,7 @@ def test_a_head_that_is_there_is_measured_again_beside_its_own_mesh_alone(fitted
     assert (folder / FIT_ERROR).stat().st_size == len(kept)
     sheet = slit_sheet()
     other = write_npz(tmp_path / "m.npz", replace(sheet, vertices=sheet.vertices * [1.0, 1.0, 1.6]))
-    with pytest.raises(FitError, match="was not fitted to .*mm RMS from it"):
+    with pytest.raises(FitError, match=r"was not fitted to .* mm RMS from it"):
         measure_head(folder, other)
     assert np.isfinite(Head.load(folder).part("face").attributes["fit_error"]).all()
 

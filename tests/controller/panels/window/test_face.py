@@ -58,7 +58,9 @@ def shown(program: str, *words: str, server: str = "-screen 0 1280x1024x24") -> 
 def scaled(program: str, dpi: int, size: tuple[int, int]) -> str:
     """:func:`shown` on a display of a size whose desktop has ``dpi`` dots per inch; 96 is 100 %."""
     server = f"-screen 0 {size[0]}x{size[1]}x24 -noreset"  # else what xrdb has set is lost with it
-    set_dpi = f"import subprocess; subprocess.run(['xrdb', '-merge'], input='Xft.dpi: {dpi}\\n', text=True, check=True)\n"
+    set_dpi = (
+        f"import subprocess; subprocess.run(['xrdb', '-merge'], input='Xft.dpi: {dpi}\\n', text=True, check=True)\n"
+    )
     return shown(set_dpi + program, server=server)
 
 

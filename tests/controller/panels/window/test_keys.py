@@ -10,7 +10,6 @@ import pytest
 
 from controller.panels.window.keys import HELP, Keys
 
-
 BELOW = 90.0  # where STOP ends
 
 
@@ -22,9 +21,7 @@ class Imgui:
     ImVec2 = staticmethod(lambda x, y: (x, y))
 
     def __init__(self) -> None:
-        self.io = SimpleNamespace(
-            want_text_input=False, key_ctrl=False, display_size=SimpleNamespace(x=640.0, y=480.0)
-        )
+        self.io = SimpleNamespace(want_text_input=False, key_ctrl=False, display_size=SimpleNamespace(x=640.0, y=480.0))
         self.font, self.place = 16.0, (0.0, 0.0)
         padding = SimpleNamespace(x=8.0, y=8.0)
         self.style = SimpleNamespace(
