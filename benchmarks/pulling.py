@@ -27,8 +27,8 @@ from rich.console import Console
 from rich.table import Table
 
 from controller.face.point_editing import PointEditor
+from controller.panels.overlay.overlay_view import OverlayView
 from controller.panels.window.editing import MouseEditing
-from controller.panels.window.overlay_view import OverlayView
 from controller.panels.window.panel import Panel
 from surface.view.draw.renderer import Renderer
 from surface.view.draw.target import Target

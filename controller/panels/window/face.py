@@ -17,13 +17,13 @@ from controller.body.panel_state import PanelState
 from controller.face.controls import Controls
 from controller.face.devices import Devices
 from controller.face.face import FrameLog, HeadValues, qualities
+from controller.panels.overlay.fit_error import FitErrorView
+from controller.panels.overlay.overlay_view import OverlayView
 from controller.panels.session.commands import History
 from controller.panels.session.next_run import NextRun, carried_to
 from controller.panels.window.editing import MouseEditing
-from controller.panels.window.fit_error import FitErrorView
 from controller.panels.window.heads import HeadChoice, HeadSource
 from controller.panels.window.looks import Looks
-from controller.panels.window.overlay_view import OverlayView
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.panels.window.sculpting import SculptPanel
 from controller.stage.stage import FaceSettings, Stage

@@ -11,6 +11,8 @@ from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import Details, PanelRequest, StartServos, StopServos
 from controller.body.panel_state import PanelState
+from controller.panels.overlay.colours import GREEN
+from controller.panels.overlay.stop import StopButton
 from controller.panels.session.capture import Capture
 from controller.panels.session.commands import Commands
 from controller.panels.session.feed import Feed
@@ -20,7 +22,6 @@ from controller.panels.session.playback import Playback
 from controller.panels.session.problems import Problems
 from controller.panels.session.servo_captures import ServoCaptures
 from controller.panels.window.calibrating import Calibrating
-from controller.panels.window.colours import GREEN
 from controller.panels.window.drops import Drops
 from controller.panels.window.expressions import ExpressionButtons
 from controller.panels.window.heads import HeadChoice
@@ -31,7 +32,6 @@ from controller.panels.window.notices import draw_jobs, draw_problems
 from controller.panels.window.saving import Saving, Words
 from controller.panels.window.servos import ServoBars
 from controller.panels.window.sliders import Sliders
-from controller.panels.window.stop import StopButton
 from controller.panels.window.timeline_panel import TimelinePanel
 from controller.panels.window.view import View
 from controller.robot.settings import RobotSettings

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from controller.panels.window.stop import LABEL, Box, StopButton
+from controller.panels.overlay.stop import LABEL, Box, StopButton
 from tests.controller.panels.window.screen import Screen
 from tests.controller.panels.window.test_face import on_a_display, scaled
 from tests.hands import Hands, Steps, run_script
@@ -21,7 +21,7 @@ robots = ["head24"]
 size = [{width}, {height}]
 quality = "fast"
 """
-PROGRAM = "from tests.controller.panels.window.test_stop import main; main()"
+PROGRAM = "from tests.controller.panels.overlay.test_stop import main; main()"
 
 
 @pytest.fixture

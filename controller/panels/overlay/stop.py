@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-from controller.panels.window.colours import RED, packed
+from controller.panels.overlay.colours import RED, packed
 
 LABEL = "STOP servos"
 _LINES, _CORNER_LINES = 2.0, 9.0  # height, and width where it has no place in the panel, in heights of a line of text

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controller.panels.window.fit_error import NONE, FitErrorView
+from controller.panels.overlay.fit_error import NONE, FitErrorView
 from surface.head import Head, save_data
 from surface.head.posing.fit_error import write_fit_error
 from surface.view.docks import PictureArea

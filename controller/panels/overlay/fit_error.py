@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from controller.face.fit_colours import NOT_MEASURED, FitColours, figures_of, plain_theme, unmeasured
-from controller.panels.window.colours import packed
+from controller.panels.overlay.colours import packed
 from surface.base.error_colours import FULL_MM, SCALE
 from surface.head import Head
 from surface.view.docks import PictureArea
