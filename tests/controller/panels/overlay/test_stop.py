@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from controller.panels.overlay.stop import LABEL, Box, StopButton
@@ -155,14 +157,12 @@ def clicked(hands: Hands, name: str) -> Steps:
 
 def red_at(hands: Hands, box: Box) -> bool:
     """Whether the display shows the button at its corners, within its rounding."""
-    import os
-
     from PIL import ImageGrab
 
-    picture = ImageGrab.grab(xdisplay=os.environ["DISPLAY"])
+    picture = np.asarray(ImageGrab.grab(xdisplay=os.environ["DISPLAY"]).convert("RGB"))
     inset = 0.2 * (box.bottom - box.top)
     corners = [(x, y) for x in (box.left + inset, box.right - inset) for y in (box.top + inset, box.bottom - inset)]
-    colours = [picture.getpixel((round(x), round(y)))[:3] for x, y in corners]
+    colours = [picture[round(y), round(x)] for x, y in corners]
     return all(red > 110 and green < 60 and blue < 60 for red, green, blue in colours)
 
 
