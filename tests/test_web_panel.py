@@ -92,6 +92,13 @@ def open_panel(browser: Page, where: str, width: int, height: int) -> None:
     assert browser.evaluate("document.documentElement.scrollWidth <= window.innerWidth"), "fits its width"
 
 
+def box_of(browser: Page, name: str) -> list[float]:
+    """Left, top, right and bottom of an element, in pixels of the page."""
+    box = f"document.getElementById('{name}').getBoundingClientRect()"
+    found: list[float] = browser.evaluate(f"(({{left, top, right, bottom}}) => [left, top, right, bottom])({box})")
+    return found
+
+
 def axe() -> str | None:
     """The text of axe-core; None where node or the package is absent."""
     node = shutil.which("node")
@@ -137,10 +144,16 @@ def test_a_phone_drives_the_head_and_stops_it_while_another_client_floods(tmp_pa
         flood = threading.Thread(target=flood_panel, args=(where, ending))
         flood.start()
         try:
+            pressed = box_of(browser, "stop")
             browser.evaluate("document.getElementById('stop').click()")
             wait_for(lambda: body.state.stop_latch.stopped is not None)
             wait_for(lambda: not any(loop.bus.running for loop in body.buses))
             browser.wait("document.getElementById('stopped').textContent.includes('Servos are off')")
+            for width, height in ((1280, 720), (390, 844)):  # who presses again where STOP was presses STOP
+                browser.resize(width, height)
+                stop, start = box_of(browser, "stop"), box_of(browser, "start")
+                assert start[2] <= stop[0] and start[1] < height and stop[2] <= width
+            assert stop == pytest.approx(pressed, abs=1.0)
         finally:
             ending.set()
             flood.join()
@@ -243,9 +256,8 @@ def test_two_panels_show_each_others_changes_without_leaving_their_origin(tmp_pa
         browser.wait("document.querySelectorAll('#link-list td').length > 0")
         head = browser.evaluate("[...document.querySelectorAll('#link-list thead th')].map(each => each.textContent)")
         assert head == ["In", "Jitter", "Lost", "Age", "Refused"]
-        assert (
-            browser.evaluate("document.querySelector('#link-list tbody th').textContent") == "127.0.0.1:0 · 1 connected"
-        )
+        # the port that is really bound, not the 0 of the stage
+        assert browser.evaluate("document.querySelector('#link-list tbody th').textContent") == f"{where} · 1 connected"
         loaded = browser.evaluate("performance.getEntriesByType('resource').map(each => new URL(each.name).host)")
         assert loaded and set(loaded) == {where}
         open_panel(browser, where, 1280, 720)  # again: what the browser has is not sent again

@@ -269,7 +269,7 @@ class Body:
         overview = self.state.overview()
         return Details(
             servos=overview["servos"],
-            links=[{"name": link.name.removeprefix("link "), **link.report()} for link in self.links],
+            links=[link.record() for link in self.links],
             buses=[loop.condition() for loop in self.buses],
             parts=self.state.parts.report(),
             notes=self.notes.take(),

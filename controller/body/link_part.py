@@ -90,6 +90,12 @@ class LinkPart:
         except Exception as error:  # noqa: BLE001  the rest of the report is still good
             return {**empty, "fault": f"its report failed: {describe(error)}"}
 
+    def record(self) -> dict[str, object]:
+        """The report with its ``name`` for people: its kind, and where it really listens."""
+        report = self.report()
+        where, name = str(report["port"]), str(self._choice)
+        return {"name": name if where in ("", name) else f"{self._choice.kind} on {where}", **report}
+
     def _open_again(self) -> None:
         while not self._stopping.wait(self._part.pause_s):
             with self._lock:

@@ -171,7 +171,9 @@ def fit(
     identities: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Identity modes of the mesh (.npz): adds named variations.")
     ] = None,
-    keep: Annotated[bool, typer.Option("--keep", help="Keep the head that is there; only add --identities.")] = False,
+    keep: Annotated[
+        bool, typer.Option("--keep", help="Keep the head that is there: measure it again, and add --identities.")
+    ] = False,
     expressions_from: Annotated[
         str | None,
         typer.Option(
@@ -216,12 +218,12 @@ def fit(
         return
     refuse_surface_options(mesh, {"--only": only, "--groups": groups, "--strict": strict})
 
-    if keep and identities is None:
-        raise ConfigError("--keep: fits nothing, and there is nothing to add", hint="--keep --identities FILE")
     given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
     check_transfer(expressions_from, landmarks, given)
-    if not keep:
-        options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
+    options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
+    if keep:
+        _measure(mesh, out, options)
+    else:
         _fit_mesh(mesh, out, name or out.resolve().name, options, expressions_from, landmarks, report, force)
     if identities is not None:
         with console.status("fitting identities"):
@@ -254,6 +256,22 @@ def _fit_mesh(
     for line in _remarks(found, shaded) + _checked(out):
         console.print(line, soft_wrap=True, markup=False)
     console.print(f"wrote {out}", soft_wrap=True)
+
+
+def _measure(mesh: Path, out: Path, options: LoadOptions) -> None:
+    """Measure a head beside the mesh that it was fitted to, and say how far it is off."""
+    import numpy as np  # start-up: --help does without either
+
+    from surface.fit.api import measure_head
+
+    with console.status("measuring"):
+        found = measure_head(out, mesh, options)
+    table = Table("part", "vertices", "RMS", "99 %", "max", title=f"distance at rest from {mesh.name}, mm")
+    for name, every in found.items():
+        mm = every[np.isfinite(every)]
+        figures = np.sqrt(np.mean(mm**2)), np.percentile(mm, 99.0), mm.max()
+        table.add_row(name, str(len(mm)), *(f"{each:.3f}" for each in figures))
+    show_table(table)
 
 
 def _fit_surfaces(wanted: SurfaceFit) -> None:

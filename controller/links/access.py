@@ -37,6 +37,11 @@ def host_and_port(listen: str, usual: int) -> tuple[str, int]:
     return host, int(port)
 
 
+def bound_at(listen: str, port: int) -> str:
+    """An address to listen at with the port that is really bound, which the system chose where the address says 0."""
+    return f"{listen.rpartition(':')[0]}:{port}"
+
+
 def is_loopback(host: str) -> bool:
     """Whether only programs on this machine reach an address."""
     try:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -25,7 +25,7 @@ from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.squints import shut_with_squints
 from surface.fit.features.wrinkles import with_deep_wrinkles
-from surface.fit.measures.dense import with_fit_alone
+from surface.fit.measures.dense import errors_at_rest, with_fit_alone
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.refusal import save_or_refuse
 from surface.fit.points.facets import facet_sag
@@ -52,13 +52,16 @@ from surface.fit.source.placing.frame import head_scale
 from surface.fit.source.placing.place import neck_of, place
 from surface.fit.source.repair import repaired
 from surface.fit.source.wrap import wrap_chart
+from surface.head import Head
 from surface.head.model.data import HeadData, Neck, PartData
-from surface.head.model.file import check_writable
+from surface.head.model.file import check_writable, load_data
 from surface.head.model.meshes import pack, tessellate
 from surface.head.model.parameters import NAMES, read_pose
+from surface.head.posing.fit_error import drop_fit_error, write_fit_error
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
 
+OTHER_MESH_MM = 1.0  # RMS distance at rest that only a head fitted to another mesh has
 LOOSE_MM = 3.0  # RMS of a head of usual size: a part beside the face that is further off, as hair, is left out
 # pose that decides how finely a part is cut into triangles
 SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
@@ -88,25 +91,45 @@ def fit_head(
     result = fit_mesh(loaded, name, report, str(mesh_path))
     if report_dir is not None:
         write_report(result, report_dir, report)
-    save_or_refuse(out_dir, result.head, result.report.faults, force=force)
+    save_or_refuse(out_dir, result.head, result.report.faults, result.errors, force=force)
     return result.report
+
+
+def measure_head(head: str | Path, mesh_path: str | Path, options: LoadOptions = LoadOptions()) -> dict[str, Floats]:
+    """Measure how far a head that was fitted to a mesh lies from it, and keep that in the head's folder.
+
+    head : its folder. mesh_path, options : as they were given to :func:`fit_head`.
+    Returns the distances of its vertices at rest, (m,) mm by part; NaN where the mesh has nothing.
+
+    Raises FitError: the mesh cannot be read, or is not the one that the head was fitted to; nothing is written then.
+    HeadFileError: the head cannot be read or written to.
+    """
+    data = load_data(head)
+    mesh, charts = charts_of(mesh_path, options)
+    errors = errors_at_rest(data, mesh, charts)
+    known = np.concatenate([np.zeros(0), *errors.values()])
+    off = float(np.sqrt(np.nanmean(known**2))) if np.isfinite(known).any() else np.inf
+    if off > OTHER_MESH_MM * head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True))):
+        why = f"{head}: was not fitted to {mesh_path}: " + (
+            f"{off:.1f} mm RMS from it" if errors else "no part is in it"
+        )
+        raise FitError(why, hint="name the mesh and the options that the head was made with")
+    drop_fit_error(head)  # may be of other triangles
+    write_fit_error(head, errors, Head(data).parts)
+    return errors
+
+
+def charts_of(mesh_path: str | Path, options: LoadOptions = LoadOptions()) -> tuple[FitMesh, dict[str, Chart]]:
+    """A mesh as it is fitted, and the charts of its parts by name. Raises FitError, as :func:`fit_head` does."""
+    planned = _planned(load_mesh(mesh_path, options), str(mesh_path))
+    mesh = planned.mesh
+    return mesh, {part.name: part_chart(mesh, part, islands) for part, islands in planned.plan.parts}
 
 
 def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh") -> FitResult:
     """Fit all parts of a mesh in memory; ``where`` names it in messages."""
-    recipe = recipe_for(loaded.mesh) if is_mapped(loaded.mesh) else None
-    if recipe is not None:
-        loaded = in_place(loaded, recipe)
-        mesh = prepare(loaded.mesh, recipe)
-        plan = recipe_plan(mesh, recipe)
-    else:
-        loaded = _repaired(place(loaded), where)
-        check_manifold(loaded.mesh, where)
-        recipe, (mesh, exchanged) = Recipe([]), correct_shapes(to_arkit(loaded.mesh, loaded.named))
-        plan = make_plan(mesh)
-        plan.notes.extend(exchanged)
-        mesh, seated = fit_lids(mesh, plan.found) if plan.found else (mesh, [])
-        plan.notes.extend(seated)
+    planned = _planned(loaded, where)
+    loaded, recipe, mesh, plan = planned.loaded, planned.recipe, planned.mesh, planned.plan
     sources = sources_of(mesh.names)
     rig = HeadRig(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress, comb=not loaded.exported)
@@ -137,7 +160,34 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces, dense,
         tuple(faults_of(dense, fitted_parts, scale)),
     )  # fmt: skip
-    return FitResult(head, report, fitted_parts)
+    return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts))
+
+
+@dataclass(frozen=True)
+class _Planned:
+    """A mesh as it is fitted, ``mesh`` with seated lids and ``loaded`` without, and what of it becomes a part."""
+
+    loaded: Loaded
+    recipe: Recipe
+    mesh: FitMesh
+    plan: Plan
+
+
+def _planned(loaded: Loaded, where: str) -> _Planned:
+    """Repair and place a mesh, and plan its parts, by a recipe where it has one; ``where`` names it in messages."""
+    recipe = recipe_for(loaded.mesh) if is_mapped(loaded.mesh) else None
+    if recipe is not None:
+        loaded = in_place(loaded, recipe)
+        mesh = prepare(loaded.mesh, recipe)
+        return _Planned(loaded, recipe, mesh, recipe_plan(mesh, recipe))
+    loaded = _repaired(place(loaded), where)
+    check_manifold(loaded.mesh, where)
+    mesh, exchanged = correct_shapes(to_arkit(loaded.mesh, loaded.named))
+    plan = make_plan(mesh)
+    plan.notes.extend(exchanged)
+    mesh, seated = fit_lids(mesh, plan.found) if plan.found else (mesh, [])
+    plan.notes.extend(seated)
+    return _Planned(loaded, Recipe([]), mesh, plan)
 
 
 def _repaired(loaded: Loaded, where: str) -> Loaded:

@@ -11,9 +11,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats, Floats32
+from surface.base.error_colours import error_colours
 from surface.base.errors import MissingPackage, ViewError
 from surface.base.progress import Progress
-from surface.fit.measures.error_colours import error_colours
 from surface.fit.measures.report_folder import report_folder
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import NEUTRAL, DenseErrors, Errors, FitReport, FitResult, FittedPart, face_bounds, plain

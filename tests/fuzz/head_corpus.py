@@ -16,6 +16,7 @@ from surface.head.model.look import Worn
 from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.model.wardrobe import read_garment, with_garments
 from surface.head.posing.baked import write_decimated, write_shade
+from surface.head.posing.fit_error import write_fit_error
 from tests.fuzz.kind import FIT_S, Kind
 from tests.fuzz.reading import reports
 from tests.surface.small_head import all_points, small_head
@@ -57,6 +58,7 @@ def _save_head(folder: Path) -> None:
     wide = Identity("wide", {"a": all_points("wide", (1, 0, 0))}, {}, np.zeros((2, 3)), np.zeros(3), fingerprint(data))
     save_identities(folder, [wide])
     write_shade(folder, {part.name: np.full(len(part.vertices), 0.5) for part in head.parts}, head.parts)
+    write_fit_error(folder, {"a": np.linspace(0.0, 2.0, len(head.part("a").vertices))}, head.parts)
     write_decimated(folder, head.parts, {f"{part.name}/full": part.triangles for part in head.parts})
 
 

@@ -15,7 +15,7 @@ import time
 from collections import Counter
 
 from controller.layers.commands import CommandSink
-from controller.links.access import WebRequests
+from controller.links.access import WebRequests, bound_at
 from controller.links.line.kind import LineSettings
 from controller.links.line.protocol import Code, LineError, format_error
 from controller.links.line.session import LineSession
@@ -82,7 +82,6 @@ class LineServer:
     """
 
     def __init__(self, settings: LineSettings, sink: CommandSink, token: str | None = None) -> None:
-        self.port = settings.address
         self._settings, self._sink, self._token = settings, sink, token
         self._clients: list[Client] = []
         self._served, self._turned_away, self._past = 0, Counter[str](), Counter[str]()
@@ -91,6 +90,7 @@ class LineServer:
         self._stopping = threading.Event()
         self._socket = bound(Address("tcp", *settings.where), socket.SOCK_STREAM)
         self._socket.listen()
+        self.port = bound_at(settings.address, self._socket.getsockname()[1])
         self._selector = selectors.DefaultSelector()
         self._selector.register(self._socket, selectors.EVENT_READ)
         self._thread = threading.Thread(target=self._run, name=f"line {self.port}", daemon=True)

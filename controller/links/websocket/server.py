@@ -22,7 +22,7 @@ from websockets.http11 import Request, Response
 from controller.base.errors import LinkError
 from controller.base.version import package_version
 from controller.layers.commands import CommandSink
-from controller.links.access import given_token, is_own_page, same_token, token_for
+from controller.links.access import bound_at, given_token, is_own_page, same_token, token_for
 from controller.links.kind import LinkContext
 from controller.links.net.meter import Meter
 from controller.links.websocket.conversation import Conversation
@@ -102,7 +102,7 @@ class WebSocketLink:
     def report(self) -> dict[str, object]:
         """Clients now and in all, requests taken, refused (by code) and not answered, and clients turned away."""
         return {
-            "port": self._settings.address,
+            "port": bound_at(self._settings.address, self._port or self._settings.where[1]),
             "connected": bool(self._clients),
             "clients": len(self._clients),
             "served": self._served,

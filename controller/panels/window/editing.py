@@ -171,7 +171,7 @@ class MouseEditing:
         if imgui.is_mouse_down(imgui.MouseButton_.left):
             if np.hypot(pixel[0] - self._stroke[-1][0], pixel[1] - self._stroke[-1][1]) >= 1.0:
                 self._stroke.append(pixel)
-            draw, left, top = imgui.get_foreground_draw_list(), self._area.left, self._area.top
+            draw, left, top = imgui.get_background_draw_list(), self._area.left, self._area.top
             points = [imgui.ImVec2(left + x, top + y) for x, y in self._stroke]
             for one, two in pairwise(points):
                 draw.add_line(one, two, _WHITE, 2.0)
@@ -236,7 +236,7 @@ class MouseEditing:
         return values
 
     def _draw_pins(self, imgui: Any, screen: Screen) -> None:
-        draw, area = imgui.get_foreground_draw_list(), self._area
+        draw, area = imgui.get_background_draw_list(), self._area
         for x, y in self.editor.pin_pixels(screen, self._newest()):
             at = imgui.ImVec2(area.left + x, area.top + y)
             draw.add_circle_filled(at, 4.0, _PIN)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from controller.panels.overlay.colours import LAYERS, packed
 from controller.panels.session.commands import Commands
-from controller.panels.window.colours import LAYERS, packed
 from controller.panels.window.flow import Flow
 from controller.panels.window.saving import Saving
 from controller.vocabulary.affect import Affect

@@ -17,12 +17,13 @@ from controller.body.panel_state import PanelState
 from controller.face.controls import Controls
 from controller.face.devices import Devices
 from controller.face.face import FrameLog, HeadValues, qualities
+from controller.panels.overlay.fit_error import FitErrorView
+from controller.panels.overlay.overlay_view import OverlayView
 from controller.panels.session.commands import History
 from controller.panels.session.next_run import NextRun, carried_to
 from controller.panels.window.editing import MouseEditing
 from controller.panels.window.heads import HeadChoice, HeadSource
 from controller.panels.window.looks import Looks
-from controller.panels.window.overlay_view import OverlayView
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.panels.window.sculpting import SculptPanel
 from controller.stage.stage import FaceSettings, Stage
@@ -83,6 +84,7 @@ class WindowFace:
             self._panel.calibrating.mirror = partial(self._mirror, panel_state)
         self.next_run: NextRun | None = None
         self._overlays: OverlayView | None = None
+        self._fit_error: FitErrorView | None = None
         self._mouse, self._looks = None, None  # type: tuple[MouseEditing | None, Looks | None]
         if stage is not None and not settings.kiosk:
             looks = Looks(stage, self._swap, self._panel.jobs)
@@ -93,7 +95,8 @@ class WindowFace:
             self._overlays = OverlayView(
                 looks.load, newest, self._area, self._panel.jobs, stage.robots, panel_state, parameters
             )
-            self._panel.view.overlays = self._overlays.draw_choice
+            self._fit_error = FitErrorView(head, self._area, lambda: self._swap(None, self._settings))
+            self._panel.view.overlays = self._draw_overlay_choice
             choice.show = partial(self._turn_to, looks)
         if copy is not None and not settings.kiosk:
             self._mouse = MouseEditing(head, copy, newest, self._panel.commands, self._area, parameters)
@@ -147,7 +150,10 @@ class WindowFace:
         """Draw another head, or the same in another look, from the next frame on."""
         shown = head or self._head
         choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
-        make = partial(Renderer, head=shown, theme=settings.make_theme(), evaluator=settings.evaluator)
+        theme = settings.make_theme()
+        if self._fit_error is not None:
+            theme = self._fit_error.dress(shown, theme)
+        make = partial(Renderer, head=shown, theme=theme, evaluator=settings.evaluator)
 
         def done(error: Exception | None) -> None:
             if error is not None:
@@ -158,6 +164,13 @@ class WindowFace:
                 self._take_over(head)
 
         self._area.remake = Remake(make, choice or settings.still_quality, done)
+
+    def _draw_overlay_choice(self) -> None:
+        """What can be drawn over the picture, and what can be painted on the face."""
+        if self._overlays is not None:
+            self._overlays.draw_choice()
+        if self._fit_error is not None:
+            self._fit_error.draw_choice()
 
     def _take_over(self, head: Head) -> None:
         """Pose, drag and look at another head from now on."""
@@ -201,6 +214,8 @@ class WindowFace:
             self._mouse(self._viewpoint.camera)
         if self._overlays is not None:
             self._overlays(self._viewpoint.camera)
+        if self._fit_error is not None:
+            self._fit_error()
 
     def report(self) -> dict[str, object]:
         """Frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from controller.panels.overlay.colours import AMBER, BRIGHT_GREEN, GREY
 from controller.panels.session.feed import Feed
-from controller.panels.window.colours import AMBER, BRIGHT_GREEN, GREY
 
 
 class LinkList:

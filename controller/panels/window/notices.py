@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from typing import Any
 
+from controller.panels.overlay.colours import AMBER
 from controller.panels.session.jobs import Jobs
 from controller.panels.session.problems import Problems
-from controller.panels.window.colours import AMBER
 
 
 def draw_problems(imgui: Any, problems: Problems) -> None:

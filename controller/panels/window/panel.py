@@ -11,6 +11,8 @@ from controller.base.errors import OMOTE_ERRORS
 from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import Details, PanelRequest, StartServos, StopServos
 from controller.body.panel_state import PanelState
+from controller.panels.overlay.colours import GREEN
+from controller.panels.overlay.stop import StopButton
 from controller.panels.session.capture import Capture
 from controller.panels.session.commands import Commands
 from controller.panels.session.feed import Feed
@@ -20,7 +22,6 @@ from controller.panels.session.playback import Playback
 from controller.panels.session.problems import Problems
 from controller.panels.session.servo_captures import ServoCaptures
 from controller.panels.window.calibrating import Calibrating
-from controller.panels.window.colours import GREEN, RED
 from controller.panels.window.drops import Drops
 from controller.panels.window.expressions import ExpressionButtons
 from controller.panels.window.heads import HeadChoice
@@ -39,7 +40,6 @@ from surface.view.docks import Dock, PictureArea
 from surface.view.fullscreen import FullScreen
 from surface.view.scene.viewpoint import Viewpoint
 
-_STOP_LINES = 2.0
 _OWN = "mine.toml"
 
 
@@ -75,8 +75,8 @@ class Panel:
 
     Attributes
     ----------
-    heads : the choice between several heads; None for one. sculpt : draws what the mouse does to the face; None for
-        nothing.
+    stop : the button that stops the servos. heads : the choice between several heads; None for one.
+    sculpt : draws what the mouse does to the face; None for nothing.
     """
 
     def __init__(
@@ -105,7 +105,9 @@ class Panel:
         if self.feed is not None:
             self.calibrating = Calibrating(ServoCaptures(options.robots, options.folder), send, self.problems)
             self.servos, self.links = ServoBars(self.feed, self.calibrating), LinkList(self.feed)
-        self.keys = Keys(self._actions(), {"z": self.commands.undo, "y": self.commands.redo})
+        self.stop = StopButton(lambda: send(StopServos()))
+        undoing = {"z": self.commands.undo, "y": self.commands.redo}
+        self.keys = Keys(self._actions(), undoing, {"escape": lambda: send(StopServos())})
         self.sculpt: Callable[[], None] | None = None
         self.heads: HeadChoice | None = None
 
@@ -130,14 +132,15 @@ class Panel:
             self._state.refresh()
         if not imgui.is_any_mouse_down():
             self.commands.end_step()
-        self.keys()
+        self.keys(self.stop.box.bottom)
         self.capture()
         self.jobs()
         self.playback()
         if self.feed is not None:
             self.feed()
-        if self.area.bare:
-            self._stop_over_the_picture(imgui)
+        if self.area.bare and self._stopped_by:
+            self._start_over_the_picture(imgui)
+        self.stop(imgui)
 
     def add_looks(self, looks: Looks, restart: Callable[[Path], None]) -> None:
         """Let the user change how the face looks, and drop files on the window.
@@ -163,7 +166,6 @@ class Panel:
             "p": self.capture.take_picture,
             "c": self.capture.toggle_clip,
             "n": self._neutral,
-            "escape": self._stop,
             "f": self._toggle_bare,
         }
 
@@ -173,25 +175,21 @@ class Panel:
         if self.feed is not None:
             self.calibrating.forget()
 
-    def _stop(self) -> None:
-        self._send(StopServos())
-
     def _toggle_bare(self) -> None:
         """The face alone on the whole screen, and back."""
         self.area.bare = not self.area.bare
         if self.area.bare != self.full_screen.on:
             self.full_screen.toggle()
 
-    def _stop_over_the_picture(self, imgui: Any) -> None:
-        """The stop in a corner of a picture that is alone: it stays in reach."""
-        size, line = imgui.get_io().display_size, imgui.get_font_size()
-        corner = imgui.ImVec2(size.x - line, size.y - line)
-        imgui.set_next_window_pos(corner, imgui.Cond_.always, imgui.ImVec2(1.0, 1.0))
-        imgui.set_next_window_size(imgui.ImVec2(line * 9, 0.0))
+    def _start_over_the_picture(self, imgui: Any) -> None:
+        """What ends a stop, above the button that stops in the corner of a picture that is alone."""
+        line, box = imgui.get_font_size(), self.stop.box
+        imgui.set_next_window_pos(imgui.ImVec2(box.right, box.top - line), imgui.Cond_.always, imgui.ImVec2(1.0, 1.0))
+        imgui.set_next_window_size(imgui.ImVec2(box.right - box.left + line, 0.0))
         flags = imgui.WindowFlags_
         hidden = flags.no_decoration | flags.no_docking | flags.no_background | flags.no_saved_settings | flags.no_move
-        imgui.begin("##stop", None, hidden)
-        self._stop_or_start(imgui)
+        imgui.begin("##start", None, hidden)
+        self._start(imgui)
         imgui.end()
 
     def _below_top(self, part: Callable[[], None]) -> Callable[[], None]:
@@ -200,7 +198,9 @@ class Panel:
         def draw() -> None:
             from imgui_bundle import imgui  # optional
 
-            self._stop_or_start(imgui)
+            self.stop.leave_room(imgui)
+            if self._stopped_by:
+                self._start(imgui)
             if self.heads is not None:
                 self.heads.draw(self.commands)
             self._top(imgui)
@@ -212,15 +212,17 @@ class Panel:
 
         return draw
 
-    def _stop_or_start(self, imgui: Any) -> None:
-        """The button that stops the servos; while they are stopped, who did it and the button that ends that."""
-        by = self._state.stopped_by if self._state is not None else ""
-        if by:
-            imgui.text(f"servos stopped by {by}")
-        label, colour, request = ("START servos", GREEN, StartServos()) if by else ("STOP servos", RED, StopServos())
-        imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(*colour))
-        if imgui.button(label, imgui.ImVec2(-1, _STOP_LINES * imgui.get_font_size())):
-            self._send(request)
+    @property
+    def _stopped_by(self) -> str:
+        """Who stopped the servos; empty while they are not stopped."""
+        return self._state.stopped_by if self._state is not None else ""
+
+    def _start(self, imgui: Any) -> None:
+        """Who stopped the servos, and the button that ends that: not where STOP is, which may be clicked twice."""
+        imgui.text_wrapped(f"servos stopped by {self._stopped_by}")
+        imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(*GREEN))
+        if imgui.button("START servos", imgui.ImVec2(-1, 0)):
+            self._send(StartServos())
         imgui.pop_style_color()
 
     def _top(self, imgui: Any) -> None:

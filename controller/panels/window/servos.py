@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from controller.panels.overlay.colours import AMBER, BRIGHT_GREEN, GREY, LAYERS, packed
 from controller.panels.session.feed import KEPT_S, Feed, servo_key
-from controller.panels.window.colours import AMBER, BRIGHT_GREEN, GREY, LAYERS, packed
 
 _PLOT_LINES = 11.0
 _HOT_C = 60.0

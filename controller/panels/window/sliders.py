@@ -9,8 +9,8 @@ import numpy as np
 
 from controller.base.parameters import PARAMETERS, Floats, Parameters, fold
 from controller.body.panel_state import PanelState
+from controller.panels.overlay.colours import layer_colour, packed
 from controller.panels.session.commands import Commands
-from controller.panels.window.colours import layer_colour, packed
 
 _ASIDE = ("mouthLeft", "mouthRight", "jawLeft", "jawRight")
 

@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
+from controller.panels.overlay.colours import AMBER, GREY, LAYERS, RED, packed
 from controller.panels.session.capture import Capture
 from controller.panels.session.commands import Commands
 from controller.panels.session.playback import Playback
 from controller.panels.session.problems import Problems
-from controller.panels.window.colours import AMBER, GREY, LAYERS, RED, packed
 from controller.panels.window.flow import Flow
 from controller.takes.timeline import EASES
 from controller.vocabulary.vocabulary import Vocabulary

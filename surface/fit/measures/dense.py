@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,10 +15,13 @@ from surface.fit.features.finish import PRODUCT
 from surface.fit.measures.closest import ClosestTree
 from surface.fit.measures.inside_out import InsideOutFaces
 from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, Turned, errors_of
+from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.head import Head
 from surface.head.model.data import HeadData
 from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
+
+NO_TRIANGLES = np.zeros((0, 3), np.int64)
 
 
 class _Pair:
@@ -30,7 +33,7 @@ class _Pair:
     def __init__(self, part: FittedPart, number: int, subject: Subject, mesh: FitMesh) -> None:
         self.name, self.number = part.name, number
         self._uv = np.asarray(subject.parts[number].uv, np.float64)
-        faces = mesh.faces[faces_of(mesh, part)]
+        faces = mesh.faces[faces_of(mesh, part.chart)]
         self.turned = InsideOutFaces(part, subject.parts[number])
         self._cut = subject.parts[number].triangles.astype(np.int64), triangles(faces)
         self._used = np.unique(self._cut[0]), np.unique(self._cut[1])
@@ -76,7 +79,7 @@ def measure_dense(
     subject = Subject(Head(head))
     places = Places(subject, find_mouth(subject))
     numbers = {p.name: k for k, p in enumerate(subject.parts)}
-    owned = [faces_of(mesh, p) for p in parts]
+    owned = [faces_of(mesh, p.chart) for p in parts]
     pairs = [_Pair(p, numbers[p.name], subject, mesh) for p, own in zip(parts, owned, strict=True) if own.any()]
     found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
     worst: dict[bool, Spot] = {}
@@ -141,10 +144,26 @@ def _greatest(
                 yield Spot(float(distance[row]), shape, pair.name, place, k == 0), inside
 
 
-def faces_of(mesh: FitMesh, part: FittedPart) -> Bools:
+def errors_at_rest(head: HeadData, mesh: FitMesh, charts: Mapping[str, Chart]) -> dict[str, Floats]:
+    """By part of a head, (m,) mm from each of its vertices at rest to the faces of the mesh that its chart samples.
+
+    charts : of the parts that were fitted, by name. Vertices that no triangle has are NaN.
+    """
+    subject, out = Subject(Head(head)), dict[str, Floats]()
+    for part, rest in zip(subject.parts, subject.rest, strict=True):
+        cut = triangles(mesh.faces[faces_of(mesh, charts[part.name])]) if part.name in charts else NO_TRIANGLES
+        if len(cut):
+            used = np.unique(part.triangles)
+            out[part.name] = np.full(len(rest), np.nan)
+            tree = ClosestTree(mesh.vertices, cut)
+            out[part.name][used] = tree.distances(rest[used].astype(np.float64), np.zeros(len(used), np.int64))
+    return out
+
+
+def faces_of(mesh: FitMesh, chart: Chart) -> Bools:
     """(f,) the faces that a chart samples: those whose corners it all uses."""
     used = np.zeros(len(mesh.vertices) + 1, bool)
-    used[part.chart.mix.indices] = True
+    used[chart.mix.indices] = True
     used[-1] = True  # the missing fourth corner of triangles
     return np.asarray(used[mesh.faces].all(axis=1))
 

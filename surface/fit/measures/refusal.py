@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from surface.base.arrays import Floats
 from surface.base.errors import FitError
+from surface.head import Head
 from surface.head.model.data import HeadData
 from surface.head.model.file import save_data
+from surface.head.posing.fit_error import drop_fit_error, write_fit_error
 
 REFUSED = "-refused"  # what is put behind the name of a folder
 HINT = "correct the mesh there or leave out what hides it (--without NAME)"
@@ -20,10 +23,12 @@ def refused_folder(out_dir: str | Path) -> Path:
 
 
 def save_or_refuse(
-    out_dir: str | Path, head: HeadData, faults: Sequence[str], *, force: bool = False, hint: str = HINT
+    out_dir: str | Path, head: HeadData, faults: Sequence[str], errors: Mapping[str, Floats], *, force: bool = False,
+    hint: str = HINT,
 ) -> None:  # fmt: skip
     """Write a head to ``out_dir``; one with faults to the folder :func:`refused_folder` instead, unless forced.
 
+    errors : by part, (m,) mm from each vertex at rest to the mesh, NaN where there is none; kept beside the head.
     hint : what to do about faults, in words.
 
     Raises FitError: the head has faults; what is in ``out_dir`` stays as it was. HeadFileError: a folder cannot be
@@ -31,7 +36,9 @@ def save_or_refuse(
     """
     refused = bool(faults) and not force
     folder = refused_folder(out_dir) if refused else Path(out_dir)
+    drop_fit_error(folder)  # of the head that was there
     save_data(folder, head)
+    write_fit_error(folder, errors, Head(head).parts)
     if refused:
         what = f"the head is refused: {'; '.join(faults)}; it was written to {folder} instead"
         look = f"look at it (omote render --head {folder} -o out.png), {hint}"

@@ -184,11 +184,15 @@ class FittedPart:
 
 @dataclass(frozen=True)
 class FitResult:
-    """A fitted head: its data, the report, and the charts it was fitted in."""
+    """A fitted head: its data, the report, and the charts it was fitted in.
+
+    errors : by part, (m,) mm from each vertex at rest to the mesh; NaN where it has none.
+    """
 
     head: HeadData
     report: FitReport
     parts: list[FittedPart]
+    errors: dict[str, Floats] = field(default_factory=dict)
 
 
 def face_bounds(report: FitReport) -> str:

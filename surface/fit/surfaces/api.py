@@ -28,6 +28,7 @@ from surface.head import Head
 from surface.head.model.data import HeadData, Jaw, Seam
 from surface.head.model.file import check_writable, save_data
 from surface.head.model.parameters import SHAPES
+from surface.head.posing.fit_error import drop_fit_error
 from surface.readers import NamedSurface
 
 MADE = "surfaces of {}, by omote fit: the file's own control points"
@@ -76,6 +77,7 @@ def fit_surfaces(
     head, report = _make(pieces, name, options, progress, str(path), notes)
     if report_dir is not None:
         write_report(report, report_dir)
+    drop_fit_error(out_dir)  # of a mesh that the head before was fitted to
     save_data(out_dir, head)
     return report
 

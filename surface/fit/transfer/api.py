@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +22,7 @@ from surface.fit.transfer.faults import HINT, faults_of_transfer
 from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.place_parts import scaled
 from surface.fit.transfer.register import STAGES, Matcher, register
-from surface.fit.transfer.reports.errors import face_reports
+from surface.fit.transfer.reports.errors import face_reports, skin_errors
 from surface.fit.transfer.reports.gaps import measure_gaps
 from surface.fit.transfer.reports.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.reports.report import (
@@ -53,11 +53,15 @@ LEAST_PICKED = 4  # given landmarks that suffice to align a scan; with fewer its
 @dataclass(frozen=True)
 class Transferred:
     """A head in the form of a scan, the report on it, and the transform ``found`` from the scan's coordinates to the
-    frame in which the scan was registered."""
+    frame in which the scan was registered.
+
+    errors : by part, (m,) mm from each vertex of the skin at rest to the scan; NaN where the scan has nothing there.
+    """
 
     head: HeadData
     report: TransferReport
     found: Similarity
+    errors: dict[str, Floats] = field(default_factory=dict)
 
 
 def transfer_head(
@@ -86,7 +90,7 @@ def transfer_head(
     made = transfer(scan, Head.load(source), name, picked, options, progress or no_progress, str(mesh_path))
     if report_dir is not None:
         write_transfer_report(made.report, scan, made.head, made.found, report_dir)
-    save_or_refuse(out_dir, made.head, made.report.fit.faults, force=force, hint=HINT)
+    save_or_refuse(out_dir, made.head, made.report.fit.faults, made.errors, force=force, hint=HINT)
     return made.report
 
 
@@ -122,6 +126,7 @@ def transfer(
     face = Head(data)
     landmarks, openings = landmarks_of(face, done.marks, found), openings_of(face, samples)
     middle = data.eyes.mean(axis=0)
+    errors = {part: factor * mm for part, mm in skin_errors(face, scan).items()}
     data = replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, options.unit or ""))
     moving = [n for n in head.parameters if any(g.name == n for p in data.parts for g in p.groups)]
     notes += overlap_notes(data)
@@ -129,7 +134,7 @@ def transfer(
     notes += [str(gap) for gap in gaps]
     fit = FitReport(name, parts, moving, notes=notes, scale=1.0, faults=faults)
     report = TransferReport(fit, head.name, *registered, landmarks, openings, changed, gaps)
-    return Transferred(data, report, found)
+    return Transferred(data, report, found, errors)
 
 
 def find_face(

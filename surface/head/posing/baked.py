@@ -11,9 +11,9 @@ is, ``PART/thin`` (m, 1), 0 thick. Triangles are ``PART/full`` and, coarser, ``P
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ STEPS = 1 << 14  # of u and v per unit
 OFFSET = 1 / 3  # of a step: halves, quarters and so on never lie between two steps, where a last bit would decide
 Shares = Mapping[str, NDArray[np.floating]]
 Triangles = NDArray[np.int32]
+Unpacked = TypeVar("Unpacked")
 
 
 class Meshed(Protocol):
@@ -55,10 +56,16 @@ def checksums(parts: Iterable[HeadPart]) -> dict[str, int]:
     return {part.name: checksum(part.mesh.triangles, part.mesh.uv) for part in parts}
 
 
-def _read(head: str | Path, file: str, parts: Iterable[Meshed]) -> dict[str, Array]:
-    """The arrays of a file that belong to these parts as they are tessellated; empty where there is no such file."""
+def read_baked(
+    head: str | Path, file: str, parts: Iterable[Meshed], unpack: Callable[[Array], Unpacked]
+) -> dict[str, Unpacked]:  # fmt: skip
+    """The arrays of a file beside a head, unpacked, that belong to these parts as they are tessellated; empty where
+    there is no such file.
 
-    def matching(stored: Sidecar) -> dict[str, Array]:
+    Raises HeadFileError: the file is damaged, of a newer version, or was made for another mesh of a part.
+    """
+
+    def matching(stored: Sidecar) -> dict[str, Unpacked]:
         arrays = dict(stored.arrays)
         for part in parts:
             if stored.checks.get(part.name) in (None, checksum(part.mesh.triangles, part.mesh.uv)):
@@ -67,7 +74,7 @@ def _read(head: str | Path, file: str, parts: Iterable[Meshed]) -> dict[str, Arr
                 why = f"was made for another mesh of part {part.name!r} than head.npz holds"
                 raise HeadFileError(f"{path}: {why}", hint=f"{hint} MESH -o {path.parent}")
             arrays = {k: v for k, v in arrays.items() if k != part.name and not k.startswith(f"{part.name}/")}
-        return arrays
+        return {name: unpack(array) for name, array in arrays.items()}
 
     path = sidecar_path(head, file)
     hint = f"delete {path}, or make the head again: omote fit"
@@ -82,8 +89,12 @@ def read_shade(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Floa
 
     Raises HeadFileError: the file is damaged, of a newer version, or was made for another mesh of a part.
     """
-    return {name: bytes_.reshape(len(bytes_), -1).astype(np.float32) / np.float32(255)
-            for name, bytes_ in _read(head, SHADE, parts).items()}  # fmt: skip
+    return read_baked(head, SHADE, parts, _shares)
+
+
+def _shares(stored: Array) -> Floats32:
+    share: Floats32 = stored.reshape(len(stored), -1).astype(np.float32) / np.float32(255)
+    return share
 
 
 def write_shade(head: str | Path, shares: Shares, parts: Iterable[HeadPart] = ()) -> Path:
@@ -114,7 +125,7 @@ def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:
 
 def read_decimated(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Triangles]:
     """Triangles (k, 3) by "PART/LEVEL", and :func:`tessellation_key` under "PART"; errors as :func:`read_shade`."""
-    return {name: array.astype(np.int32) for name, array in _read(head, DECIMATED, parts).items()}
+    return read_baked(head, DECIMATED, parts, lambda stored: stored.astype(np.int32))
 
 
 def write_decimated(head: str | Path, parts: Iterable[HeadPart], decimated: Mapping[str, Triangles]) -> Path:

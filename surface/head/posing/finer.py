@@ -1,4 +1,4 @@
-"""What is baked for the meshes of a head, for meshes that light control points made finer."""
+"""What is kept beside a head for its meshes, for meshes that light control points made finer."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from surface.head.posing.baked import (
     read_shade,
     tessellation_key,
 )  # fmt: skip
+from surface.head.posing.fit_error import apply_fit_error, read_fit_error
 from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import Mesh
 
@@ -38,13 +39,14 @@ def coarser_of(path: str | Path, name: str, mesh: Mesh) -> Mapping[str, Ints]:
 
 
 def apply_baked(path: str | Path, parts: Iterable[HeadPart], refined: Mapping[str, Refined]) -> None:
-    """Give parts their shade and decimated triangles; ``refined`` : the parts whose meshes became finer.
+    """Give parts their shade, decimated triangles and fit error; ``refined`` : the parts whose meshes became finer.
 
     Raises HeadFileError, as the readers do.
     """
     parts = list(parts)
     known = [Original(p.name, refined[p.name].mesh) if p.name in refined else p for p in parts]
     shares, decimated = read_shade(path, known), read_decimated(path, known)
+    errors = read_fit_error(path, known)
     for part in parts:
         finer = refined.get(part.name)
         if finer is None:
@@ -54,5 +56,8 @@ def apply_baked(path: str | Path, parts: Iterable[HeadPart], refined: Mapping[st
         if part.name in decimated:
             decimated[part.name] = tessellation_key(part)
         decimated |= {f"{part.name}/{level}": t.astype(np.int32) for level, t in finer.coarser.items()}
+        if part.name in errors:
+            errors[part.name] = finer.carry(errors[part.name])
     apply_shade(parts, shares)
     apply_decimated(parts, decimated)
+    apply_fit_error(parts, errors)

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+import socket
 import threading
 import time
 from collections.abc import Callable, Iterator
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
 from controller.base.errors import LinkError
+from controller.base.parameters import PARAMETERS
 from controller.base.parts import Parts
 from controller.body import link_part
 from controller.body.link_part import LinkPart, link_status, thread_errors
+from controller.layers.commands import CommandState
 from controller.links.kind import LinkContext
+from controller.links.links import read_link
 from drivers.base.shutdown import Closers
 
 
@@ -226,3 +231,28 @@ def test_status_says_how_many_links_it_has_no_room_for() -> None:
     *kept, more = word.split(";")
     assert len(word) < 1300 and len(kept) >= 5 and more == f"and_{40 - len(kept)}_more"
     assert all(each.startswith(f"vmc_on_udp:127.0.0.1:{n}:60.0Hz") for n, each in enumerate(kept))
+
+
+@pytest.mark.parametrize("kind", ["websocket", "line", "web"])
+def test_a_link_at_a_port_that_the_system_chooses_says_which_it_is(kind: str) -> None:
+    parts, state = Parts(), CommandState(PARAMETERS)
+    choice = read_link({"kind": kind, "listen": "127.0.0.1:0"})
+    part = LinkPart(choice, lambda closers: LinkContext(cast(Any, state), cast(Any, closers)), parts)
+    assert part.record()["name"] == f"{kind} on 127.0.0.1:0"
+    part.open()
+    try:
+        said = str(part.record()["name"])
+        host, _, port = said.removeprefix(f"{kind} on ").rpartition(":")
+        assert host == "127.0.0.1" and part.report()["port"] == f"{host}:{port}"
+        with socket.create_connection((host, int(port)), 10.0):
+            pass
+    finally:
+        part.close()
+
+
+def test_a_foreign_link_is_named_by_its_kind_and_where_it_says_it_is(made: list[Any]) -> None:
+    choice = SimpleNamespace(kind="foreign", __str__=lambda: "foreign on near")
+    part = LinkPart(cast(Any, choice), lambda closers: LinkContext(cast(Any, None), cast(Any, closers)), Parts())
+    part.open()
+    assert part.record() == {"name": "foreign on far", **made[0].said}
+    part.close()

@@ -77,7 +77,7 @@ def test_export_writes_what_fit_wrote(sheet, tmp_path):
         (["export", "x.glb", "--set", "jawOpn=1"], ParameterError, "jawOpn"),
         (["fit", "none.glb", "-o", "h"], FitError, "no such mesh file"),
         (["fit", "none.glb", "-o", "h", "--unit", "ell"], FitError, "no such mesh file"),
-        (["fit", "none.glb", "-o", "h", "--keep"], ConfigError, "--keep: fits nothing"),
+        (["fit", "none.glb", "-o", "h", "--keep"], HeadFileError, "h: no such head folder"),
         (["fit", "none.glb", "-o", "/dev/null/h"], HeadFileError, "/dev/null is no folder"),
     ],
 )
@@ -139,7 +139,7 @@ def fitted(monkeypatch):
     return calls, report
 
 
-def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path):
+def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path, monkeypatch):
     calls, report = fitted
     out = tmp_path / "mine"
     said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out)])
@@ -176,8 +176,14 @@ def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path):
         "identities: broad, long",
     ]
     calls.clear()
+    measured = {"face": np.array([0.1, 0.3, np.nan]), "back": np.array([2.0])}
+    monkeypatch.setattr("surface.fit.api.measure_head", lambda *given: calls.append(("measured", *given)) or measured)
     said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out), "--keep", "--identities", "i.npz"])
-    assert said.output == "identities: broad, long\n" and [call[0] for call in calls] == ["identities"]
+    assert said.output.endswith("identities: broad, long\n") and [call[0] for call in calls] == [
+        "measured",
+        "identities",
+    ]
+    assert "face 2 0.224 0.298 0.300" in " ".join(said.output.replace("\u2502", " ").split())
 
 
 def test_a_fit_can_be_forced_and_then_says_what_is_wrong(fitted, tmp_path, monkeypatch):

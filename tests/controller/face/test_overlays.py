@@ -9,7 +9,7 @@ from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.face.overlays import KINDS, MOST, Overlays
 from controller.face.skin_model import Screen
-from controller.panels.window.overlay_view import nearest
+from controller.panels.overlay.overlay_view import nearest
 from controller.robot.anchors import anchor_places
 from controller.robot.robot import load_robot
 from surface.head import Head

@@ -9,7 +9,7 @@ from slit_sheet import slit_sheet, write_npz
 
 from surface.base.errors import FitError
 from surface.fit import api, fit_head
-from surface.fit.api import eyes_of, fit_mesh, part_chart, prepare, recipe_plan
+from surface.fit.api import eyes_of, fit_mesh, measure_head, part_chart, prepare, recipe_plan
 from surface.fit.eyes.lids import gazes_of
 from surface.fit.features.generic import Plan
 from surface.fit.features.pieces import HeadRig
@@ -23,6 +23,7 @@ from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names
 from surface.head import Head
 from surface.head.model.data import Jaw
+from surface.head.posing.fit_error import FIT_ERROR
 
 
 @pytest.fixture(scope="module")
@@ -84,6 +85,26 @@ def test_the_lips_of_the_slit_part(fitted):
         gap.append(face.vertices[edge[1], 1] - face.vertices[edge[0], 1])
     assert (np.diff(gap) > 2.5).all()
     assert gap[-1] - gap[0] > 12
+
+
+def test_how_far_the_head_is_from_the_mesh_is_kept_beside_it(fitted):
+    folder, report, _ = fitted
+    mm = Head.load(folder).part("face").attributes["fit_error"]
+    assert np.isfinite(mm).all() and 0.0 < np.sqrt(np.mean(mm**2)) <= report.parts[0].neutral.rms + 0.01
+
+
+def test_a_head_that_is_there_is_measured_again_beside_its_own_mesh_alone(fitted, tmp_path):
+    folder, _, _ = fitted
+    kept = (folder / FIT_ERROR).read_bytes()
+    (folder / FIT_ERROR).unlink()
+    found = measure_head(folder, folder.parent / "m.npz")
+    assert np.allclose(found["face"], Head.load(folder).part("face").attributes["fit_error"], atol=0.006)
+    assert (folder / FIT_ERROR).stat().st_size == len(kept)
+    sheet = slit_sheet()
+    other = write_npz(tmp_path / "m.npz", replace(sheet, vertices=sheet.vertices * [1.0, 1.0, 1.6]))
+    with pytest.raises(FitError, match=r"was not fitted to .* mm RMS from it"):
+        measure_head(folder, other)
+    assert np.isfinite(Head.load(folder).part("face").attributes["fit_error"]).all()
 
 
 def test_nothing_is_written_for_a_bad_mesh(tmp_path):

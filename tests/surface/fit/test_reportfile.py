@@ -12,11 +12,11 @@ from fewer_points import fewer_points
 from slit_sheet import slit_sheet
 from small_head import small_head
 
+from surface.base.error_colours import SCALE
 from surface.base.errors import FitError, ViewError
 from surface.fit import reportfile
 from surface.fit.api import fit_mesh
 from surface.fit.eyes.search import MISSING
-from surface.fit.measures.error_colours import SCALE
 from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds, kinds_line
 from surface.fit.reportfile import EXCLUDED, _colours, as_markdown, as_table, write_report

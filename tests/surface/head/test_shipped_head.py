@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from surface.fit.points.report import RMS_MM
 from surface.head import Head
 from surface.head.model.sidecar import read_sidecar
 from surface.head.posing.baked import LEVELS, checksums, read_shade
+from surface.head.posing.fit_error import FIT_ERROR, read_fit_error
 from surface.view.draw import materials
 
 
@@ -34,6 +37,15 @@ def test_every_part_has_its_baked_shade(head: Head, folder: Path) -> None:
 @pytest.mark.parametrize("file", ["occlusion.npz", "decimated.npz"])
 def test_files_beside_it_say_which_tessellation_they_are_for(head: Head, folder: Path, file: str) -> None:
     assert read_sidecar(folder / file, lambda kept: kept.checks, "") == checksums(head.parts)
+
+
+def test_it_knows_how_far_it_is_from_the_mesh_that_it_was_fitted_to(head: Head, folder: Path) -> None:
+    found = read_fit_error(folder, head.parts)
+    checks = read_sidecar(folder / FIT_ERROR, lambda kept: kept.checks, "")
+    assert found.keys() == checks.keys() and checks.items() <= checksums(head.parts).items()
+    face = head.part("face").attributes["fit_error"]
+    assert len(face) == len(head.part("face").vertices) and face.max() < 3.0
+    assert np.sqrt(np.mean(face**2)) < RMS_MM
 
 
 def test_every_part_has_its_lean_triangles(head: Head) -> None:

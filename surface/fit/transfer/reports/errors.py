@@ -6,11 +6,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
+from surface.fit.measures.closest import ClosestTree
 from surface.fit.points.report import PartReport, errors_of
 from surface.fit.transfer.align import face_region, foremost
 from surface.fit.transfer.register import LEAST_COSINE
 from surface.fit.transfer.reports.distances import CLOSE_MM, distances_from, sample_head
-from surface.fit.transfer.scan import Samples
+from surface.fit.transfer.scan import Samples, Scan
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Head, HeadData
@@ -50,3 +51,16 @@ def distances(head: Head, front: Floats, samples: Samples) -> tuple[Floats, Floa
     same = (own.normals[found.nearest] * samples.normals[inside]).sum(axis=1) > LEAST_COSINE
     counted = (same | (found.to_sample > CLOSE_MM)) & (found.mm < REACH_MM)
     return at[counted], found.mm[counted]
+
+
+def skin_errors(head: Head, scan: Scan) -> dict[str, Floats]:
+    """By part of a head's skin, (m,) mm from each vertex at rest to the scan's surface; NaN where the scan has nothing
+    near. Both are in the head's frame."""
+    tree = ClosestTree(scan.vertices, scan.triangles)
+    out = {}
+    for part in head.parts:
+        if part.material == "skin":
+            points = part.vertices.astype(np.float64)
+            mm = tree.distances(points, np.zeros(len(points), np.int64))
+            out[part.name] = np.where(mm < REACH_MM, mm, np.nan)
+    return out

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Ints
+from surface.base.error_colours import error_colours
 from surface.base.extras import importing
 from surface.check.raster import NOTHING, View
-from surface.fit.measures.error_colours import error_colours
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.scan import Scan
 from surface.fit.transfer.template import NAMES

@@ -40,13 +40,22 @@ quality = "fast"
 """
 
 
-def shown(program: str, *words: str) -> str:
-    """What a Python program writes that opens its window on a virtual display."""
-    command = ["xvfb-run", "-a", sys.executable, "-c", program, *words]
+def shown(program: str, *words: str, server: str = "-screen 0 1280x1024x24") -> str:
+    """What a Python program writes that opens its window on a virtual display; ``server`` : the display's options."""
+    command = ["xvfb-run", "-a", "-s", server, sys.executable, "-c", program, *words]
     environment = os.environ | {"LIBGL_ALWAYS_SOFTWARE": "1"}
     result = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
     assert result.returncode == 0, result.stderr
     return result.stdout
+
+
+def scaled(program: str, dpi: int, size: tuple[int, int]) -> str:
+    """:func:`shown` on a display of a size whose desktop has ``dpi`` dots per inch; 96 is 100 %."""
+    server = f"-screen 0 {size[0]}x{size[1]}x24 -noreset"  # else what xrdb has set is lost with it
+    set_dpi = (
+        f"import subprocess; subprocess.run(['xrdb', '-merge'], input='Xft.dpi: {dpi}\\n', text=True, check=True)\n"
+    )
+    return shown(set_dpi + program, server=server)
 
 
 @pytest.mark.slow

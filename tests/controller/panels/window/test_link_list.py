@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from controller.panels.window.colours import AMBER, BRIGHT_GREEN, GREY
+from controller.panels.overlay.colours import AMBER, BRIGHT_GREEN, GREY
 from controller.panels.window.link_list import LinkList, figures, state_of
 from tests.controller.panels.window.drawn import LINE, Drawn
 

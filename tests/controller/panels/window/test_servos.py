@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -115,11 +116,12 @@ def test_links_and_faults_are_drawn_and_faults_dismissed(screen: Screen, monkeyp
     assert panel.problems.unread == []
 
 
-def test_the_face_alone_keeps_its_stop(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
-    places, sent = Places(screen.imgui, monkeypatch), []
+def test_the_face_alone_keeps_its_stop(screen: Screen) -> None:
+    sent: list[Any] = []
     panel = Panel(PARAMETERS.neutral, sent.append)
     panel._toggle_bare()
     for _ in range(3):
         screen.frame(panel)
-    screen.click(panel, *places.at["STOP servos"])
+    box = panel.stop.box
+    screen.click(panel, (box.left + box.right) / 2, (box.top + box.bottom) / 2)
     assert sent == [StopServos()]

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from surface.base.error_colours import FULL_MM, SCALE, error_colours
 from surface.base.errors import FitError
-from surface.fit.measures.error_colours import FULL_MM, SCALE, error_colours
 from surface.fit.measures.report_folder import report_folder
 
 

@@ -10,7 +10,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from surface.base.arrays import Floats
-from surface.fit.measures.error_colours import FULL_MM, SCALE
+from surface.base.error_colours import FULL_MM, SCALE
 from surface.fit.transfer.align import Similarity
 from surface.fit.transfer.reports import picture as module
 from surface.fit.transfer.reports.picture import (

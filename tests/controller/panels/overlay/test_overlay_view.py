@@ -11,8 +11,8 @@ import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.face.overlays import KINDS, Marks
-from controller.panels.window import overlay_view
-from controller.panels.window.overlay_view import OverlayView, nearest
+from controller.panels.overlay import overlay_view
+from controller.panels.overlay.overlay_view import OverlayView, nearest
 
 AREA = SimpleNamespace(left=100, top=20, width=640, height=480)
 

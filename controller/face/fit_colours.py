@@ -1,0 +1,98 @@
+"""Paints a head by how far its surface lies from the mesh that it was fitted to, and takes the paint off again.
+
+Independent of any window library.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from surface.base.arrays import Array, Floats
+from surface.base.error_colours import error_colours
+from surface.head import Head
+from surface.head.posing.fit_error import ATTRIBUTE
+from surface.head.posing.part import HeadPart
+from surface.view.scene.theme import Theme, find_theme
+
+NOT_MEASURED = np.array([0.30, 0.30, 0.30])
+"""Linear RGB of skin that was not measured."""
+_DRAWN_APART = ("lips", "freckles")  # these would tint the colours
+
+
+@dataclass(frozen=True)
+class FitFigures:
+    """How far the vertices of a head at rest lie from its mesh, mm; ``part`` is the one that they are of."""
+
+    part: str
+    rms: float
+    p99: float
+    most: float
+
+    def __str__(self) -> str:
+        return f"{self.part}: RMS {self.rms:.2f} mm, 99 % within {self.p99:.2f} mm, most {self.most:.2f} mm"
+
+
+def figures_of(head: Head) -> FitFigures | None:
+    """Of the measured part with the most vertices, which is the face; None for a head that was not measured."""
+    measured = [part for part in head.parts if np.isfinite(part.attributes.get(ATTRIBUTE, np.zeros(0))).any()]
+    if not measured:
+        return None
+    part = max(measured, key=lambda each: len(each.vertices))
+    mm = part.attributes[ATTRIBUTE].astype(np.float64)
+    mm = mm[np.isfinite(mm)]
+    return FitFigures(part.name, float(np.sqrt(np.mean(mm**2))), float(np.percentile(mm, 99.0)), float(mm.max()))
+
+
+def unmeasured(head: Head) -> bool:
+    """Whether some of the skin was not measured."""
+    return any(not np.isfinite(_mm(part)).all() for part in head.parts if part.material == "skin")
+
+
+def plain_theme(theme: Theme) -> Theme:
+    """A theme that shows the painted colours as they are, on the background of another."""
+    skin = find_theme("skin")
+    even = (skin.wrap[0],) * 3
+    return replace(
+        skin, wrap=even, gloss=0.2, detail=0.0, through=(0.0, 0.0, 0.0),
+        background_top=theme.background_top, background_bottom=theme.background_bottom,
+    )  # fmt: skip
+
+
+class FitColours:
+    """The paint on one head."""
+
+    def __init__(self) -> None:
+        self._own: list[tuple[HeadPart, dict[str, Array]]] = []
+
+    def paint(self, head: Head) -> bool:
+        """Paint the skin of a head, whoever draws it begins afterwards; False, and no paint, without measured skin."""
+        self.clear()
+        if figures_of(head) is None:
+            return False
+        for part in head.parts:
+            if part.material == "skin":
+                self._own.append((part, part.attributes))
+                plain = {name: np.zeros_like(part.attributes[name]) for name in _DRAWN_APART if name in part.attributes}
+                part.attributes = {**part.attributes, **plain, "albedo": _colours(_mm(part))}
+        return True
+
+    def clear(self) -> None:
+        """Take the paint off."""
+        for part, attributes in self._own:
+            part.attributes = attributes
+        self._own = []
+
+
+def _mm(part: HeadPart) -> Floats:
+    """(m,) mm, NaN where a vertex was not measured."""
+    mm: Floats = np.asarray(part.attributes.get(ATTRIBUTE, np.full(len(part.vertices), np.nan)), np.float64)
+    return mm
+
+
+def _colours(mm: Floats) -> Array:
+    """(m, 3) float32 linear RGB of distances."""
+    colours = error_colours(np.nan_to_num(mm))
+    colours[np.isnan(mm)] = NOT_MEASURED
+    return colours.astype(np.float32)
