@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 Arrays = dict[str, np.ndarray]
 #: Tiles of the detail texture around the head; a whole number, so that its seam at the back of the head is invisible.
 _DETAIL_TILES = 18
-#: Pores: how many along a side of the detail texture, and their radius in texels; how steep and how dark they are beside
+#: Pores: how many along a side of the detail texture, their radius in texels, how steep and how dark they are beside
 #: its noise, and how much of the noise's bumps is left beside them.
 _PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 20, 1.3, 1.7, 0.85, 0.7
 #: Centre of the sphere that the detail is wrapped on, mm.
