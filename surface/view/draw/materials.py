@@ -21,7 +21,7 @@ Arrays = dict[str, np.ndarray]
 _DETAIL_TILES = 18
 #: Pores: how many along a side of the detail texture, their radius in texels, how steep and how dark they are beside
 #: its noise, and how much of the noise's bumps is left beside them.
-_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 20, 1.3, 1.7, 0.85, 0.7
+_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 20, 1.3, 1.2, 0.8, 0.8
 #: Centre of the sphere that the detail is wrapped on, mm.
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
@@ -323,7 +323,7 @@ def detail_texture(ctx: moderngl.Context) -> moderngl.Texture:
     random = np.random.default_rng(7)
     layers = [_tiling_noise(random, falloff) for falloff in (0.5, 0.5, 0.5, 1.0)]
     bumps = np.stack(layers, axis=-1) * (_GRAIN, _GRAIN, 1.0, 1.0) + _pores(np.random.default_rng(8))
-    data = np.clip(bumps * 0.17 + 0.5, 0.0, 1.0)
+    data = np.clip(bumps / bumps.std(axis=(0, 1)) * 0.17 + 0.5, 0.0, 1.0)
     texture = ctx.texture((_DETAIL_SIZE, _DETAIL_SIZE), 4, np.rint(data * 255.0).astype(np.uint8).tobytes())
     texture.build_mipmaps()
     texture.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
@@ -338,11 +338,12 @@ def _pores(random: np.random.Generator) -> np.ndarray:
     at[tuple((places * _DETAIL_SIZE / _PORES).astype(int))] = random.uniform(0.3, 1.0, count)
     frequency = 2.0 * np.pi * np.fft.fftfreq(_DETAIL_SIZE)
     up, right = frequency[:, None], frequency[None, :]
-    pits = np.fft.fft2(at) * np.exp(-0.5 * _PORE_RADIUS**2 * (up**2 + right**2))
+    square = up**2 + right**2
+    pits = np.fft.fft2(at) * np.exp(-0.5 * _PORE_RADIUS**2 * square) * (square > (4.0 * np.pi / _DETAIL_SIZE) ** 2)
     leaning = [np.fft.ifft2(1j * way * pits).real for way in (right, up)]
     dark = -np.fft.ifft2(pits).real
     slope, depth = _PORE_SLOPE / np.std(leaning), _PORE_DARK / dark.std()
-    return np.stack([slope * leaning[0], slope * leaning[1], 0.0 * dark, depth * (dark - dark.mean())], axis=-1)
+    return np.stack([slope * leaning[0], slope * leaning[1], 0.0 * dark, depth * dark], axis=-1)
 
 
 def _tiling_noise(random: np.random.Generator, falloff: float) -> np.ndarray:
