@@ -11,12 +11,15 @@ from surface.fit.wardrobe.bun import bun
 from surface.fit.wardrobe.clothes import NECKS, garment
 from surface.fit.wardrobe.curls import afro, crop
 from surface.fit.wardrobe.long import long
-from surface.fit.wardrobe.short import short
+from surface.fit.wardrobe.short import short, swept, thin
 from surface.fit.wardrobe.skin import Skin
 from surface.fit.wardrobe.write import beard_fields, cloth_fields, hair_fields, write_garment
 from surface.head import Head
 
-STYLES = {"hair-short": short, "hair-long": long, "hair-bun": bun, "hair-crop": crop, "hair-afro": afro}
+STYLES = {
+    "hair-short": short, "hair-swept": swept, "hair-thin": thin, "hair-long": long, "hair-bun": bun, "hair-crop": crop,
+    "hair-afro": afro,
+}  # fmt: skip
 
 
 def main(head: str, out: str, *names: str) -> None:

@@ -23,6 +23,9 @@ _LIP = np.array([-22.5, -23.0, -25.0, -28.5, -33.0])  # lower line of the mousta
 _EDGE_DEG = 93.0
 _LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.8])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
+_LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
+_FIELD_MM = -7.0, 11.0  # inside the beard's lines: where stubble begins, and where it is dense
+_DENSER = 1.3  # hair over the lip, which is too short to lie over what is beside it
 _HAIRS = 1.0 / 40.0  # tiles of the noise for a mm across hairs
 
 
@@ -63,8 +66,8 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5)
     out = []
     for k, (share, cover) in enumerate(beard.shells):
-        for points, grid, fast, full_mm in ((main, (43, 13), (23, 7), 9.0), (lip, (19, 6), (10, 4), 2.6)):
-            out.append(_shell(skin, beard, points, grid, fast, share, cover, k, full_mm))
+        out.append(_shell(skin, beard, main, (43, 13), (23, 7), share, cover, k, 9.0))
+        out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, 2.2))
     return out
 
 
@@ -104,14 +107,14 @@ def _shell(
     x, y, z = flat.T
     chin = np.exp(-((x / 26.0) ** 2)) * step(-y, 44.0, 70.0) * step(z, 55.0, 95.0)
     deep = inside(flat)
-    thick = beard.thick * min(1.0, 0.1 * full_mm + 0.2)  # less over the lip
+    thick = beard.thick * min(1.0, 0.1 * full_mm + 0.1)  # less over the lip
     height = 0.4 + share * (thick + beard.chin * chin) * step(deep, -3.0, full_mm + 5.0)
     down = np.array([0.0, -0.5, 0.1]) * (share * beard.chin * chin)[:, None]  # hair falls
     points = (flat + normals * height[:, None] + down).reshape(nu, nv, 3)
     gu, gv = grid
     at_u, at_v = np.linspace(0, nu - 1, gu), np.linspace(0, nv - 1, gv)
     places = _between(ground, at_u, at_v)
-    reached = step(inside(places.reshape(-1, 3)), -2.0, full_mm).reshape(gu, gv)
+    reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv)
     width = np.linalg.norm(np.diff(places.mean(axis=1), axis=0), axis=1).sum()
     length = np.linalg.norm(np.diff(places, axis=1), axis=2).sum(axis=1).mean()
     s, t = np.meshgrid(np.linspace(0, 1, gu), np.linspace(0, 1, gv), indexing="ij")
@@ -126,6 +129,17 @@ def _shell(
     )  # fmt: skip
 
 
+def _reached(places: Floats, full_mm: float, share: float) -> Floats:
+    """(n,) how much of a shell's hairs grow at places on the skin (n, 3): fewer towards the beard's lines, and the
+    longer they are, the later; over the lip fewer towards the corners of the mouth and below the nose's middle."""
+    deep = inside(places) - _LATER * full_mm * share
+    out = step(deep, -2.0, full_mm)
+    x, y, z = places.T
+    lip = step(y, -36.0, -30.0) * step(z, 70.0, 80.0)
+    thinner = 0.45 * step(np.abs(x), 15.0, 29.0) + 0.3 * np.exp(-((x / 2.5) ** 2))
+    return np.asarray(out * (1.0 - lip * thinner))
+
+
 def _between(rows: Floats, at_u: Floats, at_v: Floats) -> Floats:
     """(gu, gv, 3) values of a grid (nu, nv, 3) at fractions of its rows and columns."""
     i, j = np.arange(len(rows)), np.arange(rows.shape[1])
@@ -135,4 +149,4 @@ def _between(rows: Floats, at_u: Floats, at_v: Floats) -> Floats:
 
 def field(skin: Skin, beard: Beard) -> Floats:
     """(s,) how much of the beard's colour the skin between its hairs has."""
-    return np.where(skin.part == 0, beard.cover * step(inside(skin.points), -3.0, 7.0), 0.0)
+    return np.where(skin.part == 0, beard.cover * step(inside(skin.points), *_FIELD_MM), 0.0)

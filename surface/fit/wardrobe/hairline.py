@@ -18,6 +18,10 @@ POINTS = np.array(
     ],
     float,
 )  # fmt: skip
+#: The same where hair has receded: high corners at the temples beside what is left in the middle.
+RECEDED = np.vstack(
+    [[(0, 122, 76), (14, 124, 71), (28, 129, 50), (42, 124, 38), (54, 108, 40), (63, 86, 45), (68, 64, 47)], POINTS[6:]]
+)
 
 
 def angles(points: Floats) -> tuple[Floats, Floats]:

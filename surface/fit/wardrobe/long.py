@@ -14,7 +14,7 @@ from surface.fit.wardrobe.styles import Style, cap, step, tangent
 PART_X = 14.0  # of the parting, mm
 ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
 TIPS_Y = -124.0  # mm
-OVER_EAR_MM = 8.5
+OVER_EAR_MM = 6.0
 FRAYED = 0.09, 0.0  # of the width, at the face and behind
 LAYERS = (
     Layer(1.07, 0.46, 1.0, 45.0, 0.1), Layer(1.0, 0.66, 0.92, 30.0, 0.1), Layer(0.88, 1.6, 0.74, 16.0),

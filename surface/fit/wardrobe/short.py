@@ -1,11 +1,13 @@
-"""Short hair: combed forwards to the side on top, close at the sides and behind."""
+"""Short hair, cut in three ways: with a fringe, swept back from the forehead, and thin with receding temples."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.hairline import Hairline
+from surface.fit.wardrobe.hairline import POINTS, RECEDED, Hairline
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheets
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
 from surface.fit.wardrobe.styles import Style, step, tangent
@@ -13,35 +15,88 @@ from surface.fit.wardrobe.styles import Style, step, tangent
 CROWN = np.array([12.0, 132.0, -42.0])
 RING_RAD = 0.05  # from the crown, seen from the skull's middle: where guides begin
 GUIDES = 73
-LAYERS = (Layer(1.06, 0.46, 1.0, 34.0), Layer(1.0, 0.70, 0.92, 20.0), Layer(0.90, 1.6, 0.74, 12.0))
+WEAVE = Weave((73, 12), (97, 15), (49, 9))
+FRINGED = (Layer(1.08, 0.42, 1.0, 40.0), Layer(1.0, 0.66, 0.92, 24.0), Layer(0.90, 1.6, 0.74, 10.0))
+SWEPT = (Layer(1.10, 0.44, 1.0, 26.0), Layer(1.0, 0.70, 0.92, 18.0), Layer(0.88, 1.6, 0.74, 9.0))
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """How hair is swept back: its line; mm it has over the skin at the sides, on top, and more at the forehead; how far
+    it goes to one side."""
+
+    points: Floats
+    sides_mm: float
+    top_mm: float
+    front_mm: float
+    aside: float
+
+
+BACK, THIN = Sweep(POINTS, 2.2, 6.5, 6.5, 0.45), Sweep(RECEDED, 2.6, 3.6, 2.0, 0.25)
 
 
 def short(skin: Skin) -> Style:
-    """Strands go from the crown to the line all round, and over it on the forehead."""
+    """Strands go from the crown to the line all round, and over it on the forehead, in a fringe to one side that leaves
+    the temples free."""
     line = Hairline(skin)
     round_it = np.linspace(np.pi, -np.pi, GUIDES)
 
     def thickness(at: Floats) -> Floats:
-        full = 3.0 + 8.0 * _top(at) + 3.0 * _top(at) * step(at[:, 2], 30.0, 75.0) - 1.4 * step(-at[:, 1], -40.0, 50.0)
-        return np.asarray(1.8 + full * step(line.inside(at), -10.0, 26.0))
+        full = 1.6 + 9.0 * _top(at) + 2.0 * _top(at) * step(at[:, 2], 30.0, 75.0) + 1.6 * step(at[:, 1], 10.0, 60.0)
+        return np.asarray(1.0 + full * step(line.inside(at), -10.0, 30.0))
 
     def flow(at: Floats, normals: Floats, share: float) -> Floats:
         away = tangent(at - CROWN, normals)
-        aside = tangent(np.tile([0.8, 0.0, 0.5], (len(at), 1)), normals)
-        down = tangent(np.tile([0.0, -1.0, -0.1], (len(at), 1)), normals)
+        aside = tangent(np.tile([0.9, 0.0, 0.4], (len(at), 1)), normals)
         top = _top(at)[:, None]
-        return tangent(away * (0.8 + 0.2 * top) + 0.35 * top * aside + 0.45 * (1.0 - top) * down, normals)
+        return tangent(away * (0.8 + 0.2 * top) + 0.5 * top * aside + 0.45 * (1.0 - top) * _down(at, normals), normals)
 
     def cut(at: Floats) -> Floats:
-        front = step(at[:, 2], 34.0, 84.0)
-        nape = step(-at[:, 2], 30.0, 50.0)
-        return np.asarray(line.inside(at) + 2.0 + 17.0 * front + 4.0 * nape)
+        fringe = step(at[:, 2], 50.0, 82.0) * step(-np.abs(at[:, 0] - 6.0), -48.0, -16.0)
+        lower = 13.0 + 7.0 * step(at[:, 0], -30.0, 30.0)
+        return np.asarray(line.inside(at) + 1.0 + lower * fringe)
 
-    roots = _ring(skin, round_it)
-    ragged = 2.0 + 5.0 * step(np.cos(round_it), 0.3, 0.8)  # in front
-    comb = Comb(roots, np.full(GUIDES, 330.0), thickness, flow, cut, ragged, steps=66, slack=0.5)
-    made = sheets(skin, comb, LAYERS, Weave((73, 12), (97, 15), (49, 9)), seed=11, closed=True)
-    return Style(made, line)
+    ragged = 1.2 + 3.0 * step(np.cos(round_it), 0.75, 0.95)  # in front
+    comb = Comb(
+        _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, ragged, 1.2, steps=66, slack=0.5
+    )  # fmt: skip
+    return Style(sheets(skin, comb, FRINGED, WEAVE, seed=11, closed=True), line)
+
+
+def swept(skin: Skin) -> Style:
+    """Hair stands up a little at the forehead and lies back from there, close at the sides."""
+    return _swept_back(skin, BACK, seed=51)
+
+
+def thin(skin: Skin) -> Style:
+    """Thin hair lies back from a line that has receded at the temples."""
+    return _swept_back(skin, THIN, seed=61)
+
+
+def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
+    """Guides go from the crown to the line, as strands do that were combed the other way."""
+    line = Hairline(skin, sweep.points)
+
+    def thickness(at: Floats) -> Floats:
+        front = sweep.front_mm * step(at[:, 2], 10.0, 60.0)
+        full = sweep.sides_mm + _top(at) * (sweep.top_mm - sweep.sides_mm + front)
+        return np.asarray(0.6 + full * step(line.inside(at), -3.0, 22.0) ** 0.8)
+
+    def flow(at: Floats, normals: Floats, share: float) -> Floats:
+        away = tangent(at - CROWN, normals)
+        aside = tangent(np.tile([1.0, 0.0, 0.2], (len(at), 1)), normals)
+        top = _top(at)[:, None]
+        along = away + sweep.aside * top * aside + 0.35 * (1.0 - top) * _down(at, normals)
+        return tangent(along, normals)
+
+    def cut(at: Floats) -> Floats:
+        return np.asarray(line.inside(at) + 1.0)
+
+    round_it = np.linspace(np.pi, -np.pi, GUIDES)
+    comb = Comb(
+        _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, 1.2, 1.2, steps=66, slack=0.5
+    )  # fmt: skip
+    return Style(sheets(skin, comb, SWEPT, WEAVE, seed=seed, closed=True), line)
 
 
 def _ring(skin: Skin, round_it: Floats) -> Floats:
@@ -52,6 +107,11 @@ def _ring(skin: Skin, round_it: Floats) -> Floats:
     aside = np.outer(np.cos(round_it), front) + np.outer(np.sin(round_it), side)
     toward = unit(np.cos(RING_RAD) * pole + np.sin(RING_RAD) * aside)
     return np.asarray(CENTRE + toward * skin.reach(toward)[:, None])
+
+
+def _down(at: Floats, normals: Floats) -> Floats:
+    """(n, 3) down along the skin, and a little back."""
+    return tangent(np.tile([0.0, -1.0, -0.1], (len(at), 1)), normals)
 
 
 def _top(at: Floats) -> Floats:

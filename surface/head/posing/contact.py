@@ -25,6 +25,7 @@ from surface.spline.kernels import fill_rows, row_capacity
 CONTACT_SHARE = 2 / 3  # of the rows at an opening can touch the other side; in the others the correction fades out
 SOFT_MM = 0.1
 OVERLAP_MM = (0.28, 0.9)  # allowed overlap of lips and of lids: triangles cut about that off the edges of both sides
+NEARLY_MM, HIDDEN_MM = 1.2, 0.25  # lips nearer than the first at rest are closed; so far each hides the other then
 PASSES, TOLERANCE_MM = 3, 0.1  # corrections are repeated while bending leaves more than this
 LIFT_GAIN = 1.6  # of what a lid is off: least squares hold it back, because its neighbours need not move
 LID_MM = 1.2  # thickness of a lid: what rests nearer to the eyeball than that never sinks further
@@ -112,6 +113,7 @@ class ContactSolver:
                          np.zeros((len(self._sides.ids), 3)), *np.zeros((2, 2, columns)))  # fmt: skip
         trace_profiles(self._sides.samples, rows, self._sides.radius, self._opening[0])
         find_gaps(self._opening[0], self._opening[4])
+        close_nearly(self._opening[4])
         self.push = np.zeros(4 * columns * profiles[2] if lids else 2 * columns)
         self._press, self._rows = OVERLAP_MM[lids], rows
 
@@ -176,6 +178,13 @@ class Follower:
     def apply(self, push: Floats, points: Floats) -> None:
         """Add what :meth:`ContactSolver.apply` returned to control points (n, 3)."""
         follow_samples(self.ids, self._beside, self._share, push, self._size, self.eye, self.radius, points)
+
+
+def close_nearly(gaps: Floats) -> None:
+    """Make gaps at rest (2, k), mm, of sides that nearly touch everywhere those of sides that do, in place: an identity
+    mixed into a head may leave its lips some tenths of a millimetre apart, which no expression could close then."""
+    if gaps.max() < NEARLY_MM:
+        np.minimum(gaps, -HIDDEN_MM, out=gaps)
 
 
 def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:

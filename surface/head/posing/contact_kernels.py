@@ -14,6 +14,7 @@ from surface.spline.lanes import add, fma_at, item, load, store3, zero
 # The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
+SIGHT = 0.7  # tangent of 35 degrees: so far from the front, lips that are closed still look closed
 # coefficients of Taylor's series: of x**10 to 1, of the sine over x and of the cosine
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(5, -1, -1))
 COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(5, -1, -1))
@@ -167,27 +168,44 @@ def find_overlap(samples: Floats, press: float, soft: float, push: Floats) -> No
             push[side, k] = worst if worst > soft else near * near / (4.0 * soft)
 
 
+@nonallocating
+def trace_edges(samples: Floats, edges: Floats) -> None:
+    """The lines that hide what lies behind an opening: ``edges (2, k, 3)``, x, height and depth of the lowest sample of
+    each column of the upper side and of the highest of the lower side, from ``samples (2, k, m, 3)``."""
+    _, columns, rows, _ = samples.shape
+    for side in range(2):
+        sign = 1.0 - 2.0 * side
+        for k in range(columns):
+            best = 0
+            for j in range(1, rows):
+                if sign * samples[side, k, j, 1] < sign * samples[side, k, best, 1]:
+                    best = j
+            for c in range(3):
+                edges[side, k, c] = samples[side, k, best, c]
+
+
 @kernel
 def find_gaps(samples: Floats, gaps: Floats) -> None:
-    """How far an opening stands open as seen from the front, ``gaps (2, k)``, from ``samples (2, k, m, 3)`` as
-    :func:`find_overlap` takes them: from the lowest of each column of the upper side to the highest of the lower side
-    at the same x, below 0 where one hides behind the other; and for each column of the lower side in turn."""
-    _, columns, rows, _ = samples.shape
-    edge, middle = np.empty((2, columns)), np.zeros((2, columns))
-    for side in range(2):
-        for k in range(columns):
-            heights = samples[side, k, :, 1]
-            edge[side, k] = heights.max() if side else heights.min()
-            for j in range(rows):
-                middle[side, k] += samples[side, k, j, 0] / rows
-    for side in range(2):
-        x, at, sign = middle[1 - side], 0, 1.0 - 2.0 * side
-        for k in range(columns):
-            while at < columns - 2 and x[at + 1] < middle[side, k]:
-                at += 1
-            t = min(max((middle[side, k] - x[at]) / max(x[at + 1] - x[at], 1e-9), 0.0), 1.0)
-            other = edge[1 - side, at] + t * (edge[1 - side, at + 1] - edge[1 - side, at])
-            gaps[side, k] = sign * (edge[side, k] - other)
+    """How far an opening stands open, ``gaps (2, k)``, as seen from the front and :data:`SIGHT` aside of it, where it
+    is widest, from ``samples (2, k, m, 3)`` as :func:`find_overlap` takes them: from the lowest of each column of the
+    upper side to the highest of the lower side in the same line of sight, below 0 where one hides behind the other;
+    and for each column of the lower side in turn."""
+    columns = samples.shape[1]
+    edges, across = np.empty((2, columns, 3)), np.empty((2, columns))
+    trace_edges(samples, edges)
+    gaps[:] = -1e9
+    for way in range(-1, 2):
+        for side in range(2):
+            for k in range(columns):
+                across[side, k] = edges[side, k, 0] - way * SIGHT * edges[side, k, 2]
+        for side in range(2):
+            x, at, sign = across[1 - side], 0, 1.0 - 2.0 * side
+            for k in range(columns):
+                while at < columns - 2 and x[at + 1] < across[side, k]:
+                    at += 1
+                t = min(max((across[side, k] - x[at]) / max(x[at + 1] - x[at], 1e-9), 0.0), 1.0)
+                other = edges[1 - side, at, 1] + t * (edges[1 - side, at + 1, 1] - edges[1 - side, at, 1])
+                gaps[side, k] = max(gaps[side, k], sign * (edges[side, k, 1] - other))
 
 
 @kernel

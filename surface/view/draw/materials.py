@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 Arrays = dict[str, np.ndarray]
 #: Tiles of the detail texture around the head; a whole number, so that its seam at the back of the head is invisible.
 _DETAIL_TILES = 18
+#: Pores: how many along a side of the detail texture, their radius in texels, how steep and how dark they are beside
+#: its noise, and how much of the noise's bumps is left beside them.
+_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 20, 1.3, 1.2, 0.8, 0.8
 #: Centre of the sphere that the detail is wrapped on, mm.
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
@@ -307,7 +310,7 @@ MATERIALS: dict[str, Material] = {
     "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
     "eye": Material("eye", lambda part, theme, openings: {"local": openings.local(part)}, _eye_uniforms, order=1),
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
-    "brow": _hair("brow", (0.72, 0.50, 0.30, 2.4), 1.0),
+    "brow": _hair("brow", (0.70, 0.46, 0.36, 1.7), 1.0),
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, order=3),
     "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.42, grooved=True, order=4),
     "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),
@@ -316,14 +319,31 @@ MATERIALS: dict[str, Material] = {
 
 
 def detail_texture(ctx: moderngl.Context) -> moderngl.Texture:
-    """Tiling noise (rgb: bumps, a: mottling) from a fixed seed."""
+    """Tiling noise (rgb: bumps, a: mottling) and pores from a fixed seed."""
     random = np.random.default_rng(7)
     layers = [_tiling_noise(random, falloff) for falloff in (0.5, 0.5, 0.5, 1.0)]
-    data = np.clip(np.stack(layers, axis=-1) * 0.17 + 0.5, 0.0, 1.0)
+    bumps = np.stack(layers, axis=-1) * (_GRAIN, _GRAIN, 1.0, 1.0) + _pores(np.random.default_rng(8))
+    data = np.clip(bumps / bumps.std(axis=(0, 1)) * 0.17 + 0.5, 0.0, 1.0)
     texture = ctx.texture((_DETAIL_SIZE, _DETAIL_SIZE), 4, np.rint(data * 255.0).astype(np.uint8).tobytes())
     texture.build_mipmaps()
     texture.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
     return texture
+
+
+def _pores(random: np.random.Generator) -> np.ndarray:
+    """Pits (size, size, 4) that tile: how the skin leans to the right and upwards in them, and how much darker they
+    are; mipmaps level them where they are smaller than a pixel."""
+    at, count = np.zeros((_DETAIL_SIZE, _DETAIL_SIZE)), _PORES**2
+    places = np.indices((_PORES, _PORES)).reshape(2, -1) + random.uniform(0.1, 0.9, (2, count))
+    at[tuple((places * _DETAIL_SIZE / _PORES).astype(int))] = random.uniform(0.3, 1.0, count)
+    frequency = 2.0 * np.pi * np.fft.fftfreq(_DETAIL_SIZE)
+    up, right = frequency[:, None], frequency[None, :]
+    square = up**2 + right**2
+    pits = np.fft.fft2(at) * np.exp(-0.5 * _PORE_RADIUS**2 * square) * (square > (4.0 * np.pi / _DETAIL_SIZE) ** 2)
+    leaning = [np.fft.ifft2(1j * way * pits).real for way in (right, up)]
+    dark = -np.fft.ifft2(pits).real
+    slope, depth = _PORE_SLOPE / np.std(leaning), _PORE_DARK / dark.std()
+    return np.stack([slope * leaning[0], slope * leaning[1], 0.0 * dark, depth * dark], axis=-1)
 
 
 def _tiling_noise(random: np.random.Generator, falloff: float) -> np.ndarray:

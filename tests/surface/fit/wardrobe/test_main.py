@@ -51,7 +51,10 @@ def places(head: Head, garment: Arrays, part: str) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["hair-afro", "hair-bun", "hair-crop", "hair-short", "beard-full", "beard-short"])
+@pytest.mark.parametrize(
+    "name",
+    ["hair-afro", "hair-bun", "hair-crop", "hair-short", "hair-swept", "hair-thin", "beard-full", "beard-short"],
+)
 def test_hair_and_beards_are_like_the_shipped_ones(
     name: str, made: Callable[[str], tuple[Arrays, Arrays]], head: Head
 ) -> None:

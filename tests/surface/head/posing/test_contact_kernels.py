@@ -7,7 +7,9 @@ from face_measures import eye_height
 from surface.fit.points.eyeball import surface_height
 from surface.head.posing.contact import LID_MM, LIFT_GAIN, TOUCH_MM, by_lanes, height_limits
 from surface.head.posing.contact_kernels import (
+    SIGHT,
     angle,
+    find_gaps,
     find_heights,
     find_lifts,
     find_overlap,
@@ -173,6 +175,16 @@ def test_sides_are_compared_at_the_same_x():
     np.testing.assert_allclose(push[0, 1:], 1.0 + 0.5 * np.arange(1, 4) - PRESS, atol=1e-9)
     np.testing.assert_allclose(push[0, 0], 1.125 - PRESS)  # nothing further left: the first column counts
     np.testing.assert_allclose(push[1], 1.0 + 0.5 * (np.arange(4) + 0.25) - PRESS, atol=1e-9)
+
+
+@pytest.mark.parametrize("ahead", [0.0, 6.0, -6.0])
+def test_an_opening_is_as_wide_as_where_one_sees_farthest_into_it(ahead):
+    """The lower rim rises by 0.5 a column, and lies ``ahead`` of the upper one: seen aside, it is beside it."""
+    samples, gaps = opening(-2.0, columns=21, slant=0.5), np.zeros((2, 21))
+    samples[1, :, :, 2] += ahead
+    find_gaps(samples, gaps)
+    seen = 2.0 - 0.5 * np.arange(21) + 0.5 * SIGHT * abs(ahead)
+    np.testing.assert_allclose(gaps[0, 5:16], seen[5:16], atol=1e-9)
 
 
 def test_points_move_up_straight_or_round_the_eyeball_or_away_from_it():
