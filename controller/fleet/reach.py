@@ -1,0 +1,78 @@
+"""What a motion can do in its next step without passing a limit of speed, acceleration or range; compiled.
+
+What counts of a step is its mean speed, which is what can be measured of it. After a step of ``t`` s with the mean
+speed ``m`` the motion may have any speed between ``m - a t / 2`` and ``m + a t / 2`` from which it can still stop
+inside its range, so that ``v^2 <= 2 a room``; these are its *end speeds*. The mean of the next step, of any length
+``T``, lies within ``a T / 2`` of one of them. So two mean speeds differ by ``a`` times the time between the middles of
+their steps at most. Braking at ``a`` from an end speed, and standing from then on, is always among the choices.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import boolean, float64, void
+
+from controller.base.parameters import Flags, Floats
+from surface.base.jit import declared
+
+_SHARE = 0.6
+"""How much of the limits closing a distance may use, beside the motion of the face itself."""
+_SETTLE_S = 0.03
+"""Time constant of the end of the way."""
+_LONGEST_S = 0.1
+"""A step is no wider than top speed goes in this time: after a pause of the machine a face does not leap."""
+_MEET = 0.5
+"""So much of the acceleration may be needed afterwards to move along with a face that is met."""
+_ROUNDING = 1e-9
+_ROW = float64[::1]
+
+
+@declared(float64(float64, float64, float64))
+def _greatest(t: float, room: float, accel: float) -> float:
+    """Greatest mean speed of a step of ``t`` s that ends where braking ends within ``room``."""
+    stoppable = math.sqrt(2.0 * accel * max(room, 0.0))
+    return stoppable - 0.5 * accel * t if stoppable >= accel * t else max(room, 0.0) / t
+
+
+@declared(float64(float64, float64, float64, float64))
+def _closing(t: float, distance: float, speed: float, accel: float) -> float:
+    """Speed that closes a distance along the braking curve of :mod:`controller.motion.motion`."""
+    settle, size, brake = max(_SETTLE_S, t), abs(distance), _SHARE * accel
+    end = brake * settle * settle
+    found = size / settle if size <= end else math.sqrt(2.0 * brake * (size - 0.5 * end))
+    return -math.copysign(min(found, _SHARE * speed), distance)
+
+
+@declared(void(float64, float64, boolean, _ROW, _ROW, _ROW, boolean[::1], _ROW, _ROW, _ROW, _ROW, _ROW, _ROW))
+def pursue(t: float, passed_s: float, stay: bool, face: Floats, before: Floats, shown: Floats, met: Flags,
+           slowest: Floats, fastest: Floats, speed: Floats, accel: Floats, low: Floats, high: Floats) -> None:  # fmt: skip
+    """Move ``shown`` for ``t`` s towards ``face``, which went there from ``before`` in ``passed_s``; in place.
+
+    All arrays are (n,). slowest, fastest : end speeds, of the last step and then of this one, units/s. met : whether
+    it is exactly the face, which is only where ``stay`` says so.
+    """
+    for i in range(len(shown)):
+        a, top = accel[i], speed[i]
+        farthest = top * min(1.0, _LONGEST_S / t)
+        least = max(slowest[i] - 0.5 * a * t, -_greatest(t, shown[i] - low[i], a), -top)
+        most = min(fastest[i] + 0.5 * a * t, _greatest(t, high[i] - shown[i], a), top)
+        least, most = min(max(least, -farthest), most), max(min(most, farthest), least)
+        drift = min(max((face[i] - before[i]) / max(t, passed_s), -top), top)
+        direct, rounding = (face[i] - shown[i]) / t, _ROUNDING * a * t
+        met[i] = (
+            stay
+            and least - rounding <= direct <= most + rounding
+            and (met[i] or abs(direct - drift) <= _MEET * a * t)
+        )
+        if met[i]:
+            mean, value = direct, face[i]
+        else:
+            wanted = drift + _closing(t, shown[i] + drift * t - face[i], top, a)
+            mean = min(max(wanted, least), most)
+            value = min(max(shown[i] + mean * t, low[i]), high[i])
+        shown[i] = value
+        slowest[i] = max(mean - 0.5 * a * t, -math.sqrt(2.0 * a * max(value - low[i], 0.0)), -top)
+        fastest[i] = min(mean + 0.5 * a * t, math.sqrt(2.0 * a * max(high[i] - value, 0.0)), top)
+        if slowest[i] > fastest[i]:  # by rounding
+            slowest[i] = fastest[i]
