@@ -103,7 +103,7 @@ class Shown:
         return float((np.abs(speed) / P.max_speed).max()), float((np.abs(change) / P.max_acceleration).max())
 
 
-def play(seed: int, *, uneven: bool, delay_ms: float, jumps: bool, seconds: float = 25.0) -> Shown:
+def play(seed: int, *, uneven: bool, delay_ms: float, jumps: bool, seconds: float = 12.0) -> Shown:
     """A head whose conductors are lost, come back and are replaced at random."""
     rng = np.random.default_rng(seed)
     follower = Follower(P, patience_s=0.4, delay_ns=round(delay_ms * MS))
@@ -139,3 +139,18 @@ def play(seed: int, *, uneven: bool, delay_ms: float, jumps: bool, seconds: floa
         shown.whose.append(0 if header is None else header.token.fence)
         shown.exact.append(follower.exact and follower.conducted)
     return shown
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("delay_ms", [0.0, 80.0])
+@pytest.mark.parametrize("jumps", [False, True])
+@pytest.mark.parametrize("uneven", [False, True])
+def test_no_sequence_of_events_passes_a_limit(uneven: bool, jumps: bool, delay_ms: float, seed: int) -> None:
+    """With ticks of whole periods by the head's own time alone; with uneven ones as far as it lies beside that."""
+    shown = play(seed, uneven=uneven, delay_ms=delay_ms, jumps=jumps)
+    speed, acceleration = shown.greatest(5e-3 if uneven else 0.0)
+    assert 0.5 < speed < 1.000001 and 0.9 < acceleration < 1.000001  # it moves, and as fast as it may
+    rows = np.array(shown.rows)
+    assert (rows >= P.low).all() and (rows <= P.high).all()
+    assert len(set(shown.whose)) > 2 and 0 in shown.whose
+    assert np.mean(shown.exact) > (0.0 if jumps else 0.3)
