@@ -8,9 +8,10 @@ A router, two conductors, two processes of two heads each, one that draws all he
 machine; with ``--loss`` or ``--delay-ms`` the heads reach the router through a proxy that drops and delays datagrams.
 Every one of them is killed and started again, or stopped and continued, conductors and the router for longer than a
 lease. Each process that shows or sends faces writes every tick to a file, which outlives it. Afterwards those files are
-judged: speed and acceleration of all parameters against their limits, waiting for a late face included, whether all heads show the same conductor two seconds
-after each event, and for one that does not what it waited for, whether any head went back to a conductor that was
-replaced, and when each face was shown by which head. Ends with 1 where a bound is not kept.
+judged: speed and acceleration of all parameters against their limits, also where a face is late, whether all heads show
+the same conductor two seconds after each event, and for one that does not what it waited for, whether any head went
+back to a conductor that was replaced, and when each face was shown by which head. Ends with 1 where a bound is not
+kept.
 """
 
 from __future__ import annotations

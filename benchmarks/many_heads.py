@@ -2,8 +2,8 @@
 
 Run ``python benchmarks/many_heads.py [--heads 50] [--hz 50] [--seconds 20] [--processes 2]``. A router, a conductor and
 the processes with the heads are processes of their own on this machine; heads have all layers and no servos. Ages are
-from when the tick was due that mixed a face to its arrival in the head's process, by the clock that all share. At last the
-conductor is killed while a second one stands by: how long the heads wait.
+from when the tick was due that mixed a face to its arrival in the head's process, by the clock that all share. At last
+the conductor is killed while a second one stands by: how long the heads wait.
 """
 
 from __future__ import annotations

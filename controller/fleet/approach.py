@@ -28,7 +28,9 @@ class Approach:
         self.met: Flags = np.zeros(len(p), dtype=bool)
         self._shown, self._face, self._before = p.neutral(), p.neutral(), p.neutral()
         self._slowest, self._fastest = -p.max_speed, p.max_speed.copy()
-        self._limits = tuple(np.array(each, dtype=np.float64) for each in (p.max_speed, p.max_acceleration, p.low, p.high))
+        self._limits = tuple(
+            np.array(each, dtype=np.float64) for each in (p.max_speed, p.max_acceleration, p.low, p.high)
+        )
 
     def begin(self, shown: Floats) -> None:
         """Start from what is shown, (P,), at whatever speed; it is inside the range."""

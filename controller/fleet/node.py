@@ -47,8 +47,9 @@ class Node:
 
     settings : the stage's ``[zenoh]``. heads : the layers of its heads by name. beside : the stage's file.
     hurry : called when a face has arrived that is shown at once. align : called with the time (ns) of one's own clock
-        at which a tick would show a face when it is due; the same everywhere for a face. due : when the present tick was
-        due (ns), however late it began, as motion goes on from one of these times to the next; when it began without.
+        at which a tick would show a face when it is due; the same everywhere for a face. due : says when the present
+        tick was due (ns), however late it began: motion goes on from one of these times to the next. Without it ticks
+        are due when they begin.
 
     Raises LinkError: an endpoint or a file cannot be used. MissingPackage: Zenoh is not installed.
     """

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 from numba import boolean, float64, void
+from numba.types import UniTuple  # type: ignore[attr-defined]  # its stubs lack it
 
 from controller.base.parameters import Flags, Floats
 from surface.base.jit import declared
@@ -44,9 +45,29 @@ def _closing(t: float, distance: float, speed: float, accel: float) -> float:
     return -math.copysign(min(found, _SHARE * speed), distance)
 
 
+@declared(UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64, float64, float64))
+def _means(t: float, shown: float, slowest: float, fastest: float, top: float, accel: float, low: float, high: float
+           ) -> tuple[float, float]:  # fmt: skip
+    """Least and greatest mean speed of a step of ``t`` s from ``shown``, after which it can go on within the limits."""
+    farthest = top * min(1.0, _LONGEST_S / t)
+    least = max(slowest - 0.5 * accel * t, -_greatest(t, shown - low, accel), -top)
+    most = min(fastest + 0.5 * accel * t, _greatest(t, high - shown, accel), top)
+    return min(max(least, -farthest), most), max(min(most, farthest), least)
+
+
+@declared(UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64, float64))
+def _ends(t: float, mean: float, shown: float, top: float, accel: float, low: float, high: float
+          ) -> tuple[float, float]:  # fmt: skip
+    """Slowest and fastest end speed of a step of ``t`` s that ended at ``shown``."""
+    fastest = min(mean + 0.5 * accel * t, math.sqrt(2.0 * accel * max(high - shown, 0.0)), top)
+    slowest = max(mean - 0.5 * accel * t, -math.sqrt(2.0 * accel * max(shown - low, 0.0)), -top)
+    return min(slowest, fastest), fastest  # rounding can cross them
+
+
 @declared(void(float64, float64, boolean, _ROW, _ROW, _ROW, boolean[::1], _ROW, _ROW, _ROW, _ROW, _ROW, _ROW))
 def pursue(t: float, passed_s: float, stay: bool, face: Floats, before: Floats, shown: Floats, met: Flags,
-           slowest: Floats, fastest: Floats, speed: Floats, accel: Floats, low: Floats, high: Floats) -> None:  # fmt: skip
+           slowest: Floats, fastest: Floats, speed: Floats, accel: Floats, low: Floats, high: Floats
+           ) -> None:  # fmt: skip
     """Move ``shown`` for ``t`` s towards ``face``, which went there from ``before`` in ``passed_s``; in place.
 
     All arrays are (n,). slowest, fastest : end speeds, of the last step and then of this one, units/s. met : whether
@@ -54,25 +75,16 @@ def pursue(t: float, passed_s: float, stay: bool, face: Floats, before: Floats, 
     """
     for i in range(len(shown)):
         a, top = accel[i], speed[i]
-        farthest = top * min(1.0, _LONGEST_S / t)
-        least = max(slowest[i] - 0.5 * a * t, -_greatest(t, shown[i] - low[i], a), -top)
-        most = min(fastest[i] + 0.5 * a * t, _greatest(t, high[i] - shown[i], a), top)
-        least, most = min(max(least, -farthest), most), max(min(most, farthest), least)
+        least, most = _means(t, shown[i], slowest[i], fastest[i], top, a, low[i], high[i])
         drift = min(max((face[i] - before[i]) / max(t, passed_s), -top), top)
-        direct, rounding = (face[i] - shown[i]) / t, _ROUNDING * a * t
-        met[i] = (
-            stay
-            and least - rounding <= direct <= most + rounding
-            and (met[i] or abs(direct - drift) <= _MEET * a * t)
-        )
+        mean, rounding = (face[i] - shown[i]) / t, _ROUNDING * a * t
+        met[i] = stay and least - rounding <= mean <= most + rounding and (
+            met[i] or abs(mean - drift) <= _MEET * a * t
+        )  # fmt: skip
         if met[i]:
-            mean, value = direct, face[i]
+            shown[i] = face[i]
         else:
-            wanted = drift + _closing(t, shown[i] + drift * t - face[i], top, a)
-            mean = min(max(wanted, least), most)
-            value = min(max(shown[i] + mean * t, low[i]), high[i])
-        shown[i] = value
-        slowest[i] = max(mean - 0.5 * a * t, -math.sqrt(2.0 * a * max(value - low[i], 0.0)), -top)
-        fastest[i] = min(mean + 0.5 * a * t, math.sqrt(2.0 * a * max(high[i] - value, 0.0)), top)
-        if slowest[i] > fastest[i]:  # by rounding
-            slowest[i] = fastest[i]
+            mean = drift + _closing(t, shown[i] + drift * t - face[i], top, a)
+            mean = min(max(mean, least), most)
+            shown[i] = min(max(shown[i] + mean * t, low[i]), high[i])
+        slowest[i], fastest[i] = _ends(t, mean, shown[i], top, a, low[i], high[i])

@@ -214,7 +214,7 @@ def test_a_slow_conductor_is_followed_within_the_limits_and_now_and_then_exactly
         exact.append(follower.exact and follower.conducted)
         rows.append(out.copy())
     check_limits(np.array(rows))
-    spans = np.array(exact[:-(len(exact) % 200)]).reshape(-1, 200)
+    spans = np.array(exact[: -(len(exact) % 200)]).reshape(-1, 200)
     assert spans.any(axis=1).all() and not all(exact)
 
 

@@ -1,4 +1,4 @@
-"""A head in any sequence of events and ticks keeps the limits of speed and acceleration; clocks are stepped by the test.
+"""A head keeps the limits of speed and acceleration in any sequence of events and ticks, which the test itself steps.
 
 Speeds and accelerations are differences of what was shown, divided by the lengths of the ticks; nothing here knows how
 the limits are kept.
