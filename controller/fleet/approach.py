@@ -26,21 +26,20 @@ class Approach:
     def __init__(self, parameters: Parameters) -> None:
         p = self._p = parameters
         self.met: Flags = np.zeros(len(p), dtype=bool)
-        self._shown, self._face, self._before = p.neutral(), p.neutral(), p.neutral()
-        self._slowest, self._fastest = -p.max_speed, p.max_speed.copy()
-        self._limits = tuple(
-            np.array(each, dtype=np.float64) for each in (p.max_speed, p.max_acceleration, p.low, p.high)
-        )
+        self._limits = np.array([p.max_speed, p.max_acceleration, p.low, p.high], dtype=np.float64)
+        self._face, self._motion = p.neutral(), np.zeros((4, len(p)))
+        self._shown, self._before, *self._end_speeds = self._motion
+        self.begin(self._face)
 
     def begin(self, shown: Floats) -> None:
         """Start from what is shown, (P,), at whatever speed; it is inside the range."""
         self._shown[:] = shown
-        self._slowest[:], self._fastest[:] = -self._p.max_speed, self._p.max_speed
+        self._end_speeds[0][:], self._end_speeds[1][:] = -self._p.max_speed, self._p.max_speed
         self.follow(shown)
 
     def follow(self, face: Floats) -> None:
         """Be on the way to another face, which is at ``face`` : (P,) now."""
-        self._face[:] = face
+        self._before[:] = face
         self.met[:] = False
 
     def step(self, time_s: float, face: Floats, out: Floats, *, stay: bool, passed_s: float | None = None) -> None:
@@ -51,7 +50,6 @@ class Approach:
         """
         if time_s > 0.0:
             passed_s = time_s if passed_s is None else passed_s
-            self._before[:], self._face[:] = self._face, face
-            pursue(time_s, passed_s, stay, self._face, self._before, self._shown, self.met, self._slowest,
-                   self._fastest, *self._limits)  # fmt: skip
+            self._face[:] = face  # which may be read-only
+            pursue(time_s, passed_s, stay, self._face, self.met, self._motion, self._limits)
         out[:] = self._shown

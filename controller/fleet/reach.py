@@ -26,7 +26,7 @@ _LONGEST_S = 0.1
 _MEET = 0.5
 """So much of the acceleration may be needed afterwards to move along with a face that is met."""
 _ROUNDING = 1e-9
-_ROW = float64[::1]
+_ROW, _ROWS = float64[::1], float64[:, ::1]
 
 
 @declared(float64(float64, float64, float64))
@@ -64,15 +64,16 @@ def _ends(t: float, mean: float, shown: float, top: float, accel: float, low: fl
     return min(slowest, fastest), fastest  # rounding can cross them
 
 
-@declared(void(float64, float64, boolean, _ROW, _ROW, _ROW, boolean[::1], _ROW, _ROW, _ROW, _ROW, _ROW, _ROW))
-def pursue(t: float, passed_s: float, stay: bool, face: Floats, before: Floats, shown: Floats, met: Flags,
-           slowest: Floats, fastest: Floats, speed: Floats, accel: Floats, low: Floats, high: Floats
-           ) -> None:  # fmt: skip
-    """Move ``shown`` for ``t`` s towards ``face``, which went there from ``before`` in ``passed_s``; in place.
+@declared(void(float64, float64, boolean, _ROW, boolean[::1], _ROWS, _ROWS))
+def pursue(t: float, passed_s: float, stay: bool, face: Floats, met: Flags, motion: Floats, limits: Floats) -> None:
+    """Move for ``t`` s towards ``face`` : (n,), which went there in ``passed_s``; in place.
 
-    All arrays are (n,). slowest, fastest : end speeds, of the last step and then of this one, units/s. met : whether
-    it is exactly the face, which is only where ``stay`` says so.
+    met : (n,) bool, whether what is shown is exactly the face, which is only where ``stay`` says so. motion : (4, n)
+    what is shown, where the face was before, slowest and fastest end speed (units/s). limits : (4, n) of speed
+    (units/s) and acceleration (units/s^2), low and high end of the range.
     """
+    shown, before, slowest, fastest = motion[0], motion[1], motion[2], motion[3]
+    speed, accel, low, high = limits[0], limits[1], limits[2], limits[3]
     for i in range(len(shown)):
         a, top = accel[i], speed[i]
         least, most = _means(t, shown[i], slowest[i], fastest[i], top, a, low[i], high[i])
@@ -88,3 +89,4 @@ def pursue(t: float, passed_s: float, stay: bool, face: Floats, before: Floats, 
             mean = min(max(mean, least), most)
             shown[i] = min(max(shown[i] + mean * t, low[i]), high[i])
         slowest[i], fastest[i] = _ends(t, mean, shown[i], top, a, low[i], high[i])
+        before[i] = face[i]
