@@ -2,8 +2,8 @@
 
 Run ``python benchmarks/many_heads.py [--heads 50] [--hz 50] [--seconds 20] [--processes 2]``. A router, a conductor and
 the processes with the heads are processes of their own on this machine; heads have all layers and no servos. Ages are
-from the tick that mixed a face to its arrival in the head's process, by the clock that all share. At last the
-conductor is killed while a second one stands by: how long the heads wait.
+from when the tick was due that mixed a face to its arrival in the head's process, by the clock that all share. At last
+the conductor is killed while a second one stands by: how long the heads wait.
 """
 
 from __future__ import annotations
@@ -58,20 +58,21 @@ def route(pipe: Connection, *endpoints: str) -> None:
 
 
 def make_node(
-    endpoint: str, role: str, names: list[str], align: Callable[[int], None] = lambda _: None, **more: object
+    endpoint: str, role: str, names: list[str], clock: Clock, **more: object
 ) -> tuple[Node, dict[str, CommandState]]:
     states = {name: CommandState(P, seed=i) for i, name in enumerate(names)}
     for state in states.values():
         state.live(1.0, 0)
     settings = ZenohSettings.model_validate({"role": role, "connect": [endpoint], **more})
-    return Node(settings, P, states, ROOT / "stage.toml", align=align), states
+    return Node(settings, P, states, ROOT / "stage.toml", align=clock.align, due=lambda: clock.deadline_ns), states
 
 
 def conduct(pipe: Connection, endpoint: str, names: list[str], hz: float) -> None:
     """A conductor's process: says when it conducts, and at the end what it published."""
-    node, states = make_node(endpoint, "conductor", names)
+    clock = Clock(hz)
+    node, states = make_node(endpoint, "conductor", names, clock)
     pipe.send("ready")
-    begin, spent, clock = 0.0, {"layers": 0.0, "publish": 0.0}, Clock(hz)
+    begin, spent = 0.0, {"layers": 0.0, "publish": 0.0}
     rested = dict.fromkeys(names, 0.0)
     shown = {name: P.neutral() for name in names}
     for now in clock.run(lambda: not pipe.poll()):
@@ -98,14 +99,15 @@ def conduct(pipe: Connection, endpoint: str, names: list[str], hz: float) -> Non
 
 def follow(pipe: Connection, endpoint: str, names: list[str], hz: float) -> None:
     """A process with heads: what arrived between ``begin`` and the end."""
-    node, states = make_node(endpoint, "head", names)
+    clock = Clock(hz)
+    node, states = make_node(endpoint, "head", names, clock)
     ages: list[float] = []
     sequences: dict[str, list[int]] = {name: [] for name in names}
     arrivals: list[tuple[float, Token]] = []
     for name, follower in node.followers.items():
         follower.take = _noting(follower.take, ages, sequences[name], arrivals if name == names[0] else [])  # type: ignore[method-assign]
     pipe.send("ready")
-    clock, values, begin = Clock(hz), P.neutral(), 0.0
+    values, begin = P.neutral(), 0.0
     order = ""
     while order != "end":
         for now in clock.run(lambda: not pipe.poll()):

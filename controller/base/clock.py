@@ -77,6 +77,11 @@ class Clock:
         self._started_ns = self._last_ns = self._deadline_ns = 0
         self._aim_ns: int | None = None
 
+    @property
+    def deadline_ns(self) -> int:
+        """When the present tick was due, by the clock's time source: ``step_s`` is the time between two of these."""
+        return self._deadline_ns
+
     def align(self, at_ns: int) -> None:
         """Let ticks fall at ``at_ns`` and whole periods before and after it.
 

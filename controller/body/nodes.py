@@ -26,7 +26,8 @@ def open_node(stage: Stage, bodies: Sequence[Body]) -> Node | None:
 
     heads = {head_key(body.state.name or stage.settings.name): body for body in bodies}
     states = {name: body.state for name, body in heads.items()}
-    node = Node(settings, stage.parameters, states, stage.path, bodies[0].clock.hurry, bodies[0].clock.align)
+    clock = bodies[0].clock
+    node = Node(settings, stage.parameters, states, stage.path, clock.hurry, clock.align, lambda: clock.deadline_ns)
     for name, body in heads.items():
         body.relay, body.rests = partial(node.relay, name), partial(node.rests, name)
     return node

@@ -63,7 +63,7 @@ class Conducting:
         return True
 
     def send(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
-        """Send what a head shows, mixed at ``now_ns``; ``values`` : (P,)."""
+        """Send what a head shows, of the tick that was due at ``now_ns``; ``values`` : (P,)."""
         self.sender.send(head, now_ns, values, stamp_ns)
 
     def close(self) -> None:

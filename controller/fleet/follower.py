@@ -19,9 +19,8 @@ the sources themselves; the limiter behind it holds them in any case."""
 _SHORTEST_S = 0.3
 _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
 """Greatest speed (1/s) and acceleration (1/s²) of the minimum-jerk curve from 0 to 1 over one second."""
-_GAP_NS, _STEP_NS = 45_000_000, 110_000_000
-"""What comes after a longer gap in which faces were lost, or was mixed after a longer step, is not shown at once: it
-can be far away by then."""
+_BESIDE_S = 5e-3
+"""The time of motion is a conductor's where that lies no farther than this from one's own: ticks begin unevenly."""
 _WAITING = 128
 
 
@@ -55,9 +54,10 @@ class Follower:
         self._waiting: deque[tuple[Header, Floats]] = deque(maxlen=_WAITING)
         self._sequence = -1
         self._sent = p.neutral()  # what the conductor sent last
+        self._followed, self._followed_ns = self._sent, 0  # that, or what lies between that and the next, and when
         self._shown = p.neutral()
-        self._before, self._last_s = p.neutral(), 0.0  # what was shown before, and how long it moved from there
-        self._passed_s = 0.0  # how far a conductor's time went on since the face that was shown before
+        self._passed_s = 0.0  # in how long what is followed moved since the last step
+        self._theirs_s = 0.0  # the same from one face that was sent to the next one; 0 where that is not so
         self._gap, self._blended_s, self._whole_s = np.zeros(len(p)), 0.0, 0.0
         self._heard_s = -np.inf
         self._begun, self._leads = False, False
@@ -105,32 +105,53 @@ class Follower:
 
         Returns when the newest command in it came, by one's own clock (ns); 0 for none.
         """
-        newest, self._passed_s = self._due(now_ns), 0.0
-        now_s = now_ns * 1e-9
+        newest, now_s = self._due(now_ns), now_ns * 1e-9
         leads, self._leads = self._leads, False
+        self._passed_s, self._theirs_s = 0.0 if self.conducted else dt, 0.0
         if newest is not None:
             self._heard_s = now_s
-            self._turn_to(*newest)
+            self._turn_to(*newest, dt)
         elif self.conducted and (leads or self._is_lost(now_s)):
-            self.conducted = False
+            self.conducted, self._passed_s = False, dt
             self._pass_to(own)
+        elif self.conducted:
+            self._bridge(now_ns + self.offset_ns - self._delay_ns)
         elif not self._begun:
             self._pass_to(own, first=True)
         self._begun = True
-        self._show(self._sent if self.conducted else own, dt, out)
+        self._show(self._followed if self.conducted else own, self._time_s(dt), out)
         header = self.header
         return 0 if not self.conducted or header is None or not header.stamp_ns else header.stamp_ns - self.offset_ns
 
-    def _turn_to(self, header: Header, face: Floats) -> None:
+    def _turn_to(self, header: Header, face: Floats, dt: float) -> None:
         """Show a face from now on, or go on to it."""
         before, self.header, self._sent = self.header, header, face
-        if before is None or before.token != header.token or not self.conducted:
+        if self.conducted and before is not None and before.token == header.token:
+            self._passed_s = 1e-9 * (header.time_ns - self._followed_ns)
+            self._theirs_s = self._passed_s if self._followed_ns == before.time_ns else 0.0
+        else:
+            self._passed_s = dt
             self._pass_to(face, first=not self._begun)
             self.conducted = True
+        self._followed, self._followed_ns = face, header.time_ns
+
+    def _bridge(self, time_ns: int) -> None:
+        """Where faces were lost and the next one waits, follow a straight line to that, as far as ``time_ns``."""
+        before = self.header
+        with self._lock:
+            following = self._waiting[0] if self._waiting else None
+        if following is None or before is None or following[0].token != before.token:
             return
-        self._passed_s = 1e-9 * (header.time_ns - before.time_ns)
-        if _is_far(before, header):
-            self._catch_up()
+        steps, span_ns = following[0].sequence - before.sequence, following[0].time_ns - before.time_ns
+        share = max(time_ns - before.time_ns, 0) * steps // max(span_ns, 1) / steps  # when the lost ones were due
+        at_ns = before.time_ns + round(share * span_ns)
+        if at_ns > self._followed_ns:
+            self._passed_s = 1e-9 * (at_ns - self._followed_ns)
+            self._followed, self._followed_ns = self._sent + share * (following[1] - self._sent), at_ns
+
+    def _time_s(self, dt: float) -> float:
+        """How far motion goes on in a step of ``dt`` s: as far as from one of a conductor's ticks to the next one."""
+        return self._theirs_s if self._theirs_s > 0.0 and abs(self._theirs_s - dt) < _BESIDE_S else dt
 
     def _due(self, now_ns: int) -> tuple[Header, Floats] | None:
         """The newest face that is to be shown by now."""
@@ -142,55 +163,29 @@ class Follower:
                 found = self._waiting.popleft()
         return found
 
-    def _catch_up(self) -> None:
-        """Go on within the limits to what a conductor sent after a gap."""
-        if self.exact:
-            self._leave()
-            self._gap[:], self._whole_s = 0.0, 0.0
-            self.exact = False
-        self._way.follow(self._sent + self._left() * self._gap)
-
     def _pass_to(self, source: Floats, *, first: bool = False) -> None:
         """Begin to pass to another source: the gap to it closes along a minimum-jerk curve."""
-        self._gap = np.zeros_like(source) if first else self._shown - source
         if first:
             self._shown[:] = source
-        elif self.exact:
-            self._leave()
+            self._way.begin(source)
+        self._gap = self._shown - source
         size = np.abs(self._gap)
         speed = _PEAK_SPEED * size / (_SHARE * self._p.max_speed)
         acceleration = np.sqrt(_PEAK_ACCELERATION * size / (_SHARE * self._p.max_acceleration))
         self._whole_s = 0.0 if first else max(_SHORTEST_S, float(speed.max()), float(acceleration.max()))
         self._blended_s = 0.0
-        self._way.follow(source + self._gap)
-        self.exact = first
-
-    def _show(self, source: Floats, dt: float, out: Floats) -> None:
-        if not self.exact:
-            self._approach(source, dt, out)
-        if self.exact:
-            out[:] = source
-            self._before, self._last_s = self._shown, self._passed_s or dt
-        self._shown = out.copy()
-
-    def _leave(self) -> None:
-        """What was shown last was exactly a source's: go on from there, as fast as it moved."""
-        speed = (self._shown - self._before) / self._last_s if self._last_s > 0.0 else np.zeros_like(self._shown)
-        self._way.begin(self._shown, speed, self._last_s, self._shown)
+        self._way.follow(self._shown)
 
     def _left(self) -> float:
         """How much of the gap is still to be closed, 1 to 0."""
         return 1.0 - minimum_jerk(self._blended_s / self._whole_s) if self._whole_s > 0.0 else 0.0
 
-    def _approach(self, source: Floats, dt: float, out: Floats) -> None:
-        """Follow the blend of both sources within the limits, until every parameter has met its end."""
-        self._blended_s += dt
+    def _show(self, source: Floats, time_s: float, out: Floats) -> None:
+        """Follow the blend of both sources within the limits; after it, exactly what every parameter has met."""
+        self._blended_s += time_s
         left = self._left()
-        self._way.step(dt, source + left * self._gap, out, stay=left == 0.0, passed_s=self._passed_s or dt)
-        self.exact = left == 0.0 and bool(self._way.met.all())
-
-
-def _is_far(before: Header, after: Header) -> bool:
-    """Whether a face is too far from the one shown before to be shown at once."""
-    passed = after.time_ns - before.time_ns
-    return passed > (_GAP_NS if after.sequence - before.sequence > 1 else _STEP_NS)
+        face = source if left == 0.0 else source + left * self._gap
+        self._way.step(time_s, face, out, stay=left == 0.0, passed_s=self._passed_s)
+        is_bridge = self.conducted and self._followed is not self._sent
+        self.exact = left == 0.0 and bool(self._way.met.all()) and not is_bridge
+        self._shown[:] = out

@@ -47,7 +47,9 @@ class Node:
 
     settings : the stage's ``[zenoh]``. heads : the layers of its heads by name. beside : the stage's file.
     hurry : called when a face has arrived that is shown at once. align : called with the time (ns) of one's own clock
-        at which a tick would show a face when it is due; the same everywhere for a face.
+        at which a tick would show a face when it is due; the same everywhere for a face. due : says when the present
+        tick was due (ns), however late it began: motion goes on from one of these times to the next. Without it ticks
+        are due when they begin.
 
     Raises LinkError: an endpoint or a file cannot be used. MissingPackage: Zenoh is not installed.
     """
@@ -55,8 +57,9 @@ class Node:
     def __init__(
         self, settings: ZenohSettings, parameters: Parameters, heads: Mapping[str, CommandState], beside: Path,
         hurry: Callable[[], None] = lambda: None, align: Callable[[int], None] = lambda _: None,
+        due: Callable[[], int] | None = None,
     ) -> None:  # fmt: skip
-        self.settings, self._heads, self._align = settings, dict(heads), align
+        self.settings, self._heads, self._align, self._due = settings, dict(heads), align, due
         lease_s = settings.lease_ms * 1e-3
         self.conducts = settings.role == "conductor"
         number, wait_s = random.getrandbits(62) | 1, random.uniform(0.0, 0.2) * lease_s
@@ -100,7 +103,7 @@ class Node:
             follower.offset_ns = self._clocks.offset_ns(follower.highest.holder)
         theirs = follower.step(now_ns, step_s, values.copy(), values)
         if conducting is not None:
-            conducting.send(head, now_ns, values, stamp_ns)
+            conducting.send(head, now_ns if self._due is None else self._due(), values, stamp_ns)
             return stamp_ns
         due_ns = follower.due_ns
         if due_ns is not None:

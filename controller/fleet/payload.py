@@ -36,8 +36,9 @@ them stays within 64 bits."""
 class Header:
     """Who sent a face, and when.
 
-    sequence : grows by 1 with each face of a conductor. time_ns : when it was mixed. stamp_ns : when the newest command
-    in it came; both of the sender's clock. stopped : STOP keeps the servos off.
+    sequence : grows by 1 with each face of a conductor. time_ns : when the tick was due that mixed it, which is how far
+    motion had come. stamp_ns : when the newest command in it came; both of the sender's clock. stopped : STOP keeps the
+    servos off.
     """
 
     token: Token

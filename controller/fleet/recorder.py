@@ -33,7 +33,7 @@ class Recording:
         self._lock, self._closed = threading.Lock(), False
 
     def add(self, time_ns: int, values: Floats) -> None:
-        """Write one row: a face mixed at ``time_ns`` of the conductor's clock."""
+        """Write one row: a face of the tick that was due at ``time_ns`` of the conductor's clock."""
         with self._lock:
             if self._closed:
                 return

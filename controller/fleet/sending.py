@@ -45,7 +45,7 @@ class FaceSender:
         self._all_until_ns = now_ns + round(FIRST_S * 1e9)
 
     def send(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
-        """Send what one head shows, mixed at ``now_ns``; ``values`` : (P,)."""
+        """Send what one head shows, of the tick that was due at ``now_ns``; ``values`` : (P,)."""
         self.sequences[head] += 1
         self.sent += 1
         sequence, data, outlet = self.sequences[head], self._payloads.encode(values), self._outlets[head]
@@ -59,7 +59,7 @@ class FaceSender:
                 self._send(now_ns, self._gathering.take())
 
     def _send(self, now_ns: int, faces: list[tuple[str, int, int, bytes]]) -> None:
-        """Send gathered faces, mixed at ``now_ns``, if there are any."""
+        """Send gathered faces, of the tick that was due at ``now_ns``, if there are any."""
         if faces:
             header = self._heading(0, now_ns, 0).encode()
             self._together.put(self._batches.encode(faces), encoding=self._batches.encoding, attachment=header)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from controller.base.errors import ParameterError
+from controller.base.errors import ControllerError, ParameterError
 from controller.base.parameters import Flags, Floats, did_you_mean
 from controller.layers.sink import CommandSink, Directory, HeadSink, Player, StatusValue
 
@@ -77,9 +77,10 @@ class Heads:
 
 
 class Group:
-    """Several heads as one :class:`controller.layers.commands.CommandSink`: each gets every command.
+    """Several heads as one :class:`controller.layers.commands.CommandSink`: each gets every command, or none of them.
 
-    Questions need one head: they raise ParameterError.
+    What one head refuses reaches no other one, and the error names that head. Questions need one head: they raise
+    ParameterError.
     """
 
     def __init__(self, name: str, members: Sequence[HeadSink]) -> None:
@@ -91,7 +92,7 @@ class Group:
     @property
     def shows(self) -> Player | None:
         """The shows of all of them; None where none plays any."""
-        players = [state.shows for state in self.members if state.shows is not None]
+        players = {state.name: state.shows for state in self.members if state.shows is not None}
         return _Players(players) if players else None
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
@@ -101,9 +102,11 @@ class Group:
         self._each(lambda state: state.release(indices, stamp_ns))
 
     def write_layer(self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
+        self._check_layer(name)
         self._each(lambda state: state.write_layer(name, values, mask, now_ns, stamp_ns))
 
     def release_layer(self, name: str) -> None:
+        self._check_layer(name)
         self._each(lambda state: state.release_layer(name))
 
     def expression(self, name: str, intensity: float, duration_s: float | None, stamp_ns: int) -> None:
@@ -164,32 +167,70 @@ class Group:
         self._refuse()
         return {}
 
+    def _check_layer(self, name: str) -> None:
+        """Raises ParameterError: a head has no layer of that name."""
+        without = [state.name for state in self.members if name not in state.layer_names()]
+        if without:
+            raise ParameterError(f"{', '.join(without)}: no layer {name!r}; nothing has changed at {self._names}",
+                                 hint=f"layers that all have: {', '.join(self.layer_names())}")  # fmt: skip
+
     def _each(self, command: Callable[[HeadSink], object]) -> None:
+        """Give each a command that all refuse alike, or none: heads of a stage share parameters and expressions."""
         for state in self.members:
             command(state)
 
+    @property
+    def _names(self) -> str:
+        return ", ".join(state.name for state in self.members)
+
     def _refuse(self) -> None:
-        names = ", ".join(state.name for state in self.members)
-        raise ParameterError(f"@{self.name} addresses several heads; a question needs one of {names}",
+        raise ParameterError(f"@{self.name} addresses several heads; a question needs one of {self._names}",
                              hint=f"ask one: @{self.members[0].name}")  # fmt: skip
 
 
 class _Players:
-    """The shows of several heads as one :class:`controller.layers.commands.Player`."""
+    """The shows of several heads as one :class:`controller.layers.commands.Player`: all do what is asked, or none.
 
-    def __init__(self, players: Sequence[Player]) -> None:
-        self._players = players
+    players : by the name of the head.
+    """
+
+    def __init__(self, players: Mapping[str, Player]) -> None:
+        self._named, self._players = players, tuple(players.values())
 
     def start(self, name: str) -> None:
-        for player in self._players:
-            player.start(name)
+        self.prepared(name)()
+
+    def prepared(self, name: str) -> Callable[[], None]:
+        return self._all(self._named, lambda player: player.prepared(name))
 
     def names(self) -> Sequence[str]:
         return self._players[0].names()
 
     def control(self, what: str, to: str | float = 0.0) -> None:
-        for player in self._players:
-            player.control(what, to)
+        self.prepared_control(what, to)()
+
+    def prepared_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
+        """For those that play something; where nobody does, that is refused."""
+        playing = {head: player for head, player in self._named.items() if player.name is not None}
+        return self._all(playing or self._named, lambda player: player.prepared_control(what, to))
+
+    def _all(
+        self, players: Mapping[str, Player], prepare: Callable[[Player], Callable[[], None]]
+    ) -> Callable[[], None]:
+        """What all do, once none has refused it. Raises the error of the first that does, with its name."""
+        ready = []
+        for head, player in players.items():
+            try:
+                ready.append(prepare(player))
+            except ControllerError as error:
+                text = f"{head}: {error}; nothing has changed at {', '.join(self._named)}"
+                raise type(error)(text, hint=error.hint) from error
+
+        def act() -> None:
+            for each in ready:
+                each()
+
+        return act
 
     def tick(self, now_ns: int) -> None:
         """Nothing: each head ticks its own."""

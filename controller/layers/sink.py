@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 from controller.base.parameters import Flags, Floats, Parameters
@@ -19,11 +19,17 @@ class Player(Protocol):
     def start(self, name: str) -> None:
         """Play a script from its beginning. Raises ConfigError."""
 
+    def prepared(self, name: str) -> Callable[[], None]:
+        """What :meth:`start` does, after all that can be refused. Raises ConfigError."""
+
     def names(self) -> Sequence[str]:
         """The scripts that can be played, by name."""
 
     def control(self, what: str, to: str | float = 0.0) -> None:
         """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s). Raises ParameterError."""
+
+    def prepared_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
+        """What :meth:`control` does, after all that can be refused. Raises ParameterError."""
 
     def tick(self, now_ns: int) -> None:
         """Send the lines that are due."""

@@ -6,6 +6,7 @@ import bisect
 import math
 import threading
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from controller.base.errors import ParameterError
 from controller.base.parameters import did_you_mean
@@ -49,6 +50,16 @@ class Show:
     def seek(self, to: str | float) -> None:
         """Go to a mark or a time (s). Earlier lines are not sent: begin such a place with NEUTRAL.
 
+        Raises ParameterError as :meth:`place`.
+        """
+        self.position_s = to_s = self.place(to)
+        self._next = bisect.bisect_left(self._times, to_s)
+        self._next_mark = bisect.bisect_left(self._marks, (to_s, ""))
+        self._last_ns = None
+
+    def place(self, to: str | float) -> float:
+        """Where a mark is (s), or a time.
+
         Raises ParameterError: no such mark, or not a time from 0 on.
         """
         if isinstance(to, str):
@@ -58,10 +69,7 @@ class Show:
             to = self.script.marks[to]
         if not 0.0 <= to < math.inf:
             raise ParameterError(f"a time must be 0 s or later, not {to}", hint="seek to 0 for the beginning")
-        self.position_s = to
-        self._next = bisect.bisect_left(self._times, to)
-        self._next_mark = bisect.bisect_left(self._marks, (to, ""))
-        self._last_ns = None
+        return to
 
     def tick(self, now_ns: int) -> list[str]:
         """Send the lines that are due at ``now_ns`` (monotonic clock) to the face; returns them."""
@@ -135,7 +143,11 @@ class Shows:
 
     def start(self, name: str) -> None:
         """Play the script of a name from its beginning. Raises ConfigError."""
-        self.play(self._find(name))
+        self.prepared(name)()
+
+    def prepared(self, name: str) -> Callable[[], None]:
+        """What :meth:`start` does, once the script has been read. Raises ConfigError."""
+        return partial(self.play, self._find(name))
 
     def play(self, script: Script) -> None:
         """Play a script from its beginning."""
@@ -149,12 +161,22 @@ class Shows:
 
         Raises ParameterError: there is no show, or no such mark or time.
         """
+        self.prepared_control(what, to)()
+
+    def prepared_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
+        """What :meth:`control` does, for the show that plays now. Raises ParameterError as that."""
+        show = self._show
+        if show is None:
+            raise ParameterError("no show plays", hint="begin one: SHOW name")
+        return partial(self._control, show, what, show.place(to) if what == "SEEK" else 0.0)
+
+    def _control(self, show: Show, what: str, to_s: float) -> None:
+        """Does nothing where another show has begun meanwhile."""
         with self._lock:
-            show = self._show
-            if show is None:
-                raise ParameterError("no show plays", hint="begin one: SHOW name")
+            if self._show is not show:
+                return
             if what == "SEEK":
-                show.seek(to)
+                show.seek(to_s)
             elif what == "STOP":
                 self._show = None
             else:

@@ -49,6 +49,23 @@ def test_a_step_is_the_time_between_two_deadlines_also_where_some_were_skipped()
     assert steps == pytest.approx([0.01, 0.01, 0.04])
 
 
+def test_a_tick_says_when_it_was_due_however_late_it_began() -> None:
+    """Motion goes on by the time between these, so what is sent with this time is as far as its motion."""
+    time, dues, steps = Time(), list[int](), list[float]()
+
+    def oversleeps(seconds: float) -> None:
+        time.ns += round(seconds * 1e9) + 3_000_000
+
+    clock = Clock(100.0, now_ns=time.now, sleep_s=oversleeps)
+    for now in clock.run(lambda: len(dues) < 5):
+        assert now - clock.deadline_ns in (0, 3_000_000)
+        dues.append(clock.deadline_ns)
+        steps.append(clock.step_s)
+        time.ns += 25_000_000 if len(dues) == 2 else 1_000_000
+    assert np.diff(dues).tolist() == [10_000_000, 30_000_000, 10_000_000, 10_000_000]
+    np.testing.assert_allclose(np.diff(dues) * 1e-9, steps[1:], rtol=1e-12)
+
+
 @pytest.mark.parametrize("off_ns", [4_000_000, -4_000_000, 123_456_789_000])
 def test_ticks_come_to_where_they_are_aligned_in_steps_that_stay_even(off_ns: int) -> None:
     time = Time()

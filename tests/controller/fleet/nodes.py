@@ -71,13 +71,14 @@ class Running:
 
     def __init__(self, endpoint: str, role: str, *, folder: Path, seed: int = 1, heads: tuple[str, ...] = ("maple",),
                  hz: float = 100.0, journal: Callable[..., None] | None = None, **more: Any) -> None:  # fmt: skip
-        self._step_s = 1.0 / hz
+        self._step_ns, self._due_ns = round(1e9 / hz), time.monotonic_ns()
         settings = {"role": role, "connect": [endpoint], "lease_ms": LEASE_MS, **more}
         self.states = {name: CommandState(P, seed=seed + i) for i, name in enumerate(heads)}
         for state in self.states.values():
             state.record(journal)
             state.live(1.0, 0)
-        self.node = Node(ZenohSettings.model_validate(settings), P, self.states, folder / "stage.toml")
+        validated = ZenohSettings.model_validate(settings)
+        self.node = Node(validated, P, self.states, folder / "stage.toml", due=lambda: self._due_ns)
         self.rows: dict[str, list[np.ndarray]] = {name: [P.neutral()] for name in heads}
         self.times: list[int] = [0]
         self.mixed: dict[str, list[tuple[bool, bool]]] = {name: [] for name in heads}
@@ -87,23 +88,23 @@ class Running:
         self._thread.start()
 
     def _run(self) -> None:
-        due, rested = time.monotonic(), dict.fromkeys(self.states, 0.0)
+        self._due_ns, rested = time.monotonic_ns(), dict.fromkeys(self.states, 0.0)
         while not self._stopping.is_set():
             while self.paused.is_set() and not self._stopping.is_set():
                 time.sleep(0.001)
-            due = max(due + self._step_s, time.monotonic() - 0.05)
-            time.sleep(max(0.0, due - time.monotonic()))
-            now = time.monotonic_ns()
+            before_ns, self._due_ns = self._due_ns, max(self._due_ns + self._step_ns, time.monotonic_ns() - 50_000_000)
+            time.sleep(max(0.0, 1e-9 * (self._due_ns - time.monotonic_ns())))
+            now, step_s = time.monotonic_ns(), 1e-9 * (self._due_ns - before_ns)
             self.times.append(now)
             for name, state in self.states.items():
                 values, stamp = self.rows[name][-1].copy(), 0
-                rested[name] += self._step_s
+                rested[name] += step_s
                 follower = self.node.followers[name]
                 follows, rests = follower.exact and follower.conducted, self.node.rests(name)
                 self.mixed[name].append((follows, not rests))
                 if not rests:
                     stamp, rested[name] = state.tick(now, rested[name], values), 0.0
-                self.node.relay(name, now, self._step_s, values, stamp)
+                self.node.relay(name, now, step_s, values, stamp)
                 self.rows[name].append(values)
                 self.exact[name].append(follower.exact and follower.conducted)  # not who shows exactly its own life
 

@@ -17,7 +17,6 @@ from fleet_faults import (
     IN_STEP_S,
     PLACES,
     RECORD,
-    Sent,
     judged_events,
     lives,
     mark_spreads,
@@ -43,12 +42,6 @@ def rows_of(place: int, values: np.ndarray, *, fence: int = 1, begin: int = 1) -
     return rows
 
 
-def sent_of(rows: np.ndarray) -> np.ndarray:
-    sent = rows.copy()
-    sent["mixed_ns"] = 0
-    return sent
-
-
 def ramp(speed: float, count: int = 60) -> np.ndarray:
     """The jaw's values at a constant speed after a start and before a stop, both soft."""
     bell = np.convolve(np.ones(count - 30), np.hanning(31) / np.hanning(31).sum())
@@ -57,47 +50,44 @@ def ramp(speed: float, count: int = 60) -> np.ndarray:
 
 def test_motion_at_its_limits_is_no_fault_and_beyond_them_it_is() -> None:
     at_limit = rows_of(0, ramp(0.99 * P.max_speed[JAW], 80))
-    speed, _ = over_limits(at_limit, Sent(sent_of(at_limit)))
-    assert 0.9 < speed < 1.0
+    speed, acceleration = over_limits(at_limit)
+    assert 0.9 < speed < 1.0 and acceleration < 1.0
     over = at_limit.copy()
     over["values"][45:, JAW] += 0.2
-    speed, acceleration = over_limits(over, Sent(sent_of(over)))
+    speed, acceleration = over_limits(over)
     assert speed > 1.05 and acceleration > 1.05
 
 
-def test_a_face_that_was_lost_counts_by_the_time_of_its_conductor() -> None:
-    whole = rows_of(0, ramp(0.9 * P.max_speed[JAW]))
-    missed = np.delete(whole, [30, 31])  # what is shown next has moved for three ticks, in one
+def test_a_head_that_stands_at_once_where_a_face_is_late_passes_a_limit() -> None:
+    late = rows_of(0, ramp(0.9 * P.max_speed[JAW]))
+    late[30:32] = late[29]
+    late["passed_s"] = TICK_S * np.arange(len(late))
+    speed, acceleration = over_limits(late)
+    assert speed > 1.05 and acceleration > 1.05
+
+
+def test_ticks_of_a_head_are_as_long_as_those_of_its_conductor_but_for_five_ms() -> None:
+    near = rows_of(0, ramp(0.99 * P.max_speed[JAW], 80))
+    near["passed_s"] += 1e-3 * (np.arange(len(near)) % 2)  # 9 and 11 ms, of faces that are 10 ms apart
+    assert max(over_limits(near)) < 1.0
+    near["conducted"] = False
+    assert over_limits(near)[0] > 1.05
+    missed = np.delete(rows_of(0, ramp(0.9 * P.max_speed[JAW])), [30])  # two of its ticks in one
     missed["passed_s"] = TICK_S * np.arange(len(missed))
-    speed, _ = over_limits(missed, Sent(sent_of(whole)))
-    assert speed < 1.0
-
-
-def test_what_is_exactly_a_conductors_counts_by_its_time_and_all_else_by_ones_own() -> None:
-    """Of a head that joins: the jaw is met and shows two faces in one tick, the brow is still on its way."""
-    brow = P.index("browInnerUp")
-    whole = rows_of(0, ramp(0.9 * P.max_speed[JAW]))
-    joins = np.delete(whole, [30])
-    joins["passed_s"], joins["exact"] = TICK_S * np.arange(len(joins)), False
-    joins["values"][:, brow] = ramp(0.9 * P.max_speed[brow])[: len(joins)]
-    speed, acceleration = over_limits(joins, Sent(sent_of(whole)))
-    assert speed < 1.0 and acceleration < 1.05
-    joins["values"][40:, brow] += 0.3
-    speed, _ = over_limits(joins, Sent(sent_of(whole)))
-    assert speed > 1.05
+    assert over_limits(missed)[0] > 1.05
 
 
 def test_a_start_cuts_the_life_of_a_head() -> None:
     rows = np.concatenate([rows_of(0, np.zeros(20)), rows_of(1, np.zeros(9)), rows_of(0, np.ones(30))])
-    assert [len(life) for life in lives(rows, 0)] == [20, 30]
+    assert [len(life) for life in lives(rows[rows["place"] == 0])] == [20, 30]
 
 
 def test_who_obeys_a_replaced_conductor_again_is_found() -> None:
     first, second, again = (rows_of(0, np.zeros(5), fence=k, begin=b) for k, b in ((1, 1), (2, 6), (1, 11)))
-    assert steps_back(np.concatenate([first, second]), 0) == 0
-    assert steps_back(np.concatenate([first, second, again]), 0) == 1
+    assert steps_back(np.concatenate([first, second])) == 0
+    assert steps_back(np.concatenate([first, second, again])) == 1
     again["fence"], again["holder"], second["holder"] = 2, 3, 4  # as high a number, of another one
-    assert steps_back(np.concatenate([first, second, again]), 0) == 1
+    assert steps_back(np.concatenate([first, second, again])) == 1
 
 
 def test_who_does_not_join_the_newest_conductor_in_time_is_found() -> None:

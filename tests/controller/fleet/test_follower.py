@@ -54,12 +54,12 @@ def play(follower: Follower, spans: list[tuple[Faces | None, float]]) -> tuple[n
 
 
 def check_limits(shown: np.ndarray) -> None:
-    """Every step within the limits of speed, and of acceleration."""
+    """Every step within the limits of speed, and of acceleration, but for rounding."""
     speed = np.diff(shown, axis=0) / DT
-    assert (np.abs(speed) <= P.max_speed * 1.001 + 1e-9).all()
+    assert (np.abs(speed) <= P.max_speed * 1.000001).all()
     acceleration = np.diff(speed, axis=0) / DT
     over = np.abs(acceleration) / P.max_acceleration
-    assert over.max() < 1.05, P.names[int(np.unravel_index(over.argmax(), over.shape)[1])]
+    assert over.max() < 1.000001, P.names[int(np.unravel_index(over.argmax(), over.shape)[1])]
 
 
 def test_what_is_sent_is_shown_bit_for_bit() -> None:
@@ -71,8 +71,8 @@ def test_a_head_that_loses_its_conductor_goes_over_to_its_own_life_and_back_with
     follower, faces = Follower(P, patience_s=0.4), Faces(1, FIRST)
     shown, sent = play(follower, [(faces, 1.5), (None, 4.0), (faces, 4.0)])
     check_limits(shown)
-    frozen = shown[150:185]
-    assert np.abs(frozen - shown[149]).max() < 1e-12  # it waits for so long only
+    waits = shown[165:185]
+    assert np.abs(waits - shown[149]).max() < 1e-3  # so long only, where it was when it heard the last face
     moves = np.abs(np.diff(shown[195:550], axis=0)).max(axis=1)
     assert (moves > 0.0).mean() > 0.9
     assert follower.exact and np.array_equal(shown[-1], sent[-1])
@@ -126,13 +126,12 @@ def test_faces_that_are_late_or_lost_bend_the_motion_and_no_more(delay_ms: float
             waiting.remove(each)
         follower.step(now_ns, DT, own, out)
         shown.append(out)
-    speed = np.abs(np.diff(np.array(shown), axis=0)) / DT
-    assert (speed <= 5.0 * P.max_speed).all()  # of as many ticks as were late or lost at once
+    check_limits(np.array(shown))
     late = round((delay_ms or 50.0) / 10.0)
     assert follower.exact and np.array_equal(shown[-1], sent[-1 - late])
     if delay_ms:  # nothing but what was lost is missing: all else is shown in its turn
         same = [np.array_equal(a, b) for a, b in zip(shown[late:], sent[:-late], strict=True)]
-        assert np.mean(same[100:]) > 0.9  # it has joined by then
+        assert np.mean(same[100:]) > 0.88  # it has joined by then; 5 % are lost
 
 
 def test_after_a_gap_the_face_goes_on_within_its_limits() -> None:
@@ -204,18 +203,49 @@ def test_a_face_that_moves_all_the_time_is_shown_exactly_again_soon_after_every_
     assert max(waits) < 0.8
 
 
-def test_a_slow_conductor_is_followed_exactly_and_after_a_lost_face_within_the_limits() -> None:
+def test_a_slow_conductor_is_followed_within_the_limits_and_now_and_then_exactly() -> None:
+    """Its faces come at every eighth tick; the head does not leap with each of them."""
     follower, faces, slow = Follower(P), Faces(1, FIRST), 8
     own, out, exact, rows = P.neutral(), P.neutral(), list[bool](), list[np.ndarray]()
-    for k in range(8, 400):
+    for k in range(8, 800):
         if k % slow == 0:
-            header, values = faces.next(k * STEP_NS)
-            if k != 240:
-                follower.take(header, values)
+            follower.take(*faces.next(k * STEP_NS))
         follower.step(k * STEP_NS, DT, own, out)
         exact.append(follower.exact and follower.conducted)
         rows.append(out.copy())
-    lost = 248 - 8
-    assert all(exact[:lost]) and not exact[lost] and exact[-1]
-    steps = np.abs(np.diff(np.array(rows), axis=0)) / (P.max_speed * DT)
-    assert steps[lost - 1 : exact.index(True, lost)].max() < 1.001
+    check_limits(np.array(rows))
+    spans = np.array(exact[: -(len(exact) % 200)]).reshape(-1, 200)
+    assert spans.any(axis=1).all() and not all(exact)
+
+
+def test_faces_that_were_lost_are_bridged_where_the_next_one_waits() -> None:
+    """With a delay it is known where the face goes; the head moves on to there and is exact again at once."""
+    late_ns = 8 * STEP_NS
+    follower, faces = Follower(P, delay_ns=late_ns), Faces(1, FIRST)
+    own, out, exact, rows = P.neutral(), P.neutral(), list[bool](), list[np.ndarray]()
+    lost = range(200, 400, 10)
+    for k in range(1, 420):
+        header, values = faces.next(k * STEP_NS)
+        if k not in lost:
+            follower.take(header, values)
+        follower.step(k * STEP_NS, DT, own, out)
+        exact.append(follower.exact and follower.conducted)
+        rows.append(out.copy())
+    shown = np.array(rows)
+    check_limits(shown[9:])
+    at = np.array(lost) + 8 - 1  # the tick that would show a lost face
+    assert not any(exact[k] for k in at)
+    assert np.mean([exact[k + 1] for k in at]) > 0.8
+    moved = np.abs(np.diff(shown, axis=0)).max(axis=1)
+    assert (moved[at - 1] > 0.0).mean() > 0.9
+
+
+def test_a_head_is_as_far_in_its_motion_as_its_conductor_where_their_ticks_differ_a_little() -> None:
+    """Else every tick that is a little shorter than the conductor's would be too fast for the limits."""
+    rng, follower, faces = np.random.default_rng(4), Follower(P), Faces(1, FIRST)
+    exact, own, out = list[bool](), P.neutral(), P.neutral()
+    for k in range(1, 600):
+        follower.take(*faces.next(k * STEP_NS))
+        follower.step(k * STEP_NS, DT + rng.uniform(-4e-3, 4e-3), own, out)
+        exact.append(follower.exact and follower.conducted)
+    assert all(exact)

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
-from controller.base.errors import ParameterError
+from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.placement import Placement
 from controller.layers.commands import CommandState
 from controller.layers.heads import Heads, Turns
+from controller.layers.mixer import LayerSettings, Mixer
+from controller.layers.settings import default_layers
+from controller.links.line.script import Script
 from controller.links.line.session import LineSession
+from controller.links.line.show import Shows
 from controller.links.websocket.conversation import Conversation
 
 JAW = P.index("jawOpen")
@@ -66,6 +71,66 @@ def test_nobody_is_meant_by_a_wrong_name_and_questions_need_one_head() -> None:
     alone = LineSession(CommandState(P), 0)
     assert "one head" in say(alone, "@maple SET jawOpen 1") and "one head" in say(alone, "TURN maple")
     assert say(alone, "LIST HEADS") == "OK LIST HEADS"
+
+
+def with_shows(states: list[CommandState], scripts: dict[str, dict[str, Script]]) -> list[Shows]:
+    """Gives each head its own scripts, by name."""
+
+    def finder(own: dict[str, Script]) -> Callable[[str], Script]:
+        def find(name: str) -> Script:
+            if name not in own:
+                raise ConfigError(f"no script {name}", hint="name one that is there")
+            return own[name]
+
+        return find
+
+    shows = [Shows(finder(scripts[state.name]), state) for state in states]
+    for state, each in zip(states, shows, strict=True):
+        state.shows = each
+    return shows
+
+
+def test_a_show_for_all_begins_at_every_head_or_at_none() -> None:
+    states, tour = hall(), Script(((0.0, "SET jawOpen 0.5"),), name="tour", marks={"middle": 1.0})
+    shows = with_shows(states, {"maple": {"tour": tour}, "oak": {}, "willow": {"tour": tour}})
+    session = LineSession(states[0], 0)
+    answer = say(session, "@all SHOW tour")
+    assert answer.startswith("ERR ") and "oak: no script tour; nothing has changed at maple, oak, willow" in answer
+    assert [each.name for each in shows] == [None] * 3
+    assert say(session, "@maple SHOW tour") == "OK SHOW tour" and [each.name for each in shows] == ["tour", None, None]
+
+
+def test_a_mark_that_one_of_the_shows_lacks_is_sought_by_none_of_them() -> None:
+    states = hall()
+    tour, walk = (Script(((5.0, "SET jawOpen 0.5"),), name=name, marks=marks)
+                  for name, marks in (("tour", {"middle": 1.0}), ("walk", {})))  # fmt: skip
+    shows = with_shows(states, {"maple": {"tour": tour}, "oak": {"walk": walk}, "willow": {}})
+    session = LineSession(states[0], 0)
+    assert "maple: no show plays" in say(session, "@all SHOW PAUSE")
+    for line in ("@maple SHOW tour", "@oak SHOW walk"):
+        say(session, line)
+    answer = say(session, "@all SHOW SEEK middle")
+    assert answer.startswith("ERR ") and "oak: unknown mark" in answer
+    assert [each.status() for each in shows] == ["tour@0.0", "walk@0.0", "off"]
+    assert say(session, "@all SHOW SEEK 2") == "OK SHOW SEEK 2"  # of those that play
+    assert say(session, "@all SHOW PAUSE") == "OK SHOW PAUSE"
+    assert [each.status() for each in shows] == ["tour@2.0,paused", "walk@2.0,paused", "off"]
+
+
+def test_a_layer_that_one_head_lacks_is_written_at_none() -> None:
+    states = hall()
+    own = [*default_layers(), LayerSettings(name="dance", priority=35)]
+    states[0].mixer, states[2].mixer = Mixer(P, own), Mixer(P, own)
+    mask = np.zeros(len(P), bool)
+    mask[JAW] = True
+    everybody = states[0].heads.find("all")
+    with pytest.raises(ParameterError, match="oak: no layer 'dance'; nothing has changed at maple, oak, willow"):
+        everybody.write_layer("dance", np.full(len(P), 0.5), mask, SECOND)
+    with pytest.raises(ParameterError, match="oak: no layer 'dance'"):
+        everybody.release_layer("dance")
+    assert not any(states[k].mixer["dance"].holding for k in (0, 2))
+    everybody.write_layer("capture", np.full(len(P), 0.5), mask, SECOND)
+    assert all(state.mixer["capture"].holding for state in states)
 
 
 def test_a_stop_for_one_head_stops_all() -> None:
