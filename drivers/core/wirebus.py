@@ -229,7 +229,7 @@ class WireBus(Bus):
         try:
             now = self._clock()
             self._settle(now)
-            sent = self._send(self._limits.apply(wanted, now, self.driven))
+            sent = self._send(self._limits.apply(wanted, now, None if self._presence.all_driven else self.driven))
         except PortLost:
             self._note_loss()
             raise
@@ -253,7 +253,7 @@ class WireBus(Bus):
         """Drive only servos whose positions are known, each from where it is; see :mod:`drivers.core.presence`."""
         for index in self._presence.note(state, self._reads_a_turn):
             self._come_back(index, float(state.position_rad[index]))
-        if self._presence.left_out.any() and self._clock() >= self._join_s:
+        if self._presence.some_left_out and self._clock() >= self._join_s:
             self._let_join(np.flatnonzero(self._presence.left_out & ~state.silent).tolist())
 
     def _come_back(self, index: int, angle_rad: float) -> None:
