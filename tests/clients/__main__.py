@@ -37,7 +37,7 @@ def environment(name: str, packages: list[str], bare: list[str]) -> Path:
     pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     for words in ([*pip, *packages], [*pip, "--no-deps", *bare] if bare else []):
         if words:
-            subprocess.run(words, check=True, timeout=INSTALL_S)
+            subprocess.run(words, check=True, timeout=INSTALL_S, stderr=subprocess.PIPE, text=True)
     mark.write_text(wanted, encoding="utf-8")
     return python
 
@@ -82,6 +82,12 @@ def result(python: str | Path, client: dict[str, Any]) -> tuple[bool, str]:
     return True, f"passed at the second try; the first: {wrong[0].splitlines()[-1]}" if len(wrong) > 1 else "passed"
 
 
+def _reason(error: subprocess.SubprocessError) -> str:
+    """What pip said last, or that it took too long."""
+    said = getattr(error, "stderr", None) or str(error)
+    return said.strip().splitlines()[-1]
+
+
 def main(names: list[str]) -> int:
     """Run the clients named, or all; 1 where one failed."""
     clients = tomllib.loads((HERE / "clients.toml").read_text(encoding="utf-8"))
@@ -90,7 +96,10 @@ def main(names: list[str]) -> int:
     table, failed = Table("client", "versions", "seconds", "result"), False
     for name in names or clients:
         client, begun = clients[name], time.monotonic()
-        passed, said = result(environment(name, client["packages"], client.get("bare", [])), client)
+        try:
+            passed, said = result(environment(name, client["packages"], client.get("bare", [])), client)
+        except subprocess.SubprocessError as error:
+            passed, said = False, f"its environment cannot be made, is the package index there? {_reason(error)}"
         versions = " ".join(client.get("bare", []) or client["packages"])
         table.add_row(name, versions, f"{time.monotonic() - begun:.1f}", said)
         failed = failed or not passed
