@@ -150,7 +150,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         return self._await(self.deadline_s - self.margin_s)
 
     def _await(self, due_s: float) -> bytes:
-        """Sleep until bytes are due, and take them; poll for them at the end where the system wakes this thread late."""
+        """Sleep until bytes are due, and take them; poll for them at the end where the system wakes threads late."""
         now, polls = self.clock(), self._wakes.late_s > POLL_WORTH_S
         wake_s = due_s - WAKE_EARLY_S if polls else due_s
         if wake_s - now > LEAST_SLEEP_S:

@@ -54,7 +54,7 @@ class Trajectory:
         profile: int = Profile.STEP,
     ) -> None:
         self.start_s, self.profile = start_s, profile
-        self._pieces = kept = []
+        kept: list[tuple[float, float, float, float]] = []
         at = 0.0
         position, velocity, _ = start
         for duration, acceleration in pieces:
@@ -63,7 +63,7 @@ class Trajectory:
                 position += (velocity + 0.5 * acceleration * duration) * duration
                 velocity += acceleration * duration
                 at += duration
-        self.duration = at
+        self._pieces, self.duration = kept, at
         self.end, self._end_velocity = (position, velocity) if goal is None else (goal, 0.0)
 
     @property
@@ -95,9 +95,11 @@ class Trajectory:
         if t >= self.duration:
             velocity = self._end_velocity
             return Motion(self.end + velocity * (t - self.duration), velocity, 0.0)
-        for begin, position, velocity, acceleration in reversed(self._pieces):
-            if t >= begin:
+        piece = self._pieces[-1]
+        for piece in reversed(self._pieces):
+            if t >= piece[0]:
                 break
+        begin, position, velocity, acceleration = piece
         t -= begin
         return Motion(position + (velocity + 0.5 * acceleration * t) * t, velocity + acceleration * t, acceleration)
 

@@ -153,9 +153,9 @@ class Registers:
 
     def _field(self, item: Item, at: int) -> _Field:
         cell, _, sign_bit = self._cells[item.name]
-        low, high = item.minimum, item.maximum
-        if low is None or high is None:
-            low, high = -math.inf, math.inf
+        low, high = -math.inf, math.inf
+        if item.minimum is not None and item.maximum is not None:
+            low, high = item.minimum, item.maximum
         permanent = self.table.is_permanent(item.address)
         return _Field(item, cell.unpack_from, at, sign_bit, permanent, item.name in GOALS, low, high)
 
