@@ -18,6 +18,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from drivers.base.priority import request_realtime, restore_priority
 from drivers.testing import ServoBoard, ServoBus, open_board, open_servos
 
 HERE = Path(__file__).resolve().parent
@@ -43,7 +44,18 @@ def environment(name: str, packages: list[str], bare: list[str]) -> Path:
 
 
 def opened(client: dict[str, Any]) -> ServoBus | ServoBoard:
-    """The simulated servos or the board that a client's section names, on a port."""
+    """The simulated servos or the board that a client's section names, on a port.
+
+    The thread that serves them inherits real-time priority where it can be had: it answers in time on a busy computer.
+    """
+    request_realtime()
+    try:
+        return _made(client)
+    finally:
+        restore_priority()  # the client must not inherit it: one that polls would keep bytes from being carried
+
+
+def _made(client: dict[str, Any]) -> ServoBus | ServoBoard:
     if "board" in client:
         return open_board(client["board"], **client.get("options", {}))
     models = {int(number): model for number, model in client.get("models", {}).items()} or client["model"]
