@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 import tomllib
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any
 import pytest
 
 from tests import clients
+from tests.clients import __main__ as program_of_clients
 from tests.clients.__main__ import HERE, result, run
 
 SERVOS: dict[str, Any] = {"model": "xl330-m288", "ids": [1, 2, 3]}
@@ -84,3 +86,19 @@ def test_every_client_has_pinned_versions_and_a_program_and_is_in_the_docs() -> 
         pin = (client.get("bare") or client["packages"])[-1]
         version = pin.partition("==")[2] or pin.rpartition("@")[2][:12]
         assert f"| {version} |" in table, name
+
+
+def test_a_client_that_cannot_be_installed_is_a_row_and_the_others_run(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def environment(name: str, packages: list[str], bare: list[str]) -> Path:
+        if name == "pypot":
+            raise subprocess.CalledProcessError(1, "pip", stderr="looking\nERROR: no index\n")
+        return Path(sys.executable)
+
+    monkeypatch.setattr(program_of_clients, "environment", environment)
+    monkeypatch.setattr(program_of_clients, "result", lambda python, client: (True, "passed"))
+    monkeypatch.setenv("COLUMNS", "200")
+    assert program_of_clients.main(["pypot", "rustypot"]) == 1
+    said = capsys.readouterr().out
+    assert "ERROR: no index" in said and "passed" in said

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import multiprocessing
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from functools import partial
 from typing import Any
 
+from controller.base.errors import ControllerError
 from controller.base.steal_time import StealTime
 from controller.tools.bench_bus import (
     SHARES,
@@ -29,11 +31,17 @@ from controller.tools.bench_bus import (
 )
 from drivers import open_bus
 from drivers.base.bus import Floats, ServoSpec
+from drivers.base.errors import DriverError
 from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.sim import SimulatedBus
 
 PACED_HZ = 100.0
 PACED_SHARE = 0.99
+TOGETHER_S = 60.0
+"""Longest time in which all buses must be ready to begin together."""
+PROCESS_S = 120.0
+"""How much longer than it measures a process may take, most of it to start."""
+_OTHER_FAILED = "another bus failed"
 Drive = Callable[[str], AbstractContextManager[Cycle]]
 """Opens the bus at a path; gives what a cycle of it does."""
 
@@ -112,55 +120,102 @@ def _driver(specs: list[ServoSpec], baud: int, fast: bool, path: str) -> Iterato
         yield cycle
 
 
-def _in_a_process(opened: Drive, path: str, seconds: float, rate_hz: float, together: Any, results: Any) -> None:
-    """A loop of one bus in a process of its own."""
+def _in_a_process(opened: Drive, path: str, seconds: float, rate_hz: float, together: Any, answers: Any) -> None:
+    """A loop of one bus in a process of its own; answers with it, or with what went wrong as text."""
     shorten_thread_switches()
     request_realtime()
-    with opened(path) as cycle:
-        together.wait(timeout=60.0)
-        results.put((path, measure_loop(cycle, seconds, rate_hz)))
+    try:
+        with opened(path) as cycle:
+            together.wait(timeout=TOGETHER_S)
+            loop = measure_loop(cycle, seconds, rate_hz)
+    except threading.BrokenBarrierError:
+        answers.send(_OTHER_FAILED)
+    except Exception as error:  # noqa: BLE001  whatever it is, the parent says it
+        together.abort()
+        answers.send(_why(error))
+    else:
+        answers.send(loop)
 
 
 def _apart(paths: list[str], opened: Drive, seconds: float, rate_hz: float) -> list[Loop]:
-    """A loop of every bus, all in processes that begin together."""
+    """A loop of every bus, all in processes that begin together; raises as `_at_once`."""
     context = multiprocessing.get_context("spawn")
-    together, results = context.Barrier(len(paths)), context.Queue()
-    arguments = [(opened, path, seconds, rate_hz, together, results) for path in paths]
-    processes = [context.Process(target=_in_a_process, args=each, daemon=True) for each in arguments]
-    for process in processes:
-        process.start()
-    loops: dict[str, Loop] = dict(results.get(timeout=seconds + 120.0) for _ in paths)
-    for process in processes:
+    together = context.Barrier(len(paths))
+    pipes = [context.Pipe(duplex=False) for _ in paths]
+    processes = [
+        context.Process(target=_in_a_process, args=(opened, path, seconds, rate_hz, together, answers), daemon=True)
+        for path, (_, answers) in zip(paths, pipes, strict=True)
+    ]
+    try:
+        for process, (_, answers) in zip(processes, pipes, strict=True):
+            process.start()
+            answers.close()  # so that the end of the process is the end of the pipe
+        end_s = time.monotonic() + seconds + PROCESS_S
+        found = [
+            _answer(answer, process, together, end_s) for (answer, _), process in zip(pipes, processes, strict=True)
+        ]
+    finally:
+        for process in [each for each in processes if each.pid]:
+            process.kill()
+            process.join()
+    return _all_loops(paths, found)
+
+
+def _answer(answer: Any, process: Any, together: Any, end_s: float) -> Loop | str:
+    """The loop of a process, or why there is none."""
+    try:
+        if answer.poll(max(end_s - time.monotonic(), 0.0)):
+            found: Loop | str = answer.recv()
+            return found
+    except EOFError:
+        together.abort()  # the others would wait for it
         process.join()
-    return [loops[path] for path in paths]
+        return f"its process ended with status {process.exitcode} before it had measured anything"
+    together.abort()
+    return f"its process did not answer within {PROCESS_S:g} s of the end of its time"
+
+
+def _why(error: Exception) -> str:
+    """What to say of an error."""
+    return str(error) if isinstance(error, DriverError) else f"{type(error).__name__}: {error}"
+
+
+def _all_loops(paths: list[str], found: list[Loop | str]) -> list[Loop]:
+    """The loops of all buses; raises ControllerError where one has none."""
+    failed = [f"bus {k} on {path}: {each}" for k, (path, each) in enumerate(zip(paths, found, strict=True), 1)
+              if isinstance(each, str) and each != _OTHER_FAILED]  # fmt: skip
+    loops = [each for each in found if isinstance(each, Loop)]
+    if len(loops) < len(paths):
+        hint = "close other programs, or measure fewer buses: --buses 2"
+        raise ControllerError("; ".join(failed) or f"buses did not begin within {TOGETHER_S:g} s", hint=hint)
+    return loops
 
 
 def _at_once(paths: list[str], opened: Drive, seconds: float, rate_hz: float, *, processes: bool = False) -> list[Loop]:
-    """A loop of every bus, all in threads that begin together; raises what the first of them raised.
+    """A loop of every bus, all in threads that begin together. Raises ControllerError that names those that failed.
 
     processes : in processes instead.
     """
     if processes:
         return _apart(paths, opened, seconds, rate_hz)
-    loops: list[Loop | BaseException | None] = [None] * len(paths)
+    found: list[Loop | str] = [_OTHER_FAILED] * len(paths)
     together = threading.Barrier(len(paths))
 
     def drive(k: int, path: str) -> None:
         try:
             request_realtime()
             with opened(path) as cycle:
-                together.wait(timeout=60.0)
-                loops[k] = measure_loop(cycle, seconds, rate_hz)
-        except BaseException as error:  # noqa: BLE001  raised again by the caller
+                together.wait(timeout=TOGETHER_S)
+                found[k] = measure_loop(cycle, seconds, rate_hz)
+        except threading.BrokenBarrierError:
+            pass  # found says so already
+        except Exception as error:  # noqa: BLE001  said by the caller
             together.abort()
-            loops[k] = error
+            found[k] = _why(error)
 
     threads = [threading.Thread(target=drive, args=(k, path)) for k, path in enumerate(paths)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    for loop in loops:
-        if isinstance(loop, BaseException) and not isinstance(loop, threading.BrokenBarrierError):
-            raise loop
-    return [loop for loop in loops if isinstance(loop, Loop)]
+    return _all_loops(paths, found)

@@ -21,6 +21,7 @@ from rich.live import Live
 
 from controller.base.config import load
 from controller.base.errors import ConfigError, ControllerError
+from controller.base.files import NEWER
 from controller.base.signals import stop_flag
 from controller.robot.buses import BusSettings
 from controller.robot.calibration import SUFFIX, CalibrationFile, CapturedAngles, rest_deg, save_calibration
@@ -82,10 +83,15 @@ def run_calibration(
 
 
 def _known_channels(target: Path, robot: RobotSettings) -> dict[str, CapturedAngles]:
-    """The channels of the robot in a calibration that is there already; none where it is another robot's or damaged."""
+    """The channels of the robot in a calibration that is there already; none where it is another robot's or damaged.
+
+    Raises ConfigError for one that a newer omote has written: replaced by this one, it would lose what only that reads.
+    """
     try:
         found = load(target, CalibrationFile) if target.exists() else None
-    except ConfigError:
+    except ConfigError as error:
+        if NEWER in str(error):
+            raise ConfigError(str(error), hint=f"{error.hint}, or save under another name: --name NAME") from error
         found = None
     if found is None or found.robot != robot.name:
         return {}

@@ -24,6 +24,7 @@ class Presence:
 
     driven : (n,) bool, read-only, a new array whenever it changes. A servo is not driven while it is away, or left out.
     left_out : (n,) bool, servos that could not be started with the others.
+    all_driven, some_left_out : what these arrays say as a whole.
     """
 
     def __init__(self, n: int) -> None:
@@ -65,4 +66,5 @@ class Presence:
 
     def _drive(self, driven: Flags) -> None:
         self.driven: Flags = read_only(driven.copy())
+        self.all_driven, self.some_left_out = bool(driven.all()), bool(self.left_out.any())
         self._complete = False

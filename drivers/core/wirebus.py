@@ -28,7 +28,8 @@ E = TypeVar("E", bound=DriverError)
 JOIN_S = 1.0
 """Time between two attempts to start servos that were left out, one of them at a time."""
 JOIN_REST = 10.0
-"""After an attempt that failed, none is made for so many times as long as it took: all servos wait for each."""
+"""A servo whose attempt failed rests for so many times as long as that took, and as many times longer as servos rest:
+all servos wait for each attempt, but for a tenth of the time at most."""
 FAR_RAD = 0.4
 """How far from its last goal a servo may stand that comes back and is simply driven on."""
 
@@ -44,6 +45,7 @@ class WireBus(Bus):
         self._presence = Presence(len(self.servos))
         self._reasons: dict[int, BusError] = {}  # why servos were left out, by index
         self._join_s, self._tried = 0.0, -1
+        self._rests_s: dict[int, float] = {}  # until when servos rest whose attempts failed, by index
         self._running = False
         self._unconfirmed = False  # servos may be on although the bus was stopped
         self._lost = False
@@ -196,6 +198,7 @@ class WireBus(Bus):
         self._reasons = {index: why for index, why in self._reasons.items() if not started[index]}
         self._limits.reset(np.where(started, here_rad, 0.0), self._clock())
         self._presence.reset(started)
+        self._rests_s.clear()
         self._join_s = self._clock() + JOIN_S
         self._running, self._unconfirmed = True, False
 
@@ -229,7 +232,7 @@ class WireBus(Bus):
         try:
             now = self._clock()
             self._settle(now)
-            sent = self._send(self._limits.apply(wanted, now, self.driven))
+            sent = self._send(self._limits.apply(wanted, now, None if self._presence.all_driven else self.driven))
         except PortLost:
             self._note_loss()
             raise
@@ -253,7 +256,7 @@ class WireBus(Bus):
         """Drive only servos whose positions are known, each from where it is; see :mod:`drivers.core.presence`."""
         for index in self._presence.note(state, self._reads_a_turn):
             self._come_back(index, float(state.position_rad[index]))
-        if self._presence.left_out.any() and self._clock() >= self._join_s:
+        if self._presence.some_left_out and self._clock() >= self._join_s:
             self._let_join(np.flatnonzero(self._presence.left_out & ~state.silent).tolist())
 
     def _come_back(self, index: int, angle_rad: float) -> None:
@@ -284,21 +287,29 @@ class WireBus(Bus):
         """Try to start one of the servos that were left out and answer, each in its turn."""
         begun_s = self._clock()
         self._join_s = begun_s + JOIN_S
-        if not waiting:
+        ready = [index for index in waiting if begun_s >= self._rests_s.get(index, begun_s)]
+        if not ready:
             return
-        index = min(waiting, key=lambda each: (each <= self._tried, each))
+        index = min(ready, key=lambda each: (each <= self._tried, each))
         self._tried = index
         try:
             here = self._join(index)
         except BusError as error:
             self._leave_out(index, error)
-            now_s = self._clock()
-            self._join_s = max(self._join_s, now_s + JOIN_REST * (now_s - begun_s))
+            self._let_rest(index, begun_s)
             return
         self._drive_again(index, here)
 
+    def _let_rest(self, index: int, begun_s: float) -> None:
+        """Try others first, after as long a pause as the attempt that failed took."""
+        now_s = self._clock()
+        took_s = now_s - begun_s
+        self._join_s = max(self._join_s, now_s + took_s)
+        self._rests_s[index] = now_s + JOIN_REST * took_s * len(self._rests_s.keys() | {index})
+
     def _drive_again(self, index: int, angle_rad: float) -> None:
         """Drive a servo that was started by itself, from where it is."""
+        self._rests_s.pop(index, None)
         self._begin_at(index, angle_rad)
         self._presence.join(index)
         if self._reasons.pop(index, None) is not None:

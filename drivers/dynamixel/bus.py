@@ -134,11 +134,12 @@ class DynamixelBus(ServoBus):
 
     def _ask(self) -> BusState:
         """One sync read of all servos and one slow value of some."""
-        unmapped, self._telemetry.unmapped = sorted(self._telemetry.unmapped), set()
-        for servo in unmapped:
-            self._map_again(servo)
+        if self._telemetry.unmapped:
+            unmapped, self._telemetry.unmapped = sorted(self._telemetry.unmapped), set()
+            for servo in unmapped:
+                self._map_again(servo)
         state = self._telemetry.cycle(self._clock, self._running, self.scale)
-        if self._running:
+        if self._running and self._telemetry.tripped:
             self._clear_watchdogs()
         return state
 

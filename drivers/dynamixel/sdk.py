@@ -213,13 +213,12 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
     def _fill(self, port: Any, size: int) -> bytes:
         """Received bytes, at least ``size`` of them unless the deadline passes.
 
-        After the first bytes it sleeps for the time that the others take on the wire: one wake-up, not one for every
-        few bytes.
+        It sleeps for the time that they take on the wire: one wake-up, not one for every few bytes.
         """
-        data: bytes = port.link.read(port.deadline_s)
+        data: bytes = port.first()
         more = data
         while more and len(data) < size:
-            more = port.more(size - len(data))
+            more = port.more()
             data += more
         return data
 

@@ -173,8 +173,8 @@ def encode_fast_part(device_id: int, error: int, data: bytes, crc: int) -> tuple
     """
     part = bytes((error, device_id)) + data
     crc = crc16(part, crc)
-    tail = bytes((crc & 0xFF, crc >> 8))
-    return part + tail, crc16(tail, crc)
+    low, high = crc & 0xFF, crc >> 8
+    return part + bytes((low, high)), _WORDS[crc ^ (low << 8 | high)]
 
 
 def decode_fast(data: bytes, devices: Sequence[tuple[int, int]]) -> list[StatusPacket]:

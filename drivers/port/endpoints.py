@@ -54,10 +54,14 @@ class Endpoint(ABC):
     def put(self, data: memoryview) -> int:
         """Write as many bytes as there is room for; raises BlockingIOError when there is none."""
 
-    def wait(self, timeout_s: float, writing: bool) -> None:
-        """Wait until bytes have arrived, or until there is room to write some, at most for a time."""
+    def wait(self, timeout_s: float, writing: bool) -> bool:
+        """Wait until bytes have arrived, or until there is room to write some, at most for a time; False: for neither.
+
+        True where that is not known, so that the caller tries.
+        """
         ends = [self.device]
-        select.select([] if writing else ends, ends if writing else [], [], timeout_s)
+        reading, room, _ = select.select([] if writing else ends, ends if writing else [], [], timeout_s)
+        return bool(reading or room)
 
     def close(self) -> None:
         """Close it."""
@@ -143,11 +147,12 @@ class UrlEnd(Endpoint):
     def put(self, data: memoryview) -> int:
         return int(self.device.write(bytes(data)) or len(data))
 
-    def wait(self, timeout_s: float, writing: bool) -> None:
+    def wait(self, timeout_s: float, writing: bool) -> bool:
         """Wait for a byte; ``write`` of pyserial waits for room by itself."""
         if not writing and not self._first:
             self.device.timeout = timeout_s
             self._first = self.device.read(1)
+        return True
 
 
 class MemoryPorts:

@@ -135,7 +135,10 @@ class SerialPort:
         A deadline of ``time.monotonic()`` in the past takes what is there already, so that bytes that came while this
         process was stalled still count.
         """
-        self._wait(deadline_s)
+        return self.read_now() if self._wait(deadline_s) else b""
+
+    def read_now(self) -> bytes:
+        """The bytes that have arrived, empty for none, without asking first whether there are any. Raises PortLost."""
         try:
             return self._take()
         except BlockingIOError:
@@ -160,8 +163,8 @@ class SerialPort:
             self.tap(False, data)
         return data
 
-    def _wait(self, deadline_s: float, writing: bool = False) -> None:
-        self._use("wait", max(0.0, deadline_s - time.monotonic()), writing)
+    def _wait(self, deadline_s: float, writing: bool = False) -> bool:
+        return bool(self._use("wait", max(0.0, deadline_s - time.monotonic()), writing))
 
     def _use(self, method: str, *arguments: Any) -> Any:
         """Call a method of the open endpoint; its BlockingIOError passes, every other error becomes PortLost."""

@@ -11,6 +11,7 @@ import threading
 from dynamixel_sdk import port_handler
 
 from drivers.base.errors import DriverError
+from drivers.base.waking import WakeDelay
 from drivers.port.latency import ReplyDelays
 from drivers.port.serialport import SerialPort, as_serial_port, reply_margin_s
 
@@ -24,6 +25,10 @@ POLL_S = 0.00002
 takes a third of the time."""
 POLL_LATE_S = 0.0005
 """How long after the last byte was due polling goes on."""
+POLL_WORTH_S = 0.00004
+"""Polling begins where nine of ten waits end later than this."""
+SLEEPS = 32
+"""So many replies after one that came piece by piece are slept for, then one is looked at again."""
 
 
 class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
@@ -56,6 +61,8 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self.stray = 0
         self.delays = ReplyDelays()
         self.deadline_s = self._free_s = 0.0
+        self._sleeps = 0
+        self._wakes = WakeDelay(0.1, 2 * POLL_WORTH_S)
         self._held = bytearray()
         self._margin_s = margin_s
         self._tune()
@@ -82,6 +89,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self.suspects.clear()
         self.delays.clear()
         self.is_using = False
+        self._sleeps = 0
         self._tune()
         self.is_open, self.ser = True, self.link.serial
         self._held.clear()
@@ -126,15 +134,33 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self._free_s = max(self.clock(), self._free_s) + len(packet) * self._byte_s
         self.link.write(packet)
 
-    def more(self, missing: int) -> bytes:
-        """The next bytes of a reply that lacks so many, empty when none came until the deadline.
+    def first(self) -> bytes:
+        """The first bytes of an expected reply, empty when none came until the deadline.
 
-        It sleeps while the wire carries them, and polls at the end.
+        Where replies come piece by piece, it sleeps while the wire carries them all: one wake-up for a reply.
         """
-        due_s = min(self.clock() + missing * self._byte_s, self.deadline_s)
-        pause = due_s - WAKE_EARLY_S - self.clock()
-        if pause > LEAST_SLEEP_S:
-            self.sleep(pause)
+        if not self._sleeps:
+            return self.link.read(self.deadline_s)
+        self._sleeps -= 1
+        return self._await(self.deadline_s - self.margin_s)
+
+    def more(self) -> bytes:
+        """The next bytes of a reply that came in part, empty when none came until the deadline."""
+        self._sleeps = SLEEPS
+        return self._await(self.deadline_s - self.margin_s)
+
+    def _await(self, due_s: float) -> bytes:
+        """Sleep until bytes are due, and take them; poll for them at the end where the system wakes threads late."""
+        now, polls = self.clock(), self._wakes.late_s > POLL_WORTH_S
+        wake_s = due_s - WAKE_EARLY_S if polls else due_s
+        if wake_s - now > LEAST_SLEEP_S:
+            self.sleep(wake_s - now)
+            self._wakes.note(self.clock() - wake_s)
+            if not polls and (data := self.link.read_now()):
+                return data
+        return self._poll(due_s) if polls else self.link.read(self.deadline_s)
+
+    def _poll(self, due_s: float) -> bytes:
         end_s = min(due_s + POLL_LATE_S, self.deadline_s)
         while (now := self.clock()) < end_s:
             if data := self.link.read(min(now + POLL_S, end_s)):

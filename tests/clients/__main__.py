@@ -18,6 +18,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from drivers.base.priority import request_realtime, restore_priority
 from drivers.testing import ServoBoard, ServoBus, open_board, open_servos
 
 HERE = Path(__file__).resolve().parent
@@ -37,13 +38,24 @@ def environment(name: str, packages: list[str], bare: list[str]) -> Path:
     pip = [python, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
     for words in ([*pip, *packages], [*pip, "--no-deps", *bare] if bare else []):
         if words:
-            subprocess.run(words, check=True, timeout=INSTALL_S)
+            subprocess.run(words, check=True, timeout=INSTALL_S, stderr=subprocess.PIPE, text=True)
     mark.write_text(wanted, encoding="utf-8")
     return python
 
 
 def opened(client: dict[str, Any]) -> ServoBus | ServoBoard:
-    """The simulated servos or the board that a client's section names, on a port."""
+    """The simulated servos or the board that a client's section names, on a port.
+
+    The thread that serves them inherits real-time priority where it can be had: it answers in time on a busy computer.
+    """
+    request_realtime()
+    try:
+        return _made(client)
+    finally:
+        restore_priority()  # the client must not inherit it: one that polls would keep bytes from being carried
+
+
+def _made(client: dict[str, Any]) -> ServoBus | ServoBoard:
     if "board" in client:
         return open_board(client["board"], **client.get("options", {}))
     models = {int(number): model for number, model in client.get("models", {}).items()} or client["model"]
@@ -82,6 +94,12 @@ def result(python: str | Path, client: dict[str, Any]) -> tuple[bool, str]:
     return True, f"passed at the second try; the first: {wrong[0].splitlines()[-1]}" if len(wrong) > 1 else "passed"
 
 
+def _reason(error: subprocess.SubprocessError) -> str:
+    """What pip said last, or that it took too long."""
+    said = getattr(error, "stderr", None) or str(error)
+    return said.strip().splitlines()[-1]
+
+
 def main(names: list[str]) -> int:
     """Run the clients named, or all; 1 where one failed."""
     clients = tomllib.loads((HERE / "clients.toml").read_text(encoding="utf-8"))
@@ -90,7 +108,10 @@ def main(names: list[str]) -> int:
     table, failed = Table("client", "versions", "seconds", "result"), False
     for name in names or clients:
         client, begun = clients[name], time.monotonic()
-        passed, said = result(environment(name, client["packages"], client.get("bare", [])), client)
+        try:
+            passed, said = result(environment(name, client["packages"], client.get("bare", [])), client)
+        except subprocess.SubprocessError as error:
+            passed, said = False, f"its environment cannot be made, is the package index there? {_reason(error)}"
         versions = " ".join(client.get("bare", []) or client["packages"])
         table.add_row(name, versions, f"{time.monotonic() - begun:.1f}", said)
         failed = failed or not passed

@@ -14,7 +14,7 @@ import sys
 import threading
 
 from drivers.base.errors import DriverError
-from drivers.base.priority import request_realtime
+from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.sim.serving.serve import Control, make_server
 
 
@@ -24,6 +24,7 @@ def main() -> int:
         if hasattr(signal, ending):
             signal.signal(getattr(signal, ending), signal.SIG_IGN)
     request_realtime()  # servos answer in time while another program draws
+    shorten_thread_switches()
     try:
         server = make_server(json.loads(sys.argv[1]))
     except DriverError as error:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from drivers.base.errors import PortError
+from drivers.base.waking import WakeDelay
 from drivers.sim.serving.control import Commands, ControlSocket, Lines
 from drivers.sim.serving.make_port import make_port
 from drivers.sim.serving.ports import Link
@@ -23,12 +24,15 @@ from drivers.sim.wire.timing import WireTiming
 
 log = logging.getLogger(__name__)
 
-EARLY_S = 80e-6
-"""How long before bytes are due the server wakes: the system wakes it about this much late."""
+EARLY_S, SPARE_S = 80e-6, 10e-6
+"""How long before bytes are due the server wakes at first, as the system wakes it late; soon as much as it has learned
+from its waits, and some to spare."""
 
 POLL_S = 800e-6
 """How long the server of a wire that takes time polls after a reply, for a client that writes again at once: the system
 would wake it late. Where the client wrote later than that last time, it waits without polling."""
+POLL_WORTH_S = 40e-6
+"""It polls only where nine of ten waits end later than this."""
 POLL_STEP_S = 100e-6
 """Sleep between polls: too short for the processor's idle states. Without it the server, where it has real-time
 priority, would keep the system from carrying the bytes of its pseudo-terminal."""
@@ -83,6 +87,7 @@ class PortServer:
         self.on_line, self._lines = on_line, Lines()
         self._replied_s = 0.0
         self._prompt = False
+        self._usual, self._least = WakeDelay(0.5, EARLY_S), WakeDelay(0.1, EARLY_S)
         line.on_unplug = self._unplug
 
     def run(self, control: Control) -> None:
@@ -92,7 +97,10 @@ class PortServer:
         try:
             while True:
                 watched = [control, *(self._socket.descriptors if self._socket else ()), *self.port.descriptors]
-                ready, _, _ = select.select(watched, [], [], self._timeout())
+                timeout_s, begun_s = self._timeout(), time.monotonic()
+                ready, _, _ = select.select(watched, [], [], timeout_s)
+                if timeout_s and not ready:
+                    self._note_wake(time.monotonic() - begun_s - timeout_s)
                 if control in ready and not self._command(control):
                     return
                 if self._socket:
@@ -102,6 +110,10 @@ class PortServer:
                 self._do_due()
         finally:
             self.close()
+
+    def _note_wake(self, late_s: float) -> None:
+        self._usual.note(late_s)
+        self._least.note(late_s)
 
     def close(self) -> None:
         """Remove port, link and socket; harmless when done."""
@@ -125,8 +137,8 @@ class PortServer:
         """Seconds until something is due; None = nothing is."""
         now_s, due_s = time.monotonic(), min(self._queue.due_s, self._timeline.due_s)
         if self._queue.replies:
-            due_s = min(due_s, self._queue.replies[0][0] - EARLY_S)
-        if self._prompt and now_s - self._replied_s < POLL_S:
+            due_s = min(due_s, self._queue.replies[0][0] - self._usual.late_s - SPARE_S)
+        if self._prompt and self._least.late_s > POLL_WORTH_S and now_s - self._replied_s < POLL_S:
             return min(POLL_STEP_S, max(due_s - now_s, 0.0))
         return None if due_s == float("inf") else max(due_s - now_s, 0.0)
 
@@ -146,7 +158,8 @@ class PortServer:
     def _do_due(self) -> None:
         """Send replies, change faults and give up packets whose time has come."""
         now_s, replies = time.monotonic(), self._queue.replies
-        while replies and replies[0][0] - EARLY_S <= now_s:
+        early_s = self._usual.late_s + SPARE_S
+        while replies and replies[0][0] - early_s <= now_s:
             while now_s < replies[0][0]:  # so little that the system would oversleep it
                 now_s = time.monotonic()
             data = replies.popleft()[1]

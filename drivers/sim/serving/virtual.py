@@ -118,6 +118,10 @@ class VirtualLink:
             if data or due_s >= end_s:
                 return data
 
+    def read_now(self) -> bytes:
+        """What has arrived."""
+        return self.read(self.clock())
+
     def drain(self, quiet_s: float = 0.0, limit_s: float = 0.2) -> int:
         """Throw away what has arrived; returns how many bytes that was."""
         self.sleep(quiet_s)

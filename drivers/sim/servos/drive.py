@@ -78,7 +78,8 @@ class Drive(ABC):
     def observe(self, now_s: float) -> tuple[Motion, Motion, float]:
         """(motion of the shaft, motion commanded to the motor, load)."""
         plant = self.plant
-        commanded, motion = plant.trajectory.at(now_s), plant.motion(now_s)
+        commanded = plant.trajectory.at(now_s)
+        motion = plant.follow(now_s, commanded)
         plant.torque_limit = self.torque_limit()
         load = plant.load(motion, commanded)
         if plant.weight and plant.powered and plant.jammed_at is None:

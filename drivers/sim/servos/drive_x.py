@@ -90,14 +90,16 @@ class XDrive(Drive):
         limit = registers.get("Velocity Limit") * self.ticks_s
         self.top_speed = max(min(self.plant.top_speed, limit), 1e-3)
         self.timed = registers.table.time_profile and bool(registers.get("Drive Mode") & TIME_PROFILE)
-        self.reach = self._reach(registers.get("Current Limit")) if self.has_current else math.inf
+        self.reach, self._own_limit = math.inf, 1.0
+        if self.has_current:
+            current = registers.get("Current Limit")
+            self.reach, self._own_limit = self._reach(current), min(1.0, abs(current) / self.full_current)
 
     def torque_limit(self) -> float:
         """The lower of Current Limit and, in the mode that it limits, Goal Current."""
-        if not self.has_current:
-            return 1.0
-        names = ("Current Limit", "Goal Current") if self.mode == CURRENT_POSITION else ("Current Limit",)
-        return min(1.0, *(abs(self.registers.get(name)) / self.full_current for name in names))
+        if not self.has_current or self.mode != CURRENT_POSITION:
+            return self._own_limit
+        return min(self._own_limit, abs(self.registers.get("Goal Current")) / self.full_current)
 
     def give(self) -> float:
         """By Position P Gain alone; the integral takes the error away, and other modes control no position."""

@@ -54,16 +54,16 @@ class Trajectory:
         profile: int = Profile.STEP,
     ) -> None:
         self.start_s, self.profile = start_s, profile
-        self._pieces: list[tuple[float, float, float, float]] = []
-        at, position, velocity = 0.0, start.position, start.velocity
+        kept: list[tuple[float, float, float, float]] = []
+        at = 0.0
+        position, velocity, _ = start
         for duration, acceleration in pieces:
-            if duration <= 0.0:
-                continue
-            self._pieces.append((at, position, velocity, acceleration))
-            position += (velocity + 0.5 * acceleration * duration) * duration
-            velocity += acceleration * duration
-            at += duration
-        self.duration = at
+            if duration > 0.0:
+                kept.append((at, position, velocity, acceleration))
+                position += (velocity + 0.5 * acceleration * duration) * duration
+                velocity += acceleration * duration
+                at += duration
+        self._pieces, self.duration = kept, at
         self.end, self._end_velocity = (position, velocity) if goal is None else (goal, 0.0)
 
     @property
@@ -89,11 +89,17 @@ class Trajectory:
 
     def at(self, now_s: float) -> Motion:
         """Motion at a time; before the start it is the start's."""
-        t = max(now_s - self.start_s, 0.0)
+        t = now_s - self.start_s
+        if t < 0.0:
+            t = 0.0
         if t >= self.duration:
             velocity = self._end_velocity
             return Motion(self.end + velocity * (t - self.duration), velocity, 0.0)
-        begin, position, velocity, acceleration = next(piece for piece in reversed(self._pieces) if t >= piece[0])
+        piece = self._pieces[-1]
+        for piece in reversed(self._pieces):
+            if t >= piece[0]:
+                break
+        begin, position, velocity, acceleration = piece
         t -= begin
         return Motion(position + (velocity + 0.5 * acceleration * t) * t, velocity + acceleration * t, acceleration)
 

@@ -135,9 +135,13 @@ class Plant:
 
     def motion(self, now_s: float) -> Motion:
         """Motion of the shaft."""
+        return self.follow(now_s, self._commanded.at(now_s))
+
+    def follow(self, now_s: float, commanded: Motion) -> Motion:
+        """Motion of the shaft at a time when this one is commanded."""
         if self.jammed_at is not None:
             return Motion(self.jammed_at)
-        motion = self._commanded.at(now_s)
+        motion = commanded
         if now_s < self._engaged_s + SETTLED * self.CATCH_UP_S:
             motion = self._in_play(now_s, motion)
         if self.stops is NO_STOPS:

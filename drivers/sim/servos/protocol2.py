@@ -121,8 +121,12 @@ class Protocol2(Protocol):
             if servo is None or not servo.status_level or not servo.table.fast_read:
                 break
             error, data = servo.read(address, length, now_s)
-            part, crc = encode_fast_part(device_id, error, data.ljust(length, b"\0"), crc)
-            arrived, late_s = self.faults.corrupt(part, device_id, shorten=_shorten_part, readdress=_readdress_part)
+            arrived: bytes | None
+            arrived, crc = encode_fast_part(device_id, error, data.ljust(length, b"\0"), crc)
+            late_s = 0.0
+            if self.faults.reply_faults:
+                corrupt = self.faults.corrupt
+                arrived, late_s = corrupt(arrived, device_id, shorten=_shorten_part, readdress=_readdress_part)
             if arrived is None:
                 break
             first = not replies

@@ -5,7 +5,9 @@ The effects of a write are in ``device``.
 
 from __future__ import annotations
 
+import math
 import struct
+from typing import Any, NamedTuple
 
 from drivers.packets.packet import ErrorNumber
 from drivers.tables.tables import ControlTable, Item, from_magnitude, to_magnitude
@@ -18,6 +20,23 @@ Change = tuple[Item, int]
 
 _CODES = {1: "B", 2: "H", 4: "I"}
 """Format of an unsigned item by its size, for ``struct``; in small letters signed."""
+
+
+class _Field(NamedTuple):
+    """An item in the data of a write.
+
+    unpack_from, at, sign_bit : how its value is read, from which byte on. permanent, is_goal : what closes it to
+    writes. low, high : its fixed range.
+    """
+
+    item: Item
+    unpack_from: Any
+    at: int
+    sign_bit: int | None
+    permanent: bool
+    is_goal: bool
+    low: float
+    high: float
 
 
 class Registers:
@@ -34,7 +53,7 @@ class Registers:
         self.memory = bytearray(table.size)
         self.locked = self.goals_locked = self.extended = False
         self._cells = {name: (_format(item), item.address, item.sign_bit) for name, item in table.items()}
-        self._layouts: dict[tuple[int, int], tuple[Item, ...] | ErrorNumber] = {}
+        self._layouts: dict[tuple[int, int], tuple[_Field, ...] | ErrorNumber] = {}
         self._pointers: dict[int, int] = {}
         self._slots = frozenset(address for _, data, count in table.indirect for address in range(data, data + count))
         self._first_slot = min(self._slots, default=table.size)
@@ -98,15 +117,14 @@ class Registers:
         if isinstance(layout, ErrorNumber):
             return layout
         changes = []
-        for item in layout:
-            cell, _, sign_bit = self._cells[item.name]
-            value = cell.unpack_from(data, item.address - address)[0]
-            if sign_bit is not None:
-                value = from_magnitude(value, sign_bit)
-            error = self._refusal(item, value)
+        for field in layout:
+            value = field.unpack_from(data, field.at)[0]
+            if field.sign_bit is not None:
+                value = from_magnitude(value, field.sign_bit)
+            error = self._refusal(field, value)
             if error:
                 return error
-            changes.append((item, value))
+            changes.append((field.item, value))
         return changes
 
     def store(self, item: Item, value: int) -> None:
@@ -114,34 +132,40 @@ class Registers:
         cell, address, sign_bit = self._cells[item.name]
         cell.pack_into(self.memory, address, value if sign_bit is None else to_magnitude(value, sign_bit))
 
-    def _layout(self, address: int, length: int) -> tuple[Item, ...] | ErrorNumber:
+    def _layout(self, address: int, length: int) -> tuple[_Field, ...] | ErrorNumber:
         """The items that a write of this size at this address covers; cached, as hosts repeat themselves."""
-        key = address, length
-        if key not in self._layouts:
-            self._layouts[key] = self._walk(*key)
-        return self._layouts[key]
+        layout = self._layouts.get((address, length))
+        if layout is None:
+            layout = self._layouts[address, length] = self._walk(address, length)
+        return layout
 
-    def _walk(self, address: int, length: int) -> tuple[Item, ...] | ErrorNumber:
-        items, end = [], address + length
+    def _walk(self, address: int, length: int) -> tuple[_Field, ...] | ErrorNumber:
+        begin, fields, end = address, [], address + length
         while address < end:
             item = self.table.by_address.get(address)
             if item is None or not item.writable:
                 return ErrorNumber.ACCESS
             if item.end > end:
                 return ErrorNumber.DATA_LENGTH
-            items.append(item)
+            fields.append(self._field(item, item.address - begin))
             address = item.end
-        return tuple(items)
+        return tuple(fields)
 
-    def _refusal(self, item: Item, value: int) -> ErrorNumber:
+    def _field(self, item: Item, at: int) -> _Field:
+        cell, _, sign_bit = self._cells[item.name]
+        low, high = -math.inf, math.inf
+        if item.minimum is not None and item.maximum is not None:
+            low, high = item.minimum, item.maximum
+        permanent = self.table.is_permanent(item.address)
+        return _Field(item, cell.unpack_from, at, sign_bit, permanent, item.name in GOALS, low, high)
+
+    def _refusal(self, field: _Field, value: int) -> ErrorNumber:
         """Why a value may not be written now; NONE where it may."""
-        if self.locked and self.table.is_permanent(item.address):
+        if self.locked and field.permanent:
             return ErrorNumber.ACCESS
-        if self.goals_locked and item.name in GOALS:
+        if (self.goals_locked and field.is_goal) or not field.low <= value <= field.high:
             return ErrorNumber.DATA_RANGE
-        low, high = item.minimum, item.maximum
-        if low is not None and high is not None and not low <= value <= high:
-            return ErrorNumber.DATA_RANGE
+        item = field.item
         if item.values is not None and value not in item.values:
             return ErrorNumber.DATA_RANGE
         return self._beyond_limit(item, value) if item.upper else ErrorNumber.NONE

@@ -103,6 +103,8 @@ class ServoState:
         self._error_register = next((name for name in names if name in table), "")
         self._settled_s = math.inf  # when a Y-series servo that is switched on or off is done
         self.is_feetech = "Response Level" in table
+        self._delay_at = table["Return Delay Time"].address
+        self._level_at = table["Response Level" if self.is_feetech else "Status Return Level"].address
         self._permanent = bytearray()
         self.registers.put("ID", device_id)
         self.force_baud(baud, self.baud)
@@ -139,19 +141,19 @@ class ServoState:
     @property
     def return_delay_s(self) -> float:
         """Pause before a reply."""
-        return self.registers.get("Return Delay Time") * 2e-6
+        return self.registers.memory[self._delay_at] * 2e-6
 
     @property
     def status_level(self) -> int:
         """0 answers a ping only, 1 a read too, 2 everything. (Feetech's Response Level has no 0.)"""
-        if self.is_feetech:
-            return 1 + self.registers.get("Response Level")
-        return self.registers.get("Status Return Level")
+        return self.is_feetech + self.registers.memory[self._level_at]
 
     @property
     def alert(self) -> int:
         """`ALERT` while a hardware error is latched, else 0."""
-        return ALERT if self.forced_alert or self.hardware_error else 0
+        if self.forced_alert or (self.registers.get(self._error_register) if self._error_register else self._errors):
+            return ALERT
+        return 0
 
     @property
     def hardware_error(self) -> int:

@@ -67,11 +67,12 @@ class WireTiming:
 
     def deliveries(self, replies: Sequence[Reply], baud: int) -> list[Timed]:
         """(time, bytes) at which the host gets the replies to the instruction that has just arrived."""
-        timed = []
-        for reply in replies:
-            delay = reply.servo.return_delay_s if reply.servo else 0.0
-            self._free_s += delay + reply.late_s + len(reply.data) * BITS_PER_BYTE / baud
-            timed.append((self._free_s, reply.data))
+        timed, free_s = [], self._free_s
+        for data, servo, late_s in replies:
+            delay = servo.return_delay_s if servo is not None else 0.0
+            free_s += delay + late_s + len(data) * BITS_PER_BYTE / baud
+            timed.append((free_s, data))
+        self._free_s = free_s
         return _through_bridge(timed, self.latency_s) if self.latency_s > 0.0 else _join(timed, USB_FRAME_S)
 
 

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
+from controller.base.errors import ControllerError
 from controller.hardware import bench_many as module
 from controller.hardware.bench_many import bench_many
 from controller.tools.bench_bus import limit_hz
@@ -38,6 +42,35 @@ def test_every_bus_has_its_own_rate(monkeypatch: pytest.MonkeyPatch) -> None:
     names = ("half of all cycles, of the wire limit", "  each driven from a process of its own", "  without a driver")
     for name in names:
         assert [0.0 < figure.value <= 101.0 for figure in figures if figure.name == name] == [True, True]
+
+
+@contextmanager
+def falling(path: str) -> Iterator[object]:
+    """Stands for opening a bus: one of them cannot be opened, and one takes its process with it."""
+    if path == "bad":
+        raise OSError("no room for it")
+    if path == "killed":
+        os._exit(9)
+    yield lambda angle_rad: True
+
+
+@pytest.mark.parametrize(
+    ("paths", "processes", "said"),
+    [
+        (["good", "bad"], False, "bus 2 on bad: OSError: no room for it"),
+        (["good", "bad"], True, "bus 2 on bad: OSError: no room for it"),
+        (["killed", "good"], True, "bus 1 on killed: its process ended with status 9"),
+    ],
+)
+def test_a_bus_that_fails_is_named_with_the_reason(paths: list[str], processes: bool, said: str) -> None:
+    with pytest.raises(ControllerError) as caught:
+        module._at_once(paths, falling, 0.1, 0.0, processes=processes)
+    assert str(caught.value).startswith(said) and "good" not in str(caught.value)
+    assert "--buses" in caught.value.hint
+
+
+def test_loops_of_processes_come_in_the_order_of_the_buses() -> None:
+    assert all(loop.rate_hz > 0.0 for loop in module._at_once(["one", "two"], falling, 0.1, 0.0, processes=True))
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from controller.base.errors import ControllerError
+from controller.base.errors import ConfigError, ControllerError
 from controller.base.parameters import PARAMETERS
 from controller.robot.robot import load_robot
 from controller.tools import calibrate as module
@@ -445,6 +445,18 @@ def test_channels_that_are_not_captured_again_stay_in_the_file(
     assert written and set(found["channels"]) == kept and found["robot"] == "pair"
     assert found["channels"]["jaw"]["max_deg"] == pytest.approx(20)
     assert ("in which 1 other channels stay?" in shown) == (len(kept) == 2)
+
+
+def test_a_file_of_a_newer_omote_is_refused_before_anything_is_captured(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    target = tmp_path / "c.toml"
+    text = "format = 2\n" + OLD.format(robot="pair")
+    target.write_text(text)
+    with pytest.raises(ConfigError, match="written by a newer omote") as caught:
+        calibrated(monkeypatch, tmp_path, [["s"], ["y"], []])
+    assert "pip install --upgrade omote" in caught.value.hint and "--name" in caught.value.hint
+    assert target.read_text() == text
 
 
 @pytest.mark.parametrize("end", ["SIGHUP", "SIGINT", "closed terminal"])

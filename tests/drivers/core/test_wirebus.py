@@ -300,3 +300,44 @@ def test_a_port_that_goes_away_while_it_is_opened_is_not_left_open(
     monkeypatch.undo()
     with bus:
         bus.start()
+
+
+def stuck(wire: VirtualBus, bus: Bus, monkeypatch: pytest.MonkeyPatch, *indices: int) -> list[float]:
+    """Leave all servos out; each attempt to start one of these takes 3 s and fails. Returns the times of attempts."""
+    attempts: list[float] = []
+    join = bus._join
+
+    def slow(index: int) -> float:
+        if index not in indices:
+            return join(index)
+        attempts.append(wire.clock())
+        wire.clock.sleep(3.0)
+        raise BusError("it does not run")
+
+    monkeypatch.setattr(bus, "_join", slow)
+    for index in range(len(bus.ids)):
+        bus._give_up(index, BusError("it is off"))
+    return attempts
+
+
+def test_one_that_takes_long_to_fail_does_not_hold_up_those_that_wait_to_join(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = VirtualBus(CHAIN)
+    with wire.bus(watchdog_ms=0) as bus:
+        bus.start()
+        attempts = stuck(wire, bus, monkeypatch, 0)
+        while not bus.driven[1]:
+            bus.read()
+            wire.clock.sleep(0.02)
+            assert wire.clock() < 10.0, "the second servo waits for the first"
+        assert len(attempts) == 1
+
+
+def test_all_servos_wait_a_tenth_of_the_time_at_most_for_those_that_fail(monkeypatch: pytest.MonkeyPatch) -> None:
+    wire = VirtualBus(CHAIN)
+    with wire.bus(watchdog_ms=0) as bus:
+        bus.start()
+        attempts = stuck(wire, bus, monkeypatch, 0, 1)
+        while wire.clock() < 600.0:
+            bus.read()
+            wire.clock.sleep(0.02)
+        assert 0.05 < 3.0 * len(attempts) / wire.clock() < 0.11

@@ -430,27 +430,25 @@ def test_replies_that_come_together_are_returned_one_by_one() -> None:
 
 
 class Pieces:
-    """A port whose reply comes in pieces, and which notes how many bytes it was asked for."""
-
-    deadline_s = 1.0
+    """A port whose reply comes in pieces, and which counts how often it was asked for more."""
 
     def __init__(self, *pieces: bytes) -> None:
-        self._pieces, self.asked, self.link = list(pieces), list[int](), self
+        self._pieces, self.asked = list(pieces), 0
 
-    def read(self, deadline_s: float) -> bytes:
+    def first(self) -> bytes:
         return self._pieces.pop(0)
 
-    def more(self, missing: int) -> bytes:
-        self.asked.append(missing)
+    def more(self) -> bytes:
+        self.asked += 1
         return self._pieces.pop(0)
 
 
-def test_of_a_reply_in_pieces_only_what_is_missing_is_waited_for() -> None:
+def test_of_a_reply_in_pieces_more_is_awaited_until_it_is_whole_or_none_comes() -> None:
     port = Pieces(b"abc", b"de", b"fghij")
     assert Packets()._fill(port, 10) == b"abcdefghij"
-    assert port.asked == [7, 5]
+    assert port.asked == 2
     cut = Pieces(b"abc", b"")
-    assert (Packets()._fill(cut, 10), cut.asked) == (b"abc", [7])
+    assert (Packets()._fill(cut, 10), cut.asked) == (b"abc", 1)
 
 
 def test_broadcast_ping_finds_everybody(wire: Wire, ours: tuple) -> None:

@@ -18,7 +18,7 @@ import serial
 from drivers.base.errors import DriverError, PortLost
 from drivers.dynamixel.sdk import Packets
 from drivers.packets.packet import Instruction, InstructionPacket, encode_status
-from drivers.servos.port import POLL_LATE_S, POLL_S, WAKE_EARLY_S, Port
+from drivers.servos.port import POLL_LATE_S, POLL_S, SLEEPS, WAKE_EARLY_S, Port
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import SERVOS
 from tests.drivers.wire import Wire
@@ -168,33 +168,71 @@ def test_s12_waiting_does_not_spin(wire: Wire, ours: tuple, theirs: Client, monk
     assert reads_while_waiting(ours[0].link, "read", ours, monkeypatch) <= 3
 
 
-def test_a_reply_is_slept_through_and_its_end_awaited_lightly(monkeypatch: pytest.MonkeyPatch) -> None:
-    port = Port("unused", margin_s=0.05)
-    now, naps, asked = 0.0, [], []
+class Waits:
+    """Stands for the clock of a port and its far end: a reply is complete at `last_s`; notes sleeps and reads."""
 
-    def sleep(seconds: float) -> None:
-        nonlocal now
-        naps.append(seconds)
-        now += seconds
+    def __init__(self, port: Port, monkeypatch: pytest.MonkeyPatch, last_s: float, late_s: float = 0.0) -> None:
+        self.now, self.last_s, self._late_s = 0.0, last_s, late_s
+        self.naps: list[float] = []
+        self.asked: list[float] = []
+        port.clock, port.sleep = lambda: self.now, self._sleep
+        monkeypatch.setattr(port.link, "read", self._read)
+        monkeypatch.setattr(port.link, "read_now", lambda: self._read(self.now))
+        port.deadline_s = 0.005 + port.margin_s  # a reply takes 5 ms on the wire
 
-    def read(deadline_s: float) -> bytes:
-        nonlocal now
-        asked.append(deadline_s)
-        now = max(now, min(deadline_s, last_s))
-        return b"x" if now >= last_s else b""
+    def _sleep(self, seconds: float) -> None:
+        self.naps.append(seconds)
+        self.now += seconds + self._late_s
 
-    port.clock, port.sleep = lambda: now, sleep
-    monkeypatch.setattr(port.link, "read", read)
-    port.deadline_s, last_s = 0.055, 0.005
-    assert port.more(500) == b"x"
-    assert naps == [pytest.approx(0.005 - WAKE_EARLY_S)]
-    assert max(asked) <= last_s + POLL_S, "so the processor is awake when it comes"
-    now, last_s, port.deadline_s = 0.0, math.inf, 0.055
-    asked.clear()
-    assert port.more(20) == b""
-    assert len(naps) == 1, "a sleep as short as this is none"
-    assert now == port.deadline_s
-    assert len(asked) <= (0.0002 + POLL_LATE_S) / POLL_S + 3, "then it is awaited in one go"
+    def _read(self, deadline_s: float) -> bytes:
+        self.asked.append(deadline_s)
+        self.now = max(self.now, min(deadline_s, self.last_s))
+        return b"x" if self.now >= self.last_s else b""
+
+
+@pytest.fixture
+def sleeper() -> Port:
+    return Port("unused", margin_s=0.05)
+
+
+def test_a_reply_in_pieces_is_slept_through_and_polled_for_at_first(
+    sleeper: Port, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits = Waits(sleeper, monkeypatch, last_s=0.005)
+    assert sleeper.more() == b"x"
+    assert waits.naps == [pytest.approx(0.005 - WAKE_EARLY_S)]
+    assert max(waits.asked) <= waits.last_s + POLL_S, "so the processor is awake when it comes"
+    waits.now, waits.last_s = 0.0048, math.inf
+    waits.asked.clear()
+    assert sleeper.more() == b""
+    assert len(waits.naps) == 1, "a sleep as short as this is none"
+    assert waits.now == sleeper.deadline_s
+    assert len(waits.asked) <= (0.0002 + POLL_LATE_S) / POLL_S + 3, "then it is awaited in one go"
+
+
+@pytest.mark.parametrize(("late_s", "polls"), [(5e-6, False), (80e-6, True)])
+def test_polling_goes_on_only_where_the_system_wakes_the_thread_late(
+    sleeper: Port, monkeypatch: pytest.MonkeyPatch, late_s: float, polls: bool
+) -> None:
+    waits = Waits(sleeper, monkeypatch, 0.005, late_s)
+    for _ in range(50):
+        waits.now = 0.0
+        assert sleeper.more() == b"x"
+    assert waits.naps[-1] == pytest.approx(0.005 - WAKE_EARLY_S if polls else 0.005)
+
+
+def test_the_replies_after_one_in_pieces_are_slept_for_from_their_beginning(
+    sleeper: Port, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    waits = Waits(sleeper, monkeypatch, 0.004)
+    assert sleeper.first() == b"x"
+    assert not waits.naps, "nothing is known yet: replies of a port without a wire come at once"
+    sleeper.more()
+    waits.naps.clear()
+    for _ in range(SLEEPS + 1):
+        waits.now = 0.0
+        assert sleeper.first() == b"x"
+    assert len(waits.naps) == SLEEPS, "then one is looked at again"
 
 
 @pytest.mark.parametrize("baud", [123_456, 250_000, 4_500_000])

@@ -16,7 +16,7 @@ from drivers.base.errors import DriverError
 from drivers.packets.packet import Instruction as I
 from drivers.packets.packet import StatusReader, encode_instruction
 from drivers.port.serialport import SerialPort
-from drivers.sim.serving.serve import EARLY_S, POLL_STEP_S, PortServer, make_server, serve, serve_dynamixel
+from drivers.sim.serving.serve import EARLY_S, POLL_STEP_S, SPARE_S, PortServer, make_server, serve, serve_dynamixel
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
 from drivers.sim.servos.simulators import ids_and_models
@@ -189,6 +189,22 @@ def test_a_server_wakes_early_for_a_reply_and_polls_after_it():
     assert server._timeout() == POLL_STEP_S
     server._prompt = False
     assert server._timeout() is None
+    server.close()
+
+
+def test_a_server_that_is_woken_on_time_wakes_later_and_no_longer_polls():
+    server = PortServer(Chain([SimulatedServo(1)]), "memory://prompt", wire=True)
+    for _ in range(100):
+        server._note_wake(5e-6)
+    server._queue.replies.append((time.monotonic() + 60.0, b"x"))
+    assert 60.0 - EARLY_S < server._timeout() + (early_s := server._usual.late_s + SPARE_S) <= 60.0
+    assert early_s < 0.5 * EARLY_S
+    server._queue.replies.clear()
+    server._prompt, server._replied_s = True, time.monotonic() + 60.0
+    assert server._timeout() is None
+    for _ in range(1000):
+        server._note_wake(70e-6)
+    assert server._timeout() == POLL_STEP_S
     server.close()
 
 
