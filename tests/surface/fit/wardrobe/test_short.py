@@ -2,25 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
-from surface.fit.wardrobe.short import CROWN, LAYERS, short
+from surface.fit.wardrobe.short import CROWN, FRINGED, SWEPT, short, swept, thin
 from surface.fit.wardrobe.skin import CENTRE, Skin
 from surface.fit.wardrobe.styles import Style
 from tests.surface.fit.wardrobe.invariants import check_patches, heights, outward_share, points_of
 
+CUTS = {short: FRINGED, swept: SWEPT, thin: SWEPT}
+
+
+@pytest.fixture(scope="module", params=CUTS, ids=lambda make: make.__name__)
+def make(request: pytest.FixtureRequest) -> Callable[[Skin], Style]:
+    return request.param
+
 
 @pytest.fixture(scope="module")
-def style(skin: Skin) -> Style:
-    return short(skin)
+def style(make: Callable[[Skin], Style], skin: Skin) -> Style:
+    return make(skin)
 
 
-def test_there_is_a_sheet_of_each_layer_and_none_below_the_skin(style: Style, skin: Skin) -> None:
+def test_there_is_a_sheet_of_each_layer_and_none_below_the_skin(
+    style: Style, make: Callable[[Skin], Style], skin: Skin
+) -> None:
     check_patches(style.patches)
-    assert len(style.patches) == len(LAYERS) and style.hanging == ()
+    assert len(style.patches) == len(CUTS[make]) and style.hanging == ()
     over = heights(skin, points_of(style.patches))
-    assert over.min() > -1.5 and over.max() < 40.0
+    assert over.min() > -2.0 and over.max() < 40.0
     assert outward_share(style.patches, CENTRE) > 0.97
 
 
@@ -34,8 +45,8 @@ def test_strands_go_from_the_crown_to_the_line(style: Style) -> None:
         np.testing.assert_allclose(points[0], points[-1], atol=6.0)  # closed behind, but for locks
 
 
-def test_the_same_head_gets_the_same_hair(style: Style, skin: Skin) -> None:
-    again = short(skin)
+def test_the_same_head_gets_the_same_hair(style: Style, make: Callable[[Skin], Style], skin: Skin) -> None:
+    again = make(skin)
     for one, other in zip(style.patches, again.patches, strict=True):
         np.testing.assert_array_equal(one.points, other.points)
         np.testing.assert_array_equal(one.strands, other.strands)
