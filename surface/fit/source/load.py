@@ -22,7 +22,7 @@ from surface.fit.source.placing.frame import Frame, find_frame
 from surface.fit.source.placing.orient import shapes_of_sides
 from surface.fit.source.textures import tinted
 from surface.head.model.placement import Placement
-from surface.readers.gltfmesh import read_gltf
+from surface.readers.gltf.mesh import read_gltf
 from surface.readers.meshdata import MeshData
 from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj

@@ -17,7 +17,7 @@ from surface.fit.source.load import wanted_faces
 from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
 from surface.fit.source.textures import Samples as Colours
 from surface.fit.transfer.colours import moved, scan_colours
-from surface.readers.gltfmesh import read_gltf
+from surface.readers.gltf.mesh import read_gltf
 from surface.readers.meshdata import MOST_VERTICES, read_bytes
 from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj

@@ -17,7 +17,7 @@ from surface.base.errors import ExportError
 from surface.export import API, SUFFIXES, Exporter, export_head, exporters
 from surface.fit.source.load import load_mesh
 from surface.head import Head
-from surface.readers.gltfmesh import read_gltf
+from surface.readers.gltf.mesh import read_gltf
 from surface.readers.obj import read_obj
 
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}

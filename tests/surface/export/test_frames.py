@@ -11,7 +11,7 @@ from surface.export import Exporter, export_head
 from surface.export.shapes import _manifold
 from surface.head import Head
 from surface.head.model.placement import Placement
-from surface.readers.gltfmesh import read_gltf
+from surface.readers.gltf.mesh import read_gltf
 from surface.readers.obj import read_obj
 
 TURN = np.array([[0.0, 1, 0], [0, 0, 1], [1, 0, 0]])

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from surface.readers.gltf import Gltf
+from surface.readers.gltf.container import Gltf
 from surface.readers.meshdata import read_bytes
 
 WRITTEN = "written by omote"  # in the first line of OBJ files that omote exports

@@ -13,7 +13,7 @@ from typing import Any
 
 from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT
-from surface.readers.gltf import Gltf
+from surface.readers.gltf.container import Gltf
 from surface.readers.meshdata import Material, kind_of_picture
 
 ALPHA = ("OPAQUE", "MASK", "BLEND")

@@ -1,4 +1,4 @@
-"""surface.readers.gltfmaterials: colours and textures of every piece; nothing in them refuses a mesh."""
+"""surface.readers.gltf.materials: colours and textures of every piece; nothing in them refuses a mesh."""
 
 import json
 
@@ -7,7 +7,7 @@ import pytest
 from meshfiles import GlbBuilder, glb
 from slit_sheet import slit_sheet
 
-from surface.readers.gltfmesh import read_gltf
+from surface.readers.gltf.mesh import read_gltf
 from surface.readers.meshdata import Material
 
 PNG = b"\x89PNG\r\n\x1a\n and the rest"
@@ -123,7 +123,7 @@ def test_a_picture_of_many_materials_is_kept_once(tmp_path):
 
 
 def test_pictures_beyond_what_a_file_may_hold_are_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr("surface.readers.gltfmaterials.DATA_LIMIT", len(PNG) + 10)
+    monkeypatch.setattr("surface.readers.gltf.materials.DATA_LIMIT", len(PNG) + 10)
     table = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
     second = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 1}}}
     builder = coloured(table, PNG, PNG)

@@ -234,7 +234,7 @@ class Gltf:
         data, start, size = self._stored(packed, where)
         mode = self.value(packed, "mode", str, where)
         filtered = self.value(packed, "filter", str, where, "NONE")
-        from surface.readers.meshopt import decode_view  # most files need no numba to be read
+        from surface.readers.gltf.meshopt import decode_view  # most files need no numba to be read
 
         try:
             self._unpacked[index] = decode_view(data[start : start + size], mode, filtered, count, stride)

@@ -14,9 +14,9 @@ import numpy as np
 
 from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
-from surface.readers.gltf import Gltf
-from surface.readers.gltfmaterials import read_materials
-from surface.readers.gltftargets import TargetNames, read_expressions
+from surface.readers.gltf.container import Gltf
+from surface.readers.gltf.materials import read_materials
+from surface.readers.gltf.targets import TargetNames, read_expressions
 from surface.readers.meshdata import Material, MeshData, check_size
 
 WELD = 1e-6  # of the mesh's size: vertices nearer than this are welded

@@ -1,4 +1,4 @@
-"""surface.readers.gltf: containers and accessors, every number checked against what was packed by hand."""
+"""surface.readers.gltf.container: containers and accessors, every number checked against what was packed by hand."""
 
 import base64
 import json
@@ -9,7 +9,7 @@ import pytest
 from meshfiles import FLOAT, GlbBuilder
 
 from surface.base.errors import FitError
-from surface.readers.gltf import MOST_ELEMENTS, Gltf
+from surface.readers.gltf.container import MOST_ELEMENTS, Gltf
 
 
 def opened(tmp_path, builder: GlbBuilder) -> Gltf:

@@ -1,4 +1,4 @@
-"""surface.readers.gltftargets: names of morph targets, and expressions of VRM files, both versions."""
+"""surface.readers.gltf.targets: names of morph targets, and expressions of VRM files, both versions."""
 
 from dataclasses import replace
 from time import process_time
@@ -9,7 +9,7 @@ from meshfiles import GlbBuilder, glb
 from slit_sheet import slit_sheet
 
 from surface.fit.source.load import load_mesh
-from surface.readers.gltfmesh import read_gltf
+from surface.readers.gltf.mesh import read_gltf
 from surface.readers.meshdata import Expression, MeshData
 
 

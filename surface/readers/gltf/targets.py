@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from surface.readers.gltf import Gltf
+from surface.readers.gltf.container import Gltf
 from surface.readers.meshdata import Expression
 
 PERCENT = 0.01  # VRM 0 gives weights in percent

@@ -1,4 +1,4 @@
-"""surface.readers.meshopt against streams that the meshoptimizer library wrote, and against the extension's own text.
+"""surface.readers.gltf.meshopt against streams that the meshoptimizer library wrote, and the extension's own text.
 
 The streams are those of meshoptimizer 0.2.30a0 for the numbers that are made here (codec version 0 for attributes).
 """
@@ -11,9 +11,9 @@ from meshfiles import GlbBuilder, glb, meshopt_compressed, meshopt_stream
 from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
-from surface.readers.gltf import MOST_ELEMENTS, Gltf
-from surface.readers.gltfmesh import read_gltf
-from surface.readers.meshopt import decode_view
+from surface.readers.gltf.container import MOST_ELEMENTS, Gltf
+from surface.readers.gltf.mesh import read_gltf
+from surface.readers.gltf.meshopt import decode_view
 
 WAVE = bytes.fromhex(
     "a01f0058585858585858585858585858585858585858585858585858585858585858ffff00005858585858585858152aaeaaea0404aeaaea"

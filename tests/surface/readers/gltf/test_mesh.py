@@ -12,8 +12,8 @@ from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
 from surface.fit.source.load import LoadOptions, load_mesh
-from surface.readers import gltfmesh
-from surface.readers.gltfmesh import read_gltf
+from surface.readers.gltf import mesh as gltfmesh
+from surface.readers.gltf.mesh import read_gltf
 
 
 def write(tmp_path, builder: GlbBuilder, name: str = "m.glb"):
