@@ -54,7 +54,7 @@ LONG_PAUSE_S, PAUSE_S = (0.3, 3.0), (0.05, 1.5)
 """How long a process is stopped: a conductor or the router for longer than a lease, and another one."""
 DELAY_MS = 80.0  # of the stage: a face is shown so long after it was mixed, everywhere at once
 IN_STEP_S = 2.0
-BESIDE_S = 5e-3
+BESIDE_S, BESIDE_SHARE = 5e-3, 0.45
 WITHIN = 1.0001
 """A limit is kept where what is measured is less than this times the limit: times are whole ns."""
 RECORD = np.dtype([
@@ -203,13 +203,14 @@ def over_limits(life: np.ndarray) -> tuple[float, float]:
     """The greatest speed and acceleration of a life in units of their limits.
 
     A step is as long as that of the process; or as the time between the two faces of a conductor that are shown, where
-    that is the same but for :data:`BESIDE_S`, because ticks of two processes are never of quite the same length.
+    that is the same but for :data:`BESIDE_S` and :data:`BESIDE_SHARE` of the longer one, because ticks of two processes
+    are never of quite the same length.
     """
     before, after = life[:-1], life[1:]
     own, theirs = np.diff(life["passed_s"]), 1e-9 * np.diff(life["mixed_ns"])
     same = before["conducted"] & after["conducted"]
     same &= (before["fence"] == after["fence"]) & (before["holder"] == after["holder"])
-    same &= (theirs > 0.0) & (np.abs(theirs - own) < BESIDE_S)
+    same &= (theirs > 0.0) & (np.abs(theirs - own) < np.minimum(BESIDE_S, BESIDE_SHARE * np.maximum(theirs, own)))
     length = np.where(same, theirs, own)[:, None]
     speed = np.diff(life["values"], axis=0) / length
     change = np.diff(speed, axis=0) / (0.5 * (length[1:] + length[:-1]))

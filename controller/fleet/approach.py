@@ -45,6 +45,9 @@ class Approach:
     def step(self, time_s: float, face: Floats, out: Floats, *, stay: bool, passed_s: float | None = None) -> None:
         """Write to ``out`` : (P,) what is shown ``time_s`` later, when the face is at ``face`` : (P,).
 
+        In no time nothing moves, and only what the face already shows is met. A value of the face that is no finite
+        number counts as what is shown.
+
         stay : what meets the face is exactly there. passed_s : the time (s) in which the face moved so far, ``time_s``
         where it is not given.
         """
@@ -52,4 +55,6 @@ class Approach:
             passed_s = time_s if passed_s is None else passed_s
             self._face[:] = face  # which may be read-only
             pursue(time_s, passed_s, stay, self._face, self.met, self._motion, self._limits)
+        else:
+            self.met &= self._shown == face
         out[:] = self._shown

@@ -19,8 +19,9 @@ the sources themselves; the limiter behind it holds them in any case."""
 _SHORTEST_S = 0.3
 _PEAK_SPEED, _PEAK_ACCELERATION = 1.875, 5.7735
 """Greatest speed (1/s) and acceleration (1/s²) of the minimum-jerk curve from 0 to 1 over one second."""
-_BESIDE_S = 5e-3
-"""The time of motion is a conductor's where that lies no farther than this from one's own: ticks begin unevenly."""
+_BESIDE_S, _BESIDE_SHARE = 5e-3, 0.45
+"""The time of motion is a conductor's where that lies nearer than this to one's own, and nearer than this share of the
+longer of both: ticks begin unevenly, but where one is left out, the next is twice as long."""
 _WAITING = 128
 
 
@@ -143,7 +144,8 @@ class Follower:
         if following is None or before is None or following[0].token != before.token:
             return
         steps, span_ns = following[0].sequence - before.sequence, following[0].time_ns - before.time_ns
-        share = max(time_ns - before.time_ns, 0) * steps // max(span_ns, 1) / steps  # when the lost ones were due
+        passed_ns = min(max(time_ns - before.time_ns, 0), span_ns)  # the next one may have come just now, and late
+        share = passed_ns * steps // max(span_ns, 1) / steps  # when the lost ones were due
         at_ns = before.time_ns + round(share * span_ns)
         if at_ns > self._followed_ns:
             self._passed_s = 1e-9 * (at_ns - self._followed_ns)
@@ -151,7 +153,9 @@ class Follower:
 
     def _time_s(self, dt: float) -> float:
         """How far motion goes on in a step of ``dt`` s: as far as from one of a conductor's ticks to the next one."""
-        return self._theirs_s if self._theirs_s > 0.0 and abs(self._theirs_s - dt) < _BESIDE_S else dt
+        theirs_s = self._theirs_s
+        beside_s = min(_BESIDE_S, _BESIDE_SHARE * max(theirs_s, dt))
+        return theirs_s if theirs_s > 0.0 and abs(theirs_s - dt) < beside_s else dt
 
     def _due(self, now_ns: int) -> tuple[Header, Floats] | None:
         """The newest face that is to be shown by now."""

@@ -68,6 +68,8 @@ def _ends(t: float, mean: float, shown: float, top: float, accel: float, low: fl
 def pursue(t: float, passed_s: float, stay: bool, face: Floats, met: Flags, motion: Floats, limits: Floats) -> None:
     """Move for ``t`` s towards ``face`` : (n,), which went there in ``passed_s``; in place.
 
+    A value of the face that is no finite number counts as what is shown, and is not met.
+
     met : (n,) bool, whether what is shown is exactly the face, which is only where ``stay`` says so. motion : (4, n)
     what is shown, where the face was before, slowest and fastest end speed (units/s). limits : (4, n) of speed
     (units/s) and acceleration (units/s^2), low and high end of the range.
@@ -75,18 +77,19 @@ def pursue(t: float, passed_s: float, stay: bool, face: Floats, met: Flags, moti
     shown, before, slowest, fastest = motion[0], motion[1], motion[2], motion[3]
     speed, accel, low, high = limits[0], limits[1], limits[2], limits[3]
     for i in range(len(shown)):
-        a, top = accel[i], speed[i]
+        a, top, known = accel[i], speed[i], math.isfinite(face[i])
+        wanted = face[i] if known else shown[i]
         least, most = _means(t, shown[i], slowest[i], fastest[i], top, a, low[i], high[i])
-        drift = min(max((face[i] - before[i]) / max(t, passed_s), -top), top)
-        mean, rounding = (face[i] - shown[i]) / t, _ROUNDING * a * t
-        met[i] = stay and least - rounding <= mean <= most + rounding and (
+        drift = min(max((wanted - before[i]) / max(t, passed_s), -top), top)
+        mean, rounding = (wanted - shown[i]) / t, _ROUNDING * a * t
+        met[i] = known and stay and least - rounding <= mean <= most + rounding and (
             met[i] or abs(mean - drift) <= _MEET * a * t
         )  # fmt: skip
         if met[i]:
-            shown[i] = face[i]
+            shown[i] = wanted
         else:
-            mean = drift + _closing(t, shown[i] + drift * t - face[i], top, a)
+            mean = drift + _closing(t, shown[i] + drift * t - wanted, top, a)
             mean = min(max(mean, least), most)
             shown[i] = min(max(shown[i] + mean * t, low[i]), high[i])
         slowest[i], fastest[i] = _ends(t, mean, shown[i], top, a, low[i], high[i])
-        before[i] = face[i]
+        before[i] = wanted

@@ -29,7 +29,9 @@ JOIN_S = 1.0
 """Time between two attempts to start servos that were left out, one of them at a time."""
 JOIN_REST = 10.0
 """A servo whose attempt failed rests for so many times as long as that took, and as many times longer as servos rest:
-all servos wait for each attempt, but for a tenth of the time at most."""
+all servos wait for each attempt, but for a tenth of the time at most once each has been tried."""
+LONGEST_TRY_S = 15.0
+"""An attempt counts as no longer than this: a process that was stopped in the middle of one must not wait for hours."""
 FAR_RAD = 0.4
 """How far from its last goal a servo may stand that comes back and is simply driven on."""
 
@@ -303,7 +305,7 @@ class WireBus(Bus):
     def _let_rest(self, index: int, begun_s: float) -> None:
         """Try others first, after as long a pause as the attempt that failed took."""
         now_s = self._clock()
-        took_s = now_s - begun_s
+        took_s = min(now_s - begun_s, LONGEST_TRY_S)
         self._join_s = max(self._join_s, now_s + took_s)
         self._rests_s[index] = now_s + JOIN_REST * took_s * len(self._rests_s.keys() | {index})
 

@@ -124,7 +124,7 @@ class MixedBus(WireBus):
                 at = half.ids.index(self.ids[index])
                 if half.driven[at]:
                     return float(half._limits.target[at])
-        raise self._reasons[index]
+        raise self._reasons[index].with_traceback(None)  # else it keeps a frame of every attempt
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
         """Bring servos back that switched off or were rebooted; see the drivers of both protocols."""

@@ -106,3 +106,27 @@ def test_no_time_is_no_motion() -> None:
     way.begin(P.neutral())
     way.step(0.0, P.high, out, stay=True)
     assert (out == P.neutral()).all() and not way.met.any()
+
+
+def test_in_no_time_only_what_the_face_shows_already_stays_met() -> None:
+    way, out, jaw = Approach(P), P.neutral(), P.index("jawOpen")
+    way.begin(P.neutral())
+    way.step(DT, P.neutral(), out, stay=True)
+    assert way.met.all()
+    face = P.neutral()
+    face[jaw] = 0.1
+    way.step(0.0, face, out, stay=True)
+    assert out[jaw] == 0.0 and not way.met[jaw] and way.met.sum() == len(P) - 1
+
+
+@pytest.mark.parametrize("wrong", [np.nan, np.inf, -np.inf])
+def test_a_value_that_is_no_finite_number_moves_nothing_and_the_next_one_is_met(wrong: float) -> None:
+    steps, face, jaw = np.full(100, DT), np.tile(0.5 * (P.low + P.high), (100, 1)), P.index("jawOpen")
+    face[20:30, jaw] = wrong
+    rows = play(steps, face, P.neutral(), stay=True)
+    check_limits(rows, steps)
+    assert (rows[-1] == face[-1]).all()
+    way, out = Approach(P), P.neutral()
+    way.begin(P.neutral())
+    way.step(DT, face[20], out, stay=True)
+    assert out[jaw] == 0.0 and not way.met[jaw]

@@ -23,13 +23,13 @@ class Faces:
         self.state.live(1.0, 0)
         self._names = ("happiness", "anger", "surprise", "sadness")
 
-    def next(self, now_ns: int) -> tuple[Header, np.ndarray]:
+    def next(self, now_ns: int, dt: float = DT) -> tuple[Header, np.ndarray]:
         if self.sequence % 90 == 0:
             self.state.expression(self._names[self.sequence // 90 % 4], 1.0, None, now_ns)
             self.state.gaze(0.4 * (-1) ** (self.sequence // 90), 0.1, now_ns)
         self.sequence += 1
         values = P.neutral()
-        self.state.tick(now_ns, DT, values)
+        self.state.tick(now_ns, dt, values)
         return Header(self.token, self.sequence, now_ns, now_ns), values
 
 
@@ -53,11 +53,11 @@ def play(follower: Follower, spans: list[tuple[Faces | None, float]]) -> tuple[n
     return np.array(shown), sent
 
 
-def check_limits(shown: np.ndarray) -> None:
-    """Every step within the limits of speed, and of acceleration, but for rounding."""
-    speed = np.diff(shown, axis=0) / DT
+def check_limits(shown: np.ndarray, dt: float = DT) -> None:
+    """Every step of ``dt`` s within the limits of speed, and of acceleration, but for rounding."""
+    speed = np.diff(shown, axis=0) / dt
     assert (np.abs(speed) <= P.max_speed * 1.000001).all()
-    acceleration = np.diff(speed, axis=0) / DT
+    acceleration = np.diff(speed, axis=0) / dt
     over = np.abs(acceleration) / P.max_acceleration
     assert over.max() < 1.000001, P.names[int(np.unravel_index(over.argmax(), over.shape)[1])]
 
@@ -249,3 +249,30 @@ def test_a_head_is_as_far_in_its_motion_as_its_conductor_where_their_ticks_diffe
         follower.step(k * STEP_NS, DT + rng.uniform(-4e-3, 4e-3), own, out)
         exact.append(follower.exact and follower.conducted)
     assert all(exact)
+
+
+@pytest.mark.parametrize("rate_hz", [250, 1000])
+def test_the_limits_hold_where_a_face_is_lost_and_ticks_are_as_short_as_they_may_be(rate_hz: int) -> None:
+    """Two short ticks of the conductor are not taken for one of the head's that came a little late."""
+    step_ns, dt, rows = round(1e9 / rate_hz), 1.0 / rate_hz, list[np.ndarray]()
+    follower, faces, own, out = Follower(P), Faces(1, FIRST), P.neutral(), P.neutral()
+    for k in range(1, 3 * rate_hz):
+        header, values = faces.next(k * step_ns, dt)
+        if k % 20 >= rate_hz // 250:
+            follower.take(header, values)
+        follower.step(k * step_ns, dt, own, out)
+        rows.append(out.copy())
+    assert np.abs(np.diff(rows, axis=0)).max() > 0.0
+    check_limits(np.array(rows), dt)
+
+
+def test_a_bridge_ends_at_the_next_face_also_where_that_came_just_now_and_late() -> None:
+    """Faces come in another thread, so one may come that is due after the tick has looked for those."""
+    follower, jaw, out = Follower(P, delay_ns=5 * STEP_NS), P.index("jawOpen"), P.neutral()
+    near, far = P.neutral(), P.neutral()
+    near[jaw], far[jaw] = 0.1, 0.2
+    follower.take(Header(FIRST, 1, 10**9), near)
+    follower.step(10**9 + 5 * STEP_NS, DT, P.neutral(), out)
+    follower.take(Header(FIRST, 3, 10**9 + 2 * STEP_NS), far)
+    follower._bridge(10**9 + 4 * STEP_NS)
+    assert np.array_equal(follower._followed, far) and follower._followed_ns == 10**9 + 2 * STEP_NS

@@ -10,6 +10,7 @@ import pytest
 
 from drivers.base.bus import Bus, BusState, ServoSpec
 from drivers.base.errors import BusError, DriverError, NoReply, PortLost, PortMissing, ServoRefused
+from drivers.core.wirebus import JOIN_REST, LONGEST_TRY_S
 from drivers.sim.serving.virtual import VirtualBus
 
 SERVOS = tuple(ServoSpec(i, f"s{i}", "rc-180", -0.5, 0.5, 2.0, 50.0) for i in (1, 4))
@@ -302,8 +303,10 @@ def test_a_port_that_goes_away_while_it_is_opened_is_not_left_open(
         bus.start()
 
 
-def stuck(wire: VirtualBus, bus: Bus, monkeypatch: pytest.MonkeyPatch, *indices: int) -> list[float]:
-    """Leave all servos out; each attempt to start one of these takes 3 s and fails. Returns the times of attempts."""
+def stuck(
+    wire: VirtualBus, bus: Bus, monkeypatch: pytest.MonkeyPatch, *indices: int, takes_s: float = 3.0
+) -> list[float]:
+    """Leave all servos out; each attempt to start one of these takes so long and fails. Returns the times of attempts."""
     attempts: list[float] = []
     join = bus._join
 
@@ -311,7 +314,7 @@ def stuck(wire: VirtualBus, bus: Bus, monkeypatch: pytest.MonkeyPatch, *indices:
         if index not in indices:
             return join(index)
         attempts.append(wire.clock())
-        wire.clock.sleep(3.0)
+        wire.clock.sleep(takes_s)
         raise BusError("it does not run")
 
     monkeypatch.setattr(bus, "_join", slow)
@@ -341,3 +344,15 @@ def test_all_servos_wait_a_tenth_of_the_time_at_most_for_those_that_fail(monkeyp
             bus.read()
             wire.clock.sleep(0.02)
         assert 0.05 < 3.0 * len(attempts) / wire.clock() < 0.11
+
+
+def test_a_process_that_was_stopped_in_an_attempt_tries_again_within_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The pause of the process is not how long the servo takes to fail."""
+    wire = VirtualBus(CHAIN)
+    with wire.bus(watchdog_ms=0) as bus:
+        bus.start()
+        attempts = stuck(wire, bus, monkeypatch, 0, takes_s=6 * 3600.0)
+        for _ in range(round(2.0 * JOIN_REST * LONGEST_TRY_S)):
+            bus.read()
+            wire.clock.sleep(1.0)
+        assert len(attempts) >= 2 and bus.driven[1]

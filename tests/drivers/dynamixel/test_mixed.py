@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -150,3 +151,19 @@ def test_everybody_is_found_in_either_protocol(wire: VirtualBus) -> None:
         assert [(info.id, info.model) for info in found] == [
             (1, "xl330-m288"), (3, "ax-12a"), (4, "mx1-28"), (5, "xl330-m288")
         ]  # fmt: skip
+
+
+def test_what_keeps_a_servo_out_grows_no_trace_of_every_attempt(
+    wire: VirtualBus, bus: Bus, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(index: int) -> float:
+        raise BusError("it does not start")
+
+    monkeypatch.setattr(bus._new, "_join", refuse)
+    for each in (bus, bus._new):  # the first servo is the first of its half
+        each._give_up(0, BusError("it is off"))
+    for _ in range(50):
+        bus.read()
+        wire.clock.sleep(1.0)
+    assert not bus.driven[0] and bus.driven[1:].all()
+    assert len(traceback.extract_tb(bus._reasons[0].__traceback__)) < 5
