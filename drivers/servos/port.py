@@ -28,7 +28,8 @@ POLL_LATE_S = 0.0005
 POLL_WORTH_S = 0.00004
 """Polling begins where nine of ten waits end later than this."""
 SLEEPS = 32
-"""So many replies after one that came piece by piece are slept for, then one is looked at again."""
+"""So many replies after one that came piece by piece are slept for, then one is looked at again. One of so many that
+are polled for without a sleep is slept for: else nothing would be learned of how late the system wakes threads."""
 
 
 class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
@@ -61,7 +62,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self.stray = 0
         self.delays = ReplyDelays()
         self.deadline_s = self._free_s = 0.0
-        self._sleeps = 0
+        self._sleeps = self._polled = 0
         self._wakes = WakeDelay(0.1, 2 * POLL_WORTH_S)
         self._held = bytearray()
         self._margin_s = margin_s
@@ -151,7 +152,8 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
 
     def _await(self, due_s: float) -> bytes:
         """Sleep until bytes are due, and take them; poll for them at the end where the system wakes threads late."""
-        now, polls = self.clock(), self._wakes.late_s > POLL_WORTH_S
+        now = self.clock()
+        polls = self._polls(due_s - now)
         wake_s = due_s - WAKE_EARLY_S if polls else due_s
         if wake_s - now > LEAST_SLEEP_S:
             self.sleep(wake_s - now)
@@ -159,6 +161,15 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
             if not polls and (data := self.link.read_now()):
                 return data
         return self._poll(due_s) if polls else self.link.read(self.deadline_s)
+
+    def _polls(self, pause_s: float) -> bool:
+        """Whether to poll at the end of a pause."""
+        if self._wakes.late_s <= POLL_WORTH_S:
+            return False
+        if not LEAST_SLEEP_S < pause_s <= LEAST_SLEEP_S + WAKE_EARLY_S:
+            return True
+        self._polled = (self._polled + 1) % SLEEPS
+        return self._polled > 0
 
     def _poll(self, due_s: float) -> bytes:
         end_s = min(due_s + POLL_LATE_S, self.deadline_s)

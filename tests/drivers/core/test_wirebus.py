@@ -306,7 +306,7 @@ def test_a_port_that_goes_away_while_it_is_opened_is_not_left_open(
 def stuck(
     wire: VirtualBus, bus: Bus, monkeypatch: pytest.MonkeyPatch, *indices: int, takes_s: float = 3.0
 ) -> list[float]:
-    """Leave all servos out; each attempt to start one of these takes so long and fails. Returns the times of attempts."""
+    """Leave all servos out; an attempt to start one of these takes so long and fails. Returns the times of attempts."""
     attempts: list[float] = []
     join = bus._join
 

@@ -221,6 +221,19 @@ def test_polling_goes_on_only_where_the_system_wakes_the_thread_late(
     assert waits.naps[-1] == pytest.approx(0.005 - WAKE_EARLY_S if polls else 0.005)
 
 
+@pytest.mark.parametrize(("late_s", "polls"), [(5e-6, False), (80e-6, True)])
+def test_it_is_learned_also_from_replies_too_short_to_sleep_before_polling(
+    sleeper: Port, monkeypatch: pytest.MonkeyPatch, late_s: float, polls: bool
+) -> None:
+    """Else a processor that was busy once would be polled on for ever."""
+    waits, calls = Waits(sleeper, monkeypatch, 0.005, late_s), 40 * SLEEPS
+    for _ in range(calls):
+        waits.now = 0.0042
+        assert sleeper.more() == b"x"
+    assert waits.naps == pytest.approx([0.0008] * len(waits.naps))
+    assert len(waits.naps) == 40 if polls else len(waits.naps) > calls / 2
+
+
 def test_the_replies_after_one_in_pieces_are_slept_for_from_their_beginning(
     sleeper: Port, monkeypatch: pytest.MonkeyPatch
 ) -> None:
