@@ -164,19 +164,21 @@ class Shows:
         self.prepared_control(what, to)()
 
     def prepared_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
-        """What :meth:`control` does, for the show that plays now. Raises ParameterError as that."""
+        """What :meth:`control` does, once nothing can refuse it. Raises ParameterError as that."""
         show = self._show
         if show is None:
             raise ParameterError("no show plays", hint="begin one: SHOW name")
         return partial(self._control, show, what, show.place(to) if what == "SEEK" else 0.0)
 
-    def _control(self, show: Show, what: str, to_s: float) -> None:
-        """Does nothing where another show has begun meanwhile."""
+    def _control(self, meant: Show, what: str, to_s: float) -> None:
+        """Where another show has begun since it was asked for, that one stops, pauses or plays, but stays where it is."""
         with self._lock:
-            if self._show is not show:
+            show = self._show
+            if show is None:
                 return
             if what == "SEEK":
-                show.seek(to_s)
+                if show is meant:  # a mark of one show is no place in another
+                    show.seek(to_s)
             elif what == "STOP":
                 self._show = None
             else:

@@ -123,3 +123,14 @@ def test_the_hint_lists_the_marks_there_are(show: Show) -> None:
     with pytest.raises(ParameterError) as caught:
         plain.seek("open")
     assert caught.value.hint == "marks: none"
+
+
+@pytest.mark.parametrize(("what", "status"), [("STOP", "off"), ("PAUSE", "next@0.0,paused"), ("SEEK", "next@0.0")])
+def test_what_stops_a_show_also_stops_one_that_has_begun_at_that_moment(what: str, status: str) -> None:
+    """A show may start another one while a link asks for it to be stopped; a place in the one is none in the other."""
+    shows = Shows(lambda name: Script(((9.0, "PING"),), name=name), CommandState(P))
+    shows.start("first")
+    act = shows.prepared_control(what, 5.0)
+    shows.start("next")
+    act()
+    assert shows.status() == status
