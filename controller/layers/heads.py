@@ -175,7 +175,10 @@ class Group:
                                  hint=f"layers that all have: {', '.join(self.layer_names())}")  # fmt: skip
 
     def _each(self, command: Callable[[HeadSink], object]) -> None:
-        """Give each a command that all refuse alike, or none: heads of a stage share parameters and expressions."""
+        """Give each a command that the first one refuses before anything has changed, if any of them does.
+
+        Heads of a stage share parameters and expressions, so all of them refuse the same.
+        """
         for state in self.members:
             command(state)
 

@@ -171,7 +171,7 @@ class Shows:
         return partial(self._control, show, what, show.place(to) if what == "SEEK" else 0.0)
 
     def _control(self, meant: Show, what: str, to_s: float) -> None:
-        """Where another show has begun since it was asked for, that one stops, pauses or plays, but stays where it is."""
+        """Where another show has begun meanwhile, that one is stopped, paused or played, but not moved to the place."""
         with self._lock:
             show = self._show
             if show is None:
