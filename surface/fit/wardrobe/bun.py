@@ -62,7 +62,7 @@ def _surface(polar: Floats, round_it: Floats, grown: float) -> Floats:
 def _coil() -> list[Patches]:
     """Strands that wind round the bun, in lobes, from its base to its tip."""
     weave, random = Weave((25, 10), (49, 13), (21, 7)), np.random.default_rng(35)
-    start = np.linspace(0.0, -2.0 * np.pi, weave.points[0])[:, None]
+    start = np.linspace(0.0, 2.0 * np.pi, weave.points[0])[:, None]
     t = np.linspace(0.0, 1.0, weave.points[1])[None]
     polar = np.radians(138.0 - 137.0 * t) + 0.0 * start
     out = []

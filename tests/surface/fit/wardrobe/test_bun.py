@@ -23,7 +23,7 @@ def test_the_coil_comes_before_the_sheets_on_the_skull(style: Style, skin: Skin)
     coil, skull = style.patches[: len(BUN_LAYERS)], style.patches[len(BUN_LAYERS) :]
     assert np.linalg.norm(points_of(coil) - BUN, axis=1).max() < 40.0
     assert heights(skin, points_of(skull)).min() > -2.5
-    assert abs(outward_share(coil, BUN) - 0.5) > 0.49  # all of it looks one way
+    assert outward_share(coil, BUN) > 0.99
     assert outward_share(skull, CENTRE) > 0.9
 
 
