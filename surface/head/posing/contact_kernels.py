@@ -204,7 +204,7 @@ def hidden_to(across: Floats, edge: Floats, at: float, sign: float) -> float:
     for k in range(1, len(across)):
         if abs(across[k] - at) < abs(across[nearest] - at):
             nearest = k
-    return edge[nearest, 1]
+    return float(edge[nearest, 1])
 
 
 @kernel
