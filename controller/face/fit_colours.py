@@ -23,7 +23,8 @@ _DRAWN_APART = ("lips", "freckles")  # these would tint the colours
 
 @dataclass(frozen=True)
 class FitFigures:
-    """How far the vertices of a head at rest lie from its mesh, mm; ``part`` is the one that they are of."""
+    """How far the vertices of a part of a head at rest lie from its mesh, mm: their root mean square, the distance
+    within which 99 % lie, and the greatest."""
 
     part: str
     rms: float
@@ -35,12 +36,14 @@ class FitFigures:
 
 
 def figures_of(head: Head) -> FitFigures | None:
-    """Of the measured part with the most vertices, which is the face; None for a head that was not measured."""
-    measured = [part for part in head.parts if np.isfinite(part.attributes.get(ATTRIBUTE, np.zeros(0))).any()]
+    """Of the measured part with lips or lids, which is the face, of several or none the one with the most vertices;
+    None for a head that was not measured."""
+    measured = [part for part in head.parts if np.isfinite(_mm(part)).any()]
     if not measured:
         return None
-    part = max(measured, key=lambda each: len(each.vertices))
-    mm = part.attributes[ATTRIBUTE].astype(np.float64)
+    opened = {contact.part for contact in head.data.contacts}
+    part = max(measured, key=lambda each: (each.name in opened, len(each.vertices)))
+    mm = _mm(part)
     mm = mm[np.isfinite(mm)]
     return FitFigures(part.name, float(np.sqrt(np.mean(mm**2))), float(np.percentile(mm, 99.0)), float(mm.max()))
 

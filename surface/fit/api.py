@@ -57,7 +57,7 @@ from surface.head.model.data import HeadData, Neck, PartData
 from surface.head.model.file import check_writable, load_data
 from surface.head.model.meshes import pack, tessellate
 from surface.head.model.parameters import NAMES, read_pose
-from surface.head.posing.fit_error import drop_fit_error, write_fit_error
+from surface.head.posing.fit_error import write_fit_error
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
 
@@ -114,7 +114,6 @@ def measure_head(head: str | Path, mesh_path: str | Path, options: LoadOptions =
             f"{off:.1f} mm RMS from it" if errors else "no part is in it"
         )
         raise FitError(why, hint="name the mesh and the options that the head was made with")
-    drop_fit_error(head)  # may be of other triangles
     write_fit_error(head, errors, Head(data).parts)
     return errors
 

@@ -37,7 +37,7 @@ class FitErrorView:
         self._see(head)
 
     def _see(self, head: Head) -> None:
-        self._head, self._figures, self._gaps = head, figures_of(head), unmeasured(head)
+        self._figures, self._gaps = figures_of(head), unmeasured(head)
 
     def dress(self, head: Head, theme: Theme) -> Theme:
         """Paint a head that is drawn from now on, or take the paint off; returns the theme that shows it so."""

@@ -16,7 +16,10 @@ _OUT = unit(np.array([0.0, 0.42, -0.91]))  # where it points
 _RADII = np.array([29.0, 26.0, 22.0])  # half its width, its height, and along where it points
 GUIDES = 73
 LAYERS = (Layer(1.06, 0.50, 1.0, 4.0, 0.5), Layer(1.0, 0.78, 0.92, 4.0, 0.4), Layer(0.90, 1.6, 0.74, 4.0, 0.75))
-BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 1.4, 0.82, 2.0))
+# The inner one so dense that it is closed up to its tip: nothing lies below it
+BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 6.0, 0.82, 0.2))
+UNDER_MM = 13.0  # from the middle of the bun's base: there strands of the skull end, well below the coil
+NAPE_RAD = 0.06  # how much higher than the line hair begins there, seen from the skull's middle
 _TURNS = 0.62  # of a strand about the bun, from its base to its tip
 
 
@@ -26,7 +29,7 @@ def bun(skin: Skin) -> Style:
     base = BUN - 14.0 * _OUT
     round_it = np.linspace(np.pi, -np.pi, GUIDES)
     nape = step(np.abs(round_it), 2.3, 2.9)
-    toward = directions(line.down(round_it) + 0.012 - 0.20 * nape, round_it)
+    toward = directions(line.down(round_it) + 0.012 - NAPE_RAD * nape, round_it)
     roots = CENTRE + toward * skin.reach(toward)[:, None]
 
     def thickness(at: Floats) -> Floats:
@@ -39,7 +42,7 @@ def bun(skin: Skin) -> Style:
         return unit(ahead * (0.65 + 0.35 * near) + 0.35 * (1.0 - near) * back)
 
     def cut(at: Floats) -> Floats:
-        return np.asarray(np.linalg.norm(at - base, axis=1) - 20.0)
+        return np.asarray(np.linalg.norm(at - base, axis=1) - UNDER_MM)
 
     comb = Comb(roots[::-1], np.full(GUIDES, 330.0), thickness, flow, cut, 0.0, 0.5, steps=66, slack=0.4)
     made = sheets(skin, comb, LAYERS, Weave((73, 12), (97, 15), (49, 9)), seed=31, closed=True)
@@ -62,7 +65,7 @@ def _surface(polar: Floats, round_it: Floats, grown: float) -> Floats:
 def _coil() -> list[Patches]:
     """Strands that wind round the bun, in lobes, from its base to its tip."""
     weave, random = Weave((25, 10), (49, 13), (21, 7)), np.random.default_rng(35)
-    start = np.linspace(0.0, -2.0 * np.pi, weave.points[0])[:, None]
+    start = np.linspace(0.0, 2.0 * np.pi, weave.points[0])[:, None]
     t = np.linspace(0.0, 1.0, weave.points[1])[None]
     polar = np.radians(138.0 - 137.0 * t) + 0.0 * start
     out = []

@@ -184,6 +184,29 @@ def trace_edges(samples: Floats, edges: Floats) -> None:
                 edges[side, k, c] = samples[side, k, best, c]
 
 
+@nonallocating
+def hidden_to(across: Floats, edge: Floats, at: float, sign: float) -> float:
+    """The height up to which a line of :func:`trace_edges`, ``edge (k, 3)``, hides what lies behind it, or down to
+    which with a ``sign`` below 0, at the place ``at`` across the line of sight; that of its nearest point beyond its
+    ends.
+
+    across : (k,) places of its points. Seen aside, the line may run back at a corner of the mouth, so that several of
+    its pieces lie at one place; the one that hides most counts.
+    """
+    most, nearest = -1e9, 0
+    for k in range(len(across) - 1):
+        a, b = across[k], across[k + 1]
+        if (a - at) * (b - at) <= 0.0:
+            t = (at - a) / (b - a) if a != b else 0.0
+            most = max(most, sign * (edge[k, 1] + t * (edge[k + 1, 1] - edge[k, 1])))
+    if most > -1e9:
+        return sign * most
+    for k in range(1, len(across)):
+        if abs(across[k] - at) < abs(across[nearest] - at):
+            nearest = k
+    return float(edge[nearest, 1])
+
+
 @kernel
 def find_gaps(samples: Floats, gaps: Floats) -> None:
     """How far an opening stands open, ``gaps (2, k)``, as seen from the front and :data:`SIGHT` aside of it, where it
@@ -199,12 +222,9 @@ def find_gaps(samples: Floats, gaps: Floats) -> None:
             for k in range(columns):
                 across[side, k] = edges[side, k, 0] - way * SIGHT * edges[side, k, 2]
         for side in range(2):
-            x, at, sign = across[1 - side], 0, 1.0 - 2.0 * side
+            sign = 1.0 - 2.0 * side
             for k in range(columns):
-                while at < columns - 2 and x[at + 1] < across[side, k]:
-                    at += 1
-                t = min(max((across[side, k] - x[at]) / max(x[at + 1] - x[at], 1e-9), 0.0), 1.0)
-                other = edges[1 - side, at, 1] + t * (edges[1 - side, at + 1, 1] - edges[1 - side, at, 1])
+                other = hidden_to(across[1 - side], edges[1 - side], across[side, k], sign)
                 gaps[side, k] = max(gaps[side, k], sign * (edges[side, k, 1] - other))
 
 

@@ -80,14 +80,16 @@ def _from_octahedron(packed: Array) -> Array:
 
 
 def _from_exponents(packed: Array) -> Array:
-    """float32 numbers from an exponent in the upper eight bits and a whole number in the lower 24."""
-    out: Array = np.ldexp(((packed << 8) >> 8).astype(np.float32), packed >> 24).astype("<f4")
+    """float32 numbers from an exponent in the upper eight bits and a whole number in the lower 24; infinite where
+    float32 has none so great."""
+    with np.errstate(over="ignore", under="ignore"):
+        out: Array = np.ldexp(((packed << 8) >> 8).astype(np.float32), packed >> 24).astype("<f4")
     return out
 
 
 @kernel
 def _read_attributes(stream, out):
-    """Fill ``out (n, stride)`` uint8; False where the stream does not hold that."""
+    """Fill ``out (n, stride)`` uint8; False where the stream holds less or more than that."""
     count, stride = out.shape
     end = len(stream) - max(LEAST_TAIL, stride)
     if end < 1:
@@ -101,7 +103,7 @@ def _read_attributes(stream, out):
             if at > end:
                 return False
             before[k] = out[last - 1, k]
-    return True
+    return at == end
 
 
 @kernel
@@ -174,7 +176,7 @@ def _read_indices(stream, out):
         base = number & 1
         last[base] = (last[base] + _signed(number >> 1)) & 0xFFFFFFFF
         out[k] = last[base]
-    return True
+    return at == end
 
 
 EDGE, CORNER, NEXT, LAST, AT = range(5)  # of a state: edges and corners remembered, two numbers, place in the stream

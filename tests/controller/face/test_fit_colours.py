@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -51,6 +52,17 @@ def test_the_figures_are_of_what_was_measured(head: Head) -> None:
     assert found.rms == pytest.approx(np.sqrt(np.mean(mm**2))) and found.most == pytest.approx(mm.max())
     assert str(found) == f"face: RMS {found.rms:.2f} mm, 99 % within {found.p99:.2f} mm, most {found.most:.2f} mm"
     assert figures_of(Head(small_head())) is None
+
+
+def test_the_figures_are_of_the_face_also_where_the_back_has_more_vertices(head: Head) -> None:
+    """As on heads whose scan or mesh is finer behind."""
+    neck = head.part("neck")
+    neck.attributes["fit_error"] = np.full(len(neck.vertices), 0.2, np.float32)
+    head.part("face").attributes["fit_error"][1:] = np.nan
+    for name in ("neck", "face"):
+        head.data.contacts[:] = [SimpleNamespace(part=name)]
+        found = figures_of(head)
+        assert found is not None and found.part == name
 
 
 def test_the_theme_that_shows_them_takes_painted_colours_and_keeps_the_background() -> None:

@@ -7,7 +7,7 @@ import pytest
 from eye_face import joined
 from slit_sheet import slit_sheet, write_npz
 
-from surface.base.errors import FitError
+from surface.base.errors import FitError, HeadFileError
 from surface.fit import api, fit_head
 from surface.fit.api import eyes_of, fit_mesh, measure_head, part_chart, prepare, recipe_plan
 from surface.fit.eyes.lids import gazes_of
@@ -105,6 +105,19 @@ def test_a_head_that_is_there_is_measured_again_beside_its_own_mesh_alone(fitted
     with pytest.raises(FitError, match=r"was not fitted to .* mm RMS from it"):
         measure_head(folder, other)
     assert np.isfinite(Head.load(folder).part("face").attributes["fit_error"]).all()
+
+
+def test_what_was_measured_before_stays_where_the_disk_is_full(fitted, monkeypatch):
+    folder, _, _ = fitted
+    kept = (folder / FIT_ERROR).read_bytes()
+
+    def full(*_, **__):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(np, "savez_compressed", full)
+    with pytest.raises(HeadFileError, match="cannot be written"):
+        measure_head(folder, folder.parent / "m.npz")
+    assert (folder / FIT_ERROR).read_bytes() == kept
 
 
 def test_nothing_is_written_for_a_bad_mesh(tmp_path):

@@ -14,6 +14,7 @@ from surface.head.posing.contact_kernels import (
     find_lifts,
     find_overlap,
     follow_samples,
+    hidden_to,
     lift_points,
     move_points,
     overlap_at,
@@ -185,6 +186,24 @@ def test_an_opening_is_as_wide_as_where_one_sees_farthest_into_it(ahead):
     find_gaps(samples, gaps)
     seen = 2.0 - 0.5 * np.arange(21) + 0.5 * SIGHT * abs(ahead)
     np.testing.assert_allclose(gaps[0, 5:16], seen[5:16], atol=1e-9)
+
+
+def test_an_opening_whose_line_runs_back_seen_aside_is_that_of_its_mirror_image():
+    """The upper rim bulges forward between its columns 5 and 8, so steeply that it hides itself seen aside."""
+    samples, gaps, mirrored = opening(-2.0, columns=21, slant=0.5), np.zeros((2, 21)), np.zeros((2, 21))
+    samples[0, 5:9, :, 2] += 4.0
+    samples[0, 6, :, 1] -= 1.5
+    find_gaps(samples, gaps)
+    find_gaps(samples[:, ::-1] * [-1.0, 1.0, 1.0], mirrored)
+    np.testing.assert_allclose(mirrored[:, ::-1], gaps, atol=1e-12)
+
+
+def test_of_the_pieces_of_a_line_at_one_place_the_one_that_hides_most_counts():
+    across, edge = np.array([0.0, 3.0, 1.0, 4.0]), np.zeros((4, 3))
+    edge[:, 1] = [0.0, 3.0, 7.0, 1.0]
+    assert hidden_to(across, edge, 2.0, 1.0) == pytest.approx(5.0)
+    assert hidden_to(across, edge, 2.0, -1.0) == pytest.approx(2.0)
+    assert hidden_to(across, edge, -5.0, 1.0) == 0.0 and hidden_to(across, edge, 9.0, -1.0) == 1.0  # beyond its ends
 
 
 def test_points_move_up_straight_or_round_the_eyeball_or_away_from_it():

@@ -86,6 +86,9 @@ def test_numbers_with_exponents() -> None:
     packed = np.array([[(-3 << 24) | 5, (2 << 24) | (-7 & 0xFFFFFF), 0]], np.int64).astype(np.int32)
     found = np.frombuffer(decode_view(meshopt_stream(packed.tobytes(), 12), "ATTRIBUTES", "EXPONENTIAL", 1, 12), "<f4")
     assert found.tolist() == [0.625, -28.0, 0.0]
+    great = np.array([[(127 << 24) | 0x7FFFFF]], np.int32)
+    stream = meshopt_stream(great.tobytes(), 4)
+    assert np.frombuffer(decode_view(stream, "ATTRIBUTES", "EXPONENTIAL", 1, 4), "<f4").tolist() == [np.inf]
 
 
 @pytest.mark.parametrize(
@@ -99,6 +102,8 @@ def test_numbers_with_exponents() -> None:
         ((WAVE, "ATTRIBUTES", "QUATERNION", 40, 8), "filter 'QUATERNION' of elements of 8 bytes is not read"),
         ((WAVE, "ATTRIBUTES", "NONE", 400, 8), "is damaged or cut short"),
         ((WAVE[:20], "ATTRIBUTES", "NONE", 40, 8), "is damaged or cut short"),
+        ((WAVE, "ATTRIBUTES", "NONE", 20, 8), "is damaged or cut short"),
+        ((INDICES, "INDICES", "NONE", 9, 4), "is damaged or cut short"),
         ((TRIANGLES, "TRIANGLES", "NONE", 101, 4), "101 numbers of 4 bytes"),
         ((TRIANGLES, "TRIANGLES", "NONE", 99, 4), "is damaged or cut short"),
         ((INDICES, "INDICES", "NONE", 11, 4), "is damaged or cut short"),
@@ -156,6 +161,7 @@ def test_accessors_of_a_compressed_view_are_read_as_of_any_other(tmp_path) -> No
     ("changed", "why"),
     [
         ({"count": 400}, "is damaged or cut short"),
+        ({"count": 20}, "is damaged or cut short"),
         ({"count": MOST_ELEMENTS + 1}, "too many"),
         ({"byteStride": -8}, "byteStride: is -8"),
         ({"byteLength": 10**6}, "it is cut short"),
