@@ -54,7 +54,9 @@ def test_interfaces_have_the_methods_that_links_use() -> None:
         "overview", "held",
     }  # fmt: skip
     assert methods(HeadSink).keys() == methods(CommandSink).keys()
-    assert methods(Player).keys() == {"start", "names", "control", "tick", "abandon", "status"}
+    assert methods(Player).keys() == {
+        "start", "prepared", "names", "control", "prepared_control", "tick", "abandon", "status",
+    }  # fmt: skip
 
 
 VALUES, MASK = np.full(len(P), 0.25), np.ones(len(P), dtype=bool)
@@ -76,6 +78,9 @@ class Head:
     def __init__(self, name: str, heads: Heads) -> None:
         self.name, self.heads = name, heads
         self.calls: list[tuple[str, tuple[Any, ...]]] = []
+
+    def layer_names(self) -> tuple[str, ...]:
+        return ("link",)
 
     def __getattr__(self, name: str) -> Callable[..., None]:
         return lambda *given: self.calls.append((name, given))

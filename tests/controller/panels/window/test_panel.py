@@ -142,18 +142,15 @@ def test_a_step_of_undo_ends_when_the_mouse_is_let_go(screen: Screen) -> None:
     assert panel.commands.now.held == {}
 
 
-def test_a_picture_that_is_alone_keeps_a_stop_in_its_corner(screen: Screen, monkeypatch: pytest.MonkeyPatch) -> None:
-    places, sent, area = Places(screen.imgui, monkeypatch), list[Any](), PictureArea()
+def test_a_picture_that_is_alone_keeps_a_stop_in_its_corner(screen: Screen) -> None:
+    sent, area = list[Any](), PictureArea()
     panel = Panel(PARAMETERS.neutral, sent.append, area=area)
-    for _ in range(2):
-        screen.frame(panel)
-    assert "STOP servos" not in places.at
     area.bare = True
     for _ in range(3):
         screen.frame(panel)
-    x, y = places.at["STOP servos"]
-    assert x > 900 - 10 * 14 - 20 and y > 3000 - 100  # of a display of 900 x 3000
-    screen.click(panel, x, y)
+    box = panel.stop.box
+    assert box.left > 900 - 10 * 14 - 20 and box.top > 3000 - 100  # of a display of 900 x 3000
+    screen.click(panel, (box.left + box.right) / 2, (box.top + box.bottom) / 2)
     assert sent == [StopServos()]
 
 
