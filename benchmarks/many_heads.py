@@ -102,7 +102,7 @@ def follow(pipe: Connection, endpoint: str, names: list[str], hz: float) -> None
     clock = Clock(hz)
     node, states = make_node(endpoint, "head", names, clock)
     ages: list[float] = []
-    sequences: dict[str, list[int]] = {name: [] for name in names}
+    sequences: dict[str, list[tuple[Token, int]]] = {name: [] for name in names}
     arrivals: list[tuple[float, Token]] = []
     for name, follower in node.followers.items():
         follower.take = _noting(follower.take, ages, sequences[name], arrivals if name == names[0] else [])  # type: ignore[method-assign]
@@ -129,14 +129,17 @@ def follow(pipe: Connection, endpoint: str, names: list[str], hz: float) -> None
 
 
 def _noting(
-    take: Callable[[Header, Any], bool], ages: list[float], sequences: list[int], arrivals: list[tuple[float, Token]]
+    take: Callable[[Header, Any], bool],
+    ages: list[float],
+    sequences: list[tuple[Token, int]],
+    arrivals: list[tuple[float, Token]],
 ) -> Callable[[Header, Any], bool]:
     def noting(header: Header, values: Any) -> bool:
         now = time.monotonic_ns()
         taken = take(header, values)
         if taken:
             ages.append((now - header.time_ns) / 1e6)
-            sequences.append(header.sequence)
+            sequences.append((header.token, header.sequence))
             arrivals.append((now * 1e-9, header.token))
         return taken
 
@@ -189,12 +192,24 @@ def measure(heads: int, hz: float, seconds: float, processes: int) -> dict[str, 
     return summary(reports, gaps, standby, hub.recv(), sent_bytes, seconds)
 
 
+def faces_sent(taken: list[tuple[Token, int]]) -> int:
+    """How many faces of one head its conductors sent from the first to the last that it took of each; each conductor
+    counts its own, in each of its terms.
+
+    taken : tokens and sequences in the order in which they were taken.
+    """
+    ends: dict[Token, tuple[int, int]] = {}
+    for token, sequence in taken:
+        ends[token] = ends.get(token, (sequence, 0))[0], sequence
+    return sum(last - first + 1 for first, last in ends.values())
+
+
 def summary(
     reports: list[Any], gaps: list[float], standby: dict[str, Any], router_s: float, sent: int, seconds: float
 ) -> dict[str, Any]:
     ages = np.concatenate([report["ages"] for report in reports])
     lists = [found for report in reports for found in report["sequences"].values()]
-    wanted = sum(found[-1] - found[0] + 1 for found in lists)
+    wanted = sum(map(faces_sent, lists))
     count = sum(map(len, lists))
     return {
         "faces a second": count / seconds,

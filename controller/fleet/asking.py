@@ -42,11 +42,12 @@ class Asking:
         self._crossed: Counter[str] = Counter()
         self._asked_s = -_CLOCK_S
 
-    def ask(self) -> None:
-        """Called often: ask what is due."""
+    def ask(self, *, silent: bool = False) -> None:
+        """Called often: ask what is due; more where it is ``silent``, so that it is soon known who is there."""
         if self._lease.active:
             return
-        pause_s = _CLOCK_S if self._clocks.answers(self._lease.highest.holder) >= _KNOWN else _OFTEN_S
+        known = self._clocks.answers(self._lease.highest.holder) >= _KNOWN
+        pause_s = _CLOCK_S if known and not silent else _OFTEN_S
         if time.monotonic() - self._asked_s >= pause_s:
             self._asked_s = time.monotonic()
             self._ask_clock()
@@ -68,7 +69,7 @@ class Asking:
             else:
                 self._clocks.add(holder, asked, received, answered, arrived)
 
-        self._wire.session.get(self._wire.key(ALL, "clock"), heard, timeout=_CLOCK_S)
+        self._wire.ask(ALL, "clock", heard, _CLOCK_S)
 
     def _catch_up(self) -> None:
         """Ask a conductor that was there before what was commanded, until it has answered once."""
@@ -78,7 +79,7 @@ class Asking:
         for name in self._heads:
             if self._restored.get(name) != highest:
                 act = self._restorer(name, highest, self._events.get(name, 0))
-                self._wire.session.get(self._wire.key(name, "state"), act, timeout=_CLOCK_S)
+                self._wire.ask(name, "state", act, _CLOCK_S)
 
     def _restorer(self, name: str, conductor: Token, events: int) -> Callable[[zenoh.Reply], None]:
         def heard(reply: zenoh.Reply) -> None:

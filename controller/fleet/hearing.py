@@ -35,16 +35,24 @@ class Hearing:
     ) -> None:  # fmt: skip
         self._followers, self._payloads, self._batches = followers, payloads, Batches(payloads)
         self._lease, self._clocks, self._recordings, self._hurry = lease, clocks, recordings, hurry
-        if len(followers) >= MANY:
-            wire.hear(ALL, "faces", self._hear_many, direct=True)
-        else:
-            for name in followers:
-                wire.hear(name, "parameters", self._hearer(name), direct=True)
+        self._heard_s: dict[str, float] = {}
+        for name in [ALL] if len(followers) >= MANY else followers:
+            self._heard_s[name] = time.monotonic()
+            if name == ALL:
+                wire.hear(ALL, "faces", self._hear_many, direct=True)
+            else:
+                wire.hear(name, "parameters", self._hear_one(name), direct=True)
 
-    def _hearer(self, head: str) -> Callable[[zenoh.Sample], None]:
+    def silent(self) -> tuple[str, float]:
+        """The head that has heard nothing for the longest time, or :data:`controller.fleet.wire.ALL` where all hear
+        together, and since when (s)."""
+        name = min(self._heard_s, key=self._heard_s.__getitem__)
+        return name, self._heard_s[name]
+
+    def _hear_one(self, head: str) -> Callable[[zenoh.Sample], None]:
         def act(sample: zenoh.Sample) -> None:
             header = header_of(sample)
-            if self._is_for_us(header):
+            if self._is_for_us(header, head):
                 values = self._payloads.decode(sample.payload.to_bytes(), str(sample.encoding))
                 if self._take(head, header, values):
                     self._hurry()
@@ -53,7 +61,7 @@ class Hearing:
 
     def _hear_many(self, sample: zenoh.Sample) -> None:
         header, taken = header_of(sample), False
-        if self._is_for_us(header):
+        if self._is_for_us(header, ALL):
             for face in self._batches.decode(sample.payload.to_bytes(), str(sample.encoding)):
                 if face.head in self._followers:
                     own = Header(header.token, face.sequence, header.time_ns, face.stamp_ns, header.stopped)
@@ -61,11 +69,13 @@ class Hearing:
         if taken:
             self._hurry()
 
-    def _is_for_us(self, header: Header) -> bool:
+    def _is_for_us(self, header: Header, whose: str) -> bool:
         """Whether a face is of another conductor, of whom the lease takes note."""
         if header.token.holder == self._lease.holder:
             return False
-        self._lease.hear(header.token, time.monotonic())
+        now_s = time.monotonic()
+        self._heard_s[whose] = now_s
+        self._lease.hear(header.token, now_s)
         self._clocks.hear(header.token.holder, header.time_ns, time.monotonic_ns())
         return True
 

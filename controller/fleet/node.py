@@ -13,6 +13,7 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from controller.fleet.lease import Lease
 from controller.fleet.offset import Clocks
 from controller.fleet.payload import Payloads
 from controller.fleet.recorder import Recording
+from controller.fleet.rejoining import Rejoining
 from controller.fleet.session import open_session
 from controller.fleet.states import States, follower_report
 from controller.fleet.wire import Wire
@@ -72,22 +74,27 @@ class Node:
         self._recordings = {}
         if settings.role == "recorder":
             self._recordings = {name: Recording(beside.parent, settings.record, name, parameters) for name in heads}
+        self._rejoins = not self.conducts and settings.way == "client" and bool(settings.connect)
         self._conducting: Conducting | None = None
         self._wire = Wire(open_session(settings, beside), settings.prefix)
         try:
-            self._declare(Payloads(parameters, settings.payload), lease_s, (lambda: None) if delay_ns else hurry)
+            self._declare(
+                beside, Payloads(parameters, settings.payload), lease_s, (lambda: None) if delay_ns else hurry
+            )
         except BaseException:
             self._wire.close()
             raise
         self._thread = threading.Thread(target=self._keep_house, name="zenoh", daemon=True)
         self._thread.start()
 
-    def _declare(self, payloads: Payloads, lease_s: float, hurry: Callable[[], None]) -> None:
+    def _declare(self, beside: Path, payloads: Payloads, lease_s: float, hurry: Callable[[], None]) -> None:
         wire, heads, followers, lease, clocks = self._wire, self._heads, self.followers, self.lease, self._clocks
         self._hearing = Hearing(wire, followers, payloads, lease, clocks, self._recordings, hurry)
         self._states = States(wire, self.settings, heads, followers, lease)
         events = Counter[str]()
         self._asking = Asking(wire, clocks, lease, heads if self.conducts else {}, events)
+        open_again = partial(open_session, self.settings, beside, again=True)
+        self._rejoining = Rejoining(wire, self._hearing, clocks, open_again, time.monotonic())
         if self.conducts:
             self._conducting = Conducting(wire, heads, payloads, lease, lease_s, events)
 
@@ -128,6 +135,7 @@ class Node:
         if self._conducting is not None:
             self._conducting.close()
         self._wire.close()
+        self._thread.join(3.0)  # a thread that is in Zenoh's hands when Python ends aborts the process
         for recording in self._recordings.values():
             recording.close()
 
@@ -179,7 +187,10 @@ class Node:
         said_s = 0.0
         while not self._stopping.wait(_HOUSE_S):
             try:
-                self._asking.ask()
+                now_s = time.monotonic()
+                self._asking.ask(silent=self._rejoining.silent(now_s))
+                if self._rejoins:
+                    self._rejoining.check(now_s)
                 if time.monotonic() - said_s >= _STATE_S:
                     said_s = time.monotonic()
                     self._states.say()

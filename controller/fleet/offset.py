@@ -58,10 +58,13 @@ class Clocks:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._known: OrderedDict[int, _Known] = OrderedDict()
+        self.answered_ns = 0
+        """When a conductor answered last, by one's own clock; 0 before."""
 
     def add(self, holder: int, asked_ns: int, received_ns: int, answered_ns: int, arrived_ns: int) -> None:
         """Take one exchange with a conductor, as :meth:`ClockOffset.add`."""
         with self._lock:
+            self.answered_ns = max(self.answered_ns, arrived_ns)
             self._of(holder).asked.add(asked_ns, received_ns, answered_ns, arrived_ns)
 
     def hear(self, holder: int, sent_ns: int, arrived_ns: int) -> None:

@@ -7,14 +7,11 @@ somebody listens: so who begins to conduct sends every face both ways at first, 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 from controller.base.parameters import Floats
 from controller.fleet.batch import Batches, Gathering
 from controller.fleet.payload import Header, Payloads
-
-if TYPE_CHECKING:
-    import zenoh  # optional: the extra zenoh
+from controller.fleet.wire import Outlet
 
 FEW = 3
 """Most heads of a stage whose faces are sent whether or not somebody is known to listen."""
@@ -31,9 +28,7 @@ class FaceSender:
     sequences : of the last face of each head.
     """
 
-    def __init__(
-        self, outlets: Mapping[str, zenoh.Publisher], together: zenoh.Publisher, payloads: Payloads, heading: Heading
-    ) -> None:
+    def __init__(self, outlets: Mapping[str, Outlet], together: Outlet, payloads: Payloads, heading: Heading) -> None:
         self._outlets, self._together, self._payloads, self._heading = outlets, together, payloads, heading
         self._batches, self._gathering = Batches(payloads), Gathering(len(outlets))
         self.sequences = dict.fromkeys(outlets, 0)
@@ -65,7 +60,7 @@ class FaceSender:
             self._together.put(self._batches.encode(faces), encoding=self._batches.encoding, attachment=header)
 
 
-def is_heard(outlet: zenoh.Publisher) -> bool:
+def is_heard(outlet: Outlet) -> bool:
     """Whether anybody listens to what a publisher sends."""
     status = outlet.matching_status
     return bool(getattr(status, "matching", status))  # some versions of the library wrap it

@@ -20,11 +20,15 @@ _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor":
 """Longest pause between two tries to reach a router that has gone; Zenoh's own would grow to 4 s."""
 _OPEN_MS = 2_000
 """Longest time that a router may take to greet; Zenoh's 10 s are lost on one that takes a connection while it ends."""
+_AGAIN_CONNECT_MS, _AGAIN_OPEN_MS = 1_800, 600
+"""The same for a session beside one that is not answered: several tries, as a greeting may be lost."""
 _NO_ROUTER_HINT = "start a router there, as zenohd -l tcp/0.0.0.0:7447, or correct [zenoh] connect"
 
 
-def open_session(settings: ZenohSettings, beside: Path) -> zenoh.Session:
+def open_session(settings: ZenohSettings, beside: Path, *, again: bool = False) -> zenoh.Session:
     """A session by a stage's ``[zenoh]``; ``beside`` : the stage's file, from whose folder other files are named.
+
+    again : another one beside one that is not answered, which takes 2 s at most.
 
     Raises LinkError: an endpoint cannot be used, or a file of certificates or settings cannot be read. MissingPackage:
     Zenoh is not installed.
@@ -34,37 +38,38 @@ def open_session(settings: ZenohSettings, beside: Path) -> zenoh.Session:
     zenoh.init_log_from_env_or("error")
     where = ", ".join([*settings.listen, *settings.connect]) or str(settings.config)
     try:
-        return zenoh.open(_configuration(settings, beside.parent))
+        return zenoh.open(_configuration(settings, beside.parent, again))
     except zenoh.ZError as error:
         why = str(error).partition(" at ")[0]
         hint = _NO_ROUTER_HINT if "connect" in why else "look whether another program has the port: ss -ltnp"
         raise LinkError(f"zenoh at {where}: {why}", hint=hint) from error
 
 
-def _configuration(settings: ZenohSettings, folder: Path) -> zenoh.Config:
+def _configuration(settings: ZenohSettings, folder: Path, again: bool) -> zenoh.Config:
     import zenoh  # optional: the extra zenoh
 
     own = None if settings.config is None else _file(folder, settings.config, "zenoh.config")
     config = zenoh.Config() if own is None else zenoh.Config.from_file(str(own))
-    for key, value in _entries(settings, folder).items():
+    for key, value in _entries(settings, folder, again).items():
         config.insert_json5(key, json.dumps(value))
     return config
 
 
-def _entries(settings: ZenohSettings, folder: Path) -> dict[str, object]:
+def _entries(settings: ZenohSettings, folder: Path, again: bool) -> dict[str, object]:
     """What the table says, as Zenoh's own keys. Nothing is searched for: no multicast, and gossip connects nobody."""
+    connect_ms, open_ms = (_AGAIN_CONNECT_MS, _AGAIN_OPEN_MS) if again else (_CONNECT_MS, _OPEN_MS)
     found: dict[str, object] = {
         "mode": settings.way,
         "scouting/multicast/enabled": False,
         "scouting/gossip/autoconnect": {"router": [], "peer": []},
         "transport/shared_memory/enabled": settings.shared_memory,
         "timestamping/enabled": False,
-        "transport/unicast/open_timeout": _OPEN_MS,
+        "transport/unicast/open_timeout": open_ms,
     }
     if settings.connect or settings.listen:
         found |= {"connect/endpoints": settings.connect, "listen/endpoints": settings.listen}
     if settings.connect:
-        found |= {"connect/timeout_ms": _CONNECT_MS, "connect/exit_on_failure": False, "connect/retry": _RETRY}
+        found |= {"connect/timeout_ms": connect_ms, "connect/exit_on_failure": False, "connect/retry": _RETRY}
     return found | (_tls(settings.tls, folder) if settings.tls is not None else {})
 
 

@@ -35,7 +35,7 @@ class States:
         for name in heads:
             wire.answer(name, "state" + tail, self._answer(partial(self.state, name)))
             wire.answer(name, "configuration" + tail, self._answer(lambda: about))
-            wire.live(name, f"alive/{self._role}/{wire.session.zid()}")
+            wire.live(name, f"alive/{self._role}")
 
     def say(self) -> None:
         """Tell conductors which one is obeyed here, once for all heads; and who listens to a head, how that is."""

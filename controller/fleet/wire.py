@@ -26,6 +26,39 @@ ALL = "_"
 """In a key in place of a head: what belongs to all of them."""
 
 
+class Declared:
+    """Something that is declared at a session, and can be declared at another one."""
+
+    def __init__(self, session: zenoh.Session, make: Callable[[zenoh.Session], Any]) -> None:
+        self._make = make
+        self._held: Any = make(session)
+
+    def made_at(self, session: zenoh.Session) -> Any:
+        """The same at another session; it counts from :meth:`hold` on."""
+        return self._make(session)
+
+    def hold(self, made: Any) -> None:
+        """Use what was made at another session; what was held ends with its own session."""
+        self._held = made
+
+    def undeclare(self) -> None:
+        """Take it back."""
+        self._held.undeclare()
+
+
+class Outlet(Declared):
+    """What sends something, and knows whether anybody listens."""
+
+    def put(self, data: bytes | str, **more: Any) -> None:
+        """Send something; ``more`` as Zenoh's own publisher takes it."""
+        self._held.put(data, **more)
+
+    @property
+    def matching_status(self) -> Any:
+        """Whether anybody listens, as Zenoh says it."""
+        return self._held.matching_status
+
+
 class Wire:
     """A session and what was declared at it. prefix : the beginning of all keys.
 
@@ -35,8 +68,7 @@ class Wire:
     def __init__(self, session: zenoh.Session, prefix: str) -> None:
         self.session, self._prefix = session, prefix
         self.refused: Counter[str] = Counter()
-        self._closers = ExitStack()
-        self._closers.callback(session.close)
+        self._declared: list[Declared] = []
 
     def key(self, head: str, what: str) -> str:
         """The key of something of a head, or of :data:`ALL`."""
@@ -47,33 +79,61 @@ class Wire:
         than a face."""
         from zenoh.handlers import Callback  # optional
 
-        call = self._guarded(act)
-        self._keep(self.session.declare_subscriber(self.key(head, what), Callback(call, indirect=not direct)))
+        call, key = self._guarded(act), self.key(head, what)
+        self._keep(lambda session: session.declare_subscriber(key, Callback(call, indirect=not direct)))
 
     def answer(self, head: str, what: str, act: Callable[[zenoh.Query], object]) -> None:
         """Call ``act`` with every query."""
-        self._keep(self.session.declare_queryable(self.key(head, what), act))
+        key = self.key(head, what)
+        self._keep(lambda session: session.declare_queryable(key, act))
+
+    def ask(self, head: str, what: str, act: Callable[[zenoh.Reply], object], timeout_s: float) -> None:
+        """Ask whoever answers, and call ``act`` with every reply.
+
+        It is called in Zenoh's own threads. With a thread of Python's for each question, which Zenoh would start, one
+        that waits for its reply when Python ends aborts the process.
+        """
+        from zenoh.handlers import Callback  # optional
+
+        self.session.get(self.key(head, what), Callback(act, indirect=False), timeout=timeout_s)
 
     def live(self, head: str, what: str) -> None:
-        """A token that is there as long as this process."""
-        self._keep(self.session.liveliness().declare_token(self.key(head, what)))
+        """A token that is there as long as this process; its key ends with the number of the session."""
+        self._keep(lambda session: session.liveliness().declare_token(f"{self.key(head, what)}/{session.zid()}"))
 
-    def outlet(self, head: str, what: str) -> zenoh.Publisher:
+    def outlet(self, head: str, what: str) -> Outlet:
         """What sends something, and knows whether anybody listens."""
-        publisher = self.session.declare_publisher(self.key(head, what))
-        self._keep(publisher)
-        return publisher
+        key = self.key(head, what)
+        outlet = Outlet(self.session, lambda session: session.declare_publisher(key))
+        self._declared.append(outlet)
+        return outlet
 
-    def outlets(self, heads: Iterable[str], what: str) -> dict[str, zenoh.Publisher]:
+    def outlets(self, heads: Iterable[str], what: str) -> dict[str, Outlet]:
         """An outlet of each head."""
         return {name: self.outlet(name, what) for name in heads}
 
+    def move(self, session: zenoh.Session) -> None:
+        """Declare everything at another session, use that from now on, and end the one before. Not for a process that
+        sends faces meanwhile."""
+        try:
+            made = [declared.made_at(session) for declared in self._declared]
+        except BaseException:
+            session.close()  # type: ignore[no-untyped-call]
+            raise
+        for declared, held in zip(self._declared, made, strict=True):
+            declared.hold(held)
+        before, self.session = self.session, session
+        before.close()  # type: ignore[no-untyped-call]
+
     def close(self) -> None:
         """Take back what was declared, and end the session."""
-        self._closers.close()
+        with ExitStack() as closers:
+            closers.callback(self.session.close)
+            for declared in self._declared:
+                closers.callback(declared.undeclare)
 
-    def _keep(self, declared: Any) -> None:
-        self._closers.callback(declared.undeclare)
+    def _keep(self, make: Callable[[zenoh.Session], Any]) -> None:
+        self._declared.append(Declared(self.session, make))
 
     def _guarded(self, act: Callable[[zenoh.Sample], object]) -> Callable[[zenoh.Sample], None]:
         def call(sample: zenoh.Sample) -> None:

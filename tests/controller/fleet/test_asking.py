@@ -16,8 +16,7 @@ from controller.fleet.offset import Clocks
 def test_a_time_that_no_clock_has_is_refused(answer: bytes) -> None:
     """With a huge one the time of a command left 64 bits, which ended the head's run."""
     heard, refused, clocks = list[Any](), list[Exception](), Clocks()
-    session = SimpleNamespace(get=lambda key, act, timeout: heard.append(act))
-    wire = SimpleNamespace(session=session, key=lambda head, what: what, refuse=refused.append)
+    wire = SimpleNamespace(ask=lambda head, what, act, *more: heard.append(act), refuse=refused.append)
     Asking(wire, clocks, Lease(1, 0.2, 0.0, 0.0), {}, {}).ask()  # type: ignore[arg-type]
     heard[0](SimpleNamespace(ok=SimpleNamespace(payload=SimpleNamespace(to_bytes=lambda: answer))))
     assert len(refused) == 1
@@ -29,8 +28,7 @@ def test_a_time_that_no_clock_has_is_refused(answer: bytes) -> None:
 @pytest.mark.parametrize("answer", [b"[1]", b"5", b"{", b"\xff", b'{"conducting": true}'])
 def test_a_state_that_is_no_conductors_is_refused(answer: bytes) -> None:
     asked, refused = dict[str, Any](), list[Exception]()
-    session = SimpleNamespace(get=lambda key, act, timeout: asked.update({key: act}))
-    wire = SimpleNamespace(session=session, key=lambda head, what: what, refuse=refused.append)
+    wire = SimpleNamespace(ask=lambda head, what, act, *more: asked.update({what: act}), refuse=refused.append)
     lease = Lease(1, 0.2, 0.0, 0.0)
     lease.hear(Token(1, 7), 0.0)
     Asking(wire, Clocks(), lease, {"maple": None}, {}).ask()  # type: ignore[arg-type, dict-item]
