@@ -156,7 +156,7 @@ def test_control_points_go_with_the_mouse_and_are_worn_by_a_stage(
     assert len(shape.ids) == np.count_nonzero(np.linalg.norm(moved, axis=1) >= 0.01)
     handles.undo()
     head.pose(np.zeros(len(head.parameters)))
-    np.testing.assert_allclose(part.control_points, rest, atol=0.1)  # mm; contacts move some at rest
+    np.testing.assert_allclose(part.control_points, rest, atol=0.4)  # mm; contacts close the lips at rest
     np.testing.assert_array_equal(part.rig.rest, rest)
     (tmp_path / "stage.toml").write_text('name = "mine"\n[groups]\n"dimple.json" = 0.5\n')
     stage = load_stage(str(tmp_path / "stage.toml"), P)

@@ -71,13 +71,13 @@ def test_a_place_under_a_pixel_has_the_depth_of_the_place_beside_it() -> None:
 # ---------------------------------------------------------------- points of the skin
 def test_samples_lie_on_the_skin_with_unit_normals_that_point_outwards(model: SkinModel, head: Head) -> None:
     part = head.part("face")
-    np.testing.assert_allclose(model.skin.rest, part.surface.evaluate(model.skin.uv), atol=0.02)  # contacts at rest
+    np.testing.assert_allclose(model.skin.rest, part.surface.evaluate(model.skin.uv), atol=0.1)  # contacts close the lips
     np.testing.assert_allclose(np.linalg.norm(model.normals, axis=1), 1.0, atol=1e-6)
     front = model.skin.rest[:, 2] > 95.0
     assert front.sum() > 50 and model.normals[front, 2].mean() > 0.5
     assert len(model.skin.rest) == module._POINTS + module._BETWEEN
     basis = model.basis @ part.surface.points
-    np.testing.assert_allclose(basis, model.skin.rest, atol=0.02)
+    np.testing.assert_allclose(basis, model.skin.rest, atol=0.1)
 
 
 def test_flat_skin_has_its_share_of_the_samples_by_area(head: Head) -> None:

@@ -119,6 +119,8 @@ class Imgui:
     def get_foreground_draw_list(self) -> Imgui:
         return self
 
+    get_background_draw_list = get_foreground_draw_list
+
     def __getattr__(self, name: str) -> Any:
         return lambda *given: self.drawn.append((name, *given))
 
