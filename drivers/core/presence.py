@@ -22,8 +22,10 @@ AGREE_RAD = 0.3
 class Presence:
     """Keeps which of n servos are driven.
 
-    driven : (n,) bool, read-only, a new array whenever it changes. A servo is not driven while it is away, or left out.
+    driven : (n,) bool, read-only, a new array whenever it changes. A servo is not driven while it is away, left out or
+        held back.
     left_out : (n,) bool, servos that could not be started with the others.
+    held_back : (n,) bool, servos that answer but refuse goals, as with a tripped watchdog: until they :meth:`join`.
     all_driven, some_left_out : what these arrays say as a whole.
     """
 
@@ -34,13 +36,14 @@ class Presence:
     def reset(self, started: Flags) -> None:
         """Begin with the servos that were ``started`` (n,); the others are left out."""
         self.left_out: Flags = ~started
+        self.held_back: Flags = np.zeros(len(started), bool)
         self._missed = np.zeros(len(started), np.int64)  # reads in a row without the servo's position
         self._seen_rad = np.full(len(started), np.nan)  # last position of a servo that is away
         self._drive(started)
 
     def join(self, index: int) -> None:
-        """A servo that was left out or away has been started at its position."""
-        self.left_out[index] = False
+        """A servo that was left out, held back or away has been started at its position."""
+        self.left_out[index] = self.held_back[index] = False
         self._missed[index] = 0
         self._drive(self.driven | (np.arange(len(self.driven)) == index))
 
@@ -49,6 +52,12 @@ class Presence:
         self.left_out[index] = True
         self._drive(self.driven & (np.arange(len(self.driven)) != index))
 
+    def hold_back(self, index: int) -> None:
+        """A servo refuses goals for now, whether or not its position is known."""
+        if not self.held_back[index]:
+            self.held_back[index] = True
+            self._drive(self.driven & ~self.held_back)
+
     def note(self, state: BusState, turn: int) -> list[int]:
         """Take a read into account, of which ``turn`` are needed to ask every servo; returns who came back with it."""
         if self._complete and state.fresh.all():
@@ -56,7 +65,7 @@ class Presence:
         self._missed = np.where(state.fresh, 0, self._missed + 1)
         unknown = (self._missed > AWAY_TURNS * turn) & (state.age_s > AWAY_S)
         away = ~state.fresh & (state.silent | unknown)
-        here = state.fresh & ~self.driven & ~self.left_out
+        here = state.fresh & ~self.driven & ~self.left_out & ~self.held_back
         back = here & (np.abs(state.position_rad - self._seen_rad) <= AGREE_RAD)
         self._seen_rad = np.where(back | away, np.nan, np.where(here, state.position_rad, self._seen_rad))
         if away.any() or back.any():

@@ -156,9 +156,15 @@ class DynamixelBus(ServoBus):
             self._use_map({i: block for i, block in self._mapped.items() if i != servo})
 
     def _clear_watchdogs(self) -> None:
-        """Clear tripped watchdogs with the goal where the servo is, so that nothing jumps."""
+        """Clear tripped watchdogs with the goal where the servo is, so that nothing jumps.
+
+        Until all of that is confirmed the servo is sent no goals. It ignored those since the watchdog tripped, so they
+        may be far from it, and it would obey the next one as soon as the first write of these has reached it.
+        """
         left_out = {self.ids[index] for index in np.flatnonzero(self._presence.left_out)}
         for servo in sorted(self._telemetry.tripped - left_out):
+            index = self.ids.index(servo)
+            self._presence.hold_back(index)
             try:
                 self._registers.put(servo, "watchdog", 0, tries=1)
                 goal = self._goal_at_present(servo)
@@ -172,8 +178,8 @@ class DynamixelBus(ServoBus):
                 log.debug("%s", error)
                 continue
             self._telemetry.tripped.discard(servo)
-            index = self.ids.index(servo)
             self._begin_at(index, self._radians(index, goal))
+            self._presence.join(index)
 
     def _goal_at_present(self, servo: int) -> int:
         """The goal that keeps a servo that holds where it is, inside its own limits: it refuses any other."""

@@ -65,7 +65,6 @@ class Telemetry(telemetry.Telemetry):
         self._joint_failures = 0
         self._fast_again_s, self._fast_pause_s = math.inf, FAST_AGAIN_S
         self._compiled: CompiledRead | None = None
-        self.tripped.clear()
         self.unmapped.clear()
 
     def send_goals(self, ticks: Ticks, driven: Flags) -> None:

@@ -74,3 +74,18 @@ def test_silence_that_a_position_contradicts_is_none() -> None:
     presence.note(state([1, 1, 0]), 1)
     assert presence.note(state([1, 1, 1], (0, 1, 0)), 1) == []
     assert presence.driven.all()
+
+
+def test_who_is_held_back_is_driven_again_only_when_it_joins() -> None:
+    presence = Presence(3)
+    presence.hold_back(1)
+    held = presence.driven
+    presence.hold_back(1)
+    assert presence.driven is held and held.tolist() == [True, False, True]
+    for _ in range(3):
+        assert presence.note(state([1, 1, 1]), 1) == []
+    presence.join(1)
+    assert presence.driven.all() and not presence.held_back.any()
+    presence.hold_back(0)
+    presence.reset(np.ones(3, bool))
+    assert presence.driven.all(), "a start begins without it"

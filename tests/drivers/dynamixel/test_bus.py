@@ -254,6 +254,35 @@ def test_a_tripped_watchdog_is_cleared_without_a_jump(wire: ServoBus) -> None:
         settle(bus, [0.2, 0.2, 0.2])
 
 
+def test_a_servo_is_sent_no_goals_until_its_watchdog_is_seen_to_be_cleared() -> None:
+    """Its watchdog is cleared, but the reply is lost: it would obey goals that went far from it while it refused them.
+
+    By the simulated clock, so that the second reply of the servo is the one that is lost.
+    """
+    wire = VirtualBus(SERVOS, driver={"margin_s": 0.02, "watchdog_ms": 200, "fast": False})
+    with wire.bus() as bus:
+        bus.start()
+        cycles(wire, bus, [0.0, 0.0, 0.0], 20)
+        here = wire.servo(2).goal
+        wire.clock.sleep(0.3)
+        wire.fault("drop:2:every=2:for=0.2s")
+        for _ in range(2):
+            bus.write([0.3, 0.3, 0.3])
+            assert wire.servo(2).register("Bus Watchdog") == 0, "cleared, and the reply lost"
+            assert wire.servo(2).goal == here and bus.driven.tolist() == [True, False, True]
+        cycles(wire, bus, [0.3, 0.3, 0.3], 50)
+        assert bus.driven.all() and wire.servo(2).register("Bus Watchdog") == 10
+        assert bus.read().position_rad[1] == pytest.approx(0.3, abs=0.02)
+
+
+def cycles(wire: VirtualBus, bus: Bus, target: list[float], count: int) -> None:
+    """So many cycles of 20 ms by the simulated clock."""
+    for _ in range(count):
+        bus.write(target)
+        bus.read()
+        wire.clock.sleep(0.02)
+
+
 def test_a_watchdog_is_armed_again_where_the_servo_stands_outside_its_own_limits(wire: ServoBus) -> None:
     """As a head that was placed by hand a few steps beyond them; a servo refuses goals outside of its limits."""
     wire.servo(2).put("Min Position Limit", 2000)
