@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +15,11 @@ from surface.base.extras import importing
 if TYPE_CHECKING:
     import zenoh  # optional: the extra zenoh
 
-_CONNECT_MS = 20_000
+_CONNECT_S = 20.0
 """A client waits so long for its router; afterwards whoever started it hears what is missing."""
+_CONNECT_MS = 4_000
+"""So long it waits with one session, then with another: where the last message of a router's greeting is lost, the
+router refuses that session as one that it has, for 10 s."""
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
 """Longest pause between two tries to reach a router that has gone; Zenoh's own would grow to 4 s."""
 _OPEN_MS = 2_000
@@ -37,12 +41,18 @@ def open_session(settings: ZenohSettings, beside: Path, *, again: bool = False) 
         import zenoh  # optional: the extra zenoh
     zenoh.init_log_from_env_or("error")
     where = ", ".join([*settings.listen, *settings.connect]) or str(settings.config)
-    try:
-        return zenoh.open(_configuration(settings, beside.parent, again))
-    except zenoh.ZError as error:
-        why = str(error).partition(" at ")[0]
-        hint = _NO_ROUTER_HINT if "connect" in why else "look whether another program has the port: ss -ltnp"
-        raise LinkError(f"zenoh at {where}: {why}", hint=hint) from error
+    waits = settings.way == "client" and not again
+    give_up_s = time.monotonic() + (_CONNECT_S if waits else 0.0)
+    while True:
+        try:
+            return zenoh.open(_configuration(settings, beside.parent, again))
+        except zenoh.ZError as error:
+            why = str(error).partition(" at ")[0]
+            if "connect" in why and time.monotonic() + 1e-3 * _CONNECT_MS < give_up_s:
+                time.sleep(1e-3 * _RETRY["period_init_ms"])
+                continue
+            hint = _NO_ROUTER_HINT if "connect" in why else "look whether another program has the port: ss -ltnp"
+            raise LinkError(f"zenoh at {where}: {why}", hint=hint) from error
 
 
 def _configuration(settings: ZenohSettings, folder: Path, again: bool) -> zenoh.Config:

@@ -6,13 +6,16 @@ import logging
 import select
 import socket
 import threading
-from contextlib import ExitStack
+import time
+from contextlib import ExitStack, closing
 from pathlib import Path
 
 import pytest
 
 zenoh = pytest.importorskip("zenoh", reason="pip install 'omote[zenoh]'")
 
+from controller.fleet.session import open_session  # noqa: E402
+from controller.stage.zenoh import ZenohSettings  # noqa: E402
 from tests.controller.fleet.nodes import Running, free_port, joined, router, until  # noqa: E402
 from tests.controller.fleet.test_node import client  # noqa: E402
 
@@ -21,10 +24,12 @@ class Air:
     """A proxy of datagrams to a router's port ``to``.
 
     losing : texts; the first datagram to the router that has one of them in it is lost.
+    answer : the number of the datagram from the router that is lost, from 1; 0: none.
     lost : how many were.
     """
 
-    def __init__(self, to: int, losing: set[bytes]) -> None:
+    def __init__(self, to: int, losing: set[bytes], answer: int = 0) -> None:
+        self._answer, self._answers = answer, 0
         self._front = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._front.bind(("127.0.0.1", 0))
         self.port: int = self._front.getsockname()[1]
@@ -45,6 +50,10 @@ class Air:
     def _carry(self, ready: socket.socket) -> None:
         data, whom = ready.recvfrom(1 << 16)
         if ready is not self._front:
+            self._answers += 1
+            if self._answers == self._answer:
+                self.lost += 1
+                return
             self._front.sendto(data, next(at for at, way in self._ways.items() if way is ready))
         elif not self._is_lost(data):
             if whom not in self._ways:
@@ -91,6 +100,18 @@ def test_a_head_whose_subscription_was_lost_joins_by_another_session(
         assert air.lost == 1
         assert head.node.followers["oak"].refused["of a conductor that was replaced"] == 0
     assert "no face of" in caplog.text
+
+
+@pytest.mark.slow
+def test_a_greeting_whose_last_answer_is_lost_is_tried_by_another_session(tmp_path: Path) -> None:
+    """The router refuses the first session as one that it has, for 10 s."""
+    udp = datagram_port()
+    with router(endpoint=f"udp/127.0.0.1:{udp}"), closing(Air(udp, set(), answer=2)) as air:
+        began_s = time.monotonic()
+        settings = ZenohSettings(role="head", connect=[f"udp/127.0.0.1:{air.port}"])
+        open_session(settings, tmp_path / "stage.toml").close()  # type: ignore[no-untyped-call]
+        assert air.lost == 1
+        assert time.monotonic() - began_s < 9.0
 
 
 def test_no_thread_waits_for_an_answer_when_a_process_ends(tmp_path: Path) -> None:
