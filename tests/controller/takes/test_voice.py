@@ -18,11 +18,12 @@ from controller.layers.commands import CommandState
 from controller.takes.voice import (
     VoiceEnvelope,
     VoiceListener,
+    _Mouth,
     levels_of,
     voice_take,
     wav_take,
 )
-from controller.takes.voices.lips import band_levels
+from controller.takes.voices.lips import AHEAD, BANDS, BEFORE, band_levels, features
 from tests.controller.takes.voices.synthesis import MEN, noise, vowel
 
 RATE = 16000
@@ -55,6 +56,17 @@ def test_the_jaw_opens_with_the_voice_and_closes_with_silence() -> None:
     assert face[62:99, JAW].min() > 0.4
     assert face[-1, JAW] < 0.02
     assert np.all((face >= 0) & (face <= 1))
+
+
+def test_of_two_visemes_the_likelier_one_shows_by_the_square_of_how_much_likelier_it_is() -> None:
+    """Else a mouth between all visemes would look like none."""
+    mouth, k = _Mouth(P), 40
+    levels = np.random.default_rng(5).uniform(-60.0, -20.0, (k + BEFORE + AHEAD, BANDS))
+    judged, shown = mouth._model.judge(features(levels, -10.0)), mouth.shares(levels, -10.0, np.full(k, -10.0))
+    likelier, stronger = judged[:, 1] / judged[:, 2], shown[:, 1] / shown[:, 2]
+    assert np.ptp(likelier) > 0.5
+    np.testing.assert_allclose(stronger / stronger[0], (likelier / likelier[0]) ** 2)
+    np.testing.assert_allclose(shown.sum(axis=1), 1.0)
 
 
 def test_hissing_moves_the_lips_and_hardly_the_jaw() -> None:
