@@ -74,8 +74,10 @@ def test_measured_and_wanted_differ_where_the_servos_lag(overlays: Overlays) -> 
     overlays.pose(values(overlays, jawOpen=0.5), values(overlays, jawOpen=0.5))
     assert len(overlays.marks("measured").lines) == 0
     overlays.pose(values(overlays, jawOpen=0.5), values(overlays, jawOpen=0.0))
-    lines = overlays.marks("measured").lines
-    assert len(lines) and np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1).max() > 5.0
+    marks = overlays.marks("measured")
+    apart_mm = np.linalg.norm(marks.lines[:, 1] - marks.lines[:, 0], axis=1)
+    assert apart_mm.max() > 5.0 > 1.0 > apart_mm.min()
+    np.testing.assert_allclose(marks.shades, np.interp(apart_mm, (1.0, 5.0), (0.2, 1.0)), err_msg="full from 5 mm on")
     overlays.pose(values(overlays, jawOpen=0.5))
     assert len(overlays.marks("measured").lines) == 0
 

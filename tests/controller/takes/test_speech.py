@@ -58,6 +58,7 @@ def step(away: np.ndarray) -> np.ndarray:
 
 def test_a_sound_alone_rises_120_ms_before_and_falls_in_80_ms_after() -> None:
     values = say((0.5, "aa"), end_s=1.0)[:, JAW]
+    assert len(values) == 109, "until the mouth is closed again, at 100 rows a second"
     time = np.arange(len(values)) / 100.0
     assert time[-1] == pytest.approx(1.08, abs=0.011)  # until the mouth is closed
     full = min(float(VISEMES.matrix[JAW] @ VISEMES.weights("aa")), 1.0)
