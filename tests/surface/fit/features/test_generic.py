@@ -205,6 +205,8 @@ def test_limits_of_a_part_are_those_of_a_head_of_its_size() -> None:
             assert (part.request.points, part.request.coarse, part.request.finest) == (500, 0.1, 0.3)
             assert part.downweight_slivers and (part.budget[0], part.budget[2]) == (0, 9)
         assert (face.request.growth, other.request.growth) == (1.12, 1.25)
+        assert (face.request.spare, other.request.spare) == (generic.SPARE, 0)
+        assert face.request.astray_mm == other.request.astray_mm == pytest.approx(generic.ASTRAY_MM * scale)
         assert (face.budget[1], other.budget[1]) == (pytest.approx(0.24 * scale), pytest.approx(0.5 * scale))
 
 
