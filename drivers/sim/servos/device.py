@@ -11,6 +11,7 @@ from functools import partial
 from typing import Any
 
 from drivers.packets.packet import ErrorNumber
+from drivers.sim.servos.drive import Sensing
 from drivers.sim.servos.drive_x import CURRENT_POSITION, EXTENDED, GOAL_TORQUE
 from drivers.sim.servos.registers import GOALS, Change
 from drivers.sim.servos.state import INVERTER_OFF, RUNNING, TURNING_OFF, TURNING_ON, ServoState
@@ -32,6 +33,8 @@ class SimulatedServo(ServoState):
     def __init__(self, device_id: int, model: str | int = "xl330-m288", **settings: Any) -> None:
         super().__init__(device_id, model, **settings)
         self._effects = self._effects_by_name()
+        self._sensing: dict[tuple[int, int], Sensing] = {}
+        self.registers.on_remap = self._sensing.clear
 
     def force(self, name: str, value: int, now_s: float) -> None:
         """Set a register whatever its access, range and lock, with all effects of a write."""
@@ -47,14 +50,20 @@ class SimulatedServo(ServoState):
         if not registers.readable(address, length):
             return self.alert | ErrorNumber.ACCESS, b""
         self.settle(now_s)
-        first, end = registers.span(address, length)
-        drive = self.drive
-        if end > drive.first_sensed and first < drive.last_sensed and now_s != self._sensed_at:
-            if drive.motion_at <= first and end <= drive.motion_end:
-                drive.sense_motion(now_s)
-            else:
-                self._sense(now_s)
+        if now_s != self._sensed_at:
+            self._sense_for(address, length, now_s)
         return self.alert, registers.read(address, length)
+
+    def _sense_for(self, address: int, length: int, now_s: float) -> None:
+        """Bring the registers that a read shows up to date; what these need is worked out once."""
+        sensing = self._sensing.get((address, length))
+        if sensing is None:
+            sensing = self.drive.sensing(self.registers.reached(address, length))
+            self._sensing[address, length] = sensing
+        if sensing is Sensing.ALL:
+            self._sense(now_s)
+        elif sensing is Sensing.QUICK:
+            self.drive.sense_quickly(now_s)
 
     def write(self, address: int, data: bytes, now_s: float) -> int:
         """Error byte of a write; nothing is changed unless all of it is allowed."""

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Collection
+from enum import Enum
 
 from drivers.sim.servos.motion import Motion, hold, plan_stop
 from drivers.sim.servos.plant import Plant
@@ -11,6 +13,14 @@ from drivers.tables.tables import ControlTable
 
 OVERLOAD_AFTER_S = 1.0
 """How long a jammed motor gives its full torque before it counts as overloaded."""
+
+
+class Sensing(Enum):
+    """What has to be sensed before registers are read."""
+
+    NOTHING = 0
+    QUICK = 1
+    ALL = 2
 
 
 def speed_unit(table: ControlTable) -> float:
@@ -25,13 +35,13 @@ class Drive(ABC):
     offset : Present Position less the shaft's, ticks; `side` and `mirror` reverse the direction.
     ticks_s : one step of the speed register, ticks/s.
     first_sensed, last_sensed : first and last-plus-one address that `sense` writes.
-    motion_at, motion_end : the same for `sense_motion`; empty where it has no separate part.
+    quick : addresses of registers that `sense_quickly` writes, among these.
     """
 
     goals: tuple[str, ...]
     first_sensed: int
     last_sensed: int
-    motion_at = motion_end = 0
+    quick: frozenset[int] = frozenset()
 
     def __init__(self, registers: Registers, plant: Plant, now_s: float) -> None:
         self.registers, self.plant, self.born_s = registers, plant, now_s
@@ -50,9 +60,16 @@ class Drive(ABC):
     def sense(self, now_s: float) -> float:
         """Write the sensors' values at `now_s` into memory; returns the load (-1 to 1)."""
 
-    def sense_motion(self, now_s: float) -> None:
-        """Write at least current, velocity and position, the registers that control loops read."""
+    def sense_quickly(self, now_s: float) -> None:
+        """Write at least the registers at `quick`, those that control loops read."""
         self.sense(now_s)
+
+    def sensing(self, addresses: Collection[int]) -> Sensing:
+        """What has to be sensed before the bytes at these addresses are read."""
+        sensed = {at for at in addresses if self.first_sensed <= at < self.last_sensed}
+        if not sensed:
+            return Sensing.NOTHING
+        return Sensing.QUICK if sensed <= self.quick else Sensing.ALL
 
     def torque_limit(self) -> float:
         """Most that the motor may give by its registers, as a share of its stall torque."""

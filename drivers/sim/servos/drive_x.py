@@ -75,6 +75,9 @@ class XDrive(Drive):
         self._profile_at = acceleration.address
         self.motion_at = table["Present Velocity"].address - 2
         self.motion_end = self.motion_at + _MOTION.size
+        temperature = table.get("Present Temperature")
+        self._celsius_at = () if temperature is None else (temperature.address,)
+        self.quick = frozenset((*range(self.motion_at, self.motion_end), *self._celsius_at))
         self.configure()
 
     def configure(self) -> None:
@@ -178,8 +181,8 @@ class XDrive(Drive):
         self._layout.pack_into(self.registers.memory, self.first_sensed, *values)
         return load
 
-    def sense_motion(self, now_s: float) -> None:
-        """Only current, velocity and position, which is what control loops read."""
+    def sense_quickly(self, now_s: float) -> None:
+        """Only current, velocity, position and temperature."""
         motion, _, load = self.observe(now_s)
         side = self.side
         _MOTION.pack_into(
@@ -189,6 +192,12 @@ class XDrive(Drive):
             side * round(motion.velocity / self.ticks_s),
             round(self.mirror + side * motion.position) + self.offset,
         )
+        for at in self._celsius_at:
+            self.registers.memory[at] = self._celsius()
+
+    def _celsius(self) -> int:
+        """Present Temperature."""
+        return min(max(round(self.plant.temperature_c), 0), 255)
 
     def _values(self, now_s: float, motion: Motion, commanded: Motion, load: float) -> tuple[int, ...]:
         """X-series registers 120-146, in order of address."""
@@ -209,7 +218,7 @@ class XDrive(Drive):
             side * round(commanded.velocity / ticks_s),
             round(self.mirror + side * commanded.position) + self.offset,
             round(10.0 * plant.voltage(load)),
-            min(max(round(plant.temperature_c), 0), 255),
+            self._celsius(),
         )
 
 

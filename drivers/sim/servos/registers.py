@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Callable
+from operator import itemgetter
 from typing import Any, NamedTuple
 
 from drivers.packets.packet import ErrorNumber
@@ -46,6 +48,7 @@ class Registers:
     locked : nothing below ``table.eeprom_end`` may be written (torque is on, or Lock is set).
     goals_locked : the bus watchdog has tripped, so goals may not be written.
     extended : Goal Position may leave one turn (operating modes 4 and 5).
+    on_remap : called when reads may reach other addresses than before.
     """
 
     def __init__(self, table: ControlTable) -> None:
@@ -53,7 +56,9 @@ class Registers:
         self.memory = bytearray(table.size)
         self.locked = self.goals_locked = self.extended = False
         self._cells = {name: (_format(item), item.address, item.sign_bit) for name, item in table.items()}
+        self.on_remap: Callable[[], None] = lambda: None
         self._layouts: dict[tuple[int, int], tuple[_Field, ...] | ErrorNumber] = {}
+        self._gathering: dict[tuple[int, int], Callable[[bytearray], tuple[int, ...]]] = {}
         self._pointers: dict[int, int] = {}
         self._slots = frozenset(address for _, data, count in table.indirect for address in range(data, data + count))
         self._first_slot = min(self._slots, default=table.size)
@@ -89,18 +94,16 @@ class Registers:
 
     def read(self, address: int, length: int) -> bytes:
         """Bytes as a host reads them: Indirect Data shows what its pointer points at."""
-        memory = self.memory
         if not self._pointers or address + length <= self._first_slot:
-            return bytes(memory[address : address + length])
-        pointers = self._pointers
-        return bytes(memory[pointers.get(at, at)] for at in range(address, address + length))
+            return bytes(self.memory[address : address + length])
+        gather = self._gathering.get((address, length))
+        if gather is None:  # one more than is read, since itemgetter makes no tuple of a single byte
+            gather = self._gathering[address, length] = itemgetter(*self.reached(address, length), 0)
+        return bytes(gather(self.memory)[:-1])
 
-    def span(self, address: int, length: int) -> tuple[int, int]:
-        """First and last-plus-one address that a read reaches through the pointers."""
-        if not self._pointers or address + length <= self._first_slot:
-            return address, address + length
-        seen = [self._pointers.get(at, at) for at in range(address, address + length)]
-        return min(seen), max(seen) + 1
+    def reached(self, address: int, length: int) -> list[int]:
+        """The address of each byte that a read shows, through the pointers."""
+        return [self._pointers.get(at, at) for at in range(address, address + length)]
 
     # ------------------------------------------------------------ writing
     def parse(self, address: int, data: bytes) -> list[Change] | ErrorNumber:
@@ -181,18 +184,19 @@ class Registers:
     # ------------------------------------------------------------ indirect area
     def remap(self) -> None:
         """Take over the pointers; one that points at its own slot makes the slot plain memory."""
-        self._pointers = {}
+        self._pointers, self._gathering = {}, {}
         for pointers, data, count in self.table.indirect:
             for k in range(count):
                 at = pointers + 2 * k
                 target = self.memory[at] | self.memory[at + 1] << 8
                 if target != data + k and target < self.table.size and target not in self._slots:
                     self._pointers[data + k] = target
+        self.on_remap()
 
     def _parse_indirect(self, address: int, data: bytes) -> list[Change] | ErrorNumber:
         """A write to Indirect Data is a write to the addresses that its pointers name, run by run."""
         changes: list[Change] = []
-        targets = [self._pointers.get(at, at) for at in range(address, address + len(data))]
+        targets = self.reached(address, len(data))
         start = 0
         for k in range(1, len(targets) + 1):
             if k < len(targets) and targets[k] == targets[k - 1] + 1:

@@ -33,10 +33,10 @@ def test_sensing_touches_nothing_but_sensed_registers(model: str):
     assert (one.first_sensed, one.last_sensed) == (min(sensed), max(sensed) + 1)
 
 
-def test_sense_motion_is_sense():
+def test_sensing_quickly_is_sensing():
     one = drive("ax-12a")
     one.plant.trajectory = hold(0.0, 300.0)
-    one.sense_motion(1.0)
+    one.sense_quickly(1.0)
     assert one.registers.get("Present Position") == 300
 
 

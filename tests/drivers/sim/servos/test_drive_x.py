@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.sim.servos.drive import Drive
+from drivers.sim.servos.drive import Drive, Sensing
 from drivers.sim.servos.drive_word import WordDrive
 from drivers.sim.servos.drive_x import XDrive
 from drivers.sim.servos.motion import hold
@@ -40,10 +40,15 @@ def test_sensing_the_motion_alone_gives_the_same_registers(model: str):
     one.sense(0.05)
     whole = bytes(one.registers.memory[one.motion_at : one.motion_end])
     one.registers.memory[one.motion_at : one.motion_end] = bytes(10)
-    one.sense_motion(0.05)
+    one.plant.forced_c = 41.0
+    one.sense_quickly(0.05)
     assert one.registers.memory[one.motion_at : one.motion_end] == whole
     assert whole != bytes(10)
     assert (one.motion_at, one.motion_end) == (126, 136)
+    assert one.registers.get("Present Temperature") == 41
+    celsius = one.registers.table["Present Temperature"].address
+    wanted = {(126, celsius): Sensing.QUICK, (125, 126): Sensing.ALL, (64, 116): Sensing.NOTHING}
+    assert {addresses: one.sensing(addresses) for addresses in wanted} == wanted
 
 
 @pytest.mark.parametrize("model", ["xl330-m288", "xl320"])

@@ -134,7 +134,7 @@ def test_indirect_data_shows_and_writes_what_its_pointers_spell(registers: Regis
     registers.memory[132:136] = struct.pack("<i", -2)
     registers.put("LED", 1)
     assert registers.read(208, 5) == le(-2) + b"\x01"
-    assert registers.span(208, 5) == (65, 136)
+    assert registers.reached(208, 5) == [132, 133, 134, 135, 65]
     changes = registers.parse(216, le(1234))
     assert [(item.name, value) for item, value in changes] == [("Goal Position", 1234)]
     assert registers.parse(208, le(1)) == E.ACCESS  # Present Position stays read-only
@@ -145,7 +145,7 @@ def test_unmapped_indirect_data_is_plain_memory(registers: Registers):
     for item, value in registers.parse(210, b"\x11\x22"):
         registers.store(item, value)
     assert registers.read(210, 2) == b"\x11\x22"
-    assert registers.span(210, 2) == (210, 212)
+    assert registers.reached(210, 2) == [210, 211]
 
 
 def test_an_indirect_write_of_scattered_targets_takes_them_one_by_one(registers: Registers):
@@ -246,10 +246,10 @@ def test_each_slot_has_its_own_pointer_and_reads_may_begin_before_the_slots():
     made.put("LED", 1)
     for _, data, count in (first, second):
         assert made.read(data + count - 2, 2) == b"\0\1"
-        assert made.span(data + count - 1, 1) == (65, 66)
+        assert made.reached(data + count - 1, 1) == [65]
     _, data, count = first
     assert made.read(data - 1, 2) == bytes(made.memory[data - 1 : data + 1])
-    assert made.span(data - 1, 1) == (data - 1, data)
+    assert made.reached(data - 1, 1) == [data - 1]
     assert made.parse(second[1] + second[2] - 1, b"\0")[0][0].name == "LED"
 
 
