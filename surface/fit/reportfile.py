@@ -17,7 +17,7 @@ from surface.base.progress import Progress
 from surface.fit.measures.report_folder import report_folder
 from surface.fit.points.nurbsnet import UniformNet, uniform_nets
 from surface.fit.points.report import NEUTRAL, DenseErrors, Errors, FitReport, FitResult, FittedPart, face_bounds, plain
-from surface.fit.source.chart import TILE
+from surface.fit.source.chart import FIRST_TILE
 from surface.head import Head
 
 FORMAT, VERSION = "omote fit report", 1
@@ -39,10 +39,10 @@ def write_report(result: FitResult, folder: str | Path, progress: Progress) -> N
 def _nets(result: FitResult) -> list[UniformNet]:
     """The control net of the face's first and largest tile, and uniform nets to compare it with."""
     face = result.parts[0]
-    own = face.chart.uv[:, 0] < TILE / 2
+    own = face.chart.uv[:, 0] < FIRST_TILE
     counted = own & ~face.chart.folded
     rms = float(np.sqrt((face.fitted.error[counted] ** 2).mean()))
-    points = int((face.fitted.net.centres[:, 0] < TILE / 2).sum())
+    points = int((face.fitted.net.centres[:, 0] < FIRST_TILE).sum())
     return [UniformNet(points, rms), *uniform_nets(face.chart, face.targets, points, rms)]
 
 

@@ -15,7 +15,7 @@ from scipy.sparse import csr_matrix, diags, identity, kron, vstack
 from scipy.sparse.linalg import splu
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.source.chart import TILE, Chart, Cut
+from surface.fit.source.chart import FIRST_TILE, Chart, Cut
 
 STEP = 1.1  # of sizes, in points
 STEPS = (-12, 24)  # the least and the largest that is tried: a third and ten times the points of the head's own net
@@ -49,8 +49,8 @@ def uniform_nets(chart: Chart, targets: Floats, points: int, enough: float) -> l
 
     targets : (m, 3) positions of the chart's samples; points : how many the head's own net has there.
     """
-    own = chart.uv[:, 0] < TILE / 2
-    cuts = [c for c in chart.cuts if c.start < TILE / 2]
+    own = chart.uv[:, 0] < FIRST_TILE
+    cuts = [c for c in chart.cuts if c.start < FIRST_TILE]
     task = _Task(chart.uv[own], chart.weight[own], ~chart.folded[own], targets[own], cuts)
     low, high = STEPS[0] - 1, STEPS[1]
     tried = {high: _net(task, points * STEP**high)}

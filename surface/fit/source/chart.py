@@ -19,6 +19,7 @@ from surface.fit.source.islands import Island, boundary_loops
 from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, triangles
 
 TILE = 2.0  # distance in u between the tiles of two islands: too far for control points to reach the next tile
+FIRST_TILE = 0.5 * (1.0 + TILE)  # the u that the first tile and its control points stay below: tiles are 1 wide
 NARROW = 0.7  # a hole whose height is less than this part of its width is a slit
 BORDER_WEIGHT = 8.0  # of samples on a border, where the surface has to meet its neighbour
 FOLD_STRETCH = (4.5, 7.0)  # stretch, in medians of it, where a fold of the mesh begins and where it is complete

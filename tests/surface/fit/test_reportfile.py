@@ -83,9 +83,9 @@ def test_a_report_replaces_an_older_one_and_folders_are_made(tmp_path: Path, mon
 def test_uniform_nets_stand_beside_the_first_tile_without_its_folds(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[tuple[int, float]] = []
     monkeypatch.setattr(reportfile, "uniform_nets", lambda *given: asked.append(given[2:]) or NETS[1:])
-    uv = np.array([[0.1, 0], [0.5, 0], [0.95, 0], [0.7, 0], [1.9, 0], [2.5, 0]])  # the last two: another tile
+    uv = np.array([[0.1, 0], [0.5, 0], [1.0, 0], [0.7, 0], [1.9, 0], [2.5, 0]])  # the last two: another tile
     chart = SimpleNamespace(uv=uv, folded=np.array([False, False, False, True, False, False]))
-    net = SimpleNamespace(centres=np.array([[0.1, 0], [0.3, 0], [0.9, 0], [1.9, 0], [2.5, 0]]))
+    net = SimpleNamespace(centres=np.array([[0.1, 0], [0.3, 0], [1.05, 0], [1.9, 0], [2.5, 0]]))
     fitted = SimpleNamespace(net=net, error=np.array([1.0, 2.0, 4.0, 9.0, 7.0, 7.0]))
     nets = reportfile._nets(SimpleNamespace(parts=[SimpleNamespace(chart=chart, fitted=fitted, targets=None)]))
     assert nets == [UniformNet(3, pytest.approx(np.sqrt(7.0))), *NETS[1:]]
