@@ -75,6 +75,18 @@ def test_a_take_is_rehearsed(tmp_path: Path) -> None:
     assert float(sent.split()[-1]) > 10
 
 
+def test_of_several_heads_the_first_plays_the_take(tmp_path: Path) -> None:
+    take = tmp_path / "a.tsv"
+    take.write_text("0.0\tsil\n4.0\tsil\n")
+    path = tmp_path / "two.toml"
+    path.write_text("".join(f'[[heads]]\nname = "{name}"\nrobots = ["head24"]\n' for name in ("maple", "oak")))
+    rows = dry_run(load_stage(str(path), PARAMETERS), take, None, PARAMETERS).rows
+    corners = {row["servo"].partition("/")[0]: row["sent (deg)"] for row in rows if row["channel"] == "lipCornerUpLeft"}
+    assert list(corners) == ["maple", "oak"]
+    assert corners["maple"].split()[0] == corners["maple"].split()[-1], "silence moves no corner of the mouth"
+    assert float(corners["oak"].split()[-1]) > 20.0, "the second head shows every expression"
+
+
 def test_the_voice_of_a_stage_is_rehearsed_where_it_is_a_file(tmp_path: Path) -> None:
     with wave.open(str(tmp_path / "a.wav"), "wb") as file:
         file.setparams((1, 2, 16000, 0, "NONE", ""))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import wave
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
+from controller.takes.voices import network
 from controller.takes.voices.network import Network, network_take, resampled
 from controller.tools.motion_file import convert
 from surface.base.errors import MissingPackage
@@ -55,6 +57,19 @@ def sound(path: Path, samples: np.ndarray, rate: int = 16_000) -> Path:
         file.setparams((1, 2, rate, 0, "NONE", ""))
         file.writeframes(np.round(32767 * samples).astype("<i2").tobytes())
     return path
+
+
+def test_an_hour_of_a_voice_is_read_at_most(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[int] = []
+    original = network.open_sound
+
+    def noting(stream: Any, where: str) -> Any:
+        opened = original(stream, where)
+        return SimpleNamespace(format=opened.format, read=lambda count: asked.append(count) or opened.read(count))
+
+    monkeypatch.setattr(network, "open_sound", noting)
+    network_take(sound(tmp_path / "a.wav", np.zeros(16_000)), loudness(tmp_path / "net.onnx"), P)
+    assert asked == [3600 * 16_000]
 
 
 def steps() -> np.ndarray:
