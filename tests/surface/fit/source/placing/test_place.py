@@ -61,6 +61,16 @@ def test_eyes_stand_where_the_cameras_expect_them():
     np.testing.assert_allclose(got.marks.eyes.centres, EYES_AT + np.outer([EYE_X, -EYE_X], [1, 0, 0]), atol=0.01)
 
 
+def test_a_head_a_hair_s_breadth_from_its_place_stays_where_it_is():
+    """So what omote exports comes back at the same numbers."""
+    at_place = placed(HEAD).mesh.vertices
+    for off, stays in ((0.03, True), (0.3, False)):
+        mesh = replace(HEAD, vertices=at_place + (off, 0.0, 0.0))
+        got = placed(mesh).mesh.vertices
+        assert np.array_equal(got, mesh.vertices) == stays
+        assert stays or np.abs(got - at_place).max() < 0.05
+
+
 def test_without_eyeballs_the_lids_tell_nearly_the_same_place():
     got = placed(transformed(good_head(eyeballs=False), SQUARE[5], 0.001, (0, 1.6, 0)))
     skin = HEAD.vertices[: len(got.mesh.vertices)]
