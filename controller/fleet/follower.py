@@ -86,9 +86,9 @@ class Follower:
             return None
         return self.header.time_ns + self._delay_ns - self.offset_ns
 
-    def shows_theirs(self, now_s: float) -> bool:
-        """Whether exactly a conductor's faces are shown, and will be at a tick before ``now_s``."""
-        return self.conducted and self.exact and not self._is_lost(now_s)
+    def follows(self, now_s: float) -> bool:
+        """Whether a conductor is followed, and will be at a tick before ``now_s``: one's own life is not used then."""
+        return self.conducted and not self._is_lost(now_s)
 
     def _is_lost(self, now_s: float) -> bool:
         return now_s - self._heard_s > self._patience_s

@@ -119,10 +119,10 @@ class Node:
         return theirs if follower.conducted else stamp_ns
 
     def rests(self, head: str) -> bool:
-        """Whether a head's own layers are not needed at this tick: it shows exactly what a conductor sends. One that
-        stands by keeps them up to date at every fifth tick, to go on from there. Called once a tick."""
+        """Whether a head's own layers are not needed at this tick: it follows what a conductor sends. One that stands
+        by keeps them up to date at every fifth tick, to go on from there. Called once a tick."""
         follower = self.followers[head]
-        self._resting[head] = follower.shows_theirs(time.monotonic()) and not self.lease.active
+        self._resting[head] = follower.follows(time.monotonic()) and not self.lease.active
         if self._resting[head] and self.conducts:
             self._rests[head] += 1
             self._resting[head] = self._rests[head] % _STANDBY_TICKS != 0

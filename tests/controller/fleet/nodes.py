@@ -100,7 +100,7 @@ class Running:
                 values, stamp = self.rows[name][-1].copy(), 0
                 rested[name] += step_s
                 follower = self.node.followers[name]
-                follows, rests = follower.exact and follower.conducted, self.node.rests(name)
+                follows, rests = follower.conducted, self.node.rests(name)
                 self.mixed[name].append((follows, not rests))
                 if not rests:
                     stamp, rested[name] = state.tick(now, rested[name], values), 0.0

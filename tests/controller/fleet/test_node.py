@@ -117,7 +117,12 @@ def test_a_stage_split_over_processes_moves_as_in_one(hub: str, tmp_path: Path) 
 
 def test_the_parts_of_a_stage_are_alive_as_tokens(hub: str, tmp_path: Path) -> None:
     with Running(hub, "head", folder=tmp_path, prefix="tokens"), client(hub) as session:
-        found = [str(reply.ok.key_expr) for reply in session.liveliness().get("tokens/**") if reply.ok]
+
+        def tokens() -> list[str]:
+            return [str(reply.ok.key_expr) for reply in session.liveliness().get("tokens/**") if reply.ok]
+
+        until(tokens)
+        found = tokens()
     assert len(found) == 1 and found[0].startswith("tokens/maple/alive/head/")
 
 
@@ -263,7 +268,7 @@ def test_layers_rest_while_another_process_decides_and_who_stands_by_keeps_up(hu
 
 
 def mixed_of(node: Running, *, follows: bool) -> list[bool]:
-    """Of the ticks at which heads showed exactly what a conductor sent, or of the others, whether layers ticked."""
+    """Of the ticks at which heads followed a conductor, or of the others, whether layers ticked."""
     return [mixed for name in node.mixed for following, mixed in node.mixed[name] if following is follows]
 
 
