@@ -7,6 +7,7 @@ import pytest
 
 from surface.check.lids import eye_opening
 from surface.check.subject import Subject
+from surface.fit.features import squints
 from surface.fit.features.squints import shut_with_squints
 from surface.head import Head
 from surface.head.model.data import Group, HeadData
@@ -48,3 +49,13 @@ def test_a_squint_that_leaves_the_eye_shut_and_a_head_without_squints_stay(head:
     for data in (good, head.data):
         same, notes = shut_with_squints(data)
         assert not notes and same.rules == data.rules
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("alone", "both", "bad"), [(0.1, 0.4, False), (0.1, 0.6, True), (0.7, 0.6, False)])
+def test_half_a_millimetre_of_a_blinking_eye_may_show(
+    head: Head, monkeypatch: pytest.MonkeyPatch, alone: float, both: float, bad: bool
+) -> None:
+    monkeypatch.setattr(squints, "_open", lambda face, subject, side, pose: both if len(pose) > 1 else alone)
+    _, notes = shut_with_squints(squinting(head.data, 0.7, "Left"))
+    assert bool(notes) == bad

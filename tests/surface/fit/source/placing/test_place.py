@@ -65,7 +65,7 @@ def test_a_head_a_hair_s_breadth_from_its_place_stays_where_it_is():
     """So what omote exports comes back at the same numbers."""
     at_place = placed(HEAD).mesh.vertices
     for off, stays in ((0.03, True), (0.3, False)):
-        mesh = replace(HEAD, vertices=at_place + (off, 0.0, 0.0))
+        mesh = replace(HEAD, vertices=at_place + np.array([off, 0.0, 0.0]))
         got = placed(mesh).mesh.vertices
         assert np.array_equal(got, mesh.vertices) == stays
         assert stays or np.abs(got - at_place).max() < 0.05
