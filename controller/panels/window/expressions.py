@@ -11,7 +11,7 @@ from controller.panels.window.saving import Saving
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.vocabulary import Vocabulary
 
-_KINDS = {"emotion": "emotions", "gesture": "gestures", "user": "own"}
+_KINDS = {"emotion": "emotions", "gesture": "gestures", "user": "your own"}
 _FINENESS = 50  # steps of the pad from the middle to its edge
 _PAD_LINES = 16.0
 
