@@ -148,9 +148,12 @@ def phone(folder: Path) -> Image.Image:
         browser.wait(f"omote.face.frames > {drawn + 2}", _LONGEST_S)
         browser.screenshot(folder / "tapped.png")
         browser.evaluate("document.getElementById('tab-servos').click()")
+        figures = "document.querySelector('#servo-list .servo').textContent"
+        assert "away" in browser.evaluate(figures), "what a servo measures is there as soon as the tab is open"
         browser.evaluate("document.getElementById('stop').click()")
         until(lambda: not any(loop.bus.running for loop in body.buses))
         browser.wait("document.getElementById('stopped').textContent.includes('Servos are off')", _LONGEST_S)
+        browser.wait(f"{figures}.includes('motor off')", _LONGEST_S)
         browser.screenshot(folder / "stopped.png")
     return beside([Image.open(folder / name).convert("RGB") for name in ("tapped.png", "stopped.png")])
 

@@ -37,6 +37,9 @@ WIDER = """[...document.querySelectorAll('body *')].filter(each => each.offsetPa
   && each.scrollWidth > each.clientWidth + 1 && getComputedStyle(each).overflowX !== 'visible')
   .map(each => each.tagName + ' ' + each.id + ': ' + each.textContent.slice(0, 40))"""
 """What holds more than it shows."""
+MARKS = """[['.wanted', 'x'], ['.measured', 'x1']].map(([name, key]) =>
+  Number(document.querySelector('#servo-list ' + name).getAttribute(key)))"""
+"""Left edge of the mark of what the first servo shall do, and where it is, in hundredths of its limits."""
 needs_chromium = pytest.mark.skipif(
     CHROMIUM is None, reason="no Chromium here; Debian, Ubuntu: sudo apt-get install chromium"
 )
@@ -122,6 +125,10 @@ def test_nothing_is_cut_or_needs_scrolling_sideways(tmp_path: Path, width: int, 
         open_panel(browser, where, width, height)
         for tab in ("express", "sliders", "shows", "servos", "links"):
             browser.evaluate(f"document.getElementById('tab-{tab}').click()")
+            if tab == "servos":  # at once, and the mark of what is wanted around the line of what is measured
+                assert "away" in browser.evaluate("document.querySelector('#servo-list .servo').textContent")
+                wanted, measured = browser.evaluate(MARKS)
+                assert wanted == pytest.approx(measured - 1.0, abs=0.2)
             if tab == "links":
                 browser.wait("document.querySelectorAll('#link-list td').length > 0")
             assert browser.evaluate(WIDER) == [], tab

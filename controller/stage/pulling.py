@@ -14,7 +14,7 @@ bend (jaw, lids) it is repeated with the slopes at the face that was found (Gaus
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -153,10 +153,12 @@ class PullSolver:
         self._held = self._skin.subset(chosen)
         stay, other = self._stay(chosen), self._other_side(chosen)
         self._staying = self._skin.subset(np.concatenate([stay, other]))
+        self._held_slopes = Slopes(self._held)
         opening = np.clip((self._held.jaw.max(initial=0.0) - _OPENING[0]) / (_OPENING[1] - _OPENING[0]), 0.0, 1.0)
         weights = np.array([_STAY] * len(stay) + [_OTHER_SIDE] * len(other))
         weights *= 1.0 - opening * np.clip(self._staying.jaw / _OPENING[0], 0.0, 1.0)
         self._stay_weights = np.repeat(weights, 3)[:, None]
+        self._stay_slopes = Slopes(self._staying, lambda moves: self._stay_weights * _flat(moves))
         reach = _reach(self._held)
         names = [self._parameters.names[i] for i in self.moved]
         able = (reach > _TOUCH_MM) & [not name.startswith(_NEVER) for name in names]
@@ -164,6 +166,8 @@ class PullSolver:
         able &= own >= min(_OWN, own[able].max(initial=0.0))  # where no shape is at home, the one that is most so
         self._free = np.flatnonzero(able @ self._ties > 0.0)
         self._lips_weight = _LIPS * float(1.0 - opening)
+        if self._lips is not None:
+            self._lip_slopes = Slopes(self._lips, lambda moves: self._lips_weight * _flat(_gap(moves)))
 
     def _other_side(self, chosen: NDArray[np.intp]) -> NDArray[np.intp]:
         """Points across the face of the pins, where no pin is near; none where both sides move alike."""
@@ -196,16 +200,16 @@ class PullSolver:
     def _step(self, pins: Sequence[Pin], k: float, x: Floats) -> Floats:
         soft, held, staying = np.sqrt(k), self._held, self._staying
         rows, goals = [], []
-        slopes, here = _slopes(held, x), held.rest + held.displacement(x)
+        slopes, here = self._held_slopes(x), held.rest + held.displacement(x)
         for i, pin in enumerate(pins):
             weights = pin.weights(soft * _DEPTH)
             rows.append(weights @ slopes[i])
             goals.append(weights @ (pin.goal - here[i]))
-        rows.append(soft * self._stay_weights * _slopes(staying, x).reshape(-1, len(x)))
+        rows.append(soft * self._stay_slopes(x))
         back = staying.displacement(self._x0) - staying.displacement(x)
         goals.append(soft * self._stay_weights[:, 0] * back.ravel())
         if self._lips is not None and self._lips_weight:
-            rows.append(soft * self._lips_weight * _gap(_slopes(self._lips, x)).reshape(-1, len(x)))
+            rows.append(soft * self._lip_slopes(x))
             way = _gap(self._lips.displacement(self._x0)) - _gap(self._lips.displacement(x))
             goals.append(soft * self._lips_weight * way.ravel())
         matrix, goal = np.vstack(rows), np.concatenate(goals)
@@ -225,12 +229,29 @@ def _reach(samples: SkinSamples) -> Floats:
     return reach
 
 
-def _slopes(samples: SkinSamples, x: Floats) -> Floats:
-    """(m, 3, s): how the points move with each shape at ``x`` : (s,), mm per unit."""
-    levels = samples.moves.shape[3]
-    quarter = np.clip((x * levels).astype(np.intp), 0, levels - 1)
-    at: Floats = np.take_along_axis(samples.moves, quarter[None, None, :, None], axis=3)[..., 0] * levels
-    return at
+class Slopes:
+    """How points move with each shape, mm per unit, kept until a shape passes from one of its levels to the next.
+
+    samples : the points. finish : what is made of the slopes (m, 3, s), and kept; themselves without.
+    """
+
+    def __init__(self, samples: SkinSamples, finish: Callable[[Floats], Floats] = lambda moves: moves) -> None:
+        self._moves, self._finish = samples.moves, finish
+        self._level = np.full(1, -1)
+
+    def __call__(self, x: Floats) -> Floats:
+        """At ``x`` : (s,); the same array until a level changes, which is not to be written to."""
+        levels = self._moves.shape[3]
+        level = np.clip((x * levels).astype(np.intp), 0, levels - 1)
+        if not np.array_equal(level, self._level):
+            self._level = level
+            self._slopes = self._finish(self._moves[:, :, np.arange(len(x)), level] * levels)
+        return self._slopes
+
+
+def _flat(moves: Floats) -> Floats:
+    """(m, 3, s) as (3 m, s)."""
+    return moves.reshape(-1, moves.shape[2])
 
 
 def _gap(moves: Floats) -> Floats:

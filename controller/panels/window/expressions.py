@@ -11,7 +11,7 @@ from controller.panels.window.saving import Saving
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.vocabulary import Vocabulary
 
-_KINDS = {"emotion": "emotions", "gesture": "gestures", "user": "own"}
+_KINDS = {"emotion": "emotions", "gesture": "gestures", "user": "your own"}
 _FINENESS = 50  # steps of the pad from the middle to its edge
 _PAD_LINES = 16.0
 
@@ -89,6 +89,8 @@ class ExpressionButtons:
             x = min(max(x, corner.x + 2), far.x - wide.x - 2)
             y = _free_height(taken, x, corner.y + half * (1 - point[1]) - wide.y / 2, wide.x, wide.y)
             taken.append((x, y, wide.x))
+            ground = imgui.get_color_u32(imgui.Col_.window_bg)  # the cross ends at a label
+            draw.add_rect_filled(imgui.ImVec2(x, y), imgui.ImVec2(x + wide.x, y + wide.y), ground)
             draw.add_text(imgui.ImVec2(x, y), packed(imgui, (0.85, 0.85, 0.85, 1.0)), name)
         shown = self._commands.now.expression.name
         if shown.startswith("VA:"):

@@ -18,7 +18,7 @@ def draw_problems(imgui: Any, problems: Problems) -> None:
     imgui.push_style_color(imgui.Col_.text, imgui.ImVec4(*AMBER))
     imgui.text_wrapped(newest.text + (f" ({newest.times} times)" if newest.times > 1 else ""))
     imgui.pop_style_color()
-    if imgui.button("read##problem"):
+    if imgui.button("dismiss##problem"):
         problems.dismiss()
     if more:
         imgui.same_line()

@@ -20,6 +20,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 _LOADED = (".toml", ".csv", ".wav")
 _TRACK_LINES, _NEAR = 3.2, 0.45
 _KEY_LINES = 0.35  # half the width of a key
+_LABEL = 2.0  # from a tick to its label, points
 _TICK_LINES = 3.0  # least distance of two ticks, in heights of a line
 
 
@@ -104,12 +105,13 @@ class TimelinePanel:
         draw, line, now = imgui.get_window_draw_list(), imgui.get_font_size(), self._commands.now
         grey, vec = packed(imgui, GREY), imgui.ImVec2
         draw.add_rect_filled(corner, vec(corner.x + width, corner.y + height), packed(imgui, GREY, 0.15), 3.0)
-        corner = vec(corner.x + line * _KEY_LINES, corner.y)
+        right, corner = corner.x + width, vec(corner.x + line * _KEY_LINES, corner.y)
         step_s = tick_s(self.playback.shown_s * _TICK_LINES * line / width)
         for i in range(int(self.playback.shown_s / step_s) + 1):
             x = corner.x + scale * i * step_s
             draw.add_line(vec(x, corner.y), vec(x, corner.y + line * 0.4), grey)
-            draw.add_text(vec(x + 2, corner.y), grey, f"{i * step_s:g}")
+            label = f"{i * step_s:g}"
+            draw.add_text(vec(label_left(x, imgui.calc_text_size(label).x, right), corner.y), grey, label)
         if self.playback.range_s is not None and now.take is not None:
             low, high = (corner.x + scale * x for x in sorted(self.playback.range_s))
             draw.add_rect_filled(vec(low, corner.y), vec(high, corner.y + height), packed(imgui, AMBER, 0.25))
@@ -213,6 +215,11 @@ class TimelinePanel:
         """Write the show or take. Raises ParameterError, ControllerError: it cannot be written."""
         path = self.playback.save(self._folder, self._name, self._vocabulary, loop=self._loop)
         self._message = f"wrote {path}"
+
+
+def label_left(tick: float, width: float, right: float) -> float:
+    """Where the label of a tick begins: right of it, or left of it where it would go on beyond ``right``."""
+    return tick + _LABEL if tick + _LABEL + width <= right else tick - _LABEL - width
 
 
 def tick_s(least_s: float) -> float:

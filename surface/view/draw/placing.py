@@ -27,8 +27,10 @@ class Placing:
         screen.viewport = screen.scissor = box
         screen.use()
         self._ctx.enable_only(self._ctx.NOTHING)
-        set_uniforms(self._program, {"picture": 1, "origin": box[:2]})
-        picture.color_attachments[0].use(1)  # type: ignore[union-attr]
+        set_uniforms(self._program, {"picture": 1})
+        texture = picture.color_attachments[0]
+        texture.filter = self._ctx.NEAREST, self._ctx.NEAREST  # type: ignore[union-attr]
+        texture.use(1)  # type: ignore[union-attr]
         self._whole.render(corners(Bands.whole(box[2:]).boxes(), box[2:]))
 
     def release(self) -> None:

@@ -2,7 +2,8 @@
 
 Pictures of two qualities differ, so a change waits for a quick movement of the face, as a blink or a shift of gaze, and
 then dissolves from one to the other. It goes to "fast" when "full" comes too late, and back when "full" would be in
-time, as far as the cost of both is known. Each return that fails makes the next wait twice as long.
+time, as far as the cost of both is known. Each return that fails makes the next wait twice as long. Pictures that come
+so late that they stutter are left at once: that is seen more than the change.
 """
 
 from __future__ import annotations
@@ -18,8 +19,13 @@ QUICK_PER_S = 3.0
 """Speed of a parameter whose range is 1 that hides a change; a blink reaches 10."""
 PATIENCE_S = 2.0
 """A change that finds no quick movement for so long begins without one."""
-FRAMES = 8
-"""Length of a dissolve."""
+FRAMES, DISSOLVE_S = 8, 8 / 60
+"""Length of a dissolve: so many frames, or less where they come so slowly that it would last longer than this."""
+STUTTER, STUTTER_FRAMES = 1.5, 6
+"""Share of a period after which a frame is seen to stutter, and how many in a row do."""
+_DRAWING = 0.5
+"""Share of a period that drawing takes at least where it is to blame for a stutter, and not a slow screen. Software
+renderers fill pixels on other threads, so this is only a part of what a picture takes."""
 HOLD_S, LONGEST_HOLD_S = 5.0, 80.0
 """Least time in "fast" before "full" is tried again, at first and at most."""
 RATIO, RATIOS = 2.2, (1.2, 4.0)
@@ -52,6 +58,7 @@ class QualityChoice:
         self._last: tuple[float, np.ndarray] | None = None
         self._quick = self._moved = False
         self._frames, self._spent_s = 0, 0.0
+        self._interval_s, self._stutters = 0.0, 0
 
     @property
     def other(self) -> str:
@@ -69,11 +76,12 @@ class QualityChoice:
             before_s, before = self._last
             step = float(np.abs(values - before).max(initial=0.0))
             self._moved, self._quick = step > 0.0, step > QUICK_PER_S * (now_s - before_s)
-            self.seconds[self.level] += now_s - before_s
+            self._interval_s = now_s - before_s
+            self.seconds[self.level] += self._interval_s
         self._last = now_s, np.array(values, float)
         if self.share < 1.0:
-            self.share = min(1.0, self.share + 1.0 / FRAMES)
-        elif self._wants_change(now_s) and (self._quick or now_s - self._asked_s >= PATIENCE_S):
+            self.share = min(1.0, self.share + max(1.0 / FRAMES, self._interval_s / DISSOLVE_S))
+        elif self._stutters >= STUTTER_FRAMES or self._may_change(now_s):
             self._change(now_s)
         return self.drawn
 
@@ -81,11 +89,17 @@ class QualityChoice:
         """End a frame that took so long to draw. Frames of a face at rest and of a dissolve do not count."""
         if not self._moved or self.share < 1.0:
             return
+        late = self._interval_s > STUTTER * self._period_s and seconds > _DRAWING * self._period_s
+        self._stutters = self._stutters + 1 if late and self.level == "full" else 0
         self._frames, self._spent_s = self._frames + 1, self._spent_s + seconds
         lasting = max(self._spent_s, self._frames * self._period_s)
         if self._frames >= _LEAST_FRAMES and lasting >= WINDOW_S:
             self._means[self.level] = self._spent_s / self._frames
             self._frames, self._spent_s = 0, 0.0
+
+    def _may_change(self, now_s: float) -> bool:
+        """Whether the other quality is wanted, and a movement hides the change or it was wanted for long enough."""
+        return self._wants_change(now_s) and (self._quick or now_s - self._asked_s >= PATIENCE_S)
 
     def _wants_change(self, now_s: float) -> bool:
         """Whether the other quality is wanted; notes since when it is."""
@@ -107,9 +121,9 @@ class QualityChoice:
         if self.level == "full":  # it is known now how much more this took
             failed = self.switches > 0 and lasted_s < LONGEST_HOLD_S
             self._hold_s = min(2.0 * self._hold_s, LONGEST_HOLD_S) if failed else HOLD_S
-            if "fast" in self._means:
+            if set(LEVELS) <= set(self._means):
                 self._ratio = float(np.clip(self._means["full"] / self._means["fast"], *RATIOS))
         self.level, self.share = self.other, 1.0 / FRAMES
         self.switches += 1
         self._means.pop(self.level, None)
-        self._frames, self._spent_s, self._asked_s = 0, 0.0, np.inf
+        self._frames, self._spent_s, self._asked_s, self._stutters = 0, 0.0, np.inf, 0

@@ -12,7 +12,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.anchors import SkinSamples, head_order, sample_skin, skin_points
 from controller.stage import pulling as module
-from controller.stage.pulling import Pin, PullSolver, lip_pairs
+from controller.stage.pulling import Pin, PullSolver, Slopes, lip_pairs
 from surface.head import Head
 from surface.spline.matrix import basis_rows
 
@@ -200,7 +200,7 @@ def test_slopes_are_those_of_the_quarter_that_a_shape_is_in() -> None:
     samples = made([[0, 0, 0]], {"jawOpen": [[0, -8, 0]], "browInnerUp": [[4, 0, 0]]})
     samples.moves[0, 1, 0] = [-1.0, -2.0, -2.5, -2.5]
     for value, slope in ((0.0, -4.0), (0.24, -4.0), (0.26, -8.0), (0.6, -10.0), (1.0, -10.0)):
-        found = module._slopes(samples, np.array([value, 0.5]))
+        found = Slopes(samples)(np.array([value, 0.5]))
         np.testing.assert_allclose(found, [[[0.0, 4.0], [slope, 0.0], [0.0, 0.0]]])
     np.testing.assert_allclose(module._reach(samples), [8.0, 4.0])
     assert module._reach(samples.subset(slice(0, 0))).tolist() == [0.0, 0.0]
@@ -270,3 +270,17 @@ def test_a_pull_reaches_its_goal_by_the_shape_that_goes_there_and_says_what_is_m
     assert solver.missed_mm <= module.CLOSE_MM
     found = solver.solve([Pin(0, np.array([40.0, 20.0, 0.0]), np.array([0.0, 0, 1]))])
     assert found[P.index("mouthSmileLeft")] == pytest.approx(1.0) and solver.missed_mm == pytest.approx(12.0, abs=0.01)
+
+
+def test_slopes_are_found_again_only_where_a_shape_reaches_another_level(bench: Bench) -> None:
+    skin, made = bench.skin.subset(slice(0, 20)), []
+    slopes = Slopes(skin, lambda moves: made.append(1) or 2.0 * moves)  # type: ignore[func-returns-value]
+    count, levels = skin.moves.shape[2:]
+    x = np.full(count, 0.3 / levels)
+    first = slopes(x)
+    assert slopes(1.5 * x) is first and len(made) == 1
+    step = 1e-6 * np.eye(count)[3]
+    for at in (x, x + 1.0 / levels * np.eye(count)[3]):
+        wanted = (skin.displacement(at + step) - skin.displacement(at)) / 1e-6
+        assert slopes(at)[:, :, 3] == pytest.approx(2.0 * wanted, abs=1e-3)
+    assert len(made) == 2

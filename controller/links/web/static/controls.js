@@ -17,7 +17,7 @@ export const percent = (value) => `${Math.round(100 * value)} %`;
 // "mouthSmileLeft" as "mouth smile left".
 export const words = (name) => name.replace(/([A-Z_])/g, " $1").replace(/_/g, "").toLowerCase();
 
-export function tabs(titles) {
+export function tabs(titles, opened = () => {}) {
   const show = (wanted) => {
     for (const name of Object.keys(titles)) {
       const chosen = name === wanted;
@@ -25,6 +25,7 @@ export function tabs(titles) {
       $(`tab-${name}`).tabIndex = chosen ? 0 : -1;
       $(name).hidden = !chosen;
     }
+    opened(wanted);
   };
   const names = Object.keys(titles);
   for (const name of names) {

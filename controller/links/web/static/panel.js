@@ -10,7 +10,7 @@ const secret = token();
 const robot = new Robot(secret), sliders = new Sliders(robot), servos = new Servos(), links = new Links();
 let latest = null, noteTimer = 0, shown = "", face = null;
 
-tabs({ express: "Express", sliders: "Sliders", shows: "Shows", servos: "Servos", links: "Links" });
+tabs({ express: "Express", sliders: "Sliders", shows: "Shows", servos: "Servos", links: "Links" }, (name) => { if (name === "servos") servos.draw(); });
 
 function note(text, seconds = 4) {
   $("note").textContent = text;

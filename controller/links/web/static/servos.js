@@ -19,8 +19,13 @@ export class Servos {
       const key = `${servo.bus}/${servo.id}`;
       const row = this.#rows.get(key) ?? this.#make(key, servo);
       row.plot.add(servo.wanted_deg, servo.measured_deg);
-      if (visible) this.#fill(row, servo);
+      row.servo = servo;
     }
+    if (visible) this.draw();
+  }
+
+  draw() {
+    for (const row of this.#rows.values()) this.#fill(row, row.servo);
   }
 
   #make(key, servo) {
@@ -38,11 +43,11 @@ export class Servos {
 
   #fill(row, servo) {
     const across = (angle) => 100 * Math.min(Math.max((angle - servo.low_deg) / (servo.high_deg - servo.low_deg), 0), 1);
-    row.wanted.setAttribute("x", Math.min(across(servo.wanted_deg), 98));
+    row.wanted.setAttribute("x", Math.min(Math.max(across(servo.wanted_deg) - 1, 0), 98));
     row.measured.setAttribute("visibility", servo.measured_deg == null ? "hidden" : "visible");
     if (servo.measured_deg != null) { const x = across(servo.measured_deg); row.measured.setAttribute("x1", x); row.measured.setAttribute("x2", x); }
     const off = servo.measured_deg == null ? null : servo.measured_deg - servo.wanted_deg;
-    row.figures.textContent = [number(servo.wanted_deg, "°", 1), off == null ? "" : `off ${off.toFixed(1)} °`, number(servo.temperature_c, "°C"), servo.torque === false ? "motor off" : ""].filter(Boolean).join(" · ");
+    row.figures.textContent = [number(servo.wanted_deg, "°", 1), off == null ? "" : `${off.toFixed(1)} ° away`, number(servo.temperature_c, "°C"), servo.torque === false ? "motor off" : ""].filter(Boolean).join(" · ");
     row.fault.textContent = servo.error;
     row.plot.draw();
   }

@@ -1,10 +1,12 @@
-// A picture at its place in a window, pixel by pixel.
+// A picture at its place in a window, pixel by pixel. Sampled, not fetched: a software renderer samples pixels of eight
+// bits on a path of its own, which is quicker.
 
 uniform sampler2D picture;
-uniform vec2 origin;   // its lower left corner, pixels
+
+in vec2 v_at;
 
 out vec4 colour;
 
 void main() {
-    colour = vec4(texelFetch(picture, ivec2(gl_FragCoord.xy - origin), 0).rgb, 1.0);
+    colour = vec4(texture(picture, 0.5 * v_at + 0.5).rgb, 1.0);
 }

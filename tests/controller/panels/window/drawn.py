@@ -15,7 +15,7 @@ def at(x: float, y: float) -> SimpleNamespace:
 class Drawn:
     """Notes every call by its name; no button is pressed but the one that is called ``pressed``."""
 
-    Col_ = SimpleNamespace(button=1, slider_grab=2, text=3)
+    Col_ = SimpleNamespace(button=1, slider_grab=2, text=3, window_bg=4)
     TableFlags_ = SimpleNamespace(sizing_stretch_prop=1)
     TableColumnFlags_ = SimpleNamespace(width_fixed=1, width_stretch=2)
 

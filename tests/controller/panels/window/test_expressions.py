@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS
@@ -49,6 +50,8 @@ def test_emotions_stand_where_their_moods_are_inside_the_pad_and_none_covers_ano
     affect = Affect.load(VOCABULARY)
     assert list(labels) == list(affect.names) and len(labels) > 5
     boxes = [(p.x, p.y, p.x + LETTER * len(text), p.y + LINE) for text, p in labels.items()]
+    grounds = [(low.x, low.y, high.x, high.y) for low, high, _ in drawn.named("add_rect_filled")]
+    assert np.allclose(grounds, boxes), "no line of the cross goes through a label"
     for number, (left, top, right, bottom) in enumerate(boxes):
         assert left >= 12.0 - 1e-9 and right <= 408.0 + 1e-9
         for other in boxes[:number]:

@@ -39,8 +39,8 @@ def test_without_problems_nothing_is_drawn() -> None:
 @pytest.mark.parametrize(("times", "text"), [(1, "lost"), (2, "lost (2 times)")])
 def test_the_newest_problem_is_drawn_with_how_often_it_was_and_can_be_read(times: int, text: str) -> None:
     problems = Problems("lost", times=times)
-    drawn = shown(problems, "read##problem")
-    assert drawn.named("text_wrapped") == [(text,)] and drawn.named("button") == [("read##problem",)]
+    drawn = shown(problems, "dismiss##problem")
+    assert drawn.named("text_wrapped") == [(text,)] and drawn.named("button") == [("dismiss##problem",)]
     assert problems.done == ["newest"]
 
 
@@ -48,7 +48,7 @@ def test_several_problems_can_be_read_at_once() -> None:
     problems = Problems("old", "older still", "new")
     drawn = shown(problems, "all 3##problem")
     assert drawn.named("text_wrapped") == [("new",)]
-    assert drawn.named("button") == [("read##problem",), ("all 3##problem",)] and problems.done == ["all"]
+    assert drawn.named("button") == [("dismiss##problem",), ("all 3##problem",)] and problems.done == ["all"]
     assert shown(problems).named("button") == drawn.named("button") and problems.done == ["all"]
 
 

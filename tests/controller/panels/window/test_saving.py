@@ -43,6 +43,15 @@ def panel_of(values: np.ndarray, folder: Path, sent: list[Any]) -> Panel:
     return Panel(lambda: values, sent.append, options=PanelOptions(folder=folder))
 
 
+def test_a_file_in_the_present_folder_is_named_from_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    values = PARAMETERS.neutral()
+    values[PARAMETERS.index("jawOpen")] = 0.5
+    panel = panel_of(values, tmp_path, [])
+    monkeypatch.chdir(tmp_path)
+    panel.saving.save("gape")
+    assert panel.saving.message == "wrote gape to mine.toml"
+
+
 def test_moved_skin_is_saved_as_a_group_that_is_a_slider_a_button_and_a_word(stage: Stage, tmp_path: Path) -> None:
     panel = panel_of(PARAMETERS.neutral(), tmp_path, [])
     mouse, asked = sculpted(stage, panel), []

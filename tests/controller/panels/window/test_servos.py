@@ -112,7 +112,7 @@ def test_links_and_faults_are_drawn_and_faults_dismissed(screen: Screen, monkeyp
     assert any("line /dev/ttyACM0: the port is not there" in text for text in places.texts)
     assert any("12.5 Hz" in text for text in places.texts) and "the port is taken" in places.texts
     assert "bus head is not back" in places.texts
-    screen.click(draw, *places.at["read##problem"])
+    screen.click(draw, *places.at["dismiss##problem"])
     assert panel.problems.unread == []
 
 

@@ -20,7 +20,7 @@ from controller.links.line.script import load_script
 from controller.panels.session.playback import Playback
 from controller.panels.session.sound import SoundPlayer
 from controller.panels.window.panel import Panel, PanelOptions
-from controller.panels.window.timeline_panel import tick_s
+from controller.panels.window.timeline_panel import label_left, tick_s
 from controller.takes.livelink import Take
 from controller.takes.plain import plain_take, write_plain
 from controller.takes.timeline import Key, Timeline, load_timeline, save_show
@@ -126,7 +126,7 @@ def test_the_window_makes_a_show_of_two_keys(
         screen.frame(draw)
     click("save show")
     assert "no keys" in desk.panel.problems.unread[-1].text
-    click("all 1##problem") if "all 1##problem" in places.at else click("read##problem")
+    click("all 1##problem") if "all 1##problem" in places.at else click("dismiss##problem")
     desk.values[JAW] = 0.6
     click("key: present face")
     desk.commands.show("happiness", 1.0)
@@ -234,6 +234,11 @@ def test_a_take_is_loaded_and_another_laid_over_it(desk: Desk, tmp_path: Path) -
 
 def test_ticks_are_round_and_far_enough_apart() -> None:
     assert [tick_s(least) for least in (0.03, 0.1, 0.6, 3.0, 7.0)] == pytest.approx([0.05, 0.1, 1.0, 5.0, 10.0])
+
+
+def test_the_label_of_the_last_tick_is_not_cut() -> None:
+    assert label_left(100.0, 10.0, 120.0) == 102.0
+    assert label_left(115.0, 10.0, 120.0) == 103.0
 
 
 def test_a_timeline_without_keys_plays_nothing(desk: Desk) -> None:

@@ -7,7 +7,15 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from surface.view.scene.choice import FRAMES, HOLD_S, LEVELS, PATIENCE_S, QualityChoice
+from surface.view.scene.choice import (
+    DISSOLVE_S,
+    FRAMES,
+    HOLD_S,
+    LEVELS,
+    PATIENCE_S,
+    STUTTER_FRAMES,
+    QualityChoice,
+)
 
 RATE_HZ = 60.0
 
@@ -93,7 +101,41 @@ def test_it_dissolves_in_even_steps() -> None:
     machine = Machine(full=0.024, fast=0.011)
     machine.run(10.0)
     shares = [share for _, level, share in machine.frames if level == "fast"]
-    assert shares[:FRAMES] == pytest.approx(np.arange(1, FRAMES + 1) / FRAMES) and set(shares[FRAMES:]) == {1.0}
+    steps = np.diff([share for share in shares if share < 1.0])
+    assert shares[0] == 1.0 / FRAMES and steps == pytest.approx((0.024 + 0.011) / DISSOLVE_S)
+    assert set(shares[len(steps) + 1 :]) == {1.0}
+
+
+def test_a_dissolve_lasts_no_longer_where_frames_are_slow() -> None:
+    machine = Machine(full=0.060, fast=0.040)
+    machine.run(4.0)
+    times = [at for at, level, share in machine.frames if level == "fast" and share < 1.0]
+    assert times[-1] - times[0] < DISSOLVE_S
+
+
+def test_pictures_that_stutter_are_left_at_once() -> None:
+    machine = Machine(full=0.060, fast=0.020, blink_s=1000.0)
+    machine.run(4.0)
+    at = next(time for time, level, _ in machine.frames if level == "fast")
+    assert at < (STUTTER_FRAMES + 3) * 0.060 and machine.choice.switches == 1
+
+
+def test_a_picture_whose_pixels_are_filled_on_other_threads_is_known_to_stutter_by_its_frames() -> None:
+    choice, now_s = QualityChoice(RATE_HZ), 0.0
+    for k in range(STUTTER_FRAMES + 2):
+        choice.begin(np.array([0.01 * k]), now_s)
+        choice.end(0.012)  # in time, but the next frame comes late
+        now_s += 0.040
+    assert choice.level == "fast"
+
+
+def test_a_slow_screen_is_no_reason_to_draw_less() -> None:
+    choice, now_s = QualityChoice(RATE_HZ), 0.0
+    for k in range(300):
+        choice.begin(np.array([0.01 * k]), now_s)
+        choice.end(0.004)
+        now_s += 1.0 / 30.0
+    assert choice.level == "full" and choice.switches == 0
 
 
 def test_a_face_at_rest_changes_nothing() -> None:
