@@ -64,19 +64,20 @@ class _Pair:
         """As :meth:`distances`, which ``found`` what it is given right after it was called with the same mesh and the
         surface's vertices ``before (m, 3)``: only what the others of its vertices change is computed."""
         moved: Bools = (surface != before).any(axis=1)
-        if not moved.any():
+        tree, at, near = self._trees[0], self._samples(1, mesh), self._near[1]
+        away: Bools = np.asarray(moved[tree.triangles].any(axis=1))
+        if not away.any():
             return found
         (to_mesh, fold), (to_surface, fold_at) = ((distance.copy(), of.copy()) for distance, of in found)
         rows = np.concatenate([moved[self._used[0]], moved[self._cut[0]].any(axis=1)])
-        near = self._near[0][rows]
-        to_mesh[rows] = self._trees[1].distances(self._samples(0, surface)[rows], near)
-        fold[rows] = self._fold_of[near]
-        tree, at, near = self._trees[0], self._samples(1, mesh), self._near[1]
+        there = self._near[0][rows]
+        to_mesh[rows] = self._trees[1].distances(self._samples(0, surface)[rows], there)
+        fold[rows] = self._fold_of[there]
         tree.move(surface)
-        away: Bools = moved[tree.triangles].any(axis=1)
         corners = tree.corners[away].reshape(-1, 3)
         outside = np.maximum(np.maximum(corners.min(axis=0) - at, at - corners.max(axis=0)), 0.0)
-        rows = np.asarray(away[near] | (np.linalg.norm(outside, axis=1) < to_surface))  # others have the same triangle nearest
+        # others keep their nearest triangle
+        rows = np.asarray(away[near] | (np.linalg.norm(outside, axis=1) < to_surface))
         to_surface[rows] = tree.distances(at[rows], near[rows])
         return [(to_mesh, fold), (to_surface, fold_at)]
 
