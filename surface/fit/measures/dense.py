@@ -58,28 +58,30 @@ class _Pair:
         to_surface = self._trees[0].distances(self._samples(1, mesh), self._near[1])
         return [(to_mesh, self._fold_of[self._near[0]]), (to_surface, self._fold_at)]
 
-    def distances_elsewhere(
-        self, surface: Floats, mesh: Floats, before: Floats, found: list[tuple[Floats, Bools]]
+    def greater_elsewhere(
+        self, surface: Floats, mesh: Floats, before: Floats, found: list[tuple[Floats, Bools]], least: float
     ) -> list[tuple[Floats, Bools]]:
-        """As :meth:`distances`, which ``found`` what it is given right after it was called with the same mesh and the
-        surface's vertices ``before (m, 3)``: only what the others of its vertices change is computed."""
-        moved: Bools = (surface != before).any(axis=1)
-        tree, at, near = self._trees[0], self._samples(1, mesh), self._near[1]
-        away: Bools = np.asarray(moved[tree.triangles].any(axis=1))
-        if not away.any():
-            return found
-        (to_mesh, fold), (to_surface, fold_at) = ((distance.copy(), of.copy()) for distance, of in found)
-        rows = np.concatenate([moved[self._used[0]], moved[self._cut[0]].any(axis=1)])
-        there = self._near[0][rows]
-        to_mesh[rows] = self._trees[1].distances(self._samples(0, surface)[rows], there)
-        fold[rows] = self._fold_of[there]
-        tree.move(surface)
-        corners = tree.corners[away].reshape(-1, 3)
-        outside = np.maximum(np.maximum(corners.min(axis=0) - at, at - corners.max(axis=0)), 0.0)
-        # others keep their nearest triangle
-        rows = np.asarray(away[near] | (np.linalg.norm(outside, axis=1) < to_surface))
-        to_surface[rows] = tree.distances(at[rows], near[rows])
-        return [(to_mesh, fold), (to_surface, fold_at)]
+        """As :meth:`distances` with the surface's vertices elsewhere, but only what is more than ``least``, the rest 0.
+
+        found : what :meth:`distances` found right before with the same mesh and the vertices ``before (m, 3)``. A
+        distance grows at most by as much as the sample, or the triangle nearest to it, moves: few have to be computed.
+        """
+        (to_mesh, fold), (to_surface, fold_at) = found
+        moved, tree, near = np.linalg.norm(surface - before, axis=1), self._trees[0], self._near[1]
+        most = np.concatenate([moved[self._used[0]], moved[self._cut[0]].max(axis=1, initial=0.0)])
+        rows = (
+            np.flatnonzero(to_mesh + most > least),
+            np.flatnonzero((to_surface + moved[tree.triangles].max(axis=1, initial=0.0)[near] > least) & ~fold_at),
+        )
+        out, fold = (np.zeros_like(to_mesh), np.zeros_like(to_surface)), fold.copy()
+        if len(rows[0]):
+            there = self._near[0][rows[0]]
+            out[0][rows[0]] = self._trees[1].distances(self._samples(0, surface)[rows[0]], there)
+            fold[rows[0]] = self._fold_of[there]
+        if len(rows[1]):
+            tree.move(surface)
+            out[1][rows[1]] = tree.distances(self._samples(1, mesh)[rows[1]], near[rows[1]])
+        return [(out[0], fold), (out[1], fold_at)]
 
     def sticking(self, to_mesh: Floats, fold: Bools, limit: float) -> Floats:
         """(k, 2) in (u, v): the surface's vertices that are further from the mesh than ``limit``, outside folds."""
@@ -109,7 +111,7 @@ def measure_dense(
     pairs = [_Pair(p, numbers[p.name], subject, mesh) for p, own in zip(parts, owned, strict=True) if own.any()]
     found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
     worst: dict[bool, Spot] = {}
-    apart: list[Spot] = []
+    apart: Spot | None = None
     sticking: dict[tuple[str, str], Floats] = {}
     turned: dict[tuple[str, str], Turned] = {}
     for shape in (NEUTRAL, *(n for n in sources if n in subject.claimed)):
@@ -128,14 +130,16 @@ def measure_dense(
             for spot, fold in _greatest(pair, both, shape, places, material):
                 worst[fold] = _greater(worst.get(fold), spot)
             if free is not None:
-                alone = pair.distances_elsewhere(_posed(free, shape, pair.number), moved, surface, both)
-                apart += [s for s, fold in _greatest(pair, alone, shape, places, material) if not fold]
+                alone = _posed(free, shape, pair.number)
+                greater = pair.greater_elsewhere(alone, moved, surface, both, apart.mm if apart else 0.0)
+                for spot, fold in _greatest(pair, greater, shape, places, material):
+                    apart = apart if fold else _greater(apart, spot)
     rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
     added = tuple(p.name for p in subject.parts if p.name not in found)
     samples = sum(len(r) for p in pairs for r in p.rest)
     return DenseErrors(
         found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned,
-        tuple(n for n in changed if n in sources), max(apart, key=lambda s: s.mm, default=None),
+        tuple(n for n in changed if n in sources), apart,
     )  # fmt: skip
 
 
