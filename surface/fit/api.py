@@ -151,7 +151,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
-    notes = [*loaded.notes, *plan.notes, *turned_faces(mesh), *mended, *findings(head, loaded.marks)]
+    notes = [*loaded.notes, *plan.notes, *turned_faces(mesh), *mended, *findings(head, loaded.marks, _kinds(loaded))]
     notes += overlap_notes(head)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
@@ -159,6 +159,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         tuple(faults_of(dense, fitted_parts, scale)),
     )  # fmt: skip
     return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts))
+
+
+def _kinds(loaded: Loaded) -> set[str]:
+    """Of the mesh's pieces, those that were left out, too."""
+    return {kind.split(",")[0] for kind in loaded.pieces.values()}
 
 
 @dataclass(frozen=True)
