@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -222,6 +223,7 @@ def fit(
     check_transfer(expressions_from, landmarks, given)
     options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
     if keep:
+        _refuse_with_keep(mesh, out, {"--name": name, "--report": report, "--force": force})
         _measure(mesh, out, options)
     else:
         _fit_mesh(mesh, out, name or out.resolve().name, options, expressions_from, landmarks, report, force)
@@ -229,6 +231,18 @@ def fit(
         with console.status("fitting identities"):
             added = add_identities(out, mesh, identities)
         console.print(f"identities: {', '.join(added)}", soft_wrap=True)
+
+
+def _refuse_with_keep(mesh: Path, out: Path, given: Mapping[str, object]) -> None:
+    """Raise ConfigError for an option that only a new head has a use for."""
+    instead = {
+        "--name": f"change name in {out / 'head.toml'}",
+        "--report": f"a report needs a new fit: omote fit {mesh} -o OTHER_FOLDER --report {given['--report']}",
+        "--force": "leave it out, or leave out --keep to write the head again",
+    }
+    for option, value in given.items():
+        if value:
+            raise ConfigError(f"{option}: cannot be used with --keep, which writes no head", hint=instead[option])
 
 
 def _fit_mesh(

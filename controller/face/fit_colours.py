@@ -12,6 +12,7 @@ import numpy as np
 from surface.base.arrays import Array, Floats
 from surface.base.error_colours import error_colours
 from surface.head import Head
+from surface.head.model.face import face_of
 from surface.head.posing.fit_error import ATTRIBUTE
 from surface.head.posing.part import HeadPart
 from surface.view.scene.theme import Theme, find_theme
@@ -36,13 +37,10 @@ class FitFigures:
 
 
 def figures_of(head: Head) -> FitFigures | None:
-    """Of the measured part with lips or lids, which is the face, of several or none the one with the most vertices;
-    None for a head that was not measured."""
-    measured = [part for part in head.parts if np.isfinite(_mm(part)).any()]
-    if not measured:
+    """Of the face; of a head whose face was not measured, of the skin that comes next; None without measured skin."""
+    part = face_of([each for each in head.parts if np.isfinite(_mm(each)).any()], head.data.contacts)
+    if part is None:
         return None
-    opened = {contact.part for contact in head.data.contacts}
-    part = max(measured, key=lambda each: (each.name in opened, len(each.vertices)))
     mm = _mm(part)
     mm = mm[np.isfinite(mm)]
     return FitFigures(part.name, float(np.sqrt(np.mean(mm**2))), float(np.percentile(mm, 99.0)), float(mm.max()))

@@ -41,6 +41,7 @@ from surface.readers import is_plain, read_surface, summary
 
 DEFAULT_HEAD = "ict"
 SURFACE_SUFFIXES = (".3dm", ".xml", ".tsm")
+MESHES = (".glb", ".gltf", ".vrm", ".obj", ".ply", ".stl", ".off")
 TRAFFIC = (".pcapng", ".log")
 
 
@@ -106,6 +107,9 @@ def _describe(path: Path, known: _Known) -> Iterator[str]:
     elif suffix in suffixes():
         take = load_take(path, known.parameters)
         yield f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz"
+    elif suffix in MESHES:
+        why = f"{path}: is a mesh; what is checked is the head that is made from it"
+        raise ConfigError(why, hint=f"omote fit {path} -o HEAD; omote check HEAD")
     else:
         yield from _describe_toml(path, known)
 

@@ -15,7 +15,7 @@ import numpy as np
 from surface.base.arrays import Bools, Floats, Floats32, Ints
 from surface.base.jit import kernel, nonallocating
 from surface.check.borders import Borders
-from surface.check.cells import any_nearer, sort_into_cells
+from surface.check.cells import any_nearer, cubes, sort_into_cells
 from surface.check.findings import AGAIN, Finding
 from surface.check.places import Places
 from surface.check.subject import Subject
@@ -268,10 +268,35 @@ def _has_mirror_image(subject: Subject, at: Floats, height: Floats, places: Plac
     middle, far = places.centre[0], MIRROR_MM * subject.scale
     out = np.zeros(len(at), bool)
     steep = np.flatnonzero(height)
-    mirrored = at[steep] * [-1.0, 1.0, 1.0] + [2.0 * middle, 0.0, 0.0]
-    for row, place in zip(steep, mirrored, strict=True):
-        near = np.linalg.norm(at[steep] - place, axis=1) < far
-        out[row] = bool((near & (np.abs(at[steep, 0] - at[row, 0]) > far)).any())
+    if len(steep):
+        points = np.ascontiguousarray(at[steep])
+        mirrored = points * [-1.0, 1.0, 1.0] + [2.0 * middle, 0.0, 0.0]
+        cells = sort_into_cells(points, far)
+        out[steep] = mirror_images(points, mirrored, *cells.columns_at(cubes(mirrored, far)), cells.order, far)
+    return out
+
+
+@kernel
+def mirror_images(points: Any, mirrored: Any, first: Any, last: Any, order: Any, far: float) -> Any:
+    """(k,) whether any of points (k, 3) is nearer than ``far`` to the mirror image (k, 3) of each, and further than
+    ``far`` to the side of the point itself.
+
+    All points that near a mirror image are those of ``order`` from ``first[i, c]`` to ``last[i, c]``, for every column
+    c.
+    """
+    out = np.zeros(len(points), np.bool_)
+    for i in range(len(points)):
+        for column in range(first.shape[1]):
+            for e in range(first[i, column], last[i, column]):
+                j = order[e]
+                if abs(points[j, 0] - points[i, 0]) > far:
+                    x, y = points[j, 0] - mirrored[i, 0], points[j, 1] - mirrored[i, 1]
+                    z = points[j, 2] - mirrored[i, 2]
+                    out[i] |= np.sqrt(x * x + y * y + z * z) < far
+                if out[i]:
+                    break
+            if out[i]:
+                break
     return out
 
 

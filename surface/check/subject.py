@@ -10,6 +10,7 @@ import numpy as np
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.check.raster import Shape
 from surface.head import Head
+from surface.head.model.face import face_of
 from surface.head.model.parameters import ANGLES, SHAPES
 from surface.head.posing.part import HeadPart
 
@@ -74,10 +75,10 @@ class Subject:
 
     @cached_property
     def skin(self) -> Ints:
-        """Numbers of the parts that are skin, the face first: the one with lids or lips, of others the largest."""
+        """Numbers of the parts that are skin, the face first, then the largest."""
+        face = face_of(self.parts, self.head.data.contacts)
         found = [k for k, p in enumerate(self.parts) if p.material == "skin"]
-        opened = {contact.part for contact in self.head.data.contacts}
-        return np.array(sorted(found, key=lambda k: (self.parts[k].name not in opened, -len(self.rest[k]))), np.int64)
+        return np.array(sorted(found, key=lambda k: (self.parts[k] is not face, -len(self.rest[k]))), np.int64)
 
     @cached_property
     def eyes(self) -> Floats | None:

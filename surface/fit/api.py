@@ -25,7 +25,7 @@ from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.squints import shut_with_squints
 from surface.fit.features.wrinkles import with_deep_wrinkles
-from surface.fit.measures.dense import errors_at_rest, with_fit_alone
+from surface.fit.measures.dense import errors_at_rest
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.refusal import save_or_refuse
 from surface.fit.points.facets import facet_sag
@@ -151,8 +151,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
-    dense = with_fit_alone(dense, head, mesh, sources, fitted_parts)
-    notes = [*loaded.notes, *plan.notes, *turned_faces(mesh), *mended, *findings(head, loaded.marks)]
+    notes = [*loaded.notes, *plan.notes, *turned_faces(mesh), *mended, *findings(head, loaded.marks, _kinds(loaded))]
     notes += overlap_notes(head)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
@@ -160,6 +159,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         tuple(faults_of(dense, fitted_parts, scale)),
     )  # fmt: skip
     return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts))
+
+
+def _kinds(loaded: Loaded) -> set[str]:
+    """Of the mesh's pieces, those that were left out, too."""
+    return {kind.split(",")[0] for kind in loaded.pieces.values()}
 
 
 @dataclass(frozen=True)

@@ -85,6 +85,8 @@ def rotation(yaw: float) -> np.ndarray:
 class BallHead:
     """Eyes that turn, a mouth that opens, lids that close, a head that turns."""
 
+    contacts = ()
+
     def __init__(self) -> None:
         self.parameters = PARAMETERS
         self.parts = (

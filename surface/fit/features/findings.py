@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from surface.fit.source.placing.anatomy import Landmarks
@@ -10,6 +12,8 @@ from surface.head.model.data import HeadData
 from surface.head.model.placement import Placement
 
 INSIDE = {"teeth": "teeth", "tongue": "tongue", "brow": "brows or hair", "lash": "lashes"}  # materials, in words
+KINDS = {"teeth": ("teeth",), "tongue": ("tongue",), "brow": ("brow", "hair", "beard"), "lash": ("lash",)}
+"""The kinds of pieces that become parts of each of these materials."""
 CLOSING = ("eyeBlinkLeft", "eyeBlinkRight")
 NO_PLACE = (
     "the head's place is not known, because its eyes were not found; it stays where it is in the file, and cameras "
@@ -24,8 +28,11 @@ NO_LIDS = (
 )
 
 
-def findings(head: HeadData, marks: Landmarks) -> list[str]:
-    """Lines on the unit, the axes and the place of a fitted head, and on the features it has and has not."""
+def findings(head: HeadData, marks: Landmarks, kinds: Collection[str] = ()) -> list[str]:
+    """Lines on the unit, the axes and the place of a fitted head, and on the features it has and has not.
+
+    kinds : of the pieces that the mesh has, those that were left out, too.
+    """
     lines = [] if head.placement is None else [_placed(head.placement)]
     there, absent = _features(head)
     lines += [f"found: {', '.join(there)}"] if there else []
@@ -33,7 +40,10 @@ def findings(head: HeadData, marks: Landmarks) -> list[str]:
     lines += [NO_EYES] if head.eye_radius <= 0 else []
     open_eyes = [name for name in CLOSING if name not in _groups(head)]
     lines += [NO_LIDS.format(" or ".join(open_eyes))] if open_eyes else []
-    lines += [f"not in the mesh, and not drawn: {', '.join(absent)}"] if absent else []
+    left_out = [INSIDE[material] for material in absent if not set(KINDS[material]).isdisjoint(kinds)]
+    absent_words = [word for word in map(INSIDE.__getitem__, absent) if word not in left_out]
+    lines += [f"in the mesh, but left out and not drawn: {', '.join(left_out)}"] if left_out else []
+    lines += [f"not in the mesh, and not drawn: {', '.join(absent_words)}"] if absent_words else []
     return lines
 
 
@@ -49,7 +59,7 @@ def _placed(placement: Placement) -> str:
 
 
 def _features(head: HeadData) -> tuple[list[str], list[str]]:
-    """What the head has, and which usual parts it has not, in words."""
+    """What the head has, in words, and the materials of usual parts that it has not."""
     materials = {p.material for p in head.parts}
     there = []
     if head.eye_radius > 0:
@@ -60,7 +70,7 @@ def _features(head: HeadData) -> tuple[list[str], list[str]]:
     if "jawOpen" in _groups(head):
         there.append("a jaw that opens")
     there += [word for material, word in INSIDE.items() if material in materials]
-    return there, [word for material, word in INSIDE.items() if material not in materials]
+    return there, [material for material in INSIDE if material not in materials]
 
 
 def _groups(head: HeadData) -> set[str]:

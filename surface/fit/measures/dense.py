@@ -58,6 +58,31 @@ class _Pair:
         to_surface = self._trees[0].distances(self._samples(1, mesh), self._near[1])
         return [(to_mesh, self._fold_of[self._near[0]]), (to_surface, self._fold_at)]
 
+    def greater_elsewhere(
+        self, surface: Floats, mesh: Floats, before: Floats, found: list[tuple[Floats, Bools]], least: float
+    ) -> list[tuple[Floats, Bools]]:
+        """As :meth:`distances` with the surface's vertices elsewhere, but only what is more than ``least``, the rest 0.
+
+        found : what :meth:`distances` found right before with the same mesh and the vertices ``before (m, 3)``. A
+        distance grows at most by as much as the sample, or the triangle nearest to it, moves: few have to be computed.
+        """
+        (to_mesh, fold), (to_surface, fold_at) = found
+        moved, tree, near = np.linalg.norm(surface - before, axis=1), self._trees[0], self._near[1]
+        most = np.concatenate([moved[self._used[0]], moved[self._cut[0]].max(axis=1, initial=0.0)])
+        rows = (
+            np.flatnonzero(to_mesh + most > least),
+            np.flatnonzero((to_surface + moved[tree.triangles].max(axis=1, initial=0.0)[near] > least) & ~fold_at),
+        )
+        out, fold = (np.zeros_like(to_mesh), np.zeros_like(to_surface)), fold.copy()
+        if len(rows[0]):
+            there = self._near[0][rows[0]]
+            out[0][rows[0]] = self._trees[1].distances(self._samples(0, surface)[rows[0]], there)
+            fold[rows[0]] = self._fold_of[there]
+        if len(rows[1]):
+            tree.move(surface)
+            out[1][rows[1]] = tree.distances(self._samples(1, mesh)[rows[1]], near[rows[1]])
+        return [(out[0], fold), (out[1], fold_at)]
+
     def sticking(self, to_mesh: Floats, fold: Bools, limit: float) -> Floats:
         """(k, 2) in (u, v): the surface's vertices that are further from the mesh than ``limit``, outside folds."""
         used = self._used[0]
@@ -66,7 +91,8 @@ class _Pair:
 
 
 def measure_dense(
-    head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart], limit: float = np.inf
+    head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart], limit: float = np.inf,
+    *, fit_alone: bool = False,
 ) -> DenseErrors:  # fmt: skip
     """Distances between a head and the mesh that it was fitted to, in neutral and with each of its shapes at 1.
 
@@ -74,48 +100,57 @@ def measure_dense(
     a shape of the mesh on purpose: what they change is said. Samples are all vertices and centres
     of triangles on both sides; each part is compared with the faces that it was fitted to, folds apart.
     sources : by parameter, the shapes of the mesh that add up to it. limit : mm, from which a vertex sticks out.
+    fit_alone : find the greatest error of what was fitted alone, without contacts, too, where the head has contacts.
     """
     head, changed = without_correctives(head)
     subject = Subject(Head(head))
+    free = Subject(Head(replace(head, contacts=[]))) if fit_alone and head.contacts else None
     places = Places(subject, find_mouth(subject))
     numbers = {p.name: k for k, p in enumerate(subject.parts)}
     owned = [faces_of(mesh, p.chart) for p in parts]
     pairs = [_Pair(p, numbers[p.name], subject, mesh) for p, own in zip(parts, owned, strict=True) if own.any()]
     found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
     worst: dict[bool, Spot] = {}
+    apart: Spot | None = None
     sticking: dict[tuple[str, str], Floats] = {}
     turned: dict[tuple[str, str], Turned] = {}
     for shape in (NEUTRAL, *(n for n in sources if n in subject.claimed)):
-        posed = subject.rest if shape == NEUTRAL else subject.at_one(shape)
         moved = mesh.vertices + _displacement(mesh, sources, shape)
         for pair in pairs:
-            both = pair.distances(posed[pair.number].astype(np.float64), moved)
+            surface = _posed(subject, shape, pair.number)
+            both = pair.distances(surface, moved)
             if len(places_out := pair.sticking(*both[0], limit)):
                 sticking[pair.name, shape] = places_out
-            over = Turned(*pair.turned.find(posed[pair.number].astype(np.float64), moved))
+            over = Turned(*pair.turned.find(surface, moved))
             if over.mm2 > 0.0:
                 turned[pair.name, shape] = over
             in_folds = np.concatenate([d[fold] for d, fold in both])
             found[pair.name][shape] = Both(*_outside_folds(both), errors_of(in_folds))
-            for spot, fold in _greatest(pair, both, shape, places, subject.parts[pair.number].material):
-                worst[fold] = max(worst.get(fold, spot), spot, key=lambda s: s.mm)
+            material = subject.parts[pair.number].material
+            for spot, fold in _greatest(pair, both, shape, places, material):
+                worst[fold] = _greater(worst.get(fold), spot)
+            if free is not None:
+                alone = _posed(free, shape, pair.number)
+                greater = pair.greater_elsewhere(alone, moved, surface, both, apart.mm if apart else 0.0)
+                for spot, fold in _greatest(pair, greater, shape, places, material):
+                    apart = apart if fold else _greater(apart, spot)
     rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
     added = tuple(p.name for p in subject.parts if p.name not in found)
     samples = sum(len(r) for p in pairs for r in p.rest)
     return DenseErrors(
         found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned,
-        tuple(n for n in changed if n in sources),
+        tuple(n for n in changed if n in sources), apart,
     )  # fmt: skip
 
 
-def with_fit_alone(
-    dense: DenseErrors, head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart]
-) -> DenseErrors:  # fmt: skip
-    """The errors of a head, and the greatest of what was fitted alone, without contacts; arguments as of
-    :func:`measure_dense`."""
-    if not head.contacts:
-        return dense
-    return replace(dense, apart=measure_dense(replace(head, contacts=[]), mesh, sources, parts).worst)
+def _posed(subject: Subject, shape: str, number: int) -> Floats:
+    """(m, 3) vertices of one part at rest or with a shape at 1."""
+    posed = subject.rest if shape == NEUTRAL else subject.at_one(shape)
+    return posed[number].astype(np.float64)
+
+
+def _greater(one: Spot | None, other: Spot) -> Spot:
+    return other if one is None or other.mm > one.mm else one
 
 
 def without_correctives(head: HeadData) -> tuple[HeadData, list[str]]:

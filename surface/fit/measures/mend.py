@@ -35,13 +35,13 @@ NEIGHBOURS = 12  # that say where a point belongs
 def mend_spikes(
     head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart], scale: float
 ) -> tuple[HeadData, DenseErrors, list[str]]:  # fmt: skip
-    """The head without spikes, its errors, and what was mended, in words.
+    """The head without spikes, its errors, also of the fit alone, and what was mended, in words.
 
     scale : size of the head relative to a usual one.
     """
     limit = STICKS_OUT_MM * scale
     notes: list[str] = []
-    dense = measure_dense(head, mesh, sources, parts, limit)
+    dense = measure_dense(head, mesh, sources, parts, limit, fit_alone=True)
     for _ in range(ROUNDS):
         wanted = _wanted(dense, limit) + _turned(dense, scale)
         if not wanted:
@@ -55,6 +55,8 @@ def mend_spikes(
             break
         notes.append(f"mended: {moved} control points stuck out or were inside out: {_in_words(wanted)}")
         head, dense = trial, after
+    if notes:  # trials are measured with their contacts only
+        dense = measure_dense(head, mesh, sources, parts, limit, fit_alone=True)
     return head, dense, notes
 
 

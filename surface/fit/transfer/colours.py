@@ -19,6 +19,7 @@ from surface.fit.points.eyeball import IRIS
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.fit.source.textures import Samples, sample_colours
 from surface.head import Head, HeadData, HeadPart
+from surface.head.model.face import face_of
 from surface.head.posing.paint import BASE, layer_field
 from surface.readers.meshdata import MeshData
 
@@ -64,7 +65,9 @@ def with_colours(data: HeadData, samples: Samples) -> tuple[HeadData, list[str]]
     solid = samples.colour[:, 3] > 0.5
     tree, rgb = cKDTree(samples.points[solid]), np.sqrt(samples.colour[solid, :3])  # means of roots look right
     head = Head(data)
-    face = max((p for p in head.parts if p.material == "skin" and p.follows == "skin"), key=lambda p: len(p.vertices))
+    face = face_of(head.parts, data.contacts)
+    if face is None:
+        return data, []
     skin = _front_colour(face, *_looked_up(face.vertices.astype(float), tree, rgb))
     if skin is None:
         return data, []

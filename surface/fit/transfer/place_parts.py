@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
 from surface.fit.transfer.template import Template
@@ -14,6 +15,8 @@ from surface.head import Group, Head, HeadData, Jaw, Neck, PartData
 EYE_RADII = 1.5  # distance from an eyeball's centre, in radii, within which skin determines its new place
 TEETH = ("teeth", "gums", "tongue")
 FRONT_MM = 4.0  # distance behind the foremost teeth over which the weight of teeth in their placing falls to 1/e
+FRONT_TEETH_MM = 20.0  # behind the foremost tooth: teeth that far back have lips or corners of the mouth before them
+BESIDE_MM = 1.5  # greatest distance aside of the skin that lies before a place of a tooth
 
 
 @dataclass(frozen=True)
@@ -69,6 +72,29 @@ def place_teeth(head: Head, warp: Warp) -> ScaleShift:
     scale = fit_scale_shift(at, goals).scale
     front = np.exp((at[:, 2] - at[:, 2].max()) / FRONT_MM)
     return ScaleShift(scale, (front / front.sum()) @ (goals - scale * at))
+
+
+def behind_skin(place: ScaleShift, teeth: Floats, before: Floats, after: Floats) -> ScaleShift:
+    """How teeth move so that they lie at least as deep behind the skin as they did, relative to their size.
+
+    The map of space does not know the scan's detail, which the skin follows afterwards: lips may come to lie in the
+    teeth. place : how the teeth (k, 3) move by that map. before, after : (m, 3) the skin's vertices on the head that
+    they come from and on the scan.
+    """
+    front = teeth[teeth[:, 2] > teeth[:, 2].max(initial=-np.inf) - FRONT_TEETH_MM]
+    lack = place.scale * _depths(front, before, BESIDE_MM) - _depths(
+        place.points(front), after, place.scale * BESIDE_MM
+    )
+    known = lack[np.isfinite(lack)]
+    back = max(0.0, float(np.median(known))) if len(known) else 0.0
+    return ScaleShift(place.scale, place.shift - [0.0, 0.0, back])
+
+
+def _depths(points: Floats, skin: Floats, beside: float) -> Floats:
+    """(k,) mm from points (k, 3) forward to the foremost vertex of skin (m, 3) that is no further aside than
+    ``beside``; NaN where there is none."""
+    near = cKDTree(skin[:, :2]).query_ball_point(points[:, :2], beside)
+    return np.array([skin[n, 2].max() - z if n else np.nan for n, z in zip(near, points[:, 2], strict=True)])
 
 
 def place_jaw(data: HeadData, warp: Warp) -> Jaw:

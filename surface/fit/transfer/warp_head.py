@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.transfer.place_parts import place_eyes, place_jaw, place_neck, place_teeth
+from surface.fit.transfer.place_parts import behind_skin, place_eyes, place_jaw, place_neck, place_teeth
 from surface.fit.transfer.register import Matcher
 from surface.fit.transfer.skin import Ball, Skin, behind_lids, close_lips, follow_skin, rims_of, seat_on_eyeballs
 from surface.fit.transfer.template import Template
@@ -32,10 +32,13 @@ def warp_head(
     """
     data = head.data
     old, new = Ball(data.eyes, data.eye_radius), Ball(*place_eyes(template, warp))
-    teeth = place_teeth(head, warp)
     skins = _skins(head, warp, matcher, old, new)
     lips = next(c for c in data.contacts if c.name == "lips")
     face = skins[lips.part]
+    crowns = [p.vertices for p in head.parts if p.material == "teeth"]
+    teeth = place_teeth(head, warp)
+    if crowns:
+        teeth = behind_skin(teeth, np.concatenate(crowns).astype(float), face.rest, face.at)
     parts = []
     for part in data.parts:
         if part.follows in ("left_eye", "right_eye"):

@@ -10,7 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.errors import HeadFileError
-from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.data import Contact, Group, HeadData, PartData
 from surface.head.model.file import load_data
 from surface.head.model.identity import load_identities, with_identities
 from surface.head.model.light import LightPoints, Refined, with_light
@@ -56,6 +56,11 @@ class Head:
         self._own, self.own_groups = OwnAmounts(()), tuple[OwnGroup, ...]()
         self._at = {name: i for i, name in enumerate(self.parameters)}
         self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
+
+    @property
+    def contacts(self) -> Sequence[Contact]:
+        """Of lids and lips."""
+        return self.data.contacts
 
     @classmethod
     def load(

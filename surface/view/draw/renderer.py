@@ -64,7 +64,7 @@ class Renderer:
         head.pose(self._values)
         self.evaluator = choose(ctx, head, evaluator)
         self.evaluator.pose(self._values)
-        self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids))
+        self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids), head.contacts)
         self._fine = ["freckles"] if any("freckles" in part.attributes for part in head.parts) else []
         self._fine += ["lips"] if self.openings.lip_tint else []
         used = {materials.material_of(part.material).program for part in head.parts}

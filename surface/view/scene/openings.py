@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from surface.head.model.data import Contact
+from surface.head.model.face import face_of
 from surface.mesh.mesh import border_edges
 from surface.view.scene.parts import ViewPart
 
@@ -82,11 +84,16 @@ class Openings:
 
     parts : the head's parts, at rest.
     read : gives the positions (k, 3) of vertices (k,) of a part as posed now.
+    contacts : of the head, which say which part is the face.
     """
 
-    def __init__(self, parts: Sequence[ViewPart], read: Read = lambda part, ids: part.vertices[ids]) -> None:
+    def __init__(
+        self, parts: Sequence[ViewPart], read: Read = lambda part, ids: part.vertices[ids],
+        contacts: Sequence[Contact] = (),
+    ) -> None:  # fmt: skip
         self._read = read
-        self._skin, loops = _face_of(parts)
+        self._skin = face_of(parts, contacts)
+        loops = [] if self._skin is None else boundary_loops(self._skin.triangles)
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
         self.lip_tint = lip_tint(self._skin)
@@ -179,21 +186,6 @@ class Openings:
             "opening_area": area * (max(size - self._shut_area, 20.0) / size),
             "opening_side": (last - first) * _SLIDE,
         }
-
-
-def _face_of(parts: Sequence[ViewPart]) -> tuple[ViewPart | None, list[np.ndarray]]:
-    """The skin that holds the most lids, of several the one with the most vertices, and the loops of its holes; None
-    without skin."""
-    eyes = [fit_sphere(np.asarray(p.vertices, float)) for p in parts if p.material == "eye"]
-
-    def held(skin: ViewPart) -> int:
-        near = (nearest_loop(loops[skin.name], skin.vertices, at, _LID_REACH * radius) for at, radius in eyes)
-        return sum(loop is not None for loop in near)
-
-    skins = [p for p in parts if p.material == "skin"]
-    loops = {p.name: boundary_loops(p.triangles) for p in skins}
-    face = max(skins, key=lambda p: (held(p), len(p.vertices)), default=None)
-    return face, [] if face is None else loops[face.name]
 
 
 def _lids(loop: np.ndarray, vertices: np.ndarray, centre: np.ndarray) -> Aperture:

@@ -10,6 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     import moderngl
 
+    from surface.head.model.data import Contact
+
 #: Above this share of a part, one whole write into new storage is faster than many small ones.
 _WHOLE = 0.5
 _VERTEX_BYTES = 12
@@ -41,12 +43,14 @@ class ViewPart(Protocol):
 
 
 class ViewHead(Protocol):
-    """Interface of a head that can be drawn."""
+    """Interface of a head that can be drawn; `contacts` of lids and lips tell which part is the face."""
 
     @property
     def parameters(self) -> tuple[str, ...]: ...
     @property
     def parts(self) -> Sequence[ViewPart]: ...
+    @property
+    def contacts(self) -> Sequence[Contact]: ...
     def pose(self, values: np.ndarray) -> None: ...
 
 

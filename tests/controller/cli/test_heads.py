@@ -313,3 +313,20 @@ def test_export_has_the_groups_of_a_vocabulary_and_their_motion(tmp_path):
     assert CliRunner().invoke(make_app(), [*words, "--set", "earLeft=0.5"]).exit_code == 0
     (mesh,) = content(out)[0]["meshes"]
     assert (mesh["extras"]["targetNames"], mesh["weights"]) == (["earLeft"], [0.5])
+
+
+@pytest.mark.parametrize(
+    ("words", "hint"),
+    [
+        (["--name", "you"], "change name in {out}/head.toml"),
+        (["--report", "r"], "a report needs a new fit: omote fit a.glb -o OTHER_FOLDER --report r"),
+        (["--force"], "leave it out, or leave out --keep to write the head again"),
+    ],
+)
+def test_what_needs_a_new_head_is_refused_for_one_that_is_kept(fitted, tmp_path, words, hint):
+    """They were ignored without a word."""
+    calls, _ = fitted
+    said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(tmp_path / "mine"), "--keep", *words])
+    assert isinstance(said.exception, ConfigError) and calls == []
+    assert str(said.exception).startswith(f"{words[0]}: cannot be used with --keep")
+    assert said.exception.hint == hint.format(out=tmp_path / "mine")

@@ -237,6 +237,15 @@ def test_a_layer_that_is_no_table_is_a_fault_of_its_file(tmp_path: Path) -> None
         check_anything(str(path))
 
 
+def test_a_mesh_is_refused_with_how_it_becomes_a_head_that_can_be_checked(tmp_path: Path) -> None:
+    """A .glb was said to be larger than 1 MB."""
+    mesh = tmp_path / "me.glb"
+    mesh.write_bytes(b"glTF" + bytes(2_000_000))
+    with pytest.raises(ConfigError, match="is a mesh") as told:
+        check_anything(str(mesh))
+    assert told.value.hint == f"omote fit {mesh} -o HEAD; omote check HEAD"
+
+
 def test_a_file_of_no_kind_says_so(tmp_path: Path) -> None:
     (tmp_path / "a.toml").write_text("colour = 3\nshape = 4\n")
     with pytest.raises(ConfigError, match="no kind of file has the keys colour, shape"):

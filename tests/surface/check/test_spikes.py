@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import tracemalloc
 
 import numpy as np
@@ -208,3 +209,30 @@ def test_corners_that_move_alike_may_move_further() -> None:
 
 def test_a_head_without_skin_has_no_spikes() -> None:
     assert texts(plain.eyeball(0)) == []
+
+
+@pytest.mark.parametrize("spread", [30.0, 300.0])
+def test_mirror_images_are_those_that_every_pair_of_points_shows(spread: float) -> None:
+    rng = np.random.default_rng(4)
+    points = rng.uniform(-spread, spread, (700, 3)) * [1.0, 0.3, 0.1]
+    height = np.where(rng.random(700) < 0.8, 1.0, 0.0)
+    subject = plain.subject(plain.part("face", *plain.sheet((-60, 60), (-90, 60), 10.0)))
+    places = Places(subject, None)
+    far, middle = spikes.MIRROR_MM * subject.scale, places.centre[0]
+    expected = np.zeros(700, bool)
+    for i in np.flatnonzero(height):
+        place = points[i] * [-1.0, 1.0, 1.0] + [2.0 * middle, 0.0, 0.0]
+        near = np.linalg.norm(points - place, axis=1) < far
+        expected[i] = (near & (height > 0.0) & (np.abs(points[:, 0] - points[i, 0]) > far)).any()
+    np.testing.assert_array_equal(spikes._has_mirror_image(subject, points, height, places), expected)
+    assert expected.any() and not expected[height > 0.0].all()
+
+
+def test_mirror_images_are_searched_for_only_where_they_can_be() -> None:
+    """All pairs of 200,000 points took minutes."""
+    points = np.random.default_rng(4).uniform(-900.0, 900.0, (200_000, 3))
+    subject = plain.subject(plain.part("face", *plain.sheet((-60, 60), (-90, 60), 10.0)))
+    spikes._has_mirror_image(subject, points[:10], np.ones(10), Places(subject, None))  # compiled before it is timed
+    started = time.process_time()
+    spikes._has_mirror_image(subject, points, np.ones(len(points)), Places(subject, None))
+    assert time.process_time() - started < 20.0

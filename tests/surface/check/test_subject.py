@@ -59,10 +59,10 @@ def test_skin_is_sorted_by_its_vertices_and_pictures_leave_hair_out() -> None:
 
 def test_the_skin_with_lids_or_lips_is_the_face_whatever_its_size() -> None:
     back = plain.part("back", *plain.sheet((-90, 90), (-200, 90), 5.0))
-    head = plain.subject(back, skin())
+    head = plain.subject(back, skin("mask"))
     assert head.skin.tolist() == [0, 1]
-    head = plain.subject(back, skin())
-    head.head.data.contacts.append(SimpleNamespace(part="face"))
+    head = plain.subject(back, skin("mask"))
+    head.head.data.contacts.append(SimpleNamespace(part="mask"))
     assert head.skin.tolist() == [1, 0]
 
 

@@ -233,8 +233,13 @@ def test_a_part_that_cannot_be_fitted_is_left_out_by_name_and_the_face_never_is(
     monkeypatch.setattr("surface.fit.features.generic.POINTS", 300)
     for most, parts in ((1e3, ["face", "brow_1"]), (0.0, ["face"])):
         monkeypatch.setattr(api, "LOOSE_MM", most)
-        result = fit_mesh(Loaded(mesh, map_names(mesh.names)), "me", lambda *_: None)
+        loaded = Loaded(
+            mesh, map_names(mesh.names), pieces={"Face": "skin", "Hair": "hair", "Shirt": "clothes, left out"}
+        )
+        result = fit_mesh(loaded, "me", lambda *_: None)
         assert [part.name for part in result.report.parts] == parts
+        said = "in the mesh, but left out and not drawn: brows or hair" in result.report.notes
+        assert said == (most == 0.0)
         assert [p.name for p in result.head.parts if p.follows == "skin"] == parts
         assert any("brow_1: left out: it cannot be fitted" in note for note in result.report.notes) == (most == 0.0)
 

@@ -33,3 +33,12 @@ def test_what_is_missing_says_what_to_do():
     assert "no lids: no shape closes eyeBlinkLeft or eyeBlinkRight" in lines and "--names" in lines
     assert "not in the mesh, and not drawn: teeth, tongue, brows or hair, lashes" in lines
     assert "place is not known" not in "\n".join(findings(head, EYES))
+
+
+def test_what_the_mesh_has_but_the_head_has_not_is_told_from_what_the_mesh_lacks():
+    """Hair that could not be fitted was said not to be in the mesh."""
+    lines = findings(small_head(eye_radius=0.0), EYES, {"hair", "skin", "tongue"})
+    assert lines[-2:] == [
+        "in the mesh, but left out and not drawn: tongue, brows or hair",
+        "not in the mesh, and not drawn: teeth, lashes",
+    ]

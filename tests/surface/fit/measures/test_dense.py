@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from surface.fit.api import fit_mesh
-from surface.fit.measures.dense import measure_dense, with_fit_alone
+from surface.fit.measures.dense import measure_dense
 from surface.fit.measures.mend import faults_of
 from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import FitResult
@@ -131,7 +131,24 @@ def test_what_contacts_move_on_purpose_is_told_from_errors_of_the_fit(mesh: FitM
 
 
 @pytest.mark.slow
+def test_what_was_fitted_alone_is_measured_as_a_head_without_contacts_is(mesh: FitMesh) -> None:
+    """In the same pass, and only where contacts move something."""
+    through = -2.0 * mesh.deltas[:1]
+    crossing = replace(mesh, names=(*mesh.names, "mouthShrugLower"), deltas=np.concatenate([mesh.deltas, through]))
+    made = fit_mesh(Loaded(crossing, map_names(crossing.names)), "sheet", lambda part, done: None)
+    given = crossing, sources_of(crossing.names), made.parts
+    both = measure_dense(made.head, *given, fit_alone=True)
+    other = replace(made.head, contacts=[])
+    alone = measure_dense(other, *given)
+    assert both.apart == alone.worst and both.apart.mm < both.worst.mm
+    assert replace(both, apart=None, sticking={}, turned={}) == replace(
+        measure_dense(made.head, *given), sticking={}, turned={}
+    )
+    assert measure_dense(other, *given, fit_alone=True).apart is None
+
+
+@pytest.mark.slow
 def test_without_contacts_there_is_one_greatest_error(result: FitResult, mesh: FitMesh) -> None:
-    dense, head = result.report.dense, replace(result.head, contacts=[])
-    assert with_fit_alone(dense, head, mesh, sources_of(mesh.names), result.parts) is dense
-    assert not any("without contacts" in line for line in dense.lines())
+    head = replace(result.head, contacts=[])
+    dense = measure_dense(head, mesh, sources_of(mesh.names), result.parts, fit_alone=True)
+    assert dense.apart is None and not any("without contacts" in line for line in dense.lines())

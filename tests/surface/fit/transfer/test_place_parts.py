@@ -8,7 +8,16 @@ import numpy as np
 import pytest
 from small_head import small_head
 
-from surface.fit.transfer.place_parts import fit_scale_shift, place_eyes, place_jaw, place_neck, place_teeth, scaled
+from surface.fit.transfer.place_parts import (
+    ScaleShift,
+    behind_skin,
+    fit_scale_shift,
+    place_eyes,
+    place_jaw,
+    place_neck,
+    place_teeth,
+    scaled,
+)
 from surface.head import Contact, HeadData
 from surface.head.posing.rig import jaw_path
 
@@ -157,3 +166,29 @@ def test_a_scaled_head_is_larger_in_everything_but_its_budget(tilted) -> None:
     assert made.eye_radius == pytest.approx(factor * tilted.eye_radius)
     assert [c.reach_mm for c in made.contacts] == [pytest.approx(6.0 * factor)]
     np.testing.assert_allclose(scaled(tilted, 1.0, middle).parts[0].points, tilted.parts[0].points)
+
+
+def arch(x: np.ndarray, front: float) -> np.ndarray:
+    """(n, 3) places of an arch, its foremost at ``front``, whatever the height."""
+    return np.column_stack([x.ravel(), np.tile([-1.0, 0.0, 1.0], x.size)[: x.size], front - 0.02 * x.ravel() ** 2])
+
+
+def test_teeth_go_back_as_deep_behind_the_skin_as_they_were() -> None:
+    """Lips that a scan's detail brings back by 3 mm had the teeth in front of them at their corners."""
+    teeth, lips = arch(np.linspace(-20, 20, 41), 90.0), arch(np.linspace(-28, 28, 113), 96.0)
+    place = ScaleShift(0.9, np.array([1.0, 2.0, 3.0]))
+    after = place.points(lips)
+    np.testing.assert_allclose(behind_skin(place, teeth, lips, after).shift, place.shift, atol=1e-9)
+    pressed = behind_skin(place, teeth, lips, after - [0.0, 0.0, 3.0])
+    np.testing.assert_allclose(pressed.shift, place.shift - [0.0, 0.0, 3.0], atol=1e-9)
+    assert pressed.scale == place.scale
+    thick = behind_skin(place, teeth, lips, after - [0.0, 0.0, -3.0])  # they may lie deeper
+    np.testing.assert_allclose(thick.shift, place.shift, atol=1e-9)
+    bumpy = after - [0.0, 0.0, 3.0] + np.outer(np.abs(after[:, 0]) < 2.0, [0.0, 0.0, 8.0])
+    np.testing.assert_allclose(behind_skin(place, teeth, lips, bumpy).shift, pressed.shift, atol=0.2)
+
+
+def test_teeth_stay_where_no_skin_lies_before_them() -> None:
+    teeth, aside = arch(np.linspace(-20, 20, 41), 90.0), arch(np.linspace(60, 80, 20), 96.0)
+    place = ScaleShift(0.9, SHIFT)
+    np.testing.assert_array_equal(behind_skin(place, teeth, aside, aside).shift, SHIFT)

@@ -248,7 +248,7 @@ def test_lips_that_pass_each_other_at_rest_do_not_turn_the_opening_round(head: B
     assert openings.mouth()["opening_area"][2] > 0.9 * np.linalg.norm(openings.mouth()["opening_area"])
 
 
-def test_the_face_is_the_skin_with_the_lids_not_the_largest(head: BallHead) -> None:
+def test_lids_and_lips_are_those_of_the_face_not_of_the_largest_skin(head: BallHead) -> None:
     back = skin()
     back.name = "back"
     back.vertices = np.concatenate([back.vertices, np.tile(back.vertices[:1], (10_000, 1))]) - [0.0, 0.0, 200.0]
