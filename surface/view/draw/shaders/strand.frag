@@ -25,9 +25,9 @@ void main() {
 #endif
     float over = v_strand.z - height;
     float soft = mix(SOFT.x, SOFT.y, clamp(1.6 * v_strand.z, 0.0, 1.0));
-    // With one sample every other pixel of a board of chess is drawn where a strand covers half: smooth.frag levels it.
+    // With one sample, where strands are few, every other pixel of a board of chess is drawn: smooth.frag levels it.
     float board = 0.5 * float(int(gl_FragCoord.x + gl_FragCoord.y) & 1) - 0.25;
-    float cover = multisampled ? clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0) : step(soft * board, over);
+    float cover = multisampled ? clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0) : step((soft - SOFT.y) * board, over);
     if (cover <= 0.0) {
         discard;
     }

@@ -72,5 +72,5 @@ def test_hair_hangs_straight_over_hollows_and_over_ears_without_a_bulge(side: fl
     np.testing.assert_allclose(hung[back], paths[back])  # where both sides meet there is no gap
     falls = y < 55.0
     own, before = side * hung[front, falls, 0], side * paths[front, falls, 0]
-    assert (np.diff(own, 2) < 0.1).all() and np.diff(before, 2).max() > 1.0  # no hollow
+    assert np.diff(own, 2).max() < 0.5 and np.diff(before, 2).max() > 5.0  # no hollow
     assert own.max() > before.max() - 4.0
