@@ -68,9 +68,9 @@ def _hung(paths: Floats, side: float) -> Floats:
     hung = np.concatenate([side * out[..., None], paths[..., 1:]], axis=-1)
     level = gaussian_filter(hung, _LEVELLED, mode="nearest")
     hangs = step(-paths[..., 1:2], *(-y for y in reversed(_HANGS_Y)))
-    from_behind = np.arange(len(paths))[:: 1 if side > 0.0 else -1]  # where both sides meet they stay as they are
-    hangs = hangs * step(from_behind, 0.0, 3.0 * _LEVELLED[0])[:, None, None]
-    return np.asarray(paths + hangs * (level - paths))
+    from_behind = np.arange(float(len(paths)))[:: 1 if side > 0.0 else -1]  # both sides stay where they meet
+    apart = step(from_behind, 0.0, 3.0 * _LEVELLED[0])[:, None, None]
+    return np.asarray(paths + hangs * apart * (level - paths))
 
 
 def _inside(a: Floats, b: Floats, c: Floats) -> bool:
