@@ -8,9 +8,9 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import resampled
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import Patches, greville
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import step
+from surface.fit.wardrobe.styles import BARE, step
 
 #: By the angle from the front, degrees, about the vertical through (0, 20): the beard's upper and lower line, mm, and
 #: the upper line of its part below the mouth.
@@ -26,7 +26,8 @@ _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips i
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
 _FIELD_MM = -7.0, 11.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.3  # hair over the lip, which is too short to lie over what is beside it
-_HAIRS = 1.0 / 40.0  # tiles of the noise for a mm across hairs
+_HAIRS = 1.0 / 26.0  # tiles of the noise for a mm across hairs
+_ROOTS_MM, _SHORTER = 7.0, 10.0  # from a shell's upper line, where hairs are seen in so many times shorter pieces
 
 
 @dataclass(frozen=True)
@@ -59,26 +60,27 @@ def inside(points: Floats) -> Floats:
 
 def garment(skin: Skin, beard: Beard) -> list[Patches]:
     """Shells, the outermost first: those of cheeks, jaw and chin, and those of the upper lip."""
-    wide = np.linspace(_EDGE_DEG, -_EDGE_DEG, 31)  # so that the outside is outside
+    wide = _EDGE_DEG * (1.0 - 2.0 * greville(31, 2))  # so that the outside is outside
     main = _grid(skin, wide, np.interp(np.abs(wide), _ANGLES, _BELOW), np.interp(np.abs(wide), _ANGLES, _LOWER), 11)
-    narrow = np.linspace(25.0, -25.0, 13)
+    narrow = 25.0 * (1.0 - 2.0 * greville(13, 2))
     top = np.interp(np.abs(narrow), _ANGLES, _UPPER)
     lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5)
     out = []
     for k, (share, cover) in enumerate(beard.shells):
-        out.append(_shell(skin, beard, main, (43, 13), (23, 7), share, cover, k, 9.0))
-        out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, 2.2))
+        out.append(_shell(skin, beard, main, (43, 13), (23, 7), share, cover, k, 9.0, over_lip=False))
+        out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, 2.2, over_lip=True))
     return out
 
 
 def _grid(skin: Skin, angles: Floats, upper: Floats, lower: Floats, rows: int) -> Floats:
-    """(columns, rows, 3) places on the skin between two lines, evenly down each column."""
+    """(columns, rows, 3) places on the skin between two lines, down each column where control points
+    act most."""
     columns = []
     for angle, top, bottom in zip(np.radians(angles), upper, lower, strict=True):
         direction = np.array([np.sin(angle), 0.0, np.cos(angle)])
         heights = np.linspace(top, bottom, 40)
         columns.append(np.array([_outermost(skin, y, direction) for y in heights]))
-    return resampled(np.array(columns), rows)
+    return resampled(np.array(columns), rows, greville(rows, 2))
 
 
 def _outermost(skin: Skin, y: float, direction: Floats) -> Floats:
@@ -98,9 +100,10 @@ def _outermost(skin: Skin, y: float, direction: Floats) -> Floats:
 
 def _shell(
     skin: Skin, beard: Beard, ground: Floats, grid: tuple[int, int], fast: tuple[int, int], share: float, cover: float,
-    layer: int, full_mm: float,
+    layer: int, full_mm: float, *, over_lip: bool,
 ) -> Patches:  # fmt: skip
-    """One shell over places on the skin (columns, rows, 3), dense from ``full_mm`` inside the beard's lines on."""
+    """One shell over places on the skin (columns, rows, 3), dense from ``full_mm`` inside the beard's lines on;
+    that over the lip thins out at its ends and towards the lip."""
     nu, nv, _ = ground.shape
     flat = ground.reshape(-1, 3)
     normals, _ = skin.nearest(flat)
@@ -108,19 +111,23 @@ def _shell(
     chin = np.exp(-((x / 26.0) ** 2)) * step(-y, 44.0, 70.0) * step(z, 55.0, 95.0)
     deep = inside(flat)
     thick = beard.thick * min(1.0, 0.1 * full_mm + 0.1)  # less over the lip
-    height = 0.4 + share * (thick + beard.chin * chin) * step(deep, -3.0, full_mm + 5.0)
+    height = 0.8 + share * (thick + beard.chin * chin) * step(deep, -3.0, full_mm + 5.0)
     down = np.array([0.0, -0.5, 0.1]) * (share * beard.chin * chin)[:, None]  # hair falls
     points = (flat + normals * height[:, None] + down).reshape(nu, nv, 3)
     gu, gv = grid
-    at_u, at_v = np.linspace(0, nu - 1, gu), np.linspace(0, nv - 1, gv)
-    places = _between(ground, at_u, at_v)
+    s, t = np.linspace(0.0, 1.0, gu), np.linspace(0.0, 1.0, gv)
+    places = _between(ground, *(np.interp(at, greville(n, 2), np.arange(n)) for at, n in ((s, nu), (t, nv))))
     reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv)
     width = np.linalg.norm(np.diff(places.mean(axis=1), axis=0), axis=1).sum()
     length = np.linalg.norm(np.diff(places, axis=1), axis=2).sum(axis=1).mean()
-    s, t = np.meshgrid(np.linspace(0, 1, gu), np.linspace(0, 1, gv), indexing="ij")
-    openness = 0.62 + 0.38 * share + 0.0 * s
+    s, t = np.meshgrid(s, t, indexing="ij")
+    openness = 0.72 + 0.28 * share + 0.0 * s
+    if over_lip:
+        openness = 0.75 * openness
+        reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.18) * (1.0 - 0.8 * step(t, 0.5, 1.0))
+    along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
     strands = np.stack(
-        [s * width * _HAIRS + 0.31 * layer, t * length / beard.grain, cover * reached, openness], axis=-1
+        [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
     )
     tint = np.full((1, gu, gv), share) * reached
     return Patches(
@@ -133,7 +140,7 @@ def _reached(places: Floats, full_mm: float, share: float) -> Floats:
     """(n,) how much of a shell's hairs grow at places on the skin (n, 3): fewer towards the beard's lines, and the
     longer they are, the later; over the lip fewer towards the corners of the mouth and below the nose's middle."""
     deep = inside(places) - _LATER * full_mm * share
-    out = step(deep, -2.0, full_mm)
+    out = step(deep, -0.3 * full_mm, 1.2 * full_mm)
     x, y, z = places.T
     lip = step(y, -36.0, -30.0) * step(z, 70.0, 80.0)
     thinner = 0.45 * step(np.abs(x), 15.0, 29.0) + 0.3 * np.exp(-((x / 2.5) ** 2))

@@ -15,10 +15,13 @@ BUN = np.array([0.0, 98.0, -97.0])  # its middle, mm
 _OUT = unit(np.array([0.0, 0.42, -0.91]))  # where it points
 _RADII = np.array([29.0, 26.0, 22.0])  # half its width, its height, and along where it points
 GUIDES = 73
-LAYERS = (Layer(1.06, 0.50, 1.0, 4.0, 0.5), Layer(1.0, 0.78, 0.92, 4.0, 0.4), Layer(0.90, 1.6, 0.74, 4.0, 0.75))
+LAYERS = (
+    Layer(1.06, 0.50, 1.0, 4.0, 0.8, 26.0), Layer(1.0, 0.78, 0.92, 4.0, 1.1, 20.0),
+    Layer(0.90, 1.8, 0.80, 4.0, 2.1, 13.0),
+)  # fmt: skip
 # The inner one so dense that it is closed up to its tip: nothing lies below it
 BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 6.0, 0.82, 0.2))
-UNDER_MM = 13.0  # from the middle of the bun's base: there strands of the skull end, well below the coil
+UNDER_MM = 8.0  # from the middle of the bun's base: there strands of the skull end, well below the coil
 NAPE_RAD = 0.06  # how much higher than the line hair begins there, seen from the skull's middle
 _TURNS = 0.62  # of a strand about the bun, from its base to its tip
 
@@ -33,7 +36,7 @@ def bun(skin: Skin) -> Style:
     roots = CENTRE + toward * skin.reach(toward)[:, None]
 
     def thickness(at: Floats) -> Floats:
-        return np.asarray(0.7 + 5.2 * step(line.inside(at), -2.0, 34.0))
+        return np.asarray(1.0 + 4.9 * step(line.inside(at), -2.0, 34.0))
 
     def flow(at: Floats, normals: Floats, share: float) -> Floats:
         ahead = tangent(base - at, normals)
@@ -44,8 +47,8 @@ def bun(skin: Skin) -> Style:
     def cut(at: Floats) -> Floats:
         return np.asarray(np.linalg.norm(at - base, axis=1) - UNDER_MM)
 
-    comb = Comb(roots[::-1], np.full(GUIDES, 330.0), thickness, flow, cut, 0.0, 0.5, steps=66, slack=0.4)
-    made = sheets(skin, comb, LAYERS, Weave((73, 12), (97, 15), (49, 9)), seed=31, closed=True)
+    comb = Comb(roots[::-1], np.full(GUIDES, 330.0), thickness, flow, cut, 0.0, 0.5, 0.0, steps=66, slack=0.4)
+    made = sheets(skin, comb, LAYERS, Weave((73, 12), (97, 15), (49, 9), -0.35), seed=31, closed=True)
     return Style([*_coil(), *made], line)
 
 

@@ -9,7 +9,7 @@ from surface.fit.wardrobe.guides import Thickness
 from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import Style, cap, step
+from surface.fit.wardrobe.styles import BARE, Style, cap, step
 
 _CURL = 1.0 / 30.0  # tiles of the noise for a mm: curls of a few mm
 _STEADY = 0.2  # of the shader strand.frag, which stretches the noise along strands by its reciprocal
@@ -48,6 +48,6 @@ def _shells(
         around = 520.0 * np.sin(np.minimum(1.75 * v, 0.5 * np.pi))  # mm round the head there
         strands[..., 0] = np.rint(520.0 * _CURL) * u + 0.37 * k + 0.0 * around
         strands[..., 1] = 150.0 * v * _CURL / _STEADY + 0.21 * k
-        strands[..., 2] = cover * (1.0 - 0.75 * step(v, 0.90, 1.0))
+        strands[..., 2] = cover - (cover + BARE) * step(v, 0.91, 1.0)
         out.append(Patches(own.points, own.degrees, own.grid, own.fast, strands, own.tint, own.shade, own.sway))
     return out

@@ -45,12 +45,13 @@ def grow(
     return np.stack(paths, axis=1), np.stack(along, axis=1)
 
 
-def resampled(rows: Floats, count: int) -> Floats:
-    """(n, count, 3) places evenly along polylines (n, k, 3)."""
+def resampled(rows: Floats, count: int, shares: Floats | None = None) -> Floats:
+    """(n, count, 3) places along polylines (n, k, 3): evenly, or at shares (count,) of their length."""
     steps = np.linalg.norm(np.diff(rows, axis=1), axis=2)
     along = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(steps, axis=1)], axis=1)
+    shares = np.linspace(0.0, 1.0, count) if shares is None else shares
     out = np.empty((len(rows), count, 3))
     for i, (own, at) in enumerate(zip(rows, along, strict=True)):
-        where = np.linspace(0.0, at[-1], count)
+        where = at[-1] * shares
         out[i] = np.column_stack([np.interp(where, at, own[:, k]) for k in range(3)])
     return out

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.hairline import Hairline
@@ -14,7 +15,9 @@ from surface.fit.wardrobe.styles import Style, cap, step, tangent
 PART_X = 14.0  # of the parting, mm
 ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
 TIPS_Y = -124.0  # mm
-OVER_EAR_MM = 6.0
+OVER_EAR_MM = 11.0
+_LEVELLED = 2.5, 1.5, 0.0  # guides and places along them, over which those that hang are levelled
+_HANGS_Y = 55.0, 95.0  # mm: where they hang, and where they do not yet
 FRAYED = 0.09, 0.0  # of the width, at the face and behind
 LAYERS = (
     Layer(1.07, 0.46, 1.0, 45.0, 0.1), Layer(1.0, 0.66, 0.92, 30.0, 0.1), Layer(0.88, 1.6, 0.74, 16.0),
@@ -29,7 +32,7 @@ def long(skin: Skin) -> Style:
         return np.asarray(3.0 + _full(line, at))
 
     hanging = [patch for side in (1.0, -1.0) for patch in _curtain(skin, line, side)]
-    return Style([cap(skin, line, thickness, share=0.5, openness=0.55)], line, tuple(_inner_last(hanging)))
+    return Style([cap(skin, line, thickness, share=0.5, openness=0.7)], line, tuple(_inner_last(hanging)))
 
 
 def _full(line: Hairline, at: Floats) -> Floats:
@@ -48,6 +51,31 @@ def _at_ear(at: Floats) -> Floats:
     """(n,) 1 over an ear, 0 away from it."""
     x, y, z = np.abs(at[:, 0]), at[:, 1], at[:, 2]
     return np.asarray(step(x, 62.0, 78.0) * step(-y, -66.0, -34.0) * step(-z, -50.0, -20.0))
+
+
+def _hung(paths: Floats, side: float) -> Floats:
+    """Guides (g, k, 3) of one side, which hang straight from where they stand out to where they stand out again, as
+    from the temple to the ear, and lie level beside each other."""
+    out = side * paths[..., 0]
+    for row, y in zip(out, paths[..., 1], strict=True):
+        order = np.argsort(y)
+        hull: list[int] = []
+        for k in order:
+            while len(hull) > 1 and _inside(*(np.array([y[j], row[j]]) for j in (*hull[-2:], k))):
+                hull.pop()
+            hull.append(int(k))
+        row[:] = np.maximum(row, np.interp(y, y[hull], row[hull]))
+    hung = np.concatenate([side * out[..., None], paths[..., 1:]], axis=-1)
+    level = gaussian_filter(hung, _LEVELLED, mode="nearest")
+    hangs = step(-paths[..., 1:2], *(-y for y in reversed(_HANGS_Y)))
+    from_behind = np.arange(float(len(paths)))[:: 1 if side > 0.0 else -1]  # both sides stay where they meet
+    apart = step(from_behind, 0.0, 3.0 * _LEVELLED[0])[:, None, None]
+    return np.asarray(paths + hangs * apart * (level - paths))
+
+
+def _inside(a: Floats, b: Floats, c: Floats) -> bool:
+    """Does b lie below the line from a to c?"""
+    return bool((b[0] - a[0]) * (c[1] - a[1]) >= (b[1] - a[1]) * (c[0] - a[0]))
 
 
 def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
@@ -80,7 +108,10 @@ def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
     order = slice(None) if side < 0.0 else slice(None, None, -1)  # so that the outside is outside
     fan, back = fan[order], back[order]
     length = np.full(len(roots), 430.0)
-    comb = Comb(roots[order], length, thickness, flow, cut, 7.0, 1.0, steps=72, stiff=0.6, slack=slack, ears=True)
+    comb = Comb(
+        roots[order], length, thickness, flow, cut, 7.0, 1.0, steps=72, stiff=0.6, slack=slack, ears=True,
+        drape=lambda paths: _hung(paths, side),
+    )  # fmt: skip
     return sheets(
         skin,
         comb,

@@ -42,6 +42,11 @@ def knots(count: int, degree: int) -> Floats:
     return np.array([every[i : i + degree + 2] for i in range(count)])
 
 
+def greville(count: int, degree: int) -> Floats:
+    """(count,) where each control point of :func:`knots` acts most: points of a line there give it evenly."""
+    return np.asarray(knots(count, degree)[:, 1:-1].mean(axis=1))
+
+
 def arrays(patches: list[Patches], skin: Skin) -> dict[str, Array]:
     """Arrays of one part by key (:mod:`surface.head.model.wardrobe`)."""
     every = [_one_kind(p, skin) for p in patches]

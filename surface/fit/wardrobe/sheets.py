@@ -11,14 +11,18 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import Flow, Thickness, grow, resampled
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import Patches, greville, knots
 from surface.fit.wardrobe.skin import Skin, unit
-from surface.fit.wardrobe.styles import ACROSS, ALONG, step
+from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, step
 
+_CLOSER = 0.45  # how much less light reaches cropped hairs, which lie on the skin
+_CROPPED = 20.0  # how many times shorter the pieces are that one sees of cropped hairs
+Drape = Callable[[Floats], Floats]
+"""Guides (g, k, 3), hung."""
 Depth = Callable[[Floats], Floats]
 """How much of a guide is left at places (n, 3), mm: hair is cut where this first falls to 0."""
 
@@ -29,7 +33,8 @@ class Layer:
 
     share : of the hair's thickness at which it lies. cover : how much of it strands fill, from 0 to 1 and more; below
     0.5 gaps are wider than strands. openness : how much light reaches it. fray_mm : of the length, along which strands
-    end one after the other. roots : how much less of the sheet its roots are.
+    end one after the other. roots : how much less of the sheet its roots are, which are so along ``roots_mm``.
+    cropped_mm : of the length, along which what is seen are ends of hairs, each a few mm long.
     """
 
     share: float
@@ -37,6 +42,8 @@ class Layer:
     openness: float
     fray_mm: float = 15.0
     roots: float = 0.0
+    roots_mm: float = 20.0
+    cropped_mm: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,8 @@ class Comb:
     """How hair is combed: where guides root (g, 3), in order, and the rest as in :func:`.guides.grow`.
 
     cut : where guides end. ragged_mm : by how much their lengths differ, of all or of each (g,). wave_mm : how far
-    sheets bulge between locks.
+    sheets bulge between locks. level : share of that which is gone at the tips. pole : do all
+    guides begin at the middle of their roots? drape : what becomes of guides that hang.
     """
 
     roots: Floats
@@ -54,19 +62,30 @@ class Comb:
     cut: Depth
     ragged_mm: Floats | float = 6.0
     wave_mm: float = 0.8
+    level: float = 0.0
     steps: int = 40
     stiff: float = 0.5
     slack: float | Thickness = 0.6
     ears: bool = False
+    pole: bool = False
+    drape: Drape | None = None
 
 
 @dataclass(frozen=True)
 class Weave:
-    """How finely a sheet is made: control points and vertices along u and v, and vertices of "fast"."""
+    """How finely a sheet is made: control points and vertices along u and v, and vertices of "fast".
+
+    dense : how much closer together they lie at strands' tips than elsewhere, or where it is negative at their roots.
+    """
 
     points: tuple[int, int]
     grid: tuple[int, int]
     fast: tuple[int, int]
+    dense: float = 0.0
+
+    def length(self, v: Floats) -> Floats:
+        """Share of strands' length that lies before v."""
+        return np.asarray(v + self.dense * v * (1.0 - v))
 
 
 def sheets(
@@ -81,7 +100,7 @@ def sheets(
     for k, layer in enumerate(layers):
         random = np.random.default_rng(seed + 7 * k)
         paths = _guides(skin, comb, layer, random, closed)
-        points = _evenly(paths, weave.points, closed)
+        points = _control_points(paths, weave)
         out.append(sheet(points, layer, weave, random, closed, sway, frayed))
     return out
 
@@ -98,9 +117,23 @@ def _guides(skin: Skin, comb: Comb, layer: Layer, random: np.random.Generator, c
     far = np.array([comb.cut(row) for row in paths]) + ragged[:, None]  # falls along a guide
     kept = resampled(np.array([_until(row, at) for row, at in zip(paths, far, strict=True)]), 24)
     outward = resampled(np.array([_until(row, at) for row, at in zip(normals, far, strict=True)]), 24)
+    if comb.drape is not None:
+        kept = comb.drape(kept)
+    if comb.pole:
+        kept[:, 0] = kept[:, 0].mean(axis=0)
     t = np.linspace(0.0, 1.0, 24)
-    bulge = comb.wave_mm * _waves(count, random, closed)[:, None] * step(t, 0.05, 0.35)
+    bulge = (
+        comb.wave_mm
+        * _waves(count, random, closed)[:, None]
+        * step(t, 0.05, 0.35)
+        * (1.0 - comb.level * step(t, 0.55, 0.9))
+    )
     return np.asarray(kept + unit(outward) * bulge[..., None])
+
+
+def tips(skin: Skin, comb: Comb) -> Floats:
+    """(g, 3) where the guides of a closed sheet end."""
+    return _guides(skin, comb, Layer(1.0, 1.0, 1.0), np.random.default_rng(0), True)[:, -1]
 
 
 def _until(row: Floats, far: Floats) -> Floats:
@@ -123,12 +156,21 @@ def _waves(count: int, random: np.random.Generator, closed: bool) -> Floats:
     return np.asarray(near / np.sqrt(1.5)).clip(-1.8, 1.8)
 
 
-def _evenly(paths: Floats, size: tuple[int, int], closed: bool) -> Floats:
-    """(nu, nv, 3) control points of a cubic surface near guides (g, k, 3)."""
-    nu, nv = size
-    rows = resampled(paths, nv)
+def _control_points(paths: Floats, weave: Weave) -> Floats:
+    """(nu, nv, 3) control points of a cubic surface through guides (g, k, 3), so that none of it sinks into the skin
+    that they lie on; u and v grow evenly with the way."""
+    nu, nv = weave.points
+    rows = resampled(paths, nv, weave.length(greville(nv, 3)))
     at = np.linspace(0.0, 1.0, len(rows))
-    return np.asarray(CubicSpline(at, rows, axis=0)(np.linspace(0.0, 1.0, nu)))
+    return _through(_through(CubicSpline(at, rows, axis=0)(greville(nu, 3)), 0), 1)
+
+
+def _through(places: Floats, axis: int) -> Floats:
+    """Control points of a cubic spline along an axis that goes through places where each of them acts most."""
+    count = places.shape[axis]
+    own = knots(count, 3)
+    every = np.concatenate([own[:, 0], own[-1, 1:]])
+    return np.moveaxis(make_interp_spline(greville(count, 3), places, k=3, t=every, axis=axis).c, 0, axis)
 
 
 def sheet(
@@ -137,7 +179,7 @@ def sheet(
 ) -> Patches:  # fmt: skip
     """One sheet over control points (nu, nv, 3), whose strands run along v; see :func:`sheets`."""
     (nu, nv), (gu, gv) = weave.points, weave.grid
-    t = np.broadcast_to(np.linspace(0, 1, gv), (gu, gv))
+    t = np.broadcast_to(weave.length(np.linspace(0, 1, gv)), (gu, gv))
     u = np.broadcast_to(np.linspace(0, 1, gu)[:, None], (gu, gv))
     wide = np.linalg.norm(np.diff(points, axis=0), axis=2).sum(axis=0).max()
     tiles = max(1.0, np.rint(wide * ACROSS)) if closed else wide * ACROSS
@@ -146,13 +188,15 @@ def sheet(
     lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
     own = np.interp(u[:, 0], np.linspace(0, 1, nu), lengths)[:, None]
     fray = np.minimum(layer.fray_mm * (1.0 - 0.3 * locks.clip(-1, 1)) / own, 0.9)
-    cover = layer.cover * (1.0 + 0.10 * locks) - (layer.cover + 0.1) * np.clip((t - 1.0 + fray) / fray, 0.0, 1.0)
+    cover = layer.cover * (1.0 + 0.10 * locks) - (layer.cover + BARE) * np.clip((t - 1.0 + fray) / fray, 0.0, 1.0)
     for width, away in zip(frayed, (u, 1.0 - u), strict=True):
         if width > 0.0:
             cover = cover - (layer.cover - 0.1) * (1.0 - np.clip(away / width, 0.0, 1.0))
-    cover = cover - layer.roots * (1.0 - step(t, 0.0, 0.10))
+    cover = cover - layer.roots * (1.0 - step(t * own, 0.0, layer.roots_mm))
     opened = layer.openness * (0.86 + 0.14 * step(t, 0.0, 0.4)) * (1.0 + 0.05 * locks)
-    along = start[1] + float(np.median(lengths)) * ALONG * t
+    ends = np.exp(-(1.0 - t) * own / max(layer.cropped_mm, 1e-9))
+    opened = opened * (1.0 - _CLOSER * ends) if layer.cropped_mm > 0.0 else opened
+    along = start[1] + ALONG * (float(np.median(lengths)) * t + _CROPPED * layer.cropped_mm * ends)
     strands = np.stack([start[0] + tiles * u, along, cover, opened + 0.0 * t], axis=-1)
     shade = 1.0 + 0.06 * locks + 0.0 * t
     moved = np.broadcast_to(sway * np.linspace(0, 1, nv) ** 1.5, (nu, nv))

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.hairline import POINTS, RECEDED, Hairline
-from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheets
+from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheets, tips
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
 from surface.fit.wardrobe.styles import Style, step, tangent
 
 CROWN = np.array([12.0, 132.0, -42.0])
-RING_RAD = 0.05  # from the crown, seen from the skull's middle: where guides begin
+RING_RAD = 0.05  # from the crown, seen from the skull's middle: where guides leave it
 GUIDES = 73
-WEAVE = Weave((73, 12), (97, 15), (49, 9))
-FRINGED = (Layer(1.08, 0.42, 1.0, 40.0), Layer(1.0, 0.66, 0.92, 24.0), Layer(0.90, 1.6, 0.74, 10.0))
-SWEPT = (Layer(1.10, 0.44, 1.0, 26.0), Layer(1.0, 0.70, 0.92, 18.0), Layer(0.88, 1.6, 0.74, 9.0))
+_SPREADS, _EVEN = 3, 0.75  # how often guides are spread, and how evenly each time
+WEAVE = Weave((73, 12), (97, 15), (49, 9), 0.35)
+FRINGED = (Layer(1.08, 0.42, 1.0, 40.0), Layer(1.0, 0.66, 0.92, 24.0), Layer(0.90, 1.8, 0.80, 13.0))
+SWEPT = (
+    Layer(1.10, 0.44, 1.0, 30.0, cropped_mm=7.0), Layer(1.0, 0.70, 0.92, 24.0, cropped_mm=7.0),
+    Layer(0.88, 1.8, 0.80, 14.0, cropped_mm=7.0),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,6 @@ def short(skin: Skin) -> Style:
     """Strands go from the crown to the line all round, and over it on the forehead, in a fringe to one side that leaves
     the temples free."""
     line = Hairline(skin)
-    round_it = np.linspace(np.pi, -np.pi, GUIDES)
 
     def thickness(at: Floats) -> Floats:
         full = 1.6 + 9.0 * _top(at) + 2.0 * _top(at) * step(at[:, 2], 30.0, 75.0) + 1.6 * step(at[:, 1], 10.0, 60.0)
@@ -56,11 +60,14 @@ def short(skin: Skin) -> Style:
         lower = 13.0 + 7.0 * step(at[:, 0], -30.0, 30.0)
         return np.asarray(line.inside(at) + 1.0 + lower * fringe)
 
-    ragged = 1.2 + 3.0 * step(np.cos(round_it), 0.75, 0.95)  # in front
-    comb = Comb(
-        _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, ragged, 1.2, steps=66, slack=0.5
-    )  # fmt: skip
-    return Style(sheets(skin, comb, FRINGED, WEAVE, seed=11, closed=True), line)
+    def comb(round_it: Floats) -> Comb:
+        ragged = 0.4 + 3.0 * step(np.cos(round_it), 0.75, 0.95)  # in front
+        return Comb(
+            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, ragged, 1.2, 0.8, steps=66, slack=0.5,
+            pole=True,
+        )  # fmt: skip
+
+    return Style(sheets(skin, _spread(skin, comb), FRINGED, WEAVE, seed=11, closed=True), line)
 
 
 def swept(skin: Skin) -> Style:
@@ -80,7 +87,7 @@ def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
     def thickness(at: Floats) -> Floats:
         front = sweep.front_mm * step(at[:, 2], 10.0, 60.0)
         full = sweep.sides_mm + _top(at) * (sweep.top_mm - sweep.sides_mm + front)
-        return np.asarray(0.6 + full * step(line.inside(at), -3.0, 22.0) ** 0.8)
+        return np.asarray(0.9 + full * step(line.inside(at), -3.0, 22.0) ** 0.8)
 
     def flow(at: Floats, normals: Floats, share: float) -> Floats:
         away = tangent(at - CROWN, normals)
@@ -92,11 +99,25 @@ def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
     def cut(at: Floats) -> Floats:
         return np.asarray(line.inside(at) + 1.0)
 
+    def comb(round_it: Floats) -> Comb:
+        return Comb(
+            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, 0.3, 1.2, 1.0, steps=66, slack=0.5,
+            pole=True,
+        )  # fmt: skip
+
+    return Style(sheets(skin, _spread(skin, comb), SWEPT, WEAVE, seed=seed, closed=True), line)
+
+
+def _spread(skin: Skin, comb: Callable[[Floats], Comb]) -> Comb:
+    """A comb by the angles at which guides leave the crown, so that they end about evenly along the line: where they
+    end far apart, the sheet would leave the skin."""
     round_it = np.linspace(np.pi, -np.pi, GUIDES)
-    comb = Comb(
-        _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, 1.2, 1.2, steps=66, slack=0.5
-    )  # fmt: skip
-    return Style(sheets(skin, comb, SWEPT, WEAVE, seed=seed, closed=True), line)
+    evenly = np.linspace(0.0, 1.0, GUIDES)
+    for _ in range(_SPREADS):
+        apart = np.linalg.norm(np.diff(tips(skin, comb(round_it)), axis=0), axis=1)
+        share = np.concatenate([[0.0], np.cumsum(apart)]) / apart.sum()
+        round_it = np.interp(evenly, _EVEN * share + (1.0 - _EVEN) * evenly, round_it)
+    return comb(round_it)
 
 
 def _ring(skin: Skin, round_it: Floats) -> Floats:

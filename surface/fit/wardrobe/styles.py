@@ -12,8 +12,10 @@ from surface.fit.wardrobe.hairline import Hairline, directions
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
 
-ACROSS = 1.0 / 64.0  # tiles of the noise for a mm across strands, and along them
+ACROSS = 1.0 / 46.0  # tiles of the noise for a mm across strands, and along them
 ALONG = 1.0 / 900.0
+_CAP = 2.2  # cover of an under-cap
+BARE = 0.3  # how far below nothing cover is where no hair grows: strand.frag fades it
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ def cap(
     points = _cap_points(skin, line, (nu, nv), thickness, share, short_mm)
     t = np.broadcast_to(np.linspace(0, 1, gv), (gu, gv))
     round_it = np.broadcast_to(np.linspace(0, 1, gu)[:, None], (gu, gv))
-    cover = 2.2 - 2.0 * step(t, 0.90, 1.0)
+    cover = _CAP - (_CAP + BARE) * step(t, 0.88, 1.0)
     strands = np.stack([round_it * 560 * ACROSS, t * 160 * ALONG, cover, openness + 0.0 * t], axis=-1)
     return Patches(
         points[None], (3, 3), (gu, gv), (25, 7), strands[None], np.zeros((1, gu, gv)), np.full((1, gu, gv), 0.85),

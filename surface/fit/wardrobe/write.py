@@ -20,8 +20,8 @@ from surface.head.model.sidecar import write_sidecar
 from surface.head.model.wardrobe import outline
 
 SIZE = 192  # pixels of a picture along u and v
-FADE_MM = (-5.0, 4.0)  # inside the hairline: where the skin begins to have hair's colour, and where it has it
-HIDDEN_MM = 17.0
+FADE_MM = (-6.0, 8.0)  # inside the hairline: where the skin begins to have hair's colour, and where it has it
+HIDDEN_MM = 26.0
 
 
 def write_garment(

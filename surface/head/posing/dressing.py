@@ -14,7 +14,8 @@ from surface.head.model.wardrobe import HINT, Garment, WornPart
 from surface.head.posing.part import HeadPart
 
 COVERED = 0.5  # of the picture of hidden skin: more is not drawn
-SCALP = 0.55  # of hair's colour on the skin between its roots, where light hardly reaches
+SCALP = 0.6  # of hair's colour on the skin between its roots, where little light reaches
+THROUGH = 0.8  # of the skin between roots of hair that is light, which lets light through and shows less on it
 
 
 def dress(parts: Iterable[HeadPart], garments: Sequence[Garment]) -> None:
@@ -63,7 +64,8 @@ def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
         cover = sampled(garment, "cover", part)
         if cover is not None:
             below = SCALP * np.asarray(garment.worn.colour, np.float32)
-            albedo = albedo + cover * (below - albedo)
+            darker = np.clip(1.0 - below.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 0.0, 1.0)
+            albedo = albedo + cover * (1.0 - THROUGH * (1.0 - darker)) * (below - albedo)
         shadow = sampled(garment, "shadow", part)
         if shadow is not None and "occlusion" in part.attributes:
             part.attributes["occlusion"] = part.attributes["occlusion"] * (1.0 - shadow)

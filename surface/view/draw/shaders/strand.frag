@@ -1,4 +1,5 @@
 // Strands: locks part and thin out where their cover falls below a strand's height.
+#define SOFT vec2(0.9, 0.3)  // of strands' heights, over which each fades: few, as at a hairline, and many together
 #define STEADY 0.2  // a strand keeps its height along its length, so that no piece of it is left by itself
 uniform sampler2D detail;
 uniform bool multisampled;  // alpha then decides how many samples of a pixel a strand covers
@@ -23,7 +24,10 @@ void main() {
     noise = mix(noise, fine, 0.6);
 #endif
     float over = v_strand.z - height;
-    float cover = multisampled ? clamp(over / max(fwidth(over), 1e-4) + 0.5, 0.0, 1.0) : step(0.0, over);
+    float soft = mix(SOFT.x, SOFT.y, clamp(1.6 * v_strand.z, 0.0, 1.0));
+    // With one sample, where strands are few, every other pixel of a board of chess is drawn: smooth.frag levels it.
+    float board = 0.5 * float(int(gl_FragCoord.x + gl_FragCoord.y) & 1) - 0.25;
+    float cover = multisampled ? clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0) : step((soft - SOFT.y) * board, over);
     if (cover <= 0.0) {
         discard;
     }

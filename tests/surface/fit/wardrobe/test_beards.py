@@ -9,6 +9,7 @@ from surface.fit.wardrobe import beards as module
 from surface.fit.wardrobe.beards import BEARDS, field, garment, inside
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.skin import Skin
+from surface.fit.wardrobe.styles import BARE
 from tests.surface.fit.wardrobe.invariants import asymmetry, check_patches, heights, points_of
 from tests.surface.fit.wardrobe.made_skin import lower_face
 
@@ -95,3 +96,17 @@ def test_a_level_ray_leaves_the_skin_where_it_is(skin: Skin) -> None:
         off = found - [0.0, -70.0, 20.0]
         np.testing.assert_allclose(off, (off @ direction) * direction, atol=1e-9)
         assert abs(heights(skin, found[None])[0]) < 4.0
+
+
+def test_hairs_thin_out_to_nothing_at_every_edge_that_is_seen(made: dict[str, list[Patches]], name: str) -> None:
+    """The border of a shell is no edge: the upper one on the cheeks, and all of the one over the lip."""
+    for main, lip in zip(made[name][::2], made[name][1::2], strict=True):
+        cover = main.strands[0, ..., 2]
+        assert (cover[:, 0] < 0.1).all() and cover.max() > 0.3
+        over = lip.strands[0, ..., 2]
+        assert over[[0, -1]].max() == pytest.approx(-BARE) and over[:, -1].max() < 0.1
+
+
+def test_hairs_are_short_where_they_come_out_of_the_skin(made: dict[str, list[Patches]], name: str) -> None:
+    along = np.diff(made[name][0].strands[0, 20, :, 1])
+    assert along[0] > 3.0 * along[-1] > 0.0

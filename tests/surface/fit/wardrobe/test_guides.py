@@ -7,6 +7,7 @@ import pytest
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import grow, resampled
+from surface.fit.wardrobe.patches import greville
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheets
 
 THICK_MM = 10.0
@@ -60,6 +61,8 @@ def test_resampled_places_lie_evenly() -> None:
     bent = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 5, 0], [1, 9, 0]]])
     steps = np.linalg.norm(np.diff(resampled(bent, 11), axis=1), axis=2)
     np.testing.assert_allclose(steps, 1.0)
+    near_the_end = resampled(bent, 3, np.array([0.0, 0.9, 1.0]))
+    np.testing.assert_allclose(near_the_end[0], [[0.0, 0, 0], [1, 8, 0], [1, 9, 0]])
 
 
 def test_sheets_lie_over_one_another_and_end_where_they_are_cut() -> None:
@@ -69,7 +72,7 @@ def test_sheets_lie_over_one_another_and_end_where_they_are_cut() -> None:
         x, y, z = np.moveaxis(patch.points[0], -1, 0)
         np.testing.assert_allclose(x[:, -1], 50.0, atol=0.1)
         np.testing.assert_allclose(y[:, -1], height, atol=0.1)
-        np.testing.assert_allclose(z[:, 0], np.linspace(0, 40, 9), atol=0.1)
+        np.testing.assert_allclose(z[:, 0], 40.0 * greville(9, 3), atol=0.1)
     assert above.strands[..., 2].max() < below.strands[..., 2].max()  # gaps in the outer show the inner
     assert above.strands[..., 3].min() > below.strands[..., 3].max()  # which is darker
 

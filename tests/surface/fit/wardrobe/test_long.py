@@ -57,3 +57,20 @@ def test_hair_over_an_ear_stands_off_there_alone() -> None:
 def test_pairs_of_sheets_are_sorted_outermost_first() -> None:
     sheets = list("abcABC")
     assert module._inner_last(sheets) == list("aAbBcC")  # type: ignore[arg-type,comparison-overlap]
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_hair_hangs_straight_over_hollows_and_over_ears_without_a_bulge(side: float) -> None:
+    """Guides alike, from the parting to the side and down, with a hollow above what stands out as an ear does."""
+    t = np.linspace(0.0, 1.0, 24)
+    y = np.interp(t, [0.0, 0.3, 1.0], [120.0, 90.0, -120.0])
+    x = np.interp(t, [0.0, 0.3, 1.0], [14.0, 80.0, 80.0]) + 15.0 * np.exp(-(((y - 20.0) / 12.0) ** 2))
+    paths = np.tile(np.stack([side * x, y, 0.0 * y], axis=-1), (20, 1, 1))
+    hung = module._hung(paths, side)
+    np.testing.assert_allclose(hung[:, y > 96.0], paths[:, y > 96.0])  # on the skull they lie as they did
+    back, front = (0, -1) if side > 0.0 else (-1, 0)
+    np.testing.assert_allclose(hung[back], paths[back])  # where both sides meet there is no gap
+    falls = y < 55.0
+    own, before = side * hung[front, falls, 0], side * paths[front, falls, 0]
+    assert np.diff(own, 2).max() < 0.5 and np.diff(before, 2).max() > 5.0  # no hollow
+    assert own.max() > before.max() - 4.0

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import BSpline
 
 from surface.fit.wardrobe import sheets as module
+from surface.fit.wardrobe.patches import Patches, knots
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheet, sheets
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import ACROSS, ALONG, tangent
+from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, tangent
 from tests.surface.fit.wardrobe.invariants import check_patches
 
 WEAVE = Weave((9, 6), (17, 11), (5, 3))
@@ -88,14 +90,41 @@ def test_a_guide_ends_where_nothing_of_it_is_left(left: list[float], end: float)
     np.testing.assert_allclose(found, np.linspace(0.0, end, 64)[:, None] * [1.0, 2.0, 0.0])
 
 
-def test_a_surface_goes_through_the_first_and_the_last_guide_and_begins_and_ends_with_all() -> None:
-    rng = np.random.default_rng(5)
-    paths = np.cumsum(rng.uniform(0.5, 1.5, (7, 24, 3)), axis=1)
-    found = module._evenly(paths, (7, 5), False)
-    np.testing.assert_allclose(found[:, 0], paths[:, 0], atol=1e-9)
-    np.testing.assert_allclose(found[:, -1], paths[:, -1], atol=1e-9)
-    finer = module._evenly(paths, (13, 5), False)
-    np.testing.assert_allclose(finer[::2], found, atol=1e-9)
+def test_a_surface_goes_through_guides_and_does_not_sink_into_what_they_lie_on() -> None:
+    """Guides on a cylinder: control points that lie on it would make a surface within it."""
+    round_it, down = np.linspace(-1.0, 1.0, 9), np.linspace(0.0, 1.5, 24)
+    on = 80.0 * np.stack([np.sin(down), np.cos(down)], axis=-1)
+    paths = np.stack([np.concatenate([on, np.full((24, 1), 80.0 * r)], axis=1) for r in round_it])
+    weave = Weave((9, 8), (9, 8), (9, 8), 0.3)
+    found = module._control_points(paths, weave)
+    every = [np.concatenate([own[:, 0], own[-1, 1:]]) for own in (knots(9, 3), knots(8, 3))]
+    at = np.linspace(0.0, 1.0, 30)
+    across = BSpline(every[0], found, 3)(at)
+    surface = BSpline(every[1], across.swapaxes(0, 1), 3)(at)  # (along, across, 3)
+    np.testing.assert_allclose(np.hypot(surface[..., 0], surface[..., 1]), 80.0, atol=0.1)
+    np.testing.assert_allclose(surface[..., 2], np.broadcast_to(160.0 * (at - 0.5), (30, 30)), atol=0.05)
+    angle = np.arctan2(surface[:, 0, 0], surface[:, 0, 1]) / 1.5
+    np.testing.assert_allclose(angle, weave.length(at), atol=0.02)  # denser at the tips
+    assert angle[-1] - angle[-2] < 0.65 * (angle[1] - angle[0])
+
+
+def _sheet(layer: Layer) -> Patches:
+    points = np.stack(np.meshgrid(np.linspace(0, 80, 8), np.linspace(0, 150, 10), [0.0], indexing="ij"), axis=-1)
+    return module.sheet(points[:, :, 0], layer, Weave((8, 10), (9, 31), (9, 31)), np.random.default_rng(1), False, 0.0)
+
+
+def test_cropped_hairs_are_seen_in_short_pieces_at_the_tips_only() -> None:
+    long, cropped = (_sheet(Layer(1.0, 0.8, 1.0, cropped_mm=mm)).strands[0, 4] for mm in (0.0, 7.0))
+    pace = np.diff(cropped[:, 1]) / np.diff(long[:, 1])
+    assert pace[-1] > 5.0 and pace[0] == pytest.approx(1.0, abs=1e-3)
+    np.testing.assert_allclose(cropped[:, 2], long[:, 2])  # their cover is the same
+    assert cropped[-1, 3] < 0.7 * long[-1, 3] and cropped[0, 3] == pytest.approx(long[0, 3])
+
+
+def test_roots_are_sparse_along_their_length_in_millimetres_and_tips_fade_to_nothing() -> None:
+    cover = _sheet(Layer(1.0, 0.8, 1.0, 5.0, roots=0.7, roots_mm=30.0)).strands[0, 4, :, 2]  # 5 mm from row to row
+    assert cover[0] < 0.2 < cover[3] < cover[7] and cover[7] == pytest.approx(cover[12])
+    assert cover[-1] == pytest.approx(-BARE, abs=0.1)
 
 
 def test_sheets_lie_over_each_other_in_the_order_of_their_layers(skin: Skin) -> None:

@@ -50,3 +50,12 @@ def test_the_same_head_gets_the_same_hair(style: Style, make: Callable[[Skin], S
     for one, other in zip(style.patches, again.patches, strict=True):
         np.testing.assert_array_equal(one.points, other.points)
         np.testing.assert_array_equal(one.strands, other.strands)
+
+
+def test_sheets_are_closed_at_the_crown_and_end_evenly_round_the_line(style: Style) -> None:
+    """A hole at the crown shows the hollow head; where tips are far apart a sheet leaves the skin between them."""
+    for patch in style.patches:
+        crown, tips = patch.points[0, :, 0], patch.points[0, :, -1]
+        np.testing.assert_allclose(crown, crown[:1].repeat(len(crown), axis=0), atol=1e-6)
+        apart = np.linalg.norm(np.diff(tips, axis=0), axis=1)[1:-1]
+        assert apart.max() < 3.0 * np.median(apart)

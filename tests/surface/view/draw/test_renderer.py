@@ -354,7 +354,7 @@ class HairyHead(BallHead):
 def test_strands_cover_a_share_of_a_pixel_where_it_has_several_samples(
     gl: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """As much hair as with whole pixels, but without their steps."""
+    """About as much hair as with whole pixels, but without their steps; strands fade over some of their height."""
     pictures = []
     for covering in (True, False):
         whole = replace(materials.MATERIALS["strand"], covering=covering)
@@ -364,4 +364,4 @@ def test_strands_cover_a_share_of_a_pixel_where_it_has_several_samples(
     shared, stepped = pictures
     steps = [int((np.abs(np.diff(picture[60:100], axis=1)).max(axis=2) > 90).sum()) for picture in pictures]
     assert 0 < steps[0] < 0.75 * steps[1]
-    assert shared.mean() == pytest.approx(stepped.mean(), rel=0.005)
+    assert shared.mean() == pytest.approx(stepped.mean(), rel=0.02)
