@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from controller.base.parameters import Parameters
@@ -48,6 +46,6 @@ def _limit(table: ChannelTable, parameters: Parameters, joint: Joint) -> JointLi
     follows[1:-1] &= (slopes[1:, servo] > 1e-6) | (slopes[:-1, servo] > 1e-6)
     follows[[0, -1]] &= slopes[[0, -1], servo] > 1e-6
     reached = amounts[follows]
-    full_rad = joint.limit.high_rad / high if math.isclose(low, 0.0) else joint.limit.high_rad
+    full_rad = joint.limit.high_rad / high
     speed = float(table.max_speed_rad_s[servo]) / steepest * full_rad
     return JointLimit(float(reached.min()) * full_rad, float(reached.max()) * full_rad, speed)

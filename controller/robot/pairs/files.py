@@ -57,8 +57,9 @@ def read_pairs(path: Path, robot: RobotSettings, parameters: Parameters) -> Pair
     known = {channel.name for channel in robot.channels}
     if faults := list(_column_faults(head, known, parameters)):
         raise _wrong(path, faults)
-    if not LEAST_PAIRS < len(lines) <= _MOST_ROWS:
-        raise _wrong(path, [f"has {max(len(lines) - 1, 0)} pairs; it takes {LEAST_PAIRS} to {_MOST_ROWS}"])
+    pairs = max(len(lines) - 1, 0)
+    if not LEAST_PAIRS <= pairs <= _MOST_ROWS:
+        raise _wrong(path, [f"has {pairs} pairs; it takes {LEAST_PAIRS} to {_MOST_ROWS}"])
     table = np.array([_numbers(path, number, line, len(head)) for number, line in enumerate(lines[1:], 2)])
     if faults := list(_number_faults(head, table, parameters)):
         raise _wrong(path, faults)

@@ -59,6 +59,11 @@ def test_a_board_has_the_limits_of_its_pulses(tmp_path: Path) -> None:
             board.wait_until(lambda: board.writes)
             head.never_beyond_limits()
             head.no_jump()
+            port.write(bytes((0x84, 0, 1530 * 4 & 0x7F, 1530 * 4 >> 7)))
+            board.wait_until(lambda: len(board.writes) > 1)
+            head.no_jump(deg=2.8)  # 30 us are 2.7 degrees of a hobby servo
+            with pytest.raises(AssertionError, match="jump"):
+                head.no_jump(deg=2.6)
         with pytest.raises(AssertionError, match="channel 0 is still on"):
             head.torque_off_at_exit()
         with pytest.raises(KeyError, match="no servo"):

@@ -47,7 +47,8 @@ vec3 iris(vec2 p, float t) {
     float angle = atan(p.y, p.x) * 0.31831;
     float fibre = texture(detail, vec2(angle * 3.0, t * 0.22)).w + texture(detail, vec2(angle * 7.0, t * 0.10)).x;
     float collarette = (1.0 - smoothstep(0.18, 0.42, abs(t - 0.26)));
-    vec3 tint = iris_colour * (0.35 + 1.1 * fibre) + vec3(0.10, 0.065, 0.03) * collarette * fibre;
+    float pale = clamp(dot(iris_colour, vec3(0.2126, 0.7152, 0.0722)) * 12.0, 0.0, 1.0);  // pigment hides the ring of dark eyes
+    vec3 tint = iris_colour * (0.35 + 1.1 * fibre) + vec3(0.10, 0.065, 0.03) * pale * collarette * fibre;
     return tint * (1.0 - 0.8 * smoothstep(0.72, 1.0, t)) * smoothstep(-0.06, 0.12, t);
 }
 

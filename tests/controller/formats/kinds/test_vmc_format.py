@@ -127,9 +127,11 @@ def test_unknown_addresses_surplus_arguments_and_names_of_an_avatar_do_no_harm()
     decoder = VmcDecoder(P)
     (frame,) = decoder.feed(
         bundle([message("/VMC/Ext/Cam", "Camera", 1.0), message("/other", 5), value("MTH_Fcl_A", 1.0),
-                message(VALUE, "JawOpen", 0.5, 99, "more"), message("/VMC/Ext/OK", 1, 3, 0, 1), APPLY])
+                message(VALUE, "JawOpen", 0.5, 99, "more"), message("/VMC/Ext/OK", 1, 3, 0, 1),
+                message("/VMC/Ext/Bone/Pos", "Head", 0.0, 0.0, 0.0, 0.0, 0.258819, 0.0, 0.965926, 7.0), APPLY])
     )  # fmt: skip
-    assert got(frame, "jawOpen") == 0.5 and frame.mask.sum() == 1 and not decoder.refused
+    assert got(frame, "jawOpen") == 0.5 and got(frame, "headYaw") < -0.4 and not decoder.refused
+    assert frame.mask.sum() == 4, "the jaw and three angles of the head"
 
 
 def test_names_without_end_take_bounded_memory() -> None:

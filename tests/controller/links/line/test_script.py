@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import FrozenInstanceError
 from pathlib import Path
@@ -78,6 +79,14 @@ def test_a_robot_gets_scripts_of_the_stage_and_the_shipped_ones_by_name(tmp_path
     assert load_named_script("tour", P, VOCABULARY, beside=stage).steps == ((0.0, "PING"),)
     (tmp_path / "other.toml").symlink_to(tmp_path / "own.toml")
     assert load_named_script("other", P, VOCABULARY, beside=stage).steps
+
+
+@pytest.mark.parametrize("name", ["/etc/voice.wav", "../voice.wav", "sub/../../voice.wav", "", "a\0b"])
+def test_the_sound_of_a_script_lies_beside_it(tmp_path: Path, name: str) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(f'sound = {json.dumps(name)}\nsteps = ["0 NEUTRAL"]\n')
+    with pytest.raises(ConfigError, match="sound: must be a file in the folder of the script or below"):
+        load_script(str(path), P, VOCABULARY)
 
 
 def test_a_robot_gets_no_other_file(tmp_path: Path) -> None:

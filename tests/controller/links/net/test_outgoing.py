@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import numpy as np
@@ -61,6 +62,20 @@ def sent(kind: str, head: Head, enough: int, **keys: object) -> list[bytes]:
     finally:
         outgoing.stop()
     return basket.messages
+
+
+def test_a_link_sends_as_often_as_its_rate_says() -> None:
+    settings = read_link({"kind": "json", "send": "127.0.0.1:1", "rate_hz": 40.0}).own
+    basket = Basket()
+    outgoing = Outgoing(settings, basket, Head(), "x")
+    began_s = time.monotonic()
+    outgoing.start()
+    try:
+        wait_for(lambda: len(basket.messages) >= 5)
+        lasted_s = time.monotonic() - began_s
+    finally:
+        outgoing.stop()
+    assert len(basket.messages) <= 40.0 * lasted_s + 3, "on a busy machine fewer, but never more"
 
 
 def decoded(kind: str, messages: list[bytes]) -> Frame:

@@ -180,6 +180,17 @@ def test_a_wrong_table_says_what_is_wrong(files: tuple[Path, Path], change: Any,
     assert fault in str(caught.value)
 
 
+@pytest.mark.parametrize(("count", "enough"), [(19, False), (20, True)])
+def test_twenty_pairs_are_enough_to_be_read(files: tuple[Path, Path], count: int, enough: bool) -> None:
+    robot, pairs = files
+    pairs.write_text("\n".join(pairs.read_text().splitlines()[: count + 1]))
+    if enough:
+        assert len(read_pairs(pairs, load_robot(robot, P), P).values) == count
+    else:
+        with pytest.raises(ConfigError, match="has 19 pairs"):
+            read_pairs(pairs, load_robot(robot, P), P)
+
+
 def test_two_spellings_of_one_parameter_and_a_hundred_thousand_columns_are_refused_at_once(tmp_path: Path) -> None:
     robot, pairs = tmp_path / "one.toml", tmp_path / "pairs.csv"
     robot.write_text(ROBOT)

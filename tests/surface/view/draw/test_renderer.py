@@ -88,6 +88,18 @@ def test_gaze_moves_the_pupils(screen: Offscreen) -> None:
     assert dark(-0.5) < dark(0.0) - 4
 
 
+def test_the_iris_of_a_dark_eye_is_dark(gl: None) -> None:
+    """A pale ring around the pupil made it amber."""
+    camera, red = Camera.around(0, 0, distance=200, target=(30, 20, 80)), {}
+    for iris in ((0.16, 0.07, 0.037), (0.016, 0.007, 0.0037)):
+        with Offscreen(BallHead(), SIZE, theme=replace(find_theme("skin"), iris=iris)) as screen:
+            picture = screen.render(values(), camera).astype(float)
+        row = picture[80]
+        pupil = np.flatnonzero(row.sum(axis=1) < 3.0)[0]
+        red[iris[0]] = row[pupil - 9 : pupil - 3, 0].mean()
+    assert red[0.016] < 0.45 * red[0.16]
+
+
 def test_the_picture_depends_on_the_pose_alone(screen: Offscreen) -> None:
     first = screen.render(values())
     screen.render(values(jawOpen=1, headYaw=-1, eyeBlinkLeft=1), Camera.profile())
