@@ -39,6 +39,13 @@ def test_the_error_bound_saves_vertices_at_no_more_deviation(variants: list[Vari
     assert len(by_error.mesh.vertices) == round((1 - by_error.saving) * len(uniform.mesh.vertices))
 
 
+@pytest.mark.slow
+def test_only_the_domain_that_is_meant_is_compared() -> None:
+    for domain, wide in ((None, 1.0), (Domain((0.25, 0.75, 0.0, 1.0)), 0.5)):
+        for variant in compare(bump(), domain, level=3):
+            assert np.ptp(variant.mesh.uv[:, 0]) == pytest.approx(wide)
+
+
 def test_deviation_of_a_flat_sheet_is_nothing_and_of_a_coarse_bump_its_height() -> None:
     surface = bump()
     flat = surface.with_points(surface.points * [1, 1, 0])

@@ -5,7 +5,7 @@ import pytest
 from eye_face import CENTRES, RADIUS, face, joined, pair, shell, with_margins
 
 from surface.fit.eyes.lids import fit_lids
-from surface.fit.eyes.margins import margins
+from surface.fit.eyes.margins import _without_teeth, margins
 from surface.fit.eyes.search import Eyes, find_eyes
 from surface.fit.source.mesh import FitMesh, face_areas
 
@@ -50,3 +50,14 @@ def test_lids_end_at_the_edge_that_is_seen_and_do_not_fold() -> None:
     rows = np.flatnonzero(eyes.skin)
     before, after = (face_areas(m.vertices, m.faces[rows]) for m in (whole, seated))
     assert (after / before).min() > 0.4
+
+
+def test_a_triangle_that_stands_out_alone_is_one_between_faces_that_are_gone() -> None:
+    """The place of a triangle that -1 fills is no vertex, and not the last one either."""
+    faces = np.array([[0, 1, 2, -1], [1, 0, 3, -1], [0, 3, 4, -1], [3, 1, 5, -1]])
+    mesh = FitMesh(np.zeros((7, 3)), faces, np.zeros((1, 2)), np.full_like(faces, -1), (), np.zeros((0, 7, 3)))
+    kept = np.array([False, True, False, False])
+    assert _without_teeth(mesh, kept, ~kept).sum() == 0, "all round it faces are gone"
+    beside = np.array([True, False, False, False])
+    again = FitMesh(mesh.vertices[:4], faces[:2], mesh.uv, mesh.face_uv[:2], (), np.zeros((0, 4, 3)))
+    assert _without_teeth(again, kept[:2], beside[:2]).tolist() == [False, True], "only one of its edges is beside one"
