@@ -17,6 +17,8 @@ FEW = 3
 """Most heads of a stage whose faces are sent whether or not somebody is known to listen."""
 FIRST_S = 3.0
 """So long after it has begun to conduct, a process sends everything whether or not somebody is known to listen."""
+_ASK_NS = 50_000_000
+"""Whether somebody listens is asked again after this time: the question takes a tenth of what mixing a face does."""
 Heading = Callable[[int, int, int], Header]
 """Makes a header of a sequence, a time and a stamp (ns)."""
 
@@ -30,6 +32,8 @@ class FaceSender:
 
     def __init__(self, outlets: Mapping[str, Outlet], together: Outlet, payloads: Payloads, heading: Heading) -> None:
         self._outlets, self._together, self._payloads, self._heading = outlets, together, payloads, heading
+        self._listeners = {name: Listeners(outlet) for name, outlet in outlets.items()}
+        self._listeners_to_all = Listeners(together)
         self._batches, self._gathering = Batches(payloads), Gathering(len(outlets))
         self.sequences = dict.fromkeys(outlets, 0)
         self.sent = 0
@@ -45,10 +49,10 @@ class FaceSender:
         self.sent += 1
         sequence, data, outlet = self.sequences[head], self._payloads.encode(values), self._outlets[head]
         all_ways = now_ns < self._all_until_ns
-        if all_ways or len(self._outlets) <= FEW or is_heard(outlet):
+        if all_ways or len(self._outlets) <= FEW or self._listeners[head].there(now_ns):
             header = self._heading(sequence, now_ns, stamp_ns).encode()
             outlet.put(data, encoding=self._payloads.encoding, attachment=header)
-        if all_ways or is_heard(self._together):
+        if all_ways or self._listeners_to_all.there(now_ns):
             self._send(*self._gathering.begin(now_ns))
             if self._gathering.add(head, sequence, stamp_ns, data):
                 self._send(now_ns, self._gathering.take())
@@ -58,6 +62,19 @@ class FaceSender:
         if faces:
             header = self._heading(0, now_ns, 0).encode()
             self._together.put(self._batches.encode(faces), encoding=self._batches.encoding, attachment=header)
+
+
+class Listeners:
+    """Those who listen to a publisher, as was heard last."""
+
+    def __init__(self, outlet: Outlet) -> None:
+        self._outlet, self._asked_ns, self._there = outlet, -_ASK_NS, False
+
+    def there(self, now_ns: int) -> bool:
+        """Whether anybody is there at a time (ns)."""
+        if not 0 <= now_ns - self._asked_ns < _ASK_NS:
+            self._asked_ns, self._there = now_ns, is_heard(self._outlet)
+        return self._there
 
 
 def is_heard(outlet: Outlet) -> bool:

@@ -17,10 +17,15 @@ from controller.fleet.sending import FEW, FIRST_S, FaceSender
 
 
 class Outlet:
-    """A publisher; ``matching_status`` : whether somebody is known to listen."""
+    """A publisher; ``listens`` : whether somebody is known to listen. asked : how often that was asked."""
 
     def __init__(self, listens: bool) -> None:
-        self.matching_status, self.put_count = listens, 0
+        self.listens, self.put_count, self.asked = listens, 0, 0
+
+    @property
+    def matching_status(self) -> bool:
+        self.asked += 1
+        return self.listens
 
     def put(self, data: bytes, **more: Any) -> None:
         self.put_count += 1
@@ -49,6 +54,18 @@ def test_faces_of_few_heads_are_sent_before_somebody_is_known_to_listen(heads: i
 def test_faces_of_many_heads_are_sent_to_who_listens() -> None:
     assert sent(FEW + 1, listens=False) == (0, 0)
     assert sent(FEW + 1, listens=True) == (2 * (FEW + 1), 0)
+
+
+def test_who_listens_is_asked_every_twentieth_of_a_second() -> None:
+    outlets, many = {f"head{k}": Outlet(False) for k in range(FEW + 1)}, Outlet(False)
+    sender = FaceSender(outlets, many, Payloads(P, "exact"), heading)  # type: ignore[arg-type]
+    one = outlets["head0"]
+    for tick in range(1, 11):  # of 10 ms
+        one.listens = tick > 2
+        for name in outlets:
+            sender.send(name, tick * 10_000_000, np.zeros(len(P)), 0)
+    assert (one.asked, many.asked) == (2, 2)
+    assert one.put_count == 5, "from the second question on"
 
 
 def test_a_tick_of_many_heads_is_one_message_to_who_hears_them_all() -> None:
