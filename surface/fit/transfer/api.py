@@ -45,7 +45,8 @@ MANY = 250_000  # samples of the scan's head once it is found
 MARGIN = 0.35  # around the head, in heights of the face: what lies within it belongs to the head
 USUAL = (0.7, 1.45)  # range of people's sizes, relative to the head that the expressions come from
 WRONG = 0.2  # greatest RMS distance of given landmarks from the head's own, in heights of the face
-MUCH = 0.5  # left and right are exchanged if exchanging them leaves less than this share of that distance
+SWAPPED, MUCH = 0.04, 0.5  # left and right are exchanged if that distance is above the first, and exchanging them
+# leaves less than the second share of it: a few landmarks that are right may fit better by chance
 LEAST_PICKED = 4  # given landmarks that suffice to align a scan; with fewer its face is searched for
 
 
@@ -153,7 +154,7 @@ def find_face(
         return align(template, sample(scan), up, forward, where)
     found, off = _by_landmarks(picked, template)
     mirrored = _by_landmarks(swapped(picked), template)[1]
-    if mirrored < MUCH * off:
+    if off > SWAPPED and mirrored < MUCH * off:
         hint = "left is the subject's left, which is on the right of a picture from the front"
         raise FitError(f"{where}: left and right of its landmarks are exchanged", hint=hint)
     if off > WRONG:

@@ -106,12 +106,15 @@ def _names(arrays: Mapping[str, Array], key: str) -> tuple[str, ...]:
 
 
 def _check_rows(part: WornPart) -> None:
-    """Raises ValueError: arrays of points or of vertices differ in length, or triangles name vertices there are not."""
+    """Raises ValueError: arrays of points or of vertices differ in length or hold what is no finite number, or
+    triangles name vertices there are not."""
     a = part.arrays
     for rows, first in ((BY_POINT, "points"), (BY_VERTEX, "mesh_uv")):
         for name, row in rows.items():
             if a[name].shape != (len(a[first]), *row):
                 raise ValueError(f"{part.name}/{name} has the shape {a[name].shape}, not {(len(a[first]), *row)}")
+            if a[name].dtype.kind == "f" and not np.isfinite(a[name]).all():
+                raise ValueError(f"{part.name}/{name} holds what is no finite number")
     for name in ("fast", "mesh_triangles"):
         if a[name].ndim != 2 or a[name].shape[1] != 3 or a[name].min() < 0 or a[name].max() >= len(a["mesh_uv"]):
             raise ValueError(f"{part.name}/{name} is no table of triangles of its {len(a['mesh_uv'])} vertices")

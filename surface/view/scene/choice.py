@@ -26,6 +26,9 @@ STUTTER, STUTTER_FRAMES = 1.5, 6
 _DRAWING = 0.5
 """Share of a period that drawing takes at least where it is to blame for a stutter, and not a slow screen. Software
 renderers fill pixels on other threads, so this is only a part of what a picture takes."""
+RELIEF, RELIEF_FRAMES = 0.9, 10
+"""After a change because of stutters, share of their periods that frames take at most, and after how many that is
+judged: where fewer pixels change nothing, the screen is slow."""
 HOLD_S, LONGEST_HOLD_S = 5.0, 80.0
 """Least time in "fast" before "full" is tried again, at first and at most."""
 RATIO, RATIOS = 2.2, (1.2, 4.0)
@@ -58,7 +61,10 @@ class QualityChoice:
         self._last: tuple[float, np.ndarray] | None = None
         self._quick = self._moved = False
         self._frames, self._spent_s = 0, 0.0
-        self._interval_s, self._stutters = 0.0, 0
+        self._interval_s = 0.0
+        self._intervals: list[float] = []  # of frames in a row that stutter, or of those after a change because of them
+        self._stuttered_s, self._screen_s = 0.0, 0.0  # mean period of stutters that are judged; that of a slow screen
+        self._undoes = False
 
     @property
     def other(self) -> str:
@@ -81,21 +87,38 @@ class QualityChoice:
         self._last = now_s, np.array(values, float)
         if self.share < 1.0:
             self.share = min(1.0, self.share + max(1.0 / FRAMES, self._interval_s / DISSOLVE_S))
-        elif self._stutters >= STUTTER_FRAMES or self._may_change(now_s):
+        elif self._stutters or self._undoes or self._may_change(now_s):
             self._change(now_s)
         return self.drawn
 
     def end(self, seconds: float) -> None:
         """End a frame that took so long to draw. Frames of a face at rest and of a dissolve do not count."""
         if not self._moved or self.share < 1.0:
+            self._intervals = [] if self.level == "full" else self._intervals
             return
-        late = self._interval_s > STUTTER * self._period_s and seconds > _DRAWING * self._period_s
-        self._stutters = self._stutters + 1 if late and self.level == "full" else 0
+        if self.level == "full":
+            late_s = STUTTER * max(self._period_s, self._screen_s)
+            late = self._interval_s > late_s and seconds > _DRAWING * self._period_s
+            self._intervals = [*self._intervals, self._interval_s] if late else []
+        elif self._stuttered_s > 0.0:
+            self._judge_stutters()
         self._frames, self._spent_s = self._frames + 1, self._spent_s + seconds
         lasting = max(self._spent_s, self._frames * self._period_s)
         if self._frames >= _LEAST_FRAMES and lasting >= WINDOW_S:
             self._means[self.level] = self._spent_s / self._frames
             self._frames, self._spent_s = 0, 0.0
+
+    @property
+    def _stutters(self) -> bool:
+        return self.level == "full" and len(self._intervals) >= STUTTER_FRAMES
+
+    def _judge_stutters(self) -> None:
+        """Go back to "full" where frames of "fast" come as late: the screen is so slow, and is not to blame again."""
+        self._intervals.append(self._interval_s)
+        if len(self._intervals) >= RELIEF_FRAMES:
+            if np.mean(self._intervals) > RELIEF * self._stuttered_s:
+                self._screen_s, self._undoes = self._stuttered_s, True
+            self._stuttered_s = 0.0
 
     def _may_change(self, now_s: float) -> bool:
         """Whether the other quality is wanted, and a movement hides the change or it was wanted for long enough."""
@@ -118,6 +141,8 @@ class QualityChoice:
 
     def _change(self, now_s: float) -> None:
         lasted_s, self._changed_s = now_s - self._changed_s, now_s
+        self._stuttered_s = float(np.mean(self._intervals)) if self._stutters else 0.0
+        self._intervals, self._undoes = [], False
         if self.level == "full":  # it is known now how much more this took
             failed = self.switches > 0 and lasted_s < LONGEST_HOLD_S
             self._hold_s = min(2.0 * self._hold_s, LONGEST_HOLD_S) if failed else HOLD_S
@@ -126,4 +151,4 @@ class QualityChoice:
         self.level, self.share = self.other, 1.0 / FRAMES
         self.switches += 1
         self._means.pop(self.level, None)
-        self._frames, self._spent_s, self._asked_s, self._stutters = 0, 0.0, np.inf, 0
+        self._frames, self._spent_s, self._asked_s = 0, 0.0, np.inf

@@ -92,8 +92,7 @@ class Openings:
         contacts: Sequence[Contact] = (),
     ) -> None:  # fmt: skip
         self._read = read
-        self._skin = face_of(parts, contacts)
-        loops = [] if self._skin is None else boundary_loops(self._skin.triangles)
+        self._skin, loops = _face_of(parts, contacts)
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
         self.lip_tint = lip_tint(self._skin)
@@ -186,6 +185,24 @@ class Openings:
             "opening_area": area * (max(size - self._shut_area, 20.0) / size),
             "opening_side": (last - first) * _SLIDE,
         }
+
+
+def _face_of(parts: Sequence[ViewPart], contacts: Sequence[Contact]) -> tuple[ViewPart | None, list[np.ndarray]]:
+    """The skin that is the face, and the loops of its holes. Without contacts it is the one that holds the most lids:
+    a head of a surface file may have its eye openings in another part than the one called "face"."""
+    loops = {id(p): boundary_loops(p.triangles) for p in parts if p.material == "skin"}
+    face = face_of(parts, contacts)
+    if face is None:
+        return None, []
+    if not contacts and len(loops) > 1:
+        eyes = [fit_sphere(np.asarray(p.vertices, float)) for p in parts if p.material == "eye"]
+
+        def held(skin: ViewPart) -> int:
+            near = (nearest_loop(loops[id(skin)], skin.vertices, at, _LID_REACH * radius) for at, radius in eyes)
+            return sum(loop is not None for loop in near)
+
+        face = max((p for p in parts if id(p) in loops), key=lambda p: (held(p), p is face))
+    return face, loops[id(face)]
 
 
 def _lids(loop: np.ndarray, vertices: np.ndarray, centre: np.ndarray) -> Aperture:

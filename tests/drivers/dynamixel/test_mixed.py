@@ -145,6 +145,27 @@ def test_a_servo_of_either_half_is_recovered_where_it_is(wire: VirtualBus, bus: 
     settle(bus, [0.0, 0.0, 0.0, 0.0], 2 * STEP_RAD)
 
 
+def test_a_servo_that_its_half_holds_back_is_driven_by_neither(wire: VirtualBus) -> None:
+    """Its watchdog is cleared, but the reply is lost; goals begin where it is once that is confirmed."""
+    with make(wire, margin_s=0.02, watchdog_ms=200, fast=False) as bus:
+        bus.start()
+        for _ in range(20):
+            bus.write([0.0] * 4)
+            bus.read()
+            wire.clock.sleep(0.02)
+        wire.clock.sleep(0.3)
+        wire.fault("drop:1:every=2:for=0.2s")
+        bus.write([0.3] * 4)
+        at = bus.ids.index(1)
+        assert not bus.driven[at] and bus.report().not_driven == (1,)
+        for _ in range(60):
+            bus.write([0.3] * 4)
+            bus.read()
+            wire.clock.sleep(0.02)
+        assert bus.driven.all() and bus.report().not_driven == ()
+        assert bus.read().position_rad[at] == pytest.approx(0.3, abs=0.02)
+
+
 def test_everybody_is_found_in_either_protocol(wire: VirtualBus) -> None:
     with make(wire, margin_s=0.02) as bus:
         found = bus.discover([5, 3, 1, 4, 9])

@@ -4,11 +4,11 @@
 uniform sampler2D detail;
 uniform bool multisampled;  // alpha then decides how many samples of a pixel a strand covers
 
-in vec3 v_colour;
-in vec4 v_strand;
+centroid in vec3 v_colour;  // at the edge of a triangle, the middle of a pixel may lie outside of it
+centroid in vec4 v_strand;
 #ifndef PER_VERTEX
-in vec3 v_through;
-in float v_surface;
+centroid in vec3 v_through;
+centroid in float v_surface;
 #endif
 
 out vec4 colour;
@@ -25,9 +25,7 @@ void main() {
 #endif
     float over = v_strand.z - height;
     float soft = mix(SOFT.x, SOFT.y, clamp(1.6 * v_strand.z, 0.0, 1.0));
-    // With one sample, where strands are few, every other pixel of a board of chess is drawn: smooth.frag levels it.
-    float board = 0.5 * float(int(gl_FragCoord.x + gl_FragCoord.y) & 1) - 0.25;
-    float cover = multisampled ? clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0) : step((soft - SOFT.y) * board, over);
+    float cover = multisampled ? clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0) : step(0.0, over);
     if (cover <= 0.0) {
         discard;
     }

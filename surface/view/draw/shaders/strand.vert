@@ -11,11 +11,11 @@ in vec4 albedo_gloss;         // square root of the linear albedo, gloss
 in vec4 strands;              // texture coordinates across and along, cover, how open it lies
 in vec3 along;                // direction of the strands at rest
 
-out vec3 v_colour;
-out vec4 v_strand;            // texture coordinates, cover, sine of the angle half way
+centroid out vec3 v_colour;
+centroid out vec4 v_strand;            // texture coordinates, cover, sine of the angle half way
 #ifndef PER_VERTEX
-out vec3 v_through;           // colour of the highlight that went through the fibre
-out float v_surface;          // strength of the other
+centroid out vec3 v_through;  // colour of the highlight that went through the fibre
+centroid out float v_surface; // strength of the other
 #endif
 
 void main() {

@@ -46,6 +46,16 @@ def test_a_garment_whose_arrays_do_not_belong_together_is_refused_by_its_path(tm
         read_garment(Worn(tmp_path / "cut.npz", GREY))
 
 
+def test_a_garment_with_what_is_no_number_is_refused(tmp_path: Path) -> None:
+    with np.load(WARDROBE / "hair-crop.npz") as file:
+        arrays = dict(file)
+    strands = arrays["hair/strands"].astype(np.float32)
+    strands[7, 2] = np.nan
+    np.savez(tmp_path / "nan.npz", **arrays | {"hair/strands": strands})
+    with pytest.raises(HeadFileError, match=r"nan\.npz: .*hair/strands holds what is no finite number"):
+        read_garment(Worn(tmp_path / "nan.npz", GREY))
+
+
 def test_points_of_a_garment_lie_on_parts_that_it_names(tmp_path: Path) -> None:
     with np.load(WARDROBE / "hair-crop.npz") as file:
         arrays = dict(file)

@@ -129,12 +129,25 @@ def test_a_picture_whose_pixels_are_filled_on_other_threads_is_known_to_stutter_
     assert choice.level == "fast"
 
 
-def test_a_slow_screen_is_no_reason_to_draw_less() -> None:
+@pytest.mark.parametrize(("drawing_s", "switches"), [(0.004, 0), (0.009, 2)])
+def test_a_slow_screen_is_no_reason_to_draw_less(drawing_s: float, switches: int) -> None:
+    """Where drawing might be to blame, "fast" is tried once."""
     choice, now_s = QualityChoice(RATE_HZ), 0.0
-    for k in range(300):
+    for k in range(900):
         choice.begin(np.array([0.01 * k]), now_s)
-        choice.end(0.004)
+        choice.end(drawing_s)
         now_s += 1.0 / 30.0
+    assert (choice.level, choice.switches) == ("full", switches)
+    assert choice.seconds["fast"] < 1.0
+
+
+def test_stutters_with_pauses_between_them_are_no_stutters_in_a_row() -> None:
+    choice, now_s, x = QualityChoice(RATE_HZ), 0.0, 0.0
+    for _ in range(2 * STUTTER_FRAMES):
+        for moves in (True, *[False] * 30):
+            now_s, x = now_s + (0.05 if moves else 1.0 / RATE_HZ), x + 0.01 * moves
+            choice.begin(np.array([x]), now_s)
+            choice.end(0.010)
     assert choice.level == "full" and choice.switches == 0
 
 

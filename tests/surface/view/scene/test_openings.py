@@ -257,6 +257,17 @@ def test_lids_and_lips_are_those_of_the_face_not_of_the_largest_skin(head: BallH
     assert set(openings.read_vertices()) >= {"face", *EYES}
 
 
+def test_without_contacts_lids_are_where_the_eyes_are_whatever_the_skin_is_called(head: BallHead) -> None:
+    """Heads of surface files have no contacts, and their face may be in several parts."""
+    face = part(head, "face")
+    face.name = "brow band"
+    lower = skin()
+    lower.name, lower.vertices = "face", lower.vertices - [0.0, 0.0, 200.0]
+    openings = Openings([lower, *head.parts])
+    assert openings.eye(part(head, "left_eye"))["lids"] == 1.0
+    assert set(openings.read_vertices()) >= {"brow band", *EYES}
+
+
 def test_without_lips_a_mouth_is_open_a_little() -> None:
     assert Openings([]).mouth() == {
         "opening_centre": (0.0, -35.0, 110.0), "opening_area": (0.0, 0.0, 250.0), "opening_side": (18.0, 0.0, 0.0),
