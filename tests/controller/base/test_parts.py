@@ -37,7 +37,7 @@ def test_pauses_grow_until_it_is_switched_off(caplog: pytest.LogCaptureFixture) 
         if part.failures > failures:
             pauses.append(now)
         now += 0.5
-    assert [b - a for a, b in itertools.pairwise(pauses)] == list(PAUSES_S)
+    assert [b - a for a, b in itertools.pairwise(pauses)] == list(PAUSES_S) == [1.0, 2.0, 4.0, 8.0, 16.0]
     assert part.off and len(caplog.messages) == 2  # the first failure, and that it is off
     assert caplog.messages[1] == (
         "idle motion failed 6 times in a row and is switched off: ZeroDivisionError: division by zero; "

@@ -15,6 +15,7 @@ from surface.fit.points.report import (
     FitReport,
     PartReport,
     face_bounds,
+    kinds_line,
     measure,
     plain,
 )
@@ -57,6 +58,14 @@ def face(rms: float, p99: float, shape: float | None) -> FitReport:
     shapes = {} if shape is None else {"jawOpen": Errors(shape, 1.0, 1.0)}
     part = PartReport("face", 5, 1, 0, Errors(rms, p99, 1.0), shapes)
     return FitReport("h", [part, replace(part, points=8, neutral=Errors(9.0, 9.0, 9.0))], [])
+
+
+@pytest.mark.parametrize(
+    ("count", "said"), [(1, ""), (4, "pieces: skin (a, b, c, d)"), (5, "pieces: skin (a, b, c, d, ...)")]
+)
+def test_four_pieces_of_a_kind_are_named(count, said):
+    report = FitReport("head", [], [], pieces=dict.fromkeys("abcdef"[:count], "skin"))
+    assert kinds_line(report) == said
 
 
 def test_the_bounds_of_a_face():

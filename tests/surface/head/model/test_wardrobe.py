@@ -46,6 +46,20 @@ def test_a_garment_whose_arrays_do_not_belong_together_is_refused_by_its_path(tm
         read_garment(Worn(tmp_path / "cut.npz", GREY))
 
 
+def test_triangles_of_a_garment_end_at_its_last_vertex(tmp_path: Path) -> None:
+    with np.load(WARDROBE / "hair-crop.npz") as file:
+        arrays = dict(file)
+    table = arrays["hair/mesh_triangles"].astype(np.int64)
+    for beyond, ends in ((0, False), (1, True)):
+        table[0, 0] = len(arrays["hair/mesh_uv"]) - 1 + beyond
+        np.savez(tmp_path / "end.npz", **arrays | {"hair/mesh_triangles": table})
+        if ends:
+            with pytest.raises(HeadFileError, match="hair/mesh_triangles is no table"):
+                read_garment(Worn(tmp_path / "end.npz", GREY))
+        else:
+            read_garment(Worn(tmp_path / "end.npz", GREY))
+
+
 def test_a_garment_with_what_is_no_number_is_refused(tmp_path: Path) -> None:
     with np.load(WARDROBE / "hair-crop.npz") as file:
         arrays = dict(file)
