@@ -17,14 +17,14 @@ if TYPE_CHECKING:
 
 _CONNECT_S = 20.0
 """A client waits so long for its router; afterwards whoever started it hears what is missing."""
-_CONNECT_MS = 4_000
+_TRY_MS = 4_000
 """So long it waits with one session, then with another: where the last message of a router's greeting is lost, the
 router refuses that session as one that it has, for 10 s."""
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
 """Longest pause between two tries to reach a router that has gone; Zenoh's own would grow to 4 s."""
 _OPEN_MS = 2_000
 """Longest time that a router may take to greet; Zenoh's 10 s are lost on one that takes a connection while it ends."""
-_AGAIN_CONNECT_MS, _AGAIN_OPEN_MS = 1_800, 600
+_AGAIN_MS, _AGAIN_OPEN_MS = 1_800, 600
 """The same for a session beside one that is not answered: several tries, as a greeting may be lost."""
 _NO_ROUTER_HINT = "start a router there, as zenohd -l tcp/0.0.0.0:7447, or correct [zenoh] connect"
 
@@ -67,7 +67,7 @@ def _configuration(settings: ZenohSettings, folder: Path, again: bool) -> zenoh.
 
 def _entries(settings: ZenohSettings, folder: Path, again: bool) -> dict[str, object]:
     """What the table says, as Zenoh's own keys. Nothing is searched for: no multicast, and gossip connects nobody."""
-    connect_ms, open_ms = (_AGAIN_CONNECT_MS, _AGAIN_OPEN_MS) if again else (_CONNECT_MS, _OPEN_MS)
+    connect_ms, open_ms = (_AGAIN_MS, _AGAIN_OPEN_MS) if again else (_TRY_MS, _OPEN_MS)
     found: dict[str, object] = {
         "mode": settings.way,
         "scouting/multicast/enabled": False,

@@ -178,7 +178,7 @@ class MixedBus(WireBus):
         sent = np.empty(len(self.ids))
         for half, index in zip(self._halves, self._index, strict=True):
             sent[index] = half.write(np.where(self.driven[index], angle_rad[index], np.nan))
-            self._mirror(half, index)
+            self._hold_back_with(half, index)
         return sent
 
     @property
@@ -188,10 +188,10 @@ class MixedBus(WireBus):
     def _ask(self) -> BusState:
         states = [half.read() for half in self._halves]
         for half, index in zip(self._halves, self._index, strict=True):
-            self._mirror(half, index)
+            self._hold_back_with(half, index)
         return BusState(states[-1].time_s, *(self._joined(states, field.name) for field in fields(BusState)[1:]))
 
-    def _mirror(self, half: DynamixelBus | LegacyBus, index: NDArray[np.intp]) -> None:
+    def _hold_back_with(self, half: DynamixelBus | LegacyBus, index: NDArray[np.intp]) -> None:
         """Hold back here, too, whom a half holds back, and let them begin where they are when it drives them again."""
         theirs, own = half._presence.held_back, self._presence.held_back
         for at in np.flatnonzero(theirs != own[index]):

@@ -92,7 +92,7 @@ class Openings:
         contacts: Sequence[Contact] = (),
     ) -> None:  # fmt: skip
         self._read = read
-        self._skin, loops = _face_of(parts, contacts)
+        self._skin, loops = _face_with_loops(parts, contacts)
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
         self.lip_tint = lip_tint(self._skin)
@@ -187,7 +187,9 @@ class Openings:
         }
 
 
-def _face_of(parts: Sequence[ViewPart], contacts: Sequence[Contact]) -> tuple[ViewPart | None, list[np.ndarray]]:
+def _face_with_loops(
+    parts: Sequence[ViewPart], contacts: Sequence[Contact]
+) -> tuple[ViewPart | None, list[np.ndarray]]:
     """The skin that is the face, and the loops of its holes. Without contacts it is the one that holds the most lids:
     a head of a surface file may have its eye openings in another part than the one called "face"."""
     loops = {id(p): boundary_loops(p.triangles) for p in parts if p.material == "skin"}

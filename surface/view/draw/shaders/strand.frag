@@ -24,8 +24,11 @@ void main() {
     noise = mix(noise, fine, 0.6);
 #endif
     float over = v_strand.z - height;
-    float soft = mix(SOFT.x, SOFT.y, clamp(1.6 * v_strand.z, 0.0, 1.0));
-    float cover = multisampled ? clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0) : step(0.0, over);
+    float cover = step(0.0, over);
+    if (multisampled) {
+        float soft = mix(SOFT.x, SOFT.y, clamp(1.6 * v_strand.z, 0.0, 1.0));
+        cover = clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0);
+    }
     if (cover <= 0.0) {
         discard;
     }
