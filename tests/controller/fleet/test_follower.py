@@ -276,3 +276,15 @@ def test_a_bridge_ends_at_the_next_face_also_where_that_came_just_now_and_late()
     follower.take(Header(FIRST, 3, 10**9 + 2 * STEP_NS), far)
     follower._bridge(10**9 + 4 * STEP_NS)
     assert np.array_equal(follower._followed, far) and follower._followed_ns == 10**9 + 2 * STEP_NS
+
+
+def test_own_life_is_not_needed_while_a_conductor_is_followed_whether_or_not_its_face_is_met() -> None:
+    follower, own, out = Follower(P, 0.5), P.neutral(), P.neutral()
+    far = P.neutral()
+    far[P.index("jawOpen")] = 1.0
+    assert not follower.follows(0.0)
+    for k in range(1, 4):
+        follower.take(Header(FIRST, k, k * STEP_NS, 0), far if k > 1 else P.neutral())
+        follower.step(k * STEP_NS, DT, own, out)
+    assert follower.conducted and not follower.exact
+    assert follower.follows(3 * DT) and not follower.follows(3 * DT + 0.6)

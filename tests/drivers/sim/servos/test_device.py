@@ -442,3 +442,16 @@ def test_a_factory_reset_restores_every_permanent_register():
         device.registers.put(item.name, item.initial ^ 0x55)
     assert device.factory_reset(0xFF, 0.0) == 0
     assert [device.registers.get(item.name) for item in permanent] == [item.initial for item in permanent]
+
+
+def test_what_a_read_senses_follows_pointers_that_are_set_later() -> None:
+    """The same slots show the LED first, which nothing senses, and then the position."""
+    device = servo(position=1000)
+    first = device.table.indirect[0]
+    for slot, target in enumerate((65,) * 4):
+        device.write(first[0] + 2 * slot, target.to_bytes(2, "little"), 0.0)
+    assert device.read(first[1], 4, 0.1)[1] == bytes(4)
+    for slot, target in enumerate(range(132, 136)):
+        device.write(first[0] + 2 * slot, target.to_bytes(2, "little"), 0.2)
+    device.place(1234, 0.3)
+    assert int.from_bytes(device.read(first[1], 4, 0.4)[1], "little") == 1234

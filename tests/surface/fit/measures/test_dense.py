@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from surface.check.subject import Subject
 from surface.fit.api import fit_mesh
-from surface.fit.measures.dense import measure_dense
+from surface.fit.measures.dense import _Pair, measure_dense
 from surface.fit.measures.mend import faults_of
 from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import FitResult
@@ -17,6 +18,7 @@ from surface.fit.reportfile import as_markdown, as_table
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names, sources_of
+from surface.head import Head
 from surface.head.model.data import Group, Rule
 from surface.head.model.parameters import SHAPES
 
@@ -152,3 +154,20 @@ def test_without_contacts_there_is_one_greatest_error(result: FitResult, mesh: F
     head = replace(result.head, contacts=[])
     dense = measure_dense(head, mesh, sources_of(mesh.names), result.parts, fit_alone=True)
     assert dense.apart is None and not any("without contacts" in line for line in dense.lines())
+
+
+@pytest.mark.slow
+def test_distances_that_grow_elsewhere_are_all_found(result: FitResult, mesh: FitMesh) -> None:
+    """Where a surface lay on the mesh, and another one of its poses does not."""
+    subject = Subject(Head(result.head))
+    part = next(p for p in result.parts if p.name == "face")
+    number = next(k for k, p in enumerate(subject.parts) if p.name == "face")
+    quick, whole = (_Pair(part, number, subject, mesh) for _ in range(2))
+    before = subject.rest[number].astype(np.float64)
+    away = before + np.where(np.arange(len(before))[:, None] % 7 == 0, [0.0, 0.0, 6.0], 0.0)
+    greater = quick.greater_elsewhere(away, mesh.vertices, before, quick.distances(before, mesh.vertices), 2.0)
+    (to_mesh, fold), (to_surface, _) = whole.distances(away, mesh.vertices)
+    assert (to_mesh > 2.0).sum() > 10
+    for found, wanted, left_out in ((greater[0][0], to_mesh, fold), (greater[1][0], to_surface, greater[1][1])):
+        beyond = (wanted > 2.0) & ~left_out
+        np.testing.assert_allclose(found[beyond], wanted[beyond], rtol=1e-9)
