@@ -15,6 +15,7 @@ from surface.check.overlaps import overlap_notes
 from surface.fit.eyes.colours import paint_layers
 from surface.fit.eyes.drawn_lids import seat_drawn_lids
 from surface.fit.eyes.lids import fit_lids, gazes_of
+from surface.fit.features.blink_squints import cancel_squints_in_blinks
 from surface.fit.features.combs import combed
 from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
@@ -23,7 +24,6 @@ from surface.fit.features.joins import find_seams
 from surface.fit.features.levelled import level_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
-from surface.fit.features.squints import shut_with_squints
 from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.measures.dense import errors_at_rest
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
@@ -145,7 +145,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     head = replace(head, parts=[_with_mesh(p, head) for p in head.parts])
     if plan.found:
         head, lid_notes = seat_drawn_lids(head)
-        head, squint_notes = shut_with_squints(head)
+        head, squint_notes = cancel_squints_in_blinks(head)
         plan.notes.extend([*lid_notes, *squint_notes])
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})

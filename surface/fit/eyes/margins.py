@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.eyes.linings import FEWEST, on_rim
+from surface.fit.eyes.linings import MIN_RING_VERTICES, on_rim
 from surface.fit.points.eyeball import surface_height
 from surface.fit.points.lid_seating import AHEAD, LID_MM
 from surface.fit.source.mesh import FitMesh, directed_edges
@@ -43,7 +43,7 @@ def margins(mesh: FitMesh, skin: Bools, centres: Floats, radius: float) -> Ints:
             if np.mean([c[own[k]].mean() if len(own[k]) else 0.0 for c, own in zip(crushed, lids, strict=True)]) > MOST:
                 for eye, hit, own in zip(eyes, crushed, lids, strict=True):
                     going[own[k][hit[own[k]] | eye.between_corners(own[k], np.concatenate(own))]] = True
-        if going.sum() < FEWEST:
+        if going.sum() < MIN_RING_VERTICES:
             break
         kept &= ~going[filled].any(axis=1)
     return np.flatnonzero(skin & ~_without_teeth(mesh, kept, skin & ~kept))
@@ -62,7 +62,7 @@ class _Eye:
         """Vertices of the rim (n,) of the upper and of the lower lid, which meet in its corners."""
         ids = np.flatnonzero(rim & self._close)
         ids = ids[np.argsort(self._local[ids, 0])]
-        if len(ids) < FEWEST:
+        if len(ids) < MIN_RING_VERTICES:
             return ids[:0], ids[:0]
         (x0, y0), (x1, y1) = self._local[ids[[0, -1]], :2]
         above = self._local[ids, 1] > np.interp(self._local[ids, 0], [x0, x1], [y0, y1])

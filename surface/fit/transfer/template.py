@@ -1,4 +1,8 @@
-"""Reduce a head to what a scanner would see of it, skin and fronts of the eyeballs, and find its landmarks."""
+"""Reduce the head whose expressions are transferred to what a scanner would see of it, and find its landmarks.
+
+A scanner sees skin and the fronts of the eyeballs. That surface, the template, is then registered to the scan. Openings
+are those of the mouth and of the eyelids.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +20,9 @@ NAMES = (
     "right_eye_inner", "right_eye_outer", "right_eye_upper", "right_eye_lower", "mouth_left", "mouth_right",
     "upper_lip", "lower_lip",
 )  # fmt: skip
-EYE_FRONT = 0.3  # distance before an eyeball's centre, in radii, from which on it can be visible between the lids
+EYE_FRONT = 0.3  # in radii: what lies further in front of an eyeball's centre may be visible between the lids
+PROFILE_MM = 2.0  # from the plane of symmetry: greatest distance of vertices that belong to the profile
+HEIGHT_MM = 3.0  # tolerance of a height at which a point of the profile is sought
 
 
 @dataclass(frozen=True)
@@ -25,7 +31,8 @@ class Template:
 
     face : (n,) whether a point belongs to the part of skin that has the openings. eye : (n,) 0 or 1 on the front of the
     left or right eyeball, else -1.
-    landmarks : places (3,) by the names of :data:`NAMES`. eyes : (2, 3) centres of the eyeballs. radius : of both.
+    landmarks : places (3,) by the names of :data:`NAMES`. eyes : (2, 3) centres of the eyeballs, mm. radius : of each
+    eyeball, mm.
     """
 
     points: Floats
@@ -44,7 +51,9 @@ class Template:
 
 
 def make_template(head: Head, where: str) -> Template:
-    """The template of a head at rest.
+    """Pose a head at rest and reduce it to a template.
+
+    where : what the user gave as the head, for messages.
 
     Raises FitError: the head lacks eyes, or openings of mouth and lids.
     """
@@ -54,7 +63,7 @@ def make_template(head: Head, where: str) -> Template:
     if data.eye_radius <= 0 or not {"lips", "left_lids", "right_lids"} <= set(contacts):
         raise FitError(f"--expressions-from {where}: the head has no eyes, or no openings of mouth and lids",
                        hint="take one that has them, such as ict")  # fmt: skip
-    rows = [_seen(p, data, contacts["lips"].part) for p in head.parts]
+    rows = [_visible_surface(p, data, contacts["lips"].part) for p in head.parts]
     rows = [r for r in rows if len(r[2])]
     first = np.cumsum([0, *(len(r[0]) for r in rows)])
     points, normals, _, face, eye = (np.concatenate([r[k] for r in rows]) for k in range(5))
@@ -63,8 +72,9 @@ def make_template(head: Head, where: str) -> Template:
     return Template(points, normals, triangles, face, eye, marks, data.eyes.copy(), data.eye_radius)
 
 
-def _seen(part: HeadPart, data: HeadData, face: str) -> tuple[Floats, Floats, Ints, Bools, Ints]:
-    """Points, normals and triangles of what is visible of a part, and their ``face`` and ``eye`` of a Template."""
+def _visible_surface(part: HeadPart, data: HeadData, face: str) -> tuple[Floats, Floats, Ints, Bools, Ints]:
+    """Points, normals and triangles of the visible surface of a part, and their ``face`` and ``eye`` of a Template;
+    ``face`` : name of the part with the openings."""
     n, tri = len(part.vertices), part.triangles.astype(np.int64)
     side = ("left_eye", "right_eye").index(part.follows) if part.follows in ("left_eye", "right_eye") else -1
     if side >= 0:
@@ -91,27 +101,26 @@ def find_landmarks(head: Head, contacts: dict[str, Contact]) -> dict[str, Floats
     ends = sorted((lips[:, 0].mean(axis=0), lips[:, -1].mean(axis=0)), key=lambda p: -p[0])
     out["mouth_left"], out["mouth_right"] = ends
     skin = head.part(contacts["lips"].part)
-    profile = skin.vertices[np.abs(skin.vertices[:, 0]) < 2.0].astype(float)
+    profile = skin.vertices[np.abs(skin.vertices[:, 0]) < PROFILE_MM].astype(float)
     eyes_y = float(np.mean([out["left_eye_upper"][1], out["right_eye_upper"][1]]))
     mouth_y = float(lips[:, :, 1].mean())
-    size = eyes_y - mouth_y
-    between = profile[(profile[:, 1] < eyes_y) & (profile[:, 1] > mouth_y + 0.2 * size)]
+    eye_to_mouth = eyes_y - mouth_y
+    between = profile[(profile[:, 1] < eyes_y) & (profile[:, 1] > mouth_y + 0.2 * eye_to_mouth)]
     tip = between[between[:, 2].argmax()]
     bridge = _at_height(profile, eyes_y)
-    upper = _front(profile, mouth_y, mouth_y + 0.15 * size)
-    lower = _front(profile, mouth_y - 0.2 * size, mouth_y)
-    chin = _front(profile, mouth_y - 0.75 * size, mouth_y - 0.4 * size)
+    upper = _front(profile, mouth_y, mouth_y + 0.15 * eye_to_mouth)
+    lower = _front(profile, mouth_y - 0.2 * eye_to_mouth, mouth_y)
+    chin = _front(profile, mouth_y - 0.75 * eye_to_mouth, mouth_y - 0.4 * eye_to_mouth)
     return out | {"nose_tip": tip, "nose_bridge": bridge, "upper_lip": upper, "lower_lip": lower, "chin": chin}
 
 
 def _front(profile: Floats, low: float, high: float) -> Floats:
     """The foremost point of a profile between two heights."""
-    own = profile[(profile[:, 1] >= low) & (profile[:, 1] <= high)]
-    foremost: Floats = own[own[:, 2].argmax()]
+    inside = profile[(profile[:, 1] >= low) & (profile[:, 1] <= high)]
+    foremost: Floats = inside[inside[:, 2].argmax()]
     return foremost
 
 
 def _at_height(profile: Floats, y: float) -> Floats:
-    own = profile[np.abs(profile[:, 1] - y) < 3.0]
-    foremost: Floats = own[own[:, 2].argmax()]
-    return foremost
+    """The foremost point of a profile near a height."""
+    return _front(profile, y - HEIGHT_MM, y + HEIGHT_MM)

@@ -1,4 +1,4 @@
-"""A squint that opens a blinking eye is taken back as far as the eye blinks."""
+"""A squint that opens a blinking eye is subtracted in proportion to the blink."""
 
 from dataclasses import replace
 
@@ -7,8 +7,8 @@ import pytest
 
 from surface.check.lids import eye_opening
 from surface.check.subject import Subject
-from surface.fit.features import squints
-from surface.fit.features.squints import shut_with_squints
+from surface.fit.features import blink_squints
+from surface.fit.features.blink_squints import cancel_squints_in_blinks
 from surface.head import Head
 from surface.head.model.data import Group, HeadData
 
@@ -16,7 +16,7 @@ BOTH = {"eyeBlinkLeft": 1.0, "eyeSquintLeft": 1.0}
 
 
 def squinting(data: HeadData, share: float, *sides: str) -> HeadData:
-    """The head whose squints take back a share of its blinks."""
+    """The head whose squints undo a part of its blinks."""
     parts = []
     for part in data.parts:
         own = [g for g in part.groups if g.name in {f"eyeBlink{s}" for s in sides}]
@@ -36,18 +36,18 @@ def test_a_blink_stays_shut_with_a_squint_that_opened_it(head: Head) -> None:
     bad = squinting(head.data, 0.7, "Left")
     alone = opening(bad, {"eyeBlinkLeft": 1.0})
     assert opening(bad, BOTH) > alone + 1.0
-    mended, (note,) = shut_with_squints(bad)
+    mended, (note,) = cancel_squints_in_blinks(bad)
     assert opening(mended, BOTH) == pytest.approx(alone, abs=0.05) and note.startswith("eyeSquintLeft left ")
     only = {"eyeSquintLeft": 1.0}
     assert opening(mended, only) == pytest.approx(opening(bad, only), abs=0.01)
-    assert shut_with_squints(mended) == (mended, [])
+    assert cancel_squints_in_blinks(mended) == (mended, [])
 
 
 @pytest.mark.slow
 def test_a_squint_that_leaves_the_eye_shut_and_a_head_without_squints_stay(head: Head) -> None:
     good = squinting(head.data, -0.2, "Left", "Right")
     for data in (good, head.data):
-        same, notes = shut_with_squints(data)
+        same, notes = cancel_squints_in_blinks(data)
         assert not notes and same.rules == data.rules
 
 
@@ -56,6 +56,8 @@ def test_a_squint_that_leaves_the_eye_shut_and_a_head_without_squints_stay(head:
 def test_half_a_millimetre_of_a_blinking_eye_may_show(
     head: Head, monkeypatch: pytest.MonkeyPatch, alone: float, both: float, bad: bool
 ) -> None:
-    monkeypatch.setattr(squints, "_open", lambda face, subject, side, pose: both if len(pose) > 1 else alone)
-    _, notes = shut_with_squints(squinting(head.data, 0.7, "Left"))
+    monkeypatch.setattr(
+        blink_squints, "_opening_mm", lambda face, subject, side, pose: both if len(pose) > 1 else alone
+    )
+    _, notes = cancel_squints_in_blinks(squinting(head.data, 0.7, "Left"))
     assert bool(notes) == bad
