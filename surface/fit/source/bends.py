@@ -7,7 +7,7 @@ import numpy as np
 from surface.base.arrays import Floats, Ints
 from surface.fit.source.mesh import corners, directed_edges
 
-HALF = np.radians(20.0)  # where the mesh bends so far from a face to its neighbours, its slope counts half
+HALF_TRUST_RAD = np.radians(20.0)  # bend of the mesh at a face at which its slope gets half the weight
 
 
 def slope_trust(points: Floats, faces: Ints) -> Floats:
@@ -17,7 +17,7 @@ def slope_trust(points: Floats, faces: Ints) -> Floats:
     between it and its neighbours. Weighted by the inverse of that variance, smooth skin keeps its slopes, and in an ear
     of few faces positions decide.
     """
-    trust: Floats = 1.0 / (1.0 + (bends(points, faces) / HALF) ** 2)
+    trust: Floats = 1.0 / (1.0 + (bends(points, faces) / HALF_TRUST_RAD) ** 2)
     return trust
 
 

@@ -20,13 +20,13 @@ from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, triangl
 
 TILE = 2.0  # distance in u between the tiles of two islands: too far for control points to reach the next tile
 FIRST_TILE = 0.5 * (1.0 + TILE)  # the u that the first tile and its control points stay below: tiles are 1 wide
-NARROW = 0.7  # a hole whose height is less than this part of its width is a slit
+MAX_SLIT_ASPECT = 0.7  # height over width of a hole, below which it is a slit
 BORDER_WEIGHT = 8.0  # of samples on a border, where the surface has to meet its neighbour
 FOLD_STRETCH = (4.5, 7.0)  # stretch, in medians of it, where a fold of the mesh begins and where it is complete
 FOLD_WEIGHT = 0.05  # of samples deep in a fold
-INNER = np.array([4.0, 1.0, 1.0]) / 6.0  # weights of a triangle's corners: a place of it where no sample lies
-QUARTER = np.array([0.75, 0.25])  # the same of an edge of the border
-THIRD = 0.4  # spacing of such places, relative to that of the mesh
+INNER_WEIGHTS = np.array([4.0, 1.0, 1.0]) / 6.0  # of a triangle's corners at places inside it where no sample lies
+EDGE_WEIGHTS = np.array([0.75, 0.25])  # of the ends of a border edge at such places on the border
+PLACE_SPACING = 0.4  # of such places, relative to the spacing of the mesh
 SLOPE_WEIGHT = 2.0  # of a face's slope, relative to that of a sample's position
 
 
@@ -149,11 +149,11 @@ def _between(island: Island, vertices: int, fold: Floats) -> Places:
     """Places inside every triangle, and along the border a quarter of an edge from either end."""
     tri, loops = triangles(island.faces), boundary_loops(island)
     rim = np.concatenate([np.zeros((0, 2), np.int64), *(np.column_stack([x, np.roll(x, -1)]) for x in loops)])
-    inside = [_mix(tri, np.roll(INNER, k), len(island.uv)) for k in range(3)]
-    along = [_mix(rim, share, len(island.uv)) for share in (QUARTER, QUARTER[::-1])]
+    inside = [_mix(tri, np.roll(INNER_WEIGHTS, k), len(island.uv)) for k in range(3)]
+    along = [_mix(rim, share, len(island.uv)) for share in (EDGE_WEIGHTS, EDGE_WEIGHTS[::-1])]
     rows = vstack([*inside, *along]).tocsr()
     mix = rows @ identity(vertices, format="csr")[island.vertex]
-    return Places(rows @ island.uv, mix, THIRD * (rows @ _spacing(island)), rows @ fold > 0.5)
+    return Places(rows @ island.uv, mix, PLACE_SPACING * (rows @ _spacing(island)), rows @ fold > 0.5)
 
 
 def _mix(corner: Ints, share: Floats, points: int) -> csr_matrix:
@@ -170,7 +170,7 @@ def _fold_weight(fold: Floats) -> Floats:
 def slit_of(loop: Floats) -> Cut | None:
     """The centre line of a low, wide hole; None for a hole of any other form."""
     (u0, v0), (u1, v1) = loop.min(axis=0), loop.max(axis=0)
-    if v1 - v0 > NARROW * (u1 - u0):
+    if v1 - v0 > MAX_SLIT_ASPECT * (u1 - u0):
         return None
     return Cut(0.5 * (v0 + v1), u0, u1)
 

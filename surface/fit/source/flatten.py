@@ -17,12 +17,13 @@ from surface.base.arrays import Bools, Floats, Ints
 from surface.base.extras import importing
 from surface.fit.source.islands import Island, boundary_loops
 
-ROUNDS, STEPS = 12, 4  # of SLIM: after so many steps the map is looked at
-SETTLED = 4e-3  # a round that moves points less than this share of the chart's size is the last
-OPENING = 0.22  # depth of the cone in a flat hole, in its widths: it gives the hole its height in (u, v)
-WEIGHTS = (1e-3, 1e3)  # least and most of mean value coordinates, in their median: slivers have any
-SLIVER = 1e-3  # height over length below which a triangle has no form that could be kept
-FREE = 1e-6  # weight of the soft constraint of one point, which keeps the map in its place
+MAX_ROUNDS = 12  # of SLIM
+STEPS = 4  # of SLIM in each round; the map is checked after a round
+MIN_STEP = 4e-3  # a round that moves no point by more than this fraction of the chart's size is the last
+CONE_DEPTH = 0.22  # of the cone that fills a flat hole, in widths of the hole: it gives the hole its height in (u, v)
+WEIGHT_RANGE = (1e-3, 1e3)  # of mean value coordinates, relative to their median: those of slivers can have any size
+SLIVER_ASPECT = 1e-3  # height over length of a triangle below which its form is not kept
+ANCHOR_WEIGHT = 1e-6  # of the soft constraint of one point, which keeps the map from drifting
 
 
 def flatten(points: Floats, tri: Ints) -> Floats | None:
@@ -63,7 +64,7 @@ def _filled(points: Floats, tri: Ints, holes: list[Ints]) -> tuple[Floats, Ints]
         axes = np.linalg.svd(across, full_matrices=False)[2]
         width, height = np.ptp(across @ axes[0]), np.ptp(across @ axes[1])
         away = normal[hole].sum(axis=0)
-        depth = max(OPENING * width - 0.5 * height, 0.0)
+        depth = max(CONE_DEPTH * width - 0.5 * height, 0.0)
         tips.append((rim.mean(axis=0) - depth * away / max(float(np.linalg.norm(away)), 1e-12))[None])
         cones.append(np.column_stack([np.roll(hole, -1), hole, np.full(len(hole), len(points) + k)]))
     return np.concatenate(tips), np.concatenate(cones)
@@ -106,7 +107,7 @@ def _mean_value(points: Floats, tri: Ints) -> csr_matrix:
             values.append(half / np.maximum(length, 1e-9))
     value = np.concatenate(values)
     usual = float(np.median(value))
-    value = np.clip(value, WEIGHTS[0] * usual, WEIGHTS[1] * usual)
+    value = np.clip(value, WEIGHT_RANGE[0] * usual, WEIGHT_RANGE[1] * usual)
     out = csr_matrix((value, (np.concatenate(rows), np.concatenate(columns))), shape=(len(points), len(points)))
     total = np.asarray(out.sum(axis=1)).ravel()
     return csr_matrix(out.multiply(1.0 / np.maximum(total, 1e-300)[:, None]))
@@ -117,7 +118,7 @@ def _with_form(points: Floats, tri: Ints) -> Floats:
     sides = points[tri] - points[np.roll(tri, -1, axis=1)]
     longest = np.linalg.norm(sides, axis=2).max(axis=1)
     height = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1) / np.maximum(longest, 1e-300)
-    bad = np.unique(tri[height < SLIVER * np.maximum(longest, 1e-3 * np.median(longest))])
+    bad = np.unique(tri[height < SLIVER_ASPECT * np.maximum(longest, 1e-3 * np.median(longest))])
     out = points.copy()
     shift = np.random.default_rng(1).normal(size=(len(bad), 3))
     out[bad] += 0.03 * float(np.median(longest)) * shift
@@ -133,15 +134,15 @@ def _relaxed(points: Floats, tri: Ints, start: Floats, rim: Ints) -> Floats:
     faces = np.asfortranarray(tri.astype(np.int32))
     data = igl.slim_precompute(
         np.asfortranarray(points), faces, np.asfortranarray(start), igl.MappingEnergyType.SYMMETRIC_DIRICHLET,
-        np.zeros(1, np.int32), np.asfortranarray(start[:1]), FREE,
+        np.zeros(1, np.int32), np.asfortranarray(start[:1]), ANCHOR_WEIGHT,
     )  # fmt: skip
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         after = np.array(igl.slim_solve(data, STEPS))[:, :2]
         if not np.isfinite(after).all() or not _one_to_one(after, tri, rim):
             break
         moved = float(np.abs((after - after.mean(axis=0)) - (best - best.mean(axis=0))).max())
         best = after
-        if moved < SETTLED * size:
+        if moved < MIN_STEP * size:
             break
     return best
 

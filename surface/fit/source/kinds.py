@@ -19,12 +19,18 @@ from surface.fit.source.mesh import FitMesh
 from surface.readers.meshdata import MeshData
 
 WORDS = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|[^\W\d_a-zA-Z]+")
-LONGEST = 4  # words of one entry of the table
-INSIDE = 5  # letters of an entry that counts as the beginning or the end of a longer word, too
-ENDINGS = ("lash", "lashes", "brow", "brows", "hair")  # shorter ones that end longer words
+MAX_WORDS = 4  # of one entry of the table
+MIN_LETTERS = 5  # of an entry that is also found at the beginning or end of a longer word
+SHORT_ENDINGS = (
+    "lash",
+    "lashes",
+    "brow",
+    "brows",
+    "hair",
+)  # shorter entries that are also found at the end of a longer word
 SKIN, PROP = "skin", "prop"
-MOST_NAMES = 4  # of one kind that a note names
-MOVED = 0.5  # of the largest movement: a piece that shapes move by this is of the face, whatever its name
+MAX_NAMES = 4  # of pieces of one kind that a note lists
+FACE_MOTION = 0.5  # of the largest motion: a piece that shapes move this far belongs to the face, whatever its name
 
 
 @dataclass(frozen=True)
@@ -112,8 +118,8 @@ def skin_and_eyes(mesh: FitMesh | MeshData, kept: Bools) -> tuple[Bools, list[st
 
 def listed(names: list[str]) -> str:
     """Names of pieces in one line; of very many the first ones, and how many more."""
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(map(repr, names[:MOST_NAMES])) + more
+    more = f" and {len(names) - MAX_NAMES} more" if len(names) > MAX_NAMES else ""
+    return ", ".join(map(repr, names[:MAX_NAMES])) + more
 
 
 def piece_kinds(mesh: FitMesh, kept: Bools) -> dict[str, str]:
@@ -131,7 +137,7 @@ def _moves(mesh: FitMesh, own: Bools) -> bool:
     """Whether shapes move some faces (f,) nearly as far as they move anything."""
     used = np.unique(mesh.faces[own])
     most = np.abs(mesh.deltas).max(initial=0.0)
-    return bool(most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= MOVED * most)
+    return bool(most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= FACE_MOTION * most)
 
 
 @cache
@@ -150,7 +156,7 @@ def _said(name: str) -> str | None:
     """The kind by the words in one name: the longest word counts, of two the last; skin only where there is no other,
     and scaffolding wherever it is named."""
     words = [w.lower() for w in WORDS.findall(name)]
-    spans = [(i, j) for i in range(len(words)) for j in range(i + 1, min(i + LONGEST, len(words)) + 1)]
+    spans = [(i, j) for i in range(len(words)) for j in range(i + 1, min(i + MAX_WORDS, len(words)) + 1)]
     found = [(i, j, kind) for i, j in spans if (kind := _entry("".join(words[i:j]), j - i > 1)) is not None]
     outer = [(i, j, k) for i, j, k in found if not any(a <= i and j <= b and b - a > j - i for a, b, _ in found)]
     ranked = [(k == PROP, k != SKIN, sum(map(len, words[i:j])), i, k) for i, j, k in outer]
@@ -168,5 +174,5 @@ def _entry(word: str, several: bool) -> str | None:
 def _inside(entry: str, word: str) -> bool:
     if not entry.isascii():
         return entry in word
-    long = len(entry) >= INSIDE and (word.startswith(entry) or word.endswith(entry))
-    return long or (entry in ENDINGS and word.endswith(entry))
+    long = len(entry) >= MIN_LETTERS and (word.startswith(entry) or word.endswith(entry))
+    return long or (entry in SHORT_ENDINGS and word.endswith(entry))

@@ -17,17 +17,17 @@ from surface.fit.source.islands import Island, boundary_loops, signed_areas
 from surface.fit.source.mesh import FitMesh, components, directed_edges
 from surface.head.model.parameters import smoothstep
 
-LARGE = 0.03  # least area of a mirrored half, relative to its island; smaller areas of that orientation are folds
-TILT = 0.35  # rad; holes that are tilted more do not show what is level
-HIGH = 0.7  # height by width from which on holes do not show it either
-FLAT = 0.05  # sine of a slope below which a surface has no upward direction
-SMALLEST = 0.12  # least size of an island in its tile, relative to the largest island
+MIN_HALF_AREA = 0.03  # of a mirrored half, relative to its island; smaller areas of that orientation are folds
+MAX_TILT_RAD = 0.35  # of a hole: those tilted further do not show which direction is level
+MAX_ASPECT = 0.7  # height over width of a hole: higher ones do not show it either
+MIN_SLOPE = 0.05  # sine of a slope below which a surface has no upward direction
+MIN_ISLAND_SIZE = 0.12  # of an island in its tile, relative to the largest island
 COLUMNS = 33  # places along a hole at which its middle line is computed
-INSIDE = 0.7  # greatest distance of a slit from the middle line of its hole, in half heights of the hole
-OPEN = 0.4  # height by width that a flat hole gets
-BAND = 2.0  # half the height of the band that is stretched most, in heights of the hole
-REACH_V = 2.0  # distance above and below the hole over which the stretching fades, in its widths
-REACH_U = 1.2  # the same to the sides
+MAX_SLIT_OFFSET = 0.7  # of a slit from the middle line of its hole, in half heights of the hole
+OPENED_ASPECT = 0.4  # height over width that a flat hole is given
+BAND_HEIGHT = 2.0  # half the height of the band that is stretched most, in heights of the hole
+FADE_V = 2.0  # distance above and below the hole over which the stretching fades, in widths of the hole
+FADE_U = 1.2  # distance beside the hole over which it fades, in widths of the hole
 
 
 def separate(island: Island) -> list[Island]:
@@ -37,7 +37,7 @@ def separate(island: Island) -> list[Island]:
     same = (area[one] > 0) == (area[two] > 0)
     label = components(one[same], two[same], len(area))
     size = np.bincount(label, np.abs(area))
-    large = size >= LARGE * size.sum()
+    large = size >= MIN_HALF_AREA * size.sum()
     if large.sum() < 2:
         return [island]
     label = _join_small(label, large, one, two)
@@ -81,7 +81,7 @@ def _upright(mesh: FitMesh, island: Island) -> Island:
     scale, axes = np.linalg.eigh(np.einsum("f,fik,fjk->ij", weight, slope, slope) / total)
     even = (axes * np.sqrt(np.maximum(scale, 1e-6 * max(float(scale.max()), 1e-30)))) @ axes.T
     up = np.linalg.inv(even) @ (weight @ slope[:, :, 1]) / total
-    c, s = up[::-1] / np.linalg.norm(up) if np.linalg.norm(up) > FLAT else (1.0, 0.0)
+    c, s = up[::-1] / np.linalg.norm(up) if np.linalg.norm(up) > MIN_SLOPE else (1.0, 0.0)
     return _levelled(replace(island, uv=uv @ even.T @ np.array([[c, -s], [s, c]]).T))
 
 
@@ -92,7 +92,7 @@ def _levelled(island: Island) -> Island:
         across = island.uv[loop] - island.uv[loop].mean(axis=0)
         (long, short), (along, _) = np.linalg.svd(across, full_matrices=False)[1:]
         angle = float(np.arctan(along[1] / along[0])) if abs(along[0]) > 1e-9 else np.pi
-        if short < HIGH * long and abs(angle) < TILT:
+        if short < MAX_ASPECT * long and abs(angle) < MAX_TILT_RAD:
             tilt.append(angle)
             length.append(long)
     if not tilt:
@@ -119,7 +119,7 @@ def _slopes(mesh: FitMesh, island: Island) -> tuple[Floats, Floats]:
 def _in_tile(island: Island, k: int, largest: float) -> Island:
     low, high = island.uv.min(axis=0), island.uv.max(axis=0)
     extent = max(float((high - low).max()), 1e-12)
-    size = max(extent / max(largest, 1e-12), SMALLEST)
+    size = max(extent / max(largest, 1e-12), MIN_ISLAND_SIZE)
     return replace(island, uv=(island.uv - low) * (size / extent) + [TILE * k, 0.0])
 
 
@@ -144,10 +144,10 @@ def _straightened(uv: Floats, rim: Floats) -> Floats:
     middle, half = middle_line(rim, u)
     off = middle - level
     inner = slice(1, -1)
-    if (np.abs(off) < INSIDE * half)[inner].all():
+    if (np.abs(off) < MAX_SLIT_OFFSET * half)[inner].all():
         return uv
-    outside = np.maximum(low[0] - uv[:, 0], uv[:, 0] - high[0]) / (REACH_U * width)
-    fade = (1.0 - smoothstep(outside)) * np.exp(-(((uv[:, 1] - level) / (REACH_V * width)) ** 2))
+    outside = np.maximum(low[0] - uv[:, 0], uv[:, 0] - high[0]) / (FADE_U * width)
+    fade = (1.0 - smoothstep(outside)) * np.exp(-(((uv[:, 1] - level) / (FADE_V * width)) ** 2))
     return np.column_stack([uv[:, 0], uv[:, 1] - fade * np.interp(uv[:, 0], u, off)])
 
 
@@ -175,10 +175,10 @@ def open_flat_holes(island: Island) -> Island:
     for loop in boundary_loops(island)[1:]:
         (u0, v0), (u1, v1) = island.uv[loop].min(axis=0), island.uv[loop].max(axis=0)
         width, height = u1 - u0, max(v1 - v0, 1e-6)
-        if height < OPEN * width:
+        if height < OPENED_ASPECT * width:
             u, v = island.uv[:, 0], island.uv[:, 1] - 0.5 * (v0 + v1)
-            outside = np.maximum(u0 - u, u - u1) / (REACH_U * width)
-            fade = (1.0 - smoothstep(outside)) * np.exp(-((v / (REACH_V * width)) ** 2))
-            half = BAND * height
-            shift += (OPEN * width / height - 1.0) * half * np.arctan(v / half) * fade
+            outside = np.maximum(u0 - u, u - u1) / (FADE_U * width)
+            fade = (1.0 - smoothstep(outside)) * np.exp(-((v / (FADE_V * width)) ** 2))
+            half = BAND_HEIGHT * height
+            shift += (OPENED_ASPECT * width / height - 1.0) * half * np.arctan(v / half) * fade
     return replace(island, uv=np.column_stack([island.uv[:, 0], island.uv[:, 1] + shift]))

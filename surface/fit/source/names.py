@@ -21,7 +21,7 @@ from surface.fit.source.naming.wordings import is_junk, names_table, presets_tab
 from surface.head.model.parameters import SHAPES
 
 EXAMPLE = 'a table looks like: [names] "My_Smile_L" = "mouthSmileLeft"'
-MUCH = 0.25  # of another shape: with more of it, one is a mixture of both
+MIXED_FRACTION = 0.25  # of another shape: a shape that contains more of it is a mixture of both
 _Found = dict[str, dict[str, int]]
 
 
@@ -175,7 +175,7 @@ def _stand_ins(
         index, less = presets.get(row["from"]), presets.get(row.get("less", ""), -1)
         if index is None:
             continue
-        much = less >= 0 and share(index, less) > MUCH
+        much = less >= 0 and share(index, less) > MIXED_FRACTION
         for shape, side in _sides_of(row["parameter"]):
             if not every[shape]:
                 source = Source(index, side, row.get("region", ""), less)

@@ -14,13 +14,21 @@ from surface.fit.source.mesh import FitMesh, triangles
 from surface.fit.source.regions import connected, face_regions, in_two, own_corners
 from surface.fit.source.uvcheck import SQUEEZED_SHARE, measure_uv, squeezed_share, unevenness
 
-UNEVEN, WORTH = 2.2, 0.85  # so uneven a chart of a face is replaced, by one that is so much more even
-LEAST = 24  # faces of a region that is cut in two only because it is squeezed
-NONE = np.zeros(0, np.int64)
+MAX_UNEVENNESS = 2.2  # of a face's chart; a more uneven one is replaced where another is better
+MIN_GAIN = 0.85  # the other chart's unevenness over this one's must be below this
+MIN_FACES = 24  # of a region that is cut in two only because its chart is squeezed
+NO_FACES = np.zeros(0, np.int64)
 
 
 def usable_islands(
-    mesh: FitMesh, faces: Ints, scale: float, notes: list[str], what: str, *, face: bool = False, others: Ints = NONE
+    mesh: FitMesh,
+    faces: Ints,
+    scale: float,
+    notes: list[str],
+    what: str,
+    *,
+    face: bool = False,
+    others: Ints = NO_FACES,
 ) -> list[Island]:
     """Islands without flips or overlaps of the faces (f,) of one piece.
 
@@ -49,10 +57,10 @@ def _evener(
     has little room for control points.
     """
     before = unevenness(mesh, given)
-    if before <= UNEVEN:
+    if before <= MAX_UNEVENNESS:
         return given
     made = own_islands(mesh, faces, scale, face=True, others=others)
-    if not made or unevenness(mesh, made) > WORTH * before:
+    if not made or unevenness(mesh, made) > MIN_GAIN * before:
         return given
     notes.append(f"face: its texture coordinates are squeezed {before:.1f} times in places: omote made its own")
     return made
@@ -86,7 +94,7 @@ def faces_of(mesh: FitMesh, faces: Ints, island: Island) -> Ints:
 
 
 def own_islands(
-    mesh: FitMesh, faces: Ints, scale: float = 1.0, *, face: bool = False, others: Ints = NONE
+    mesh: FitMesh, faces: Ints, scale: float = 1.0, *, face: bool = False, others: Ints = NO_FACES
 ) -> list[Island]:
     """Charts of our own for faces (f,) of a mesh, in mm; see :func:`usable_islands`."""
     regions = face_regions(mesh, faces, others, scale) if face else connected(mesh, faces)
@@ -99,7 +107,7 @@ def _unwrapped(mesh: FitMesh, faces: Ints) -> list[Island]:
     uv = flatten(mesh.vertices[island.vertex], triangles(island.faces))
     if uv is not None:
         flat = replace(island, uv=uv)
-        if len(faces) <= LEAST or squeezed_share(mesh, flat) <= SQUEEZED_SHARE:
+        if len(faces) <= MIN_FACES or squeezed_share(mesh, flat) <= SQUEEZED_SHARE:
             return [flat]
     if len(faces) == 1:
         return []  # a face without area

@@ -15,15 +15,17 @@ from surface.base.jit import kernel
 from surface.fit.source.islands import Island
 from surface.fit.source.mesh import FitMesh, components, directed_edges, face_areas, triangles
 
-VIEWS, PIXELS = 96, 448  # directions that the head is looked at from; of a depth map along each side
-GRAZING = 0.25  # cosine: a face that is seen at a flatter angle is not judged from there
-TOLERANCE = 3.0  # pixels of depth
-SEEN, UNSEEN = 0.12, 0.01  # shares of directions: what is surely outside, surely inside
+VIEWS = 96  # directions from which the head is seen
+PIXELS = 448  # of a depth map along each side
+MIN_COSINE = 0.25  # between a face's normal and a direction of view that can judge the face
+DEPTH_TOLERANCE = 3.0  # of depth, in pixels
+OUTSIDE, INSIDE = 0.12, 0.01  # fractions of directions that see a face which is surely outside, and surely inside
 LINING_MM2 = 220.0  # of a head of usual size: a smaller hidden place is a nostril or a fold
-AHEAD, BEHIND = np.radians(100.0), np.radians(135.0)  # from straight ahead, seen from the head's middle: face, back
-LEAST_BACK = 0.08  # of the area: less is no back of the head
-ENDS = 0.3  # of a region's faces on either side, between which it is cut in two
-UNITS = 1e4  # a capacity of this many is the longest edge
+FACE_ANGLE = np.radians(100.0)  # from straight ahead, seen from the head's middle, within which skin is the face's
+BACK_ANGLE = np.radians(135.0)  # beyond which it is the back of the head
+MIN_BACK_AREA = 0.08  # of the back of the head, as a fraction of the area; a mask has no back
+END_FRACTION = 0.3  # of a region's faces at either end, between which the region is cut in two
+CAPACITY_UNITS = 1e4  # integer capacity of the longest edge in the minimal cut
 
 
 def own_corners(mesh: FitMesh, faces: Ints) -> Island:
@@ -79,9 +81,11 @@ def shortest_cut(mesh: FitMesh, faces: Ints, inside: Bools, outside: Bools) -> B
         return ~outside if inside.any() else np.zeros(len(faces), bool)
     one, two, length = neighbours(mesh, faces)
     n = len(faces)
-    strength = np.maximum(1, np.rint(UNITS * length / max(float(length.max(initial=0.0)), 1e-12))).astype(np.int32)
+    strength = np.maximum(1, np.rint(CAPACITY_UNITS * length / max(float(length.max(initial=0.0)), 1e-12))).astype(
+        np.int32
+    )
     ends = [(np.full(int(m.sum()), source), np.flatnonzero(m)) for source, m in ((n, inside), (n + 1, outside))]
-    pairs = [(one, two, strength), *((a, b, np.full(len(a), int(UNITS) * 8, np.int32)) for a, b in ends)]
+    pairs = [(one, two, strength), *((a, b, np.full(len(a), int(CAPACITY_UNITS) * 8, np.int32)) for a, b in ends)]
     a = np.concatenate([p[0] for p in pairs])
     b = np.concatenate([p[1] for p in pairs])
     both = np.concatenate([p[2] for p in pairs])
@@ -100,7 +104,7 @@ def in_two(mesh: FitMesh, faces: Ints) -> list[Ints]:
     middle = mesh.vertices[mesh.faces[faces][:, :3]].mean(axis=1)
     axis = np.linalg.svd(middle - middle.mean(axis=0), full_matrices=False)[2][0]
     place = np.argsort(np.argsort(middle @ axis, kind="stable"), kind="stable") / max(len(faces) - 1, 1)
-    side = shortest_cut(mesh, faces, place <= ENDS, place >= 1.0 - ENDS)
+    side = shortest_cut(mesh, faces, place <= END_FRACTION, place >= 1.0 - END_FRACTION)
     return [part for half in (faces[side], faces[~side]) for part in connected(mesh, half)]
 
 
@@ -120,7 +124,7 @@ def face_regions(mesh: FitMesh, faces: Ints, others: Ints, scale: float) -> list
 def _hidden(mesh: FitMesh, faces: Ints, others: Ints, scale: float) -> Bools:
     """(f,) what cannot be seen from outside: linings of mouth and sockets, where they are large."""
     seen = sight(mesh, faces, others)
-    hidden = ~shortest_cut(mesh, faces, seen > SEEN, seen < UNSEEN)
+    hidden = ~shortest_cut(mesh, faces, seen > OUTSIDE, seen < INSIDE)
     area = face_areas(mesh.vertices, mesh.faces[faces])
     place = np.flatnonzero(hidden)
     for group in connected(mesh, faces[hidden]) if hidden.any() else []:
@@ -145,7 +149,7 @@ def sight(mesh: FitMesh, faces: Ints, others: Ints) -> Floats:
     step = 2.0 * radius / (PIXELS - 3)
     facing, seen = np.zeros(len(faces)), np.zeros(len(faces))
     for way in directions(VIEWS):
-        before = normal @ way > GRAZING
+        before = normal @ way > MIN_COSINE
         seen += before & _visible(mesh.vertices[tri] - centre, middle - centre, way, radius, step)
         facing += before
     return seen / np.maximum(facing, 1.0)
@@ -167,7 +171,7 @@ def _visible(tri: Floats, points: Floats, way: Floats, radius: float, step: floa
     draw_depth((tri @ frame + [radius, radius, 0.0]) / [step, step, 1.0] + [1.0, 1.0, 0.0], depth)
     at = points @ frame
     pixel = np.rint((at[:, :2] + radius) / step + 1.0).astype(np.int64)
-    visible: Bools = at[:, 2] > depth[pixel[:, 1], pixel[:, 0]] - TOLERANCE * step
+    visible: Bools = at[:, 2] > depth[pixel[:, 1], pixel[:, 0]] - DEPTH_TOLERANCE * step
     return visible
 
 
@@ -195,9 +199,9 @@ def _back(mesh: FitMesh, faces: Ints) -> Bools:
     way[:, 1] = np.maximum(way[:, 1], 0.0)  # below, the neck is cut along its whole length
     angle = np.arccos(np.clip(way[:, 2] / np.maximum(np.linalg.norm(way, axis=1), 1e-12), -1.0, 1.0))
     area = face_areas(mesh.vertices, mesh.faces[faces])
-    if area[angle > BEHIND].sum() < LEAST_BACK * area.sum():
+    if area[angle > BACK_ANGLE].sum() < MIN_BACK_AREA * area.sum():
         return np.zeros(len(faces), bool)
-    return ~shortest_cut(mesh, faces, angle < AHEAD, angle > BEHIND)
+    return ~shortest_cut(mesh, faces, angle < FACE_ANGLE, angle > BACK_ANGLE)
 
 
 def _middle(mesh: FitMesh, faces: Ints) -> Floats:

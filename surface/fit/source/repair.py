@@ -17,7 +17,9 @@ from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.mesh import FitMesh, corners, directed_edges, face_areas, renumbered
 
 INSIDE_OUT = -0.2  # mean of the cosine between normals and the directions from the middle: below, a skin is inside out
-OTHER_PIECE = 3.0  # faces of two pieces continue each other only where there is no other: more than any cosine
+OTHER_PIECE_PENALTY = (
+    3.0  # added between faces of two pieces: more than any cosine, so that they join only where no other face does
+)
 
 
 @dataclass(frozen=True)
@@ -136,7 +138,7 @@ def _smoothest(mesh: FitMesh, own: Ints, face: Ints, reach: Floats) -> Ints:
     """(p, 2) pairs of the sides of one edge, the two that lie most nearly in one plane first; one side may be left."""
     cost = reach @ reach.T
     if len(mesh.piece):
-        cost = cost + OTHER_PIECE * (mesh.piece[face][:, None] != mesh.piece[face])
+        cost = cost + OTHER_PIECE_PENALTY * (mesh.piece[face][:, None] != mesh.piece[face])
     cost[np.tril_indices(len(own))] = np.inf
     pairs = []
     while np.isfinite(cost).any():

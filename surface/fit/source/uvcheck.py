@@ -19,14 +19,14 @@ from surface.fit.source.mesh import FitMesh, face_areas, triangles
 
 RASTER = (256, 2048)  # least and most pixels along the longer side of an island
 PER_FACE = 6.0  # pixels that a face of usual size covers along each side
-APART_MM = 2.0  # two places of the surface that share a point in (u, v) and lie further apart are an overlap
+OVERLAP_MM = 2.0  # two places of the surface that share a point in (u, v) and lie further apart are an overlap
 OVERLAP_SHARE = 0.002  # of the surface's area: less is a crease that least squares smooths over
-FAR_MM = 12.0  # such a distance is never a crease
+MIN_OVERLAP_MM = 12.0  # a distance above this is never a crease
 SQUEEZED, SQUEEZED_SHARE = 8.0, 0.06  # times the usual stretch; of the area
-FLAT = 1e-6  # of the usual area in (u, v) per area of surface: nothing
+MIN_UV_AREA = 1e-6  # per area of surface, relative to the usual ratio: less counts as nothing
 FRONT = 0.35  # z of the normal of what is seen from the front
-RIM = 0.05  # of all movement, on each side: beyond that it is not the front's
-LARGE = 0.04  # of the area: smaller islands line the mouth and the sockets
+RIM_MOTION = 0.05  # fraction of all motion on each side beyond which a place is not in front
+MIN_ISLAND_AREA = 0.04  # fraction of the area: smaller islands line the mouth and the sockets
 SEAM_MM = 20.0  # of a head of usual size: a longer seam through its front is seen
 
 
@@ -56,7 +56,7 @@ class UVDefects:
         out = []
         if self.missing:
             out.append("none at all" if self.missing == self.faces else f"{self.missing} faces have none")
-        if self.overlap > OVERLAP_SHARE or self.apart_mm > FAR_MM * scale:
+        if self.overlap > OVERLAP_SHARE or self.apart_mm > MIN_OVERLAP_MM * scale:
             out += [f"{self.flipped} faces flipped"] if self.flipped else []
             out.append(f"{self.overlapping} faces overlapping others up to {self.apart_mm:.0f} mm away")
         if self.squeezed > SQUEEZED_SHARE:
@@ -93,9 +93,9 @@ def _measure_island(mesh: FitMesh, island: Island, scale: float) -> tuple[float,
     surface = face_areas(mesh.vertices[island.vertex], island.faces)
     usual = np.median(np.abs(area) / np.maximum(surface, 1e-12))
     way = 1.0 if area.sum() >= 0 else -1.0
-    flat = np.abs(area) <= FLAT * usual * surface
+    flat = np.abs(area) <= MIN_UV_AREA * usual * surface
     apart, owner = _overlaps(mesh, island)
-    over = apart > APART_MM * scale
+    over = apart > OVERLAP_MM * scale
     faces = np.zeros(len(island.faces), bool)
     faces[owner[over]] = True
     squeezed = _stretch(mesh, island) > SQUEEZED
@@ -196,7 +196,7 @@ def front_seams(mesh: FitMesh, islands: list[Island], faces: Ints) -> float:
     """
     area = np.array([face_areas(mesh.vertices[i.vertex], i.faces).sum() for i in islands])
     edges = [np.zeros((0, 2), np.int64)]
-    for island in (i for i, own in zip(islands, area, strict=True) if own > LARGE * area.sum()):
+    for island in (i for i, own in zip(islands, area, strict=True) if own > MIN_ISLAND_AREA * area.sum()):
         ids = island.vertex[boundary_loops(island)[0]]
         edges.append(np.sort(np.column_stack([ids, np.roll(ids, -1)]), axis=1))
     every, count = np.unique(np.concatenate(edges), axis=0, return_counts=True)
@@ -217,7 +217,7 @@ def _front(mesh: FitMesh, faces: Ints) -> Bools:
     inside[used] = True
     for axis in (0, 1):
         order = np.argsort(mesh.vertices[used, axis])
-        ends = np.searchsorted(np.cumsum(share[order]), (RIM, 1.0 - RIM))
+        ends = np.searchsorted(np.cumsum(share[order]), (RIM_MOTION, 1.0 - RIM_MOTION))
         low, high = mesh.vertices[used[order[np.clip(ends, 0, len(used) - 1)]], axis]
         inside &= (mesh.vertices[:, axis] >= low) & (mesh.vertices[:, axis] <= high)
     return inside & (vertex_normals(mesh, faces)[:, 2] > FRONT)

@@ -14,10 +14,10 @@ from surface.fit.source.kinds import kind_of
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.parameters import smoothstep
 
-TAKEN, STAYS = 0.6, 0.3  # of the largest motion, along it: skin that the jaw takes so far, and that it takes no further
-NEAR = 0.2  # of it: so near to each other both lie along the lips, and nowhere else but where skin is torn
-LEAST = 6  # vertices along the lips
-FADE = 0.15, 0.9  # of the way from the lips to where less than STAYS is left of the motion: where it is taken back in
+LOWER, UPPER = 0.6, 0.3  # of the jaw's largest motion: the lower lip moves at least so far, the upper lip no further
+NEAR = 0.2  # of that motion: only along the lips are skin that moves and skin that stays this near to each other
+MIN_VERTICES = 6  # along the lips
+FADE = 0.15, 0.9  # of the way from the lips to where less than UPPER is left of the motion: where it is taken back in
 # part, and not at all
 OTHER = ("teeth", "gums", "tongue")  # materials of pieces that stay with the jaw
 SKIN = "skin"
@@ -32,16 +32,16 @@ def made_close(mesh: FitMesh) -> Floats | None:
         return None
     jaw, skin = mesh.deltas[mesh.names.index("jawOpen")], _of(mesh, (SKIN,))
     along = _along(jaw, skin)
-    down, still = np.flatnonzero(skin & (along > TAKEN)), np.flatnonzero(skin & (along < STAYS))
+    down, still = np.flatnonzero(skin & (along > LOWER)), np.flatnonzero(skin & (along < UPPER))
     if not len(down) or not len(still):
         return None
     at, most = mesh.vertices, float(np.linalg.norm(jaw[skin], axis=1).max())
     distance, other = cKDTree(at[still]).query(at[down])
     lips = (distance < NEAR * most) & (at[still][other, 1] >= at[down, 1] - NEAR * most)
-    if lips.sum() < LEAST:
+    if lips.sum() < MIN_VERTICES:
         return None
     line = 0.5 * (at[down[lips]] + at[still[other[lips]]])
-    reach = float(line[:, 1].mean() - at[skin & (along > STAYS), 1].min())
+    reach = float(line[:, 1].mean() - at[skin & (along > UPPER), 1].min())
     share = 1.0 - smoothstep(cKDTree(line).query(at)[0] / max(reach, 1e-9), *FADE)
     back: Floats = -np.where(_of(mesh, OTHER), 0.0, share)[:, None] * jaw
     return back
@@ -52,7 +52,7 @@ def _along(jaw: Floats, skin: Bools) -> Floats:
     far = np.where(skin, np.linalg.norm(jaw, axis=1), 0.0)
     if not far.any():
         return far
-    down = jaw[(far > TAKEN * far.max()) & (jaw[:, 1] < 0.0)].sum(axis=0)
+    down = jaw[(far > LOWER * far.max()) & (jaw[:, 1] < 0.0)].sum(axis=0)
     out: Floats = jaw @ down / max(float(np.linalg.norm(down)), 1e-9) / far.max()
     return out
 

@@ -10,7 +10,7 @@ import numpy as np
 from surface.fit.source.mesh import FitMesh
 from surface.readers.meshdata import Expression
 
-WHOLE = 0.01  # an expression that is one shape by 1 within this is that shape under another name
+TOLERANCE = 0.01  # of an amount of 1: an expression that is one shape by 1 is that shape under another name
 PREFIX = "expression:"
 
 
@@ -24,7 +24,7 @@ def with_expressions(mesh: FitMesh, expressions: Sequence[Expression]) -> tuple[
     names, moves = [], []
     for expression in expressions:
         binds = [(index[shape], weight) for shape, weight in expression.binds if shape in index]
-        if len(binds) == 1 and abs(binds[0][1] - 1.0) < WHOLE:
+        if len(binds) == 1 and abs(binds[0][1] - 1.0) < TOLERANCE:
             other.setdefault(binds[0][0], []).append(expression.name)
         elif binds and (title := PREFIX + expression.name) not in names:
             names.append(title)

@@ -15,8 +15,8 @@ from surface.fit.source.mesh import FitMesh
 from surface.fit.source.naming.closes import made_close
 
 PAIRS = (("mouthLeft", "mouthRight"), ("jawLeft", "jawRight"))
-CLOSES = 0.25  # of the way of jawOpen: a mouthClose that moves nothing so far only presses the lips
-SURE = 0.2  # of a shape's motion that goes sideways: less does not say where it goes
+MIN_CLOSING = 0.25  # of the way of jawOpen: a mouthClose that moves nothing this far only presses the lips
+MIN_SIDEWAYS = 0.2  # fraction of a shape's motion that goes sideways; with less its direction is not known
 
 
 def correct_shapes(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
@@ -37,7 +37,7 @@ def closing(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
     why, kept = "the mesh has none", mesh
     if "mouthClose" in mesh.names:
         close, jaw = (float(np.abs(_delta(mesh, n)).max(initial=0.0)) for n in ("mouthClose", "jawOpen"))
-        if close >= CLOSES * jaw:
+        if close >= MIN_CLOSING * jaw:
             return mesh, []
         why = f"that of the mesh moves the lips by {close:.1f} mm, and closes no jaw that opens by {jaw:.1f} mm"
         rows = [k for k, n in enumerate(mesh.names) if n != "mouthClose"]
@@ -61,7 +61,7 @@ def correct_sides(mesh: FitMesh) -> tuple[FitMesh, list[str]]:
     for left, right in PAIRS:
         if left in names and right in names:
             k, m = names.index(left), names.index(right)
-            if _goes_left(mesh.deltas[k]) < -SURE and _goes_left(mesh.deltas[m]) > SURE:
+            if _goes_left(mesh.deltas[k]) < -MIN_SIDEWAYS and _goes_left(mesh.deltas[m]) > MIN_SIDEWAYS:
                 names[k], names[m] = right, left
                 notes.append(f"{left} and {right} go to the other side in the file (left is the subject's): exchanged")
     return replace(mesh, names=tuple(names)), notes

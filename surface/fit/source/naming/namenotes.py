@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from surface.fit.source.names import NameMap, Source
 
-MOST = 12  # names of one list that are written out
+MAX_LISTED = 12  # names of one list that are written out
 
 
 def name_notes(names: tuple[str, ...], mapped: NameMap, other: Mapping[int, Iterable[str]] | None = None) -> list[str]:
@@ -64,5 +64,5 @@ def _one(source: Source, titles: list[str], cut: bool) -> str:
 
 def listed(every: tuple[str, ...]) -> str:
     """Names in one line; of very many the first ones, and how many more."""
-    more = f" and {len(every) - MOST} more" if len(every) > MOST else ""
-    return ", ".join(every[:MOST]) + more
+    more = f" and {len(every) - MAX_LISTED} more" if len(every) > MAX_LISTED else ""
+    return ", ".join(every[:MAX_LISTED]) + more

@@ -11,17 +11,19 @@ from surface.fit.source.kinds import kind_name
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import NameMap, Source
 
-MIDDLE = 0.06  # half the band about the middle in which a shape for both sides fades from one to the other, in widths
-EMPTY = 1e-5  # of the mesh's size: a shape that moves no vertex as far as this is empty
+HALF_BAND = (
+    0.06  # in widths: half the band about the middle in which a shape for both sides fades from one to the other
+)
+MIN_MOTION = 1e-5  # of the mesh's size: a shape that moves no vertex this far is empty
 MOUTH_END, EYES_BEGIN = 0.35, 0.75  # between mouth (0) and eyes (1) a mood fades from one to the other
-LIDS = 0.98  # share of what lids do that lies below the end of their region
-BROWS = 0.25  # of the same length: above the lids eyes fade into brows over this
+LID_FRACTION = 0.98  # of the motion of the lids that lies below the upper end of their region
+BROW_FADE = 0.25  # of the distance from mouth to eyes, over which the eyes' region fades into the brows above the lids
 
 
 def empty_shapes(mesh: FitMesh) -> frozenset[int]:
     """Indices of the shapes that move nothing."""
     size = float(np.ptp(mesh.vertices, axis=0).max(initial=0.0))
-    return frozenset(k for k, d in enumerate(mesh.deltas) if np.abs(d).max(initial=0.0) <= EMPTY * size)
+    return frozenset(k for k, d in enumerate(mesh.deltas) if np.abs(d).max(initial=0.0) <= MIN_MOTION * size)
 
 
 def to_arkit(mesh: FitMesh, mapped: NameMap) -> FitMesh:
@@ -53,7 +55,7 @@ def share_of(mesh: FitMesh, shape: int, other: int) -> float:
 def _sides(mesh: FitMesh) -> dict[str, Floats]:
     """(n,) how much of each side every vertex belongs to; "" is both."""
     x = mesh.vertices[:, 0]
-    left = _rise(x, 0.5 * (x.min() + x.max()), MIDDLE * max(float(np.ptp(x)), 1e-9))
+    left = _rise(x, 0.5 * (x.min() + x.max()), HALF_BAND * max(float(np.ptp(x)), 1e-9))
     return {"": np.ones(len(x)), "Left": left, "Right": 1.0 - left}
 
 
@@ -81,17 +83,17 @@ def _regions(mesh: FitMesh, mapped: NameMap) -> dict[str, Floats]:
         return out
     along = (mesh.vertices - low) @ (high - low) / length
     above = _rise(along, 0.5 * (MOUTH_END + EYES_BEGIN), 0.5 * (EYES_BEGIN - MOUTH_END))
-    brows = np.where(brow, 1.0, _rise(along, _brow_line(along, lids, brow), 0.5 * BROWS))
+    brows = np.where(brow, 1.0, _rise(along, _brow_line(along, lids, brow), 0.5 * BROW_FADE))
     return {"": one, "mouth": 1.0 - above, "eyes": above * (1.0 - brows), "brows": brows}
 
 
 def _brow_line(along: Floats, lids: Floats, brow: Bools) -> float:
     """Where eyes have faded into brows by half: a little below brows that are pieces, or else above what lids move."""
     if brow.any():
-        return float(np.quantile(along[brow], 0.05)) - 0.5 * BROWS
+        return float(np.quantile(along[brow], 0.05)) - 0.5 * BROW_FADE
     order = np.argsort(along)
     reached = np.cumsum(lids[order]) / lids.sum()
-    return float(along[order][np.searchsorted(reached, LIDS)]) + 0.5 * BROWS
+    return float(along[order][np.searchsorted(reached, LID_FRACTION)]) + 0.5 * BROW_FADE
 
 
 def _of_kind(mesh: FitMesh, kind: str) -> Bools:

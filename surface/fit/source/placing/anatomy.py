@@ -20,14 +20,16 @@ LIPS = (
     "mouthFrownRight", "mouthStretchLeft", "mouthStretchRight", "mouthUpperUpLeft", "mouthUpperUpRight",
     "mouthLowerDownLeft", "mouthLowerDownRight", "mouthDimpleLeft", "mouthDimpleRight",
 )  # fmt: skip
-ROUND = 0.1  # how far an eyeball may stray from a sphere, in radii
-APART = (2.2, 9.0)  # distance between two eyeballs, in radii
-CORNEA = 2.0  # vertices further off a ball than so many times their median are no part of it
-LEAST_BALL = 12  # vertices of an eyeball
-MOST_BALLS = 64  # pieces that look like eyeballs; of more, those with most vertices are compared
-COVER = 0.75  # extent of an eyeball's piece along each axis, in radii: a front half shell has 1 along its depth
-WIDEST, NARROWEST = 3.0, 0.33  # two eyeballs' distance, in distances of the lids
-SPREAD = 0.35  # of a lid's shape about its middle, in distances of the lids: a face-wide shape shows no eye
+MAX_FIT_ERROR = 0.1  # of an eyeball from a sphere, in radii
+SPACING = (2.2, 9.0)  # minimum and maximum distance between two eyeballs, in radii
+MAX_OFFSET = 2.0  # vertices further off a sphere than this many times the median distance are no part of it
+MIN_BALL_VERTICES = 12  # of an eyeball
+MAX_BALLS = 64  # pieces that are compared as eyeballs; of more, those with most vertices
+MIN_EXTENT = 0.75  # of an eyeball's piece along each axis, in radii: a front half shell has 1 along its depth
+MAX_RATIO, MIN_RATIO = 3.0, 0.33  # of the distance between two eyeballs to that between the lids
+MAX_SPREAD = (
+    0.35  # of the motion of a lid's shape about its middle, in distances of the lids: a face-wide shape shows no eye
+)
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ def find_eyes(
     """
     lids, balls = _lids(vertices, shapes), _eyeballs(vertices, faces)
     if lids is not None:
-        near = [pair for pair in balls if NARROWEST < _apart(pair) / lids.apart < WIDEST]
+        near = [pair for pair in balls if MIN_RATIO < _apart(pair) / lids.apart < MAX_RATIO]
         near = [pair for pair in near if _distance(pair, lids.centres) < 0.5 * lids.apart]
         if not near:
             return lids
@@ -155,17 +157,17 @@ def _two(vertices: Floats, move: Floats) -> Floats | None:
     out = np.stack([w[s] @ rows[s] / w[s].sum() for s in (side, ~side)])
     off = rows - np.where(side[:, None], out[0], out[1])
     spread = float(np.sqrt(w @ (off**2).sum(axis=1) / w.sum()))
-    return out if spread < SPREAD * _apart(out) else None
+    return out if spread < MAX_SPREAD * _apart(out) else None
 
 
 def _eyeballs(vertices: Floats, faces: Ints) -> list[Floats]:
     """(2, 3) centres of pairs of pieces that are balls of one size, those with most vertices first."""
-    balls = sorted(_balls(vertices, faces), key=lambda ball: -ball[2])[:MOST_BALLS]
+    balls = sorted(_balls(vertices, faces), key=lambda ball: -ball[2])[:MAX_BALLS]
     pairs = []
     for i, (p, r, n) in enumerate(balls):
         for q, s, m in balls[i + 1 :]:
             apart = float(np.linalg.norm(p - q))
-            if abs(r - s) < 0.1 * r and APART[0] * r < apart < APART[1] * r and min(n, m) > 0.5 * max(n, m):
+            if abs(r - s) < 0.1 * r and SPACING[0] * r < apart < SPACING[1] * r and min(n, m) > 0.5 * max(n, m):
                 pairs.append((n + m, np.stack([p, q])))
     return [pair for _, pair in sorted(pairs, key=lambda x: -x[0])]
 
@@ -177,7 +179,7 @@ def _balls(vertices: Floats, faces: Ints) -> list[tuple[Floats, float, int]]:
     used = np.unique(faces[faces >= 0])
     order = used[np.argsort(label[used], kind="stable")]
     starts = np.flatnonzero(np.diff(label[order], prepend=-1))
-    pieces = [ids for ids in np.split(order, starts[1:]) if len(ids) >= LEAST_BALL]
+    pieces = [ids for ids in np.split(order, starts[1:]) if len(ids) >= MIN_BALL_VERTICES]
     return [(*ball, len(ids)) for ids in pieces if (ball := _sphere(vertices[ids])) is not None]
 
 
@@ -191,10 +193,12 @@ def _sphere(points: Floats) -> tuple[Floats, float] | None:
     off = np.abs(np.linalg.norm(points - origin - centre, axis=1) - radius)
     for _ in range(4):  # without the cornea, which stands out of the ball
         near = np.abs(np.linalg.norm(points - origin - centre, axis=1) - radius)
-        kept = near <= CORNEA * np.median(near)
-        if kept.sum() >= LEAST_BALL and not kept.all():
+        kept = near <= MAX_OFFSET * np.median(near)
+        if kept.sum() >= MIN_BALL_VERTICES and not kept.all():
             centre, radius = _least_squares((points - origin)[kept])
-    good = radius > 0 and float(np.sqrt((off**2).mean())) < ROUND * radius and extent.min() > COVER * radius
+    good = (
+        radius > 0 and float(np.sqrt((off**2).mean())) < MAX_FIT_ERROR * radius and extent.min() > MIN_EXTENT * radius
+    )
     return (origin + centre, radius) if good else None
 
 

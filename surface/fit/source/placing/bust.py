@@ -12,10 +12,10 @@ from surface.fit.source.mesh import FitMesh, face_areas, renumbered, triangles
 
 BODY_BELOW = 300.0  # a mesh that reaches further below the eyes, mm at usual size, has a body; a bust has not
 BASE, DOWN, ASIDE = -131.0, 98.0, 150.0  # the bust's outline: from this height, so far down and so far to the sides
-ROUND = 4.0  # exponent of the outline, a superellipse: 2 would be an ellipse
-MOSTLY = 0.5  # an object with less of its area than this inside the outline belongs to the body
+EXPONENT = 4.0  # of the outline, a superellipse: 2 would be an ellipse
+MIN_AREA_INSIDE = 0.5  # of an object; with a smaller fraction of its area inside the outline it belongs to the body
 NECK = -125.0  # below the eyes, mm at usual size: between chin and shoulders
-NEAR = 0.12  # of an edge: a vertex as near to the outline as that is on it; no slivers are cut
+SNAP = 0.12  # of an edge: a vertex this near to the outline is on it, so that no slivers are cut
 
 
 def cut_bust(mesh: FitMesh, eyes_at: Floats, scale: float) -> tuple[FitMesh, list[str]]:
@@ -36,7 +36,7 @@ def outline(points: Floats, eyes_at: Floats, scale: float) -> Floats:
     """(n,) mm that points (n, 3) lie outside the bust's outline; negative inside."""
     off = (points - eyes_at) / scale
     down = np.maximum(BASE - off[:, 1], 0.0) / DOWN
-    radius = (down**ROUND + (np.abs(off[:, 0]) / ASIDE) ** ROUND) ** (1.0 / ROUND)
+    radius = (down**EXPONENT + (np.abs(off[:, 0]) / ASIDE) ** EXPONENT) ** (1.0 / EXPONENT)
     beyond: Floats = np.where(off[:, 1] < BASE, (radius - 1.0) * DOWN, (np.abs(off[:, 0]) / ASIDE - 1.0) * ASIDE)
     head: Floats = np.where(off[:, 1] > 0.6 * BASE, -ASIDE, beyond)  # hair and ears may be as wide as they are
     return scale * head
@@ -53,7 +53,7 @@ def _body_objects(mesh: FitMesh, outside: Floats) -> Bools:
     moving = np.zeros(len(mesh.pieces))  # a body with a face is one object with it
     most = np.abs(mesh.deltas).max(axis=(0, 2)) if len(mesh.deltas) else np.zeros(len(mesh.vertices))
     np.maximum.at(moving, mesh.piece, most[first])
-    gone: Bools = (inside < MOSTLY * whole) & (moving < 1.0)
+    gone: Bools = (inside < MIN_AREA_INSIDE * whole) & (moving < 1.0)
     return gone if not gone[np.unique(mesh.piece)].all() else np.zeros(len(mesh.pieces), bool)
 
 
@@ -97,8 +97,8 @@ def _settled(mesh: FitMesh, outside: Floats) -> Floats:
     crossed = outside[a] * outside[b] < 0
     a, b = a[crossed], b[crossed]
     share = outside[a] / (outside[a] - outside[b])
-    value[a[share < NEAR]] = 0.0
-    value[b[share > 1.0 - NEAR]] = 0.0
+    value[a[share < SNAP]] = 0.0
+    value[b[share > 1.0 - SNAP]] = 0.0
     return value
 
 

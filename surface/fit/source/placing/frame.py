@@ -19,11 +19,11 @@ AXES = {f"{sign}{'xyz'[i]}": (i, -1.0 if sign else 1.0) for i in range(3) for si
 HEAD_HEIGHT_MM = 250.0  # a head with neck; enough to distinguish units by the height
 EYES_MM = 65.4  # between the middles of what blinks, on the head that the bounds were set for
 HEIGHT_MM = 338.0  # of the whole head that the bounds were set for
-HUMAN = 1.6  # a head of a guessed unit is at most so much larger or smaller than usual
+MAX_GUESSED_RATIO = 1.6  # of the size of a head in a guessed unit to the usual size, and of the usual to that size
 EYES_AT = np.array([0.0, 36.1, 84.2])  # middle between the eyeballs' centres of the shipped head, mm
 HALF_APART = np.array([[31.8, 0.0, 0.0], [-31.8, 0.0, 0.0]])  # from there to each
 MOUTH_AT = np.array([0.0, -35.9, 102.3])  # middle of what its lips' shapes move
-DEFINED = 2.5  # and one of a unit that its format defines: figures may be large
+MAX_DEFINED_RATIO = 2.5  # the same in a unit that the file format defines: figures may be large
 
 
 @dataclass(frozen=True)
@@ -110,13 +110,13 @@ def _scale(
         return float(np.exp(abs(np.log(max(scale * measure, 1e-12) / usual))))
 
     given = by_user or convention.unit
-    if given and (by_user or off(UNITS[given]) <= (DEFINED if eyes else 12.0)):
-        if by_user and eyes and off(UNITS[given]) > DEFINED:
+    if given and (by_user or off(UNITS[given]) <= (MAX_DEFINED_RATIO if eyes else 12.0)):
+        if by_user and eyes and off(UNITS[given]) > MAX_DEFINED_RATIO:
             notes.append(f"with --unit {given} {words(UNITS[given])}, a human's {EYES_MM:.0f}")
         return UNITS[given], given
     why = f"although {convention.by} defines {convention.unit}, since then {words(UNITS[given])}" if given else ""
     guess = min(UNITS, key=lambda u: off(UNITS[u]))
-    if off(UNITS[guess]) > HUMAN and eyes:
+    if off(UNITS[guess]) > MAX_GUESSED_RATIO and eyes:
         why = f", {why}" if why else ""
         notes.append(f"no usual unit fits{why}: its eyes are taken to be {EYES_MM:.0f} mm apart (say --unit otherwise)")
         return usual / measure, ""

@@ -22,17 +22,28 @@ from surface.fit.source.placing.symmetry import Mirror, find_mirrors
 
 TEMPLATE = Path(__file__).with_name("face_template.npz")  # the front of the shipped head, mm, 400 points and normals
 NOSE = np.array([0.0, 0.0, 130.5])  # its tip
-TALL = 180.0  # its height
-COARSE, SAMPLES, FEW = 120, 8000, 3000  # points of the template and of the mesh at first; of the mesh at last
-SHARES = (1.1, 0.8, 0.55, 0.38, 0.26, 0.13, 0.1)  # of the mesh's height that the face may take: mask, head, bust, body
-ANGLES, NOSES, BINS = 12, 6, 60  # directions of up, places of a nose in one profile, heights of the profile
-BESIDE = 4  # heights above and below a place that it stands out of
-FINE = 24  # fits that are refined
-FLAT = 0.8  # a sheet whose faces look one way by more than this holds no face; masks have up to 0.65
-FAR = 25.0  # distances count as no more than that, mm of the template
+TEMPLATE_HEIGHT = 180.0  # mm
+COARSE, SAMPLES = 120, 8000  # points of the template and of the mesh in the first search
+REFINED_SAMPLES = 3000  # points of the mesh in the refinement
+FACE_FRACTIONS = (
+    1.1,
+    0.8,
+    0.55,
+    0.38,
+    0.26,
+    0.13,
+    0.1,
+)  # of the mesh's height that the face may take: mask, head, bust, body
+ANGLES = 12  # directions that are tried as up
+NOSES = 6  # places in one profile that are tried as the nose
+BINS = 60  # heights of a profile
+NEIGHBOUR_BINS = 4  # heights above and below a place that it must stand out of
+MAX_REFINED = 24  # fits that are refined
+MAX_ALIGNMENT = 0.8  # mean of the normals of a sheet: above this it is too flat for a face; masks have up to 0.65
+MAX_DISTANCE = 25.0  # mm of the template: larger distances count as this
 GOOD_MM = 6.5  # the mean error of a face: sculptures and simple faces have up to 6, no other place less than 7
-CLEAR = 1.25  # any other way round must fit worse by this factor
-OTHER = 2.6  # trace of the rotation between two ways round: less is another one (37 degrees)
+MIN_LEAD = 1.25  # factor by which any other orientation must fit worse
+SAME_TRACE = 2.6  # trace of the rotation between two orientations above which they are the same (37 degrees)
 
 
 @dataclass(frozen=True)
@@ -53,20 +64,22 @@ class FaceMatch:
 
 def match_face(vertices: Floats, faces: Ints) -> FaceMatch | None:
     """The face in a mesh, vertices (n, 3) and faces (f, 4); None where no place is clearly one."""
-    if len(faces) < 100 or _flatness(vertices, faces) > FLAT:
+    if len(faces) < 100 or _flatness(vertices, faces) > MAX_ALIGNMENT:
         return None
     points, normals = _sampled(vertices, faces)
-    starts = [s for mirror in find_mirrors(points[:FEW]) for s in _starts(points, mirror)]
+    starts = [s for mirror in find_mirrors(points[:REFINED_SAMPLES]) for s in _starts(points, mirror)]
     if not starts:
         return None
     template, facing = _template()
-    rough = _Cloud(points[:FEW], normals[:FEW]).fits(template[:COARSE], facing[:COARSE], starts, 4)
+    rough = _Cloud(points[:REFINED_SAMPLES], normals[:REFINED_SAMPLES]).fits(
+        template[:COARSE], facing[:COARSE], starts, 4
+    )
     cloud = _Cloud(points, normals)
-    found = sorted(cloud.fits(template, facing, rough[:FINE], 15), key=lambda m: m.error)
+    found = sorted(cloud.fits(template, facing, rough[:MAX_REFINED], 15), key=lambda m: m.error)
     if not found or found[0].error > GOOD_MM:
         return None
-    others = [m for m in found[1:] if float((m.turn * found[0].turn).sum()) < OTHER]
-    return found[0] if not others or others[0].error > CLEAR * found[0].error else None
+    others = [m for m in found[1:] if float((m.turn * found[0].turn).sum()) < SAME_TRACE]
+    return found[0] if not others or others[0].error > MIN_LEAD * found[0].error else None
 
 
 @cache
@@ -112,8 +125,8 @@ def _starts(points: Floats, mirror: Mirror) -> list[FaceMatch]:
             local = (points - mirror.centre) @ turn.T
             height = float(np.ptp(local[:, 1]))
             for nose in _noses(local, height):
-                for share in SHARES:
-                    scale = share * height / TALL
+                for share in FACE_FRACTIONS:
+                    scale = share * height / TEMPLATE_HEIGHT
                     shift = mirror.centre + (np.array([0.0, *nose]) - scale * NOSE) @ turn
                     out.append(FaceMatch(turn, scale, shift, np.inf))
     return out
@@ -129,9 +142,11 @@ def _noses(local: Floats, height: float) -> list[tuple[float, float]]:
     level = np.clip(((profile[:, 1] - low) / height * BINS).astype(int), 0, BINS - 1)
     depth = np.full(BINS, -np.inf)
     np.maximum.at(depth, level, profile[:, 2])
-    padded = np.pad(depth, BESIDE, constant_values=-np.inf)
-    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * BESIDE + 1)
-    peaks = np.flatnonzero(np.isfinite(depth) & (depth >= around[:, BESIDE - 2 : BESIDE + 3].max(axis=1)))
+    padded = np.pad(depth, NEIGHBOUR_BINS, constant_values=-np.inf)
+    around = np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOUR_BINS + 1)
+    peaks = np.flatnonzero(
+        np.isfinite(depth) & (depth >= around[:, NEIGHBOUR_BINS - 2 : NEIGHBOUR_BINS + 3].max(axis=1))
+    )
     lowest = np.where(np.isfinite(around), around, np.inf).min(axis=1)  # what is beside a nose lies further back
     peaks = peaks[np.argsort(lowest[peaks] - depth[peaks], kind="stable")][:NOSES]
     return [(low + (k + 0.5) / BINS * height, float(depth[k])) for k in peaks.tolist()]
@@ -153,7 +168,7 @@ class _Cloud:
             weight = ((agree > 0.1) & (distance <= limit[:, None])).astype(float) + 1e-9
             turn, scale, shift = _moved(template, target, weight / weight.sum(axis=1)[:, None], turn, scale)
         distance, agree, _ = self._nearest(template, facing, turn, scale, shift)
-        off = np.minimum(distance / scale[:, None], FAR).mean(axis=1)
+        off = np.minimum(distance / scale[:, None], MAX_DISTANCE).mean(axis=1)
         error = off + 10.0 * (1.0 - np.clip(agree, 0.0, 1.0)).mean(axis=1)
         order = np.argsort(error, kind="stable")
         return [FaceMatch(turn[k], float(scale[k]), shift[k], float(error[k])) for k in order]

@@ -16,8 +16,8 @@ from surface.fit.source.placing.anatomy import Eyes, Landmarks
 TILT = {"mouth": (-13.9, -6.0), "jaw": (-3.2, 3.7)}
 LEVEL_DEG = 4.0  # a head whose left lies nearer to an axis is upright as it is: its own small asymmetry
 PITCH_DEG = 30.0  # and whose face is pitched by less: stylised faces differ by as much
-BEHIND = -0.15  # in distances of the eyes, or depths of the mesh: further behind its middle they look backwards
-AROUND = 1.6  # radius, in distances of the eyes, of what is around them
+MAX_BACKWARD = -0.15  # in distances of the eyes, or depths of the mesh: eyes further behind its middle look backwards
+EYE_REGION = 1.6  # radius of what is around the eyes, in distances of the eyes
 
 
 @dataclass(frozen=True)
@@ -56,15 +56,15 @@ def oriented_by(vertices: Floats, eyes: Eyes, low: Floats, tilt_deg: float) -> O
 def _behind(vertices: Floats, eyes: Eyes, forward: Floats) -> bool:
     """Whether the eyes look the other way: at the back of what is around them, else at the back of the whole mesh."""
     front = in_front(vertices, eyes, forward)
-    if abs(front) > -BEHIND * eyes.apart:
+    if abs(front) > -MAX_BACKWARD * eyes.apart:
         return front < 0
     depth = vertices @ forward
-    return float(eyes.middle @ forward - 0.5 * (depth.min() + depth.max())) < BEHIND * float(np.ptp(depth))
+    return float(eyes.middle @ forward - 0.5 * (depth.min() + depth.max())) < MAX_BACKWARD * float(np.ptp(depth))
 
 
 def in_front(vertices: Floats, eyes: Eyes, forward: Floats) -> float:
     """How far the eyes are in front of the middle of what lies around them, along ``forward``; negative: behind."""
-    depth = vertices[np.linalg.norm(vertices - eyes.middle, axis=1) < AROUND * eyes.apart] @ forward
+    depth = vertices[np.linalg.norm(vertices - eyes.middle, axis=1) < EYE_REGION * eyes.apart] @ forward
     return float(eyes.middle @ forward - 0.5 * (depth.min() + depth.max())) if len(depth) else 0.0
 
 

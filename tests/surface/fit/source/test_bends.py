@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from slit_sheet import slit_sheet
 
-from surface.fit.source.bends import HALF, bends, slope_trust
+from surface.fit.source.bends import HALF_TRUST_RAD, bends, slope_trust
 from surface.fit.source.chart import make_chart
 from surface.fit.source.islands import find_islands
 
@@ -33,7 +33,7 @@ def test_a_face_alone_and_no_face_do_not_bend() -> None:
 
 
 def test_slopes_count_half_where_the_mesh_bends_by_so_much() -> None:
-    points, faces = prism(round(2.0 * np.pi / HALF))
+    points, faces = prism(round(2.0 * np.pi / HALF_TRUST_RAD))
     np.testing.assert_allclose(slope_trust(points, faces), 0.5, atol=1e-9)
     flat = points * [1.0, 1e-9, 1.0]
     assert slope_trust(flat[:, [0, 2, 1]], faces[1:3]).tolist() == pytest.approx([1.0, 1.0])

@@ -10,7 +10,7 @@ from slit_sheet import SIZE_MM, slit_sheet
 from surface.fit.source import layout
 from surface.fit.source.chart import TILE
 from surface.fit.source.islands import Island, boundary_loops, find_islands
-from surface.fit.source.layout import OPEN, lay_out, open_flat_holes, separate, signed_areas
+from surface.fit.source.layout import OPENED_ASPECT, lay_out, open_flat_holes, separate, signed_areas
 
 
 def mirrored_halves():
@@ -106,7 +106,7 @@ def test_no_face_is_turned_over():
 
 def test_a_chart_without_flat_holes_is_left_alone():
     island = find_islands(slit_sheet())[0]
-    tall = Island(island.vertex, island.uv * [1.0, 1.0 / OPEN * 4], island.faces)
+    tall = Island(island.vertex, island.uv * [1.0, 1.0 / OPENED_ASPECT * 4], island.faces)
     np.testing.assert_array_equal(open_flat_holes(tall).uv, tall.uv)
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from surface.fit.source.names import NameMap, Source
-from surface.fit.source.naming.namenotes import MOST, listed, name_notes
+from surface.fit.source.naming.namenotes import MAX_LISTED, listed, name_notes
 
 NAMES = ("jawOpen", "Joy", "A", "blank", "smile2", "odd")
 
@@ -63,8 +63,8 @@ def test_shapes_are_called_as_the_file_calls_them_elsewhere() -> None:
     assert stand_in({"jawOpen": [Source(1)]}, other={2: ["x"], 1: ["Joy"]}) == ["jawOpen is made from 'Joy'"]
 
 
-@pytest.mark.parametrize("count", [1, MOST, MOST + 1, MOST + 5])
+@pytest.mark.parametrize("count", [1, MAX_LISTED, MAX_LISTED + 1, MAX_LISTED + 5])
 def test_of_very_many_names_the_first_ones_are_listed(count: int) -> None:
     every = tuple(f"n{k}" for k in range(count))
-    more = f" and {count - MOST} more" if count > MOST else ""
-    assert listed(every) == ", ".join(every[:MOST]) + more
+    more = f" and {count - MAX_LISTED} more" if count > MAX_LISTED else ""
+    assert listed(every) == ", ".join(every[:MAX_LISTED]) + more

@@ -154,11 +154,11 @@ def test_starts_have_the_nose_on_the_profile_and_the_plane_of_the_template_in_th
         assert np.linalg.det(s.turn) == pytest.approx(1) and abs(s.turn[0] @ turn[0]) == pytest.approx(1)
         assert (s.at(match.NOSE) - mirror.centre) @ turn[0] == pytest.approx(0, abs=1e-9)
     upright = [s for s in starts if np.allclose(s.turn, turn)]
-    assert len(upright) % len(match.SHARES) == 0
+    assert len(upright) % len(match.FACE_FRACTIONS) == 0
     at = {round(float((s.at(match.NOSE) - mirror.centre) @ turn[1])) for s in upright}
     assert 20 in at or 21 in at
-    scales = sorted({round(s.scale * match.TALL / 60.0, 6) for s in upright}, reverse=True)
-    assert scales == sorted(match.SHARES, reverse=True)
+    scales = sorted({round(s.scale * match.TEMPLATE_HEIGHT / 60.0, 6) for s in upright}, reverse=True)
+    assert scales == sorted(match.FACE_FRACTIONS, reverse=True)
 
 
 @pytest.mark.parametrize("angle", [0.0, 12.0, -25.0])
@@ -196,7 +196,7 @@ def test_an_error_is_the_distance_in_the_templates_size_and_the_turn_of_its_norm
         return found.error
 
     assert error(up) == pytest.approx(0.0, abs=1e-9) and error(up, 3.0) == pytest.approx(3.0)
-    assert error(up, 3.0, 2.0) == pytest.approx(1.5) and error(up, 900.0) == match.FAR
+    assert error(up, 3.0, 2.0) == pytest.approx(1.5) and error(up, 900.0) == match.MAX_DISTANCE
     assert error(-up) == pytest.approx(10.0) and error(np.tile([0, 0.8, 0.6], (81, 1))) == pytest.approx(4.0)
     starts = [FaceMatch(np.eye(3), 1.0, np.array([0, 0, z]), np.inf) for z in (4.0, 1.0, 2.0)]
     assert [round(m.error, 6) for m in cloud.fits(points, up, starts, 0)] == [1.0, 2.0, 4.0]
