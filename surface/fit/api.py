@@ -29,7 +29,7 @@ from surface.fit.measures.dense import errors_at_rest
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.refusal import save_or_refuse
 from surface.fit.points.facets import facet_sag
-from surface.fit.points.importance import POINTS as MORE_POINTS
+from surface.fit.points.importance import POINTS_PER_EYE as MORE_POINTS
 from surface.fit.points.importance import with_importance
 from surface.fit.points.lid_seating import close_lips, seat_lids
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for

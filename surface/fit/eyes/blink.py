@@ -12,16 +12,18 @@ from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import sources_of
 from surface.head.model.parameters import smoothstep
 
-OVERLAP_MM = 1.0  # further than to where they meet: contacts keep lids from passing through each other
-UPPER = 0.85  # share of the way that the upper lid goes
-BLINKS = 0.6  # of the opening's height: a shape that leaves more open is no whole blink and stays as it is
-REACH = 0.7  # rad round the eyeball from a lid's edge: where the change has faded out
-CORNER = 0.12  # of the opening's width: how far beyond its corners the change has faded out
+OVERLAP_MM = 1.0  # by which a closing lid passes the place where both lids meet; contacts hold them back there
+UPPER_FRACTION = 0.85  # of the missing way that the upper lid is moved; the lower lid is moved by the rest
+MAX_LEFT_OPEN = 0.6  # of the opening's height: a shape that leaves more open is no complete blink and stays unchanged
+FADE_RAD = 0.7  # angle round the eyeball from a lid's edge at which the change has faded out
+CORNER_FADE = 0.12  # of the opening's width: distance beyond its corners at which the change has faded out
 COLUMNS = 33
-SPREAD = 9  # columns to either side over which what is missing in one fades: lids are no curtains
-LEAST_MM = 0.3  # of the way of an edge: in the corners it is none
-STILL = 0.2  # of the way of the other lid: one that a blink takes no further follows as a whole
-MOVED = 0.5  # of the way that a blink takes a lid: skin that it moves so far follows wholly, what it leaves alone stays
+SPREAD_COLUMNS = 9  # columns to either side over which what is missing in one column fades out
+MIN_WAY_MM = 0.3  # of a lid's edge that is lengthened: in the corners it hardly moves
+MIN_MOTION = 0.2  # relative to the other lid: a lid that a blink moves less than this follows as a whole
+FULL_MOTION = (
+    0.5  # of the lid's own motion: skin that the blink moves this far follows fully, skin that it leaves still does not
+)
 
 
 @dataclass(frozen=True)
@@ -49,7 +51,7 @@ def shut_blinks(mesh: FitMesh, openings: list[Opening], eyes: Floats, radius: fl
         move = deltas[indices].sum(axis=0)
         open_rest, open_shut = (_edges(at, opening.edge, rest) for at in (rest, rest + move))
         left = float(open_shut.gap.max()) * radius
-        if left > BLINKS * float(open_rest.gap.max()) * radius:
+        if left > MAX_LEFT_OPEN * float(open_rest.gap.max()) * radius:
             continue
         deltas[indices[0]] += _lengthened(rest, move, open_rest, open_shut, radius)
         if left > 0.5:
@@ -82,7 +84,7 @@ def _edges(local: Floats, edge: Ints, rest: Floats) -> _Edges:
 def _spread(need: Floats) -> Floats:
     """What is missing in every column, or a share of what is missing in others beside it."""
     columns = np.arange(len(need))
-    share = 1.0 - smoothstep(np.abs(columns[:, None] - columns), 0.0, SPREAD)
+    share = 1.0 - smoothstep(np.abs(columns[:, None] - columns), 0.0, SPREAD_COLUMNS)
     out: Floats = (share * need).max(axis=1)
     return out
 
@@ -93,9 +95,9 @@ def _moved(rest: Floats, move: Floats, is_upper: Bools, before: _Edges, after: _
     ways = [radius * np.abs(a - b) for a, b in ((before.upper, after.upper), (before.lower, after.lower))]
     most = max(float(way.max()) for way in ways)
     for side, way in zip((is_upper, ~is_upper), ways, strict=True):
-        if way.max() > STILL * most:
-            edge = np.maximum(np.interp(rest[:, 0], before.x, way), LEAST_MM)
-            out = np.where(side, smoothstep(far / (MOVED * edge)), out)
+        if way.max() > MIN_MOTION * most:
+            edge = np.maximum(np.interp(rest[:, 0], before.x, way), MIN_WAY_MM)
+            out = np.where(side, smoothstep(far / (FULL_MOTION * edge)), out)
     return out
 
 
@@ -103,7 +105,7 @@ def _lengthened(rest: Floats, move: Floats, before: _Edges, after: _Edges, radiu
     """(n, 3) what to add to a blink's displacements, so that both edges meet and overlap a little."""
     local = rest + move
     along = (local[:, 0] - after.x[0]) / (after.x[-1] - after.x[0])
-    inner = 1.0 - smoothstep(np.maximum(-along, along - 1.0), 0.0, CORNER)
+    inner = 1.0 - smoothstep(np.maximum(-along, along - 1.0), 0.0, CORNER_FADE)
     overlap = OVERLAP_MM / radius * np.clip(4.0 * before.gap / max(float(before.gap.max()), 1e-9), 0.0, 1.0)
     need = _spread(np.maximum(after.gap + overlap, 0.0))
     own, angle = np.interp(local[:, 0], after.x, need) * inner, _angle(rest)
@@ -111,10 +113,12 @@ def _lengthened(rest: Floats, move: Floats, before: _Edges, after: _Edges, radiu
     is_upper = angle >= 0.5 * (upper + lower)
     off = np.where(is_upper, angle - upper, lower - angle)
     fade = (
-        (1.0 - smoothstep(off, 0.0, REACH)) * (local[:, 2] > 0.3 * radius) * (np.linalg.norm(rest, axis=1) < 2 * radius)
+        (1.0 - smoothstep(off, 0.0, FADE_RAD))
+        * (local[:, 2] > 0.3 * radius)
+        * (np.linalg.norm(rest, axis=1) < 2 * radius)
     )
     fade = fade * _moved(rest, move, is_upper, before, after, radius)
-    turn = own * fade * np.where(is_upper, -UPPER, 1.0 - UPPER)
+    turn = own * fade * np.where(is_upper, -UPPER_FRACTION, 1.0 - UPPER_FRACTION)
     c, s = np.cos(turn), np.sin(turn)
     y, z = c * local[:, 1] + s * local[:, 2], c * local[:, 2] - s * local[:, 1]
     return np.column_stack([np.zeros(len(rest)), y - local[:, 1], z - local[:, 2]])

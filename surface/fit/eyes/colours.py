@@ -20,15 +20,18 @@ from surface.fit.source.textures import Samples, sample_colours
 from surface.head.model.data import PartData
 
 USUAL_IRIS = 0.094  # radius of an iris, in distances between the eyes: 5.9 of 63 mm
-SMALLEST, LARGEST = 0.25, 0.85  # radius of an iris, in eyeball radii
-STEP = np.radians(2.5)  # width of the rings in which a texture of an eye is looked at
+MIN_IRIS, MAX_IRIS = 0.25, 0.85  # radius of an iris, in eyeball radii
+RING_WIDTH = np.radians(2.5)  # rad; a texture of an eye is averaged over rings about its axis
 RINGS = 28
-WHITE = np.radians(45.0), np.radians(70.0)  # rings that are white in every texture
-BESIDE = np.radians(4.0), np.radians(16.0)  # from an iris's edge: textures are brightest there, as lids shade the rest
-CLEAR = 0.07  # difference, in roots of linear colours, by which an iris differs from the white
-WITHIN = 0.42, 0.85  # of an iris: between pupil and rim
-FRONT = 0.3  # least z of the normals of faces whose colour is the skin's
-OPAQUE = 0.5
+WHITE_RINGS = np.radians(45.0), np.radians(70.0)  # rad from the axis: rings that are white in every texture
+BRIGHT_RINGS = (
+    np.radians(4.0),
+    np.radians(16.0),
+)  # rad from an iris's edge: textures are brightest there, as lids shade the rest
+MIN_CONTRAST = 0.07  # between iris and white, in square roots of linear colours
+IRIS_RANGE = 0.42, 0.85  # of its radius: between pupil and rim
+MIN_NORMAL_Z = 0.3  # of faces whose colour is taken as the skin's
+MIN_ALPHA = 0.5
 SKIN_RANGE, EYE_RANGE = (0.015, 0.85), (0.004, 0.80)  # linear: nothing on a face is darker or brighter
 
 
@@ -46,14 +49,14 @@ def skin_colour(mesh: FitMesh, skin: Bools) -> Floats | None:
     ids = np.flatnonzero(skin)
     tri = mesh.vertices[mesh.faces[ids, :3]]
     normal = np.cross(tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0])
-    front = normal[:, 2] > FRONT * np.maximum(np.linalg.norm(normal, axis=1), 1e-12)
+    front = normal[:, 2] > MIN_NORMAL_Z * np.maximum(np.linalg.norm(normal, axis=1), 1e-12)
     found = sample_colours(mesh, ids[front], steps=1)
     return None if found is None else _most(found, np.ones(len(found.weight), bool), SKIN_RANGE)
 
 
 def _most(samples: Samples, chosen: Bools, limits: tuple[float, float]) -> Floats | None:
     """(3,) the weighted median of each channel of chosen samples (m,) that are opaque; None without any."""
-    chosen = chosen & (samples.colour[:, 3] > OPAQUE)
+    chosen = chosen & (samples.colour[:, 3] > MIN_ALPHA)
     weight = samples.weight[chosen]
     if not weight.sum() > 0:
         return None
@@ -70,7 +73,7 @@ def eye_colours(mesh: FitMesh, eyes: Eyes) -> list[EyeColours]:
     """The colours of the left and the right eye, as far as the mesh has them."""
     apart = float(np.linalg.norm(eyes.centres[0] - eyes.centres[1]))
     usual = eyes.iris / eyes.radius if eyes.iris > 0 else USUAL_IRIS * apart / eyes.radius
-    usual = float(np.clip(usual, SMALLEST, LARGEST))
+    usual = float(np.clip(usual, MIN_IRIS, MAX_IRIS))
     sides = zip(_sides(mesh, eyes), eyes.centres, strict=True)
     return [_one(mesh, ids, centre, usual) for ids, centre in sides]
 
@@ -100,33 +103,37 @@ def _all(samples: Samples) -> Bools:
 
 def _of_iris_piece(samples: Samples | None) -> Floats | None:
     """The colour of an iris of its own, between its pupil and its rim."""
-    if samples is None or not (samples.colour[:, 3] > OPAQUE).any():
+    if samples is None or not (samples.colour[:, 3] > MIN_ALPHA).any():
         return None
-    seen = samples.colour[:, 3] > OPAQUE
+    seen = samples.colour[:, 3] > MIN_ALPHA
     middle = 0.5 * (samples.points[seen].min(axis=0) + samples.points[seen].max(axis=0))
     off = np.linalg.norm((samples.points - middle)[:, :2], axis=1)
     off /= max(float(off[seen].max()), 1e-9)
-    return _most(samples, (off > WITHIN[0]) & (off < WITHIN[1]), EYE_RANGE)
+    return _most(samples, (off > IRIS_RANGE[0]) & (off < IRIS_RANGE[1]), EYE_RANGE)
 
 
 def by_rings(samples: Samples, centre: Floats, usual: float) -> EyeColours:
     """Colours of an eyeball with a texture: the iris ends where rings round the axis become white."""
     local = samples.points - centre
     angle = np.arctan2(np.hypot(local[:, 0], local[:, 1]), local[:, 2])
-    white = _most(samples, (angle > WHITE[0]) & (angle < WHITE[1]), EYE_RANGE)
+    white = _most(samples, (angle > WHITE_RINGS[0]) & (angle < WHITE_RINGS[1]), EYE_RANGE)
     if white is None:
         return EyeColours(None, None, usual)
-    rings = [_most(samples, np.abs(angle - (k + 0.5) * STEP) <= 0.5 * STEP, (0.0, 1.0)) for k in range(RINGS)]
+    rings = [
+        _most(samples, np.abs(angle - (k + 0.5) * RING_WIDTH) <= 0.5 * RING_WIDTH, (0.0, 1.0)) for k in range(RINGS)
+    ]
     off = np.array([0.0 if r is None else float(np.linalg.norm(np.sqrt(r) - np.sqrt(white))) for r in rings])
-    dark = np.flatnonzero((off > max(CLEAR, 0.5 * off.max())) & ((np.arange(RINGS) + 0.5) * STEP < WHITE[0]))
+    dark = np.flatnonzero(
+        (off > max(MIN_CONTRAST, 0.5 * off.max())) & ((np.arange(RINGS) + 0.5) * RING_WIDTH < WHITE_RINGS[0])
+    )
     if not len(dark):
         return EyeColours(None, white, usual)
-    edge = float((dark.max() + 1) * STEP)
-    between = (np.sin(angle) > WITHIN[0] * np.sin(edge)) & (np.sin(angle) < WITHIN[1] * np.sin(edge))
+    edge = float((dark.max() + 1) * RING_WIDTH)
+    between = (np.sin(angle) > IRIS_RANGE[0] * np.sin(edge)) & (np.sin(angle) < IRIS_RANGE[1] * np.sin(edge))
     iris = _most(samples, between & (local[:, 2] > 0), EYE_RANGE)
-    beside = (angle > edge + BESIDE[0]) & (angle < edge + BESIDE[1])
+    beside = (angle > edge + BRIGHT_RINGS[0]) & (angle < edge + BRIGHT_RINGS[1])
     white = _most(samples, beside, EYE_RANGE) if beside.any() else white
-    return EyeColours(iris, white, float(np.clip(np.sin(edge), SMALLEST, LARGEST)))
+    return EyeColours(iris, white, float(np.clip(np.sin(edge), MIN_IRIS, MAX_IRIS)))
 
 
 def paint_layers(mesh: FitMesh, eyes: Eyes, parts: Iterable[PartData]) -> list[dict[str, Any]]:

@@ -23,24 +23,30 @@ from surface.head.posing.contact import ContactSolver, contact_rows
 from surface.head.posing.rig import SkinRig, optical_axis
 from surface.mesh.mesh import Mesh
 
-HIDES, REACH, DEEP = (
-    2.5,
-    1.6,
-    0.8,
-)  # in radii from the centre, at rest: skin that may hide the eye lies no further, lids
-# no further; what lies deeper is no lid
-FRONT = 0.05, 0.35  # in radii before the centre: where a lid begins to be kept above the eyeball, and where it is
-ABOVE = 0.045, 0.01  # least height of lids above an eyeball, in radii, at rest and in shapes: 0.5 and 0.1 of 12 mm
-STEPS = 3  # a triangle is looked at in so many steps along an edge
-ROUNDS, GAIN = 6, 1.2
-STIFF, STILL = 0.02, 0.05  # weights of moving no control point, and of moving no sample that lies well
-ENOUGH = 0.0025  # in radii: what may be missing
-CLOSINGS = 6  # of a blink
-CORRECTIONS = 3  # of a head, one on top of the other
-PIXEL, OVERLAP = 0.008, 0.02  # in radii: of the picture that shows what is open; how far it is closed beyond that
-BESIDE = 0.06  # of the lids' width: so far beside their columns, at the corners, nothing may be open either
-PART_WAY = 0.6  # of the opening at rest: a shape that leaves more open is no whole blink and stays as it is
-TELL_MM = 0.5  # a gap that is closed is worth a note
+# Distances from the eyeball's centre at rest, in radii.
+SKIN_REACH = 2.5  # greatest of skin that may hide the eye
+LID_REACH = 1.6  # greatest of lids
+LID_DEPTH = 0.8  # least of lids
+FRONT_RANGE = (
+    0.05,
+    0.35,
+)  # in radii in front of the centre: where lids begin to be kept above the eyeball, and where they fully are
+MIN_HEIGHT = 0.045, 0.01  # of lids above an eyeball, in radii, at rest and in shapes: 0.5 and 0.1 of 12 mm
+SAMPLE_STEPS = 3  # samples of a triangle along an edge
+MAX_ROUNDS = 6  # of lifting lids
+GAIN = 1.2  # of each: least squares hold lids back
+STIFFNESS = 0.02  # weight of moving no control point
+HOLD_WEIGHT = 0.05  # weight of moving no sample that is high enough
+TOLERANCE = 0.0025  # in radii: height that may be missing
+MAX_CLOSINGS = 6  # corrections of a blink
+MAX_CORRECTIONS = 3  # of a head, one after the other
+PIXEL = 0.008  # in radii, of the picture in which the open eye is measured
+OVERLAP = 0.02  # in radii, by which a gap is closed further than it was open
+CORNER_WIDTH = (
+    0.06  # of the width of the lids: beside their columns, at the corners, nothing may be open this far either
+)
+MAX_LEFT_OPEN = 0.6  # of the opening at rest: a shape that leaves more open is no complete blink and stays unchanged
+NOTE_MM = 0.5  # a gap of at least this height that was closed is reported
 FORWARD = np.array([0.0, 0.0, 1.0])
 BLINKS = "eyeBlinkLeft", "eyeBlinkRight"
 SIDES = "left_eye", "right_eye"
@@ -57,7 +63,7 @@ def seat_drawn_lids(head: HeadData) -> tuple[HeadData, list[str]]:
         head = lids.cleared_at_rest(head)
     for lids in eyes:
         head, was_open, is_open = lids.shut(head)
-        if was_open - is_open > TELL_MM:
+        if was_open - is_open > NOTE_MM:
             fault = f"{lids.blink} left up to {was_open:.1f} mm of the eye open"
             notes.append(f"{fault}: its displacements were lengthened, to {is_open:.1f} mm")
     return head, notes
@@ -75,13 +81,13 @@ class DrawnLids:
         part = self._face(head)
         surface, mesh = make_surface(part), _mesh_of(part)
         local = mesh.vertices - self._eye
-        near = (np.linalg.norm(local, axis=1) < HIDES * self._radius) & (local[:, 2] > 0)
+        near = (np.linalg.norm(local, axis=1) < SKIN_REACH * self._radius) & (local[:, 2] > 0)
         used, corner = np.unique(mesh.triangles[near[mesh.triangles].all(axis=1)], return_inverse=True)
         self._triangles = np.ascontiguousarray(corner.reshape(-1, 3).astype(np.int32))
         self._vertices = surface.basis_matrix(mesh.uv[used], side=mesh.side[used])
         samples = (_shares(corner.reshape(-1, 3), len(used)) @ self._vertices).tocsr()
         away = np.linalg.norm(samples @ part.points - self._eye, axis=1) / self._radius
-        self._samples = samples[(away > DEEP) & (away < REACH)]
+        self._samples = samples[(away > LID_DEPTH) & (away < LID_REACH)]
         self._ids = np.unique(self._samples.indices)
         self._dense = self._samples[:, self._ids].toarray()
         self._square = self._dense.T @ self._dense
@@ -95,8 +101,8 @@ class DrawnLids:
         """The head with these lids above the eyeball at rest."""
         part = self._face(head)
         points = part.points.copy()
-        for _ in range(ROUNDS):
-            moves = self._lift(points, FORWARD, ABOVE[0])
+        for _ in range(MAX_ROUNDS):
+            moves = self._lift(points, FORWARD, MIN_HEIGHT[0])
             if not len(moves):
                 break
             points[self._ids] += moves
@@ -111,7 +117,7 @@ class DrawnLids:
         """
         more, was_open, is_open = self.corrections(head)
         best, least = head, np.inf
-        for _ in range(CORRECTIONS):
+        for _ in range(MAX_CORRECTIONS):
             head = self.with_more(head, more)
             more, now, is_open = self.corrections(head)
             if now < least:
@@ -141,12 +147,12 @@ class DrawnLids:
         """Control points (n, 3), as groups have moved them, moved on until lids are above an eye that looks along
         ``axis (3,)`` once contacts have moved them, too; those with which least is missing."""
         best, least, points = points, np.inf, points.copy()
-        for _ in range(ROUNDS):
+        for _ in range(MAX_ROUNDS):
             posed = _posed(points, axis, solver)
-            worst = float(self._sampled(posed, axis, ABOVE[1])[1].max(initial=0.0))
+            worst = float(self._sampled(posed, axis, MIN_HEIGHT[1])[1].max(initial=0.0))
             if worst < least:
                 best, least = points.copy(), worst
-            moves = self._lift(posed, axis, ABOVE[1])
+            moves = self._lift(posed, axis, MIN_HEIGHT[1])
             if not len(moves):
                 break
             points[self._ids] += moves
@@ -159,7 +165,7 @@ class DrawnLids:
         length = np.maximum(np.linalg.norm(at, axis=1), 1e-9)
         unit = at / length[:, None]
         ground = self._radius * (surface_height(unit, axis) + above)
-        before = smoothstep(at[:, 2] / self._radius, *FRONT)
+        before = smoothstep(at[:, 2] / self._radius, *FRONT_RANGE)
         return unit, np.maximum(ground - length, 0.0) * before
 
     def _lift(self, points: Floats, axis: Floats, above: float) -> Floats:
@@ -167,11 +173,11 @@ class DrawnLids:
         none where that is little."""
         unit, missing = self._sampled(points, axis, above)
         low = missing > 0
-        if missing.max(initial=0.0) <= ENOUGH * self._radius:
+        if missing.max(initial=0.0) <= TOLERANCE * self._radius:
             return np.zeros((0, 3))
         own = self._dense[low]
-        normal = STILL * self._square + (1.0 - STILL) * (own.T @ own)
-        normal[np.diag_indices(len(normal))] += STIFF * float(np.diag(self._square).mean())
+        normal = HOLD_WEIGHT * self._square + (1.0 - HOLD_WEIGHT) * (own.T @ own)
+        normal[np.diag_indices(len(normal))] += STIFFNESS * float(np.diag(self._square).mean())
         moves: Floats = np.linalg.solve(normal, own.T @ (GAIN * missing[low, None] * unit[low]))
         return moves
 
@@ -188,9 +194,9 @@ class DrawnLids:
         the eye, mm, ``before`` and they leave open. Only such blinks are changed as shut most of the eye."""
         was_open = self._most_open(_posed(before, FORWARD, solver))
         best, least, points = points, np.inf, points.copy()
-        if was_open > PART_WAY * self._most_open(part.points):
+        if was_open > MAX_LEFT_OPEN * self._most_open(part.points):
             return best, was_open, was_open
-        for k in range(CLOSINGS):
+        for k in range(MAX_CLOSINGS):
             posed = _posed(points, FORWARD, solver)
             x, seen = self._open(posed)
             if seen.max() < least:
@@ -214,7 +220,7 @@ class DrawnLids:
         picture = view.draw([skin, (ball.astype(np.float32), self._ball.triangles.astype(np.int32))])
         seen = (picture.parts == 1).sum(axis=0) * view.step
         x, columns = x0 + view.step * np.arange(len(seen)), self._columns(points)
-        beside = BESIDE * float(np.ptp(columns))
+        beside = CORNER_WIDTH * float(np.ptp(columns))
         return x, np.where((x > columns.min() - beside) & (x < columns.max() + beside), seen, 0.0)
 
     def _columns(self, points: Floats) -> Floats:
@@ -241,7 +247,9 @@ def _mesh_of(part: PartData) -> Mesh:
 
 def _shares(triangles: Ints, count: int) -> csr_matrix:
     """(t k, count) samples all over triangles (t, 3) of ``count`` vertices, as weights of these."""
-    s, t = np.meshgrid(np.arange(STEPS + 1) / STEPS, np.arange(STEPS + 1) / STEPS, indexing="ij")
+    s, t = np.meshgrid(
+        np.arange(SAMPLE_STEPS + 1) / SAMPLE_STEPS, np.arange(SAMPLE_STEPS + 1) / SAMPLE_STEPS, indexing="ij"
+    )
     inside = s + t <= 1.0 + 1e-9
     share = np.column_stack([1.0 - s[inside] - t[inside], s[inside], t[inside]])
     rows = np.repeat(np.arange(len(triangles) * len(share)), 3)

@@ -16,10 +16,10 @@ from surface.fit.source.names import sources_of
 from surface.head.model.parameters import NAMES, read_pose
 from surface.head.posing.rig import optical_axis
 
-REACH = 1.9  # in radii: lids lie no further from the centre
-DEEP = 0.2  # in radii: skin further inside an eyeball is no lid
-LEAST_MM, MOST_MM = 0.2, 0.7  # of lids above an eyeball: however fine their faces are, and however coarse
-TELL_MM = 1.0  # a lid that is moved further at rest is worth a note
+LID_REACH = 1.9  # greatest distance of lids from the centre, in radii
+MAX_DEPTH = 0.2  # of lids inside an eyeball, in radii; deeper skin is no lid
+MIN_HEIGHT_MM, MAX_HEIGHT_MM = 0.2, 0.7  # of lids above an eyeball, for the finest and the coarsest faces
+NOTE_MM = 1.0  # a lid that is moved further at rest is reported
 
 
 def fit_lids(mesh: FitMesh, eyes: Eyes) -> tuple[FitMesh, list[str]]:
@@ -37,7 +37,7 @@ def fit_lids(mesh: FitMesh, eyes: Eyes) -> tuple[FitMesh, list[str]]:
     least = _least_height(mesh, lids, eyes.radius)
     seated = seat_lids(shut, ball, ball, lids, gazes_of(mesh), under_gaze=True, least=least, cling=False)
     most = float(np.linalg.norm(seated.vertices - mesh.vertices, axis=1).max(initial=0.0))
-    notes += [f"lids were moved by up to {most:.1f} mm, out of the eyeballs"] if most > TELL_MM else []
+    notes += [f"lids were moved by up to {most:.1f} mm, out of the eyeballs"] if most > NOTE_MM else []
     return seated, notes
 
 
@@ -49,7 +49,7 @@ def _least_height(mesh: FitMesh, lids: Ints, radius: float) -> float:
     if not near.any():
         return LID_MM[0]
     edge = float(np.median(np.linalg.norm(mesh.vertices[a[near]] - mesh.vertices[b[near]], axis=1)))
-    return float(np.clip(LEAST_MM + edge**2 / (8.0 * CORNEA * radius), LID_MM[0], MOST_MM))
+    return float(np.clip(MIN_HEIGHT_MM + edge**2 / (8.0 * CORNEA * radius), LID_MM[0], MAX_HEIGHT_MM))
 
 
 def with_looks(mesh: FitMesh) -> FitMesh:
@@ -64,7 +64,7 @@ def _lids(mesh: FitMesh, eyes: Floats, radius: float, eye_faces: Bools) -> Ints:
     """Vertices near an eye that belong to no eye, but those deep inside an eyeball, which nobody sees."""
     used = renumbered(mesh.faces[~eye_faces])[0]
     away = np.linalg.norm(mesh.vertices[used][:, None] - eyes, axis=2).min(axis=1) / radius
-    return np.asarray(used[(away < REACH) & (away > 1.0 - DEEP)])
+    return np.asarray(used[(away < LID_REACH) & (away > 1.0 - MAX_DEPTH)])
 
 
 def gazes_of(mesh: FitMesh) -> Floats:

@@ -15,12 +15,12 @@ from surface.fit.points.eyeball import surface_height
 from surface.fit.points.lid_seating import AHEAD, LID_MM
 from surface.fit.source.mesh import FitMesh, directed_edges
 
-RINGS = 4  # of vertices, from a hole's rim outwards, that may belong to a margin
-REACH = 1.4  # in radii: margins lie no further from an eye's centre
-STANDS = 0.6  # of an edge's length: how far it leads straight away from the eyeball where it is a margin's
-CRUSHED = 0.35  # of an edge's length: a rim that is lifted so far comes to lie on the next ring
-CORNER = 0.06  # of the opening's width: there only what would be crushed goes
-MOST = 0.3  # of the rim of a lid: where so much of it would be crushed, all of it goes, so that no teeth stay
+MAX_RINGS = 4  # of vertices, from a hole's rim outwards, that may belong to a margin
+MAX_DISTANCE = 1.4  # of margins from an eye's centre, in radii
+MIN_STEEPNESS = 0.6  # of an edge's length: its part straight away from the eyeball, where it belongs to a margin
+MIN_LIFT = 0.35  # of an edge's length: a rim that is lifted this far comes to lie on the next ring
+CORNER_WIDTH = 0.06  # of the opening's width, in which only vertices that would be crushed are left out
+MAX_CRUSHED = 0.3  # of a lid's rim: where more of it would be crushed, all of it is left out, so that no teeth remain
 
 
 def margins(mesh: FitMesh, skin: Bools, centres: Floats, radius: float) -> Ints:
@@ -33,14 +33,17 @@ def margins(mesh: FitMesh, skin: Bools, centres: Floats, radius: float) -> Ints:
     eyes = [_Eye(mesh.vertices - centre, radius) for centre in centres]
     filled = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
     kept = skin.copy()
-    for _ in range(RINGS):
+    for _ in range(MAX_RINGS):
         a, b = directed_edges(mesh.faces[kept])
         rim = on_rim(a, b, len(mesh.vertices))
         lids = [eye.lids(rim) for eye in eyes]
         crushed = [eye.crushed(a, b, rim) for eye in eyes]
         going = np.zeros(len(rim), bool)
         for k in (0, 1):  # upper, lower
-            if np.mean([c[own[k]].mean() if len(own[k]) else 0.0 for c, own in zip(crushed, lids, strict=True)]) > MOST:
+            if (
+                np.mean([c[own[k]].mean() if len(own[k]) else 0.0 for c, own in zip(crushed, lids, strict=True)])
+                > MAX_CRUSHED
+            ):
                 for eye, hit, own in zip(eyes, crushed, lids, strict=True):
                     going[own[k][hit[own[k]] | eye.between_corners(own[k], np.concatenate(own))]] = True
         if going.sum() < MIN_RING_VERTICES:
@@ -56,7 +59,7 @@ class _Eye:
         self._local, self._away = local, np.maximum(np.linalg.norm(local, axis=1), 1e-9)
         height = radius * surface_height(local / self._away[:, None], AHEAD) + LID_MM[0]
         self._lift = height - self._away
-        self._close = (self._away < REACH * radius) & (local[:, 2] > 0)
+        self._close = (self._away < MAX_DISTANCE * radius) & (local[:, 2] > 0)
 
     def lids(self, rim: Bools) -> tuple[Ints, Ints]:
         """Vertices of the rim (n,) of the upper and of the lower lid, which meet in its corners."""
@@ -73,7 +76,7 @@ class _Eye:
         eyeball, and one could see in between."""
         x = self._local[rim, 0]
         off = np.minimum(self._local[ids, 0] - x.min(), x.max() - self._local[ids, 0])
-        return np.asarray(off > CORNER * np.ptp(x))
+        return np.asarray(off > CORNER_WIDTH * np.ptp(x))
 
     def crushed(self, a: Ints, b: Ints, rim: Bools) -> Bools:
         """(n,) which vertices of the rim, lifted out of the eyeball, come as high as one that an edge a -> b (e,) leads
@@ -84,7 +87,7 @@ class _Eye:
         length = np.linalg.norm(self._local[end] - self._local[start], axis=1)
         rise = self._away[end] - self._away[start]
         found = np.zeros(len(rim), bool)
-        found[start[(self._lift[start] > CRUSHED * length) & (rise > STANDS * length)]] = True
+        found[start[(self._lift[start] > MIN_LIFT * length) & (rise > MIN_STEEPNESS * length)]] = True
         return found
 
 
@@ -93,7 +96,7 @@ def _without_teeth(mesh: FitMesh, kept: Bools, gone: Bools) -> Bools:
     on the rim."""
     kept, touched = kept.copy(), np.zeros(len(mesh.vertices), bool)
     touched[mesh.faces[gone][mesh.faces[gone] >= 0]] = True
-    for _ in range(RINGS):
+    for _ in range(MAX_RINGS):
         ids = np.flatnonzero(kept)
         a, b = directed_edges(mesh.faces[ids])
         single = ~np.isin(a * len(touched) + b, b * len(touched) + a) & touched[a] & touched[b]

@@ -9,24 +9,26 @@ from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.eyes.pieces import USUAL, mirrored
+from surface.fit.eyes.pieces import USUAL_SIZE, mirrored
 from surface.fit.points.ballfit import Ball
 from surface.fit.points.lid_seating import LID_MM
 from surface.fit.source.islands import Island, boundary_loops
 from surface.fit.source.mesh import FitMesh, directed_edges, renumbered
 
-WIDTHS = (0.15, 0.9)  # of an opening, in distances between both
-NEAR = 0.45  # of that distance: how far the middle of what blinks may be from its opening's
-FACING = 0.3  # least z of an opening's normal
-RINGS = 5  # of vertices around a hole, in which the lids' edges lie
-DEPTH, MOST_RINGS = 0.2, 60  # of a hole's width: on fine meshes edges lie in all rings that are so near; and no more
-SECTOR = 0.4  # of a vertex's share of the whole turn: how far aside of it the edge is looked for
-WIDE, CORNERS = 0.12, 0.15  # the least of that, rad: holes may be finer than skin; but not so near a corner, in widths
-NEARER = 0.97  # an edge must be nearer than this share of the hole's distance from its middle; else it is the hole
+WIDTH_RANGE = (0.15, 0.9)  # of an opening, in distances between both
+MAX_OFFSET = 0.45  # of the middle of what blinks from its opening's, in distances between both openings
+MIN_NORMAL_Z = 0.3  # of an opening
+MIN_RINGS = 5  # of vertices around a hole, in which the lids' edges lie
+RING_DEPTH = 0.2  # of a hole's width: on fine meshes the lids' edges lie in all rings this near to it
+MAX_RINGS = 60
+SECTOR_FRACTION = 0.4  # of a vertex's part of the whole turn: how far beside it the edge is searched
+MIN_SECTOR = 0.12  # of that, rad, as holes may be finer than skin
+CORNER_WIDTH = 0.15  # of the hole's width from a corner, in which that minimum is not used
+MAX_EDGE_RATIO = 0.97  # of an edge's distance from the hole's middle to the hole's own: others are the hole itself
 FULL_WIDTH, FULL_HEIGHT = 0.40, 0.70  # least radius of an eyeball, in widths and heights of the opening it has to fill
-PRIOR = 6.0  # weight of the usual radius, in vertices of an edge
+PRIOR_WEIGHT = 6.0  # of the usual radius, in vertices of an edge
 SHAPES = ("eyeBlink", "eyeWide", "eyeSquint", "eyeLookUp", "eyeLookDown")  # that slide lids over the eyeball
-DEEP = 0.3  # in radii in front of the centre: skin further back may lie inside the eyeball
+MIN_FRONT = 0.3  # in radii in front of the centre: skin further back may lie inside the eyeball
 
 
 @dataclass(frozen=True)
@@ -53,8 +55,8 @@ def find_openings(mesh: FitMesh, skin: Bools, middle: float, near: Floats | None
             if p[0] <= middle or q[0] >= middle or not mirrored(p, q, middle):
                 continue
             sizes = [float(np.ptp(mesh.vertices[holes[k], 0])) / apart for k in (i, j)]
-            placed = near is None or max(np.linalg.norm(np.stack([p, q]) - near, axis=1)) < NEAR * apart
-            if placed and all(WIDTHS[0] < s < WIDTHS[1] for s in sizes) and apart > (best or (0.0,))[0]:
+            placed = near is None or max(np.linalg.norm(np.stack([p, q]) - near, axis=1)) < MAX_OFFSET * apart
+            if placed and all(WIDTH_RANGE[0] < s < WIDTH_RANGE[1] for s in sizes) and apart > (best or (0.0,))[0]:
                 best = apart, i, j
     if best is None:
         return []
@@ -72,7 +74,7 @@ def _faces_front(points: Floats) -> bool:
     """Is a loop (k, 3) seen from the front as an area, not from its edge?"""
     local = points - points.mean(axis=0)
     area = 0.5 * np.cross(local, np.roll(local, -1, axis=0)).sum(axis=0)
-    return bool(abs(area[2]) > FACING * max(float(np.linalg.norm(area)), 1e-12))
+    return bool(abs(area[2]) > MIN_NORMAL_Z * max(float(np.linalg.norm(area)), 1e-12))
 
 
 def _centre(points: Floats) -> Floats:
@@ -96,15 +98,15 @@ def _edge(mesh: FitMesh, skin: Bools, hole: Ints) -> Ints:
     own, away = _polar(mesh.vertices[hole], middle)
     turn = np.abs((angle - own[:, None] + np.pi) % (2 * np.pi) - np.pi)
     beside = np.where(turn < _sectors(mesh.vertices[hole])[:, None], off, np.inf)
-    nearest = np.where(beside.min(axis=1) < NEARER * away, ids[beside.argmin(axis=1)], hole)
+    nearest = np.where(beside.min(axis=1) < MAX_EDGE_RATIO * away, ids[beside.argmin(axis=1)], hole)
     return np.unique(nearest)
 
 
 def _sectors(hole: Floats) -> Floats:
     """(h,) how far aside of a hole's vertices (h, 3) the edge is looked for, rad; in corners it soon becomes nearer."""
     low, high = hole[:, 0].min(), hole[:, 0].max()
-    inside = np.minimum(hole[:, 0] - low, high - hole[:, 0]) > CORNERS * (high - low)
-    return np.maximum(SECTOR * 2 * np.pi / len(hole), np.where(inside, WIDE, 0.0))
+    inside = np.minimum(hole[:, 0] - low, high - hole[:, 0]) > CORNER_WIDTH * (high - low)
+    return np.maximum(SECTOR_FRACTION * 2 * np.pi / len(hole), np.where(inside, MIN_SECTOR, 0.0))
 
 
 def _around(mesh: FitMesh, skin: Bools, hole: Ints) -> Bools:
@@ -112,11 +114,11 @@ def _around(mesh: FitMesh, skin: Bools, hole: Ints) -> Bools:
     a, b = directed_edges(mesh.faces[skin])
     reached = np.zeros(len(mesh.vertices), bool)
     reached[hole] = True
-    near = cKDTree(mesh.vertices[hole]).query(mesh.vertices)[0] < DEPTH * np.ptp(mesh.vertices[hole, 0])
-    for ring in range(MOST_RINGS):
+    near = cKDTree(mesh.vertices[hole]).query(mesh.vertices)[0] < RING_DEPTH * np.ptp(mesh.vertices[hole, 0])
+    for ring in range(MAX_RINGS):
         fresh = np.zeros_like(reached)
         fresh[np.concatenate([b[reached[a]], a[reached[b]]])] = True
-        fresh &= ~reached & (near | (ring < RINGS))
+        fresh &= ~reached & (near | (ring < MIN_RINGS))
         if not fresh.any():
             break
         reached |= fresh
@@ -142,7 +144,7 @@ def lid_positions(mesh: FitMesh, opening: Opening) -> Floats:
 
 def usual_radius(opening: Opening, apart: float) -> float:
     """Radius of an eyeball that fills an opening: as people's, in the distance between the eyes, or larger."""
-    return max(USUAL * apart, FULL_WIDTH * float(opening.size[0]), FULL_HEIGHT * float(opening.size[1]))
+    return max(USUAL_SIZE * apart, FULL_WIDTH * float(opening.size[0]), FULL_HEIGHT * float(opening.size[1]))
 
 
 def ball_behind(mesh: FitMesh, opening: Opening, flat: Floats | None, apart: float) -> Ball:
@@ -155,7 +157,7 @@ def ball_behind(mesh: FitMesh, opening: Opening, flat: Floats | None, apart: flo
     """
     points, usual = lid_positions(mesh, opening), usual_radius(opening, apart)
     across = (opening.middle if flat is None else flat)[:2]
-    pull = np.sqrt(PRIOR * len(points) / len(opening.edge)), np.sqrt(0.5 * PRIOR)
+    pull = np.sqrt(PRIOR_WEIGHT * len(points) / len(opening.edge)), np.sqrt(0.5 * PRIOR_WEIGHT)
 
     def off(x: Floats) -> Floats:
         heights = np.linalg.norm(points - x[:3], axis=1) - x[3] - LID_MM[0]
@@ -170,7 +172,7 @@ def ball_behind(mesh: FitMesh, opening: Opening, flat: Floats | None, apart: flo
 def set_back(centre: Floats, radius: float, edge: Floats) -> Floats:
     """The centre, moved back until nine tenths of an edge (e, 3) lie outside the sphere."""
     across = np.linalg.norm(edge[:, :2] - centre[:2], axis=1)
-    seen = edge[(edge[:, 2] > centre[2] + DEEP * radius) & (across < 0.98 * radius)]
+    seen = edge[(edge[:, 2] > centre[2] + MIN_FRONT * radius) & (across < 0.98 * radius)]
     if not len(seen):
         return centre
     height = np.sqrt(np.maximum(radius**2 - ((seen - centre)[:, :2] ** 2).sum(axis=1), 0.0))

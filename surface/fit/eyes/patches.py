@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.eyes.pieces import SIZES, Piece, Side, round_sides, weighted_points
+from surface.fit.eyes.pieces import SIZE_RANGE, Piece, Side, round_sides, weighted_points
 from surface.fit.points.ballfit import Ball, fit_ball, turn_angle
 from surface.fit.points.rigidfit import rigid_fit
 from surface.fit.source.islands import find_islands
 from surface.fit.source.mesh import FitMesh, components, corners, face_areas, renumbered, triangles
 
 LOOKS = ("eyeLookUp", "eyeLookDown", "eyeLookIn", "eyeLookOut")
-REGION = 0.5  # of the distance between both eyes: how far from the middle of what blinks an eye may reach
-HELD = 0.03  # of a blink's greatest displacement: what moves less is no lid
-TURNED = 0.35  # of the greatest displacement by looking: what moves more may be the eyeball
-RIGID = 0.12  # of the displacement: what may be left of it by the best rotation
-STRAY = 0.04  # a patch's points stray less from a sphere, in radii
-OUTWARD = 0.6  # mean cosine between a patch's normals and the directions from its centre
-FEWEST = 9  # vertices of a patch
-PATCH_SPREAD = 0.3  # sine of half the angle a patch spans
+MAX_REGION = 0.5  # of the distance between both eyes: how far an eye may reach from the middle of what blinks
+MIN_BLINK = 0.03  # of a blink's greatest displacement: what moves less is no lid
+MIN_TURN = 0.35  # of the greatest displacement by looking: what moves more may be the eyeball
+MAX_RESIDUAL = 0.12  # of the displacement that the best rotation may leave
+MAX_FIT_ERROR = 0.04  # of a patch's points from a sphere, in radii
+MIN_ALIGNMENT = 0.6  # mean cosine between a patch's normals and the directions from its centre
+MIN_VERTICES = 9  # of a patch
+MIN_SPREAD = 0.3  # sine of half the angle that a patch spans
 
 
 def shaped_sides(mesh: FitMesh, skin: Bools, near: Floats | None) -> list[Side]:
@@ -29,7 +29,7 @@ def shaped_sides(mesh: FitMesh, skin: Bools, near: Floats | None) -> list[Side]:
     """
     if near is None:
         return []
-    reach = REGION * float(np.linalg.norm(near[0] - near[1]))
+    reach = MAX_REGION * float(np.linalg.norm(near[0] - near[1]))
     found = [_patch(mesh, skin, side, at, reach) for side, at in zip(("Left", "Right"), near, strict=True)]
     return [side for side in found if side is not None] if all(found) else []
 
@@ -37,14 +37,14 @@ def shaped_sides(mesh: FitMesh, skin: Bools, near: Floats | None) -> list[Side]:
 def _patch(mesh: FitMesh, skin: Bools, side: str, middle: Floats, reach: float) -> Side | None:
     """One eye, by how it turns, else by what does not blink."""
     still = _size(mesh, f"eyeBlink{side}")
-    still = still < HELD * still.max(initial=0.0)
+    still = still < MIN_BLINK * still.max(initial=0.0)
     near = np.linalg.norm(mesh.vertices - middle, axis=1) < reach
     looks = [k for k in (f"{look}{side}" for look in LOOKS) if k in mesh.names]
     by_turn = np.max([_size(mesh, k) for k in looks], axis=0) if len(looks) >= 2 else np.zeros(len(still))
     most = by_turn[near & still].max(initial=0.0)
-    for chosen in (still & near & (by_turn > TURNED * most), still & near):
+    for chosen in (still & near & (by_turn > MIN_TURN * most), still & near):
         for faces in _clusters(mesh, skin, chosen, near, middle):
-            if found := _as_eye(mesh, faces, looks, 2.0 * reach / (2 * REGION), middle):
+            if found := _as_eye(mesh, faces, looks, 2.0 * reach / (2 * MAX_REGION), middle):
                 return found
     return None
 
@@ -72,7 +72,7 @@ def _clusters(mesh: FitMesh, skin: Bools, chosen: Bools, near: Bools, middle: Fl
     for k in np.unique(label[first]):
         own = ids[label[first] == k]
         used = renumbered(faces[own])[0]
-        if len(used) >= FEWEST and not open_ends[used].any():
+        if len(used) >= MIN_VERTICES and not open_ends[used].any():
             out.append((float(np.linalg.norm(mesh.vertices[used].mean(axis=0) - middle)), own))
     return [own for _, own in sorted(out, key=lambda pair: pair[0])]
 
@@ -90,12 +90,12 @@ def _as_eye(mesh: FitMesh, faces: Ints, looks: list[str], apart: float, middle: 
     """A cluster of faces as an eye, if it is round or turns as a whole, is of an eye's size and bulges outwards."""
     points, weight = weighted_points(mesh, faces)
     ball = fit_ball(points, weight)
-    if ball is None or ball.off > STRAY or not SIZES[0] < ball.radius / apart < SIZES[1]:
+    if ball is None or ball.off > MAX_FIT_ERROR or not SIZE_RANGE[0] < ball.radius / apart < SIZE_RANGE[1]:
         return None
     turned = turns(mesh, faces, looks)
-    if not (ball.spread > PATCH_SPREAD and bulges(mesh, faces, ball.centre)):
+    if not (ball.spread > MIN_SPREAD and bulges(mesh, faces, ball.centre)):
         return None
-    if not turned and np.linalg.norm(points.mean(axis=0) - middle) > 0.5 * apart * REGION:
+    if not turned and np.linalg.norm(points.mean(axis=0) - middle) > 0.5 * apart * MAX_REGION:
         return None
     return Side(grown(mesh, faces), ball, points, weight)
 
@@ -114,7 +114,7 @@ def turns(mesh: FitMesh, faces: Ints, looks: list[str]) -> list[tuple[Floats, Fl
         own = left <= np.quantile(left, 0.9)  # an apex at the back may stay where it is
         turn, shift = rigid_fit(rest[own], (rest + move)[own])
         left = np.linalg.norm(rest @ turn.T + shift - rest - move, axis=1)
-        if np.quantile(left, 0.9) < RIGID * length and turn_angle(turn) > 0.02:
+        if np.quantile(left, 0.9) < MAX_RESIDUAL * length and turn_angle(turn) > 0.02:
             out.append((turn, shift))
     return out
 
@@ -126,7 +126,7 @@ def bulges(mesh: FitMesh, faces: Ints, centre: Floats) -> bool:
     out = tri.mean(axis=1) - centre
     along = (normal * out).sum(axis=1) / np.maximum(np.linalg.norm(out, axis=1), 1e-12)
     total = float(np.linalg.norm(normal, axis=1).sum())
-    return bool(along.sum() > OUTWARD * total)
+    return bool(along.sum() > MIN_ALIGNMENT * total)
 
 
 def grown(mesh: FitMesh, faces: Ints) -> Ints:
@@ -141,7 +141,7 @@ def island_sides(mesh: FitMesh, skin: Bools, middle: float, near: Floats | None)
     if not len(mesh.uv) or not skin.any():
         return []
     ids = np.flatnonzero(skin)
-    islands = [i for i in find_islands(mesh, ids)[1:] if len(i.vertex) >= FEWEST]
+    islands = [i for i in find_islands(mesh, ids)[1:] if len(i.vertex) >= MIN_VERTICES]
     area = face_areas(mesh.vertices, mesh.faces[ids]).sum()
     corner = _face_keys(mesh.faces[ids])
     pieces = []
@@ -157,7 +157,7 @@ def island_sides(mesh: FitMesh, skin: Bools, middle: float, near: Floats | None)
 
 def _trusted(ball: Ball) -> Ball:
     """A patch shows less of a sphere than a whole ball and counts as one all the same."""
-    enough = ball.spread > PATCH_SPREAD and ball.off < STRAY
+    enough = ball.spread > MIN_SPREAD and ball.off < MAX_FIT_ERROR
     return Ball(ball.centre, ball.radius, min(ball.off, 0.03), 1.0) if enough else ball
 
 

@@ -11,16 +11,17 @@ from surface.fit.eyes.names import is_cover, is_eye, is_iris
 from surface.fit.points.ballfit import Ball, fit_ball, front_ball
 from surface.fit.source.mesh import FitMesh, components, face_areas, renumbered
 
-SIZES = (0.1, 0.46)  # radius of an eyeball, in distances between both; people's is 0.19, a large cartoon's 0.4
-USUAL, SPAN = 0.19, 0.45  # of people, and the standard deviation of its logarithm over all kinds of heads
-ROUND = 0.035  # a ball's points stray less from a sphere, in radii: half of them
-NEARLY = 0.01  # of a sphere as exact as its facets allow
-SPREAD = 0.6  # sine of half the angle that a piece has to span for its sphere to be believed
-MIRRORED = 0.3  # of the distance between two eyes: how far they may be from mirroring each other
-ALIKE = 0.2  # difference of their radii
-FEWEST = 12  # vertices of a ball without a name
-CROWD = 3  # more balls of one size are teeth, beads or buttons
-AROUND = 1.3  # in radii: pieces that lie in so large a ball belong to the eye: cornea, iris, highlight
+SIZE_RANGE = (0.1, 0.46)  # radius of an eyeball, in distances between both; a large cartoon's is 0.4
+USUAL_SIZE = 0.19  # that of people
+SIZE_DEVIATION = 0.45  # standard deviation of its logarithm over all kinds of heads
+MAX_FIT_ERROR = 0.035  # median distance of a ball's points from a sphere, in radii
+EXACT_ERROR = 0.01  # the same of a sphere that is as exact as its facets allow
+MIN_SPREAD = 0.6  # sine of half the angle that a piece has to span for its sphere to be trusted
+MAX_ASYMMETRY = 0.3  # of the distance between two eyes: how far they may be from mirroring each other
+MAX_RADIUS_DIFFERENCE = 0.2  # of both eyes, relative
+MIN_VERTICES = 12  # of a ball without a name
+MAX_BALLS = 3  # of one size; more of them are teeth, beads or buttons
+EYE_REACH = 1.3  # in radii: pieces within this distance belong to the eye, such as cornea, iris and highlight
 
 
 @dataclass(frozen=True)
@@ -119,19 +120,19 @@ def _side(pieces: list[Piece]) -> Side:
         points, weight, ball = best.points, best.weight, best.ball
     else:
         whole = fit_ball(points, weight)
-        ball = whole if whole is not None and whole.spread > SPREAD and whole.off < 2 * ROUND else None
+        ball = whole if whole is not None and whole.spread > MIN_SPREAD and whole.off < 2 * MAX_FIT_ERROR else None
     faces = np.concatenate([p.faces for p in pieces])
     return Side(faces, _on_front(points, weight, ball), points, weight, _iris(pieces), pieces)
 
 
 def _on_front(points: Floats, weight: Floats, ball: Ball | None) -> Ball | None:
     """The sphere, or that of the front of an eye that is none."""
-    return ball if ball is None or ball.off < NEARLY else front_ball(points, weight, ball)
+    return ball if ball is None or ball.off < EXACT_ERROR else front_ball(points, weight, ball)
 
 
 def is_round(ball: Ball) -> bool:
     """Are the points on a sphere, and on enough of one?"""
-    return ball.off < ROUND and ball.spread > SPREAD
+    return ball.off < MAX_FIT_ERROR and ball.spread > MIN_SPREAD
 
 
 def _iris(pieces: list[Piece]) -> float:
@@ -144,7 +145,7 @@ def mirrored(p: Floats, q: Floats, middle: float) -> bool:
     """Do a left and a right point (3,) mirror each other, about, at the plane x = middle?"""
     apart = float(p[0] - q[0])
     aside = abs(float(p[0] + q[0]) - 2.0 * middle)
-    return apart > 0 and aside < MIRRORED * apart and float(np.abs((p - q)[1:]).max()) < MIRRORED * apart
+    return apart > 0 and aside < MAX_ASYMMETRY * apart and float(np.abs((p - q)[1:]).max()) < MAX_ASYMMETRY * apart
 
 
 def round_sides(pieces: list[Piece], middle: float, near: Floats | None) -> list[Side]:
@@ -152,8 +153,8 @@ def round_sides(pieces: list[Piece], middle: float, near: Floats | None) -> list
 
     middle : x of the plane between them. near : (2, 3) left and right, where lids close, if that is known.
     """
-    balls = [p for p in pieces if p.ball is not None and len(p.points) >= FEWEST and is_round(p.ball)]
-    balls = [p for p in balls if _apart(p, balls) <= CROWD]
+    balls = [p for p in pieces if p.ball is not None and len(p.points) >= MIN_VERTICES and is_round(p.ball)]
+    balls = [p for p in balls if _apart(p, balls) <= MAX_BALLS]
     left, right = ([p for p in balls if (p.ball.centre[0] > middle) == x] for x in (True, False))  # type: ignore[union-attr]
     pairs = [(_likeness(a.ball, b.ball, middle, near), a, b) for a in left for b in right if a.ball and b.ball]
     likely = [pair for pair in pairs if pair[0] > 0]
@@ -169,7 +170,7 @@ def _apart(piece: Piece, balls: list[Piece]) -> int:
     others = [p.ball for p in balls if p.ball is not None and p.ball is not own]
     if own is None:
         return 0
-    alike = [b for b in others if abs(b.radius - own.radius) < ALIKE * own.radius]
+    alike = [b for b in others if abs(b.radius - own.radius) < MAX_RADIUS_DIFFERENCE * own.radius]
     return sum(float(np.linalg.norm(b.centre - own.centre)) > own.radius for b in alike)
 
 
@@ -177,13 +178,15 @@ def _likeness(a: Ball, b: Ball, middle: float, near: Floats | None) -> float:
     """How much two balls are like a pair of eyes, 0..1; 0 for two that cannot be one."""
     apart = float(np.linalg.norm(a.centre - b.centre))
     size = 0.5 * (a.radius + b.radius) / max(apart, 1e-9)
-    if not mirrored(a.centre, b.centre, middle) or abs(a.radius - b.radius) > ALIKE * a.radius:
+    if not mirrored(a.centre, b.centre, middle) or abs(a.radius - b.radius) > MAX_RADIUS_DIFFERENCE * a.radius:
         return 0.0
-    if not SIZES[0] < size < SIZES[1]:
+    if not SIZE_RANGE[0] < size < SIZE_RANGE[1]:
         return 0.0
     if near is not None and max(np.linalg.norm(x.centre - n) for x, n in zip((a, b), near, strict=True)) > 0.5 * apart:
         return 0.0
-    return float(np.exp(-0.5 * (np.log(size / USUAL) / SPAN) ** 2)) * (1.0 - 0.5 * (a.off + b.off) / (2 * ROUND))
+    return float(np.exp(-0.5 * (np.log(size / USUAL_SIZE) / SIZE_DEVIATION) ** 2)) * (
+        1.0 - 0.5 * (a.off + b.off) / (2 * MAX_FIT_ERROR)
+    )
 
 
 def around(pieces: list[Piece], sides: list[Side]) -> Ints:
@@ -194,4 +197,4 @@ def around(pieces: list[Piece], sides: list[Side]) -> Ints:
 
 
 def _within(piece: Piece, ball: Ball) -> bool:
-    return bool((np.linalg.norm(piece.points - ball.centre, axis=1) < AROUND * ball.radius).all())
+    return bool((np.linalg.norm(piece.points - ball.centre, axis=1) < EYE_REACH * ball.radius).all())

@@ -27,10 +27,8 @@ MISSING = (
     "them (--without glasses, for example), or cut the eyes open"
 )
 ADDED = "the mesh has no eyes: eyeballs were fitted into the openings between its lids"
-AT_CENTRE, OFF_CENTRE = (
-    0.04,
-    0.4,
-)  # of the radius: where an eye turns is its sphere's centre, or believed so far from it
+SAME_CENTRE = 0.04  # of the radius: a pivot this near to the sphere's centre is that centre
+MAX_OFFSET = 0.4  # of the radius: a pivot further from the sphere's centre is not trusted
 
 
 @dataclass(frozen=True)
@@ -152,7 +150,7 @@ def _turned(mesh: FitMesh, side: Side, index: int) -> Ball:
     name = ("Left", "Right")[index]
     centre = turning_centre(turns(mesh, side.faces, [f"{n}{name}" for n in LOOKS if f"{n}{name}" in mesh.names]))
     off = np.inf if centre is None else float(np.linalg.norm(centre - side.ball.centre))
-    if centre is None or not AT_CENTRE * side.ball.radius < off < OFF_CENTRE * side.ball.radius:
+    if centre is None or not SAME_CENTRE * side.ball.radius < off < MAX_OFFSET * side.ball.radius:
         return side.ball
     front = side.points[(side.points - centre)[:, 2] > 0.5 * side.ball.radius]
     return replace(side.ball, centre=centre, radius=float(np.median(np.linalg.norm(front - centre, axis=1))))

@@ -8,13 +8,13 @@ from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.mesh import FitMesh, components, corners, triangles
 from surface.head.model.parameters import rotation
 
-REACH = 1.6  # in radii: a socket lies no further from an eye's centre
-COVER = 3.0  # in radii: so far from it skin hides a socket from who looks from above or aside: brow, nose, cheek
-VIEWS = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.45), (0.0, -0.45))  # yaw and pitch of who looks, rad
+MAX_DISTANCE = 1.6  # of a socket from an eye's centre, in radii
+COVER_REACH = 3.0  # in radii: brow, nose and cheek this far away hide a socket from views from above or aside
+VIEWS = ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.0), (0.0, 0.45), (0.0, -0.45))  # yaw and pitch of the directions of view, rad
 PIXEL = 0.04  # in radii
-BEHIND = 0.06  # in radii: what lies deeper behind what is seen is hidden
-MOST_SAMPLES = 24  # of a triangle along an edge
-SHRUNK = 0.96  # of the radius: what lies on the eyeball is not behind it
+MIN_DEPTH = 0.06  # in radii: what lies this much deeper than what is seen is hidden
+MAX_SAMPLES = 24  # of a triangle along an edge
+SHRINKAGE = 0.96  # of the radius, so that what lies on the eyeball is not behind it
 
 
 def hidden_faces(mesh: FitMesh, skin: Bools, centre: Floats, radius: float) -> Ints:
@@ -25,7 +25,7 @@ def hidden_faces(mesh: FitMesh, skin: Bools, centre: Floats, radius: float) -> I
     """
     filled = np.where(mesh.faces < 0, mesh.faces[:, :1], mesh.faces)
     away = np.linalg.norm(mesh.vertices - centre, axis=1)
-    close, hiding = away < REACH * radius, away < COVER * radius
+    close, hiding = away < MAX_DISTANCE * radius, away < COVER_REACH * radius
     near, cover = (np.flatnonzero(skin & inside[filled].any(axis=1)) for inside in (close, hiding))
     used = np.unique(filled[near])
     if not len(near):
@@ -48,7 +48,7 @@ def _local(mesh: FitMesh, faces: Ints, centre: Floats) -> Floats:
 def _seen(points: Floats, tri: Floats) -> Bools:
     """(m,) which points are seen in one of the views, past triangles (t, 3, 3) and a ball of radius 1 at the origin."""
     out = np.zeros(len(points), bool)
-    size = int(np.ceil(2.0 * (COVER + 1.0) / PIXEL))
+    size = int(np.ceil(2.0 * (COVER_REACH + 1.0) / PIXEL))
     samples = _samples(tri)
     for yaw, pitch in VIEWS:
         turn = rotation(yaw, pitch)
@@ -58,20 +58,20 @@ def _seen(points: Floats, tri: Floats) -> Bools:
         np.maximum.at(depth, (i, j), cover[:, 2])
         i, j = _pixels(at, size)
         across = (at[:, :2] ** 2).sum(axis=1)
-        ball = np.where(across < SHRUNK**2, np.sqrt(np.maximum(SHRUNK**2 - across, 0.0)), -np.inf)
-        out |= at[:, 2] > np.maximum(depth[i, j], ball) - BEHIND
+        ball = np.where(across < SHRINKAGE**2, np.sqrt(np.maximum(SHRINKAGE**2 - across, 0.0)), -np.inf)
+        out |= at[:, 2] > np.maximum(depth[i, j], ball) - MIN_DEPTH
     return out
 
 
 def _pixels(points: Floats, size: int) -> tuple[Ints, Ints]:
-    at = np.clip(((points[:, :2] + COVER + 1.0) / PIXEL).astype(np.int64), 0, size - 1)
+    at = np.clip(((points[:, :2] + COVER_REACH + 1.0) / PIXEL).astype(np.int64), 0, size - 1)
     return at[:, 0], at[:, 1]
 
 
 def _samples(tri: Floats) -> Floats:
     """(s, 3) points all over triangles, no further apart than pixels, as long as those are not too large."""
     longest = np.linalg.norm(tri - np.roll(tri, -1, axis=1), axis=2).max(axis=1)
-    steps = np.clip(np.ceil(longest / (0.7 * PIXEL)), 1, MOST_SAMPLES).astype(int)
+    steps = np.clip(np.ceil(longest / (0.7 * PIXEL)), 1, MAX_SAMPLES).astype(int)
     out = []
     for count in np.unique(steps):
         own = tri[steps == count]

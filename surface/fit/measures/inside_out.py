@@ -12,9 +12,9 @@ from surface.base.arrays import Bools, Floats
 from surface.fit.points.report import FittedPart
 from surface.head.posing.part import HeadPart
 
-NEAR = 4  # faces of the mesh about a triangle, all of which it has to oppose: one alone may lie beyond a crease
-OPPOSED = -0.2  # cosine between normals
-SURE = 0.5  # of the usual weight: faces in folds and slivers do not say which way the surface goes
+NEIGHBOURS = 4  # faces of the mesh about a triangle, all of which must oppose it: a single one may lie beyond a crease
+MAX_COSINE = -0.2  # between normals that oppose each other
+MIN_WEIGHT = 0.5  # of the usual one: faces in folds and slivers do not show the orientation of the surface
 
 
 class InsideOutFaces:
@@ -24,12 +24,12 @@ class InsideOutFaces:
         slopes, triangles = fitted.chart.slopes, part.triangles.astype(np.int64)
         uv = np.asarray(part.uv, np.float64)
         self._triangles, self._uv = triangles[:0], uv[:0]
-        if slopes is None or len(slopes.uv) < NEAR or not len(triangles):
+        if slopes is None or len(slopes.uv) < NEIGHBOURS or not len(triangles):
             return
         middle = uv[triangles].mean(axis=1)
-        near = cKDTree(slopes.uv).query(middle, NEAR)[1]
+        near = cKDTree(slopes.uv).query(middle, NEIGHBOURS)[1]
         usual = max(float(np.median(slopes.weight)), 1e-12)
-        known = (slopes.weight[near] > SURE * usual).all(axis=1)
+        known = (slopes.weight[near] > MIN_WEIGHT * usual).all(axis=1)
         self._triangles, self._uv, self._near = triangles[known], middle[known], near[known]
         self._mix = slopes.mix_u, slopes.mix_v
 
@@ -43,7 +43,7 @@ class InsideOutFaces:
         a, b, c = (surface[self._triangles[:, k]] for k in range(3))
         normal = np.cross(b - a, c - a)
         cosine = np.einsum("tkx,tx->tk", wanted[self._near], _unit(normal))
-        turned: Bools = cosine.max(axis=1) < OPPOSED
+        turned: Bools = cosine.max(axis=1) < MAX_COSINE
         return float(0.5 * np.linalg.norm(normal[turned], axis=1).sum()), self._uv[turned]
 
 

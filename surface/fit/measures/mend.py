@@ -25,11 +25,15 @@ STICKS_OUT_MM = 6.0  # of a head of usual size: a surface so far from the mesh i
 TURNED_MM2 = 10.0  # area that is inside out, on a head of usual size, from which on it is mended
 REFUSED_MM, REFUSED_MM2 = 20.0, 100.0  # distance from the mesh, and area inside out, for which a face is refused
 ASTRAY_MM = 4.0  # and one of which at rest a hundredth is further from it
-ROUNDS = 3
-RINGS = (0, 1, 3)  # of neighbours that are put right with the points that hold a place, until it gets better
-HOLDS = 0.1  # least weight of a control point at a place that sticks out
-NOWHERE = np.zeros((0, 2))
-NEIGHBOURS = 12  # that say where a point belongs
+MAX_ROUNDS = 3
+RINGS = (
+    0,
+    1,
+    3,
+)  # of neighbours that are corrected with the points that hold a place, tried in turn until it gets better
+MIN_HOLD = 0.1  # least weight of a control point at a place that sticks out
+NO_PLACES = np.zeros((0, 2))
+NEIGHBOURS = 12  # control points that show where one belongs
 
 
 def mend_spikes(
@@ -42,7 +46,7 @@ def mend_spikes(
     limit = STICKS_OUT_MM * scale
     notes: list[str] = []
     dense = measure_dense(head, mesh, sources, parts, limit, fit_alone=True)
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         wanted = _wanted(dense, limit) + _turned(dense, scale)
         if not wanted:
             break
@@ -115,7 +119,7 @@ def _smoothed(head: HeadData, name: str, shape: str, dense: DenseErrors, rings: 
     many they are."""
     part = next(p for p in head.parts if p.name == name)
     over = dense.turned.get((name, shape))
-    found = [dense.sticking.get((name, shape), NOWHERE), over.uv if over is not None else NOWHERE]
+    found = [dense.sticking.get((name, shape), NO_PLACES), over.uv if over is not None else NO_PLACES]
     rows = np.concatenate(found)
     if not len(rows):
         return head, 0
@@ -131,7 +135,7 @@ def _holding(part: PartData, uv: Floats) -> Bools:
     """(n,) control points that have weight at places (k, 2) in (u, v)."""
     _, ids, share = weights_at(make_surface(part), uv)
     out = np.zeros(len(part.points), bool)
-    out[ids[share > HOLDS]] = True
+    out[ids[share > MIN_HOLD]] = True
     return out
 
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from surface.base.arrays import Floats
 
-ROUNDS = 40  # of reweighting; each about halves the influence of points off the sphere
-LOOSE = 0.005  # of the radius: no vertex of a mesh is nearer to a sphere than its facets are
-FRONT = np.cos(np.radians(60.0))  # an eye's front is within so many degrees of the axis along which it looks
-LEAST_TURN = np.radians(4.0)  # a shape that turns an eye by less does not determine the centre
+MAX_ROUNDS = 40  # of reweighting; each about halves the influence of points off the sphere
+MIN_SCALE = 0.005  # of the radius: no vertex of a mesh is nearer to a sphere than its facets are
+FRONT_COSINE = np.cos(np.radians(60.0))  # of the angle from the axis of gaze, within which the front of an eye lies
+MIN_TURN_RAD = np.radians(4.0)  # a shape that turns an eye by less does not determine the centre
 
 
 @dataclass(frozen=True)
@@ -45,12 +45,12 @@ def fit_ball(points: Floats, weight: Floats) -> Ball | None:
     if not size > 0:
         return None
     local, ball = (points - middle) / size, None
-    for _ in range(ROUNDS):
+    for _ in range(MAX_ROUNDS):
         ball = _least_squares(local, trust)
         if ball is None:
             return None
         off = np.abs(np.linalg.norm(local - ball[0], axis=1) - ball[1])
-        spread = max(weighted_median(off, weight), LOOSE * ball[1])
+        spread = max(weighted_median(off, weight), MIN_SCALE * ball[1])
         trust = weight / (1.0 + (off / spread) ** 2)
     centre, radius = ball if ball is not None else (np.zeros(3), 1.0)
     off = np.abs(np.linalg.norm(local - centre, axis=1) - radius)
@@ -90,7 +90,7 @@ def front_ball(points: Floats, weight: Floats, ball: Ball) -> Ball:
     """The sphere of an eye's front, +z, where lids lie on it: for an eye that is flatter or longer than a sphere."""
     local = points - ball.centre
     length = np.maximum(np.linalg.norm(local, axis=1), 1e-12)
-    front = local[:, 2] > FRONT * length
+    front = local[:, 2] > FRONT_COSINE * length
     fitted = fit_ball(points[front], weight[front]) if front.sum() >= 12 else None
     if fitted is None or not 0.6 < fitted.radius / ball.radius < 2.2:
         return ball
@@ -103,7 +103,7 @@ def turning_centre(moves: list[tuple[Floats, Floats]]) -> Floats | None:
     moves : rotation (3, 3) and shift (3,) of each shape in which the eye looks somewhere. Every rotation leaves the
     points of its axis where they are: (1 - R) c = t; two axes that cross determine c, by least squares.
     """
-    kept = [(r, t) for r, t in moves if turn_angle(r) > LEAST_TURN]
+    kept = [(r, t) for r, t in moves if turn_angle(r) > MIN_TURN_RAD]
     if not kept:
         return None
     system = np.concatenate([np.eye(3) - r for r, _ in kept])

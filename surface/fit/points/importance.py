@@ -12,8 +12,8 @@ from surface.fit.source.mesh import FitMesh
 from surface.head.model.parameters import smoothstep
 
 LID_IMPORTANCE = 3.0  # factor by which errors on a lid count more than elsewhere
-REACH = 1.7, 1.3  # distances from an eyeball's centre, in its radii, between which the importance rises
-POINTS = 160  # more control points for each eye
+RISE_RANGE = 1.7, 1.3  # distances from an eyeball's centre, in its radii, between which the importance rises
+POINTS_PER_EYE = 160  # additional control points for each eye
 
 
 def with_importance(chart: Chart, mesh: FitMesh, eyes: Floats, radius: float) -> Chart:
@@ -23,5 +23,5 @@ def with_importance(chart: Chart, mesh: FitMesh, eyes: Floats, radius: float) ->
     for eye in eyes:
         away = np.linalg.norm(at - eye, axis=1) / radius
         before = at[:, 2] > eye[2]
-        importance = np.maximum(importance, 1.0 + (LID_IMPORTANCE - 1.0) * smoothstep(away, *REACH) * before)
+        importance = np.maximum(importance, 1.0 + (LID_IMPORTANCE - 1.0) * smoothstep(away, *RISE_RANGE) * before)
     return replace(chart, importance=importance)

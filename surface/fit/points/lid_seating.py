@@ -16,10 +16,10 @@ from surface.fit.source.mesh import FitMesh
 from surface.head.model.parameters import smoothstep
 
 LID_MM = (0.1, 1.2)  # a lid that lies on the eyeball is this far above it: its inner edge, its skin
-LOOSE_MM = 1.6  # points further above it at rest may come off it; those nearer stay as near in every shape
+MAX_HELD_MM = 1.6  # points further above it at rest may come off it; nearer ones stay as near in every shape
 AHEAD = np.array([0.0, 0.0, 1.0])
-FRONT_MM = (0.0, 5.0)  # in front of an eyeball's centre: where lids begin to lie on it, and where they do
-HELD = 0.93  # of the radius: further out a sphere's front is too steep to seat a lid on
+FRONT_MM = (0.0, 5.0)  # in front of an eyeball's centre: where lids begin to lie on it, and where they fully do
+MAX_RADIUS = 0.93  # of the radius: further out a sphere's front is too steep to seat a lid on
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def seat_lids(
     thick = np.clip(_above(warped, new, ahead), least, LID_MM[1])
     rest[vertices] = _lay(warped, new, ahead, thick, np.full(len(vertices), np.inf))
     most = _above(rest[vertices], new, ahead)
-    most[(most > LOOSE_MM) | (not cling)] = np.inf
+    most[(most > MAX_HELD_MM) | (not cling)] = np.inf
     for k, delta in enumerate(mesh.deltas):
         gaze = ahead if gazes is None else gazes[k]
         whole = under_gaze and not np.array_equal(gaze, ahead)
@@ -128,7 +128,7 @@ def _warp(points: Floats, old: Eyeball, new: Eyeball) -> Floats:
 
 def _bulge(across: Floats, radius: float) -> Floats:
     """Height of a sphere above its equator, held where it becomes steep."""
-    held = HELD * radius
+    held = MAX_RADIUS * radius
     over = 0.5 * (np.sqrt((across - held) ** 2 + 0.4) + across - held)  # max(0, across - held), rounded
     return np.sqrt(radius**2 - np.minimum(across - over, held) ** 2)
 

@@ -21,10 +21,10 @@ from surface.fit.points.solve import basis, solve
 from surface.fit.source.chart import Chart, Places
 from surface.fit.source.mesh import FitMesh
 
-HOLDS = (1.0, 30.0, 1e3, 3e4)  # how strongly points around strays are held, one turn after another
-FAR = 1.5  # times the error that is mended: control points there are put into the mesh's own range where nothing helped
-WORTH = 1.25  # times the RMS of the first fit: what mends a spike may cost so much elsewhere
-FEWER = 0.9  # of the places that strayed, or of the largest error: less progress ends the mending
+HOLD_WEIGHTS = (1.0, 30.0, 1e3, 3e4)  # how strongly points around outliers are held, one round after another
+FAR_FACTOR = 1.5  # of the error that is mended: control points beyond it are clamped to the mesh's own range
+MAX_RMS_FACTOR = 1.25  # of the RMS of the first fit: the price elsewhere that mending a spike may have
+MIN_PROGRESS = 0.9  # of the number of outliers, or of the largest error: a round that leaves more is the last
 
 
 @dataclass(frozen=True)
@@ -115,14 +115,14 @@ def _mended(
 ) -> Fitted:  # fmt: skip
     """The fit without spikes between its samples; the errors that come with it are those of the chart's own samples."""
     within, held = chart, np.zeros((0, 2))
-    places, best, enough = places_of(chart, mesh), fitted, WORTH * _rms(mesh, chart, fitted)
+    places, best, enough = places_of(chart, mesh), fitted, MAX_RMS_FACTOR * _rms(mesh, chart, fitted)
     count, most = len(places.uv) + 1, np.inf
-    for factor in HOLDS:
+    for factor in HOLD_WEIGHTS:
         strays = _strays(mesh, chart, fitted, request.astray_mm)
         if not strays.any():
             return fitted
         now = _most(mesh, chart, fitted)
-        if strays.sum() > FEWER * count and now > FEWER * most:
+        if strays.sum() > MIN_PROGRESS * count and now > MIN_PROGRESS * most:
             break
         count, most = int(strays.sum()), now
         held = np.concatenate([held, places.uv[strays]])
@@ -131,7 +131,7 @@ def _mended(
         if _rms(mesh, chart, fitted) <= enough:
             best = min(best, fitted, key=lambda f: _most(mesh, chart, f))
     off = dense_errors(mesh, chart, best.net, best.points, best.moves)
-    far = np.maximum(off.neutral, off.worst) > FAR * request.astray_mm
+    far = np.maximum(off.neutral, off.worst) > FAR_FACTOR * request.astray_mm
     points, moves = bounded(mesh, chart, best.net, best.points, best.moves, far)
     put = _on(mesh, chart, replace(best, points=points, moves=moves))
     better = _most(mesh, chart, put) < _most(mesh, chart, best) and _rms(mesh, chart, put) <= enough

@@ -11,9 +11,9 @@ from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.model.placement import Placement
 
-CHORD = 4e-4  # of the head's size: how near its triangles are to it
-DEEPEST = 8
-POSED = 0.4  # of every group at once: the pose that decides how finely a part is cut into triangles
+CHORD_ERROR = 4e-4  # of a part's triangles, as a fraction of the head's size
+MAX_DEPTH = 8
+POSE_AMOUNT = 0.4  # of every group at once in the pose that decides how finely a part is tessellated
 
 
 def make_part(piece: Piece, placement: Placement, size: float, follows: str, *, flip: bool) -> PartData:
@@ -26,7 +26,7 @@ def make_part(piece: Piece, placement: Placement, size: float, follows: str, *, 
     return PartData(
         piece.name, "eye" if follows.endswith("_eye") else piece.material, follows, placement.points(surface.points),
         surface.weights.copy(), knots_u, knots_v, np.stack(surface.degrees, axis=1),
-        [np.array(loop) for loop in domain.loops], np.zeros((0, 3)), (0, CHORD * size, DEEPEST), [], none, none,
+        [np.array(loop) for loop in domain.loops], np.zeros((0, 3)), (0, CHORD_ERROR * size, MAX_DEPTH), [], none, none,
         closed_u=surface.closed[0], closed_v=surface.closed[1], rect=domain.rect, flip=flip, cuts=tuple(domain.slits),
     )  # fmt: skip
 
@@ -36,7 +36,7 @@ def with_mesh(part: PartData, head: HeadData) -> PartData:
     surface = make_surface(part)
     moved = part.points.copy()
     for group in part.groups:
-        moved[group.ids] += POSED * group.moves
+        moved[group.ids] += POSE_AMOUNT * group.moves
     return replace(part, mesh=pack(tessellate(part, surface.with_points(moved), head.seams), part.budget))
 
 

@@ -25,12 +25,15 @@ from surface.head.model.parameters import SHAPES, smoothstep
 from surface.head.posing.head import Head
 
 NORMAL_MM = 14.0  # distance that a difference of normals by 1 counts as in the search for the nearest places
-FINER = 8.0  # divides the chord error of the sampling, so that the control points of flat surfaces get samples, too
-NEAR = 4  # places of the skin whose displacements are averaged at a sample
-FAR_MM = (12.0, 35.0)  # distance from the other head's skin where displacements begin to fade, and where they are 0
-PULL = 1e-2  # weight of the mean over a subdomain, relative to that of the samples in it
-LEAST_MM, LEAST_GROUP_MM = 0.01, 0.25  # shorter displacements are dropped, and groups without any longer than this
-SHOWN = 0.5  # least share of a rule's group, such as a wrinkle, that the surfaces must reproduce to keep the group
+FINER_FACTOR = (
+    8.0  # divides the chord error of the sampling, so that the control points of flat surfaces get samples, too
+)
+NEIGHBOURS = 4  # places of the skin whose displacements are averaged at a sample
+FADE_MM = (12.0, 35.0)  # distance from the other head's skin where displacements begin to fade, and where they are 0
+MEAN_WEIGHT = 1e-2  # weight of the mean over a subdomain, relative to that of the samples in it
+MIN_MM = 0.01  # shorter displacements are dropped
+MIN_GROUP_MM = 0.25  # groups whose displacements are all shorter are dropped
+MIN_SHOWN = 0.5  # of a rule's group, such as a wrinkle: the fraction that the surfaces must reproduce to keep the group
 
 
 @dataclass(frozen=True)
@@ -48,12 +51,12 @@ class Fields:
     def at(self, points: Floats, normals: Floats) -> Floats:
         """(k, c) values at other points (k, 3) with unit normals (k, 3)."""
         tree = cKDTree(np.hstack([self.points, NORMAL_MM * self.normals]))
-        distance, near = tree.query(np.hstack([points, NORMAL_MM * normals]), k=NEAR)
+        distance, near = tree.query(np.hstack([points, NORMAL_MM * normals]), k=NEIGHBOURS)
         weight = 1.0 / (distance + 0.3) ** 2
         weight /= weight.sum(axis=1, keepdims=True)
         away = np.linalg.norm(self.points[near[:, 0]] - points, axis=1)
-        weight *= (1.0 - smoothstep(away, *FAR_MM))[:, None]
-        out: Floats = sum(weight[:, k, None] * self.values[near[:, k]] for k in range(NEAR))
+        weight *= (1.0 - smoothstep(away, *FADE_MM))[:, None]
+        out: Floats = sum(weight[:, k, None] * self.values[near[:, k]] for k in range(NEIGHBOURS))
         return out
 
 
@@ -119,7 +122,7 @@ class FittedFields:
 
 def fit_fields(part: PartData, piece: Piece, fields: Fields) -> FittedFields:
     """The least-squares fit of fields by a part's control points, at samples of the surface it was made from."""
-    mesh, surface = replace(piece, chord=piece.chord / FINER).mesh, make_surface(part)
+    mesh, surface = replace(piece, chord=piece.chord / FINER_FACTOR).mesh, make_surface(part)
     sign = -1.0 if part.flip else 1.0
     points, su, sv = surface.derivatives(mesh.uv, side=mesh.side)
     normals = np.cross(su, sv)
@@ -150,7 +153,7 @@ def solve_fields(basis: csr_matrix, weight: Floats, wanted: Floats) -> FittedFie
     weighted = diags(weight) @ basis
     reach = np.asarray(weighted.sum(axis=0)).ravel()
     mean = (weighted.T @ wanted) / np.maximum(reach, 1e-12)[:, None]
-    pull = PULL * reach + 1e-9 * max(float(reach.max()), 1e-12)
+    pull = MEAN_WEIGHT * reach + 1e-9 * max(float(reach.max()), 1e-12)
     normal = (basis.T @ weighted + diags(pull)).tocsc()
     values = splu(normal).solve(weighted.T @ wanted + pull[:, None] * mean)
     residual = (weight[:, None] * (basis @ values - wanted) ** 2).sum(axis=0)
@@ -161,7 +164,7 @@ def _shown(fields: Fields, fitted: Sequence[FittedFields]) -> set[str]:
     """Names of the groups to keep: all shapes, and those other groups that the surfaces reproduce well enough."""
     whole, residual = (sum(getattr(f, key) for f in fitted) for key in ("whole", "residual"))
     by_group = np.stack([np.asarray(rows)[:-1].reshape(-1, 3).sum(axis=1) for rows in (whole, residual)])
-    shown = by_group[1] < (1.0 - SHOWN) * by_group[0]
+    shown = by_group[1] < (1.0 - MIN_SHOWN) * by_group[0]
     return {name for name, good in zip(fields.names, shown, strict=True) if good or name in SHAPES}
 
 
@@ -171,6 +174,6 @@ def _moved(part: PartData, values: Floats, names: tuple[str, ...], kept: set[str
     for k, name in enumerate(names):
         moves = values[:, 3 * k : 3 * k + 3]
         length = np.linalg.norm(moves, axis=1)
-        if name in kept and length.max() > LEAST_GROUP_MM:
-            groups.append(sparse_group(name, np.where(length[:, None] > LEAST_MM, np.round(moves, 4), 0.0)))
+        if name in kept and length.max() > MIN_GROUP_MM:
+            groups.append(sparse_group(name, np.where(length[:, None] > MIN_MM, np.round(moves, 4), 0.0)))
     return replace(part, groups=groups, jaw=np.clip(np.round(values[:, -1], 6), 0.0, 1.0))

@@ -18,8 +18,8 @@ from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
 from surface.readers import NamedSurface, Ties, read_surface
 
-FINE = 1.5e-3  # chords of the samples, relative to the whole file's size
-DEEPEST = 6  # levels of the samples' quad trees
+CHORD_ERROR = 1.5e-3  # of the samples, relative to the whole file's size
+MAX_DEPTH = 6  # of the samples' quad trees
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class Piece:
     def mesh(self) -> Mesh:
         """Its samples: triangles run as S_u x S_v says."""
         with np.errstate(divide="ignore", invalid="ignore"):  # triangles without area while borders are cut
-            return self.surface.tessellate(chord_error=self.chord, max_depth=DEEPEST, domain=self.domain)
+            return self.surface.tessellate(chord_error=self.chord, max_depth=MAX_DEPTH, domain=self.domain)
 
 
 def read_pieces(
@@ -118,7 +118,7 @@ def make_pieces(items: Sequence[NamedSurface], where: str) -> list[Piece]:
         domain = item.domain or Domain(item.surface.rect)
         material = kind_of(item.name).material
         fitted = item.ties, item.deviation, item.seams
-        piece = Piece(name, item.name, material, item.surface, domain, FINE * size, *fitted)
+        piece = Piece(name, item.name, material, item.surface, domain, CHORD_ERROR * size, *fitted)
         if not len(piece.mesh.triangles):
             raise FitError(f"{where}: {item.name!r} covers nothing of its domain", hint=f"--without '{item.name}'")
         out.append(piece)

@@ -14,7 +14,7 @@ from surface.fit.source.placing.place import eye_middle, head_size, neck_of
 from surface.head.model.data import Neck
 from surface.head.model.placement import Placement
 
-FAR_MM = 1.0  # surfaces without a face whose middle is as near to the origin stay where they are
+MIN_SHIFT_MM = 1.0  # surfaces without a face whose middle is nearer to the origin than this stay where they are
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ def place(points: Floats, triangles: Ints, unit: str | None, up: str | None, for
     marks = _turned(frame)
     if marks.eyes is None:
         middle = 0.5 * (at.min(axis=0) + at.max(axis=0))
-        shift = -middle if np.abs(middle).max() > FAR_MM else np.zeros(3)
+        shift = -middle if np.abs(middle).max() > MIN_SHIFT_MM else np.zeros(3)
     else:
         shift = EYES_AT - eye_middle(marks.eyes, head_size(marks))
         marks = _moved(marks, shift)

@@ -17,7 +17,7 @@ from tests.once import once
 @pytest.fixture
 def given_charts(monkeypatch: pytest.MonkeyPatch) -> None:
     """Keeps the face's charts as they are: charts of our own take seconds and say nothing about eyes."""
-    monkeypatch.setattr("surface.fit.source.owncharts.UNEVEN", np.inf)
+    monkeypatch.setattr("surface.fit.source.owncharts.MAX_UNEVENNESS", np.inf)
 
 
 @pytest.fixture(scope="package")

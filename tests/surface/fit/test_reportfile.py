@@ -187,7 +187,7 @@ def result():
     mesh = replace(mesh, names=(*mesh.names, "odd"), deltas=np.concatenate([mesh.deltas, mesh.deltas[:1]]))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("surface.fit.source.uvcheck.SQUEEZED_SHARE", 1.0)  # the pit stays squeezed: it is a fold
-        patch.setattr("surface.fit.source.owncharts.UNEVEN", np.inf)
+        patch.setattr("surface.fit.source.owncharts.MAX_UNEVENNESS", np.inf)
         with fewer_points():
             return fit_mesh(Loaded(mesh, map_names(mesh.names), ("unit taken to be mm",)), "sheet", lambda *_: None)
 

@@ -117,7 +117,7 @@ def test_edges_are_angles_about_the_eye_over_even_places() -> None:
 
 def test_lids_turn_by_the_gap_and_an_overlap_that_fades_towards_the_corners(monkeypatch) -> None:
     """Closed form: the gap left and a millimetre more, of which the upper lid goes 85 hundredths."""
-    monkeypatch.setattr(module, "SPREAD", 0.5)
+    monkeypatch.setattr(module, "SPREAD_COLUMNS", 0.5)
     x, radius = np.linspace(-13, 13, module.COLUMNS), 12.0
     opening = np.clip(1.0 - (x / 13) ** 2, 0.0, None)
     before = module._Edges(x, 0.5 * opening + 0.1, -0.3 * opening + 0.1)
@@ -145,7 +145,7 @@ def test_what_is_missing_in_one_column_is_shared_by_those_beside_it() -> None:
     need[10] = 2.0
     spread = module._spread(need)
     assert spread[10] == 2.0 and (np.diff(spread[:11]) >= 0).all() and (np.diff(spread[10:]) <= 0).all()
-    assert np.abs(np.diff(spread)).max() < 0.4 and spread[10 + module.SPREAD :].max() == 0.0
+    assert np.abs(np.diff(spread)).max() < 0.4 and spread[10 + module.SPREAD_COLUMNS :].max() == 0.0
     np.testing.assert_array_equal(module._spread(np.full(5, 0.7)), 0.7)
 
 

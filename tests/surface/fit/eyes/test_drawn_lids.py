@@ -7,7 +7,7 @@ import pytest
 from eye_face import CENTRES
 from face_measures import Window
 
-from surface.fit.eyes.drawn_lids import BLINKS, CORRECTIONS, DrawnLids, seat_drawn_lids
+from surface.fit.eyes.drawn_lids import BLINKS, MAX_CORRECTIONS, DrawnLids, seat_drawn_lids
 from surface.head import Group, Head, HeadData
 
 AHEAD = 40.0 + 6.0  # z of what lies before the middle of an eyeball
@@ -113,7 +113,7 @@ class Part(DrawnLids):
 
 
 @pytest.mark.parametrize(
-    ("share", "left", "asked"), [(0.5, 0.5, CORRECTIONS + 1), (1.0, 0.0, 2), (-1.0, 8.0, CORRECTIONS + 1)]
+    ("share", "left", "asked"), [(0.5, 0.5, MAX_CORRECTIONS + 1), (1.0, 0.0, 2), (-1.0, 8.0, MAX_CORRECTIONS + 1)]
 )
 def test_what_a_head_takes_only_in_part_is_corrected_again(share, left, asked) -> None:
     """The least of the gaps after a correction counts; before it, other shapes are not corrected either."""

@@ -119,7 +119,7 @@ def test_edges_are_found_on_fine_meshes_and_about_holes_finer_than_the_skin(lini
     points, faces, rim, edge = lined_hole(lining, count, hole)
     mesh = replace(face(shapes=False), vertices=points, faces=faces, deltas=np.zeros((0, len(points), 3)))
     found = module._edge(mesh, np.ones(len(faces), bool), rim)
-    beside = np.abs(points[found, 0]) < (1.0 - 2.0 * module.CORNERS) * 6.6
+    beside = np.abs(points[found, 0]) < (1.0 - 2.0 * module.CORNER_WIDTH) * 6.6
     assert np.isin(found[beside], edge).all() and beside.sum() > 0.6 * len(edge) * min(1.0, 4 * hole / count)
 
 

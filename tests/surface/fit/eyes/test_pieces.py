@@ -9,11 +9,11 @@ from eye_face import CENTRES, RADIUS, disc, joined, pair, shell
 
 from surface.fit.eyes import pieces as eye_pieces
 from surface.fit.eyes.pieces import (
-    MIRRORED,
-    ROUND,
-    SIZES,
-    SPAN,
-    USUAL,
+    MAX_ASYMMETRY,
+    MAX_FIT_ERROR,
+    SIZE_DEVIATION,
+    SIZE_RANGE,
+    USUAL_SIZE,
     around,
     is_round,
     mirrored,
@@ -73,7 +73,7 @@ def test_what_mirrors_each_other(p, q, found: bool) -> None:
     assert (
         mirrored(np.array(p, float) + np.array([100, 5, 5]), np.array(q, float) + np.array([100, 5, 5]), 100.0) == found
     )
-    assert MIRRORED * 60 == 18
+    assert MAX_ASYMMETRY * 60 == 18
 
 
 def balls(*every_ball):
@@ -93,7 +93,7 @@ def test_a_pair_of_balls_are_eyes_the_left_one_first() -> None:
 )  # in distances between both
 def test_balls_of_no_eyes_size_are_none(radius: float, found: bool) -> None:
     apart = 64.0
-    assert SIZES[0] > 0.08 and SIZES[1] < 0.48
+    assert SIZE_RANGE[0] > 0.08 and SIZE_RANGE[1] < 0.48
     assert bool(round_sides(balls(*[(c, radius * apart) for c in CENTRES]), 0.0, None)) == found
 
 
@@ -183,11 +183,14 @@ def test_a_pair_is_less_likely_the_further_its_size_and_its_form_are_from_eyes()
         a, b = (Ball(c, radius, off, 1.0) for c in CENTRES)
         return eye_pieces._likeness(a, b, 0.0, None)
 
-    usual = USUAL * 64.0
+    usual = USUAL_SIZE * 64.0
     assert like(usual) == pytest.approx(1.0)
-    smaller, larger = like(usual / np.exp(SPAN)), like(usual * np.exp(SPAN))  # a standard deviation off
+    smaller, larger = (
+        like(usual / np.exp(SIZE_DEVIATION)),
+        like(usual * np.exp(SIZE_DEVIATION)),
+    )  # a standard deviation off
     assert smaller == pytest.approx(np.exp(-0.5)) == larger
-    assert like(usual, ROUND) == pytest.approx(0.5) and like(usual, 0.5 * ROUND) == pytest.approx(0.75)
+    assert like(usual, MAX_FIT_ERROR) == pytest.approx(0.5) and like(usual, 0.5 * MAX_FIT_ERROR) == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize(

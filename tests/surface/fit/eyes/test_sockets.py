@@ -92,7 +92,7 @@ def test_pixels_are_clipped_to_the_picture() -> None:
 def test_a_ball_is_as_deep_as_a_sphere_a_little_smaller_than_the_eye(monkeypatch) -> None:
     monkeypatch.setattr(module, "VIEWS", ((0.0, 0.0),))
     for across in (0.0, 0.3, 0.7, 0.9, 0.95):
-        front = np.sqrt(0.96**2 - across**2) - module.BEHIND
+        front = np.sqrt(0.96**2 - across**2) - module.MIN_DEPTH
         for turn in (0.0, 1.1, 4.0):
             x, y = across * np.cos(turn), across * np.sin(turn)
             assert ahead([[x, y, front + 0.01], [x, y, front - 0.01]]) == [True, False], across

@@ -10,7 +10,7 @@ import shapes
 from small_head import small_head
 
 from surface import Domain
-from surface.fit.surfaces.build import CHORD, DEEPEST, make_part, sparse_group, with_groups, with_mesh
+from surface.fit.surfaces.build import CHORD_ERROR, MAX_DEPTH, make_part, sparse_group, with_groups, with_mesh
 from surface.fit.surfaces.pieces import Piece
 from surface.head.model.data import Group, PartData
 from surface.head.model.meshes import make_surface, unpack
@@ -42,7 +42,7 @@ def test_a_part_is_the_surface_of_the_file_in_head_space(placement: Placement) -
     np.testing.assert_array_equal(part.weights, own.weights)
     assert part.weights is not own.weights
     assert (part.name, part.material, part.follows, part.flip) == ("cheek", "skin", "skin", False)
-    assert part.budget == (0, CHORD * 200.0, DEEPEST) and part.groups == []
+    assert part.budget == (0, CHORD_ERROR * 200.0, MAX_DEPTH) and part.groups == []
     assert part.rect == (0.0, 1.0, 0.0, 1.0) and part.closed_u is None and not part.jaw.any() and not part.lids.any()
     assert made(placement, flip=True).flip
 

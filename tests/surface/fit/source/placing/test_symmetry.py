@@ -49,7 +49,8 @@ def test_a_box_has_three_planes_and_they_differ() -> None:
 def test_a_plane_that_is_much_worse_than_the_best_is_none() -> None:
     found = find_mirrors(lopsided())
     assert (
-        len(found) == 1 or found[1].error < max(module.RIVALS * found[0].error, found[0].error + module.NEARLY) <= 0.1
+        len(found) == 1
+        or found[1].error < max(module.RIVAL_FACTOR * found[0].error, found[0].error + module.RIVAL_EXCESS) <= 0.1
     )
 
 
