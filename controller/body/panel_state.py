@@ -1,4 +1,5 @@
-"""State for the panel besides the values: who holds each parameter, what the servos show, who stopped them.
+"""State for the panel besides the values: who holds each parameter, and at what, what the servos show, who stopped
+them.
 
 The body writes it ten times a second to a mailbox; main reads it when it draws.
 """
@@ -28,18 +29,21 @@ class PanelState:
         self._mailbox, self._layers, self._p = mailbox, tuple(layers), len(parameters)
         self._all = np.full(self.size(parameters), np.nan)
         self._regions = parameters.region_names
-        ends = np.cumsum([self._p, self._p, len(self._regions)])
-        self._holders, self._measured, self._away, self._stopped = np.split(self._all, ends)
+        ends = np.cumsum([self._p, self._p, self._p, len(self._regions)])
+        self._holders, self._held, self._measured, self._away, self._stopped = np.split(self._all, ends)
 
     @staticmethod
     def size(parameters: Parameters) -> int:
-        """Length of the mailbox's vector: layers that hold (P), measured values (P), degrees by region, a name."""
-        return 2 * len(parameters) + len(parameters.region_names) + _NAME_LENGTH
+        """Length of the mailbox's vector: layers and values that hold (P, P), measured ones (P), degrees, a name."""
+        return 3 * len(parameters) + len(parameters.region_names) + _NAME_LENGTH
 
     def publish(self, state: CommandState, measured_face: MeasuredFace | None) -> None:
         """Write the state of this moment; ``measured_face`` None without servos."""
         layers = {name: i for i, name in enumerate(self._layers)}
         self._holders[:] = [layers.get(state.holder(i) or "", -1) for i in range(self._p)]
+        self._held[:] = np.nan
+        for index, value in state.held().items():
+            self._held[index] = value
         if measured_face is not None:
             known = np.zeros(self._p, dtype=bool)
             measured_face.read(self._measured, known)
@@ -64,6 +68,12 @@ class PanelState:
         """The layer that holds a parameter; empty when none does or nothing is known."""
         layer = self._holders[index]
         return self._layers[int(layer)] if layer >= 0 else ""
+
+    def held(self) -> dict[int, float] | None:
+        """Values of the parameters that are held by hand, by any panel or link; None where nothing is known yet."""
+        if np.isnan(self._holders).all():
+            return None
+        return {int(i): float(self._held[i]) for i in np.flatnonzero(np.isfinite(self._held))}
 
     @property
     def stopped_by(self) -> str:

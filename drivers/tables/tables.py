@@ -158,7 +158,7 @@ class ControlTable(Mapping[str, Item]):
         self.group_read: str = spec.get("group_read", "")
         self.lock: str = spec.get("lock", "torque")
         self.motor = Motor(*spec["motor"]) if "motor" in spec else None
-        self.top_speed: int = spec.get("top_speed", 0) or self._no_load_steps()
+        self.top_speed: int = self._no_load_steps() or spec.get("top_speed", 0)
         self.baud = _bit_rates(spec)
         self.voltage: int = round(10.0 * self.motor.supply_v) if self.motor else spec["voltage"]
         self.indirect: tuple[tuple[int, int, int], ...] = tuple(tuple(area) for area in spec.get("indirect", ()))

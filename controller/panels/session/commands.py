@@ -5,7 +5,7 @@ Independent of the window library.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -109,9 +109,22 @@ class Commands:
         self.end_step()
 
     def hold(self, values: Mapping[int, float | None], step: Hashable = None) -> None:
-        """Hold parameters at values; None gives one back to the layers. ``step`` : see :meth:`change`."""
+        """Hold parameters at values; None releases one, also where another panel or a link holds it.
+
+        ``step`` : see :meth:`change`.
+        """
+        others = [i for i, value in values.items() if value is None and i not in self.now.held]
+        for i in others:
+            self.send(Hold(i, None))
+        if others and len(others) == len(values):
+            return
         held = {**self.now.held, **values}
         self.change(replace(self.now, held={i: x for i, x in held.items() if x is not None}), step)
+
+    def forget(self, indices: Iterable[int]) -> None:
+        """Others have released what was held here: nothing is sent, and nothing of it can be taken back."""
+        gone = set(indices)
+        self.now = replace(self.now, held={i: x for i, x in self.now.held.items() if i not in gone})
 
     def show(self, name: str, intensity: float, step: Hashable = None) -> None:
         """Show an expression."""

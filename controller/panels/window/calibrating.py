@@ -64,8 +64,12 @@ class Calibrating:
                 self._try(lambda mark=mark: self._captures.capture(servo, mark))  # type: ignore[misc]
         if captured != Captured() and flow.button(f"clear##{key}"):
             self._captures.clear(servo)
-        if key in self._jogged and flow.button(f"give back##{key}"):
+        if key not in self._jogged:
+            return
+        if flow.button(f"release##{key}"):
             self.jog(servo, None)
+        if imgui.is_item_hovered():
+            imgui.set_tooltip("the servo follows the face again")
 
     def jog(self, servo: Mapping[str, Any], angle_deg: float | None) -> None:
         """Turn a servo; None lets it follow the face again."""

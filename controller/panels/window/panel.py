@@ -130,6 +130,7 @@ class Panel:
 
         if self._state is not None:
             self._state.refresh()
+        self.sliders.listen()
         if not imgui.is_any_mouse_down():
             self.commands.end_step()
         self.keys(self.stop.box.bottom)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -13,23 +14,30 @@ from controller.panels.overlay.colours import layer_colour, packed
 from controller.panels.session.commands import Commands
 
 _ASIDE = ("mouthLeft", "mouthRight", "jawLeft", "jawRight")
+_OTHERS = "expressions, idle motion, speech and live faces"
+_TICK = f"tick: hold it by hand, and {_OTHERS} do not move it"
+_UNTICK = f"held by hand, or by a command\nuntick: release it, and {_OTHERS} move it again"
+_PATIENCE_S = 1.0
+"""For so long after something was set here, what the body tells of it may still be older."""
 
 
 class Sliders:
     """Draws the sliders.
 
     newest : the newest parameters (P,). state : the body's state; without it no holder and no servo is shown.
-    parameters : of the stage; those of the base vocabulary without.
+    parameters : of the stage; those of the base vocabulary without. clock : seconds.
     """
 
     def __init__(
         self, newest: Callable[[], Floats], commands: Commands, state: PanelState | None = None,
-        parameters: Parameters | None = None,
+        parameters: Parameters | None = None, clock: Callable[[], float] = time.monotonic,
     ) -> None:  # fmt: skip
         self._parameters = parameters or PARAMETERS
         self._newest, self._commands, self._state = newest, commands, state
         self._search, self._linked = "", True
         self._mirror = self._parameters.mirror()
+        self._clock, self._own, self._set_s = clock, commands.now.held, -np.inf
+        self._heard: dict[int, float] | None = None
 
     def __call__(self) -> None:
         """Draw; called once a frame."""
@@ -39,6 +47,7 @@ class Sliders:
         _, self._search = imgui.input_text_with_hint("##search", "search", self._search)
         imgui.same_line()
         _, self._linked = imgui.checkbox("both sides", self._linked)
+        self._all_held(imgui)
         for region in self._parameters.region_names:
             self._region(imgui, region)
 
@@ -55,13 +64,42 @@ class Sliders:
         same = {pair: same_sense(pair, self._parameters) for pair in pairs}
         return [pair for pair in pairs if same[pair]] + [(i,) for pair in pairs if not same[pair] for i in pair]
 
+    def held(self, index: int) -> float | None:
+        """The value at which a parameter is held by hand, here or by another panel or link; None where it is not."""
+        own = self._commands.now.held
+        return (own if self._heard is None or own is not self._own else self._heard).get(index)
+
+    def listen(self) -> None:
+        """Hear what is held; called once a frame, also where the sliders are not drawn.
+
+        What was set here just now, which the body may not know yet, counts first. What was set here and others have
+        released is forgotten.
+        """
+        if self._commands.now.held is not self._own:
+            self._own, self._set_s = self._commands.now.held, self._clock()
+        new = self._clock() - self._set_s < _PATIENCE_S
+        self._heard = None if new or self._state is None else self._state.held()
+        if self._heard is not None and (gone := self._own.keys() - self._heard.keys()):
+            self._commands.forget(gone)
+            self._own = self._commands.now.held
+
+    def _all_held(self, imgui: Any) -> None:
+        """How many are held, and a button that releases all of them."""
+        held = [i for i in range(len(self._parameters)) if self.held(i) is not None]
+        imgui.begin_disabled(not held)
+        if imgui.button("release all"):
+            self._commands.hold(dict.fromkeys(held))
+        imgui.end_disabled()
+        imgui.same_line()
+        imgui.text_disabled(f"{len(held)} held" if held else "a tick holds a value by hand")
+
     def _region(self, imgui: Any, region: str) -> None:
         rows = self.rows(region)
         if not rows:
             return
         if self._search:
             imgui.set_next_item_open(True)
-        if not imgui.collapsing_header(f"{region}{self._away(region)}###{region}"):
+        if not imgui.collapsing_header(f"{region}{self._held_in(region)}{self._away(region)}###{region}"):
             return
         names = [_label(row, self._parameters) for row in rows]
         if imgui.begin_table(f"##{region}", 2, imgui.TableFlags_.sizing_stretch_prop):
@@ -76,12 +114,12 @@ class Sliders:
         """The lock with the name, and the slider."""
         imgui.table_next_row()
         imgui.table_next_column()
-        held = all(i in self._commands.now.held for i in row)
+        held = all(self.held(i) is not None for i in row)
         values = self._newest()
         locked, held = imgui.checkbox(f"{name}##hold", held)
         if imgui.is_item_hovered():
             about = self._parameters.descriptions.get(self._parameters.names[row[0]], "")
-            imgui.set_tooltip(("hold by hand" if not held else "give back to the layers") + (about and f"\n{about}"))
+            imgui.set_tooltip((_UNTICK if held else _TICK) + (about and f"\n{about}"))
         if locked:
             self._commands.hold({i: float(values[i]) if held else None for i in row})
         imgui.table_next_column()
@@ -89,7 +127,7 @@ class Sliders:
 
     def _slider(self, imgui: Any, name: str, row: Sequence[int], values: Floats) -> None:
         low, high = float(self._parameters.low[row[0]]), float(self._parameters.high[row[0]])
-        held = [self._commands.now.held.get(i, float(values[i])) for i in row]
+        held = [float(values[i]) if (value := self.held(i)) is None else value for i in row]
         holder = "" if self._state is None else self._state.holder(row[0])
         words = f"%.2f  {holder.replace('%', '%%')}" if holder else "%.2f"
         imgui.push_style_color(imgui.Col_.slider_grab, imgui.ImVec4(*layer_colour(holder)))
@@ -112,6 +150,11 @@ class Sliders:
         imgui.get_window_draw_list().add_line(imgui.ImVec2(x, corner.y), imgui.ImVec2(x, far.y), white, 1.5)
         if imgui.is_item_hovered():
             imgui.set_tooltip("servos show " + " and ".join(f"{x:.2f}" for x in known))
+
+    def _held_in(self, region: str) -> str:
+        """How many parameters of a region are held, for its title, which may be closed."""
+        count = sum(self.held(int(i)) is not None for i in self._parameters.region(region))
+        return f"   {count} held" if count else ""
 
     def _away(self, region: str) -> str:
         """How far the servos of a region are from their wanted angles, for its title."""

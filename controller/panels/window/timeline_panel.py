@@ -63,8 +63,10 @@ class TimelinePanel:
         if imgui.button("stop##timeline" if playback.playing else "play##timeline"):
             self._try(playback.toggle)
         imgui.same_line()
-        if imgui.button("give back##timeline"):
+        if imgui.button("release##timeline"):
             playback.stop()
+        if imgui.is_item_hovered():
+            imgui.set_tooltip("ends what plays here, and what moved the face before moves it again")
         imgui.same_line()
         imgui.text(f"{playback.position_s:.2f} of {playback.length_s:.2f} s")
 

@@ -49,6 +49,24 @@ def test_holders_measured_values_and_differences_reach_the_other_side() -> None:
         assert insight.away_deg("tongue") is None
 
 
+def test_what_is_held_by_hand_reaches_the_other_side_until_it_is_released() -> None:
+    state, out = CommandState(P), P.neutral()
+    with Mailbox.create(PanelState.size(P)) as mailbox:
+        body, panel = (PanelState(mailbox, state.layer_names(), P) for _ in range(2))
+        panel.refresh()
+        assert panel.held() is None  # not known is not released
+        state.set_parameters([JAW], [0.5], 0)
+        state.tick(10_000_000, 0.01, out)
+        body.publish(state, None)
+        panel.refresh()
+        assert panel.held() == {JAW: 0.5}
+        state.release([JAW], 20_000_000)
+        state.tick(30_000_000, 0.01, out)
+        body.publish(state, None)
+        panel.refresh()
+        assert panel.held() == {}
+
+
 def test_who_stopped_the_servos_reaches_the_other_side() -> None:
     state = CommandState(P)
     with Mailbox.create(PanelState.size(P)) as mailbox:

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from pathlib import Path
 
 import pytest
 import serial
@@ -16,22 +17,26 @@ from drivers.port.serialport import SerialPort, as_serial_port, latency_s, reply
 
 
 class Pty:
-    """The far end of a pseudo-terminal in raw mode."""
+    """The far end of a pseudo-terminal in raw mode.
 
-    def __init__(self) -> None:
+    path : a link to it, which goes with it; the system may give its own name to another program at once.
+    """
+
+    def __init__(self, path: Path) -> None:
         self.master, slave = os.openpty()
-        self.path = os.ttyname(slave)
-        self._slave = slave
+        path.symlink_to(os.ttyname(slave))
+        self._slave, self._link, self.path = slave, path, str(path)
 
     def unplug(self) -> None:
+        self._link.unlink(missing_ok=True)
         for fd in (self.master, self._slave):
             with suppress(OSError):
                 os.close(fd)
 
 
 @pytest.fixture
-def pty() -> Iterator[Pty]:
-    end = Pty()
+def pty(tmp_path: Path) -> Iterator[Pty]:
+    end = Pty(tmp_path / "port")
     yield end
     end.unplug()
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import runpy
 import tomllib
 from pathlib import Path
@@ -17,8 +18,8 @@ NOT_DESCRIBED = ("rh-p12-rn",)
 """Models that the SDK has a file of and omote no table."""
 NEWER_FIRMWARE = {"Startup Configuration", "Backup Ready"}
 """Registers of firmware 45 and later, which older versions of a page lack."""
-NO_PAGE = {"mx1-28": {"Realtime Tick"}, "mx1-12w": {"Realtime Tick"}}
-"""Registers that a page lacks though its firmware has them (the page of MX-64 says: from version 40 on)."""
+NO_SPECIFICATION = {"xw540-h260"}
+"""Models whose motor no stored version of the manual describes: its Velocity Limit is taken for its no-load speed."""
 MISPRINTS = {("ym", "Min Voltage Limit"): 4}
 """Sizes that pages print and that would overlap the next register: beginning of the model's name, register -> size."""
 SHORTENED = {f"Error Code History {k}" for k in range(1, 17)}
@@ -64,7 +65,7 @@ def test_the_registers_of_a_page_are_those_of_the_table(model: str) -> None:
         assert misprint != (item.size == size), name
         assert (item.address, item.writable) == (address, access == "RW"), name
     extra = {name for name in table if not name.startswith("Indirect ")} - set(page.rows)
-    assert extra <= NEWER_FIRMWARE | SHORTENED | NO_PAGE.get(model, set())
+    assert extra <= NEWER_FIRMWARE | SHORTENED
 
 
 @pytest.mark.parametrize("model", [name for name in DYNAMIXEL if load_table(name).protocol == 2])
@@ -176,6 +177,33 @@ def test_a_motor_can_be_supplied_within_the_limits_that_its_servo_has(model: str
         return
     assert table.motor.lowest_v <= table.motor.supply_v <= table.motor.highest_v
     assert table["Min Voltage Limit"].initial <= 10 * table.motor.supply_v <= table["Max Voltage Limit"].initial
+
+
+@pytest.mark.parametrize("model", DYNAMIXEL)
+def test_each_model_has_the_no_load_speed_of_its_own_motor(model: str) -> None:
+    """Also where a family of models of Protocol 1.0 shares one table."""
+    table = load_table(model)
+    if table.motor is None:
+        assert model in NO_SPECIFICATION
+        return
+    item = table.get("Present Velocity") or table["Present Speed"]
+    assert table.top_speed * item.scale == pytest.approx(table.motor.no_load_rad_s, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("model", "rpm"), [("ax-12a", 0.111), ("mx1-28", 0.114), ("mx1-106", 0.114), ("mx1-12w", 0.916)]
+)
+def test_a_step_of_speed_is_what_the_descriptions_below_the_tables_give(model: str, rpm: float) -> None:
+    """Moving Speed (32) of the pages of AX and MX, which have no column of units."""
+    for name in ("Moving Speed", "Present Speed"):
+        assert load_table(model)[name].scale == pytest.approx(rpm * 2 * math.pi / 60, rel=1e-3)
+
+
+def test_a_step_of_acceleration_of_mx_servos() -> None:
+    """Goal Acceleration (73): 8.583 degrees/s^2 a step, and 14.3 rev/min one second after 10 were set."""
+    scale = load_table("mx1-64")["Goal Acceleration"].scale
+    assert scale == pytest.approx(math.radians(8.583), rel=1e-5)
+    assert 10 * scale == pytest.approx(14.3 * 2 * math.pi / 60, rel=1e-3)
 
 
 # ---------------------------------------------------------------------------- reading pages

@@ -64,7 +64,7 @@ export class Sliders {
     const label = words(name), id = `p-${name}`;
     const input = make("input", { id, type: "range", min: range.low, max: range.high, step: 0.01, value: 0 });
     const output = make("output", { for: id, text: "0.00" });
-    const free = make("button", { type: "button", class: "free", "aria-label": `Release ${label}`, title: "Release", text: "×", onclick: () => this.release(name) });
+    const free = make("button", { type: "button", class: "free", "aria-label": `Release ${label}`, title: "Release: expressions, idle motion, speech and live faces move it again", text: "×", onclick: () => this.release(name) });
     const row = make("div", { class: "row" }, make("span", {}, make("label", { for: id, text: label })), input, output, free);
     input.addEventListener("input", () => this.move(name, Number(input.value)));
     for (const [event, touched] of [["pointerdown", true], ["pointerup", false], ["pointercancel", false]]) input.addEventListener(event, () => { this.#rows.get(name).touched = touched; });
@@ -107,7 +107,7 @@ export class Sliders {
   hold(held, holders) {
     for (const [name, { row, free }] of this.#rows) {
       row.classList.toggle("held", name in held);
-      row.title = holders[name] ? `moved by ${holders[name]}` : "";
+      row.title = name in held ? "held by hand, or by a command" : holders[name] ? `moved by ${holders[name]}` : "";
       free.hidden = !(name in held);
     }
   }

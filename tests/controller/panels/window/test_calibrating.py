@@ -82,11 +82,12 @@ def test_a_slider_turns_the_servo_within_its_limits_until_it_is_given_back() -> 
     assert (shown, low, high) == (4.0, -10.0, 30.0) and words == "jaw %.1f deg" and sent == []
     library = drawn(calibrating, to=12.5)
     assert sent == [Jog("head", "jaw", 12.5)]
-    assert any(label.startswith("give back") for (label,) in library.named("button"))
+    assert any(label.startswith("release") for (label,) in library.named("button"))
+    assert library.named("set_tooltip") == [("the servo follows the face again",)]
     assert drawn(calibrating).named("slider")[0][1] == 12.5  # and not where the face wants it
-    drawn(calibrating, pressed="give back")
+    drawn(calibrating, pressed="release")
     assert sent[-1] == Jog("head", "jaw", None) and drawn(calibrating).named("slider")[0][1] == 4.0
-    assert not any(label.startswith("give back") for (label,) in drawn(calibrating).named("button"))
+    assert not any(label.startswith("release") for (label,) in drawn(calibrating).named("button"))
     drawn(calibrating, to=20.0)
     calibrating.forget()
     assert drawn(calibrating).named("slider")[0][1] == 4.0 and len(sent) == 3

@@ -219,6 +219,6 @@ def test_the_panel_shows_who_holds_a_parameter_and_how_far_the_servos_are(
         draw = drawn(panel, "Sliders")
         for _ in range(2):
             screen.frame(draw)
-        screen.click(draw, *places.at["jaw   servos 3.0 deg away###jaw"])
+        screen.click(draw, *places.at["jaw   1 held   servos 3.0 deg away###jaw"])
         screen.frame(draw)
     assert places.formats["##jawOpen"] == "%.2f  manual"

@@ -77,7 +77,7 @@ def test_a_servo_is_turned_by_hand_captured_and_given_back(
     screen.click(draw, *places.at[f"clear##{key}"])
     assert panel.calibrating._captures.of(servo).neutral is None
     screen.frame(draw)
-    screen.click(draw, *places.at[f"give back##{key}"])
+    screen.click(draw, *places.at[f"release##{key}"])
     assert Jog("head", servo["name"], None) in sent
     screen.click(draw, *places.at["the face mirrors the servos"])
     assert mirrored == [True]

@@ -50,10 +50,14 @@ class Widgets(Drawn):
 
 
 class Servos:
-    """Stands for the body's state: the jaw is held by speech, and its servo shows 0.25."""
+    """Stands for the body's state: the jaw is held by speech, and its servo shows 0.25. ``by_hand`` : what is held."""
 
     def __init__(self, shown: dict[int, float]) -> None:
         self.shown = shown
+        self.by_hand: dict[int, float] | None = None
+
+    def held(self) -> dict[int, float] | None:
+        return self.by_hand
 
     def holder(self, index: int) -> str:
         return "speech 50%" if index == JAW else ""
@@ -105,12 +109,74 @@ def test_the_lock_holds_a_face_as_it_is_and_gives_it_back() -> None:
     sliders._row(drawn, "mouthSmile", SMILE)
     assert commands.now.held == {SMILE[0]: 0.2, SMILE[1]: 0.6}
     assert [on for _, on in drawn.named("checkbox")] == [False]
-    assert drawn.named("set_tooltip")[0][0].startswith("give back to the layers")  # it is locked now
+    assert drawn.named("set_tooltip")[0][0].startswith("held by hand, or by a command\nuntick: release it")
     sliders._row(drawn, "mouthSmile", SMILE)
-    assert commands.now.held == {} and drawn.named("set_tooltip")[1][0].startswith("hold by hand")
+    assert commands.now.held == {} and drawn.named("set_tooltip")[1][0].startswith("tick: hold it by hand")
     commands.hold({SMILE[0]: 0.1})
     sliders._row(Widgets(clicked="mouthSmile"), "mouthSmile", SMILE)  # type: ignore[arg-type]
     assert set(commands.now.held) == set(SMILE)  # one side alone is not locked
+
+
+class Desk:
+    """Sliders beside a body: ``told`` stands for its state, and ``now_s`` is the time."""
+
+    def __init__(self) -> None:
+        self.sent: list[Any] = []
+        self.commands, self.told, self.now_s = Commands(self.sent.append), Servos({}), 10.0
+        state: Any = self.told
+        self.sliders = Sliders(PARAMETERS.neutral, self.commands, state, clock=lambda: self.now_s)
+
+    def drawn(self, *, pressed: str = "", clicked: str = "") -> Any:
+        """What one frame of the line above the sliders and the row of the jaw draws."""
+        library: Any = Widgets(clicked=clicked)
+        library.pressed = pressed
+        self.sliders.listen()
+        self.sliders._all_held(library)
+        self.sliders._row(library, "jawOpen", (JAW,))
+        return library
+
+
+@pytest.fixture
+def desk() -> Desk:
+    return Desk()
+
+
+def test_what_a_link_holds_is_ticked_and_can_be_released_here(desk: Desk) -> None:
+    assert [on for _, on in desk.drawn().named("checkbox")] == [False]  # nothing is known yet
+    desk.told.by_hand = {JAW: 0.6}
+    drawn = desk.drawn()
+    assert [on for _, on in drawn.named("checkbox")] == [True] and drawn.named("slider")[0][1] == 0.6
+    assert drawn.named("text_disabled") == [("1 held",)]
+    assert desk.sliders._held_in("jaw") == "   1 held" and desk.sliders._held_in("mouth") == ""
+    desk.drawn(clicked="jawOpen")
+    assert desk.sent == [Hold(JAW, None)] and not desk.commands.undoable
+
+
+def test_what_another_panel_has_released_is_forgotten_here_but_not_what_was_just_set(desk: Desk) -> None:
+    desk.told.by_hand = {}
+    desk.commands.hold({JAW: 0.7})
+    assert [on for _, on in desk.drawn().named("checkbox")] == [True]
+    desk.now_s += 0.9  # the body may not have told yet
+    assert [on for _, on in desk.drawn().named("checkbox")] == [True]
+    desk.told.by_hand = {JAW: 0.7}
+    desk.now_s += 5.0
+    assert [on for _, on in desk.drawn().named("checkbox")] == [True]
+    desk.told.by_hand = {}
+    assert [on for _, on in desk.drawn().named("checkbox")] == [False] and desk.commands.now.held == {}
+    desk.commands.hold({JAW: 0.7})
+    assert desk.sent == [Hold(JAW, 0.7), Hold(JAW, 0.7)]  # it is not taken for what is held already
+
+
+def test_all_are_released_together_whoever_holds_them(desk: Desk) -> None:
+    assert desk.drawn().named("text_disabled") == [("a tick holds a value by hand",)]
+    desk.commands.hold({YAW: 0.2})
+    desk.drawn()
+    desk.told.by_hand, desk.now_s = {YAW: 0.2, JAW: 0.6}, 20.0
+    desk.drawn(pressed="release all")
+    assert {*desk.sent[1:]} == {Hold(YAW, None), Hold(JAW, None)}
+    assert desk.commands.now.held == {}
+    desk.commands.undo()
+    assert desk.commands.now.held == {YAW: 0.2}
 
 
 def test_a_slider_says_who_holds_it() -> None:

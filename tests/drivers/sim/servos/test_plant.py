@@ -200,8 +200,8 @@ def test_the_play_of_a_model_is_that_of_its_specification():
     Feetech: at most 0.5 degrees (STS3215, STS3250).
     """
     arcmin = 4096 / 360 / 60
-    plays = {"xm430-w350": 15 * arcmin, "mx-64": 20 * arcmin, "xl330-m288": 0.0, "ph54-100-s500": 0.0,
-        "sts3215": 30 * arcmin, "scs0009": 0.0}  # fmt: skip
+    plays = {"xm430-w350": 15 * arcmin, "xd540-t270": 15 * arcmin, "xw430-t333": 15 * arcmin, "mx-64": 20 * arcmin,
+        "xl330-m288": 0.0, "ph54-100-s500": 0.0, "sts3215": 30 * arcmin, "scs0009": 0.0}  # fmt: skip
     for model, play in plays.items():
         assert load_table(model).play_ticks == pytest.approx(play), model
         assert ServoState(1, model).plant.play == pytest.approx(play), model
