@@ -86,6 +86,41 @@ class _Alike:
         return np.hstack([rows, np.zeros((len(rows), 1))])[:, self.order]
 
 
+@dataclass
+class LoadedHead:
+    """A head of a wall. stage : of the first head that looks so. order : its parameters' indices in full vectors.
+    places : numbers in the stage of all heads that look like it."""
+
+    head: Head
+    stage: Stage
+    order: np.ndarray
+    places: list[int] = field(default_factory=list)
+
+    def camera(self, tile: tuple[int, int]) -> Camera:
+        """A camera that shows the head whole in a tile of a size, pixels."""
+        narrow = min(1.0, tile[0] / tile[1] / _ASPECT)
+        return zoom_to_head(framed(self.stage.settings.face.make_camera(), self.head)).zoom(narrow)
+
+
+def load_heads(
+    stages: Sequence[Stage], parameters: Parameters, wanted: Callable[[], bool] = lambda: True
+) -> list[LoadedHead]:
+    """Load the heads of a stage, one for all that look alike; those left out that come after ``wanted`` is False.
+
+    stages : of each head, as if it were the only one. Raises SurfaceError: a head cannot be read.
+    """
+    found: dict[object, LoadedHead] = {}
+    for i, stage in enumerate(stages):
+        look = _look_of(stage)
+        if look not in found:
+            if not wanted():
+                break
+            head = stage.load_head()
+            found[look] = LoadedHead(head, stage, head_indices(parameters, head.parameters))
+        found[look].places.append(i)
+    return list(found.values())
+
+
 class Wall:
     """The heads of a stage, each in a tile of one picture; a context manager.
 
@@ -103,14 +138,10 @@ class Wall:
         self.names = tuple(head.name for head in stage.heads)
         self.columns, rows = grid(len(stages), size)
         self.tile = max(16, size[0] // self.columns), max(16, size[1] // rows)
-        self._alike: dict[object, _Alike] = {}
-        for i, each in enumerate(stages):
-            look = _look_of(each)
-            if look not in self._alike:
-                self._alike[look] = _Alike(*_head_of(each, parameters, self.tile))
-            self._alike[look].places.append(i)
+        loaded = load_heads(stages, parameters)
+        self._alike = [_Alike(each.head, each.camera(self.tile), each.order, each.places) for each in loaded]
         self._closers, first = ExitStack(), None
-        for alike in self._alike.values():
+        for alike in self._alike:
             screen = self._closers.enter_context(alike.begin(self.tile, face, first))
             first = first or screen
         assert first is not None
@@ -121,7 +152,7 @@ class Wall:
 
         rows : (n, P) full parameter vectors, in the order of the stage.
         """
-        for alike in self._alike.values():
+        for alike in self._alike:
             alike.draw(rows[alike.places], time_s)
 
     def pictures(self, rows: Floats, *, drawn: bool = False) -> list[Image]:
@@ -130,14 +161,14 @@ class Wall:
         drawn : :meth:`draw` has begun them.
         """
         found: dict[int, Image] = {}
-        for alike in self._alike.values():
+        for alike in self._alike:
             found.update(zip(alike.places, alike.pictures(rows[alike.places], drawn=drawn), strict=True))
         return [found[i] for i in range(len(rows))]
 
     @property
     def crowded(self) -> bool:
         """Whether some heads look alike, so that :meth:`draw` does not draw all of them."""
-        return any(alike.crowd is not None for alike in self._alike.values())
+        return any(alike.crowd is not None for alike in self._alike)
 
     def joined(self, pictures: Sequence[Image]) -> Image:
         """Pictures of the heads as one, (h, w, 3) uint8."""
@@ -197,11 +228,3 @@ def _look_of(stage: Stage) -> object:
     """Equal for stages whose heads look alike."""
     identity = tuple(sorted(stage.settings.identity.items()))
     return stage.head, identity, stage.groups, tuple((person.path, share) for person, share in stage.persons)
-
-
-def _head_of(stage: Stage, parameters: Parameters, tile: tuple[int, int]) -> tuple[Head, Camera, np.ndarray]:
-    """A head, a camera that shows it whole in a tile, and the place of each of its parameters."""
-    head = stage.load_head()
-    narrow = min(1.0, tile[0] / tile[1] / _ASPECT)
-    camera = zoom_to_head(framed(stage.settings.face.make_camera(), head)).zoom(narrow)
-    return head, camera, head_indices(parameters, head.parameters)

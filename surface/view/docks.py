@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
+    import moderngl
+
     from surface.view.draw.renderer import Renderer
     from surface.view.scene.choice import QualityChoice
 
@@ -46,12 +48,23 @@ class Remake:
     done: Callable[[Exception | None], None]
 
 
+class Instead(Protocol):
+    """What a window can show in place of its head."""
+
+    def draw(self, ctx: moderngl.Context, size: tuple[int, int]) -> moderngl.Framebuffer | None:
+        """The next picture of ``size``, pixels; None for the head, after all."""
+
+    def release(self) -> None:
+        """Release the graphics memory; called while the context exists."""
+
+
 @dataclass
 class PictureArea:
     """Where the picture is in a window, in ImGui's points from the window's top left corner.
 
     wanted : gets the next picture once, (height, width, 3) uint8. bare : the caller hides all docked panels.
     remake : drawn from the next frame on. dropped : gets files that are dropped on the window.
+    instead : draws something else in place of the head; the mouse does not turn the head meanwhile.
     """
 
     left: float = 0.0
@@ -62,6 +75,7 @@ class PictureArea:
     bare: bool = False
     remake: Remake | None = None
     dropped: Callable[[Sequence[Path]], None] | None = None
+    instead: Instead | None = None
 
 
 LINE = 16.0

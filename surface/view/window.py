@@ -285,6 +285,10 @@ class _Window:
         for each in self._drawings.values():
             each.size = size
         values, camera = self._source(), self._viewpoint.camera
+        if self.area.instead is not None and self._ctx is not None:
+            picture = self.area.instead.draw(self._ctx, size)
+            if picture is not None:
+                return picture
         if self._alternating is not None:
             self._alternating.draw(values, camera)
             return self._alternating.picture()
@@ -326,7 +330,7 @@ class _Window:
         """Apply this frame's mouse and keys to the camera, unless a panel uses them."""
         imgui, viewpoint = self._imgui, self._viewpoint
         io = imgui.get_io()
-        if not io.want_capture_mouse:
+        if not io.want_capture_mouse and self.area.instead is None:
             moved = io.mouse_delta
             if imgui.is_mouse_down(imgui.MouseButton_.left):
                 viewpoint.turn(moved.x, moved.y)
@@ -351,10 +355,11 @@ class _Window:
 
     def stop(self) -> None:
         """Release the graphics memory, while the context still exists."""
-        for thing in (self._placing, self._alternating, *self._drawings.values()):
+        for thing in (self.area.instead, self._placing, self._alternating, *self._drawings.values()):
             if thing is not None:
                 thing.release()
         self._ctx, self._placing, self._alternating, self._drawings = None, None, None, {}
+        self.area.instead = None
 
     def _pixels(self) -> tuple[int, int]:
         """Size of the window's framebuffer, pixels."""

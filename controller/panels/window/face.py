@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.base.errors import OMOTE_ERRORS
-from controller.base.parameters import PARAMETERS
+from controller.base.parameters import PARAMETERS, Parameters
 from controller.body.messages import Details, PanelRequest, ToHead
 from controller.body.panel_state import PanelState
 from controller.face.controls import Controls
@@ -26,6 +26,7 @@ from controller.panels.window.heads import HeadChoice, HeadSource
 from controller.panels.window.looks import Looks
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.panels.window.sculpting import SculptPanel
+from controller.panels.window.wall_view import WallView
 from controller.stage.stage import FaceSettings, Stage
 from controller.vocabulary.controls import ControlsFile
 from surface.head import Head
@@ -48,7 +49,7 @@ class WindowFace:
     copy : loads the head again, for dragging points with the mouse; without, none can be dragged.
     controls : what gamepad and keys do. stage : whose look can be changed; without, it stays as it is.
     details : the newest answer of the body to the panel. carried : what was set in the window before this one.
-    heads : of a stage that has several, the first of which is shown first.
+    heads : of a stage that has several, which are shown side by side.
 
     Attributes
     ----------
@@ -80,6 +81,7 @@ class WindowFace:
         parameters = PARAMETERS if options is None else options.parameters
         self._panel = Panel(newest, ask, panel_state, options, self._viewpoint, self._area, details=details)
         self._panel.heads = choice
+        self._wall = self._make_wall(choice, heads, parameters) if len(heads) > 1 else None
         if details is not None and panel_state is not None:
             self._panel.calibrating.mirror = partial(self._mirror, panel_state)
         self.next_run: NextRun | None = None
@@ -132,7 +134,7 @@ class WindowFace:
                 source,
                 size=self._settings.size,
                 title=_TITLE,
-                gui=None if kiosk and self._devices is None else self._gui,
+                gui=None if kiosk and self._devices is None and self._wall is None else self._gui,
                 keep_going=lambda: keep_going() and not self._ended,
                 camera=self._viewpoint,
                 quality=self._choice or self._settings.still_quality,
@@ -145,6 +147,16 @@ class WindowFace:
             )
         finally:
             self._panel.playback.close()
+
+    def _make_wall(self, choice: HeadChoice, heads: Sequence[HeadSource], parameters: Parameters) -> WallView:
+        """Show all heads as soon as they are loaded, and one until then."""
+        settings, panel = self._settings, self._panel
+        quality = "fast" if settings.quality == "auto" else settings.quality
+        wall = WallView(heads, parameters, quality, self._area, panel.jobs, panel.problems)
+        wall.chosen, wall.choose = lambda: choice.chosen, lambda number: choice.choose(number, panel.commands)
+        choice.wall = wall
+        wall.switch(True)
+        return wall
 
     def _swap(self, head: Head | None, settings: FaceSettings) -> None:
         """Draw another head, or the same in another look, from the next frame on."""
@@ -206,10 +218,18 @@ class WindowFace:
         self.next_run, self._ended = NextRun(stage.path, files, history, options.parameters.names, held), True
 
     def _gui(self) -> None:
+        from imgui_bundle import imgui  # optional
+
         if not self._settings.kiosk:
             self._panel()
+        elif self._wall is not None:
+            self._panel.jobs()
         if self._devices is not None:
             self._devices()
+        if self._wall is not None and self._wall.shown:
+            if not self._settings.kiosk:
+                self._wall(imgui)
+            return  # points to pull and overlays belong to a head that is shown alone
         if self._mouse is not None:
             self._mouse(self._viewpoint.camera)
         if self._overlays is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from controller.base.mailboxes import Mailbox
 from controller.body.messages import PanelRequest, StartServos, StopServos, ToHead
@@ -12,6 +13,9 @@ from controller.body.panel_state import PanelState
 from controller.face.face import HeadValues
 from controller.panels.session.commands import Commands
 from controller.stage.stage import Stage
+
+if TYPE_CHECKING:
+    from controller.panels.window.wall_view import WallView
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,7 @@ class HeadChoice:
     Attributes
     ----------
     chosen : the number of the head that is shown. show : shows the head of a stage; set by who can.
+    wall : shows all heads side by side; None where that is not possible.
     """
 
     def __init__(
@@ -43,6 +48,7 @@ class HeadChoice:
         self._values, self._state, self._tell = values, state, tell
         self.chosen = 0
         self.show: Callable[[Stage], None] = lambda stage: None
+        self.wall: WallView | None = None
 
     @property
     def names(self) -> list[str]:
@@ -76,3 +82,9 @@ class HeadChoice:
         changed, number = imgui.combo("head", self.chosen, self.names)
         if changed:
             self.choose(number, commands)
+        if self.wall is not None:
+            imgui.same_line()
+            changed, on = imgui.checkbox("all", self.wall.on)
+            imgui.set_item_tooltip("Show all heads side by side. Click one to move it, double-click to see it alone.")
+            if changed:
+                self.wall.switch(on)

@@ -1,0 +1,122 @@
+"""Draws all heads of a stage into one picture, in the context of a window."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from controller.base.mailboxes import Mailbox
+from controller.base.parameters import Floats, Parameters
+from controller.face.wall import LoadedHead, grid
+from surface.head import Crowd
+from surface.head.model.parameters import head_angles
+from surface.view.draw.placing import Box, Placing
+from surface.view.draw.renderer import Renderer
+from surface.view.live import LiveDrawing
+
+if TYPE_CHECKING:
+    import moderngl
+
+
+class LiveWall:
+    """The heads of a stage, each in a tile of one picture.
+
+    A renderer takes some tenths of a second to make, so one is made in each frame: heads appear one after the other,
+    and the window goes on.
+
+    loaded : from :func:`controller.face.wall.load_heads`. mailboxes : of all heads, in the order of the stage.
+    quality : "full" or "fast".
+    """
+
+    def __init__(
+        self, loaded: Sequence[LoadedHead], parameters: Parameters, mailboxes: Sequence[Mailbox], quality: str
+    ) -> None:
+        self._waiting, self._groups = list(loaded), list[_Group]()
+        self._mailboxes, self._quality = mailboxes, quality
+        self._rows = np.zeros((len(mailboxes), len(parameters) + 1))  # with a 0 for parameters that omote does not know
+        self._size = 0, 0
+        self._picture: moderngl.Framebuffer | None = None
+        self._placing: Placing | None = None
+
+    def boxes(self, size: tuple[float, float]) -> list[tuple[float, float, float, float]]:
+        """Left, top, width and height of each head's tile in a picture of a size, from its top left corner."""
+        columns, rows = grid(len(self._mailboxes), (int(size[0]), int(size[1])))
+        width, height = size[0] // columns, size[1] // rows
+        left, top = (size[0] - columns * width) // 2, (size[1] - rows * height) // 2
+        return [
+            (left + i % columns * width, top + i // columns * height, width, height)
+            for i in range(len(self._mailboxes))
+        ]
+
+    def draw(self, ctx: moderngl.Context, size: tuple[int, int]) -> moderngl.Framebuffer:
+        """The next picture of all heads, of ``size``, pixels."""
+        if self._waiting:
+            self._groups.append(_Group(ctx, self._waiting.pop(0), self._quality))
+        if self._picture is None or size != self._size:
+            self._make_picture(ctx, size)
+        assert self._picture is not None and self._placing is not None
+        for mailbox, row in zip(self._mailboxes, self._rows, strict=True):
+            mailbox.read(row[:-1])
+        boxes = [_from_below(box, size) for box in self.boxes(size)]
+        for group in self._groups:
+            group.draw(self._rows, boxes, self._picture, self._placing)
+        return self._picture
+
+    def _make_picture(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
+        self._release_picture()
+        self._size = size
+        self._picture = ctx.framebuffer([ctx.texture(size, 4)])
+        self._picture.clear()
+        self._placing = self._placing or Placing(ctx)
+
+    def _release_picture(self) -> None:
+        if self._picture is not None:
+            self._picture.color_attachments[0].release()
+            self._picture.release()
+            self._picture = None
+
+    def release(self) -> None:
+        """Release the graphics memory."""
+        self._release_picture()
+        for group in self._groups:
+            group.drawing.release()
+        if self._placing is not None:
+            self._placing.release()
+        self._groups, self._placing = [], None
+
+
+class _Group:
+    """Heads that look alike: one that is posed by its renderer, or several that are posed in one batch."""
+
+    def __init__(self, ctx: moderngl.Context, loaded: LoadedHead, quality: str) -> None:
+        face, alone = loaded.stage.settings.face, len(loaded.places) == 1
+        self._loaded = loaded
+        self._crowd = None if alone else Crowd(loaded.head, len(loaded.places))
+        evaluator = face.evaluator if alone else "cpu"
+        renderer = Renderer(ctx, loaded.head, quality=quality, theme=face.make_theme(), evaluator=evaluator)
+        self.drawing = LiveDrawing(renderer, posed_elsewhere=not alone)
+
+    def draw(self, rows: Floats, boxes: Sequence[Box], picture: moderngl.Framebuffer, placing: Placing) -> None:
+        """Draw the heads in the poses of ``rows (n, P + 1)`` into their ``boxes`` of a picture."""
+        places, head = self._loaded.places, self._loaded.head
+        self.drawing.size = boxes[places[0]][2:]
+        values, camera = rows[places][:, self._loaded.order], self._loaded.camera(self.drawing.size)
+        if self._crowd is None:
+            head.sway.advance(head_angles(values[0]), time.monotonic())
+            self.drawing.draw(values[0], camera)
+            placing.copy(picture, self.drawing.target.picture, boxes[places[0]])
+            return
+        self._crowd.pose(values)
+        for k, place in enumerate(places):
+            self._crowd.show(k)
+            self.drawing.draw_present(camera)
+            placing.copy(picture, self.drawing.target.picture, boxes[place])
+
+
+def _from_below(box: tuple[float, float, float, float], size: tuple[int, int]) -> Box:
+    """A box as OpenGL counts it, from the lower left corner."""
+    left, top, width, height = (int(number) for number in box)
+    return left, size[1] - top - height, width, height
