@@ -17,6 +17,7 @@ from surface.fit.eyes.drawn_lids import seat_drawn_lids
 from surface.fit.eyes.lids import fit_lids, gazes_of
 from surface.fit.features.blink_squints import cancel_squints_in_blinks
 from surface.fit.features.combs import combed
+from surface.fit.features.cutouts import cut_out
 from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
@@ -233,6 +234,8 @@ def _fit_parts(
         parts.append(skin_part(part, chart, fitted, rig))
         if comb and part.material == "lash" and not recipe.parts and rig.radius > 0:
             parts[-1] = combed(parts[-1], mesh, islands, rig.eyes, scale)
+        if not recipe.parts:
+            parts[-1] = cut_out(parts[-1], mesh, islands)
         reports.append(report)
         fitted_parts.append(FittedPart(part.name, chart, fitted, chart.mix @ mesh.vertices))
         if recipe.hair and recipe.hair["face"] == part.name:

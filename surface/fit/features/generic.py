@@ -31,6 +31,7 @@ from surface.mesh.tessellate import MOST_ROOTS
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.3  # in spacings of the mesh: the largest around a place count, and a coarse mesh has corners and creases
+BEND = 0.1  # weight of what bends within faces of the mesh: shading shows waves that distances do not
 ASTRAY_MM = 1.8  # of a head of usual size: where the surface is further off, it is mended
 SPARE = 60  # points of the face that are kept for mending
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
@@ -148,7 +149,8 @@ def _part(
     face = name == "face"
     request = FitRequest(
         points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale,
-        finest=FINEST, growth=GROWTH if face else 1.25, astray_mm=ASTRAY_MM * scale, spare=SPARE if face else 0,
+        finest=FINEST, bend=BEND, growth=GROWTH if face else 1.25,
+        astray_mm=ASTRAY_MM * scale, spare=SPARE if face else 0,
     )  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth

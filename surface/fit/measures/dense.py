@@ -18,7 +18,8 @@ from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, Fitted
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.head import Head
-from surface.head.model.data import HeadData
+from surface.head.model.data import HeadData, PartData
+from surface.head.model.meshes import domain_of
 from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
 
 NO_TRIANGLES = np.zeros((0, 3), np.int64)
@@ -27,23 +28,25 @@ NO_TRIANGLES = np.zeros((0, 3), np.int64)
 class _Pair:
     """A part of the head and the faces of the mesh that it was fitted to, with samples of both.
 
+    data : the part as it is drawn; what its outlines cut off has no samples on the mesh.
     rest : samples of the surface and of the mesh at rest, each (m, 3).
     """
 
-    def __init__(self, part: FittedPart, number: int, subject: Subject, mesh: FitMesh) -> None:
+    def __init__(self, part: FittedPart, data: PartData, number: int, subject: Subject, mesh: FitMesh) -> None:
         self.name, self.number = part.name, number
         self._uv = np.asarray(subject.parts[number].uv, np.float64)
         faces = mesh.faces[faces_of(mesh, part.chart)]
         self.turned = InsideOutFaces(part, subject.parts[number])
-        self._cut = subject.parts[number].triangles.astype(np.int64), triangles(faces)
-        self._used = np.unique(self._cut[0]), np.unique(self._cut[1])
+        shown, every = ~_cut_off(mesh, part, data), triangles(faces)
+        self._cut = subject.parts[number].triangles.astype(np.int64), every[shown[every].all(axis=1)]
+        self._used = np.unique(self._cut[0]), np.unique(every)[shown[np.unique(every)]]
         at = subject.rest[number].astype(np.float64), mesh.vertices
-        self._trees = ClosestTree(at[0], self._cut[0]), ClosestTree(at[1], self._cut[1])
+        self._trees = ClosestTree(at[0], self._cut[0]), ClosestTree(at[1], every)
         self._near = [np.zeros(len(t) + len(u), np.int64) for t, u in zip(self._cut, self._used, strict=True)]
         self.rest = self._samples(0, at[0]), self._samples(1, at[1])
         folded = _folded(mesh, part)
-        flat: Bools = np.asarray(folded[self._cut[1]].any(axis=1))
-        self._fold_of, self._fold_at = flat[self._trees[1].order], np.concatenate([folded[self._used[1]], flat])
+        flat, whole = (np.asarray(folded[cut].any(axis=1), bool) for cut in (self._cut[1], every))
+        self._fold_of, self._fold_at = whole[self._trees[1].order], np.concatenate([folded[self._used[1]], flat])
 
     def _samples(self, k: int, vertices: Floats) -> Floats:
         """Vertices and centres of triangles of the head's part (0) or of the mesh (1)."""
@@ -108,7 +111,9 @@ def measure_dense(
     places = Places(subject, find_mouth(subject))
     numbers = {p.name: k for k, p in enumerate(subject.parts)}
     owned = [faces_of(mesh, p.chart) for p in parts]
-    pairs = [_Pair(p, numbers[p.name], subject, mesh) for p, own in zip(parts, owned, strict=True) if own.any()]
+    data = {p.name: p for p in head.parts}
+    fitted = [p for p, own in zip(parts, owned, strict=True) if own.any()]
+    pairs = [_Pair(p, data[p.name], numbers[p.name], subject, mesh) for p in fitted]
     found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
     worst: dict[bool, Spot] = {}
     apart: Spot | None = None
@@ -209,6 +214,17 @@ def _folded(mesh: FitMesh, part: FittedPart) -> Bools:
     alone = np.diff(mix.indptr) == 1  # samples that are a vertex
     out = np.zeros(len(mesh.vertices), bool)
     out[mix.indices[mix.indptr[:-1][alone & part.chart.folded]]] = True
+    return out
+
+
+def _cut_off(mesh: FitMesh, part: FittedPart, data: PartData) -> Bools:
+    """(n,) vertices of the mesh that are not drawn: its outlines were narrowed to what a texture shows, or to hairs."""
+    out, chart = np.zeros(len(mesh.vertices), bool), part.chart
+    if len(data.loops) == len(chart.loops) and all(map(np.array_equal, data.loops, chart.loops)):
+        return out
+    alone = np.flatnonzero(np.diff(chart.mix.indptr) == 1)
+    gone = alone[~domain_of(data).inside(chart.uv[alone])]
+    out[chart.mix.indices[chart.mix.indptr[gone]]] = True
     return out
 
 

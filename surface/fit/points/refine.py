@@ -33,6 +33,7 @@ class FitRequest:
 
     points : most control points; coarse : spacing of the first net, in tiles; deepest : its finest level.
     neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
+    bend : weight of bending within faces of the mesh, where it says nothing of the form, relative to that of slopes.
     growth : most factor by which the net grows between two solves.
     finest : least spacing of a net, in spacings of the mesh's vertices.
     astray_mm : where the surface is further off, also between samples, it is mended; spare : points kept for that.
@@ -44,6 +45,7 @@ class FitRequest:
     neutral_mm: float = 0.25
     shape_mm: float = 0.3
     fair: float = 1e-4
+    bend: float = 0.0
     growth: float = 1.25
     finest: float = 1.2
     astray_mm: float = 2.5
@@ -99,7 +101,7 @@ def _refined(
         slopes = chart.slopes, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
     while True:
         b = basis(net, chart.uv)
-        solved = solve(net, b, chart.weight, targets, hold.fair(net, request.fair), slopes)
+        solved = solve(net, b, chart.weight, targets, hold.fair(net, request.fair), slopes, request.bend)
         fitted = _measured(net, b, targets, solved)
         report(min(1.0, len(net) / request.points))
         room = request.points - len(net)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 from scipy.sparse import csr_matrix, diags, identity
@@ -30,6 +32,20 @@ def fairness(net: Net) -> csr_matrix:
     A Laplacian in effect: it decides what the samples leave open, and damps waves between levels.
     """
     return (identity(len(net)) - basis(net, net.centres)).tocsr()
+
+
+def bending(net: Net, slopes: Slopes, axis: int, centre: csr_matrix) -> Iterator[csr_matrix]:
+    """Rows (f, n) that vanish where the surface does not bend within the faces of a mesh, one for each corner.
+
+    What stands closer than the mesh's vertices may wave between them, for positions and slopes say nothing there. These
+    rows are the differences of the slope along ``axis`` half-way to a corner and that in the face's ``centre (f, n)``.
+    """
+    derivative = ((1, 0), (0, 1))[axis]
+    for k in range(slopes.corners.shape[1]):
+        half = 0.5 * (slopes.uv + slopes.corners[:, k])
+        (rows,) = basis_matrices(_surface(net), half, [derivative])
+        rows.data *= np.repeat(slopes.span[:, axis], np.diff(rows.indptr))
+        yield (rows - centre).tocsr()
 
 
 @kernel
@@ -61,13 +77,13 @@ def normal_equations(rows: csr_matrix, weight: Floats, targets: Floats) -> tuple
 
 def solve(
     net: Net, samples: csr_matrix, weight: Floats, targets: Floats, fair: float | Floats,
-    slopes: tuple[Slopes, Floats, Floats] | None = None,
+    slopes: tuple[Slopes, Floats, Floats] | None = None, bend: float = 0.0,
 ) -> Floats:  # fmt: skip
     """Control point coordinates (n, c) for all targets (m, c) at once.
 
     Minimises sum weight (B P - target)^2 + slopes + fair (m / n) |F P|^2 with F of :func:`fairness`; one
     factorisation serves every right-hand side. ``slopes`` come with their targets (f, c) in u and in v. ``fair`` is one
-    number, or one of each control point (n,).
+    number, or one of each control point (n,). ``bend`` : weight of :func:`bending` relative to that of slopes.
     """
     n = len(net)
     normal, right = normal_equations(samples, weight, targets)
@@ -78,6 +94,10 @@ def solve(
             more, more_right = normal_equations(slope, where.weight, wanted[axis])
             normal += more
             right += more_right
+            if bend > 0.0:
+                still = np.zeros((len(where.weight), 0))
+                for rows in bending(net, where, axis, slope):
+                    normal += normal_equations(rows, bend * where.weight, still)[0]
     strength = weight.sum() / n
     f = fairness(net)
     normal += (strength * (f.T @ diags(np.broadcast_to(fair, n)) @ f)).toarray()

@@ -230,7 +230,7 @@ class Slopes:
 
     uv : (f, 2) face centres; span : (f, 2) a face's extent in u and in v.
     mix_u, mix_v : (f, n) sparse; times the mesh's n vertices: what a surface's S_u, S_v times span should be.
-    weight : (f,) in least squares.
+    weight : (f,) in least squares. corners : (f, 4, 2) of the faces in (u, v); the centre where there is no fourth.
     """
 
     uv: Floats
@@ -238,6 +238,7 @@ class Slopes:
     mix_u: csr_matrix
     mix_v: csr_matrix
     weight: Floats
+    corners: Floats = field(default_factory=lambda: np.zeros((0, 4, 2)))
 
 
 def face_slopes(island: Island, vertices: int, weight: Floats, *, downweight_slivers: bool = False) -> Slopes:
@@ -260,11 +261,13 @@ def face_slopes(island: Island, vertices: int, weight: Floats, *, downweight_sli
     mix_u, mix_v = (csr_matrix(((gradient[..., i] * span[:, i, None]).ravel(), place), shape=shape) for i in (0, 1))
     decided = np.linalg.det(moments)  # above 0 also without extent in u or v, where full weight does no harm
     trust = decided / np.maximum((span**2).prod(axis=1), decided) if downweight_slivers else np.ones(len(corner))
-    return Slopes(centre, span, mix_u, mix_v, trust * np.where(used, weight[corner], np.inf).min(axis=1))
+    weight = trust * np.where(used, weight[corner], np.inf).min(axis=1)
+    return Slopes(centre, span, mix_u, mix_v, weight, centre[:, None] + offset)
 
 
 def join_slopes(parts: list[Slopes]) -> Slopes:
     """The slopes of several islands as one."""
     mix_u, mix_v = (vstack([getattr(p, k) for p in parts]).tocsr() for k in ("mix_u", "mix_v"))
-    uv, span, weight = (np.concatenate([getattr(p, k) for p in parts]) for k in ("uv", "span", "weight"))
-    return Slopes(uv, span, mix_u, mix_v, weight)
+    keys = ("uv", "span", "weight", "corners")
+    uv, span, weight, corner = (np.concatenate([getattr(p, k) for p in parts]) for k in keys)
+    return Slopes(uv, span, mix_u, mix_v, weight, corner)

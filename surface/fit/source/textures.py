@@ -42,6 +42,13 @@ def sample_colours(
     return Samples(*(np.concatenate([getattr(s, key) for s in own]) for key in ("points", "colour", "weight")))
 
 
+def opacity_at(material: Material, uv: Floats) -> Floats:
+    """(m,) opacity of a material, 0..1, at texture coordinates (m, 2); its own where its texture cannot be read."""
+    picture = _picture(material.texture) if material.texture is not None else None
+    own = np.full(len(uv), material.colour[3])
+    return own if picture is None else own * _looked_up(picture, material.in_picture(uv))[:, 3]
+
+
 def tinted(mesh: MeshData) -> tuple[Material | None, ...]:
     """The materials of a mesh's pieces; those without a texture that have colours of vertices get their median."""
     if mesh.colours is None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.kinds import SKIN, is_known, kind_of
-from surface.fit.source.mesh import FitMesh, face_areas, renumbered, triangles
+from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, renumbered, triangles
 
 BODY_BELOW = 300.0  # a mesh that reaches further below the eyes, mm at usual size, has a body; a bust has not
 BASE, DOWN, ASIDE = -131.0, 98.0, 150.0  # the bust's outline: from this height, so far down and so far to the sides
@@ -16,6 +17,12 @@ EXPONENT = 4.0  # of the outline, a superellipse: 2 would be an ellipse
 MIN_AREA_INSIDE = 0.5  # of an object; with a smaller fraction of its area inside the outline it belongs to the body
 NECK = -125.0  # below the eyes, mm at usual size: between chin and shoulders
 SNAP = 0.12  # of an edge: a vertex this near to the outline is on it, so that no slivers are cut
+CHIN = -95.0  # below the eyes, mm on an average head: borders of skin above this are those of mouth and eyes
+RAISED, NARROWED = 60.0, 54.0  # mm on an average head: how much shorter, and less deep, a bust may become
+STEPS = 20  # in which it becomes shorter
+CLEARANCE = 1.0  # mm on an average head: how far inside the outline a border may lie
+TOUCHES = 0.3  # mm on an average head: a border this near to another one is none
+UP = np.array([0.0, 1.0, 0.0])
 
 
 def cut_bust(mesh: FitMesh, eyes_at: Floats, scale: float) -> tuple[FitMesh, list[str]]:
@@ -26,10 +33,36 @@ def cut_bust(mesh: FitMesh, eyes_at: Floats, scale: float) -> tuple[FitMesh, lis
     low = float(mesh.vertices[:, 1].min() - eyes_at[1])
     if low > -BODY_BELOW * scale:
         return mesh, []
-    outside = outline(mesh.vertices, eyes_at, scale)
+    outside = _whole_outline(mesh, eyes_at, scale)
     gone = _body_objects(mesh, outside) & ~_necks(mesh, outside, eyes_at[1] + NECK * scale)
     notes = _notes(mesh, gone, -low)
     return _compact(cut(_subset(mesh, _kept_faces(mesh, gone)), outside)), notes
+
+
+def _whole_outline(mesh: FitMesh, eyes_at: Floats, scale: float) -> Floats:
+    """(n,) as :func:`outline`, of a bust so much shorter that no border of skin is within: under clothes, skin is often
+    left out, and its ragged border would end the bust. Where no bust is short enough, of the usual one."""
+    ragged = _skin_borders(mesh, eyes_at, scale)
+    for share in np.linspace(0.0, 1.0, STEPS + 1):
+        raised = eyes_at + share * RAISED * scale * UP
+        outside: Floats = outline(mesh.vertices, raised, scale) + share * NARROWED * scale
+        if (outside[ragged] > -CLEARANCE * scale).all():
+            return outside
+    return outline(mesh.vertices, eyes_at, scale)
+
+
+def _skin_borders(mesh: FitMesh, eyes_at: Floats, scale: float) -> Ints:
+    """Vertices below the chin where skin, by name, ends, and no other skin goes on."""
+    if not len(mesh.piece):
+        return np.zeros(0, np.int64)
+    own = mesh.faces[_named_skin(mesh)[mesh.piece]]
+    a, b = directed_edges(own)
+    n = len(mesh.vertices)
+    rim = np.unique(a[~np.isin(a * n + b, b * n + a)])
+    rim = rim[mesh.vertices[rim, 1] < eyes_at[1] + CHIN * scale]
+    beside = cKDTree(mesh.vertices[rim]).query_ball_point(mesh.vertices[rim], TOUCHES * scale, return_length=True)
+    alone: Ints = rim[np.asarray(beside) < 2]
+    return alone
 
 
 def outline(points: Floats, eyes_at: Floats, scale: float) -> Floats:
@@ -60,11 +93,16 @@ def _body_objects(mesh: FitMesh, outside: Floats) -> Bools:
 def _necks(mesh: FitMesh, outside: Floats, height: float) -> Bools:
     """(objects,) which objects are skin, by name, and reach up to a height inside the outline: they hold the neck of a
     head that ends at the chin, and are cut like a body of one piece with its head."""
-    skin = np.array([is_known(n) and kind_of(n).name == SKIN for n in mesh.pieces], bool)
+    skin = _named_skin(mesh)
     first = mesh.faces[:, 0]
     most = np.full(len(mesh.pieces), -np.inf)
     np.maximum.at(most, mesh.piece, np.where(outside[first] < 0, mesh.vertices[first, 1], -np.inf))
     return skin & (most > height)
+
+
+def _named_skin(mesh: FitMesh) -> Bools:
+    """(objects,) which objects are skin, by name."""
+    return np.array([is_known(n) and kind_of(n).name == SKIN for n in mesh.pieces], bool)
 
 
 def _kept_faces(mesh: FitMesh, gone: Bools) -> Bools:

@@ -7,14 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from lash_strip import LONG, TALL, strip
+from lash_strip import mesh as lash_mesh
 
 from surface.check.subject import Subject
 from surface.fit.api import fit_mesh
-from surface.fit.measures.dense import _Pair, measure_dense
+from surface.fit.measures.dense import _cut_off, _Pair, measure_dense
 from surface.fit.measures.mend import faults_of
 from surface.fit.points.nurbsnet import UniformNet
-from surface.fit.points.report import FitResult
+from surface.fit.points.report import FitResult, FittedPart
 from surface.fit.reportfile import as_markdown, as_table
+from surface.fit.source.chart import make_chart
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names, sources_of
@@ -162,7 +165,8 @@ def test_distances_that_grow_elsewhere_are_all_found(result: FitResult, mesh: Fi
     subject = Subject(Head(result.head))
     part = next(p for p in result.parts if p.name == "face")
     number = next(k for k, p in enumerate(subject.parts) if p.name == "face")
-    quick, whole = (_Pair(part, number, subject, mesh) for _ in range(2))
+    data = next(p for p in result.head.parts if p.name == "face")
+    quick, whole = (_Pair(part, data, number, subject, mesh) for _ in range(2))
     before = subject.rest[number].astype(np.float64)
     away = before + np.where(np.arange(len(before))[:, None] % 7 == 0, [0.0, 0.0, 6.0], 0.0)
     greater = quick.greater_elsewhere(away, mesh.vertices, before, quick.distances(before, mesh.vertices), 2.0)
@@ -171,3 +175,12 @@ def test_distances_that_grow_elsewhere_are_all_found(result: FitResult, mesh: Fi
     for found, wanted, left_out in ((greater[0][0], to_mesh, fold), (greater[1][0], to_surface, greater[1][1])):
         beyond = (wanted > 2.0) & ~left_out
         np.testing.assert_allclose(found[beyond], wanted[beyond], rtol=1e-9)
+
+
+def test_what_outlines_leave_of_a_card_is_measured_alone() -> None:
+    part, (whole, islands) = strip()[0], lash_mesh()
+    chart = make_chart(whole, islands, normalise=False)
+    fitted = FittedPart("lash_1", chart, None, whole.vertices)  # type: ignore[arg-type]
+    assert not _cut_off(whole, fitted, replace(part, loops=chart.loops)).any()
+    left = np.array([[-1.0, -1.0], [0.5 * LONG, -1.0], [0.5 * LONG, TALL + 1.0], [-1.0, TALL + 1.0]])
+    assert _cut_off(whole, fitted, replace(part, loops=[left])).tolist() == [False, True, True, False]

@@ -68,8 +68,8 @@ def test_slopes_are_matched_besides_positions(net):
         np.testing.assert_allclose(slope, target, rtol=0.02)
 
 
-@pytest.mark.parametrize("sloped", [False, True])
-def test_the_solution_is_that_of_the_functional(net, sloped):
+@pytest.mark.parametrize(("sloped", "bend"), [(False, 0.0), (True, 0.0), (True, 0.6)])
+def test_the_solution_is_that_of_the_functional(net, sloped, bend):
     """Dense algebra over the documented sum, with derivatives by central differences."""
     rng, fair = np.random.default_rng(5), 0.3
     uv = np.vstack([UV, rng.random((2000, 2)) * 0.98 + 0.01])
@@ -84,13 +84,21 @@ def test_the_solution_is_that_of_the_functional(net, sloped):
         at, none = rng.random((30, 2)) * 0.9 + 0.05, csr_matrix((30, 1))
         span, heavy = rng.uniform(0.05, 0.2, (30, 2)), rng.uniform(50.0, 200.0, 30)
         wanted = rng.normal(size=(2, 30, 2))
-        slopes = Slopes(at, span, none, none, heavy), *wanted
+        corners = at[:, None] + rng.uniform(-0.04, 0.04, (30, 4, 2))
+        slopes = Slopes(at, span, none, none, heavy, corners), *wanted
         for axis in range(2):
             d = 1e-5 * np.eye(2)[axis]
-            rows = ((basis(net, at + d) - basis(net, at - d)) / 2e-5).toarray() * span[:, axis, None]
+
+            def slope(at, d=d, axis=axis):
+                return ((basis(net, at + d) - basis(net, at - d)) / 2e-5).toarray() * span[:, axis, None]
+
+            rows = slope(at)
             normal += rows.T @ (heavy[:, None] * rows)
             right += rows.T @ (heavy[:, None] * wanted[axis])
-    x = solve(net, b, weight, targets, fair, slopes)
+            for k in range(4):
+                bent = slope(0.5 * (at + corners[:, k])) - rows
+                normal += bend * bent.T @ (heavy[:, None] * bent)
+    x = solve(net, b, weight, targets, fair, slopes, bend)
     np.testing.assert_allclose(x, np.linalg.solve(normal, right), atol=2e-4)
 
 

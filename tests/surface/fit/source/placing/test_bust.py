@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from traps import _tube, good_head, joined, on_body, transformed
+from traps import _tube, good_head, grid, joined, on_body, transformed
 
 from surface.fit.source.mesh import FitMesh, check_manifold, check_mesh, triangles
 from surface.fit.source.placing.bust import cut, cut_bust, outline
@@ -96,6 +96,20 @@ def test_one_object_with_a_face_and_a_body_is_cut_not_dropped():
     mesh, notes = cut_bust(one, EYES_AT, 1.0)
     assert "left out" not in notes[0] and mesh.vertices[:, 1].min() > -194
     assert len(mesh.faces) > len(HEAD.faces) * 0.9
+
+
+@pytest.mark.parametrize(("name", "clear"), [("Body_SKIN", True), ("Dress", False)])
+def test_a_ragged_border_of_skin_under_clothes_is_cut_off(name, clear):
+    """Skin that a dress hides is often left out of a mesh, from face to face, up to the shoulders."""
+    u, v, faces = grid(25, 41)
+    points = np.column_stack([60 * np.cos(2 * np.pi * u), EYES_AT[1] - 90.0 - 160.0 * v, 60 * np.sin(2 * np.pi * u)])
+    left = points[faces[:, :3], 1].min(axis=1) > EYES_AT[1] - 165.0 - 20.0 * (np.arange(len(faces)) % 3)
+    skirt = FitMesh(points, faces[left], np.column_stack([u, v]), faces[left], (), np.zeros((0, len(u), 3)),
+                    np.zeros(int(left.sum()), np.int64), (name,))  # fmt: skip
+    legs = [_tube((s * 80, -760, -10), (s * 80, -1500, -10), 80, "Trousers") for s in (1, -1)]
+    mesh, _ = cut_bust(joined(HEAD, skirt, *legs), EYES_AT, 1.0)
+    own = np.unique(mesh.faces[mesh.piece == list(mesh.pieces).index(name)][:, :3])
+    assert (mesh.vertices[own, 1].min() > EYES_AT[1] - 165.0) == clear
 
 
 def test_the_outline_is_a_bust():
