@@ -30,9 +30,9 @@ class Moves:
             row[group.ids] = True
         self._order = gray_order(moved)
         self._tiles = -(-self._n // LANES)
-        place = np.empty(self._n, np.int64)
-        place[self._order] = np.arange(self._n)
-        found = [self._tiles_of(group, place) for group in groups]
+        at = np.empty(self._n, np.int64)
+        at[self._order] = np.arange(self._n)
+        found = [self._tiles_of(group, at) for group in groups]
         self._start = np.cumsum([0, *(len(tiles) for tiles, _ in found)])
         self._tile = np.concatenate([np.zeros(0, np.int32), *(tiles for tiles, _ in found)])
         self._rows = np.concatenate([np.zeros(0, np.float32), *(rows.ravel() for _, rows in found)])
