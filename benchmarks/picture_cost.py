@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from rich.console import Console
@@ -27,9 +27,9 @@ FRAMES = 40
 Times = tuple[float, float, float]
 
 
-def timed(work: Callable[[], object], frames: int = FRAMES) -> Times:
+def timed(work: Callable[[], object], frames: int | None = None) -> Times:
     """Milliseconds a call: clock, processor, this thread; the least of three rounds by the processor's."""
-    rounds = []
+    rounds, frames = [], frames or FRAMES
     for _ in range(3):
         began = time.process_time(), time.perf_counter(), time.thread_time()
         for _ in range(frames):
@@ -75,7 +75,7 @@ class Bench:
         self.draw("everything")
         for buffers in self.parts:
             with query:
-                draw(buffers)
+                draw(buffers, multisampled=self.target.samples > 1)
             found[buffers.part.name] = query.samples
         return found
 
@@ -129,14 +129,14 @@ def ratio(one: Bench, other: Bench, rounds: int = 9) -> str:
     return f"{middle[0]:.2f} ms against {middle[1]:.2f} ms a frame: {middle[0] / middle[1]:.3f}"
 
 
-def main() -> None:
-    """Measure and print."""
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Measure and print; ``arguments`` : in place of the command line's."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quality", default="full", choices=("full", "fast"))
     parser.add_argument("--size", default="1280x720")
     parser.add_argument("--person", default="", help="a name of configs/persons, with hair and clothes")
     parser.add_argument("--beside", help="another person, or none, drawn in turn with the first: prints only the ratio")
-    given = parser.parse_args()
+    given = parser.parse_args(arguments)
     width, height = (int(number) for number in given.size.split("x"))
     bench, console = Bench(given.quality, (width, height), given.person), Console(highlight=False)
     if given.beside is not None:

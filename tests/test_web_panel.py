@@ -312,3 +312,18 @@ def test_the_panel_reads_a_pose_as_omote_does(root: Path, tmp_path: Path) -> Non
         np.testing.assert_allclose([found["weights"][name] for name in SHAPES], wanted.shapes, atol=1e-9)
         np.testing.assert_allclose(found["eyes"], wanted.gaze, atol=1e-9)
         np.testing.assert_allclose(found["head"], wanted.head, atol=1e-9)
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+@pytest.mark.parametrize(("shown", "apart"), [
+    ({}, 0.0), ({"mouthSmileLeft": 1.0}, 0.0), ({"jawOpen": 0.5, "mouthClose": 0.5}, 0.0), ({"jawOpen": 0.4}, 0.4),
+    ({"mouthUpperUpLeft": 1.0, "mouthUpperUpRight": 1.0}, 0.5), ({"jawOpen": 1.0, "mouthFunnel": 1.0}, 1.0),
+])  # fmt: skip
+def test_light_enters_a_mouth_only_between_lips_that_are_apart(
+    root: Path, tmp_path: Path, shown: dict[str, float], apart: float
+) -> None:
+    (tmp_path / "pose.mjs").write_bytes((root / "controller/links/web/static/pose.js").read_bytes())
+    program = f"import {{ lipsApart }} from './pose.mjs'; console.log(lipsApart({json.dumps(shown)}));"
+    (tmp_path / "run.mjs").write_text(program)
+    done = subprocess.run(["node", "run.mjs"], capture_output=True, text=True, cwd=tmp_path, check=True)
+    assert float(done.stdout) == pytest.approx(apart)

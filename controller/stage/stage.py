@@ -238,7 +238,8 @@ def _check_groups(files: Sequence[Path], head: Head, light: Sequence[LightPoints
 def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
     """``stage`` with command-line options over its ``[face]``; see :func:`controller.stage.picture.with_options`."""
     face = with_options(stage.settings.face, wanted)
-    persons = tuple(find_persons(face.person, stage.head, beside=stage.path))
+    same = face.person == stage.settings.face.person  # they have been read with the stage
+    persons = stage.persons if same else tuple(find_persons(face.person, stage.head, beside=stage.path))
     heads = tuple(replace(head, stage=with_picture(head.stage, wanted)) for head in stage.heads)
     return replace(stage, persons=persons, settings=stage.settings.model_copy(update={"face": face}), heads=heads)
 

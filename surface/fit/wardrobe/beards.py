@@ -20,12 +20,13 @@ _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0
 _BELOW = np.array([-45.0, -45.0, -43.5, -39.5, -35.0, -35.0, -35.0, -26.0, -8.0, 12.0, 14.0])
 _LIP = np.array([-22.5, -23.0, -25.0, -28.5, -33.0])  # lower line of the moustache, at the first five angles: it ends
 # level with the corners of the mouth, since one that hangs over them makes every face look sad
-_EDGE_DEG = 93.0
+_EDGE_DEG = 90.0
 _LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.8])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
 _FIELD_MM = -7.0, 11.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.3  # hair over the lip, which is too short to lie over what is beside it
+_SIDE_DEG, _SIDE = (60.0, 88.0), 0.85  # between which it gets shorter towards the ear, and by which share
 _HAIRS = 1.0 / 26.0  # tiles of the noise for a mm across hairs
 _ROOTS_MM, _SHORTER = 7.0, 10.0  # from a shell's upper line, where hairs are seen in so many times shorter pieces
 
@@ -50,12 +51,16 @@ BEARDS = {
 
 def inside(points: Floats) -> Floats:
     """(n,) how far inside the beard's lines places on the face (n, 3) lie, mm; negative outside."""
-    x, y, z = points.T
-    angle = np.degrees(np.arctan2(np.abs(x), z - 20.0))
+    y, z, angle = points[:, 1], points[:, 2], _angle(points)
     upper, lower = np.interp(angle, _ANGLES, _UPPER), np.interp(angle, _ANGLES, _LOWER)
     out = np.linalg.norm((points[:, :2] - _LIPS) / _LIP_RADII, axis=1)
     lips = np.where(z > _MOUTH_DEPTH, 11.0 * (out - 1.0), 50.0)
     return np.asarray(np.minimum.reduce([upper - y, y - lower, lips, 1.3 * (_EDGE_DEG - 2.0 - angle)]))
+
+
+def _angle(points: Floats) -> Floats:
+    """(n,) angle from the front of points (n, 3), degrees, about the vertical that the beard's lines are given by."""
+    return np.asarray(np.degrees(np.arctan2(np.abs(points[:, 0]), points[:, 2] - 20.0)))
 
 
 def garment(skin: Skin, beard: Beard) -> list[Patches]:
@@ -111,7 +116,8 @@ def _shell(
     chin = np.exp(-((x / 26.0) ** 2)) * step(-y, 44.0, 70.0) * step(z, 55.0, 95.0)
     deep = inside(flat)
     thick = beard.thick * min(1.0, 0.1 * full_mm + 0.1)  # less over the lip
-    height = 0.8 + share * (thick + beard.chin * chin) * step(deep, -3.0, full_mm + 5.0)
+    shorter = 1.0 - _SIDE * step(_angle(flat), *_SIDE_DEG)
+    height = 0.8 - 0.4 * (1.0 - shorter) + share * shorter * (thick + beard.chin * chin) * step(deep, -3.0, full_mm + 5)
     down = np.array([0.0, -0.5, 0.1]) * (share * beard.chin * chin)[:, None]  # hair falls
     points = (flat + normals * height[:, None] + down).reshape(nu, nv, 3)
     gu, gv = grid

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.hairline import Hairline, directions
+from surface.fit.wardrobe.hairline import TIED, Hairline, directions
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheet, sheets
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
@@ -20,7 +20,7 @@ LAYERS = (
     Layer(0.90, 1.8, 0.80, 4.0, 2.1, 13.0),
 )  # fmt: skip
 # The inner one so dense that it is closed up to its tip: nothing lies below it
-BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 6.0, 0.82, 0.2))
+BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 6.6, 0.82, 0.2))
 UNDER_MM = 8.0  # from the middle of the bun's base: there strands of the skull end, well below the coil
 NAPE_RAD = 0.06  # how much higher than the line hair begins there, seen from the skull's middle
 _TURNS = 0.62  # of a strand about the bun, from its base to its tip
@@ -28,7 +28,7 @@ _TURNS = 0.62  # of a strand about the bun, from its base to its tip
 
 def bun(skin: Skin) -> Style:
     """All hair lies on the skull, from the line to a bun high on the back of the head."""
-    line = Hairline(skin)
+    line = Hairline(skin, TIED)
     base = BUN - 14.0 * _OUT
     round_it = np.linspace(np.pi, -np.pi, GUIDES)
     nape = step(np.abs(round_it), 2.3, 2.9)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from surface.base.arrays import Array, Floats, Ints
 from surface.fit.wardrobe.skin import Skin
 
 APART = 2.0  # between patches, in u
+_CELL = 12  # rows of vertices along u in a cell of the mesh: only the points that reach them are in its list
 _MADE = (0.0, 1.0, 1.0)  # a budget that nothing else makes: the mesh is the file's own
 
 
@@ -52,7 +54,7 @@ def arrays(patches: list[Patches], skin: Skin) -> dict[str, Array]:
     every = [_one_kind(p, skin) for p in patches]
     out: dict[str, Array] = {}
     width = max(part["knots_u"].shape[1] for part in every), max(part["knots_v"].shape[1] for part in every)
-    point = vertex = cell = 0
+    point = vertex = 0
     first_u: float = 0.0
     for part in every:
         for key, wanted in zip(("knots_u", "knots_v"), width, strict=True):
@@ -62,7 +64,7 @@ def arrays(patches: list[Patches], skin: Skin) -> dict[str, Array]:
         for key, first in (("mesh_triangles", vertex), ("fast", vertex), ("mesh_list_ids", point)):
             part[key] = part[key] + first
         first_u += APART * float(part.pop("count"))
-        point, vertex, cell = point + len(part["points"]), vertex + len(part["mesh_uv"]), cell + 1
+        point, vertex = point + len(part["points"]), vertex + len(part["mesh_uv"])
     for key in every[0]:
         out[key] = np.concatenate([part[key] for part in every])
     sizes = out.pop("cells")
@@ -103,6 +105,7 @@ def _one_kind(p: Patches, skin: Skin) -> dict[str, Array]:
     uv = np.stack([u[None] + shift[:, None, None], np.broadcast_to(v, (k, gu, gv))], axis=-1).reshape(-1, 2)
     side = (u >= 1.0) * 1 + (v >= 1.0) * 2
     first = np.arange(k)[:, None, None] * gu * gv
+    sizes, lists = _cells(p)
     return {
         "points": offsets, "anchor": anchor, "count": np.array(k),
         "degrees": np.tile([pu, pv], (len(points), 1)),
@@ -113,9 +116,24 @@ def _one_kind(p: Patches, skin: Skin) -> dict[str, Array]:
         "mesh_uv": uv, "mesh_side": np.tile(side.ravel(), k),
         "mesh_triangles": (first + _triangles(p.grid, p.grid)).reshape(-1, 3),
         "fast": (first + _triangles(p.grid, p.fast)).reshape(-1, 3),
-        "mesh_list_ids": np.arange(len(points)),
-        "cells": np.tile([gu * gv, nu * nv], (k, 1)),
+        "mesh_list_ids": (np.arange(k)[:, None] * nu * nv + lists).ravel(),
+        "cells": np.tile(sizes, (k, 1)),
     }  # fmt: skip
+
+
+def _cells(p: Patches) -> tuple[Ints, Ints]:
+    """Cells of one patch, each of some rows of its vertices: how many vertices and points each has, (c, 2), and the
+    points of all of them, one after the other."""
+    (nu, nv), (gu, gv) = p.points.shape[1:3], p.grid
+    reach = knots(nu, p.degrees[0])
+    ends = np.rint(np.linspace(0, gu, max(1, round(gu / _CELL)) + 1)).astype(int)
+    sizes, lists = [], []
+    for begin, end in pairwise(ends):
+        low, high = begin / (gu - 1), (end - 1) / (gu - 1)
+        rows = np.flatnonzero((reach[:, 0] <= high) & (reach[:, -1] >= low))
+        lists.append((rows[:, None] * nv + np.arange(nv)).ravel())
+        sizes.append(((end - begin) * gv, len(lists[-1])))
+    return np.array(sizes), np.concatenate(lists)
 
 
 def _anchored_at(roots: Floats, points: Floats, each: int, skin: Skin) -> tuple[Floats, Floats]:

@@ -94,26 +94,30 @@ def sheets(
 ) -> list[Patches]:  # fmt: skip
     """Sheets along the guides of a comb, the outermost first.
 
+    All of them bulge in the same places: the inner ones would come through the outer ones otherwise.
+
     closed : does the last guide meet the first? frayed : over which share of u strands grow sparse at either edge.
     """
-    out = []
+    out, bulges = [], _waves(len(comb.roots), np.random.default_rng(seed), closed)
     for k, layer in enumerate(layers):
-        random = np.random.default_rng(seed + 7 * k)
-        paths = _guides(skin, comb, layer, random, closed)
+        random = np.random.default_rng(seed + 7 * k + 1)
+        paths = _guides(skin, comb, layer, comb.ragged_mm * _waves(len(bulges), random, closed), bulges)
         points = _control_points(paths, weave)
         out.append(sheet(points, layer, weave, random, closed, sway, frayed))
     return out
 
 
-def _guides(skin: Skin, comb: Comb, layer: Layer, random: np.random.Generator, closed: bool) -> Floats:
-    """(g, k, 3) guides, cut to length, each a little further out or in than its neighbours."""
+def _guides(skin: Skin, comb: Comb, layer: Layer, ragged: Floats, bulges: Floats) -> Floats:
+    """(g, k, 3) guides, cut to length, each a little further out or in than its neighbours.
+
+    ragged : (g,) mm by which each is longer. bulges : (g,) how far out it lies, in ``comb.wave_mm``.
+    """
     count = len(comb.roots)
     lift = np.full(count, layer.share)
     paths, normals = grow(
         skin, comb.roots, comb.length, comb.thickness, comb.flow, lift=lift, steps=comb.steps, stiff=comb.stiff,
         slack=comb.slack, ears=comb.ears, below=0.9 * layer.share,
     )  # fmt: skip
-    ragged = comb.ragged_mm * _waves(count, random, closed)
     far = np.array([comb.cut(row) for row in paths]) + ragged[:, None]  # falls along a guide
     kept = resampled(np.array([_until(row, at) for row, at in zip(paths, far, strict=True)]), 24)
     outward = resampled(np.array([_until(row, at) for row, at in zip(normals, far, strict=True)]), 24)
@@ -122,18 +126,14 @@ def _guides(skin: Skin, comb: Comb, layer: Layer, random: np.random.Generator, c
     if comb.pole:
         kept[:, 0] = kept[:, 0].mean(axis=0)
     t = np.linspace(0.0, 1.0, 24)
-    bulge = (
-        comb.wave_mm
-        * _waves(count, random, closed)[:, None]
-        * step(t, 0.05, 0.35)
-        * (1.0 - comb.level * step(t, 0.55, 0.9))
-    )
+    bulge = comb.wave_mm * bulges[:, None] * step(t, 0.05, 0.35) * (1.0 - comb.level * step(t, 0.55, 0.9))
     return np.asarray(kept + unit(outward) * bulge[..., None])
 
 
 def tips(skin: Skin, comb: Comb) -> Floats:
     """(g, 3) where the guides of a closed sheet end."""
-    return _guides(skin, comb, Layer(1.0, 1.0, 1.0), np.random.default_rng(0), True)[:, -1]
+    raggedness, bulges = _waves(len(comb.roots), np.random.default_rng(0), True), np.zeros(len(comb.roots))
+    return _guides(skin, comb, Layer(1.0, 1.0, 1.0), comb.ragged_mm * raggedness, bulges)[:, -1]
 
 
 def _until(row: Floats, far: Floats) -> Floats:

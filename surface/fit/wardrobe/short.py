@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from surface.fit.wardrobe.styles import Style, step, tangent
 CROWN = np.array([12.0, 132.0, -42.0])
 RING_RAD = 0.05  # from the crown, seen from the skull's middle: where guides leave it
 GUIDES = 73
+CLOSE_MM = 0.9, 0.4  # over the skin, where hair ends at the line: at the sides and over the forehead
 _SPREADS, _EVEN = 3, 0.75  # how often guides are spread, and how evenly each time
 WEAVE = Weave((73, 12), (97, 15), (49, 9), 0.35)
 FRINGED = (Layer(1.08, 0.42, 1.0, 40.0), Layer(1.0, 0.66, 0.92, 24.0), Layer(0.90, 1.8, 0.80, 13.0))
@@ -28,16 +29,20 @@ SWEPT = (
 @dataclass(frozen=True)
 class Sweep:
     """How hair is swept back: its line; mm it has over the skin at the sides, on top, and more at the forehead; how far
-    it goes to one side."""
+    it goes to one side; mm from the line until it lies so high; its sheets."""
 
     points: Floats
     sides_mm: float
     top_mm: float
     front_mm: float
     aside: float
+    rise_mm: float
+    layers: tuple[Layer, ...]
 
 
-BACK, THIN = Sweep(POINTS, 2.2, 6.5, 6.5, 0.45), Sweep(RECEDED, 2.6, 3.6, 2.0, 0.25)
+BACK = Sweep(POINTS, 2.2, 6.5, 6.5, 0.45, 22.0, SWEPT)
+THIN = Sweep(RECEDED, 2.6, 3.6, 0.8, 0.25, 34.0, tuple(replace(each, fray_mm=0.4 * each.fray_mm) for each in SWEPT))
+"""What is left over the forehead lies flat and reaches the skin: a lock whose ends are few stands off it."""
 
 
 def short(skin: Skin) -> Style:
@@ -87,7 +92,8 @@ def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
     def thickness(at: Floats) -> Floats:
         front = sweep.front_mm * step(at[:, 2], 10.0, 60.0)
         full = sweep.sides_mm + _top(at) * (sweep.top_mm - sweep.sides_mm + front)
-        return np.asarray(0.9 + full * step(line.inside(at), -3.0, 22.0) ** 0.8)
+        close = CLOSE_MM[0] + (CLOSE_MM[1] - CLOSE_MM[0]) * step(at[:, 2], 35.0, 60.0)
+        return np.asarray(close + full * step(line.inside(at), -3.0, sweep.rise_mm) ** 0.8)
 
     def flow(at: Floats, normals: Floats, share: float) -> Floats:
         away = tangent(at - CROWN, normals)
@@ -96,16 +102,19 @@ def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
         along = away + sweep.aside * top * aside + 0.35 * (1.0 - top) * _down(at, normals)
         return tangent(along, normals)
 
+    def slack(at: Floats) -> Floats:
+        return np.asarray(0.1 + 0.4 * step(line.inside(at), 0.0, 25.0))
+
     def cut(at: Floats) -> Floats:
         return np.asarray(line.inside(at) + 1.0)
 
     def comb(round_it: Floats) -> Comb:
         return Comb(
-            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, 0.3, 1.2, 1.0, steps=66, slack=0.5,
+            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, 0.3, 1.2, 1.0, steps=66, slack=slack,
             pole=True,
         )  # fmt: skip
 
-    return Style(sheets(skin, _spread(skin, comb), SWEPT, WEAVE, seed=seed, closed=True), line)
+    return Style(sheets(skin, _spread(skin, comb), sweep.layers, WEAVE, seed=seed, closed=True), line)
 
 
 def _spread(skin: Skin, comb: Callable[[Floats], Comb]) -> Comb:

@@ -15,7 +15,9 @@ from surface.fit.wardrobe.skin import CENTRE, Skin, unit
 ACROSS = 1.0 / 46.0  # tiles of the noise for a mm across strands, and along them
 ALONG = 1.0 / 900.0
 _CAP = 2.2  # cover of an under-cap
-BARE = 0.3  # how far below nothing cover is where no hair grows: strand.frag fades it
+BARE = (
+    0.5  # how far below nothing cover is where no hair grows: strand.frag fades it, and the tallest strands reach 0.3
+)
 
 
 @dataclass(frozen=True)

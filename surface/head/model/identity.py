@@ -7,6 +7,7 @@ import math
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -49,10 +50,25 @@ def fingerprint(head: HeadData) -> int:
 def load_identities(head: str | Path) -> dict[str, Identity]:
     """The identities of a head, given by its folder or its head.toml, by name; empty where it has none.
 
+    A start asks for them several times; they are read again only when the file has changed.
+
     Raises HeadFileError: the file is damaged or of a newer version.
     """
+    path = sidecar_path(head, FILE)
+    try:
+        found = path.stat()
+    except OSError:
+        return _read(path, ())  # which says what is wrong with it
+    return dict(_read_once(path, (found.st_ino, found.st_mtime_ns, found.st_size)))
+
+
+def _read(path: Path, stamp: tuple[int, ...]) -> dict[str, Identity]:
+    """The identities of a file, whose ``stamp`` changes when it does."""
     hint = "make it again: omote fit MESH -o FOLDER --keep --identities FILE"
-    return read_sidecar(sidecar_path(head, FILE), _identities, hint) or {}
+    return read_sidecar(path, _identities, hint) or {}
+
+
+_read_once = lru_cache(maxsize=2)(_read)
 
 
 def _identities(file: Sidecar) -> dict[str, Identity]:

@@ -105,6 +105,7 @@ def with_age(head: HeadData, age: float) -> HeadData:
     for part in head.parts:
         points = np.array(part.points)
         for group in part.groups:
-            np.add.at(points, group.ids, shares.get(group.name, 0.0) * group.moves)
+            if share := shares.get(group.name, 0.0):
+                np.add.at(points, group.ids, share * group.moves)
         parts.append(replace(part, points=points))
     return replace(head, parts=parts)

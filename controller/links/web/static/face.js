@@ -1,10 +1,11 @@
 // Draws the face: loads it once, then poses it from numbers.
 import * as THREE from "/three.min.js";
 import { Part } from "/morph.js";
-import { ownAmounts, readPose } from "/pose.js";
+import { lipsApart, ownAmounts, readPose } from "/pose.js";
 import { material, shared } from "/shaders.js";
 
 const EYES = ["eye_left", "eye_right"], HALF = "Half";
+const LIT_APART = 0.12;  // how far lips are apart where light enters between them as it does into an open mouth
 
 // Whether pictures are computed without a graphics processor: smooth edges would cost a third of the time then.
 function isSoftware() {
@@ -97,6 +98,7 @@ export class Face {
     Object.assign(weights, ownAmounts(names, values, this.own));
     for (const name of this.half) { const w = weights[name.slice(0, -HALF.length)]; weights[name] = 4 * w * (1 - w); }
     for (const part of this.#parts) part.show(weights);
+    shared.between_lips.value = Math.min(lipsApart(weights) / LIT_APART, 1);
     this.head.rotation.set(head[1], head[0], head[2], "YXZ");
     eyes.forEach(([yaw, pitch], i) => this.#eyes[i]?.rotation.set(pitch, yaw, 0, "YXZ"));
     this.head.updateMatrixWorld(true);

@@ -46,3 +46,10 @@ export function readPose(names, values) {
   const head = ["headYaw", "headPitch", "headRoll"].map((name, i) => (at[name] ?? 0) * HEAD_DEG[i] * RAD);
   return { weights: at, eyes, head };
 }
+
+// How far lips are apart, 0 to 1, by the weights of shapes that part them.
+export function lipsApart(weights) {
+  const of = (name) => weights[name] ?? 0, both = (name) => (of(`${name}Left`) + of(`${name}Right`)) / 2;
+  const parted = 0.5 * both("mouthLowerDown") + 0.5 * both("mouthUpperUp") + 0.35 * of("mouthFunnel");
+  return clamp(of("jawOpen") - of("mouthClose") + parted, 0, 1);
+}

@@ -15,6 +15,7 @@ export const shared = {
   sky: vec(0.20, 0.21, 0.235), ground: vec(0.115, 0.085, 0.072),
   key_at_rest: { value: direction(-34, 32) }, rim_at_rest: { value: direction(152, 28) },
   turn: { value: new THREE.Matrix3() }, pivot: vec(0, 0, 0), middle: vec(0, 0.015, 0), eye_axis: vec(0, 0, 1),
+  between_lips: { value: 1 },
 };
 
 const LIGHT = `
@@ -119,8 +120,10 @@ void main() {
 varying vec3 v_colour;
 void main() { gl_FragColor = vec4(v_colour, 1.0); }`];
 
+// Hardly any light enters between closed lips, and nothing white is seen where their triangles do not quite meet.
 const INNER = [`
 attribute vec4 color;
+uniform float between_lips;
 varying vec3 v_colour;
 void main() {
   place();
@@ -128,7 +131,8 @@ void main() {
   vec3 wrap = vec3(0.3, 0.18, 0.18);
   vec3 light = key_colour * wrapped(dot(n, key_direction), wrap) + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
   float nh = dot(n, normalize(key_direction + v));
-  v_colour = encode(0.9 * color.rgb * light + 0.25 * dot(color.rgb, vec3(0.33)) * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * key_colour);
+  vec3 lit = 0.9 * color.rgb * light + 0.25 * dot(color.rgb, vec3(0.33)) * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * key_colour;
+  v_colour = encode(lit * mix(0.03, 1.0, between_lips));
 }`, CLOTH[1]];
 
 const HAIR = [`

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.interpolate import BSpline
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import Patches, knots
 from surface.fit.wardrobe.skin import Skin
 
 
@@ -54,3 +55,22 @@ def outward_share(patches: Sequence[Patches], middle: Floats) -> float:
 def asymmetry(points: Floats, share: float = 1.0) -> float:
     """The greatest distance from a point's mirror image to the nearest other point, mm, of this share of the points."""
     return float(np.quantile(cKDTree(points).query(points * [-1.0, 1.0, 1.0])[0], share))
+
+
+def share_below(outer: Patches, inner: Patches, middle: Floats) -> float:
+    """The share of one sheet that lies nearer to a place than the sheet that shall lie below it."""
+    above, below = (_dense(patch) for patch in (outer, inner))
+    normals = np.cross(np.gradient(below, axis=0), np.gradient(below, axis=1)).reshape(-1, 3)
+    above, below = above.reshape(-1, 3), below.reshape(-1, 3)
+    normals *= np.sign((normals * (below - middle)).sum(axis=1, keepdims=True))
+    away, near = cKDTree(below).query(above)
+    beside = away < 5.0
+    return float((((above - below[near]) * normals[near]).sum(axis=1)[beside] < 0.0).mean())
+
+
+def _dense(patch: Patches) -> Floats:
+    """(300, 100, 3) places on the first patch, but for its ends."""
+    at = [np.linspace(low, high, n) for low, high, n in ((0.0, 1.0, 300), (0.02, 0.94, 100))]
+    every = [np.concatenate([own[:, 0], own[-1, 1:]]) for own in map(knots, patch.points.shape[1:3], patch.degrees)]
+    along = BSpline(every[0], patch.points[0], patch.degrees[0])(at[0]).swapaxes(0, 1)
+    return np.asarray(BSpline(every[1], along, patch.degrees[1])(at[1]).swapaxes(0, 1))

@@ -88,7 +88,7 @@ def test_ends_are_ragged_and_strands_sparse_there() -> None:
 def test_an_edge_that_is_frayed_has_fewer_strands() -> None:
     (patch,) = sheets(Plane(), comb(), (Layer(1.0, 0.8, 1.0),), WEAVE, seed=3, frayed=(0.3, 0.0))  # type: ignore[arg-type]
     across = patch.strands[0, :, 2, 2]
-    assert across[0] < 0.2 < 0.6 < across[-1]
+    assert across[0] < 0.25 < 0.6 < across[-1]
 
 
 def test_the_edges_of_a_closed_sheet_show_the_same_strands() -> None:

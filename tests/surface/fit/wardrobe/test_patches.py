@@ -88,6 +88,22 @@ def test_each_patch_is_a_cell_with_its_own_vertices_and_control_points(made: dic
     assert len(made["mesh_triangles"]) == 2 * (2 * (2 * 3) + 3 * (1 * 2))
 
 
+def test_a_cell_of_a_wide_sheet_lists_just_the_points_that_reach_it() -> None:
+    """One list for the whole sheet would hold mostly points that do not reach a vertex; each of them costs time."""
+    made = arrays([sheets(1, (40, 4), (3, 3), (61, 5))], Plane())  # type: ignore[arg-type]
+    vertices, lists = made["mesh_cell_start"], made["mesh_list_start"]
+    assert len(vertices) == len(lists) == 6 and (vertices[0], vertices[-1], lists[-1]) == (
+        0,
+        305,
+        len(made["mesh_list_ids"]),
+    )
+    for k in range(5):
+        u = made["mesh_uv"][vertices[k] : vertices[k + 1], 0]
+        ids, (low, high) = made["mesh_list_ids"][lists[k] : lists[k + 1]], made["knots_u"][:, [0, -1]].T
+        assert set(ids) == set(np.flatnonzero((low <= u.max()) & (high >= u.min())))
+    assert lists[-1] < 2 * 160  # not 5 times all
+
+
 @pytest.mark.parametrize("key", ["mesh_triangles", "fast"])
 def test_triangles_cover_each_sheet_once_and_turn_alike(made: dict[str, np.ndarray], key: str) -> None:
     a, b, c = made["mesh_uv"][made[key]].swapaxes(0, 1)

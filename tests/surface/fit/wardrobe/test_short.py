@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from surface.fit.wardrobe.short import CROWN, FRINGED, SWEPT, short, swept, thin
 from surface.fit.wardrobe.skin import CENTRE, Skin
 from surface.fit.wardrobe.styles import Style
-from tests.surface.fit.wardrobe.invariants import check_patches, heights, outward_share, points_of
+from tests.surface.fit.wardrobe.invariants import check_patches, heights, outward_share, points_of, share_below
 
 CUTS = {short: FRINGED, swept: SWEPT, thin: SWEPT}
 
@@ -33,6 +34,11 @@ def test_there_is_a_sheet_of_each_layer_and_none_below_the_skin(
     over = heights(skin, points_of(style.patches))
     assert over.min() > -2.0 and over.max() < 40.0
     assert outward_share(style.patches, CENTRE) > 0.97
+
+
+def test_inner_sheets_do_not_come_through_outer_ones(style: Style) -> None:
+    """Where each had bulges of its own, a fifth of a sheet lay below the next one, with hard edges between the two."""
+    assert max(share_below(*pair, CENTRE) for pair in pairwise(style.patches)) < 0.03
 
 
 def test_strands_go_from_the_crown_to_the_line(style: Style) -> None:

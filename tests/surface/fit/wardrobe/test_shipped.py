@@ -1,0 +1,61 @@
+"""Shipped garments on the shipped head: where hair lies on the skin, and where none may lie."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from surface.base.arrays import Floats
+from surface.head import Head
+from surface.head.model.look import Look, Worn
+
+EAR_X, EAR_Y, EAR_Z = 76.0, (-20.0, 32.0), (-20.0, 8.0)
+"""A box in an ear, from its lobe to below the top of its rim and from behind its front edge, mm."""
+
+
+class Dressed:
+    """Vertices (m, 3) of hair or a beard on the head, their u and v (m, 2), cover (m,) and mm from the skin (m,)."""
+
+    def __init__(self, root: Path, garment: str) -> None:
+        folder, file = root / "configs/heads/ict", root / "configs/wardrobe" / f"{garment}.npz"
+        head = Head.load(folder, look=Look(worn=(Worn(file, (0.1, 0.1, 0.1)),)))
+        part, bare = head.part(garment.partition("-")[0]), Head.load(folder)
+        self.at, self.uv = part.vertices.astype(float), part.uv
+        self.cover = part.attributes["strands"][:, 2]
+        self.away = cKDTree(np.vstack([_dense(bare, name) for name in ("face", "back")])).query(self.at)[0]
+
+
+def _dense(head: Head, name: str) -> Floats:
+    """Vertices of a part, and the middles of its triangles and their edges."""
+    part = head.part(name)
+    a, b, c = part.vertices[part.triangles].astype(float).swapaxes(0, 1)
+    return np.vstack([part.vertices, (a + b + c) / 3, (a + b) / 2, (b + c) / 2, (c + a) / 2])
+
+
+@pytest.fixture(scope="module", params=["hair-bun", "hair-short", "hair-swept", "hair-thin"])
+def hair(request: pytest.FixtureRequest, root: Path) -> Dressed:
+    return Dressed(root, request.param)
+
+
+def test_no_hair_lies_over_an_ear(hair: Dressed) -> None:
+    x, y, z = np.abs(hair.at[:, 0]), hair.at[:, 1], hair.at[:, 2]
+    inside = (x > EAR_X) & (EAR_Y[0] < y) & (y < EAR_Y[1]) & (EAR_Z[0] < z) & (z < EAR_Z[1])
+    assert not (inside & (hair.cover > 0.0)).any(), hair.at[inside & (hair.cover > 0.0)]
+
+
+def test_thin_hair_over_the_forehead_ends_on_the_skin(root: Path) -> None:
+    """Seen from the side it stood in the air; strands that are few there must not be far from the skin."""
+    thin = Dressed(root, "hair-thin")
+    front = (np.abs(thin.at[:, 0]) < 12.0) & (thin.at[:, 2] > 60.0)
+    ends, few = front & (thin.uv[:, 1] > 0.99), front & (thin.cover < 0.3)
+    assert ends.any() and thin.away[ends].max() < 1.7
+    assert few.any() and thin.away[few].max() < 4.0
+
+
+def test_beards_lie_close_to_the_skin_at_the_ears(root: Path) -> None:
+    beard = Dressed(root, "beard-full")
+    side = (np.degrees(np.arctan2(np.abs(beard.at[:, 0]), beard.at[:, 2] - 20.0)) > 84.0) & (beard.cover > -0.25)
+    assert side.any() and beard.away[side].max() < 3.0
