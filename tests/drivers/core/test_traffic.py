@@ -45,6 +45,10 @@ def test_a_ping_tells_the_model_and_names_registers_from_then_on() -> None:
     ]
 
 
+def test_an_answer_whose_question_was_not_heard_is_told_as_its_bytes() -> None:
+    assert both(Decoder2(), (None, v2.encode_status(3, 0, b"\1\2\3"))) == ["<- 3 01 02 03"]
+
+
 @pytest.mark.parametrize("sent", [True, None])
 def test_reads_are_told_with_names_and_values(sent: bool | None) -> None:
     decoder = Decoder2({1: X, 2: X})
