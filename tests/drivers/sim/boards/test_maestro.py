@@ -150,6 +150,14 @@ def test_crc_is_checked_where_it_is_asked_for():
     assert pulse(board, 2) == 1500
 
 
+def test_a_question_without_data_waits_for_its_crc():
+    board = Maestro(crc=True)
+    question = bytes.fromhex("A1")
+    assert board.feed(question, 0.0) == [] and board.errors == 0
+    answers = board.feed(bytes((crc7(question),)), 0.1)
+    assert b"".join(answer.data for answer in answers) == bytes(2)
+
+
 def test_scripts_are_accepted_and_never_run():
     board = Maestro()
     assert send(board, "A4 A7 00 A8 00 00 00 8A 00 00 00 00 AE") == "01"
