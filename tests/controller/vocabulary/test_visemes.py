@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import config_dir
