@@ -38,6 +38,10 @@ def test_the_line_of_the_lips_is_where_the_jaw_tears_the_skin(scale: float) -> N
     np.testing.assert_allclose(found.middle, [0.0, LIPS_Y, 5.0], atol=0.8 * scale)
 
 
+def test_pixels_grow_with_the_head() -> None:
+    assert mouth_module._front(plain.subject(*jaw(), eyes=1.5 * plain.EYES)).view.step == pytest.approx(0.75)
+
+
 def test_the_middle_of_a_mouth_lies_between_its_corners_at_its_foremost_depth() -> None:
     line = Mouth(np.array([-10.0, 0.0, 30.0]), np.array([1.0, 2.0, 9.0]), np.array([3.0, 8.0, 4.0]), 9.0)
     np.testing.assert_allclose(line.middle, [10.0, 2.0, 8.0])
