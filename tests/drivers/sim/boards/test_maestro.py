@@ -193,7 +193,8 @@ def test_states_for_tools_and_faults():
 
 
 @pytest.mark.parametrize(
-    ("highest", "board", "channels"), [(3, "micro", 6), (3, "mini", 12), (12, "mini", 18), (23, "mini", 24), (30, "mini", 24)]
+    ("highest", "board", "channels"),
+    [(3, "micro", 6), (3, "mini", 12), (12, "mini", 18), (23, "mini", 24), (30, "mini", 24)],
 )
 def test_a_board_is_as_large_as_its_channels_need(highest: int, board: str, channels: int) -> None:
     line = make_line("maestro", [(0, "rc-90"), (highest, "rc-90")], 0.0, options={"board": board})
