@@ -59,8 +59,8 @@ def find_mouth(subject: Subject) -> Mouth | None:
     if len(columns) < 5:
         return None
     rows = np.argmax(step[:, columns], axis=0)
-    y = np.array([picture.at(r, 0)[1] for r in rows]) + 0.5 * (1 + below[rows + 1, columns]) * picture.view.step
-    x = np.array([picture.at(0, c)[0] for c in columns])
+    x, edge = picture.at(rows, columns)
+    y = edge + 0.5 * (1 + below[rows + 1, columns]) * picture.view.step
     return Mouth(x, y, picture.depth[rows, columns], float(np.nanmax(-down)))
 
 

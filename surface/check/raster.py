@@ -71,8 +71,8 @@ class Picture:
     parts: Ints
     rows: Ints
 
-    def at(self, row: int, column: int) -> tuple[float, float]:
-        """x and y of a pixel, mm."""
+    def at(self, row: Any, column: Any) -> tuple[Any, Any]:
+        """x and y of a pixel, mm; of many where rows and columns are arrays (k,)."""
         return self.view.x[0] + column * self.view.step, self.view.y[0] + row * self.view.step
 
 

@@ -189,7 +189,7 @@ class Rings:
         if used <= MOST_LISTED:
             ids = np.zeros(used, np.int64)
             list_rings(self._points, *near, self._ring, begin, ids)
-            near = np.arange(count), begin[:-1, None], begin[1:, None], ids
+            near = np.arange(count), begin[:count, None], begin[1:, None], ids
         self._near = near
 
     def heights(self, values: Floats, enough: float = 0.0) -> Floats:

@@ -228,7 +228,7 @@ class Layout:
         elif abs(x - high) <= near:
             centre = len(row) - 3 + inward
         else:
-            centre = nearest(row, x) + inward
+            centre = nearest(row, x)
         if not 2 <= centre <= len(row) - 3:
             return None
         return tuple(row[centre - 2 : centre + 3])

@@ -41,7 +41,7 @@ class SimulatedServo(ServoState):
         item = self.table[name]
         self._store(item, value, now_s)
         self.keep_permanent(item.address, min(item.end, self.table.eeprom_end))
-        self._sensed_at = -1.0
+        self._sensed_at = None
 
     # ------------------------------------------------------------ instructions
     def read(self, address: int, length: int, now_s: float) -> tuple[int, bytes]:
@@ -164,7 +164,7 @@ class SimulatedServo(ServoState):
         self.on_write(changes, now_s)
         for item, value in changes:
             self._store(item, value, now_s)
-        self._sensed_at = -1.0
+        self._sensed_at = None
 
     def _store(self, item: Item, value: int, now_s: float) -> None:
         if item.name == "Torque Enable" and value and self.shut_down and not self._recover():

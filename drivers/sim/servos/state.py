@@ -96,7 +96,7 @@ class ServoState:
         self.eeprom_busy_s = 0.0
         self.last_instruction = LastInstruction(now_s)
         self.next_health_s = now_s
-        self._sensed_at = -1.0
+        self._sensed_at: float | None = None
         self._pending: list[Change] = []
         self._errors = 0
         names = ("Hardware Error Status", "Error Code")
@@ -198,7 +198,7 @@ class ServoState:
         if self.plant.powered:
             raise ValueError(f"servo {self.id} holds its shaft: switch its torque off before moving it by hand")
         self.plant.place(now_s, self.drive.to_shaft(round(position)))
-        self._sensed_at = -1.0
+        self._sensed_at = None
 
     def latch(self, bits: int, now_s: float) -> None:
         """Latch hardware errors; those in the Shutdown mask switch the motor off until a reboot."""
@@ -287,10 +287,10 @@ class ServoState:
             plant.jam(now_s, begins)
         elif kind == "stops":
             plant.set_stops(now_s, value if begins else NO_STOPS)
-            self._sensed_at = -1.0
+            self._sensed_at = None
         elif kind == "weight":
             plant.weight = value if begins else 0.0
-            self._sensed_at = -1.0
+            self._sensed_at = None
         elif kind == "hw" and begins:
             self.latch(int(value), now_s)
         elif kind == "volts":
@@ -369,7 +369,7 @@ class ServoState:
         if self.table.protocol == 2 and "Operating Mode" in self.table:
             registers.extended = registers.get("Operating Mode") in (EXTENDED, CURRENT_POSITION)
         self._reset_goals(now_s)
-        self._sensed_at = -1.0
+        self._sensed_at = None
         startup = self.table.get("Startup Configuration")
         if startup and registers.get(startup.name) & 1:
             registers.put("Torque Enable", 1)
@@ -404,7 +404,7 @@ class ServoState:
 
     def _wrap_position(self, now_s: float) -> None:
         """Bring the shaft's position back into one turn."""
-        self._sensed_at = -1.0
+        self._sensed_at = None
         turn, first = self.table.ticks_per_turn, self.table.first_step
         position = self.plant.motion(now_s).position - first
         if not 0 <= position < turn:

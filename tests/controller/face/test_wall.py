@@ -67,3 +67,15 @@ def test_the_newest_face_of_every_head_is_drawn_and_kept(tmp_path: Path) -> None
             report = face.report()
     assert report["frames"] == 2 and report["heads"] == ["h0", "h1"]
     assert recorder.frames[0].shape == (80, 192, 3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("heads", [('person = "oak"', ""), ("", "")])
+def test_without_a_recorder_heads_are_drawn_and_nothing_is_kept(tmp_path: Path, heads: tuple[str, str]) -> None:
+    stage = stage_of(tmp_path, *heads)
+    with ExitStack() as stack:
+        boxes = [stack.enter_context(Mailbox.create(len(P))) for _ in heads]
+        with closing(WallFace(stage, P, boxes)) as face:
+            asked = iter([True, True, False])
+            face.run(lambda: next(asked))
+            assert face.report()["frames"] == 2

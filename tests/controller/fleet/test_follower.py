@@ -288,3 +288,22 @@ def test_own_life_is_not_needed_while_a_conductor_is_followed_whether_or_not_its
         follower.step(k * STEP_NS, DT, own, out)
     assert follower.conducted and not follower.exact
     assert follower.follows(3 * DT) and not follower.follows(3 * DT + 0.6)
+
+
+@pytest.mark.parametrize(("yaw_rad", "limit"), [(0.3, "acceleration"), (1.0, "speed")])
+def test_a_turn_to_a_conductor_is_as_quick_as_six_tenths_of_the_limits_let_it_be(yaw_rad: float, limit: str) -> None:
+    follower, at, theirs, shown = Follower(P), P.index("headYaw"), P.neutral(), []
+    theirs[at] = yaw_rad
+    for k in range(400):
+        now_ns, out = 10**9 + k * STEP_NS, P.neutral()
+        if k >= 50:
+            follower.take(Header(FIRST, k, now_ns), theirs)
+        follower.step(now_ns, DT, P.neutral(), out)
+        shown.append(out[at])
+    speed = np.diff(shown) / DT
+    shares = {
+        "speed": np.abs(speed).max() / P.max_speed[at],
+        "acceleration": np.abs(np.diff(speed)).max() / DT / P.max_acceleration[at],
+    }
+    assert shown[-1] == yaw_rad
+    assert shares[limit] == pytest.approx(0.6, abs=0.01) and max(shares.values()) < 0.61

@@ -260,7 +260,7 @@ def test_layers_rest_while_another_process_decides_and_who_stands_by_keeps_up(hu
     with Running(hub, "conductor", **more) as first:
         until(lambda: first.node.lease.active)
         with Running(hub, "conductor", seed=9, **more) as second, Running(hub, "head", seed=5, **more) as head:
-            until(lambda: all(len(mixed_of(node, follows=True)) > 60 for node in (second, head)))
+            until(lambda: all(len(mixed_of(node, follows=True)) > 150 for node in (second, head)))
     assert all(all(mixed_of(node, follows=False)) for node in (first, second, head))
     assert not any(mixed_of(head, follows=True))
     standby = mixed_of(second, follows=True)

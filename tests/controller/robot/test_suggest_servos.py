@@ -81,3 +81,10 @@ def test_a_suggestion_is_one_line_with_the_keys_of_an_anchor() -> None:
     said = described(module.Suggestion(point, direction, 4.56, "jaw", 2.34, 0.56, 1.234, 0.5))
     assert "in the region jaw, at point = [1.3, -2.0, 3.0], direction = [0.0, 0.6, 0.8], up to 4.6 mm" in said
     assert "there 2.3 mm left would become 0.6, of the whole skin 1.23 -> 0.50 mm (rms)" in said
+
+
+@pytest.mark.parametrize("way_mm", [(0.3, 0.1, 0.0), (-0.3, -0.1, 0.0), (0.0, 40.0, -9.0)])
+def test_a_servo_pulls_where_the_face_wants_to_go_however_short_the_way(way_mm: tuple[float, float, float]) -> None:
+    way = np.array(way_mm)
+    _, direction = module._best(np.array([[0.1], [1.0]]), way[None, None])
+    assert direction == pytest.approx(way / np.linalg.norm(way))

@@ -151,6 +151,7 @@ def test_lips_that_are_open_may_go_where_they_like(bench: Bench) -> None:
 def test_a_head_without_contacts_has_no_lips_to_keep_closed(small: Callable[[], Head]) -> None:
     samples, pairs = lip_pairs(small(), small().parts[0].name)
     assert pairs == 0 and len(samples.rest) == 0
+    assert solver_of(made([[0, 0, 0]], {"a": [[1, 0, 0]]}), "jawOpen")._lips is None
 
 
 @pytest.fixture

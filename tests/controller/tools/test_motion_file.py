@@ -10,6 +10,8 @@ import pytest
 from controller.base.errors import ConfigError, ControllerError, TakeError
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
+from controller.links.line.script import load_script
+from controller.links.line.show import Show
 from controller.takes.reader import load_take
 from controller.takes.recording import recorded
 from controller.tools.motion_file import convert, load_motion
@@ -46,6 +48,20 @@ def test_a_show_moves_as_on_the_face(tmp_path: Path) -> None:
     assert motion.values[[28, 55], JAW] == pytest.approx([0.8, 0.2], abs=0.02)
     assert motion.values[-1, JAW] == pytest.approx(0.0, abs=0.01) and np.flatnonzero(motion.mask).tolist() == [JAW]
     assert motion.times_s[-1] == pytest.approx(3.0, abs=0.02)
+
+
+def test_a_show_moves_whenever_it_begins_as_in_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text('steps = ["0 EXPR happiness 0.8", "0 GAZE 5 4", "0.4 GAZE OFF", "0.6 NEUTRAL 0.2"]')
+    state, out = CommandState(P), P.neutral()
+    show = Show(load_script(str(path), P), state)
+    show.playing = True
+    motion = load_motion(path, P, 100.0)
+    for k, row in enumerate(motion.values):
+        now_ns = 10**12 + 10_000_000 * k
+        show.tick(now_ns)
+        state.tick(now_ns, 0.01, out)
+        np.testing.assert_allclose(row, out, atol=2e-3)
 
 
 def test_a_recording_is_what_its_ticks_were(tmp_path: Path) -> None:

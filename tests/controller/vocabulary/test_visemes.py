@@ -10,6 +10,7 @@ import pytest
 
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS as P
+from controller.base.paths import config_dir
 from controller.vocabulary.visemes import Visemes
 
 VISEMES = Visemes.load(P)
@@ -50,6 +51,14 @@ def test_a_smile_shows_through() -> None:
     assert 0 < VISEMES.through[P.index("mouthSmileLeft")] < 1
     assert VISEMES.through[P.index("jawOpen")] == 0 and VISEMES.through[P.index("browInnerUp")] == 1
     assert not VISEMES.mask[P.index("browInnerUp")] and VISEMES.mask[P.index("jawOpen")]
+
+
+def test_speech_may_hold_back_what_no_viseme_moves(tmp_path: Path) -> None:
+    path = tmp_path / "visemes.toml"
+    shipped = (config_dir() / "vocabularies" / "visemes.toml").read_text()
+    path.write_text(shipped.replace("[through]\n", "[through]\nnoseSneer = 0.5\n"))
+    assert not VISEMES.mask[P.index("noseSneerLeft")]
+    assert Visemes.load(P, path).mask[P.index("noseSneerLeft")]
 
 
 def test_a_wrong_file_lists_every_fault(tmp_path: Path) -> None:

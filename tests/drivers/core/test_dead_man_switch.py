@@ -171,7 +171,7 @@ def test_orders_that_cannot_be_carried_out_are_told() -> None:
 
 def test_a_python_that_does_not_start_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "python"))
-    with pytest.raises(DriverError, match="does not start: No such file"):
+    with pytest.raises(DriverError, match="/python does not start: No such file"):
         DeadManSwitch("/dev/ttyUSB7", 1_000_000, [OFF])
 
 

@@ -18,7 +18,7 @@ from drivers.core.families import (
     PulseSettings,
     ServoSettings,
 )
-from drivers.core.registry import FAMILIES
+from drivers.core.registry import FAMILIES, kinds
 
 
 @pytest.mark.parametrize(
@@ -64,6 +64,12 @@ def test_every_family_of_omote_can_be_loaded_and_keeps_off_reserved_keys(kind: s
     assert issubclass(family.settings, AnySettings)
     for reference in (family.driver, family.check_model, family.simulator):
         assert FAMILIES.load(family, reference)
+
+
+def test_servos_on_boards_for_hobby_servos_can_be_calibrated_by_their_pulses() -> None:
+    by_check = {kind: FAMILIES.get(kind).check_model.endswith(":check_hobby") for kind in kinds()}
+    assert {kind for kind, is_hobby in by_check.items() if is_hobby} == {"maestro", "ssc32", "text"}
+    assert all(FAMILIES.get(kind).hobby for kind, is_hobby in by_check.items() if is_hobby)
 
 
 def test_a_family_is_one_of_boards_unless_it_says_otherwise() -> None:

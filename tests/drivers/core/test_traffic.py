@@ -45,6 +45,10 @@ def test_a_ping_tells_the_model_and_names_registers_from_then_on() -> None:
     ]
 
 
+def test_an_answer_whose_question_was_not_heard_is_told_as_its_bytes() -> None:
+    assert both(Decoder2(), (None, v2.encode_status(3, 0, b"\1\2\3"))) == ["<- 3 01 02 03"]
+
+
 @pytest.mark.parametrize("sent", [True, None])
 def test_reads_are_told_with_names_and_values(sent: bool | None) -> None:
     decoder = Decoder2({1: X, 2: X})
@@ -64,7 +68,9 @@ def test_reads_are_told_with_names_and_values(sent: bool | None) -> None:
 
 
 def test_a_refusal_is_told_by_name() -> None:
-    assert both(Decoder2(), (False, v2.encode_status(9, 7))) == ["<- 9 refused: access"]
+    names = ("result fail", "instruction", "crc", "data range", "data length", "data limit", "access")
+    for number, name in enumerate(names, 1):
+        assert both(Decoder2(), (False, v2.encode_status(9, number))) == [f"<- 9 refused: {name}"]
 
 
 def test_group_writes_name_the_register_once() -> None:
@@ -88,7 +94,10 @@ def test_a_joint_reply_is_taken_apart() -> None:
 
 
 def test_noise_is_counted() -> None:
-    assert both(Decoder2(), (False, b"\x01\x02" + v2.encode_status(1))) == ["<- 1 ok", "?? 2 bytes that are no packet"]
+    noisy, decoder = b"\x01\x02" + v2.encode_status(1), Decoder2()
+    for _ in range(2):
+        assert both(decoder, (False, noisy)) == ["<- 1 ok", "?? 2 bytes that are no packet"]
+    assert both(decoder, (False, v2.encode_status(1))) == ["<- 1 ok"]
 
 
 @pytest.mark.parametrize("sent", [True, None])

@@ -46,6 +46,7 @@ def test_a_head_is_plain_text() -> None:
         ("# omote traffic = 1\n0.1 ff\n", "line 2"),
         ("# omote traffic = 1\nnan > ff\n", "times must rise"),
         ("# omote traffic = 1\n0.2 > ff\n0.1 > ff\n", "line 3: times must rise"),
+        ("# omote traffic = 1\n0.1 > ff\n0.3 > ff\n0.2 > ff\n", "line 4: times must rise; 0.2 is before 0.3"),
     ],
 )
 def test_a_wrong_log_is_told(text: str, message: str) -> None:

@@ -6,6 +6,8 @@ Numbers are those of the fault list in docs/drivers.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -265,6 +267,21 @@ def test_fast_reads_come_back_after_a_fault_has_passed(wire: VirtualBus, monkeyp
         for _ in range(5):
             assert bus.read().fresh.all()
         assert bus._telemetry._fast
+
+
+def test_fast_reads_are_tried_again_after_twice_the_time_each_time_until_one_is_answered(wire: VirtualBus) -> None:
+    lost, answered = (SimpleNamespace(joint_lost=is_lost, replies={1: b""}) for is_lost in (True, False))
+    with wire.bus(fast=True, **CALM) as bus:
+        reads: Any = bus._telemetry
+        for pause_s in (5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 320.0):
+            while reads._fast:
+                reads._note_joint(lost, 1000.0)
+            assert reads._fast_again_s == 1000.0 + pause_s
+            reads._try_fast_again()
+        reads._note_joint(answered, 1000.0)
+        while reads._fast:
+            reads._note_joint(lost, 1000.0)
+        assert reads._fast_again_s == 1005.0
 
 
 def test_mixed_models_share_a_wire() -> None:

@@ -147,9 +147,9 @@ def test_other_urls_are_pyserials() -> None:
     with pytest.raises(BlockingIOError):
         end.take()
     assert end.put(memoryview(b"abc")) == 3
-    end.wait(0.0, True)
-    end.wait(20.0, False)
-    end.wait(20.0, False)  # the first byte waits already
+    assert end.wait(0.0, True)
+    assert end.wait(20.0, False)
+    assert end.wait(20.0, False)  # the first byte waits already
     assert end.take() == b"abc"
     with pytest.raises(BlockingIOError):
         end.take()

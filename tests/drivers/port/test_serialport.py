@@ -177,6 +177,24 @@ def test_a_far_end_that_takes_nothing_does_not_block_for_ever(pty: Pty) -> None:
     port.close()
 
 
+def test_bytes_wait_for_a_far_end_that_is_slow_to_take_them(pty: Pty) -> None:
+    data, taken = bytes(range(256)) * 256, bytearray()
+    port = SerialPort(pty.path)
+    port.open()
+
+    def take() -> None:
+        time.sleep(0.1)
+        while len(taken) < len(data):
+            taken.extend(os.read(pty.master, 4096))
+
+    far_end = threading.Thread(target=take)
+    far_end.start()
+    port.write(data)
+    far_end.join(20.0)
+    port.close()
+    assert taken == data
+
+
 def test_a_closed_port_refuses_use() -> None:
     port = SerialPort("/dev/nowhere")
     with pytest.raises(PortLost, match="not open"):

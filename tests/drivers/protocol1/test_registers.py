@@ -45,6 +45,14 @@ def test_a_window_holds_its_register_and_ends_inside_the_table(model: str) -> No
         assert size not in (HELLO, 2)
 
 
+@pytest.mark.parametrize("model", ["ax-12a", "mx1-28", "sts3215"])
+def test_the_window_of_the_last_register_ends_with_the_table(model: str) -> None:
+    table = load_table(model)
+    last = max((item for item in table.values() if item.size == 2), key=lambda item: item.end)
+    at, size = window(table, last)
+    assert at <= last.address < last.end <= at + size <= table.size
+
+
 def test_the_last_register_of_two_bytes_is_read_with_those_before_it(wire: VirtualBus, registers: Registers) -> None:
     table = registers.tables[1]
     words = [(item.end, name) for name in NAMES if (item := item_of(table, name)) and item.size == 2]

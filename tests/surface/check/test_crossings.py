@@ -96,3 +96,22 @@ def test_normals_of_a_ball_point_away_from_its_middle():
     normals = crossings._normals(places)
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-9)
     assert (normals * away).sum(axis=1).min() > 0.99
+
+
+@pytest.mark.parametrize("up", [1.0, -1.0])
+def test_what_a_ball_dips_below_a_sheet_lies_as_deep_as_its_height_says(up):
+    """The sheet's triangles are not those of a grid in line with the ball's, and face up or down."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-15.3, 14.9, 17), np.linspace(-14.7, 15.5, 17)))
+    first = np.flatnonzero((x < 14.8) & (y < 15.4))
+    sheet = np.concatenate([first[:, None] + [0, 1, 18], first[:, None] + [0, 18, 17]])
+    flat = np.column_stack([x, y, np.zeros(len(x))]), sheet if up > 0.0 else sheet[:, ::-1]
+    at, faces, same, kind = joined(ball(10.0, [0, 0, up * 7.03], 33), flat)
+    found = Crossings(at, faces, same, kind, TWO)
+    rows, depth = found.depths(found.pairs(at), 0, 1, 20.0, 0.1)
+    np.testing.assert_allclose(depth, -up * at[rows, 2], atol=1e-9)
+    below = np.unique(same[np.unique(faces[kind == 0])[-up * at[np.unique(faces[kind == 0]), 2] > 0.1]])
+    np.testing.assert_array_equal(np.sort(same[rows]), below)
+    near, shallow = found.depths(found.pairs(at), 0, 1, 1.5, 0.1)
+    assert 0 < len(near) < len(rows) and shallow.max() <= 1.5  # no further than so far along the ball
+    kept = rows[depth > 1.0]
+    np.testing.assert_array_equal(np.sort(found.depths(found.pairs(at), 0, 1, 20.0, 1.0)[0]), np.sort(kept))

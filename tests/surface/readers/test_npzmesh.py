@@ -38,6 +38,12 @@ def test_every_array_comes_back_in_its_type(tmp_path):
     assert mesh.piece.tolist() == [0, 0, 0] and mesh.pieces == ("mesh",)
 
 
+def test_a_mesh_may_have_no_texture_coordinates(tmp_path):
+    np.savez(tmp_path / "m.npz", **{key: array for key, array in arrays().items() if "uv" not in key})
+    mesh = read_npz(tmp_path / "m.npz")
+    assert mesh.uv.shape == (0, 2) and mesh.face_uv.shape == (3, 4) and (mesh.face_uv == -1).all()
+
+
 def test_names_may_be_bytes(tmp_path):
     assert read_npz(saved(tmp_path, names=np.array([b"jawOpen", b"a\xff"]))).names == ("jawOpen", "a\ufffd")
 

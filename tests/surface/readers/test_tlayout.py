@@ -11,6 +11,7 @@ from relief import cube_tsm
 from surface.readers.common import Location
 from surface.readers.tlayout import Complex, Copy, Layout, Ray, directions, nearest, overlap
 from surface.readers.tsmfile import parse
+from tests.surface.readers.test_tsm import Writer, cells
 
 KNOTS = Copy(3, (0.0, 1.0, 2.0, 4.0, 5.0), (-2.0, -1.0, 0.0, 3.0, 7.0))
 
@@ -84,3 +85,21 @@ def test_a_layout_is_flat_around_each_face_and_lays_nothing_twice() -> None:
         areas = [(b - a) * (d - c) for a, b, c, d in rects]
         sizes = [np.prod([side[0] for side in mesh._sides(mesh.loops[f])]) for f in layout.rects]
         assert areas == pytest.approx(sizes)
+
+
+def windows(knots: list[float]) -> list[tuple[float, ...]]:
+    """Five knots of every B-spline of degree 3 that ends at both ends of a row of knots."""
+    row = [knots[0]] * 3 + knots + [knots[-1]] * 3
+    return [tuple(row[k : k + 5]) for k in range(len(row) - 4)]
+
+
+def test_grips_that_act_in_a_face_are_the_b_splines_of_the_net() -> None:
+    us, vs = [0.0, 0.5, 1.25, 3.0, 4.0], [0.0, 1.0, 3.0, 3.5]
+    faces = cells(us, vs)
+    mesh = Complex(parse(Location(Path("net.tsm")), Writer(faces).text()))
+    for face, (a, b, c, d) in enumerate(faces):
+        copies = Layout(mesh, face).copies(face)
+        found = sorted((copy.knots_u, copy.knots_v) for copy in (copy.moved(a, c, 0) for copy in copies))
+        along_u = [knots for knots in windows(us) if knots[0] < b and knots[-1] > a]
+        along_v = [knots for knots in windows(vs) if knots[0] < d and knots[-1] > c]
+        assert len(copies) == 16 and found == sorted((u, v) for u in along_u for v in along_v)

@@ -82,5 +82,12 @@ def test_what_is_sent_has_the_published_form() -> None:
     assert re.fullmatch(rf"head#({number},){{5}}{number}\|(rightEye|leftEye)#.*\|(rightEye|leftEye)#.*\|", turns)
 
 
+def test_values_are_sent_in_hundredths_of_a_whole_movement() -> None:
+    values = P.neutral()
+    values[[P.index("mouthSmileLeft"), P.index("jawOpen")]] = 0.5, 1.2
+    (data,) = IFacialMocapEncoder(P).encode(Frame(values, np.ones(len(P), dtype=bool)))
+    assert {"mouthSmile_L-50", "jawOpen-120", "browInnerUp-0"} <= set(data.decode().split("|"))
+
+
 def test_nothing_is_sent_without_a_face() -> None:
     assert IFacialMocapEncoder(P).encode(Frame(P.neutral(), np.zeros(len(P), dtype=bool), face=False)) == []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from dataclasses import replace
 
@@ -63,6 +64,14 @@ def test_a_second_source_is_heard_when_the_first_is_silent() -> None:
     finally:
         incoming.stop()
     assert fed.closed
+
+
+def test_a_link_that_nobody_stops_does_not_keep_the_program_alive() -> None:
+    _, _, incoming = opened()
+    try:
+        assert [each.daemon for each in threading.enumerate() if each.name == "link livelink here"] == [True]
+    finally:
+        incoming.stop()
 
 
 def test_of_several_sources_at_once_the_first_counts() -> None:

@@ -68,3 +68,31 @@ def test_a_silent_source_has_no_rate_and_midnight_loses_nothing() -> None:
     for n, number in enumerate([5_183_998, 5_183_999, 0, 1]):
         meter.note(n / 60, number)
     assert meter.lost == 0 and meter.report(60.0)["rate_hz"] == 0.0
+
+
+def test_averages_move_by_a_twentieth_and_pauses_are_left_out() -> None:
+    meter = Meter()
+    for now_s in (0.0, 0.02, 0.04, 0.08):
+        meter.note(now_s)
+    wanted = {"rate_hz": 47.6, "jitter_ms": 1.0, "lost": 0, "age_s": 0.02}
+    assert meter.report(0.1) == wanted
+    meter.note(5.0)
+    assert meter.report(5.02) == wanted and meter.report(5.98)["rate_hz"] == 47.6
+    assert meter.report(6.02)["rate_hz"] == 0.0
+
+
+def test_messages_that_were_not_read_count_in_the_rate() -> None:
+    meter = Meter()
+    meter.note(0.0)
+    meter.note(0.1, skipped=9)
+    assert meter.report(0.1)["rate_hz"] == 100.0 and meter.frames == 11
+    meter.note(2.1, skipped=9)  # 0.2 s each
+    assert meter.report(2.1)["rate_hz"] < 100.0
+
+
+@pytest.mark.parametrize(("number", "lost"), [(3002, 2999), (3003, 0), (-99, 0), (1, 0)])
+def test_three_thousand_may_be_missing_at_once_and_beyond_a_source_has_begun_anew(number: int, lost: int) -> None:
+    meter = Meter()
+    for n, each in enumerate([100, 101, 102, 100 + number, 101 + number]):
+        meter.note(n / 60, each)
+    assert meter.lost == lost

@@ -62,7 +62,7 @@ class FakeScreen:
 
 
 class FakeOverlays:
-    """Two control points, and a line that no part of another kind has."""
+    """Two control points, and two lines that no part of another kind has."""
 
     def __init__(self) -> None:
         self.posed: list[tuple[np.ndarray, np.ndarray | None]] = []
@@ -78,7 +78,7 @@ class FakeOverlays:
         if kind == "control points":
             return Marks(points=np.array([[10.0, 20, 5], [30, 40, 6]]), shades=np.array([0.0, 1.0]),
                          families=np.array([1, 10]), labels={1: "brow"})  # fmt: skip
-        return Marks(lines=np.array([[[1.0, 2, 0], [3, 4, 0]]]), shades=np.array([0.5]))
+        return Marks(lines=np.array([[[1.0, 2, 0], [3, 4, 0]], [[5, 6, 0], [7, 9, 0]]]), shades=np.array([0.5, 1.0]))
 
 
 @pytest.fixture
@@ -117,7 +117,10 @@ def test_lines_run_between_their_ends(imgui: Imgui) -> None:
     made, _ = view()
     made.switch(next(kind for kind in KINDS if kind != "control points"), on=True)
     made(None)  # type: ignore[arg-type]
-    assert imgui.draw.calls[1:-1] == [("add_line", (101.0, 22.0), (103.0, 24.0), 95_062)]
+    assert imgui.draw.calls[1:-1] == [
+        ("add_line", (101.0, 22.0), (103.0, 24.0), 95_062),
+        ("add_line", (105.0, 26.0), (107.0, 29.0), 95_100),
+    ]
 
 
 @pytest.mark.parametrize(("shift", "ctrl", "clicked"), [(True, False, True), (False, False, True), (True, True, True)])

@@ -88,10 +88,12 @@ def test_a_folder_that_is_a_file_is_a_message(tmp_path: Path) -> None:
 def test_a_clip_has_the_pictures_of_its_time_at_the_rate_they_came(bench: Bench, tmp_path: Path) -> None:
     jobs = bench.capture._jobs
     bench.capture.toggle_clip()
+    times_s = []
     for grey in range(40):
         bench.frame(0.05, 0.0)
         if bench.area.wanted is not None:
             take, bench.area.wanted = bench.area.wanted, None
+            times_s.append(0.05 * grey)
             take(np.full((96, 128, 3), 6 * grey, np.uint8))
     assert bench.capture.filming
     bench.capture.toggle_clip()
@@ -105,6 +107,8 @@ def test_a_clip_has_the_pictures_of_its_time_at_the_rate_they_came(bench: Bench,
         clip.load()
         assert clip.size == (128, 96) and 15 <= frames <= 27
         assert abs(frames * clip.info["duration"] / 1000.0 - 2.0) < 0.3
+        assert frames == len(times_s)
+        assert clip.info["duration"] == pytest.approx(1e3 * np.diff(times_s).mean(), abs=1.5)
     assert bench.capture.message == f"wrote {path}, {frames} pictures"
 
 

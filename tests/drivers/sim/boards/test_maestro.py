@@ -150,6 +150,14 @@ def test_crc_is_checked_where_it_is_asked_for():
     assert pulse(board, 2) == 1500
 
 
+def test_a_question_without_data_waits_for_its_crc():
+    board = Maestro(crc=True)
+    question = bytes.fromhex("A1")
+    assert board.feed(question, 0.0) == [] and board.errors == 0
+    answers = board.feed(bytes((crc7(question),)), 0.1)
+    assert b"".join(answer.data for answer in answers) == bytes(2)
+
+
 def test_scripts_are_accepted_and_never_run():
     board = Maestro()
     assert send(board, "A4 A7 00 A8 00 00 00 8A 00 00 00 00 AE") == "01"
@@ -185,7 +193,8 @@ def test_states_for_tools_and_faults():
 
 
 @pytest.mark.parametrize(
-    ("highest", "board", "channels"), [(3, "micro", 6), (3, "mini", 12), (12, "mini", 18), (23, "mini", 24)]
+    ("highest", "board", "channels"),
+    [(3, "micro", 6), (3, "mini", 12), (12, "mini", 18), (23, "mini", 24), (30, "mini", 24)],
 )
 def test_a_board_is_as_large_as_its_channels_need(highest: int, board: str, channels: int) -> None:
     line = make_line("maestro", [(0, "rc-90"), (highest, "rc-90")], 0.0, options={"board": board})

@@ -56,6 +56,14 @@ def test_the_direction_of_an_xl320_is_left_in_its_register():
     assert one.registers.get("Present Load") == round(1023 * 0.1) | 1024
 
 
+@pytest.mark.parametrize(("mode", "turns"), [(1, True), (2, False)])
+def test_an_xl320_turns_endlessly_in_wheel_mode_alone(mode: int, turns: bool):
+    one = drive("xl320", Control_Mode=mode, Goal_Position=700, Moving_Speed=200)
+    one.plant.powered = True
+    one.plan(0.0)
+    assert (one.plant.trajectory.at(60.0).velocity != 0.0) == turns
+
+
 def test_positions_outside_the_turn_are_cut():
     one = drive("ax-12a")
     for shaft, shown in ((-50.0, 0), (2000.0, 1023)):

@@ -386,3 +386,12 @@ def test_a_look_at_a_servo_trips_its_watchdog():
     write(device, "Torque Enable", 1)
     device.update(1.0)
     assert device.registers.goals_locked
+
+
+def test_the_last_errors_of_a_servo_with_codes_are_listed_with_the_newest_first():
+    device = servo("ym070-210-r051")
+    codes = device.table.error_codes
+    for now_s, cause in enumerate(("voltage", "temperature", "temperature", "overload")):
+        device.latch(codes[cause], float(now_s))
+    listed = [read(device, f"Error Code History {k}", 9.0) for k in range(1, 5)]
+    assert listed == [codes["overload"], codes["temperature"], codes["voltage"], 0]

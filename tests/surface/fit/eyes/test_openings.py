@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -175,3 +177,22 @@ def test_a_centre_is_set_back_until_nine_tenths_of_an_edge_lie_outside() -> None
     np.testing.assert_allclose(set_back(centre, radius, few), centre, atol=1e-9)
     np.testing.assert_allclose(set_back(centre, radius, edge * [3, 3, 1]), centre)  # beside it
     np.testing.assert_allclose(set_back(centre, radius, edge - [0, 0, 6.0]), centre)  # too far back to tell
+
+
+@pytest.mark.parametrize(("wide", "near"), [(3, 0.4), (61, 12.0)])
+def test_edges_are_looked_for_in_five_rings_about_a_hole_and_further_out_on_fine_meshes(wide: int, near: float) -> None:
+    points, faces = grid(101, 61)
+    hole = np.flatnonzero((points[:, 1] == 30) & (np.abs(points[:, 0] - 50) <= wide // 2))
+    away = np.abs(points[:, None, :2] - points[None, hole, :2])
+    rings, distance = away.sum(axis=2).min(axis=1), np.hypot(*np.moveaxis(away, 2, 0)).min(axis=1)
+    mesh: Any = SimpleNamespace(vertices=points, faces=faces)
+    found = module._around(mesh, np.ones(len(faces), bool), hole)
+    np.testing.assert_array_equal(found, (rings <= 5) | (distance < near))
+
+
+def grid(wide: int, high: int) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n, 3) a millimetre apart, and the squares (f, 4) between them."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(wide), np.arange(high)))
+    first = np.flatnonzero((x < wide - 1) & (y < high - 1))
+    faces = first[:, None] + [0, 1, wide + 1, wide]
+    return np.column_stack([x, y, np.zeros(len(x))]).astype(float), faces

@@ -72,6 +72,8 @@ def test_a_missing_file_and_numbers_that_are_none():
         read_scan("nowhere.stl")
     with pytest.raises(FitError, match="vertex 1 is not a finite"):
         make_scan(np.array([[0, 0, 0], [np.nan, 0, 0], [1, 0, 0]]), TWO[:1], "x")
+    with pytest.raises(FitError, match="vertex 2 is not a finite number of usable size"):
+        make_scan(np.array([[0, 0, 0], [0, 1, 0], [1e7, 0, 0]]), TWO[:1], "x")
     with pytest.raises(FitError, match="not there"):
         make_scan(SQUARE, TWO + 2, "x")
 

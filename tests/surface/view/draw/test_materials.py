@@ -101,6 +101,13 @@ def test_vertex_data_of_skin_comes_in_the_order_of_the_shader() -> None:
     assert bare["surface_uv_gloss"][:, 2:] == pytest.approx(np.tile([0.3, 0.0], (count, 1)))
 
 
+def test_what_is_worn_shines_as_its_material_does_where_no_gloss_is_painted() -> None:
+    bare, dull = skin(), skin()
+    dull.attributes = {"gloss": np.full((len(dull.rest), 1), 0.2)}
+    made = [material_of("cloth").static(part, THEMES["skin"], openings())["albedo_gloss"] for part in (bare, dull)]
+    assert (made[0][:, 3] == 255).all() and (made[1][:, 3] == 51).all()
+
+
 def test_detail_is_longitude_and_latitude_on_the_skull_and_height_below_it() -> None:
     part = skin()
     tiles = 18 / (2 * np.pi)
