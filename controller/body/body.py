@@ -143,7 +143,7 @@ class Body:
     def _bus_loops(self, robot: RobotSettings, parameters: Parameters, limp: bool) -> list[BusLoop]:
         anchors = None
         if robot.anchored_channels:
-            from controller.robot.anchors import load_anchors  # start-up: loads the head
+            from controller.robot.anchors import load_anchors  # imported lazily: it loads the head
 
             anchors = load_anchors(robot, self.stage.head, parameters)
         prefix = f"{self.state.name}/" if self._member is not None else ""

@@ -21,8 +21,8 @@ from controller.base.signals import signals_blocked, unblock_signals
 from drivers.base.permission import check_ports_allowed
 
 if TYPE_CHECKING:
-    from controller.base.mailboxes import Mailbox  # start-up: it loads numpy
-    from controller.body.messages import BodyOrders  # start-up: it loads numpy
+    from controller.base.mailboxes import Mailbox  # imported lazily: it loads numpy
+    from controller.body.messages import BodyOrders  # imported lazily: it loads numpy
 
 _END_S = 5.0
 
@@ -94,7 +94,7 @@ def _wait(pipe: Connection, voice: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
     unblock_signals()
     with garbage_collection_off():
-        from controller.body.main import body_main  # start-up: in the child, while main reads its orders
+        from controller.body.main import body_main  # imported lazily: in the child, while main reads its orders
     try:
         orders: BodyOrders = pipe.recv()
     except (EOFError, OSError):

@@ -11,7 +11,7 @@ __all__ = ["main"]
 def main() -> None:
     """Entry point of the ``omote`` command: Ctrl-C ends it quietly from here on, also while its modules load."""
     try:
-        from controller.cli import app  # start-up: it loads modules of Python that an interrupt could hit
+        from controller.cli import app  # imported lazily: it loads modules of Python that an interrupt could hit
 
         app.main()
     except KeyboardInterrupt:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from sys import UnraisableHookArgs
     from types import FrameType
 
-    from typer import Typer  # start-up: Ctrl-C ends it quietly while all this still loads
+    from typer import Typer  # imported lazily: Ctrl-C ends omote quietly while this still loads
 
 _AGAIN_S = 0.01
 _LONGEST_LINE = 600
@@ -28,25 +28,25 @@ WEB = "127.0.0.1:8080"
 
 
 def _runs() -> tuple[Callable[..., None], ...]:
-    from controller.cli import run  # start-up: each of these only where it is needed
+    from controller.cli import run  # imported lazily: only the commands that need it load it
 
     return run.demo, run.run, run.edit, run.play, run.convert
 
 
 def _pictures() -> tuple[Callable[..., None], ...]:
-    from controller.cli import heads, landmarks  # start-up: the same
+    from controller.cli import heads, landmarks  # imported lazily: as above
 
     return heads.render, heads.fit, landmarks.landmarks, heads.export
 
 
 def _buses() -> tuple[Callable[..., None], ...]:
-    from controller.cli import bus, hardware  # start-up: the same
+    from controller.cli import bus, hardware  # imported lazily: as above
 
     return bus.ports, bus.scan, bus.set_id, bus.monitor, bus.calibrate, hardware.preflight, hardware.service
 
 
 def _others() -> tuple[Callable[..., None], ...]:
-    from controller.cli import bench, check, study, translate, webcam  # start-up: the same
+    from controller.cli import bench, check, study, translate, webcam  # imported lazily: as above
 
     return check.check, check.plugins, bench.bench, translate.translate, webcam.webcam, study.study
 
@@ -62,10 +62,10 @@ COMMANDS = (
 
 def make_app(only: str = "") -> Typer:
     """All commands, or only those that are loaded with the one called ``only``, which is faster."""
-    # start-up: main() ends Ctrl-C quietly from its first line on, while all this still loads
+    # imported lazily: main() ends Ctrl-C quietly from its first line on, also while these load
     from typer import Typer
 
-    from controller.cli import version  # start-up: the same
+    from controller.cli import version  # imported lazily: as above
 
     app = Typer(
         name="omote",
@@ -80,7 +80,7 @@ def make_app(only: str = "") -> Typer:
         for command in load():
             app.command()(command)
     if not chosen:
-        from controller.cli import simulate  # start-up: the same
+        from controller.cli import simulate  # imported lazily: as above
 
         app.add_typer(simulate.make_app(), name="simulate")
     app.callback()(version.root)
@@ -99,7 +99,7 @@ def _shortened(text: str) -> str:
 
 def report_error(error: BaseException, remark: str = "") -> None:
     """Print what failed and what to do next on standard error."""
-    # start-up: Ctrl-C ends it quietly from main() on
+    # imported lazily: Ctrl-C ends omote quietly from main() on
     from rich.console import Console
     from rich.text import Text
 
@@ -166,7 +166,7 @@ def with_web_address(arguments: list[str]) -> list[str]:
 
 def _run() -> int:
     """Run the command of this process; returns its exit code."""
-    # start-up: main() ends Ctrl-C quietly
+    # imported lazily: main() ends Ctrl-C quietly
     from controller.base.errors import OMOTE_ERRORS
     from controller.cli.streams import fault_of, prepare_streams
 
@@ -194,7 +194,7 @@ def _run() -> int:
 
 def _report_fault(error: Exception) -> int:
     """Report an error that no command expected; returns the exit code."""
-    from controller.base.errors import denied, exhausted  # start-up: main() ends Ctrl-C quietly
+    from controller.base.errors import denied, exhausted  # imported lazily: main() ends Ctrl-C quietly
 
     if _is_interrupt(error):
         return 130

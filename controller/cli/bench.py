@@ -92,7 +92,7 @@ def bench(
     if what is Subject.bus:
         _bench_bus(seconds, face, as_json, real, baud, buses, servos)
         return
-    from controller.tools import bench_surface as benches  # start-up: --help does without it
+    from controller.tools import bench_surface as benches  # imported lazily: not needed for --help
 
     columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
     picture = out if what is Subject.quadtree else growth if what is Subject.surface else None
@@ -140,7 +140,7 @@ def _bench_surface(
     advance: Callable[[str, float], None],
 ) -> list[tuple[str, list[Measure]]]:  # fmt: skip
     """The engine at its limit; also far more vertices if ``large``, and growth with size if that file is given."""
-    from controller.tools import bench_surface as benches  # start-up: --help does without it
+    from controller.tools import bench_surface as benches  # imported lazily: not needed for --help
 
     tables = benches.bench_surface(seconds, log, vertices, head)
     tables += benches.bench_large(seconds, log, advance, vertices) if large else []
@@ -154,7 +154,7 @@ def _ratio(row: Measure) -> str:
 
 
 def _bench_bus(seconds: float, face: bool, as_json: bool, real: str, baud: int, buses: int, servos: int) -> None:
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.hardware.bench_many import bench_many
     from controller.hardware.bench_real_bus import bench_real_bus
     from controller.tools.bench_bus import bench_bus, to_json

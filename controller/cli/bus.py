@@ -26,7 +26,7 @@ def ports() -> None:
 
     Example: omote ports
     """
-    from drivers.port.ports import list_ports  # start-up: --help does without it
+    from drivers.port.ports import list_ports  # imported lazily: not needed for --help
 
     found = list_ports()
     if not found:
@@ -62,7 +62,7 @@ def scan(
 
     Example: omote scan /dev/ttyUSB0 --baud 1000000
     """
-    from controller.tools.scan import STEPS, plan_scan, scan_port  # start-up: --help does without it
+    from controller.tools.scan import STEPS, plan_scan, scan_port  # imported lazily: not needed for --help
 
     plan = plan_scan(baud, protocol or (2, 1))
     table = Table("baud", "prot.", "id", "model", "fw", "supply", "temp.", "error", "torque")
@@ -94,7 +94,7 @@ def set_id(
 
     Example: omote set-id /dev/ttyUSB0 1 12
     """
-    from drivers.tools.set_id import set_id as change  # start-up: --help does without it
+    from drivers.tools.set_id import set_id as change  # imported lazily: not needed for --help
 
     info = change(port, baud, protocol, old, new, release=release)
     console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}", soft_wrap=True)
@@ -123,7 +123,7 @@ def monitor(
 
     Example: omote monitor /dev/ttyUSB0 --baud 57600
     """
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.signals import stop_flag
     from controller.body.process import deadline
     from controller.tools.monitor import listen_to_bus, poll_servos, replay_traffic
@@ -176,7 +176,7 @@ def calibrate(
 
     Example: omote calibrate head24 --name desk
     """
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS, did_you_mean
     from controller.robot.calibration import calibration_path
     from controller.robot.robot import load_robot
@@ -193,7 +193,7 @@ def calibrate(
             raise ConfigError(f"robot {settings.name} has no channel called {word!r}{did_you_mean(word, known)}")
     channels = [each for each in settings.channels if not channel or each.name in channel]
     if find_stops:
-        from controller.cli.hardware import look_for_stops  # start-up: --help does without it
+        from controller.cli.hardware import look_for_stops  # imported lazily: not needed for --help
 
         look_for_stops(settings, channels, torque, margin, yes)
         return
@@ -207,7 +207,7 @@ def calibrate(
 
 def _fit_pairs(path: Path, pairs: Path, target: Path) -> None:
     """Fit the channels of the robot in ``path`` to pairs, write them to ``target`` and say how well they fit."""
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.robot.pairs.files import fit_channels, read_pairs, report_rows, write_robot
     from controller.robot.robot import load_robot, robot_parameters

@@ -34,7 +34,7 @@ def check(
 
     Example: omote check configs/robots/head24.toml
     """
-    from controller.tools.check import check_anything  # start-up: --help does without it
+    from controller.tools.check import check_anything  # imported lazily: not needed for --help
 
     for line in check_anything(file, vocabulary_files(vocabulary)):
         console.print(escape(line), soft_wrap=True)
@@ -45,7 +45,7 @@ def plugins() -> None:
 
     Example: omote plugins
     """
-    from controller.tools.plugins import listed  # start-up: --help does without it
+    from controller.tools.plugins import listed  # imported lazily: not needed for --help
 
     table, broken = Table(box=None, pad_edge=False), []
     for head in ("sort", "kind", "what it is", "from"):

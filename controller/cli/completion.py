@@ -24,7 +24,7 @@ def names_of(kind: str) -> Complete:
     """Names of a folder of configs; what else may stand there is a path, which the shell itself completes."""
 
     def names() -> Iterable[str]:
-        from controller.base.paths import config_dir  # start-up: only completion needs it
+        from controller.base.paths import config_dir  # imported lazily: only completion needs it
 
         return (path.stem for path in (config_dir() / kind).iterdir() if not path.name.startswith("."))
 
@@ -32,13 +32,13 @@ def names_of(kind: str) -> Complete:
 
 
 def _settings() -> Iterable[str]:
-    from controller.base.parameters import PARAMETERS  # start-up: only completion needs it
+    from controller.base.parameters import PARAMETERS  # imported lazily: only completion needs it
 
     return (f"{name}=" for name in PARAMETERS.names)
 
 
 def _expressions() -> Iterable[str]:
-    # start-up: only completion needs them
+    # imported lazily: only completion needs them
     from controller.base.parameters import PARAMETERS
     from controller.vocabulary.vocabulary import Vocabulary
 
@@ -46,7 +46,7 @@ def _expressions() -> Iterable[str]:
 
 
 def _identities() -> Iterable[str]:
-    # start-up: only completion needs them
+    # imported lazily: only completion needs them
     from controller.base.paths import find_config
     from surface.head.model.identity import load_identities
 
@@ -54,7 +54,7 @@ def _identities() -> Iterable[str]:
 
 
 def _models() -> Iterable[str]:
-    from drivers.tables.tables import known_models  # start-up: only completion needs it
+    from drivers.tables.tables import known_models  # imported lazily: only completion needs it
 
     return known_models().values()
 

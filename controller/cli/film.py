@@ -12,7 +12,7 @@ from controller.base.errors import ConfigError
 from controller.cli.console import console
 
 if TYPE_CHECKING:
-    from controller.face.still import Still  # start-up: --help does without it
+    from controller.face.still import Still  # imported lazily: not needed for --help
 
 FilmTake = Annotated[
     Path | None,
@@ -41,7 +41,7 @@ def check_film(take: Path | None, sound: Path | None, rate_hz: float | None, oth
 
 def render_film(still: Still, out: Path, take: Path, sound: Path | None, rate_hz: float | None) -> None:
     """Draw the film and say what was written. Raises TakeError, ConfigError, ViewError."""
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.face.film import FPS, base_of, draw_film
     from controller.tools.motion_file import load_motion
 
@@ -68,7 +68,7 @@ def _heard(sound: Path | None, *, silent: bool) -> str:
 
 def _sound_of(take: Path) -> Path | None:
     """What is heard of a take or a show; None where nothing is."""
-    # start-up: --help does without them
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.links.line.script import load_script
     from controller.takes.reader import TAKES

@@ -42,7 +42,7 @@ def preflight(
 
     Example: omote preflight my-robot.toml -o preflight.toml
     """
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.hardware.preflight import Options, new_preflight, run_preflight
     from controller.hardware.preflight_report import check_report_path, preflight_table, write_preflight
@@ -88,7 +88,7 @@ def look_for_stops(
     robot: RobotSettings, channels: Sequence[ChannelSettings], torque: float, margin_deg: float, yes: bool
 ) -> None:
     """``omote calibrate --find-stops``; raises ControllerError where something does not fit."""
-    from controller.hardware.stops import find_robot_stops, stops_table  # start-up: --help does without it
+    from controller.hardware.stops import find_robot_stops, stops_table  # imported lazily: not needed for --help
 
     servos = f"{_count(len(channels), 'servo')} of {robot.name}"
     what = f"{servos}, one after the other: looking for end stops with {100 * torque:.0f} % of the torque."
@@ -119,7 +119,7 @@ def service(
 
     Example: omote service my-stage.toml -o service
     """
-    from controller.hardware.service import write_service  # start-up: --help does without it
+    from controller.hardware.service import write_service  # imported lazily: not needed for --help
 
     written, commands = write_service(what, out, user, name)
     for path in written:
@@ -131,7 +131,7 @@ def service(
 
 def _robot(robot: str, names: Sequence[str] | None) -> tuple[Path, RobotSettings, list[ChannelSettings]]:
     """The file, the settings and the channels that were asked for; raises ConfigError."""
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS, did_you_mean
     from controller.robot.robot import load_robot
 

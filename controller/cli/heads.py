@@ -19,12 +19,12 @@ from controller.cli.film import FilmRate, FilmTake, Sound, check_film, render_fi
 from surface.base.extras import require
 
 if TYPE_CHECKING:
-    from controller.base.parameters import Parameters  # start-up: --help does without it
-    from controller.tools.surface_fit import SurfaceFit  # start-up: --help does without it
-    from surface.export.animation import Animation  # start-up: --help does without it
-    from surface.fit.points.report import FitReport  # start-up: --help does without it
-    from surface.fit.source.load import LoadOptions  # start-up: --help does without it
-    from surface.head import Head  # start-up: --help does without it
+    from controller.base.parameters import Parameters  # imported lazily: not needed for --help
+    from controller.tools.surface_fit import SurfaceFit  # imported lazily: not needed for --help
+    from surface.export.animation import Animation  # imported lazily: not needed for --help
+    from surface.fit.points.report import FitReport  # imported lazily: not needed for --help
+    from surface.fit.source.load import LoadOptions  # imported lazily: not needed for --help
+    from surface.head import Head  # imported lazily: not needed for --help
 
 _NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
 _NO_SHAPES = "the mesh has no shapes: --expressions-from ict gives it those of another head"
@@ -112,9 +112,9 @@ def render(
     """
     check_film(take, sound, rate_hz, {"--sheet": sheet, "--crowd": crowd})
     require("a picture", "moderngl", "PIL")
-    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still  # start-up: --help does without it
-    from controller.stage.persons import parse_person  # start-up: --help does without it
-    from controller.stage.picture import parse_background  # start-up: --help does without it
+    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still  # imported lazily: not needed for --help
+    from controller.stage.persons import parse_person  # imported lazily: not needed for --help
+    from controller.stage.picture import parse_background  # imported lazily: not needed for --help
 
     look = {
         "camera": camera, "quality": quality, "theme": theme, "background": parse_background(background),
@@ -201,7 +201,7 @@ def fit(
     omote fit scan.ply -o heads/scan --expressions-from ict; surfaces:
     omote fit face.3dm -o heads/face --groups groups.toml
     """
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.tools.surface_fit import SurfaceFit, is_surface_file, refuse_surface_options
     from controller.tools.transfer import check_transfer
     from surface.fit.identities import add_identities
@@ -250,7 +250,7 @@ def _fit_mesh(
     report: Path | None, force: bool,
 ) -> None:  # fmt: skip
     """Make a head of a mesh, by its own shapes or another head's, and say what was found."""
-    from controller.tools.transfer import transfer  # start-up: --help does without either
+    from controller.tools.transfer import transfer  # imported lazily: not needed for --help
     from surface.fit.api import fit_head
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -274,7 +274,7 @@ def _fit_mesh(
 
 def _measure(mesh: Path, out: Path, options: LoadOptions) -> None:
     """Measure a head beside the mesh that it was fitted to, and say how far it is off."""
-    import numpy as np  # start-up: --help does without either
+    import numpy as np  # imported lazily: not needed for --help
 
     from surface.fit.api import measure_head
 
@@ -305,7 +305,7 @@ def _fit_surfaces(wanted: SurfaceFit) -> None:
 
 def _remarks(found: FitReport, shaded: bool) -> list[str]:
     """What is said below the table of a fit: bounds, pieces, notes, what is missing, the greatest errors last."""
-    from surface.fit.points.report import face_bounds, kinds_line  # start-up: --help does without it
+    from surface.fit.points.report import face_bounds, kinds_line  # imported lazily: not needed for --help
 
     missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)
     lines = [face_bounds(found), *filter(None, [kinds_line(found)]), *found.notes]
@@ -319,7 +319,7 @@ def _remarks(found: FitReport, shaded: bool) -> list[str]:
 
 def _checked(out: Path) -> list[str]:
     """What ``omote check`` would say of a head, in lines; how skin overlaps is among the remarks of a fit already."""
-    # start-up: --help does without these
+    # imported lazily: not needed for --help
     from surface.check import check_head
     from surface.head import Head
 
@@ -329,7 +329,7 @@ def _checked(out: Path) -> list[str]:
 
 def _decimate_and_shade(out: Path) -> bool:
     """Add to a head's folder its decimated triangles and how much light reaches each vertex; False without OpenGL."""
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from surface.base.errors import MissingPackage, ViewError
     from surface.view.draw.decimate import decimate_head
     from surface.view.pictures.occlusion import shade_head
@@ -388,7 +388,7 @@ def export(
 
     Example: omote export head.glb; with an animation: omote export head.glb --take alex_rom_3.csv
     """
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.face.still import Still
     from controller.stage.persons import parse_person
     from controller.tools.plugins import EXPORTERS, added_exporters
@@ -417,7 +417,7 @@ def export(
 
 def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> list[Path]:
     """Write a .urdf with the limits of a robot's servos. Raises ConfigError: another kind of file, or no such robot."""
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.base.paths import find_config
     from controller.robot.joint_limits import joint_limits
@@ -436,9 +436,9 @@ def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> l
 
 def _animation(take: Path | None, rate_hz: float | None, head: Head, parameters: Parameters) -> Animation | None:
     """What a take shows, as an animation; None without one."""
-    import numpy as np  # start-up: --help does without any of these
+    import numpy as np  # imported lazily: not needed for --help
 
-    # start-up: the same
+    # imported lazily: as above
     from controller.face.face import head_indices
     from controller.tools.motion_file import load_motion
     from surface.export.animation import Animation

@@ -35,7 +35,7 @@ def landmarks(
     Example: omote landmarks scan.ply -o landmarks.toml
     """
     require("finding landmarks", "scipy", "PIL")
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from surface.fit.source.load import LoadOptions
     from surface.fit.transfer.pick_landmarks import pick_landmarks
 

@@ -50,7 +50,7 @@ def demo(
 
     Example: omote demo --seconds 5 --headless
     """
-    from controller.tools.stage_run import has_display  # start-up: --help does without it
+    from controller.tools.stage_run import has_display  # imported lazily: not needed for --help
 
     if has_display() and not headless:
         _run("demo", seconds)
@@ -106,7 +106,7 @@ def run(
     if dry_run:
         _dry_run(stage, None, seconds, report, voice, voice_hz, vocabularies=more)
         return
-    from controller.stage.persons import parse_person  # start-up: --help does without it
+    from controller.stage.persons import parse_person  # imported lazily: not needed for --help
 
     look = {"kiosk": kiosk or None, "monitor": monitor, "quality": quality, "fps": fps, "theme": theme,
             "camera": camera, "evaluator": evaluator, "person": parse_person(person)}  # fmt: skip
@@ -128,9 +128,9 @@ def edit(
 
     Example: omote edit demo --vocabulary mine.toml
     """
-    from controller.stage.last import last_stage  # start-up: --help does without it
-    from controller.stage.persons import parse_person  # start-up: --help does without it
-    from controller.tools.stage_run import has_display  # start-up: --help does without it
+    from controller.stage.last import last_stage  # imported lazily: not needed for --help
+    from controller.stage.persons import parse_person  # imported lazily: not needed for --help
+    from controller.tools.stage_run import has_display  # imported lazily: not needed for --help
 
     if not has_display():
         raise ConfigError("omote edit needs a display to open a window on", hint="omote render draws without one")
@@ -142,7 +142,7 @@ def edit(
 
 def vocabulary_files(names: Sequence[str] | None) -> tuple[Path, ...]:
     """The files of ``--vocabulary``. Raises ConfigError: there is none of such a name."""
-    from controller.base.paths import find_config  # start-up: --help does without it
+    from controller.base.paths import find_config  # imported lazily: not needed for --help
 
     return tuple(find_config("vocabularies", name).resolve() for name in names or ())
 
@@ -152,7 +152,7 @@ def _named_or_last(stage: str | None, vocabulary: Sequence[str] | None) -> tuple
     more = vocabulary_files(vocabulary)
     if stage is not None:
         return stage, more
-    from controller.stage.last import last_stage  # start-up: --help does without it
+    from controller.stage.last import last_stage  # imported lazily: not needed for --help
 
     if (last := last_stage()) is None:
         raise ConfigError("no stage is named, and none was shown in a window before", hint="omote run demo")
@@ -211,7 +211,7 @@ def convert(
 
     Example: omote convert alex_rom_3.csv alex.csv --rate 30
     """
-    # start-up: --help does without either
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.base.paths import find_config
     from controller.tools.motion_file import convert as write
@@ -245,12 +245,12 @@ def _run(
     vocabularies: tuple[Path, ...] = (),
     at_rest: bool = False,
 ) -> None:
-    from controller.body.preload import PreloadedBody, garbage_collection_off  # start-up: --help does without it
+    from controller.body.preload import PreloadedBody, garbage_collection_off  # imported lazily: not needed for --help
 
     if not no_face:
         require("a face (--no-face runs without one)", "moderngl", *(["PIL"] if pictures else []))
     with console.status("starting") as status, PreloadedBody() as preloaded, garbage_collection_off():
-        # start-up: the body's process loads its code at the same time
+        # imported lazily: the control process (body) loads its code at the same time
         from controller.body.messages import RunOptions
         from controller.body.sources import Voice
         from controller.stage.stage import parse_identity
@@ -301,7 +301,7 @@ def _dry_run(
     alone: bool = False,
     vocabularies: tuple[Path, ...] = (),
 ) -> None:
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.body.sources import Voice
     from controller.stage.dry_run import dry_run

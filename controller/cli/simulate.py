@@ -19,7 +19,7 @@ from drivers.base.errors import PluginError
 from drivers.base.options import REQUIRED, Entry, entries
 
 if TYPE_CHECKING:
-    from controller.tools.simulate import Serving  # start-up: --help does without it
+    from controller.tools.simulate import Serving  # imported lazily: not needed for --help
 
 log = logging.getLogger(__name__)
 
@@ -29,7 +29,7 @@ class _Simulators(TyperGroup):
 
     def list_commands(self, ctx: Any) -> list[str]:
         """Names of all commands; a family that cannot be loaded is logged and left out."""
-        # start-up: most commands need no families
+        # imported lazily: most commands need no families
         from drivers.core.registry import FAMILIES
         from drivers.sim.wire.simulator import simulator_of
 
@@ -45,7 +45,7 @@ class _Simulators(TyperGroup):
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
         """The command of a name; None where there is none."""
-        from drivers.core.registry import kinds  # start-up: most commands need no families
+        from drivers.core.registry import kinds  # imported lazily: most commands need no families
 
         if cmd_name in self.commands or cmd_name not in kinds():
             return self.commands.get(cmd_name)
@@ -55,7 +55,7 @@ class _Simulators(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that the words name; an unknown one is refused with the nearest of all."""
-        from drivers.core.registry import kinds  # start-up: most commands need no families
+        from drivers.core.registry import kinds  # imported lazily: most commands need no families
 
         known = [*kinds(), *self.commands]
         close = difflib.get_close_matches(args[0], known, n=1) if args and args[0] not in known else []
@@ -112,7 +112,7 @@ def _serving(
     record: Record = None,
 ) -> Serving:
     """Where and how to serve: a link to a pseudo-terminal, or an address."""
-    from controller.tools.simulate import Serving  # start-up: --help does without it
+    from controller.tools.simulate import Serving  # imported lazily: not needed for --help
 
     places = {"--link": link, "--tcp": tcp, "--rfc2217": rfc2217}
     if len(given := [name for name, place in places.items() if place is not None]) > 1:
@@ -145,7 +145,7 @@ def _options(command: Callable[..., Any]) -> list[inspect.Parameter]:
 
 def _simulate_family(kind: str) -> Callable[..., None]:
     """The command that serves the simulator of a family."""
-    from controller.base.schema import from_command_line  # start-up: the command line shows its help without it
+    from controller.base.schema import from_command_line  # imported lazily: not needed for --help
     from controller.tools.simulate import serve_alone
     from drivers.core.registry import FAMILIES
     from drivers.sim.wire.simulator import simulator_of
@@ -183,7 +183,7 @@ def simulate_robot(
 
     Example: omote simulate robot head24 --link /tmp/head
     """
-    from controller.tools.simulate import serve_robot  # start-up: --help does without it
+    from controller.tools.simulate import serve_robot  # imported lazily: not needed for --help
 
     serve_robot(robot, bus, how, console)
 
@@ -197,7 +197,7 @@ def simulate_record(
 
     Example: omote simulate record desk.log --link /tmp/head
     """
-    from controller.tools.simulate import serve_record  # start-up: --help does without it
+    from controller.tools.simulate import serve_record  # imported lazily: not needed for --help
 
     serve_record(file, how, console)
 
@@ -212,6 +212,6 @@ def simulate_host(
 
     Example: omote simulate host tour --link /tmp/robot
     """
-    from controller.tools.simulate import serve_host  # start-up: --help does without it
+    from controller.tools.simulate import serve_host  # imported lazily: not needed for --help
 
     serve_host(script, link, console)

@@ -22,7 +22,7 @@ def study(
 
     Example: omote study smiles.toml -o participant-7 --seed 7
     """
-    # start-up: --help does without them
+    # imported lazily: not needed for --help
     from controller.tools.stage_run import StageRun, has_display
     from controller.tools.study_run import run_study
     from surface.base.extras import require

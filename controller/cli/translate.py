@@ -36,7 +36,7 @@ def translate(
 
     Example: omote translate livelink:127.0.0.1:11111 vmc:127.0.0.1:39539
     """
-    # start-up: --help does without it
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.base.paths import find_config
     from controller.tools.translate import Options

@@ -13,7 +13,7 @@ def show_version(wanted: bool) -> None:
     """Print omote's version and end, where the option was given."""
     if not wanted:
         return
-    from importlib.metadata import PackageNotFoundError, version  # start-up: --help does without it
+    from importlib.metadata import PackageNotFoundError, version  # imported lazily: not needed for --help
 
     try:
         console.print(f"omote {version('omote')}")

@@ -22,7 +22,7 @@ def webcam(
 
     Example: omote webcam face_landmarker.task json:127.0.0.1:9400
     """
-    # start-up: --help does without it
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.tools.webcam import send_webcam
 

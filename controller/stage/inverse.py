@@ -32,7 +32,7 @@ from surface.head.model.data import HeadData
 from surface.head.model.light import LightPoints, join_light
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix  # start-up: only sculpting needs it
+    from scipy.sparse import csr_matrix  # imported lazily: only sculpting needs it
 
 _RIDGE = 1e-3
 _SPARSITY = 0.02
@@ -137,8 +137,8 @@ class SculptSolver:
 
     def __init__(self, head: Head, part: str = "face", *, fairness: float = 10.0) -> None:
         require("moving control points by hand", "scipy")
-        from scipy.sparse import identity  # start-up: only sculpting needs it
-        from scipy.sparse.linalg import splu  # start-up: only sculpting needs it
+        from scipy.sparse import identity  # imported lazily: only sculpting needs it
+        from scipy.sparse.linalg import splu  # imported lazily: only sculpting needs it
 
         self.part, self._surface = part, head.part(part).surface
         points = self._surface.points
@@ -168,8 +168,8 @@ class SculptSolver:
 
 def _differences(points: Floats, jaw: NDArray[np.floating]) -> csr_matrix:
     """(n, n) sparse: each control point minus the mean of its six nearest ones, never across the mouth."""
-    from scipy.sparse import coo_matrix, identity  # start-up: only sculpting needs it
-    from scipy.spatial import cKDTree  # start-up: only sculpting needs it
+    from scipy.sparse import coo_matrix, identity  # imported lazily: only sculpting needs it
+    from scipy.spatial import cKDTree  # imported lazily: only sculpting needs it
 
     # the lips lie close together but belong to different jaws: set them apart
     apart = np.column_stack([points, 60.0 * np.asarray(jaw, np.float64)])

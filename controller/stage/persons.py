@@ -16,7 +16,7 @@ from controller.base.errors import ConfigError, ParameterError
 from controller.base.paths import config_dir, find_config
 
 if TYPE_CHECKING:
-    from surface.head.model.look import Colour, Look, Worn  # start-up: the body reads stages and draws nothing
+    from surface.head.model.look import Colour, Look, Worn  # imported lazily: the body draws nothing
 
 HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
 PersonName = str | dict[str, Share]
@@ -75,7 +75,7 @@ class PersonSettings(Settings):
 
         Raises ConfigError: no such style.
         """
-        from surface.head.model.look import Look  # start-up: the body reads stages and draws nothing
+        from surface.head.model.look import Look  # imported lazily: the body draws nothing
 
         skin = self.skin
         worn = [_worn(kind, each, beside) for kind in WORN if (each := getattr(self, kind)) is not None]
@@ -94,7 +94,7 @@ class PersonSettings(Settings):
 
 
 def _worn(kind: str, settings: WornSettings, beside: Path | None) -> Worn:
-    from surface.head.model.look import Worn  # start-up: as Look
+    from surface.head.model.look import Worn  # imported lazily: as Look
 
     colour = linear(settings.colour) or (0.0, 0.0, 0.0)
     return Worn(find_style(kind, settings.style, beside), colour, linear(settings.tips), settings.gloss)

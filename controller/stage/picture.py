@@ -13,8 +13,8 @@ from controller.base.errors import ParameterError
 from controller.stage.persons import HexColour, PersonName
 
 if TYPE_CHECKING:
-    from surface.view.scene.camera import Camera  # start-up: the body reads stages and draws nothing
-    from surface.view.scene.theme import Colour, Theme  # start-up: the body reads stages and draws nothing
+    from surface.view.scene.camera import Camera  # imported lazily: the body draws nothing
+    from surface.view.scene.theme import Colour, Theme  # imported lazily: the body draws nothing
 
 Share = Annotated[float, Field(ge=0, le=4)]
 CameraName = Literal["front", "three_quarter", "three_quarter_right", "profile", "profile_right"]
@@ -56,7 +56,7 @@ class PictureSettings(Settings):
 
     def make_theme(self) -> Theme:
         """The theme with this background and these lights."""
-        from surface.view.scene.theme import THEMES  # start-up: the body reads stages and draws nothing
+        from surface.view.scene.theme import THEMES  # imported lazily: the body draws nothing
 
         theme, light = THEMES[self.theme], self.light
         red, green, blue = theme.key.colour
@@ -89,7 +89,7 @@ class PictureSettings(Settings):
 
     def make_camera(self) -> Camera:
         """The camera of that name."""
-        from surface.view.scene.camera import PRESETS  # start-up: the body reads stages and draws nothing
+        from surface.view.scene.camera import PRESETS  # imported lazily: the body draws nothing
 
         return PRESETS[self.camera.replace("_", "-")]()
 

@@ -34,8 +34,8 @@ from controller.vocabulary.controls import ControlsFile, load_controls
 from controller.vocabulary.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
-    from surface.head import Head  # start-up: the body reads stages and draws nothing
-    from surface.head.model.light import LightPoints  # start-up: the same
+    from surface.head import Head  # imported lazily: the body draws nothing
+    from surface.head.model.light import LightPoints  # imported lazily: as above
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 
@@ -73,7 +73,7 @@ def parse_identity(text: str | None) -> dict[str, float]:
 
 def check_identity(head: Path, wanted: Mapping[str, float]) -> None:
     """Raise ConfigError for a name that the head in folder ``head`` does not have."""
-    from surface.head.model.identity import load_identities  # start-up: few stages name any
+    from surface.head.model.identity import load_identities  # imported lazily: few stages name any
 
     known = load_identities(head) if wanted else {}
     for name in wanted:
@@ -205,8 +205,8 @@ def load_head(
 
     Raises SurfaceError when the head cannot be read, ConfigError when a group does not fit it.
     """
-    from controller.stage.inverse import add_group, light_of, placed_groups, read_group  # start-up: as Head
-    from surface.head import Head, OwnGroup  # start-up: the body reads stages and draws nothing
+    from controller.stage.inverse import add_group, light_of, placed_groups, read_group  # imported lazily: few stages add groups
+    from surface.head import Head, OwnGroup  # imported lazily: the body draws nothing
 
     files = [*(path for path, _ in groups), *(group.file for group in own.values())]
     found = [read_group(path)[1] for path in files]
@@ -227,7 +227,7 @@ def load_head(
 
 def _check_groups(files: Sequence[Path], head: Head, light: Sequence[LightPoints]) -> None:
     """Raise ConfigError for the first group file that does not fit a head, which has ``light`` besides its own."""
-    from controller.stage.inverse import read_group  # start-up: as Head
+    from controller.stage.inverse import read_group  # imported lazily: few stages add groups
 
     added = {part.name: sum(len(each) for each in light if each.part == part.name) for part in head.data.parts}
     counts = {part.name: len(part.points) - added[part.name] for part in head.data.parts}

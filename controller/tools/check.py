@@ -126,9 +126,9 @@ def _is_head(path: Path) -> bool:
 
 def _check_head(folder: Path) -> Iterator[str]:
     """Look at the head at rest and with every parameter at its end; every defect is one line of the error."""
-    from surface.check import check_head  # start-up: only heads need it
-    from surface.head import Head  # start-up: only heads and groups need it
-    from surface.head.model.identity import load_identities, with_identities  # start-up: the same
+    from surface.check import check_head  # imported lazily: only heads need it
+    from surface.head import Head  # imported lazily: only heads and groups need it
+    from surface.head.model.identity import load_identities, with_identities  # imported lazily: as above
 
     head = Head.load(folder)
     known = load_identities(folder)
@@ -153,8 +153,8 @@ def _is_group(path: Path) -> bool:
 
 
 def _check_group(path: Path) -> str:
-    from controller.stage.inverse import load_group  # start-up: as Head
-    from surface.head.model.file import load_data  # start-up: as Head
+    from controller.stage.inverse import load_group  # imported lazily: only heads and groups need it
+    from surface.head.model.file import load_data  # imported lazily: only heads and groups need it
 
     head = load_data(find_config("heads", DEFAULT_HEAD))
     name, group = load_group(path, head)
@@ -293,8 +293,8 @@ def _describe_robot(path: Path, known: _Known) -> Iterator[str]:
     yield from _warnings([robot])
     if not robot.anchored_channels:
         return
-    from controller.robot.anchors import load_anchors, residual_rows  # start-up: as Head
-    from controller.robot.suggest_servos import described, suggest_servos  # start-up: as Head
+    from controller.robot.anchors import load_anchors, residual_rows  # imported lazily: for anchors
+    from controller.robot.suggest_servos import described, suggest_servos  # imported lazily: for anchors
 
     anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), parameters, where=str(path))
     vocabulary = Vocabulary.load(parameters, more=known.more)

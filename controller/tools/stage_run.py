@@ -37,12 +37,12 @@ from drivers.base.priority import lower_process_priority
 from surface.base.extras import require
 
 if TYPE_CHECKING:
-    from controller.face.wall import WallFace  # start-up: the body gets its orders first
-    from controller.panels.session.next_run import NextRun  # start-up: the body gets its orders first
-    from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
-    from controller.panels.window.heads import HeadSource  # start-up: the same
-    from controller.panels.window.panel import PanelOptions  # start-up: the same
-    from surface.head import Head  # start-up: the same
+    from controller.face.wall import WallFace  # imported lazily: the body starts first
+    from controller.panels.session.next_run import NextRun  # imported lazily: the body starts first
+    from controller.panels.window.face import WindowFace  # imported lazily: the body starts first
+    from controller.panels.window.heads import HeadSource  # imported lazily: as above
+    from controller.panels.window.panel import PanelOptions  # imported lazily: as above
+    from surface.head import Head  # imported lazily: as above
 
 REPORT_FORMAT = 1
 """Version of a report's keys: raised when one changes its meaning or is removed; older reports state none."""
@@ -122,7 +122,7 @@ class StageRun:
     def _headless_face(self, body: BodyProcess, recorder: Recorder | None) -> HeadlessFace | WallFace:
         """What draws the head, or the wall of heads."""
         if self.stage.heads:
-            from controller.face.wall import WallFace  # start-up: the body gets its orders first
+            from controller.face.wall import WallFace  # imported lazily: the body starts first
 
             lower_process_priority()
             return WallFace(self.stage, self.stage.parameters, body.mailboxes, recorder)
@@ -133,7 +133,7 @@ class StageRun:
         """Run with a window until it is closed, the take ends or ``seconds`` are over."""
         with self._body() as (body, flag):
             values, head = self._load_head(body)
-            from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
+            from controller.panels.window.face import WindowFace  # imported lazily: the body starts first
 
             stage = self.stage
             face = WindowFace(
@@ -149,7 +149,7 @@ class StageRun:
 
     def _sources(self, body: BodyProcess) -> list[HeadSource]:
         """The heads that the window can show; none where there is one."""
-        from controller.panels.window.heads import HeadSource  # start-up: the body gets its orders first
+        from controller.panels.window.heads import HeadSource  # imported lazily: the body starts first
 
         boxes = zip(self.stage.heads, body.mailboxes, body.panel_states, strict=True) if self.stage.heads else ()
         return [HeadSource(head.name, head.stage, mailbox, state) for head, mailbox, state in boxes]
@@ -250,7 +250,7 @@ def check_web(listen: str, *, alone: bool) -> None:
 
 def _panel_options(stage: Stage) -> PanelOptions:
     """What the window's panel shows of a stage."""
-    from controller.panels.window.panel import PanelOptions  # start-up: the body gets its orders first
+    from controller.panels.window.panel import PanelOptions  # imported lazily: the body starts first
 
     own = [file for file in stage.vocabularies if not file.resolve().is_relative_to(config_dir().resolve())]
     return PanelOptions(

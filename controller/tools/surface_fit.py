@@ -12,7 +12,7 @@ from controller.base.paths import find_config
 from surface.base.progress import Progress
 
 if TYPE_CHECKING:
-    from surface.fit.surfaces import SurfaceReport  # start-up: only surface files need it
+    from surface.fit.surfaces import SurfaceReport  # imported lazily: only surface files need it
 
 SUFFIXES = (".3dm", ".tsm", ".xml", ".json")
 
@@ -59,7 +59,7 @@ class SurfaceFit:
 
     def run(self, progress: Progress) -> SurfaceReport:
         """Make the head. Raises ConfigError: no such head; others as :func:`surface.fit.surfaces.fit_surfaces`."""
-        from surface.fit.surfaces import SurfaceOptions, fit_surfaces  # start-up: only surface files need it
+        from surface.fit.surfaces import SurfaceOptions, fit_surfaces  # imported lazily: only surface files need it
 
         source = None if self.expressions_from is None else find_config("heads", self.expressions_from)
         options = SurfaceOptions(

@@ -19,7 +19,7 @@ from controller.base.plain_numbers import plain_number
 from controller.vocabulary.sides import sides, spread, unknown_names
 
 if TYPE_CHECKING:
-    from controller.base.solve import BoundedSolver  # start-up: numba and scipy, only for reading back
+    from controller.base.solve import BoundedSolver  # imported lazily: it loads numba and scipy
 
 LETTERS = "ABCDE"
 """Letters of intensities of FACS, from 0.2 to 1.0."""
@@ -189,7 +189,7 @@ class Facs:
 
     @cached_property
     def _solver(self) -> BoundedSolver:
-        from controller.base.solve import BoundedSolver  # start-up: numba and scipy, only for reading back
+        from controller.base.solve import BoundedSolver  # imported lazily: it loads numba and scipy
 
         high = self._read.astype(np.float64)
         return BoundedSolver(
