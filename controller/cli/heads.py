@@ -112,9 +112,10 @@ def render(
     """
     check_film(take, sound, rate_hz, {"--sheet": sheet, "--crowd": crowd})
     require("a picture", "moderngl", "PIL")
-    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still  # imported lazily: not needed for --help
-    from controller.stage.persons import parse_person  # imported lazily: not needed for --help
-    from controller.stage.picture import parse_background  # imported lazily: not needed for --help
+    # imported lazily: not needed for --help
+    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still
+    from controller.stage.persons import parse_person
+    from controller.stage.picture import parse_background
 
     look = {
         "camera": camera, "quality": quality, "theme": theme, "background": parse_background(background),

@@ -205,8 +205,9 @@ def load_head(
 
     Raises SurfaceError when the head cannot be read, ConfigError when a group does not fit it.
     """
-    from controller.stage.inverse import add_group, light_of, placed_groups, read_group  # imported lazily: few stages add groups
-    from surface.head import Head, OwnGroup  # imported lazily: the body draws nothing
+    # imported lazily: the control process (body) draws nothing
+    from controller.stage.inverse import add_group, light_of, placed_groups, read_group
+    from surface.head import Head, OwnGroup
 
     files = [*(path for path, _ in groups), *(group.file for group in own.values())]
     found = [read_group(path)[1] for path in files]
