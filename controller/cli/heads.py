@@ -126,7 +126,7 @@ def render(
         stage=stage, vocabularies=vocabulary or (), groups=group or (),
     )  # fmt: skip
     if sheet and crowd:
-        raise ConfigError("--sheet and --crowd are two pictures", hint="leave out one of them")
+        raise ConfigError("--sheet and --crowd draw different pictures", hint="leave out one of them")
     if take is not None:
         render_film(still, out, take, sound, rate_hz)
         return
