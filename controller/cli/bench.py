@@ -1,4 +1,4 @@
-"""``omote bench``: measures heads, the surface engine and the servo bus, and prints tables."""
+"""``omote bench``: measures heads, the surface engine or a servo bus, and prints tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``omote render --take``: draws a film of a take (performance data), a show (script) or a recording, with its sound."""
+"""``omote render --take``: draws a film of a take, a show (timed script) or a recording, with its sound."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from rich.text import Text
 
 from controller.tools.scan import scan_port
 from controller.tools.tables import fit_table
-from controller.tools.traffic_files import TrafficWriter, all_of, decoder_of, read_traffic
+from controller.tools.traffic_files import TrafficWriter, combine_taps, decoder_of, read_traffic
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
@@ -122,7 +122,7 @@ def poll_servos(
     wire = Wire(kind, baud, {info.id: tables[info.id].model for info in known})
     with ExitStack() as stack:
         writer = stack.enter_context(TrafficWriter(record, wire)) if record else None
-        with tapped(all_of(view.tap, *([writer.tap] if writer else []))):
+        with tapped(combine_taps(view.tap, *([writer.tap] if writer else []))):
             bus = stack.enter_context(open_bus(kind, specs, port=port, baud=baud))
         reader = _Reader(bus, 1.0 / rate_hz)
         view.rows = reader.rows
