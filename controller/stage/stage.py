@@ -25,7 +25,7 @@ from controller.links.line.script import load_script
 from controller.links.links import LinkSettings, LinkTable
 from controller.robot.robot import load_robot, robot_parameters
 from controller.robot.settings import RobotSettings
-from controller.stage.heads import MOST, HeadSettings, Names, head_faults, own_settings
+from controller.stage.heads import MAX_HEADS, HeadSettings, Names, head_faults, own_settings
 from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
 from controller.stage.picture import PictureSettings, with_options
 from controller.stage.zenoh import ZenohSettings
@@ -107,7 +107,7 @@ class StageSettings(Settings):
     layers: Annotated[dict[str, dict[str, Any]], Field(max_length=64)] = {}
     face: FaceSettings = FaceSettings()
     links: Annotated[list[LinkTable], Field(max_length=64)] = []
-    heads: Annotated[list[HeadSettings], Field(max_length=MOST)] = []
+    heads: Annotated[list[HeadSettings], Field(max_length=MAX_HEADS)] = []
     turns: Literal["manual", "auto"] = "manual"
     zenoh: ZenohSettings | None = None
 

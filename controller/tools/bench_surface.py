@@ -130,7 +130,7 @@ def bench_quadtree(name: str, log: Log, level: int = UNIFORM_LEVEL, out: Path | 
 
 
 def bench_savings(name: str, log: Log, level: int = UNIFORM_LEVEL) -> Tables:
-    """Return what quad trees save on a face and nine other surfaces, least first, beside uniform meshes of level - 2."""
+    """Return what quad trees save on a face and nine other surfaces, least first; uniform meshes have level - 2."""
     log("loading")
     head = Head.load(find_config("heads", name))
     domain = domain_of(next(part for part in head.data.parts if part.name == "face"))

@@ -68,7 +68,7 @@ def test_an_endpoint_has_a_protocol_and_an_address(endpoint: str) -> None:
 
 
 def test_nothing_is_searched_for() -> None:
-    assert "give listen or connect" in fault() and "nothing is searched for" in fault(role="head")
+    assert "give listen or connect" in fault() and "there is no discovery" in fault(role="head")
 
 
 @pytest.mark.parametrize("prefix", ["", "/omote", "omote/", "a//b", "a b", "ä", "a/*", "a" * 129])
