@@ -1,6 +1,6 @@
-"""pytest's fixtures of omote: ``servo_bus``, ``servo_board``, ``robot_head`` and ``robot_host``.
+"""omote's pytest fixtures: ``servo_bus``, ``servo_board``, ``robot_head`` and ``robot_host``.
 
-Each gives a function that opens simulated hardware at a port, as often as a test calls it; after the test all of it is
+Each is a function that opens simulated hardware at a port, as often as a test calls it; after the test all of it is
 closed. docs/testing-your-robot.md has examples.
 """
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:  # imported lazily: tests that use no fixture load nothing of 
 
 
 def _opener(stack: ExitStack, open_it: Callable[..., Any]) -> Callable[..., Any]:
-    """``open_it``, with what it opens closed by the stack, and the hint of an error shown."""
+    """Return a function as ``open_it``, whose results the stack closes, and whose errors show their hint."""
 
     def opened(*words: Any, **options: Any) -> Any:
         __tracebackhide__ = True
