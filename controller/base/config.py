@@ -25,7 +25,8 @@ _PYDANTIC_NAME = re.compile(r"(constrained|function)-|(tuple|list|dict)\[")  # p
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite number; neither ``true`` nor ``"1"`` is one."""
 Positive = Annotated[Number, Field(gt=0)]
-Share = Annotated[Number, Field(ge=0, le=1)]
+Fraction = Annotated[Number, Field(ge=0, le=1)]
+"""A number from 0 to 1."""
 
 
 class Settings(BaseModel):

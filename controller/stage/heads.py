@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from controller.base.config import Number, Settings, Share
+from controller.base.config import Fraction, Number, Settings
 from controller.base.parameters import did_you_mean
 from controller.base.placement import Placement
 from controller.layers.heads import EVERYBODY
@@ -30,11 +30,11 @@ class HeadSettings(Settings):
     name: str
     person: PersonName | None = None
     head: str | None = None
-    identity: dict[str, Share] | None = None
+    identity: dict[str, Fraction] | None = None
     robots: Annotated[list[str], Field(max_length=32)] = []
     links: Annotated[list[LinkTable], Field(max_length=64)] = []
     layers: Annotated[dict[str, dict[str, Any]], Field(max_length=64)] = {}
-    liveliness: Share | None = None
+    liveliness: Fraction | None = None
     life: str | None = None
     manner: Literal["auto", "alone", "listen", "speak"] | None = None
     seed: Annotated[int, Field(ge=0)] | None = None

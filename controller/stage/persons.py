@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from pydantic import Field
 
-from controller.base.config import Number, Settings, Share, load
+from controller.base.config import Fraction, Number, Settings, load
 from controller.base.errors import ConfigError, ParameterError
 from controller.base.paths import config_dir, find_config
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from surface.head.model.look import Colour, Look, Worn  # imported lazily: the body draws nothing
 
 HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
-PersonName = str | dict[str, Share]
+PersonName = str | dict[str, Fraction]
 WORN = ("hair", "beard", "clothes")
 PERSON_HINT = "--person maple, or --person maple=0.5,oak=0.5"
 
@@ -27,11 +27,11 @@ PERSON_HINT = "--person maple, or --person maple=0.5,oak=0.5"
 class SkinSettings(Settings):
     """Appearance of the skin; see :class:`surface.head.model.look.Look`."""
 
-    melanin: Share = 0.2
+    melanin: Fraction = 0.2
     blood: Annotated[Number, Field(ge=-1, le=1)] = 0.0
     redness: Annotated[Number, Field(ge=0, le=2)] = 1.0
-    freckles: Share = 0.0
-    age: Share = 0.0
+    freckles: Fraction = 0.0
+    age: Fraction = 0.0
     lips: HexColour | None = None
 
 
@@ -54,7 +54,7 @@ class WornSettings(Settings):
     style: str
     colour: HexColour = "#2b1d14"
     tips: HexColour | None = None
-    gloss: Share = 1.0
+    gloss: Fraction = 1.0
 
 
 class PersonSettings(Settings):
@@ -62,7 +62,7 @@ class PersonSettings(Settings):
 
     name: str
     description: str = ""
-    identity: dict[str, Share] = {}
+    identity: dict[str, Fraction] = {}
     skin: SkinSettings = SkinSettings()
     eyes: EyeSettings = EyeSettings()
     brows: BrowSettings = BrowSettings()

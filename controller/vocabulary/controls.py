@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from controller.base.config import Number, Settings, Share, load
+from controller.base.config import Fraction, Number, Settings, load
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters
 from controller.vocabulary.sides import unknown_names
@@ -31,7 +31,7 @@ class ControlsFile(Settings):
     """The contents of a file: MIDI controllers by parameter, and what axes, buttons and keys do."""
 
     controllers: dict[str, MidiController] = {}
-    dead_zone: Share = 0.1
+    dead_zone: Fraction = 0.1
     axes: dict[str, dict[str, Amount]] = {}
     buttons: dict[str, Action] = {}
     keys: Annotated[dict[str, Action], Field(max_length=256)] = {}

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, Protocol
 import numpy as np
 from pydantic import BeforeValidator, Field, RootModel, ValidationInfo, field_validator
 
-from controller.base.config import Number, Settings, Share, load
+from controller.base.config import Fraction, Number, Settings, load
 from controller.base.errors import ConfigError
 from controller.base.parameters import TABLE_KEYS, Floats, Parameters, describes_parameters, did_you_mean, fold
 from controller.vocabulary.sides import sides, unknown_names
@@ -71,7 +71,7 @@ class _Table(Settings):
     gaze: _Override = "keep"
     mouth: _Override = "keep"
     response: Annotated[Number, Field(ge=0.2, le=5)] = 1.0
-    of: dict[str, Share] = {}
+    of: dict[str, Fraction] = {}
     weights: dict[str, Number] = Field(default=None, validate_default=True)
 
     @field_validator("weights", mode="before")

@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from controller.base.config import Settings, Share, load
+from controller.base.config import Fraction, Settings, load
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, fold
 from controller.base.paths import config_dir
@@ -21,7 +21,7 @@ class _Preset(Settings):
     aliases: list[str] = []
     expression: str | None = None
     viseme: str | None = None
-    weights: dict[str, Share] = {}
+    weights: dict[str, Fraction] = {}
     tracked: bool = False
 
 

@@ -11,7 +11,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from controller.base.config import Number, Settings, Share, load
+from controller.base.config import Fraction, Number, Settings, load
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import config_dir
@@ -24,9 +24,9 @@ _MAX_LETTERS = 3
 class _Viseme(Settings):
     sounds: str = ""
     duration: Annotated[Number, Field(ge=0, le=10)] = 0.5
-    hold: Share = 0.5
+    hold: Fraction = 0.5
     aliases: list[str] = []
-    weights: dict[str, Share] = {}
+    weights: dict[str, Fraction] = {}
 
 
 class _File(Settings):
@@ -36,7 +36,7 @@ class _File(Settings):
     ipa: dict[str, str] = {}
     sapi: dict[Annotated[str, Field(pattern=r"^\d+$")], str] = {}
     letters: dict[str, str] = {}
-    through: dict[str, Share] = {}
+    through: dict[str, Fraction] = {}
 
 
 @dataclass(frozen=True, eq=False)
