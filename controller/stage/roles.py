@@ -36,8 +36,8 @@ def for_role(stage: Stage, role: str | None = None, heads: Sequence[str] = ()) -
     kept = _local_heads(stage, table)
     settings = stage.settings.model_copy(update={"zenoh": table, "heads": kept})
     names = {head.name for head in kept}
-    heads = tuple(replace(head, stage=_strip(head.stage, table.role)) for head in stage.heads if head.name in names)
-    return replace(_strip(replace(stage, settings=settings), table.role), heads=heads)
+    local = tuple(replace(head, stage=_strip(head.stage, table.role)) for head in stage.heads if head.name in names)
+    return replace(_strip(replace(stage, settings=settings), table.role), heads=local)
 
 
 def _local_heads(stage: Stage, table: ZenohSettings) -> list[HeadSettings]:

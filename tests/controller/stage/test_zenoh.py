@@ -54,7 +54,8 @@ def test_who_listens_routes_and_who_only_connects_is_a_client(table: dict[str, A
 )
 def test_others_reach_only_who_says_so(endpoint: str, far: bool) -> None:
     if far:
-        assert f"other machines can reach {endpoint}; set open_to_network = true" in fault(listen=["tcp/[::1]:1", endpoint])
+        why = f"other machines can reach {endpoint}; set open_to_network = true"
+        assert why in fault(listen=["tcp/[::1]:1", endpoint])
     else:
         settings(listen=[endpoint])
     assert settings(listen=[endpoint], open_to_network=True).listen == [endpoint]
