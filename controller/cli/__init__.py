@@ -1,6 +1,6 @@
 """The command line: options, help and exit codes of ``omote``.
 
-In: command-line arguments. Out: calls of controller.tools. May import every other package of omote.
+In: command-line arguments. Out: calls of controller.tools. Imports any other package of omote.
 """
 
 import sys
