@@ -248,4 +248,4 @@ def test_a_format_has_a_link_and_is_translated(omote: Omote, tmp_path: Path) -> 
         assert receiver.recv(1000) == b"jawOpen=0;headYaw=0" and receiver.recv(1000) == b"jawOpen=1;headYaw=0.2"
     assert "pairs on udp:127.0.0.1:9403" in good.stdout
     assert far.returncode == 1 and "open_to_network = true allows it" in far.stderr
-    assert translated.returncode == 0 and "2 messages went out" in translated.stderr
+    assert translated.returncode == 0 and "2 messages sent" in translated.stderr

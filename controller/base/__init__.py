@@ -1,4 +1,4 @@
-"""Provides what all rooms of the controller use: errors, files, settings, parameters, clocks, mailboxes.
+"""Provides what all folders of the controller use: errors, files, settings, parameters, clocks, mailboxes.
 
-In: files a user edits. Out: checked settings, and errors with their place. Imports no other sub-room.
+In: files that a user edits. Out: checked settings, and errors with their key. Imports no other folder of controller.
 """

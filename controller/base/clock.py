@@ -1,6 +1,6 @@
 """Ticks at a fixed rate on absolute deadlines, and collects statistics of measurements.
 
-A tick that comes too late is skipped and counted, never made up for.
+A missed deadline is skipped and counted; its tick is not repeated later.
 """
 
 from __future__ import annotations
@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-_ALIGN_SHARE, _ALIGN_MOST = 4, 20
-"""A deadline is moved by this part of what it is off, and by this part of a period at most."""
+_ALIGN_DIVISOR = 4
+"""An aligned deadline moves by its error divided by this."""
+_MAX_ALIGN_DIVISOR = 20
+"""An aligned deadline moves at most by the period divided by this."""
 
 
 class Samples:
@@ -24,14 +26,17 @@ class Samples:
         self.maximum = 0.0
 
     def add(self, value: float) -> None:
-        """Take one measurement."""
+        """Add one measurement."""
         self._values[self.count % len(self._values)] = value
         self.count += 1
         self._sum += value
         self.maximum = max(self.maximum, value)
 
     def summary(self) -> dict[str, float]:
-        """Mean, median, p95, p99 and maximum, in the unit that was added; empty without measurements."""
+        """Return mean, p50, p95, p99 and max, in the unit of the measurements; empty without measurements.
+
+        Mean and max are of all measurements, percentiles of the newest ``capacity``.
+        """
         if not self.count:
             return {}
         percentiles = np.percentile(self._values[: self.count], [50, 95, 99]).tolist()
@@ -45,15 +50,15 @@ class Clock:
     Parameters
     ----------
     rate_hz : ticks per second.
-    now_ns, sleep_s : the time source and the way to wait; replaced in tests.
-    prompt : after a tick that took too long the next comes at once, and the deadlines move with it; else it waits for
-        the next deadline. Servos need even steps, pictures a high rate.
+    now_ns, sleep_s : the time source and the function that waits; replaced in tests.
+    prompt : after a tick that took too long, tick again immediately and move the deadlines, as pictures need for a high
+        rate; otherwise wait for the next deadline, as servos need for even steps.
 
     Attributes
     ----------
     jitter_ms : how much later than its deadline each tick began.
     skipped : deadlines that passed unused.
-    step_s : time between the last two deadlines: how far motion goes on in this tick, however late it began.
+    step_s : time between the last two deadlines: how far motion advances in this tick, however late it began.
     """
 
     def __init__(
@@ -79,13 +84,13 @@ class Clock:
 
     @property
     def deadline_ns(self) -> int:
-        """When the present tick was due, by the clock's time source: ``step_s`` is the time between two of these."""
+        """When the present tick was due, by the clock's time source; ``step_s`` is the time between two of these."""
         return self._deadline_ns
 
     def align(self, at_ns: int) -> None:
-        """Let ticks fall at ``at_ns`` and whole periods before and after it.
+        """Shift the phase of the ticks towards ``at_ns`` plus whole periods.
 
-        The next tick comes a little nearer to that, so steps stay even. Called at each tick, as clocks drift.
+        Each call moves only the next deadline, by a small step, so that steps stay even; call it at every tick.
         """
         self._aim_ns = at_ns
 
@@ -100,10 +105,10 @@ class Clock:
             before_ns = self._deadline_ns
             yield now
             self._last_ns = self._now_ns()
-            self._deadline_ns = self._aligned(self._next_deadline(self._deadline_ns))
+            self._deadline_ns = self._align_deadline(self._next_deadline(self._deadline_ns))
 
     def _wait(self) -> int:
-        """Wait for the next tick; the present time (ns)."""
+        """Wait for the next tick; return the present time (ns)."""
         now = self._now_ns()
         while now < self._deadline_ns:
             self._sleep_s((self._deadline_ns - now) / 1e9)
@@ -121,17 +126,17 @@ class Clock:
         self.skipped += missed
         return deadline + (missed + 1) * self.period_ns
 
-    def _aligned(self, deadline: int) -> int:
-        """A deadline, nearer to what :meth:`align` asked for since the last one."""
+    def _align_deadline(self, deadline: int) -> int:
+        """Move a deadline towards the phase that :meth:`align` was called with since the last one."""
         if self._aim_ns is None:
             return deadline
-        half, most = self.period_ns // 2, self.period_ns // _ALIGN_MOST
-        off = (self._aim_ns - deadline + half) % self.period_ns - half
+        half, limit = self.period_ns // 2, self.period_ns // _MAX_ALIGN_DIVISOR
+        error = (self._aim_ns - deadline + half) % self.period_ns - half
         self._aim_ns = None
-        return deadline + min(max(off // _ALIGN_SHARE, -most), most)
+        return deadline + min(max(error // _ALIGN_DIVISOR, -limit), limit)
 
     def report(self) -> dict[str, object]:
-        """Measured rate (Hz), ticks, skipped deadlines and jitter percentiles (ms)."""
+        """Return the measured rate and the wanted one (Hz), ticks, skipped deadlines and jitter percentiles (ms)."""
         seconds = (self._last_ns - self._started_ns) / 1e9
         return {
             "rate_hz": self.ticks / seconds if seconds > 0 else 0.0,

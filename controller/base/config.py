@@ -18,14 +18,15 @@ from surface.base import files
 
 Model = TypeVar("Model", bound=BaseModel)
 
-_MOST_FAULTS = 50  # listed of a file
+_MAX_FAULTS = 50  # faults listed per file
 _guesses_left: ContextVar[list[int] | None] = ContextVar("guesses left", default=None)
-_KIND = re.compile(r"(constrained|function)-|(tuple|list|dict)\[")  # pydantic's names of kinds: no keys of the file
+_PYDANTIC_NAME = re.compile(r"(constrained|function)-|(tuple|list|dict)\[")  # pydantic's internal names in locations
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 """A finite number; neither ``true`` nor ``"1"`` is one."""
 Positive = Annotated[Number, Field(gt=0)]
-Share = Annotated[Number, Field(ge=0, le=1)]
+Fraction = Annotated[Number, Field(ge=0, le=1)]
+"""A number from 0 to 1."""
 
 
 class Settings(BaseModel):
@@ -35,23 +36,23 @@ class Settings(BaseModel):
 
     @classmethod
     def known_keys(cls) -> list[str]:
-        """Keys that such a table may have, for suggestions."""
+        """Return the keys that such a table may have, for suggestions."""
         return list(cls.model_fields)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """A TOML file as tables. Raises ConfigError when it cannot be read or is not TOML."""
+    """Read a TOML file. Raises ConfigError: it cannot be read or is not TOML."""
     with files.reading(path, ConfigError, hint="correct the line named above"):
         return files.read_toml(path)
 
 
 def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str]] | None = None) -> Model:
-    """Read ``path`` as ``model``.
+    """Read the TOML file ``path`` as ``model``.
 
-    cross_check : returns the faults between values, such as unknown names; of a file that does not fit the model it
-        gets the part that does.
+    cross_check : returns faults that ``model`` cannot find, such as unknown names. If the file does not fit the model,
+        it gets the part that does, so that all faults are reported together.
 
-    Raises ConfigError: when the file cannot be read, is not TOML, or does not fit; lists every fault with its key.
+    Raises ConfigError: the file cannot be read, is not TOML, or does not fit; lists every fault with its key.
     """
     return check(read_toml(path), model, path, cross_check)
 
@@ -59,16 +60,18 @@ def load(path: Path, model: type[Model], cross_check: Callable[[Model], list[str
 def check(table: dict[str, Any], model: type[Model], path: Path,
           cross_check: Callable[[Model], list[str]] | None = None) -> Model:  # fmt: skip
     """Turn a table into ``model``; ``path`` only names the source in messages. See :func:`load`."""
-    token = _guesses_left.set([2 * _MOST_FAULTS])
+    token = _guesses_left.set([2 * _MAX_FAULTS])
     try:
-        return _checked(table, model, path, cross_check)
+        return _validate(table, model, path, cross_check)
     finally:
         _guesses_left.reset(token)
 
 
 def may_guess() -> bool:
-    """Whether to look for the name that a wrong one may mean; while a file is checked, only for as many faults as are
-    listed of it, since a file may hold a hundred thousand."""
+    """Whether to search for a suggestion for a wrong name; while a file is checked, each call uses up one of a limit.
+
+    A file may have a hundred thousand wrong names, of which only the first faults are listed.
+    """
     left = _guesses_left.get()
     if left is None:
         return True
@@ -76,8 +79,8 @@ def may_guess() -> bool:
     return left[0] >= 0
 
 
-def _checked(table: dict[str, Any], model: type[Model], path: Path,
-             cross_check: Callable[[Model], list[str]] | None) -> Model:  # fmt: skip
+def _validate(table: dict[str, Any], model: type[Model], path: Path,
+              cross_check: Callable[[Model], list[str]] | None) -> Model:  # fmt: skip
     try:
         read = model.model_validate(table)
     except ValidationError as error:
@@ -92,10 +95,10 @@ def _checked(table: dict[str, Any], model: type[Model], path: Path,
 
 
 def config_error(path: Path, faults: list[str], retry: str = "") -> ConfigError:
-    """One error that lists all ``faults`` of ``path``; ``retry`` : the command to try again with."""
-    listing = "\n".join(f"  {fault}" for fault in faults[:_MOST_FAULTS])
-    if len(faults) > _MOST_FAULTS:
-        listing += f"\n  and {len(faults) - _MOST_FAULTS} more"
+    """Return one error that lists the ``faults`` of ``path``; ``retry`` : the command to check it again."""
+    listing = "\n".join(f"  {fault}" for fault in faults[:_MAX_FAULTS])
+    if len(faults) > _MAX_FAULTS:
+        listing += f"\n  and {len(faults) - _MAX_FAULTS} more"
     count = "1 fault" if len(faults) == 1 else f"{len(faults)} faults"
     newer = any(NEWER in fault for fault in faults)
     hint = "pip install --upgrade omote" if newer else f"correct the file, then: {retry or f'omote check {path}'}"
@@ -103,11 +106,11 @@ def config_error(path: Path, faults: list[str], retry: str = "") -> ConfigError:
 
 
 def describe_all(faults: Iterable[Any], model: type[BaseModel]) -> list[str]:
-    """Faults as :func:`describe`; those of a value that may be of several kinds become one."""
+    """Describe pydantic faults, see :func:`describe`; the faults of a value of alternative types become one."""
     found: dict[str, list[str]] = {}
     single: list[str] = []
     for fault in faults:
-        place = tuple(part for part in fault["loc"] if not _KIND.match(str(part)))
+        place = tuple(part for part in fault["loc"] if not _PYDANTIC_NAME.match(str(part)))
         text = describe({**fault, "loc": place}, model)
         where, _, reason = text.partition(": ")
         if place == fault["loc"]:
@@ -121,7 +124,7 @@ def describe_all(faults: Iterable[Any], model: type[BaseModel]) -> list[str]:
 
 
 def describe(fault: Any, model: type[BaseModel]) -> str:
-    """One pydantic fault as ``key.path: reason``; misspelt keys get the closest known one."""
+    """Describe one pydantic fault as ``key.path: reason``, with a suggestion for a misspelt key."""
     where = key_path(fault["loc"])
     if fault["type"] == "extra_forbidden":
         known = _keys_at(model, fault["loc"][:-1]) if may_guess() else []
@@ -132,19 +135,19 @@ def describe(fault: Any, model: type[BaseModel]) -> str:
     reason = fault["msg"].removeprefix("Value error, ")
     if fault["type"] in ("model_type", "dict_type"):
         reason = "must be a table"
-    given = fault.get("input")
-    shown = f" (is {shortened(given)})" if isinstance(given, str | int | float | bool) else ""
+    value = fault.get("input")
+    shown = f" (is {shorten(value)})" if isinstance(value, str | int | float | bool) else ""
     return f"{where}: {reason[:1].lower()}{reason[1:]}{shown}"
 
 
-def shortened(given: object) -> str:
-    """What was given, as a person would write it; the beginning of what is long."""
-    text = repr(given)
+def shorten(value: object) -> str:
+    """Return ``repr(value)``, or its beginning if it is long."""
+    text = repr(value)
     return text if len(text) <= 80 else f"{text[:76]} ..."
 
 
 def key_path(parts: tuple[str | int, ...]) -> str:
-    """``("links", 0, "port")`` as ``links[0].port``."""
+    """Format a location: ``("links", 0, "port")`` becomes ``links[0].port``."""
     text = ""
     for part in parts:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
@@ -152,11 +155,11 @@ def key_path(parts: tuple[str | int, ...]) -> str:
 
 
 def _keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[str]:
-    """The keys the table at ``location`` may have."""
+    """Return the keys that the table at ``location`` may have."""
     current: Any = model
     for part in location:
         field = current.model_fields.get("root" if issubclass(current, RootModel) else part)
-        if field is None:  # the number of an entry of a list, or the name of one of a table of tables
+        if field is None:  # an index in a list, or a name in a table of tables
             continue
         current = _inner_model(field.annotation)
         if current is None:
@@ -165,7 +168,7 @@ def _keys_at(model: type[BaseModel], location: tuple[str | int, ...]) -> list[st
 
 
 def _inner_model(annotation: Any) -> Any:
-    """The model inside ``X``, ``list[X]``, ``X | None``."""
+    """Return the model ``X`` of ``X``, ``list[X]`` or ``X | None``; None if there is none."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return annotation
     for argument in getattr(annotation, "__args__", ()):

@@ -1,4 +1,4 @@
-"""Defines the errors of the controller room, and the tuple of all errors that a command line has to catch."""
+"""Defines the errors of the package ``controller``, and the tuple of all errors that the command line catches."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ _EXHAUSTED = {
 
 
 def exhausted(error: BaseException) -> ControllerError | None:
-    """An error of the system that says that something is used up, with what to do; None for any other error."""
+    """Convert a system error about an exhausted resource to one with a hint; return None for any other error."""
     if isinstance(error, MemoryError):
         error = OSError(errno.ENOMEM, os.strerror(errno.ENOMEM))
     if not isinstance(error, OSError) or error.errno not in _EXHAUSTED:
@@ -56,11 +56,11 @@ _DENIED = (errno.EACCES, errno.EPERM, errno.EROFS, errno.ENOTDIR, errno.ENAMETOO
 
 
 def denied(error: BaseException) -> ControllerError | None:
-    """An error of the system that says that a file which it names cannot be used; None for any other error."""
+    """Convert a system error about an unusable file to one that names it; return None for any other error."""
     if not isinstance(error, OSError) or error.errno not in _DENIED or not error.filename:
         return None
     return ControllerError(f"{error.filename}: {os.strerror(error.errno)}", hint=f"look at: ls -ld {error.filename}")
 
 
 OMOTE_ERRORS = (ControllerError, DriverError, SurfaceError)
-"""Everything omote raises on purpose; the command line prints one message and exits with code 1."""
+"""Base classes of all errors that omote raises on purpose; the command line prints the message and exits with 1."""

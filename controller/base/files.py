@@ -22,10 +22,11 @@ NEWER = "written by a newer omote"
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """A temporary path that takes the place of ``path`` when the block ends well; see
-    :func:`surface.base.writing.replacing`. Folders that are missing are made.
+    """Yield a temporary path that replaces ``path`` if the block ends without an error; creates missing folders.
 
-    Raises ControllerError: when the file cannot be written; ``path`` stays as it was.
+    See :func:`surface.base.writing.replacing`.
+
+    Raises ControllerError: the file cannot be written; ``path`` is unchanged.
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -37,14 +38,15 @@ def replacing(path: Path) -> Iterator[Path]:
 
 
 def place_hint(error: OSError, path: Path) -> str:
-    """What to do where a file of the user's choice cannot be written."""
+    """Return a hint for a file that cannot be written."""
     return _NO_PLACE.get(error.errno or 0, "choose another folder: ls -ld {folder}").format(folder=path.parent)
 
 
 def format_fault(found: object, newest: int) -> str | None:
-    """What is wrong with the version that a file states; None when this omote reads it.
+    """Return the fault of the format version that a file states, or None if this omote can read it.
 
-    found : what the file states; it grows when older readers could misread a file. newest : the newest known version.
+    found : the stated version, which is raised when older readers could misread a file. newest : the newest that this
+    omote reads.
     """
     if isinstance(found, bool) or not isinstance(found, int) or found < 1:
         return f"format: must be a whole number from 1 (is {found!r})"

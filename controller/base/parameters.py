@@ -1,7 +1,7 @@
 """The registry of face parameters: names, order, ranges, regions and motion limits, read from the base vocabulary.
 
-Every parameter vector in omote is (P,) float64 in the order of ``configs/vocabularies/arkit.toml``; parameters of one's
-own, which vocabularies of a stage or robot add, follow in the order of their files.
+Every parameter vector in omote is (P,) float64 in the order of ``configs/vocabularies/arkit.toml``. Custom parameters,
+which vocabularies of a stage or robot add, follow in the order of their files.
 """
 
 from __future__ import annotations
@@ -29,19 +29,22 @@ Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 REGIONS = ("brows", "lids", "eyes", "cheeks", "nose", "jaw", "mouth", "tongue", "head")
-"""Regions of the face, in the order reports list them."""
+"""Regions of the face, in the order of reports."""
 TABLE_KEYS = ("regions", "profile", "parameters", "aliases")
-"""Keys of a vocabulary that describe parameters; all others are expressions."""
+"""Keys of a vocabulary file that describe parameters; all other keys are names of expressions."""
 
 _ARRAYS = ("low", "high", "full_scale_rad", "max_speed", "max_acceleration", "max_jerk", "response_s", "rest")
-_MOST_OWN = 512
+_MAX_PER_FILE = 512
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-_TAKEN = frozenset({"all", "time", "type", "face", "subject", "measured", "neutral"})  # words of formats and links
+_RESERVED = frozenset({"all", "time", "type", "face", "subject", "measured", "neutral"})  # words of formats and links
 
 
 @dataclass(frozen=True)
 class PointGroup:
-    """Control points that a parameter moves: their file, and parameters by whose values the amount is multiplied."""
+    """Control points that a parameter moves.
+
+    file : of the group. times : names of parameters whose values multiply the amount.
+    """
 
     file: Path
     times: tuple[str, ...] = ()
@@ -57,11 +60,11 @@ class Parameters:
     full_scale_rad : angle (rad) of the value 1; NaN where the parameter is not an angle.
     max_speed : largest speed (units/s). max_acceleration : largest acceleration (units/s^2).
     max_jerk : largest jerk (units/s^3); infinity for none. response_s : time constant (s) of the approach to a target.
-    rest : value of the neutral face; 0 without, as for all of the base vocabulary.
-    aliases : other spellings, folded, to canonical names.
-    base : how many of them, the first, are of the base vocabulary; those after them are somebody's own.
-    descriptions : texts about some of them for people, by name. own_regions : regions that own vocabularies add.
-    files : the vocabularies that were added. point_groups : control points that own ones move, by name.
+    rest : value in the neutral face. Default: 0, as for all of the base vocabulary.
+    aliases : canonical names by other spelling, folded.
+    base : number of parameters of the base vocabulary, which come first; custom ones follow.
+    descriptions : texts for people about some parameters, by name. own_regions : regions that custom vocabularies add.
+    files : the vocabularies that were added. point_groups : control points that custom parameters move, by name.
     """
 
     names: tuple[str, ...]
@@ -89,16 +92,16 @@ class Parameters:
 
     @classmethod
     def load(cls, path: Path | None = None) -> Parameters:
-        """Read a base vocabulary; the shipped one without ``path``. Raises ConfigError with every fault."""
+        """Read a base vocabulary; by default, the shipped one. Raises ConfigError that lists every fault."""
         path = path or config_dir() / "vocabularies" / "arkit.toml"
         return _build(load(path, _File, lambda file: [*_unknown_regions(file), *_unknown_aliases(file)]))
 
     def with_files(self, paths: Iterable[Path]) -> Parameters:
-        """These, and behind them the parameters of their own that vocabularies add.
+        """Return these parameters, followed by the custom ones of vocabulary files.
 
-        ``paths`` : files; one that was added before, or that describes no parameters, adds nothing.
+        ``paths`` : a file that was added before, or that describes no parameters, adds nothing.
 
-        Raises ConfigError: a file cannot be read or is wrong; every fault with its key.
+        Raises ConfigError: a file cannot be read or is wrong; lists every fault with its key.
         """
         found = self
         for path in map(Path.resolve, paths):
@@ -113,7 +116,7 @@ class Parameters:
         own = {key: table[key] for key in TABLE_KEYS if key in table}
         if isinstance(own.get("profile", {}), Mapping):
             own["profile"] = {**_shipped_profiles(), **own.get("profile", {})}
-        file = check(own, _File, path, partial(_own_faults, self, path.parent))
+        file = check(own, _File, path, partial(_custom_faults, self, path.parent))
         more = _build(file)
         arrays: dict[str, Any] = {name: np.concatenate([getattr(self, name), getattr(more, name)]) for name in _ARRAYS}
         for array in arrays.values():
@@ -132,26 +135,26 @@ class Parameters:
 
     @property
     def own(self) -> tuple[str, ...]:
-        """Names of those that vocabularies of a stage or robot add."""
+        """Names of the custom parameters, which vocabularies of a stage or robot add."""
         return self.names[self.base :]
 
     @property
     def region_names(self) -> tuple[str, ...]:
-        """Regions of the face, and behind them those that own vocabularies add."""
+        """Regions of the face, followed by those that custom vocabularies add."""
         return REGIONS + self.own_regions
 
     def __len__(self) -> int:
         return len(self.names)
 
     def find(self, name: str) -> int | None:
-        """Position of ``name``, any known spelling; None for what is no parameter."""
+        """Return the index of ``name`` in any known spelling; None if there is no such parameter."""
         found = self._lookup.get(name)  # the canonical spelling needs no folding
         return self._lookup.get(fold(name)) if found is None else found
 
     def index(self, name: str) -> int:
-        """Position of ``name``, any known spelling.
+        """Return the index of ``name`` in any known spelling.
 
-        Raises ParameterError: no such parameter; the message suggests the nearest names.
+        Raises ParameterError: no such parameter; the message suggests similar names.
         """
         found = self.find(name)
         if found is None:
@@ -162,26 +165,26 @@ class Parameters:
         return found
 
     def indices(self, names: Iterable[str]) -> NDArray[np.intp]:
-        """Positions of ``names``. Raises ParameterError at the first unknown one."""
+        """Return the indices of ``names``. Raises ParameterError at the first unknown one."""
         return np.array([self.index(name) for name in names], dtype=np.intp)
 
     def region(self, name: str) -> NDArray[np.intp]:
-        """Positions of every parameter of a region. Raises ParameterError for an unknown region."""
+        """Return the indices of all parameters of a region. Raises ParameterError: an unknown region."""
         if name not in (known := self.region_names):
             raise ParameterError(f"unknown region {name!r}{did_you_mean(name, known)}", hint=", ".join(known))
         return np.array([i for i, region in enumerate(self.regions) if region == name], dtype=np.intp)
 
     def clip(self, values: Floats, out: Floats) -> Floats:
-        """Write ``values`` : (P,), kept in range, to ``out``; what is not finite leaves ``out`` as it was."""
+        """Write ``values`` : (P,) to ``out``, clipped to their ranges, and return it; skip nonfinite ones."""
         np.copyto(out, values, where=np.isfinite(values))
         return np.clip(out, self.low, self.high, out=out)
 
     def neutral(self) -> Floats:
-        """A new (P,) vector of the neutral face: zero, but where one's own parameters rest elsewhere."""
+        """Return a new (P,) vector of the neutral face: zero, except for custom parameters with another rest value."""
         return self.rest.copy()
 
     def mirror(self) -> NDArray[np.intp]:
-        """(P,) position of each parameter's counterpart on the other side; itself where there is none."""
+        """Return (P,) the index of each parameter's counterpart on the other side, or its own if there is none."""
         return np.array([self._lookup.get(_other_side(name), i) for i, name in enumerate(self.names)])
 
     @cached_property
@@ -192,7 +195,7 @@ class Parameters:
 
 
 def fold(name: str) -> str:
-    """One spelling for all: lower case, ``_L``/``_R`` (``-``, ``.``) as left/right at the end."""
+    """Normalise the spelling of a name: lower case, no separators, a final ``_L`` or ``_R`` as left or right."""
     plain = re.sub(r"[\s_.\-]+", "_", name.strip()).lower()
     plain = re.sub(r"_l$", "left", plain)
     plain = re.sub(r"_r$", "right", plain)
@@ -200,7 +203,7 @@ def fold(name: str) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """``, did you mean 'x'?`` or nothing; at most three guesses."""
+    """Return ``, did you mean 'x'?`` with at most three suggestions, or an empty text."""
     if not may_guess():
         return ""
     folded = {fold(k): k for k in known}
@@ -211,7 +214,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 PARAMETERS: Parameters
-"""The shipped parameters; read at first use."""
+"""The shipped parameters, which are read at the first use of this name."""
 
 
 @cache
@@ -226,18 +229,18 @@ def _other_side(name: str) -> str:
     return re.sub("Left$|Right$|^left|^right", lambda m: swap[m.group()], name)
 
 
-def _rising(value: tuple[float, float]) -> tuple[float, float]:
+def _require_ascending(value: tuple[float, float]) -> tuple[float, float]:
     if value[0] >= value[1]:
         raise ValueError(f"must be [lowest, highest], not {list(value)}")
     return value
 
 
 class _Entry(Settings, validate_default=True):
-    """One parameter of the file, with the keys of its profile; the motion limits of an angle are in degrees."""
+    """One parameter of a file, with the keys of its profile; motion limits of an angle are in degrees."""
 
     region: str
     profile: str | None = None
-    range: Annotated[tuple[Number, Number], AfterValidator(_rising)]
+    range: Annotated[tuple[Number, Number], AfterValidator(_require_ascending)]
     response_s: Positive
     full_scale_deg: Positive | None = None
     max_speed: Positive | None = None
@@ -268,7 +271,7 @@ class _Entry(Settings, validate_default=True):
         return value
 
     def numbers(self) -> tuple[float, ...]:
-        """Values for :data:`_ARRAYS`: those in degrees are divided by the full scale."""
+        """Return the values for :data:`_ARRAYS`, with limits in degrees divided by the full scale."""
         if self.full_scale_deg is None:
             scale, full, limits = 1.0, math.nan, (self.max_speed, self.max_acceleration, self.max_jerk)
         else:
@@ -279,7 +282,7 @@ class _Entry(Settings, validate_default=True):
 
 
 def _with_profile(given: Any, info: ValidationInfo) -> Any:
-    """The table of a parameter on top of that of its profile."""
+    """Merge the table of a parameter into the table of its profile."""
     if not isinstance(given, dict) or "profile" not in given:
         return given
     profiles, name = info.data.get("profile", {}), str(given["profile"])
@@ -292,7 +295,7 @@ class _File(Settings):
     regions: Annotated[list[str], Field(max_length=32)] = []
     profile: dict[str, dict[str, Any]] = {}
     parameters: Annotated[
-        dict[str, Annotated[_Entry, BeforeValidator(_with_profile)]], Field(min_length=1, max_length=_MOST_OWN)
+        dict[str, Annotated[_Entry, BeforeValidator(_with_profile)]], Field(min_length=1, max_length=_MAX_PER_FILE)
     ]
     aliases: dict[str, str] = {}
 
@@ -316,7 +319,7 @@ def _unknown_regions(file: _File, known: Sequence[str] = REGIONS) -> Iterator[st
 
 
 def describes_parameters(table: Mapping[str, Any]) -> bool:
-    """Whether a vocabulary's table adds parameters; an expression of the name has ``weights`` or ``of``."""
+    """Whether a vocabulary's table adds parameters: its ``parameters`` is not an expression of that name."""
     found = table.get("parameters")
     return isinstance(found, Mapping) and not {"weights", "of"} & set(found)
 
@@ -333,7 +336,7 @@ def _point_groups(file: _File, folder: Path) -> dict[str, PointGroup]:
 
 
 def _group_faults(known: Parameters, folder: Path, file: _File) -> Iterator[str]:
-    """Groups of control points whose file is not there, or that multiply with what is no parameter."""
+    """Yield faults of groups of control points: missing files, and unknown parameters as multipliers."""
     names = (*known.names, *file.parameters)
     for name, entry in file.parameters.items():
         if entry.group and not os.path.isfile(folder / entry.group):
@@ -345,8 +348,8 @@ def _group_faults(known: Parameters, folder: Path, file: _File) -> Iterator[str]
                 yield f"parameters.{name}.times: unknown parameter {each!r}{did_you_mean(each, names)}"
 
 
-def _own_faults(known: Parameters, folder: Path, file: _File) -> list[str]:
-    """Names that cannot be used, or are taken, regions that there are not, aliases of nothing, groups without files."""
+def _custom_faults(known: Parameters, folder: Path, file: _File) -> list[str]:
+    """Return the faults of custom parameters: invalid, reserved or repeated names, unknown regions, missing files."""
     faults = [f"regions: {name!r} must be a letter, then letters, digits or _" for name in file.regions
               if not _NAME.fullmatch(name)]  # fmt: skip
     faults += [*_unknown_aliases(file), *_unknown_regions(file, known.region_names)]
@@ -356,7 +359,7 @@ def _own_faults(known: Parameters, folder: Path, file: _File) -> list[str]:
         key = fold(name)
         if not _NAME.fullmatch(name):
             faults.append(f"{where}: must be a letter, then letters, digits or _, 64 at most")
-        elif key in _TAKEN:
+        elif key in _RESERVED:
             faults.append(f"{where}: is a word of links and formats; choose another name")
         elif (found := known.find(name)) is not None:
             faults.append(f"{where}: is a name of {known.names[found]} already; choose another one")

@@ -1,6 +1,6 @@
-"""Validates the part of a configuration table that is left when its faults are removed, to find further faults in it.
+"""Removes the faults of a configuration table and validates the rest, to find further faults.
 
-A value that does not fit its key is removed; where the table around it cannot be read without it, so is that table.
+A value that does not fit its key is removed; if the table around it is invalid without it, that table is removed, too.
 """
 
 from __future__ import annotations
@@ -31,12 +31,15 @@ class PartialConfig(Generic[Model]):
                 error = left
 
     def relocate(self, faults: Iterable[str]) -> list[str]:
-        """Faults of :attr:`read` by their places in the whole file, without those that name something removed."""
+        """Convert the places in faults of :attr:`read` to places in the whole file.
+
+        Faults that name something that was removed are omitted.
+        """
         named = re.compile("|".join(re.escape(repr(name)) for name in self._removed) or "(?!)")
-        return [_PLACE.sub(self._placed, fault) for fault in faults if not named.search(fault)]
+        return [_PLACE.sub(self._original_place, fault) for fault in faults if not named.search(fault)]
 
     def _remove(self, error: ValidationError) -> bool:
-        """Remove what is at the places of the faults, or the tables around them; False where nothing is left."""
+        """Remove the values at the faults, or the tables around them; return False if there is nothing to remove."""
         found = {_existing(self._rest, fault["loc"]) for fault in error.errors()} - {()}
         outermost = [loc for loc in found if not any(loc[:depth] in found for depth in range(1, len(loc)))]
         for *parents, last in sorted(outermost, key=_order, reverse=True):  # the last entries of a list first
@@ -47,8 +50,8 @@ class PartialConfig(Generic[Model]):
             self._removed |= {*_texts(value), *([str(last)] if isinstance(value, dict) else [])}
         return bool(found)
 
-    def _placed(self, found: re.Match[str]) -> str:
-        """A place in the remaining table, such as ``channels[1].map.deg[0]``, with the indices of the whole file."""
+    def _original_place(self, found: re.Match[str]) -> str:
+        """Convert a place in the remaining table, as ``channels[1].map.deg[0]``, to the indices of the whole file."""
         value: Any = self._rest
         parts = re.split(r"([.\[\]]+)", found[0])
         for i, part in enumerate(parts[::2]):
@@ -64,32 +67,32 @@ _PLACE = re.compile(r"[\w-]+(?:\.[\w-]+|\[\d+\])+")
 
 
 class _Numbered(list[Any]):
-    """A list that knows the numbers its entries had before others were removed."""
+    """A list that knows the indices its entries had before others were removed."""
 
     def __init__(self, values: Iterable[Any]) -> None:
         super().__init__(values)
         self.numbers = list(range(len(self)))
 
     def pop(self, index: Any = -1) -> Any:
-        """Remove an entry and its number."""
+        """Remove an entry and its original index."""
         self.numbers.pop(index)
         return super().pop(index)
 
 
 def _numbered(value: Any) -> Any:
-    """A copy in which every list is numbered."""
+    """Copy a value with every list as a :class:`_Numbered`."""
     if isinstance(value, dict):
         return {key: _numbered(each) for key, each in value.items()}
     return _Numbered(map(_numbered, value)) if isinstance(value, list) else value
 
 
 def _order(loc: Loc) -> tuple[tuple[bool, int | str], ...]:
-    """Sorts places: names before numbers."""
+    """Return a sort key of places: names before numbers."""
     return tuple((isinstance(part, int), part) for part in loc)
 
 
 def _existing(table: Any, loc: Loc) -> Loc:
-    """The longest part of ``loc`` that exists; pydantic adds internal names, and keys that are missing."""
+    """Return the longest prefix of ``loc`` that exists: pydantic adds internal names, and keys that are missing."""
     for depth, part in enumerate(loc):
         keys: Any = table if isinstance(table, dict) else range(len(table)) if isinstance(table, list) else ()
         if part not in keys:
@@ -99,7 +102,7 @@ def _existing(table: Any, loc: Loc) -> Loc:
 
 
 def _texts(value: Any) -> Iterator[str]:
-    """Every text in a value and its tables."""
+    """Yield every text in a value, also in its tables and lists."""
     if isinstance(value, str):
         yield value
     elif isinstance(value, dict | list):

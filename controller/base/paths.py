@@ -1,7 +1,7 @@
-"""Finds configuration files: beside the code in a checkout, under share/ when installed.
+"""Finds configuration files: beside the code in a source folder, under share/ when installed.
 
-An installer puts ``share/`` under the environment, under the user's own folder, or beside the code (``pip install
---target``), and records where in the package's metadata. The folder beside the code is tried first, then the
+An installer puts ``share/`` into the environment, into the user's folder, or beside the code (``pip install
+--target``), and records the place in the package's metadata. The folder beside the code is tried first, then the
 recorded one.
 """
 
@@ -23,7 +23,7 @@ _SHARE = Path("share/omote/configs")
 
 
 def config_dir() -> Path:
-    """Folder that holds heads, vocabularies, robots and stages. Raises ConfigError: no such folder is found."""
+    """Return the folder with heads, vocabularies, robots and stages. Raises ConfigError: it is not found."""
     looked: list[Path] = []
     for folder in _candidates():
         if (folder / "vocabularies").is_dir():
@@ -36,13 +36,13 @@ def config_dir() -> Path:
 
 
 def find_config(kind: str, name: str, *, beside: Path | None = None) -> Path:
-    """The file or folder that ``name`` means.
+    """Return the configuration file, or the folder of a head, that ``name`` means.
 
-    kind : ``"heads"``, ``"robots"``, ``"stages"``, ``"vocabularies"``, ``"controls"`` or ``"scripts"``.
+    kind : a folder of configs, as ``"heads"``, ``"robots"``, ``"stages"``, ``"vocabularies"`` or ``"scripts"``.
     name : a path (also relative to the folder of ``beside``), or a name from ``configs/<kind>``.
     beside : the file that contains ``name``.
 
-    Raises ConfigError: nothing of that name; the message lists what there is.
+    Raises ConfigError: no file of that name; the message lists the known names.
     """
     folder = config_dir() / kind
     places = [Path(name), folder / name, folder / f"{name}.toml"]
@@ -67,7 +67,7 @@ def _unknown(kind: str, name: str, folder: Path) -> ConfigError:
 
 
 def _candidates() -> Iterator[Path]:
-    """Possible folders, the likeliest first; the folder of the environment variable alone where that is set."""
+    """Yield possible folders in the order of the search; if the environment variable is set, only its folder."""
     override = os.environ.get(VARIABLE)
     if override:
         yield Path(override)
@@ -82,8 +82,8 @@ def _candidates() -> Iterator[Path]:
 
 @cache
 def _installed_files() -> tuple[Path, ...]:
-    """The folder in the installer's list of files; none where there is no such list."""
-    from importlib import metadata  # takes a while, and a checkout does without
+    """Return the folder in the installer's list of files, as a tuple of one; empty if there is no such list."""
+    from importlib import metadata  # imported lazily: it is slow, and a source folder does not need it
 
     try:
         files = metadata.files("omote") or []

@@ -1,4 +1,4 @@
-"""Turns SIGINT, SIGTERM and SIGHUP into a flag, so that programs end in the ordinary way."""
+"""Converts SIGINT, SIGTERM and SIGHUP to a flag, so that programs can end in order."""
 
 from __future__ import annotations
 
@@ -9,25 +9,25 @@ from contextlib import contextmanager
 from multiprocessing import resource_tracker
 
 TERMINATION_SIGNALS = tuple(getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name))
-"""Signals that ask a process to end: from a service manager, and from a terminal that was closed."""
+"""Signals that request the end of a process: from a service manager, and from a terminal that was closed."""
 
 
 def termination_signals() -> tuple[signal.Signals, ...]:
-    """Those of :data:`TERMINATION_SIGNALS` that end this process; under nohup SIGHUP is ignored."""
+    """Return the :data:`TERMINATION_SIGNALS` that are to end this process; under nohup, SIGHUP is not one of them."""
     return tuple(n for n in TERMINATION_SIGNALS if n == signal.SIGTERM or signal.getsignal(n) is not signal.SIG_IGN)
 
 
 @contextmanager
 def signals_blocked() -> Iterator[None]:
-    """Block SIGINT and :data:`TERMINATION_SIGNALS`, also in a process started meanwhile, until that calls
-    :func:`unblock_signals`.
+    """Block SIGINT and :data:`TERMINATION_SIGNALS` in this block, and in processes that it starts.
 
-    A program that was ended halfway through starting a process would leave one that cannot read what it shall do.
+    Such a process calls :func:`unblock_signals` itself. If a signal ended this program while it starts a process, that
+    process would be left waiting for orders.
     """
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    resource_tracker.ensure_running()  # else it starts with the first process, and unblocks SIGINT then
+    resource_tracker.ensure_running()  # otherwise it starts with the first process, and unblocks SIGINT
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *TERMINATION_SIGNALS})
     try:
         yield
@@ -42,15 +42,15 @@ def unblock_signals() -> None:
 
 
 def was_interrupted(handler: object) -> bool:
-    """Whether a handler of SIGINT of the command line has seen one, whatever became of its KeyboardInterrupt."""
+    """Whether the command line's handler of SIGINT was called, even if its KeyboardInterrupt was swallowed."""
     return bool(getattr(handler, "came", False))
 
 
 @contextmanager
 def stop_flag() -> Iterator[threading.Event]:
-    """An event that SIGINT or a signal of :func:`termination_signals` sets; a second SIGINT raises KeyboardInterrupt.
+    """Yield an event that SIGINT or a termination signal sets; a second SIGINT raises KeyboardInterrupt.
 
-    It is set from the beginning where an earlier SIGINT was swallowed. Main thread only.
+    If an earlier SIGINT was swallowed, the event is set from the beginning. For the main thread only.
     """
     flag = threading.Event()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, *termination_signals())}

@@ -1,4 +1,4 @@
-"""Solves bounded, sparse least squares problems: finds the values, as of parameters, that reproduce a given face.
+"""Solves bounded, sparse least squares problems, for example for the parameters that reproduce a given face.
 
 Minimises over ``low <= x <= high``
 
@@ -16,13 +16,13 @@ import numpy as np
 from controller.base.parameters import Floats
 from surface.base.jit import kernel
 
-_ROUNDS = 200
-_ZERO = 1e-13
+_MAX_ROUNDS = 200
+_ZERO = 1e-13  # smaller values after a Newton step are set to zero
 
 
 @kernel
 def _sweep(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> float:
-    """One round over all coordinates, in place on ``x`` and ``gradient``; returns the largest change."""
+    """Update every coordinate once, in place on ``x`` and ``gradient``; return the largest change."""
     largest = 0.0
     for i in range(len(x)):
         goal = x[i] - gradient[i] / gram[i, i]
@@ -38,8 +38,8 @@ def _sweep(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: 
 
 
 @kernel
-def _reach(x: float, step: float, low: float, high: float) -> float:
-    """How much of ``step`` can be taken from ``x`` without leaving the bounds or passing zero, 0..1."""
+def _step_fraction(x: float, step: float, low: float, high: float) -> float:
+    """Return the fraction 0..1 of ``step`` that keeps ``x`` within its bounds and on its side of zero."""
     end = x + step
     stop = high if step > 0.0 else low
     if x > 0.0 and step < 0.0:
@@ -51,9 +51,9 @@ def _reach(x: float, step: float, low: float, high: float) -> float:
 
 @kernel
 def _solve(matrix: Floats, right: Floats) -> None:
-    """Gauss elimination with pivots: ``right (n,)`` becomes the solution; ``matrix (n, n)`` is overwritten.
+    """Solve by Gauss elimination with pivots: ``right (n,)`` becomes the solution; ``matrix (n, n)`` is overwritten.
 
-    numba's own products and solutions would import scipy, which takes longer than all else of this module.
+    numba's own matrix functions would import scipy, which takes longer than everything else in this module.
     """
     n = len(right)
     for i in range(n):
@@ -65,11 +65,11 @@ def _solve(matrix: Floats, right: Floats) -> None:
         if matrix[i, i] == 0.0:
             raise ValueError("the values inside their bounds do not determine each other")
         for j in range(i + 1, n):
-            share = matrix[j, i] / matrix[i, i]
-            if share != 0.0:
+            factor = matrix[j, i] / matrix[i, i]
+            if factor != 0.0:
                 for k in range(i + 1, n):
-                    matrix[j, k] -= share * matrix[i, k]
-                right[j] -= share * right[i]
+                    matrix[j, k] -= factor * matrix[i, k]
+                right[j] -= factor * right[i]
     for i in range(n - 1, -1, -1):
         for k in range(i + 1, n):
             right[i] -= matrix[i, k] * right[k]
@@ -78,7 +78,7 @@ def _solve(matrix: Floats, right: Floats) -> None:
 
 @kernel
 def _newton_step(gram: Floats, gradient: Floats, low: Floats, high: Floats, sparsity: float, x: Floats) -> None:
-    """Newton step of all values inside their bounds at once, as far as the first bound; in place."""
+    """Take a common Newton step of all nonzero values inside their bounds, until the first bound or zero; in place."""
     free = np.flatnonzero((x > low) & (x < high) & (x != 0.0))
     if len(free) == 0:
         return
@@ -90,13 +90,13 @@ def _newton_step(gram: Floats, gradient: Floats, low: Floats, high: Floats, spar
             block[i, j] = gram[free[i], free[j]]
     _solve(block, slope)
     step = -slope
-    reach = 1.0
+    fraction = 1.0
     for i in range(len(free)):
         k = free[i]
-        reach = min(reach, _reach(x[k], step[i], low[k], high[k]))
+        fraction = min(fraction, _step_fraction(x[k], step[i], low[k], high[k]))
     for i in range(len(free)):
         k = free[i]
-        x[k] = min(max(x[k] + reach * step[i], low[k]), high[k])
+        x[k] = min(max(x[k] + fraction * step[i], low[k]), high[k])
         if abs(x[k]) < _ZERO:
             x[k] = 0.0
 
@@ -105,9 +105,9 @@ def _newton_step(gram: Floats, gradient: Floats, low: Floats, high: Floats, spar
 def _descend(
     gram: Floats, wanted: Floats, low: Floats, high: Floats, sparsity: float, tolerance: float, x: Floats
 ) -> int:
-    """Minimise for ``gram`` : (n, n) and ``wanted`` : (n,), in place on ``x``; returns the number of rounds."""
+    """Minimise for ``gram`` : (n, n) and ``wanted`` : (n,), in place on ``x``; return the number of rounds."""
     gradient = np.empty(len(x))
-    for round_ in range(_ROUNDS):
+    for round_ in range(_MAX_ROUNDS):
         for i in range(len(x)):
             gradient[i] = -wanted[i]
             for j in range(len(x)):
@@ -116,18 +116,17 @@ def _descend(
             return round_ + 1
         _sweep(gram, gradient, low, high, sparsity, x)
         _newton_step(gram, gradient, low, high, sparsity, x)
-    return _ROUNDS
+    return _MAX_ROUNDS
 
 
 class BoundedSolver:
     """Solves for one matrix and many right-hand sides.
 
-    matrix : (m, n) float64. low, high : (n,) bounds.
-    weights : (m,) how much each row counts; all alike without.
-    ridge : L2 penalty, which decides what the rows leave open. sparsity : L1 penalty.
-    tolerance : largest change of a value at which it stops.
+    matrix : (m, n) float64. low, high : (n,) bounds. weights : (m,) of the rows. Default: 1.
+    ridge : L2 penalty, which decides where the rows leave a choice. sparsity : L1 penalty.
+    tolerance : iteration stops when no value changes by more than this.
 
-    Raises ValueError: shapes do not fit, a number is not finite, or bounds are inside out.
+    Raises ValueError: shapes do not fit, a number is not finite, or a lower bound is above its upper bound.
     """
 
     def __init__(
@@ -160,9 +159,9 @@ class BoundedSolver:
         self.solve(np.zeros(m))  # compiles, which may take seconds, before a bus waits for an answer
 
     def solve(self, wanted: Floats, start: Floats | None = None) -> Floats:
-        """The best (n,) values for ``wanted`` : (m,).
+        """Return the best (n,) values for ``wanted`` : (m,).
 
-        ``start`` : (n,) where to begin; the last solution of something that moves. Zero without.
+        ``start`` : (n,) initial values, as the last solution when following a motion. Default: zero.
 
         Raises ValueError: ``wanted`` is not finite.
         """

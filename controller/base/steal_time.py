@@ -1,4 +1,4 @@
-"""Measures steal time: processor time that the host of a virtual machine gave to others."""
+"""Measures steal time: processor time that the host of a virtual machine used for other machines."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import time
 from pathlib import Path
 
 STAT = Path("/proc/stat")
-_STEAL = 8  # of "cpu user nice system idle iowait irq softirq steal ...", proc(5)
+_STEAL_FIELD = 8  # index in "cpu user nice system idle iowait irq softirq steal ...", proc(5)
 
 
 class StealTime:
-    """Counts from its creation."""
+    """Measures the steal time since its creation."""
 
     def __init__(self) -> None:
         self._began, self._before_s = time.monotonic(), steal_time_s()
 
-    def share(self) -> float | None:
-        """Share of all processors' time since then, 0 to 1; None where the system does not report it."""
+    def fraction(self) -> float | None:
+        """Fraction of all processors' time since the creation, 0 to 1; None if the system does not report it."""
         now_s, passed_s = steal_time_s(), time.monotonic() - self._began
         if now_s is None or self._before_s is None or passed_s <= 0.0:
             return None
@@ -25,9 +25,9 @@ class StealTime:
 
 
 def steal_time_s() -> float | None:
-    """Seconds since the start of the system, summed over its processors; None where it does not report it."""
+    """Steal time (s) since the start of the system, summed over its processors; None if it is not reported."""
     try:
         fields = STAT.read_text(encoding="ascii").split("\n", 1)[0].split()
-        return int(fields[_STEAL]) / os.sysconf("SC_CLK_TCK")
+        return int(fields[_STEAL_FIELD]) / os.sysconf("SC_CLK_TCK")
     except (OSError, ValueError, IndexError):
         return None

@@ -1,8 +1,8 @@
-"""The body: runs links, layers, motion limits and buses of a stage, in a separate process.
+"""The body: runs links, layers, motion limits and buses of a stage, in a separate control process.
 
-The control loop turns commands into parameters at ``control_hz`` and publishes them; each bus drives its servos at its
-own rate from the newest ones. The process stops its servos safely however it ends: a request to stop, the end of the
-main process, SIGTERM, or an error in this process.
+The control loop computes parameters from commands at ``control_hz`` and publishes them; each bus drives its servos at
+its own rate from the newest parameters. The process stops its servos safely whether it ends by a request, the end of
+the main process, SIGTERM, or an error.
 """
 
 from __future__ import annotations
@@ -44,22 +44,22 @@ log = logging.getLogger(__name__)
 
 
 Relay = Callable[[int, float, Floats, int], int]
-"""Gets the time of a tick (ns), its length (s), the values (P,), which it may change, and the time of the newest
-command in them; returns the time of the newest command in what it left."""
-_LONGEST_STEP_S = 0.1
-"""Layers that rested for longer go on as after a step of this length."""
+"""Function of a tick's time (ns) and length (s), the values (P,), which it may change in place, and the time (ns) of
+the newest command in them; it returns the time of the newest command in the resulting values."""
+_MAX_STEP_S = 0.1
+"""Layers that paused for longer continue as after a step of this length."""
 
 
 class Body:
     """Everything between the links and the servos of one head; publishes the parameters to ``mailbox``.
 
-    member : set where this is one of several heads, all of which
-        :class:`controller.body.multi_head.MultiHeadBody` ticks; None where it is the only head.
+    member : what the head shares with the other heads of its stage, which
+        :class:`controller.body.multi_head.MultiHeadBody` ticks; None for the only head of a stage.
 
     Attributes
     ----------
-    relay : passes on what was mixed to other processes, or replaces it by what they want; None where there are none.
-    rests : whether the layers are not needed, because another process decides what is shown.
+    relay : sends the mixed values to other processes, or replaces them by what a conductor sends; None without others.
+    rests : returns whether the layers are not needed, because another process decides what is shown.
     """
 
     def __init__(
@@ -72,7 +72,7 @@ class Body:
     ) -> None:
         self.stage, self._member = stage, member
         self.relay: Relay | None = None
-        self._unmixed_s = 0.0  # since the layers ticked last
+        self._unmixed_s = 0.0  # time since the layers ticked last
         self.rests: Callable[[], bool] = lambda: False
         self._closers, self.notes = Closers(), Notes()
         self.state = stage.state(parameters)
@@ -86,7 +86,7 @@ class Body:
         self.clock = HurriedClock(stage.settings.control_hz) if member is None else member.clock
         self.state.on_command = self.clock.hurry
         liveliness = 0.0 if options.mirror else stage.settings.liveliness
-        self.state.live(liveliness, 0, stage.settings.manner)  # 0: no command set it
+        self.state.live(liveliness, 0, stage.settings.manner)  # the time 0 means that no command set it
         self.links: list[LinkPart] = []
         self.buses = [loop for robot in stage.robots for loop in self._bus_loops(robot, parameters, options.mirror)]
         self.measured_face: MeasuredFace | None = None
@@ -108,15 +108,15 @@ class Body:
         self._newest: tuple[Floats, int] = (parameters.neutral(), 0)
         self._stopping, self._begun = threading.Event(), threading.Event()
         self._error: Exception | None = None
-        self._lost = False  # nothing is left to follow
+        self._nothing_to_follow = False
         self._panel = self.state.parts.add(Part("panel state", effect="the panel shows what it knew last"))
         self._thread = threading.Thread(target=self._control, name="control", daemon=True)
 
     def _make_shows(self, options: RunOptions, parameters: Parameters) -> None:
-        """What plays scripts and keeps their events; the show that the options or the stage name begins."""
+        """Create the player of shows and its event log; start the show that the options or the stage name."""
         events = None
         if options.events is not None:
-            remedy = "what came before is in it; start again with -o on a disk that has space"
+            remedy = "the earlier events are kept; start again with -o on a disk that has space"
             part = self.state.parts.add(Part(f"events {options.events}", remedy=remedy))
             events = EventLog(options.events, lsl=options.lsl, failed=lambda error: part.fail(error, time.monotonic()))
             self._closers.callback(events.close)
@@ -128,7 +128,10 @@ class Body:
             shows.play(self._as_part(script))
 
     def _make_sources(self, options: RunOptions, parameters: Parameters) -> Sources:
-        """A take, a voice or the servos that the face follows; those of a live stage play beside its links."""
+        """Create the sources: a take, a voice, or the servos of a head that is moved by hand.
+
+        If links are open (no take in the options), the stage's own take and voice play beside them.
+        """
         path, voice, settings = options.take, options.voice, self.stage.settings
         if self.live:
             path = self.stage.file(settings.take) if settings.take is not None else None
@@ -141,9 +144,10 @@ class Body:
         return Sources(self.state, player, follow, voice, beside=self.live)
 
     def _bus_loops(self, robot: RobotSettings, parameters: Parameters, limp: bool) -> list[BusLoop]:
+        """Create the loops of a robot's buses; ``limp`` : keep the torque of all servos off."""
         anchors = None
         if robot.anchored_channels:
-            from controller.robot.anchors import load_anchors  # start-up: loads the head
+            from controller.robot.anchors import load_anchors  # imported lazily: it loads the head
 
             anchors = load_anchors(robot, self.stage.head, parameters)
         prefix = f"{self.state.name}/" if self._member is not None else ""
@@ -159,7 +163,7 @@ class Body:
 
     def _record(self, path: Path) -> None:
         seed, period_s = self.stage.settings.seed, self.stage.period_s
-        remedy = "what came before is in it; begin another with --record on a disk that has space"
+        remedy = "the earlier ticks are kept; begin another one with --record on a disk that has space"
         part = self.state.parts.add(Part(f"recording {path}", remedy=remedy))
         self._closers.enter_context(
             recorded(
@@ -169,7 +173,7 @@ class Body:
         )  # fmt: skip
 
     def _find_show(self, name: str) -> Script:
-        """The script that a robot asks for by name. Raises ConfigError: there is none, or it was switched off."""
+        """Return the script that a command names. Raises ConfigError: there is none, or it is switched off."""
         stage = self.stage
         return self._as_part(load_named_script(name, self.state.parameters, stage.vocabulary, beside=stage.path))
 
@@ -177,25 +181,25 @@ class Body:
         return script_names(beside=self.stage.path)
 
     def _as_part(self, script: Script) -> Script:
-        """The script, as a part that fails alone. Raises ConfigError: it was switched off."""
+        """Register a script as a part that fails separately, and return it. Raises ConfigError: it is switched off."""
         part = self.state.parts.add(show_part(script.name))
         if part.off:
             raise ConfigError(f"{part.name} failed too often and is switched off: {part.why}", hint="start omote again")
         return script
 
     def newest(self) -> tuple[Floats, int]:
-        """The newest parameters and the arrival time (monotonic ns) of the command that caused them."""
+        """Return the newest parameters and the arrival time (monotonic ns) of the newest command in them."""
         return self._newest
 
     @property
     def finished(self) -> bool:
-        """True once there is nothing left to play."""
+        """Whether the take, the voice or the recording that the run plays has ended."""
         return self.sources.finished or (self.replay is not None and self.replay.finished)
 
     def start(self) -> None:
-        """Bring the servos up and hold them where they are.
+        """Start the buses, hold the servos where they are, and start the control loop.
 
-        Raises DriverError when a port or servo does not come up; what was up is shut down again.
+        Raises DriverError: a port or servo cannot be started; those already started are stopped again.
         """
         try:
             for bus in self.buses:
@@ -208,10 +212,10 @@ class Body:
             raise
 
     def begin(self) -> None:
-        """Let the servos follow; open the links, or start the take.
+        """Let the servos follow the face; open the links and start listening to a voice, or start the take.
 
-        Raises what the first link raises where none comes up and nothing else plays; otherwise a link that does not
-        come up is tried again.
+        A link that cannot be opened is retried, unless no link can be opened and there is no other source: then the
+        error of the first link is raised.
         """
         if self.live:
             self._closers.enter_context(thread_errors(lambda: self.links, self.state.parts))
@@ -223,7 +227,7 @@ class Body:
         self._begun.set()
 
     def _open_links(self) -> None:
-        """Open the links; those that do not come up are tried again, unless there is nothing else to follow."""
+        """Open the links; see :meth:`begin` for those that cannot be opened."""
         stage, state = self.stage, self.state
 
         def context(closers: Closers) -> LinkContext:
@@ -239,7 +243,7 @@ class Body:
             self._closers.callback(link.close)
             try:
                 link.open()
-            except Exception as error:  # noqa: BLE001  raised below, or tried again
+            except Exception as error:  # noqa: BLE001  raised below, or the link is retried
                 faults.append((link, error))
         if faults and len(faults) == len(self.links) and not self.sources.any:
             raise faults[0][1]
@@ -247,14 +251,14 @@ class Body:
             link.fail(fault)
 
     def play_take(self, path: Path) -> None:
-        """Play a take from its beginning, beside the links; one that cannot be read is logged and changes nothing."""
+        """Play a take from its beginning, beside the links; if it cannot be read, only log the error."""
         try:
             self.sources.play(TakePlayer(load_take(path, self.state.parameters), self.state, reader_of(path).layer))
         except OMOTE_ERRORS as error:
             log.warning("%s", error)
 
     def jog(self, bus: str, servo: str, angle_deg: float | None) -> None:
-        """Turn a servo by hand, see :class:`controller.body.messages.Jog`."""
+        """Move a single servo, see :class:`controller.body.messages.Jog`."""
         for loop in self.buses:
             if loop.settings.name == bus:
                 loop.jog(servo, None if angle_deg is None else math.radians(angle_deg))
@@ -265,7 +269,7 @@ class Body:
             loop.end_jogs()
 
     def details(self) -> Details:
-        """What servos, links, buses and parts report now, and what was logged since the last time."""
+        """Return what servos, links, buses and parts report now, and what was logged since the last call."""
         overview = self.state.overview()
         return Details(
             servos=overview["servos"],
@@ -279,33 +283,33 @@ class Body:
         """Write the state for the panel."""
         self._panel.run(lambda: panel_state.publish(self.state, self.measured_face), time.monotonic())
 
-    def _look_for_something_to_follow(self) -> None:
-        """Say once when parts have failed and nothing is left that the face could follow."""
+    def _warn_if_nothing_to_follow(self) -> None:
+        """Log an error once when parts have failed and no link or source is left for the face to follow."""
         follows = self.sources.playing or any(link.opened for link in self.links)
-        lost = self.live and self._begun.is_set() and not follows and bool(self.state.parts.failed)
-        if lost and not self._lost:
+        nothing = self.live and self._begun.is_set() and not follows and bool(self.state.parts.failed)
+        if nothing and not self._nothing_to_follow:
             log.error(
                 "NOTHING IS LEFT TO FOLLOW: every link, take, voice and show has failed or ended; the face keeps its "
                 "last commands and the servos hold them; see the messages above, then end it with Ctrl-C"
             )
-        self._lost = lost
+        self._nothing_to_follow = nothing
 
     def check(self) -> None:
-        """Raise the error that ended one of the loops, or the only thing there was to play."""
-        self._look_for_something_to_follow()
+        """Raise the error that ended a loop, or the only source that was to be played."""
+        self._warn_if_nothing_to_follow()
         for error in (self._error, self.sources.error, *(bus.error for bus in self.buses)):
             if error is not None:
                 raise error
 
     def stop(self) -> None:
-        """Close links, then stop the servos; errors of one do not keep the others from being stopped."""
+        """Close the links, then stop the servos; an error of one does not prevent the others from being stopped."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
         self._closers.close()
 
     def _control(self) -> None:
-        request_realtime()  # else a servo's thread waits for this one while that waits for a processor
+        request_realtime()  # otherwise a bus thread can wait for this thread while this one waits for a processor
         try:
             self._control_loop()
         except Exception as error:  # noqa: BLE001  check() raises it, and the servos are stopped
@@ -316,13 +320,13 @@ class Body:
             self.tick(now, self.clock.step_s)
 
     def tick(self, now_ns: int, step_s: float) -> None:
-        """One step of the face: its sources, the layers, and what of it the buses and the picture get."""
+        """Compute one step of the face from its sources and layers, and pass it to the buses and the picture."""
         begun, values = self._begun.is_set(), self._newest[0].copy()
         self.sources.tick(now_ns, begun)
-        self._unmixed_s = min(self._unmixed_s + step_s, _LONGEST_STEP_S)
+        self._unmixed_s = min(self._unmixed_s + step_s, _MAX_STEP_S)
         stamp = 0
         if not self.rests():
-            stamp = self._tick(now_ns, self._unmixed_s, values, begun)
+            stamp = self._tick_layers(now_ns, self._unmixed_s, values, begun)
             self._unmixed_s = 0.0
         if self.relay is not None:
             stamp = self.relay(now_ns, step_s, values, stamp)
@@ -332,19 +336,22 @@ class Body:
             bus.feed(step_s, urgent=is_new)
         self._mailbox.publish(values, stamp)
 
-    def _tick(self, now_ns: int, dt: float, values: Floats, begun: bool) -> int:
-        """Write the face of this tick to ``values`` : (P,); a recording that cannot be played on leaves it as it is."""
+    def _tick_layers(self, now_ns: int, dt: float, values: Floats, begun: bool) -> int:
+        """Write the face of the layers or of a recording to ``values`` : (P,); return the newest command's time (ns).
+
+        After an error of a recording, ``values`` stay unchanged.
+        """
         if self.replay is None or not begun:
             return self.state.tick(now_ns, dt, values)
         if self.sources.error is None:
             try:
                 return self.replay.tick(now_ns, dt, values)
-            except Exception as error:  # noqa: BLE001  check() raises it; the servos are led to rest first
+            except Exception as error:  # noqa: BLE001  check() raises it, after the servos were brought to rest
                 self.sources.error = error
         return 0
 
     def report(self) -> dict[str, object]:
-        """Measurements of the control loop, the links and the buses, and the parts that failed."""
+        """Return measurements of the control loop, sources, links and buses, and the parts that failed."""
         return {
             "control": self.clock.report(),
             **self.sources.report(),

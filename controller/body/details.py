@@ -1,4 +1,4 @@
-"""Keeps what was logged for the window's panel."""
+"""Keeps logged warnings and errors for the window's panel."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import logging
 import threading
 from collections import deque
 
-_MOST = 50
+_MAX_NOTES = 50
 
 
 class Notes(logging.Handler):
@@ -14,17 +14,17 @@ class Notes(logging.Handler):
 
     def __init__(self) -> None:
         super().__init__(logging.WARNING)
-        self._kept: deque[str] = deque(maxlen=_MOST)
-        self._taking = threading.Lock()
+        self._kept: deque[str] = deque(maxlen=_MAX_NOTES)
+        self._lock = threading.Lock()
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Keep one."""
-        with self._taking:
+        """Keep the message of a record."""
+        with self._lock:
             self._kept.append(record.getMessage())
 
     def take(self) -> list[str]:
-        """Those since the last time, oldest first; 50 at most."""
-        with self._taking:
+        """Return and remove the kept messages, at most 50, oldest first."""
+        with self._lock:
             taken = list(self._kept)
             self._kept.clear()
         return taken

@@ -1,4 +1,4 @@
-"""Writes what a show does, and when, to a table; sends its marks as markers of LSL (lab streaming layer)."""
+"""Writes the events of shows to a table with their times; sends marks as markers of LSL (lab streaming layer)."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ HEADER = b"time_s,unix_s,event,text\n"
 
 
 class EventLog:
-    """A table of events: seconds since the first of them, seconds since 1970, ``mark`` or ``line``, and its text.
+    """A table of events: seconds since the first event, seconds since 1970, ``mark`` or ``line``, and its text.
 
-    A thread of its own writes, so that a slow disk does not delay the face.
+    A separate thread writes, so that a slow disk does not delay the face.
 
-    lsl : send marks as a stream of LSL named ``omote``, too. failed : called once, from any thread, when the file
-    cannot be written any more; it keeps the whole lines that are in it.
+    lsl : also send marks as an LSL stream named ``omote``. failed : called from any thread when the file cannot be
+    written any more; the file is then truncated to its last whole line.
 
     Raises ControllerError: the file cannot be written. MissingPackage: pylsl is not installed.
     """
 
     def __init__(self, path: Path, *, lsl: bool = False, failed: Callable[[Exception], object] | None = None) -> None:
-        self._outlet = _outlet() if lsl else None
+        self._outlet = _open_outlet() if lsl else None
         try:
             self._writer = LineWriter(path, failed or (lambda _: None))
         except OSError as error:
@@ -46,11 +46,11 @@ class EventLog:
         self._writer.put(f'{(now_ns - self._begin_ns) * 1e-9:.6f},{unix_s:.6f},{event},"{quoted}"\n'.encode())
 
     def close(self) -> None:
-        """Write the remaining events and close the file."""
+        """Write the remaining events, and close the file."""
         self._writer.close()
 
 
-def _outlet() -> Any:
+def _open_outlet() -> Any:
     with importing("sending markers of LSL", "pylsl"):
         import pylsl  # optional: the extra lsl
     return pylsl.StreamOutlet(pylsl.StreamInfo("omote", "Markers", 1, 0, "string", "omote-marks"))

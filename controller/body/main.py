@@ -1,4 +1,4 @@
-"""The process of the body: gets its orders over a pipe, runs the body, and reports."""
+"""The main function of the control process (body): receives orders over a pipe, runs the body, and reports."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ _POLL_S = 0.1
 
 
 def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
-    """Run the body's process.
+    """Run the control process.
 
-    Sends to main one :class:`Ready` or :class:`Failed`, perhaps :class:`Finished`, at the end a :class:`Report`.
-    Main may send requests of its panel; ``Stop`` and main's own end both mean stop.
+    It sends to the main process a :class:`Ready`, perhaps a :class:`Finished`, and at the end a :class:`Report`, or at
+    any time a :class:`Failed`. Main may send requests of its panel; ``Stop``, or the end of main, stops the body.
     """
     stop = threading.Event()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
-    for ending in termination_signals():
-        signal.signal(ending, lambda *_: stop.set())
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; main stops the body
+    for number in termination_signals():
+        signal.signal(number, lambda *_: stop.set())
     measured: dict[str, object] = {}
     try:
         _serve(orders, pipe, stop, measured)
@@ -54,7 +54,7 @@ def body_main(orders: messages.BodyOrders, pipe: Connection) -> None:
 
 
 def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event, measured: dict[str, object]) -> None:
-    """Run the body until it is asked to stop; ``measured`` takes its report, also where a servo does not stop."""
+    """Run the body until a request to stop; its report is written to ``measured``, even if stopping a servo fails."""
     stage = orders.options.load_stage(orders.stage)
     parameters, mailboxes, panels = stage.parameters, [], []
     for each in heads_of(stage):
@@ -68,11 +68,11 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event,
         body = Body(stage, parameters, mailboxes[0], orders.options)
     bodies = body.bodies if isinstance(body, MultiHeadBody) else [body]
     node = open_node(stage, bodies)
-    shorten_thread_switches()  # before torque: later garbage collections have few objects to check
-    with _logged(bodies[0].notes), ExitStack() as ending:
+    shorten_thread_switches()  # before torque is enabled, since it also shortens later garbage collections
+    with _log_to(bodies[0].notes), ExitStack() as ending:
         if node is not None:
             ending.callback(node.close)
-        ending.callback(lambda: measured.update(body.report()))  # comes after the stop, also one that fails
+        ending.callback(lambda: measured.update(body.report()))  # runs after body.stop(), even if that fails
         ending.callback(body.stop)
         body.start()
         _send(pipe, messages.Ready())
@@ -81,8 +81,8 @@ def _serve(orders: messages.BodyOrders, pipe: Connection, stop: threading.Event,
 
 
 @contextmanager
-def _logged(notes: logging.Handler) -> Iterator[None]:
-    """Keep warnings for who watches the body, and print them: with a handler of its own, logging prints nothing."""
+def _log_to(notes: logging.Handler) -> Iterator[None]:
+    """Send warnings to ``notes`` for the panel, and also print them, which logging stops when it has a handler."""
     root, handlers = logging.getLogger(), [notes, *filter(None, [logging.lastResort])]
     for handler in handlers:
         root.addHandler(handler)
@@ -94,7 +94,7 @@ def _logged(notes: logging.Handler) -> Iterator[None]:
 
 
 def _wait(body: Body | MultiHeadBody, pipe: Connection, stop: threading.Event, panel_state: PanelState | None) -> None:
-    """Serve main until it requests a stop or has ended, a signal arrives, or a bus failed for good."""
+    """Handle requests of main until it requests a stop or ends, a signal arrives, or ``body.check()`` raises."""
     finished = False
     while not stop.is_set():
         if pipe.poll(_POLL_S) and not _handle(body, pipe):
@@ -108,43 +108,43 @@ def _wait(body: Body | MultiHeadBody, pipe: Connection, stop: threading.Event, p
 
 
 def _handle(body: Body | MultiHeadBody, pipe: Connection) -> bool:
-    """Carry out a request of main or its panel; False when it requests a stop or has ended."""
+    """Carry out a request of main or its panel; return False if it requests a stop or has ended."""
     try:
         request = pipe.recv()
     except (EOFError, OSError):
         return False
     if isinstance(request, messages.Begin):
         shorten_thread_switches()
-        request_realtime()  # the links' threads too: one put off while it holds the interpreter puts off the servos
+        request_realtime()  # links' threads inherit it: one that is preempted with the interpreter's lock delays servos
         body.begin()
         return True
-    to = request.head if isinstance(request, messages.ToHead) else ""
+    head = request.head if isinstance(request, messages.ToHead) else ""
     request = request.request if isinstance(request, messages.ToHead) else request
     try:
-        return _answer(request, body.body_of(to) if isinstance(body, MultiHeadBody) else body, pipe)
-    except Exception as error:  # nothing that a panel asks for ends the run
+        return _carry_out(request, body.body_of(head) if isinstance(body, MultiHeadBody) else body, pipe)
+    except Exception as error:  # a failed request of a panel must not end the run
         trace = error if os.environ.get("OMOTE_DEBUG") else None
         log.error("panel: %s failed: %s; all else goes on", type(request).__name__, describe(error), exc_info=trace)
         if isinstance(request, messages.AskDetails):
-            _send(pipe, messages.Details())  # it asks again only when it has an answer
+            _send(pipe, messages.Details())  # main asks again only after it has an answer
         return True
 
 
-def _answer(request: object, who: Body, pipe: Connection) -> bool:
-    """Carry out a request for one head; False when it is none of a panel's, but asks to stop."""
+def _carry_out(request: object, body: Body, pipe: Connection) -> bool:
+    """Carry out a request for one head; return False if it is not a request of a panel, but Stop."""
     if isinstance(request, messages.AskDetails):
-        _send(pipe, who.details())
+        _send(pipe, body.details())
     elif isinstance(request, messages.PlayTake):
-        who.play_take(request.path)
+        body.play_take(request.path)
     elif isinstance(request, messages.Jog):
-        who.jog(request.bus, request.servo, request.angle_deg)
+        body.jog(request.bus, request.servo, request.angle_deg)
     else:
         if isinstance(request, messages.Neutral):
-            who.end_jogs()
-        return carry_out(request, who.state, time.monotonic_ns())
+            body.end_jogs()
+        return carry_out(request, body.state, time.monotonic_ns())
     return True
 
 
 def _send(pipe: Connection, message: object) -> None:
-    with suppress(OSError):  # main has ended; the servos are still stopped
+    with suppress(OSError):  # if main has ended, the body only has to stop the servos
         pipe.send(message)

@@ -1,4 +1,4 @@
-"""What the body of a head shares with those of the other heads of its stage."""
+"""What the bodies of several heads of a stage share: layers of all heads, the clock and the stop latch."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from controller.layers.heads import Heads
 
 @dataclass(frozen=True)
 class Member:
-    """A head among several: somebody else ticks it.
+    """A head among several, which :class:`controller.body.multi_head.MultiHeadBody` ticks.
 
-    heads : all of them. clock : theirs. stop_latch : a STOP of any stops all.
+    heads : all heads of the stage. clock : their common clock. stop_latch : common, so that a STOP stops all heads.
     """
 
     name: str
@@ -26,7 +26,7 @@ class Member:
     stop_latch: StopLatch
 
     def join(self, state: CommandState) -> None:
-        """Make ``state`` one of the heads."""
+        """Give ``state`` the name, placement and stop latch of this head, and add it to the heads."""
         state.name, state.placement, state.heads, state.stop_latch = (
             self.name, self.placement, self.heads, self.stop_latch,
         )  # fmt: skip
@@ -34,8 +34,11 @@ class Member:
 
 
 def options_of(options: RunOptions, name: str, *, first: bool) -> RunOptions:
-    """The options of a run for one of its heads: takes, voices, shows and panels are the first head's, and each head
-    has a recording of its own, ``a-maple.rec`` for ``a.rec``."""
+    """Return the options of a run for one of its heads.
+
+    Takes, voices, shows and panels are only for the first head. Each head has its own recording, as ``a-maple.rec`` for
+    ``a.rec``.
+    """
     record = options.record
-    own = None if record is None else record.with_name(f"{record.stem}-{name}{record.suffix}")
-    return replace(options, record=own) if first else RunOptions(mirror=options.mirror, record=own)
+    head_record = None if record is None else record.with_name(f"{record.stem}-{name}{record.suffix}")
+    return replace(options, record=head_record) if first else RunOptions(mirror=options.mirror, record=head_record)

@@ -1,4 +1,4 @@
-"""Messages between the main process and the body's process: pickled records that are sent over a pipe."""
+"""Messages between the main process and the control process (body): pickled records that are sent over a pipe."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class WebPanel:
     face: Path
 
     def link(self) -> LinkSettings:
-        """Its link. Raises pydantic.ValidationError: ``listen`` is no address."""
+        """Return the settings of its link. Raises pydantic.ValidationError: ``listen`` is not an address."""
         return read_link({"kind": "web", "listen": self.listen, "face": str(self.face), "open_to_network": True})
 
 
@@ -33,12 +33,13 @@ class RunOptions:
     """Options of a run besides its stage.
 
     take : a take or recording to play instead of the links. voice : a voice that moves the mouth.
-    mirror : leave the servos' torque off; the face follows a head that is moved by hand.
+    mirror : leave the servos' torque off; the face follows a robot that is moved by hand.
     record : file for every command and tick. web : a web panel. show : a script to play instead of the stage's show.
     events : file for the lines and marks of shows. lsl : send those marks as LSL markers.
     role, heads : replace those of the stage's ``[zenoh]``.
-    standard_input : a link listens there: the body gets what comes in at main's.
-    vocabularies : files that the stage has behind its own ones. at_rest : only the panel moves the face.
+    standard_input : whether a link reads standard input, which the main process then forwards to the body.
+    vocabularies : files to add after the stage's own ones. at_rest : run without links, robots and sources, so only the
+        panel moves the face.
     """
 
     take: Path | None = None
@@ -56,15 +57,17 @@ class RunOptions:
     at_rest: bool = False
 
     def load_stage(self, name: str) -> Stage:
-        """The stage as this run has it. Raises ConfigError."""
+        """Load a stage and reduce it to what this run needs of it. Raises ConfigError."""
         stage = for_role(load_stage(name, PARAMETERS, self.vocabularies), self.role, self.heads)
         return at_rest(stage) if self.at_rest else stage
 
 
 @dataclass(frozen=True)
 class BodyOrders:
-    """Main to body, first: the stage's file and options. The mailboxes for parameters and panel state follow it, two
-    for each head."""
+    """Main to body, first: the stage's file and options.
+
+    The mailboxes for parameters and panel state follow it, two for each head.
+    """
 
     stage: str
     options: RunOptions = RunOptions()
@@ -82,7 +85,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Hold:
-    """Main to body, from the panel: hold parameter ``index`` at a value; None releases it to the layers below."""
+    """Main to body, from the panel: hold parameter ``index`` at a value; None releases it to lower layers."""
 
     index: int
     value: float | None
@@ -90,7 +93,7 @@ class Hold:
 
 @dataclass(frozen=True)
 class HoldAll:
-    """Main to body, from the panel: hold several parameters at once; without values release them."""
+    """Main to body, from the panel: hold several parameters at once; ``values`` None releases them."""
 
     indices: tuple[int, ...]
     values: tuple[float, ...] | None
@@ -106,15 +109,17 @@ class Show:
 
 @dataclass(frozen=True)
 class LookAt:
-    """Main to body, from the panel: look at a point (mm; x to the subject's left, y up, z forward from the middle
-    between the eyes); None looks at nothing in particular."""
+    """Main to body, from the panel: look at a point; None ends a commanded gaze.
+
+    point : mm from the middle between the eyes; x to the subject's left, y up, z forward.
+    """
 
     point: tuple[float, float, float] | None
 
 
 @dataclass(frozen=True)
 class Live:
-    """Main to body, from the panel: the amount of idle motion, 0..1, and the manner; the present one without."""
+    """Main to body, from the panel: set the amount of idle motion, 0..1, and its manner; None keeps the manner."""
 
     amount: float
     manner: str | None = None
@@ -136,7 +141,7 @@ class ControlShow:
 
 @dataclass(frozen=True)
 class Learn:
-    """Main to body, from the panel: know a named expression of weights (P,) from now on, on every link."""
+    """Main to body, from the panel: add a named expression of weights (P,) to the vocabulary of every link."""
 
     name: str
     weights: tuple[float, ...]
@@ -145,14 +150,14 @@ class Learn:
 
 @dataclass(frozen=True)
 class Neutral:
-    """Main to body, from the panel: release everything and return to neutral over ``seconds``."""
+    """Main to body, from the panel: release everything and return to the neutral face within ``seconds``."""
 
     seconds: float
 
 
 @dataclass(frozen=True)
 class StopServos:
-    """Main to body, from the panel: servos off until :class:`StartServos`, whatever else is commanded."""
+    """Main to body, from the panel: switch the servos off until :class:`StartServos`, whatever else is commanded."""
 
 
 @dataclass(frozen=True)
@@ -162,8 +167,10 @@ class StartServos:
 
 @dataclass(frozen=True)
 class Jog:
-    """Main to body, from the panel: turn one servo to an angle, within its limits, whatever the face wants; None gives
-    it back to the face, as :class:`Neutral` does with all. Servos that are stopped stay off."""
+    """Main to body, from the panel: move one servo to an angle within its limits, independent of the face.
+
+    None lets it follow the face again, as :class:`Neutral` does with all servos. Servos that are stopped stay off.
+    """
 
     bus: str
     servo: str
@@ -172,7 +179,7 @@ class Jog:
 
 @dataclass(frozen=True)
 class AskDetails:
-    """Main to body, from the panel: answer with :class:`Details`. One at a time, so that none pile up."""
+    """Main to body, from the panel: answer with :class:`Details`. Main waits for the answer before it asks again."""
 
 
 @dataclass(frozen=True)
@@ -202,7 +209,7 @@ PanelRequest = (
 
 @dataclass(frozen=True)
 class ToHead:
-    """Main to body, from the panel: a request for the head of a name; without this it is for the first one."""
+    """Main to body, from the panel: a request for the head called ``head``; a bare request is for the first head."""
 
     head: str
     request: PanelRequest
@@ -210,12 +217,12 @@ class ToHead:
 
 @dataclass(frozen=True)
 class Ready:
-    """Body to main: the servos are up; the body waits for :class:`Begin`."""
+    """Body to main: the servos are started; the body waits for :class:`Begin`."""
 
 
 @dataclass(frozen=True)
 class Failed:
-    """Body to main: it could not start, or gave up; the error's message and hint, and what was measured before."""
+    """Body to main: the body could not start, or failed; the error's message and hint, and the measurements so far."""
 
     message: str
     hint: str = ""
@@ -231,9 +238,9 @@ class Finished:
 class Details:
     """Body to main: what every servo, link and bus reports now, and the parts that failed.
 
-    servos : see :func:`controller.robot.servo_states.servo_states`. links : a report each, with its ``name``.
+    servos : see :func:`controller.robot.servo_states.servo_states`. links : the report of each, with its ``name``.
     buses : ``name``, ``running``, ``fault``. parts : see :meth:`controller.base.parts.Part.report`.
-    notes : warnings and errors since the last one, oldest first.
+    notes : warnings and errors that were logged since the last answer, oldest first.
     """
 
     servos: list[dict[str, Any]] = field(default_factory=list)
@@ -245,6 +252,6 @@ class Details:
 
 @dataclass(frozen=True)
 class Report:
-    """Body to main, last: what was measured."""
+    """Body to main, last: the measurements of the run."""
 
     content: dict[str, object] = field(default_factory=dict)

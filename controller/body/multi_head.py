@@ -20,7 +20,7 @@ from drivers.base.priority import request_realtime
 
 
 class MultiHeadBody:
-    """The bodies of several heads, ticked together; it has the same methods as :class:`controller.body.body.Body`.
+    """The bodies of several heads, which it ticks together; has the methods of :class:`controller.body.body.Body`.
 
     mailboxes, panels : one for each head of the stage, in its order.
 
@@ -52,11 +52,11 @@ class MultiHeadBody:
 
     @property
     def state(self) -> CommandState:
-        """The layers of the first head, which takes every command that names no head."""
+        """The layers of the first head, which receives every command that names no head."""
         return self.bodies[0].state
 
     def body_of(self, name: str) -> Body:
-        """The body of the head of a name; that of the first one where there is none."""
+        """Return the body of the head called ``name``, or of the first head if there is none."""
         return next((body for body in self.bodies if body.state.name == name), self.bodies[0])
 
     @property
@@ -66,11 +66,11 @@ class MultiHeadBody:
 
     @property
     def finished(self) -> bool:
-        """Whether every take, show and voice has been played to its end."""
+        """Whether the sources of the first head, which plays all takes and voices, have ended."""
         return self.bodies[0].finished
 
     def start(self) -> None:
-        """Start all servos and hold them where they are. Raises DriverError; those already started are stopped then."""
+        """Start all servos and hold them where they are. Raises DriverError; then started servos are stopped again."""
         started: list[Body] = []
         try:
             for body in self.bodies:
@@ -85,7 +85,7 @@ class MultiHeadBody:
     def begin(self) -> None:
         """Let the servos follow the faces, and open the links.
 
-        Raises the error of a link that cannot be opened where its head has nothing else to follow.
+        Raises the error of a link that cannot be opened if its head has no other link or source.
         """
         for body in self.bodies:
             body.begin()
@@ -96,29 +96,32 @@ class MultiHeadBody:
             body.publish(panel)
 
     def check(self) -> None:
-        """Raise the error that ended the control loop, or that ended the only thing that a head had to play."""
+        """Raise the error that ended the control loop, a bus loop, or the only source that was to be played."""
         if self._error is not None:
             raise self._error
         for body in self.bodies:
             body.check()
 
     def stop(self) -> None:
-        """Close all links, then stop all servos; errors of one head do not keep the others from being stopped."""
+        """Stop the heads one by one: close the links and stop the servos of each, also after an error of another.
+
+        Raises the first error.
+        """
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
-        errors = [error for body in self.bodies if (error := _stopped(body)) is not None]
+        errors = [error for body in self.bodies if (error := _stop_body(body)) is not None]
         if errors:
             raise errors[0]
 
     def report(self) -> dict[str, object]:
-        """The report of a body for all heads; every link, bus and part also names its head."""
+        """Return one report for all heads; every link, bus and part in it also names its head."""
         reports = [(body.state.name, body.report()) for body in self.bodies]
         lists = {
             key: [{"head": name, **each} for name, report in reports for each in report[key]]  # type: ignore[attr-defined]
             for key in ("links", "buses", "parts")
         }
-        heads = [_place(body) for body in self.bodies]
+        heads = [_head_report(body) for body in self.bodies]
         return {**reports[0][1], "control": self.clock.report(), **lists, "heads": heads}
 
     def _control(self) -> None:
@@ -130,23 +133,23 @@ class MultiHeadBody:
             self._error = error
 
     def tick(self, now_ns: int, step_s: float) -> None:
-        """One step of every head, after one of the turn-taking between them."""
+        """Tick the turn-taking between the heads, then every head."""
         if self.heads.turns is not None:
             self.heads.turns.tick(now_ns)
         for body in self.bodies:
             body.tick(now_ns, step_s)
 
 
-def _stopped(body: Body) -> Exception | None:
+def _stop_body(body: Body) -> Exception | None:
     try:
         body.stop()
-    except Exception as error:  # noqa: BLE001  the others are stopped first
+    except Exception as error:  # noqa: BLE001  returned, because the other bodies are stopped first
         return error
     return None
 
 
-def _place(body: Body) -> dict[str, object]:
-    """Name, place and turn of a head, for the report."""
+def _head_report(body: Body) -> dict[str, object]:
+    """Return name, position, direction and number of ticks of a head."""
     place = body.state.placement
     return {"head": body.state.name, "position_mm": list(place.position_mm), "yaw_deg": place.yaw_deg,
             "ticks": body.state.status()["ticks"]}  # fmt: skip

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def open_node(stage: Stage, bodies: Sequence[Body]) -> Node | None:
-    """What joins the others by the stage's ``[zenoh]``; None without that.
+    """Connect the heads of this process to the stage's other processes; return None if the stage has no ``[zenoh]``.
 
     Raises LinkError: an endpoint or a file cannot be used. MissingPackage: Zenoh is not installed.
     """
@@ -34,5 +34,5 @@ def open_node(stage: Stage, bodies: Sequence[Body]) -> Node | None:
 
 
 def head_key(name: str) -> str:
-    """A name as a part of a key: letters, digits, ``_`` and ``-``."""
+    """Convert a name to a part of a Zenoh key: letters, digits, ``_`` and ``-``."""
     return re.sub(r"[^A-Za-z0-9_-]+", "-", name).strip("-_") or "head"

@@ -15,20 +15,20 @@ log = logging.getLogger(__name__)
 
 
 def carry_out(request: object, state: CommandState, now_ns: int) -> bool:
-    """Carry out a request; False when it is none of a panel's. One that is refused changes nothing and is logged."""
+    """Carry out a request; return False if it is not a request of a panel. A refused request is only logged."""
     try:
         return (
-            _held(request, state, now_ns)
-            or _face(request, state, now_ns)
-            or _show(request, state)
-            or _servos(request, state, now_ns)
+            _carry_out_hold(request, state, now_ns)
+            or _carry_out_face(request, state, now_ns)
+            or _carry_out_show(request, state)
+            or _carry_out_servos(request, state, now_ns)
         )
     except ControllerError as error:
         log.warning("panel: %s", error)
         return True
 
 
-def _held(request: object, state: CommandState, now: int) -> bool:
+def _carry_out_hold(request: object, state: CommandState, now: int) -> bool:
     match request:
         case messages.Hold(index, None):
             state.release([index], now)
@@ -43,7 +43,7 @@ def _held(request: object, state: CommandState, now: int) -> bool:
     return True
 
 
-def _face(request: object, state: CommandState, now: int) -> bool:
+def _carry_out_face(request: object, state: CommandState, now: int) -> bool:
     match request:
         case messages.Show(name, intensity):
             state.expression(name, intensity, None, now)
@@ -62,11 +62,11 @@ def _face(request: object, state: CommandState, now: int) -> bool:
     return True
 
 
-def _show(request: object, state: CommandState) -> bool:
+def _carry_out_show(request: object, state: CommandState) -> bool:
     if not isinstance(request, messages.PlayShow | messages.ControlShow):
         return False
     if state.shows is None:
-        raise ParameterError("there is nothing here that plays shows")
+        raise ParameterError("this process plays no shows")
     if isinstance(request, messages.PlayShow):
         state.shows.start(request.name)
     else:
@@ -74,7 +74,7 @@ def _show(request: object, state: CommandState) -> bool:
     return True
 
 
-def _servos(request: object, state: CommandState, now: int) -> bool:
+def _carry_out_servos(request: object, state: CommandState, now: int) -> bool:
     match request:
         case messages.StopServos():
             state.stop_latch.stop("panel", now)

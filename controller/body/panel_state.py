@@ -1,7 +1,7 @@
-"""State for the panel besides the values: who holds each parameter, and at what, what the servos show, who stopped
+"""State for the panel besides the values: who holds each parameter, and at what, what the servos measure, who stopped
 them.
 
-The body writes it ten times a second to a mailbox; main reads it when it draws.
+The control process (body) writes it ten times a second to a mailbox; main reads it when it draws.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from controller.layers.commands import CommandState
 from controller.robot.following import MeasuredFace
 
 _NAME_LENGTH = 64
-"""Characters of the name of who stopped the servos, a number each: a mailbox carries numbers only."""
+"""Characters of the name of who stopped the servos; each is encoded as a number, since a mailbox carries numbers."""
 
 
 class PanelState:
@@ -30,15 +30,15 @@ class PanelState:
         self._all = np.full(self.size(parameters), np.nan)
         self._regions = parameters.region_names
         ends = np.cumsum([self._p, self._p, self._p, len(self._regions)])
-        self._holders, self._held, self._measured, self._away, self._stopped = np.split(self._all, ends)
+        self._holders, self._held, self._measured, self._differences, self._stopped = np.split(self._all, ends)
 
     @staticmethod
     def size(parameters: Parameters) -> int:
-        """Length of the mailbox's vector: layers and values that hold (P, P), measured ones (P), degrees, a name."""
+        """Return the length of the mailbox's vector: layers and values that hold (P, P), measured (P), regions, a name."""
         return 3 * len(parameters) + len(parameters.region_names) + _NAME_LENGTH
 
     def publish(self, state: CommandState, measured_face: MeasuredFace | None) -> None:
-        """Write the state of this moment; ``measured_face`` None without servos."""
+        """Write the present state; ``measured_face`` is None without servos."""
         layers = {name: i for i, name in enumerate(self._layers)}
         self._holders[:] = [layers.get(state.holder(i) or "", -1) for i in range(self._p)]
         self._held[:] = np.nan
@@ -48,24 +48,24 @@ class PanelState:
             known = np.zeros(self._p, dtype=bool)
             measured_face.read(self._measured, known)
             self._measured[~known] = np.nan
-            away = measured_face.differences()
-            self._away[:] = [away.get(region, np.nan) for region in self._regions]
+            differences = measured_face.differences()
+            self._differences[:] = [differences.get(region, np.nan) for region in self._regions]
         stopped = state.stop_latch.stopped
-        _write(self._stopped, stopped.who if stopped is not None else "")
+        _encode_text(self._stopped, stopped.who if stopped is not None else "")
         self._mailbox.publish(self._all)
 
     def turn_to(self, other: PanelState) -> None:
-        """Read what another one reads, of the same parameters."""
+        """Read from now on the mailbox of another head, which has the same parameters."""
         self._mailbox, self._layers = other._mailbox, other._layers
         self._all[:] = np.nan
 
     def refresh(self) -> None:
-        """Read what was written last; nothing is known before the first time."""
+        """Read the newest state, if any was written."""
         if self._mailbox.sequence:
             self._mailbox.read(self._all)
 
     def holder(self, index: int) -> str:
-        """The layer that holds a parameter; empty when none does or nothing is known."""
+        """Return the layer that holds a parameter; empty if none does or it is not known."""
         layer = self._holders[index]
         return self._layers[int(layer)] if layer >= 0 else ""
 
@@ -78,28 +78,28 @@ class PanelState:
     @property
     def stopped_by(self) -> str:
         """Who stopped the servos; empty while they may move."""
-        return _read(self._stopped)
+        return _decode_text(self._stopped)
 
     def measured(self, index: int) -> float | None:
-        """What the servos show of a parameter; None where that is not known."""
+        """Return the value of a parameter that the servos measure; None if not known."""
         return float(self._measured[index]) if np.isfinite(self._measured[index]) else None
 
     def show_measured(self, values: Floats) -> None:
-        """Replace parameters (P,) by what the servos show of them, where that is known."""
+        """Replace parameter values (P,) by the measured ones where these are known."""
         np.copyto(values, self._measured, where=np.isfinite(self._measured))
 
     def away_deg(self, region: str) -> float | None:
-        """How far the servos of a region are from their wanted angles (rms, degrees); None where not known."""
-        value = self._away[self._regions.index(region)]
+        """Return the difference (rms, degrees) of a region's servos from their wanted angles; None if not known."""
+        value = self._differences[self._regions.index(region)]
         return float(value) if np.isfinite(value) else None
 
 
-def _write(place: Floats, text: str) -> None:
-    """Write a text as numbers, as much as there is room for."""
-    letters = [ord(letter) for letter in text[: len(place)]]
-    place[:] = np.nan
-    place[: len(letters)] = letters
+def _encode_text(out: Floats, text: str) -> None:
+    """Write the code points of a text to ``out``, as many as fit, and NaN after them."""
+    codes = [ord(letter) for letter in text[: len(out)]]
+    out[:] = np.nan
+    out[: len(codes)] = codes
 
 
-def _read(place: Floats) -> str:
-    return "".join(chr(int(letter)) for letter in place[np.isfinite(place)])
+def _decode_text(codes: Floats) -> str:
+    return "".join(chr(int(code)) for code in codes[np.isfinite(codes)])

@@ -1,6 +1,6 @@
-"""Starts the body's process early: it loads its code while the main process still reads its settings.
+"""Starts the control process (body) early, so that it loads its code while the main process reads the settings.
 
-Imports nothing that takes long, because it is started before everything else.
+It imports no slow modules, because it runs before everything else.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from controller.base.signals import signals_blocked, unblock_signals
 from drivers.base.permission import check_ports_allowed
 
 if TYPE_CHECKING:
-    from controller.base.mailboxes import Mailbox  # start-up: it loads numpy
-    from controller.body.messages import BodyOrders  # start-up: it loads numpy
+    from controller.base.mailboxes import Mailbox  # imported lazily: it loads numpy
+    from controller.body.messages import BodyOrders  # imported lazily: it loads numpy
 
 _END_S = 5.0
 
@@ -30,8 +30,9 @@ _END_S = 5.0
 class PreloadedBody:
     """A process that waits for :class:`controller.body.messages.BodyOrders`.
 
-    A context manager: the process ends with the block unless :meth:`send` has given it orders.
-    ``pipe`` leads to it; ``voice`` carries standard input, which a child process does not have, for a voice or a link.
+    A context manager: the process ends with the block unless :meth:`send` was called.
+
+    pipe : to the process. voice : pipe that carries standard input, which a child process does not have, to it.
     """
 
     def __init__(self) -> None:
@@ -47,9 +48,9 @@ class PreloadedBody:
         self._sent = False
 
     def send(self, orders: BodyOrders, *mailboxes: Mailbox) -> None:
-        """Send the process its orders and mailboxes; from now on the caller has to end it."""
+        """Send the process its orders and mailboxes; from now on the caller is responsible for ending it."""
         self._sent = True
-        with suppress(OSError):  # the caller that waits for its answer reports a process that has ended
+        with suppress(OSError):  # if the process has ended, the caller that waits for its answer reports that
             self.pipe.send(orders)
             for mailbox in mailboxes:
                 mailbox.send(self.pipe)
@@ -63,14 +64,14 @@ class PreloadedBody:
             self.voice.close()
             self.process.terminate()
             self.process.join(_END_S)
-            if self.process.exitcode is None:  # a signal that is sent while it starts can be lost
+            if self.process.exitcode is None:  # a signal that is sent while the process starts can be lost
                 self.process.kill()
                 self.process.join(_END_S)
 
 
 @contextmanager
 def garbage_collection_off() -> Iterator[None]:
-    """Switch garbage collection off: a start creates hardly any garbage, and collecting takes a tenth of its time."""
+    """Disable garbage collection: starting creates hardly any garbage, and collecting takes a tenth of its time."""
     gc.disable()
     try:
         yield
@@ -80,7 +81,7 @@ def garbage_collection_off() -> Iterator[None]:
 
 @contextmanager
 def _without_main_module() -> Iterator[None]:
-    """Keep a spawned process from importing the program that starts it: the body needs no command line."""
+    """Keep a spawned process from importing the program that starts it, which the body does not need."""
     main = sys.modules["__main__"].__dict__
     removed = {name: main.pop(name) for name in ("__file__",) if name in main}
     try:
@@ -91,10 +92,10 @@ def _without_main_module() -> Iterator[None]:
 
 def _wait(pipe: Connection, voice: Connection) -> None:
     """Load the body's code, wait for orders, then run the body."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole group; main asks the body to stop
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group; main stops the body
     unblock_signals()
     with garbage_collection_off():
-        from controller.body.main import body_main  # start-up: in the child, while main reads its orders
+        from controller.body.main import body_main  # imported lazily: in the child, while main reads its orders
     try:
         orders: BodyOrders = pipe.recv()
     except (EOFError, OSError):

@@ -1,4 +1,4 @@
-"""The body's process as the main process sees it: starts it, sends requests, receives reports, stops it."""
+"""The main process's side of the control process (body): starts it, sends requests, receives reports, stops it."""
 
 from __future__ import annotations
 
@@ -24,14 +24,15 @@ _TERMINATE_TIMEOUT_S = 5.0
 
 
 class BodyProcess:
-    """The body as main sees it; a context manager that always stops it.
+    """The control process (body) of a run; a context manager that always stops it.
 
-    details : the newest answer to :class:`AskDetails`.
-    ``preloaded`` : a process that waits for orders; without one it is started here.
+    preloaded : a process that waits for orders. Default: start one.
 
     Attributes
     ----------
     mailboxes, panel_states : of each head, in the order of the stage. mailbox, panel_state : of the first one.
+    details : the newest answer to :class:`controller.body.messages.AskDetails`. finished : whether all sources ended.
+    report : the final measurements, empty before the end.
     """
 
     def __init__(
@@ -43,7 +44,7 @@ class BodyProcess:
         preloaded: PreloadedBody | None = None,
     ) -> None:
         preloaded = preloaded or PreloadedBody()
-        options = self._with_input(stage, options, preloaded)
+        options = self._forward_standard_input(stage, options, preloaded)
         stages = heads_of(stage)
         self.mailboxes = [Mailbox.create(len(parameters.names)) for _ in stages]
         self._panel_mailboxes = [Mailbox.create(PanelState.size(parameters)) for _ in stages]
@@ -61,8 +62,10 @@ class BodyProcess:
         preloaded.send(messages.BodyOrders(str(stage.path), options), *boxes)
 
     @staticmethod
-    def _with_input(stage: Stage, options: messages.RunOptions, preloaded: PreloadedBody) -> messages.RunOptions:
-        """Give the body what comes in at standard input, where a voice or a link wants it."""
+    def _forward_standard_input(
+        stage: Stage, options: messages.RunOptions, preloaded: PreloadedBody
+    ) -> messages.RunOptions:
+        """Forward standard input to the body if a voice or a link reads it; return the options with that choice."""
         voice = options.voice is not None and options.voice.path == "-"
         links = (
             0
@@ -80,29 +83,29 @@ class BodyProcess:
         return replace(options, standard_input=link)
 
     def wait_ready(self) -> messages.Ready:
-        """Wait until the servos are up; raises ControllerError with the body's message when they do not come up."""
+        """Wait until the servos are started. Raises ControllerError: they cannot be started, or there is no answer."""
         message = self._receive(_START_TIMEOUT_S)
         if not isinstance(message, messages.Ready):
             raise ControllerError(f"the body sent {message!r} before it was ready")
         return message
 
     def begin(self) -> None:
-        """Let commands in: open the links, or start the take."""
+        """Tell the body to open the links, or to start the take."""
         self.send(messages.Begin())
 
     def alive(self) -> bool:
-        """Receive the body's messages; whether it has something to play. Raises ControllerError when it gave up."""
+        """Receive the body's messages; return whether the run is to continue. Raises ControllerError if it failed."""
         while self._pipe.poll():
             self._handle(self._receive(0.0))
         return not self.finished
 
     def send(self, request: messages.Begin | messages.PanelRequest | messages.ToHead) -> None:
-        """Send a request of main or its panel."""
+        """Send a request of the main process or its panel."""
         with suppress(OSError):  # alive() reports a body that has ended
             self._pipe.send(request)
 
     def stop(self) -> None:
-        """Ask the body to stop, wait for its servos to be safe, and keep its report."""
+        """Tell the body to stop, wait until its servos are safe, and keep its report."""
         if not self._process.is_alive() and not self._pipe.poll():
             return
         try:
@@ -126,7 +129,7 @@ class BodyProcess:
             message = self._pipe.recv() if self._pipe.poll(timeout_s) else None
         except (EOFError, OSError):
             self._process.join(1.0)
-            message = messages.Failed(f"the body process ended by itself (exit code {self._process.exitcode})")
+            message = messages.Failed(f"the body process ended unexpectedly (exit code {self._process.exitcode})")
         if message is None:
             raise ControllerError(f"the body did not answer within {timeout_s:g} s")
         if isinstance(message, messages.Failed):
@@ -139,7 +142,7 @@ class BodyProcess:
         if self._process.is_alive():
             self._process.terminate()
             self._process.join(_TERMINATE_TIMEOUT_S)
-        if self._process.is_alive():  # the bus watchdog stops its servos, which is better than a hang
+        if self._process.is_alive():  # the servos' watchdog stops them, which is better than waiting forever
             self._process.kill()
             self._process.join()
 
@@ -153,7 +156,7 @@ class BodyProcess:
                 return
             try:
                 self.stop()
-            except ControllerError:  # the error already being raised is the one to report
+            except ControllerError:  # the error that is already being raised is reported
                 self._end_process()
         finally:
             self._pipe.close()
@@ -162,6 +165,6 @@ class BodyProcess:
 
 
 def deadline(seconds: float | None) -> Callable[[], bool]:
-    """A function that is true until ``seconds`` have passed since its first call; for None it is always true."""
+    """Return a function that is true until ``seconds`` have passed since its first call, or always if None."""
     first_s = cache(time.monotonic)
     return lambda: seconds is None or time.monotonic() - first_s() < seconds

@@ -1,4 +1,4 @@
-"""Sources of the layers besides the links: a take, a voice, a head that is moved by hand."""
+"""Sources that write to the layers, besides the links: a take, a voice, a show, a robot that is moved by hand."""
 
 from __future__ import annotations
 
@@ -25,16 +25,17 @@ from controller.takes.voice import HOP_S, VoiceListener
 if TYPE_CHECKING:
     from _typeshed import WriteableBuffer  # a name of the type checker's only
 
-_CHUNK = 4096
+_CHUNK_BYTES = 4096
 
 
 @dataclass(frozen=True)
 class Voice:
     """Where a voice comes from.
 
-    path : file, named pipe or device with WAV of PCM; ``-`` for standard input.
-    raw_hz : samples per second of signed 16 bit mono PCM without a header; None for WAV.
-    alone : nothing else plays: its end is the end of the run. pipe : carries standard input to the body's process.
+    path : file, named pipe or device with WAV (PCM); ``-`` for standard input.
+    raw_hz : sample rate of signed 16 bit mono PCM without a header; None for WAV.
+    alone : the voice is all there is to play, so its end, also by an error, ends the run.
+    pipe : carries standard input to the control process (body).
     """
 
     path: str
@@ -44,24 +45,24 @@ class Voice:
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name for messages."""
         return "on standard input" if self.path == "-" else self.path
 
     @property
     def reopens(self) -> bool:
-        """Whether it can be opened again after a failure: a named pipe or a device; a file would begin again."""
+        """Whether to open it again after a failure: a named pipe or a device, but not a file, which would restart."""
         return self.path != "-" and not Path(self.path).is_file()
 
     def check(self) -> None:
-        """Raises TakeError where there is nothing at the path, or it may not be read."""
+        """Raise TakeError if there is nothing at the path, or it may not be read."""
         if self.path != "-" and not os.access(self.path, os.R_OK):
             why = os.strerror(errno.EACCES if os.path.exists(self.path) else errno.ENOENT)
             raise TakeError(f"{self.path}: cannot be read: {why}", hint=f"look at: ls -l {self.path}")
 
     def open(self) -> IO[bytes]:
-        """Open the stream; raises TakeError when that fails."""
+        """Open the stream. Raises TakeError: it cannot be opened."""
         if self.pipe is not None:
-            return io.BufferedReader(PipeStream(self.pipe), _CHUNK)
+            return io.BufferedReader(PipeStream(self.pipe), _CHUNK_BYTES)
         if self.path == "-":
             return standard_input().buffer
         try:
@@ -78,11 +79,11 @@ class PipeStream(io.RawIOBase):
         self._pipe, self._left = pipe, b""
 
     def readable(self) -> bool:
-        """Always true."""
+        """Return True."""
         return True
 
     def readinto(self, buffer: WriteableBuffer) -> int:
-        """Wait for some bytes; 0 at the end."""
+        """Wait for bytes, write them to ``buffer`` and return their number; 0 at the end."""
         if not self._left:
             try:
                 self._left = self._pipe.recv_bytes()
@@ -95,7 +96,7 @@ class PipeStream(io.RawIOBase):
 
 
 def standard_input() -> TextIO:
-    """Standard input; raises TakeError where it is closed."""
+    """Return standard input. Raises TakeError: it is closed."""
     if sys.stdin is None:
         hint = "ffmpeg -i voice.mp3 -f wav -acodec pcm_s16le - | omote play -"
         raise TakeError("standard input is closed: no voice can come from it", hint=hint)
@@ -103,17 +104,17 @@ def standard_input() -> TextIO:
 
 
 def pump(pipe: Connection, stream: IO[bytes] | None = None, *, raw: bool = False) -> threading.Thread:
-    """Copy a stream, by default standard input, to a pipe in a thread, and close the pipe at the end.
+    """Copy a stream, by default standard input, to a pipe in a thread; the pipe is closed at the end.
 
-    raw : as bytes without their counts, for a far end that reads the pipe as a file.
+    raw : write plain bytes, for a reader that uses the pipe as a file; otherwise messages of multiprocessing.
 
-    Raises TakeError when standard input is closed.
+    Raises TakeError: standard input is closed.
     """
     source = (stream or standard_input()).fileno()
 
     def run() -> None:
         with suppress(OSError):  # the body has ended, or the stream was closed
-            while data := os.read(source, _CHUNK):
+            while data := os.read(source, _CHUNK_BYTES):
                 if raw:
                     _write_all(pipe.fileno(), data)
                 else:
@@ -131,17 +132,17 @@ def _write_all(file: int, data: bytes) -> None:
 
 
 class Sources:
-    """Everything that writes to the layers before they are mixed; each is a part that fails alone.
+    """The sources of a run, which write to the layers before these are mixed; each is a part that fails separately.
 
     Parameters
     ----------
-    state : the layers. player : plays a take. follow : the measured face of a head that is moved by hand.
+    state : the layers. player : plays a take. follow : the measured face of a robot that is moved by hand.
     voice : a voice to listen to.
-    beside : the take plays beside the links, and its end is not the end of the run.
+    beside : whether the take plays beside links, so that its end does not end the run.
 
     Attributes
     ----------
-    error : what ended the take or the voice that was all there is to play.
+    error : the error of the only source of the run, which ends the run.
     """
 
     def __init__(
@@ -169,14 +170,14 @@ class Sources:
 
     @property
     def finished(self) -> bool:
-        """A take has been played to its end, or a voice that was all there is to play has ended."""
+        """Whether the take, or the voice that is all there is to play, has ended."""
         if self._player is not None:
             return self._player.finished and not self._beside
         return self.voice_ended and self._voice is not None and self._voice.alone
 
     @property
     def playing(self) -> bool:
-        """Whether the face follows any of them."""
+        """Whether the face follows a take, a voice, a show or a robot now."""
         take = self._player is not None and not self._player.finished and not (self._take and self._take.failed)
         voice = self._voice is not None and not self.voice_ended
         show = self._state.shows is not None and self._state.shows.status() != "off"
@@ -184,17 +185,17 @@ class Sources:
 
     @property
     def any(self) -> bool:
-        """Whether there is anything but links: a take, a voice, a show, a head that is moved by hand."""
+        """Whether there is a source besides the links: a take, a voice, a show or a robot that is moved by hand."""
         show = self._state.shows is not None and self._state.shows.name is not None
         return show or any(each is not None for each in (self._player, self._voice, self._follow))
 
     def begin(self) -> None:
-        """Start to listen to the voice."""
+        """Start the thread that listens to the voice."""
         if self._voice is not None:
             threading.Thread(target=self._listen, args=(self._voice,), name="voice", daemon=True).start()
 
     def play(self, player: TakePlayer) -> None:
-        """Play another take from its beginning; the one before ends, and its layer is given back."""
+        """Play another take from its beginning; the one before ends, and its layer is released."""
         before, self._player = self._player, None
         if before is not None:
             self._state.release_layer(before.layer)
@@ -203,13 +204,13 @@ class Sources:
         self._player, self._beside = player, True
 
     def stop(self) -> None:
-        """Stop listening; a thread that waits for a silent stream ends with the process."""
+        """Stop listening; a thread that waits for a silent stream only ends with the process."""
         self._stopping.set()
         if self._voice_listener is not None:
             self._voice_listener.stop()
 
     def tick(self, now_ns: int, begun: bool) -> None:
-        """Write to the layers what is due; takes and shows wait until ``begun``."""
+        """Write to the layers what is due at ``now_ns``; takes and shows only if the run has ``begun``."""
         if begun:
             self._play_take(now_ns)
         if (follow := self._follow) is not None:
@@ -218,19 +219,19 @@ class Sources:
             self._play_show(self._state.shows, self._state.shows.name, now_ns)
 
     def _play_take(self, now_ns: int) -> None:
-        player = self._player  # the panel may begin another
+        player = self._player  # the panel may replace it from another thread
         if player is None or self._take is None or self._take.failed:
             return
         try:
             player.tick(now_ns)
-        except Exception as error:  # noqa: BLE001  the rest goes on
+        except Exception as error:  # noqa: BLE001  a failed take must not end the control loop
             if self._beside:
                 self._take.fail(error, now_ns * 1e-9)
             else:
-                self._fail_alone(self._take, error)
+                self._end_run(self._take, error)
 
-    def _fail_alone(self, part: Part, error: Exception) -> None:
-        """Keep the error of the only thing there is to play, which ends the run."""
+    def _end_run(self, part: Part, error: Exception) -> None:
+        """Keep the error of the only source, which ends the run."""
         part.failed = True
         self.error = self.error or error
 
@@ -243,7 +244,7 @@ class Sources:
                 shows.abandon(now_ns)
 
     def report(self) -> dict[str, object]:
-        """How much of a take was played and of a voice was received (s); None without."""
+        """Return how much of the take was played, and of the voice was received (s); each is None if there is none."""
         take, voice = None, None
         if self._player is not None:
             played = self._player.take
@@ -261,11 +262,11 @@ class Sources:
         """Listen to the voice until it ends; a pipe or device that failed is opened again."""
         pause_s: float | None = 0.0
         while pause_s is not None and not self._stopping.wait(pause_s):
-            pause_s = self._hear(voice)
+            pause_s = self._listen_once(voice)
         self.voice_ended = True
 
-    def _hear(self, voice: Voice) -> float | None:
-        """Listen once; returns after how long (s) to try again, None for never."""
+    def _listen_once(self, voice: Voice) -> float | None:
+        """Listen until the stream ends; return after how long (s) to open it again, or None not to."""
         part = self._voice_part
         assert part is not None
         try:
@@ -274,15 +275,17 @@ class Sources:
                 part.recover()
                 if not self._stopping.is_set():
                     self._voice_listener.run()
-        except Exception as error:  # noqa: BLE001  the rest goes on
+        except Exception as error:  # noqa: BLE001  a failed voice must not end the thread without a report
             if voice.alone:
-                self._fail_alone(part, error)
+                self._end_run(part, error)
                 return None
-            again = part.fail(error, time.monotonic())
-            return again if voice.reopens else None
+            retry_s = part.fail(error, time.monotonic())
+            return retry_s if voice.reopens else None
         return None
 
 
 def show_part(name: str) -> Part:
-    """The part of a show; it begins again with its command."""
-    return Part(f"show {name}", remedy=f"SHOW {name} begins it again", effect="the face gives back what it moved")
+    """Return the part of a show, which the user restarts by its command."""
+    return Part(
+        f"show {name}", remedy=f"SHOW {name} starts it again", effect="the parameters that it moved are released"
+    )

@@ -1,6 +1,6 @@
 """The command line: options, help and exit codes of ``omote``.
 
-In: words. Out: calls of controller.tools. Imports any room left of it.
+In: command-line arguments. Out: calls of controller.tools. Imports any other package of omote.
 """
 
 import sys
@@ -9,9 +9,9 @@ __all__ = ["main"]
 
 
 def main() -> None:
-    """Entry point of the ``omote`` command: Ctrl-C ends it quietly from here on, also while its modules load."""
+    """Run the ``omote`` command; Ctrl-C ends it without a traceback, also while its modules are imported."""
     try:
-        from controller.cli import app  # start-up: it loads modules of Python that an interrupt could hit
+        from controller.cli import app  # imported lazily: it loads modules of Python that an interrupt could hit
 
         app.main()
     except KeyboardInterrupt:

@@ -1,4 +1,4 @@
-"""``omote bench``: measures heads, the surface engine and the servo bus, and prints tables."""
+"""``omote bench``: measures heads, the surface engine or a servo bus, and prints tables."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ from surface.base.extras import require
 if TYPE_CHECKING:
     from surface.bench.bench import Measure
 
-PICTURES = (".png", ".svg", ".jpg", ".webp")
-MOST_HEADS = 10_000
-_KEPT = {None: "", True: "kept", False: "missed"}
+PICTURE_SUFFIXES = (".png", ".svg", ".jpg", ".webp")
+MAX_HEADS = 10_000
+_VERDICTS = {None: "", True: "met", False: "missed"}
 
 
 class Subject(StrEnum):
-    """Things that can be measured."""
+    """What ``omote bench`` can measure."""
 
     head = "head"
     surface = "surface"
@@ -38,48 +38,66 @@ class Subject(StrEnum):
     bus = "bus"
 
 
-_NEEDS = {Subject.surface: ("scipy",)}
-"""What else is compared there."""
+_PACKAGES = {Subject.surface: ("scipy",)}
+"""Optional packages that a subject needs, because it compares omote with them."""
 
 
 def bench(
-    what: Annotated[
+    subject: Annotated[
         Subject,
-        typer.Argument(help="A head, the engine at its limit, quad trees, drift, a crowd, or a servo bus."),
+        typer.Argument(
+            help="One head; the surface engine on many vertices; the savings of quad trees; the rounding error that "
+            "updates accumulate (drift); a crowd of heads; or a servo bus."
+        ),
     ] = Subject.head,
     head: Annotated[
-        str, typer.Option(help="Head: a name from configs/heads or a folder.", autocompletion=names_of("heads"))
+        str,
+        typer.Option(
+            help="Head: a name from configs/heads or a folder (all but bus).", autocompletion=names_of("heads")
+        ),
     ] = "ict",
-    seconds: Annotated[float, typer.Option(help="Time for each measurement.", min=0.01)] = 0.3,
+    seconds: Annotated[
+        float, typer.Option(help="Time for each measurement (not for quadtree and drift).", min=0.01)
+    ] = 0.3,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="Picture of the meshes (quadtree only).")] = None,
     large: Annotated[
-        bool, typer.Option("--large", help="Also a million vertices; for quadtree, ten surfaces.")
+        bool,
+        typer.Option("--large", help="surface: also ten times --vertices; quadtree: also ten surfaces; else ignored."),
     ] = False,
     growth: Annotated[
-        Path | None, typer.Option(help="Also growth with size, drawn as this SVG (surface only).")
+        Path | None,
+        typer.Option(help="Also measure how time and memory grow with size; picture to write (surface only)."),
     ] = None,
     vertices: Annotated[
         int,
-        typer.Option(help="Number of vertices, about; --large takes ten times that (surface only).", min=1_000),
+        typer.Option(help="Approximate number of vertices (surface; ignored elsewhere).", min=1_000),
     ] = 100_000,
-    level: Annotated[int, typer.Option(help="Levels of the uniform mesh (quadtree only).", min=0, max=9)] = 7,
-    updates: Annotated[int, typer.Option(help="Number of updates (drift only).", min=1)] = 1_000_000,
-    heads: Annotated[int, typer.Option(help="Number of heads (crowd only).", min=1, max=MOST_HEADS)] = 64,
-    face: Annotated[bool, typer.Option("--face", help="Also while the face is drawn (bus only).")] = False,
+    level: Annotated[
+        int, typer.Option(help="Subdivision levels of the uniform mesh (quadtree; ignored elsewhere).", min=0, max=9)
+    ] = 7,
+    updates: Annotated[int, typer.Option(help="Number of updates (drift; ignored elsewhere).", min=1)] = 1_000_000,
+    heads: Annotated[int, typer.Option(help="Number of heads (crowd; ignored elsewhere).", min=1, max=MAX_HEADS)] = 64,
+    face: Annotated[bool, typer.Option("--face", help="Also measure while the face is drawn (bus only).")] = False,
     real: Annotated[
         str, typer.Option("--real", help="Port of a real bus, which is only read (bus only).", metavar="PORT")
     ] = "",
-    baud: Annotated[int, typer.Option(help="Baud rate, with --real and --buses.", min=300)] = 1_000_000,
-    buses: Annotated[int, typer.Option(help="Several simulated buses at once (bus only).", min=0, max=16)] = 0,
-    servos: Annotated[int, typer.Option(help="Servos on each of --buses.", min=1, max=64)] = 12,
+    baud: Annotated[
+        int, typer.Option(help="Baud rate of --real or --buses; ignored without them.", min=300)
+    ] = 1_000_000,
+    buses: Annotated[
+        int, typer.Option(help="Measure this many simulated buses at the same time (bus only).", min=0, max=16)
+    ] = 0,
+    servos: Annotated[int, typer.Option(help="Servos on each of --buses; ignored without it.", min=1, max=64)] = 12,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON (bus only).")] = False,
 ) -> None:
-    """Measure the engine (full evaluation, incremental updates), other libraries, or a servo bus, in one run.
+    """Measure the surface engine (full evaluation, incremental updates), other libraries, or a servo bus.
+
+    An option that is marked "only" is refused for another subject.
 
     Example: omote bench surface --large --growth growth.svg
     """
-    _refuse_what_belongs_elsewhere(
-        what,
+    _reject_inapplicable_options(
+        subject,
         {
             "--out": (out is not None, Subject.quadtree), "--growth": (growth is not None, Subject.surface),
             "--face": (face, Subject.bus), "--real": (bool(real), Subject.bus), "--json": (as_json, Subject.bus),
@@ -88,78 +106,80 @@ def bench(
     )  # fmt: skip
     if real and buses:
         raise ControllerError("--real measures one bus, --buses simulates several", hint="leave out one of them")
-    require(f"omote bench {what}", *_NEEDS.get(what, ()), *(["moderngl"] if face else []), *(["PIL"] if out else []))
-    if what is Subject.bus:
+    packages = [*_PACKAGES.get(subject, ()), *(["moderngl"] if face else []), *(["PIL"] if out else [])]
+    require(f"omote bench {subject}", *packages)
+    if subject is Subject.bus:
         _bench_bus(seconds, face, as_json, real, baud, buses, servos)
         return
-    from controller.tools import bench_surface as benches  # start-up: --help does without it
+    from controller.tools import bench_surface as benches  # imported lazily: not needed for --help
 
     columns = SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()
-    picture = out if what is Subject.quadtree else growth if what is Subject.surface else None
-    if picture is not None and picture.suffix.lower() not in PICTURES:
-        raise ControllerError(f"{picture}: no picture is named so", hint=f"let it end in {' or '.join(PICTURES)}")
-    drawing = nullcontext() if picture is None else replacing(picture)  # refused here if it cannot be written
+    picture = out if subject is Subject.quadtree else growth if subject is Subject.surface else None
+    if picture is not None and picture.suffix.lower() not in PICTURE_SUFFIXES:
+        known = " or ".join(PICTURE_SUFFIXES)
+        raise ControllerError(f"{picture}: unknown suffix of a picture", hint=f"let it end in {known}")
+    drawing = nullcontext() if picture is None else replacing(picture)  # a path that cannot be written fails here
     with drawing as file, Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("measuring", total=None)
 
         def log(text: str) -> None:
             progress.reset(task, total=None, description=f"measuring {text}")
 
-        def advance(stage: str, part: float) -> None:
-            progress.update(task, description=f"building: {stage}", total=1.0, completed=part)
+        def advance(step: str, fraction: float) -> None:
+            progress.update(task, description=f"building: {step}", total=1.0, completed=fraction)
 
         simple = {
             Subject.head: lambda: benches.bench_head(head, seconds, log),
             Subject.crowd: lambda: benches.bench_crowd(head, heads, seconds, log),
             Subject.drift: lambda: benches.bench_drift(head, updates, log),
         }
-        if what in simple:
-            tables = simple[what]()
-        elif what is Subject.quadtree:
+        if subject in simple:
+            tables = simple[subject]()
+        elif subject is Subject.quadtree:
             tables = benches.bench_savings(head, log, level) if large else []
             tables += benches.bench_quadtree(head, log, level, file)
         else:
             tables = _bench_surface(head, seconds, vertices, large, file, log, advance)
     for title, measures in tables:
-        table = Table("measure", "ms", "ratio", "to", "reach", "", title=title, title_justify="left")
+        table = Table("measure", "ms", "ratio", "ratio to", "bound", "", title=title, title_justify="left")
         for row in measures:
             took = f"{row.milliseconds:.3f}" if row.milliseconds else ""
-            table.add_row(row.name, took, _ratio(row), row.against, row.reach, _KEPT[row.kept])
+            table.add_row(row.name, took, _format_ratio(row), row.against, row.reach, _VERDICTS[row.kept])
         show_table(table)
 
 
-def _refuse_what_belongs_elsewhere(what: Subject, given: Mapping[str, tuple[bool, Subject]]) -> None:
-    """Raise ControllerError for an option that was given and belongs to another subject."""
-    for option, (is_given, subject) in given.items():
-        if is_given and what is not subject:
-            raise ControllerError(f"{option} is for {subject}, not for {what}", hint=f"omote bench {subject} {option}")
+def _reject_inapplicable_options(subject: Subject, given: Mapping[str, tuple[bool, Subject]]) -> None:
+    """Raise ControllerError for an option that was given and applies only to another subject."""
+    for option, (is_given, owner) in given.items():
+        if is_given and subject is not owner:
+            raise ControllerError(f"{option} is for {owner}, not for {subject}", hint=f"omote bench {owner} {option}")
 
 
 def _bench_surface(
     head: str, seconds: float, vertices: int, large: bool, growth: Path | None, log: Callable[[str], None],
     advance: Callable[[str, float], None],
 ) -> list[tuple[str, list[Measure]]]:  # fmt: skip
-    """The engine at its limit; also far more vertices if ``large``, and growth with size if that file is given."""
-    from controller.tools import bench_surface as benches  # start-up: --help does without it
+    """Return the tables of the engine; if ``large``, also for ten times the vertices; if ``growth``, also by size."""
+    from controller.tools import bench_surface as benches  # imported lazily: not needed for --help
 
     tables = benches.bench_surface(seconds, log, vertices, head)
     tables += benches.bench_large(seconds, log, advance, vertices) if large else []
     return tables + (benches.bench_growth(seconds, log, growth, vertices) if growth is not None else [])
 
 
-def _ratio(row: Measure) -> str:
-    """A ratio as text, with its interval where there is one."""
+def _format_ratio(row: Measure) -> str:
+    """Return a ratio as text, with its confidence interval if it has one."""
     interval = "" if row.interval is None else f" ({row.interval[0]:.2f} to {row.interval[1]:.2f})"
     return "" if row.ratio is None else f"{row.ratio:.2f}{interval}"
 
 
 def _bench_bus(seconds: float, face: bool, as_json: bool, real: str, baud: int, buses: int, servos: int) -> None:
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.hardware.bench_many import bench_many
     from controller.hardware.bench_real_bus import bench_real_bus
     from controller.tools.bench_bus import bench_bus, to_json
 
-    errors = Console(stderr=True)  # lines and no moving bar: drawing one would disturb the measurements
+    errors = Console(stderr=True)  # prints lines, because drawing a progress bar would disturb the measurements
 
     def log(text: str) -> None:
         errors.print(f"measuring {text}", soft_wrap=True)
@@ -175,7 +195,7 @@ def _bench_bus(seconds: float, face: bool, as_json: bool, real: str, baud: int, 
         console.out(to_json(tables), highlight=False)
         return
     for title, figures in tables:
-        table = Table("measure", "", "", "reach", "", title=title, title_justify="left")
+        table = Table("measure", "", "", "bound", "", title=title, title_justify="left")
         for row in figures:
-            table.add_row(row.name, f"{row.value:.2f}", row.unit, row.reach, _KEPT[row.kept])
+            table.add_row(row.name, f"{row.value:.2f}", row.unit, row.reach, _VERDICTS[row.kept])
         show_table(table)

@@ -17,7 +17,7 @@ from controller.cli.console import console, show_table
 Port = Annotated[str, typer.Argument(help="Serial port; omote ports lists them.")]
 Protocol = Annotated[
     int | None,
-    typer.Option(min=1, max=2, help="2 (Dynamixel X, XL-320) or 1 (AX, MX, Feetech). Default: both are tried."),
+    typer.Option(min=1, max=2, help="2 (Dynamixel X, XL-320) or 1 (AX, MX, Feetech). Default: try both."),
 ]
 
 
@@ -26,7 +26,7 @@ def ports() -> None:
 
     Example: omote ports
     """
-    from drivers.port.ports import list_ports  # start-up: --help does without it
+    from drivers.port.ports import list_ports  # imported lazily: not needed for --help
 
     found = list_ports()
     if not found:
@@ -45,7 +45,7 @@ def ports() -> None:
         if record.hint:
             console.print(f"{record.device}: {record.hint}", soft_wrap=True)
         if record.lasting_hint:
-            console.print(f"{record.device}, after every start, too: {record.lasting_hint}", soft_wrap=True)
+            console.print(f"{record.device}, also after every restart: {record.lasting_hint}", soft_wrap=True)
 
 
 def scan(
@@ -58,11 +58,11 @@ def scan(
         typer.Option("--protocol", min=1, max=2, help="2 (Dynamixel X, XL-320) or 1 (AX, MX, Feetech). Default: both."),
     ] = None,
 ) -> None:
-    """Look for Dynamixel and Feetech servos on a port, at all rates and in both protocols; nothing moves.
+    """Find the Dynamixel and Feetech servos on a port, at all baud rates and in both protocols; nothing moves.
 
     Example: omote scan /dev/ttyUSB0 --baud 1000000
     """
-    from controller.tools.scan import STEPS, plan_scan, scan_port  # start-up: --help does without it
+    from controller.tools.scan import STEPS, plan_scan, scan_port  # imported lazily: not needed for --help
 
     plan = plan_scan(baud, protocol or (2, 1))
     table = Table("baud", "prot.", "id", "model", "fw", "supply", "temp.", "error", "torque")
@@ -82,48 +82,48 @@ def scan(
 
 def set_id(
     port: Port,
-    old: Annotated[int, typer.Argument(min=0, max=252, help="Id that the servo has.")],
+    old: Annotated[int, typer.Argument(min=0, max=252, help="Present id of the servo.")],
     new: Annotated[int, typer.Argument(min=0, max=252, help="New id of the servo.")],
     baud: Annotated[int, typer.Option(help="Baud rate of the servo; omote scan finds it.")] = 1_000_000,
     protocol: Protocol = None,
     release: Annotated[
-        bool, typer.Option("--release", help="Switch its motor off first; support what it holds.")
+        bool, typer.Option("--release", help="Disable its torque first; support the part that it holds.")
     ] = False,
 ) -> None:
     """Change the id of a servo. Checks that no other servo has the new id, and reads the change back.
 
     Example: omote set-id /dev/ttyUSB0 1 12
     """
-    from drivers.tools.set_id import set_id as change  # start-up: --help does without it
+    from drivers.tools.set_id import set_id as change  # imported lazily: not needed for --help
 
     info = change(port, baud, protocol, old, new, release=release)
     console.print(f"{info.model}: permanent id {old} -> {info.id}, written and read back on {port}", soft_wrap=True)
 
 
 def monitor(
-    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them. None with --replay.")] = "",
+    port: Annotated[str, typer.Argument(help="Serial port; omote ports lists them. Omit it with --replay.")] = "",
     baud: Annotated[int, typer.Option(help="Baud rate of the bus; omote scan finds it.")] = 1_000_000,
     protocol: Protocol = None,
     listen: Annotated[
-        bool, typer.Option("--listen", help="Only listen: for a second adapter on a wire that another program drives.")
+        bool, typer.Option("--listen", help="Send nothing: for a second adapter on a bus that another program drives.")
     ] = False,
     model: Annotated[
-        str, typer.Option(help="With --listen: the servos' model, so that registers have names.", autocompletion=models)
+        str, typer.Option(help="With --listen: model of the servos, which names the registers.", autocompletion=models)
     ] = "",
-    rate: Annotated[float, typer.Option(min=0.1, max=200, help="How often the servos are read, per second.")] = 10.0,
+    rate: Annotated[float, typer.Option(min=0.1, max=200, help="Reads of the servos per second.")] = 10.0,
     seconds: Annotated[float | None, typer.Option("--seconds", "-s", min=0.1, help="Stop after this long.")] = None,
     record: Annotated[
         Path | None, typer.Option("--record", help="Write the traffic to this file: .pcapng, else a text log.")
     ] = None,
     replay: Annotated[Path | None, typer.Option("--replay", help="Decode a recorded file instead of a port.")] = None,
 ) -> None:
-    """Show the servos of a bus and the decoded packets that pass, live; nothing is switched on or moved.
+    """Show the servos of a bus and its decoded packets, live; no torque is enabled and nothing moves.
 
-    Where the output is no terminal, the packets are printed line by line.
+    If the output is not a terminal, the packets are printed line by line.
 
     Example: omote monitor /dev/ttyUSB0 --baud 57600
     """
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.signals import stop_flag
     from controller.body.process import deadline
     from controller.tools.monitor import listen_to_bus, poll_servos, replay_traffic
@@ -151,32 +151,34 @@ def calibrate(
     ],
     name: Annotated[str, typer.Option("--name", "-n", help="Name of the calibration.")] = "default",
     out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="File to write; default: beside the robot file.")
+        Path | None, typer.Option("--out", "-o", help="File to write. Default: beside the robot file.")
     ] = None,
     channel: Annotated[
         list[str] | None, typer.Option("--channel", "-c", help="Only this channel; may be repeated.")
     ] = None,
-    margin: Annotated[float, typer.Option(min=0, max=20, help="Degrees kept away from the captured ends.")] = 1.0,
+    margin: Annotated[
+        float, typer.Option(min=0, max=20, help="Degrees by which the captured ends are moved inwards.")
+    ] = 1.0,
     find_stops: Annotated[
-        bool, typer.Option("--find-stops", help="Find the end stops by current, one servo after the other, and report.")
+        bool, typer.Option("--find-stops", help="Find the end stops by motor current, servo by servo; only reports.")
     ] = False,
     torque: Annotated[
-        float, typer.Option(min=0.01, max=0.5, help="Share of its full torque that a servo looks for stops with.")
+        float, typer.Option(min=0.01, max=0.5, help="With --find-stops: fraction of the full torque to push with.")
     ] = 0.15,
     yes: Annotated[bool, typer.Option("--yes", help="With --find-stops: do not ask before servos move.")] = False,
     pairs: Annotated[
         Path | None,
-        typer.Option("--pairs", help="Fit mixes to a table of parameters and angles instead; nothing moves."),
+        typer.Option("--pairs", help="Fit each channel's mix to this table of parameters and angles; nothing moves."),
     ] = None,
 ) -> None:
-    """Capture the neutral and end positions of each servo of a head, by hand or by keys, and save them by name.
+    """Capture the neutral and end positions of each servo of a robot, by hand or by keys, and save them by name.
 
-    The motors are off until h is pressed: support what they hold. A file that exists is only replaced after a question.
-    With --find-stops each servo feels for both of its end stops by itself, after a question.
+    The torque is off until h is pressed: support what the servos hold. An existing file is only replaced after a
+    question. With --find-stops each servo drives to both of its end stops, after a question.
 
     Example: omote calibrate head24 --name desk
     """
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS, did_you_mean
     from controller.robot.calibration import calibration_path
     from controller.robot.robot import load_robot
@@ -193,21 +195,21 @@ def calibrate(
             raise ConfigError(f"robot {settings.name} has no channel called {word!r}{did_you_mean(word, known)}")
     channels = [each for each in settings.channels if not channel or each.name in channel]
     if find_stops:
-        from controller.cli.hardware import look_for_stops  # start-up: --help does without it
+        from controller.cli import hardware  # imported lazily: not needed for --help
 
-        look_for_stops(settings, channels, torque, margin, yes)
+        hardware.find_stops(settings, channels, torque, margin, yes)
         return
     target = out or calibration_path(name, path)
     if run_calibration(settings, channels, name, target, margin, console):
         console.print(f"wrote {target}", soft_wrap=True)
         console.print(
-            f'The robot file takes it with: calibration = "{name if out is None else target}"', soft_wrap=True
+            f'To use it, write in the robot file: calibration = "{name if out is None else target}"', soft_wrap=True
         )
 
 
 def _fit_pairs(path: Path, pairs: Path, target: Path) -> None:
-    """Fit the channels of the robot in ``path`` to pairs, write them to ``target`` and say how well they fit."""
-    # start-up: --help does without any of these
+    """Fit the channels of the robot in ``path`` to pairs, write them to ``target`` and print how well they fit."""
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.robot.pairs.files import fit_channels, read_pairs, report_rows, write_robot
     from controller.robot.robot import load_robot, robot_parameters

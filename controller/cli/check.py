@@ -1,4 +1,4 @@
-"""``omote check`` and ``plugins``: check any file omote reads; list every kind of bus, link, take and export."""
+"""``omote check`` and ``plugins``: check any file that omote reads; list every plug-in."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from controller.cli.run import vocabulary_files
 
 
 def checkable(incomplete: str) -> list[str]:
-    """Names that can be checked."""
+    """Return the names of stages, robots and heads that begin with ``incomplete``, for the shell's completion."""
     return [name for kind in ("stages", "robots", "heads") for name in names_of(kind)(incomplete)]
 
 
@@ -23,36 +23,37 @@ def check(
     file: Annotated[
         str,
         typer.Argument(
-            help="A stage, robot, calibration, head, vocabulary, layers, life, script, take, recording, group or "
-            "surface: path or name.",
+            help="File of a stage, robot, calibration, head, vocabulary, layers, life (idle motion), script, take, "
+            "recording, group or surface: path or name.",
             autocompletion=checkable,
         ),
     ],
     vocabulary: Vocabularies = None,
 ) -> None:
-    """Check any file omote reads, and all it refers to, without running it; lists every fault with its place.
+    """Check any file that omote reads, and all files it refers to, without running it; list every fault with its place.
 
     Example: omote check configs/robots/head24.toml
     """
-    from controller.tools.check import check_anything  # start-up: --help does without it
+    from controller.tools.check import check_anything  # imported lazily: not needed for --help
 
     for line in check_anything(file, vocabulary_files(vocabulary)):
         console.print(escape(line), soft_wrap=True)
 
 
 def plugins() -> None:
-    """List every kind of bus, link, take and export: what omote brings, and what other packages add.
+    """List every kind of bus, linkage, link, format, take and export, of omote and of other packages.
 
     Example: omote plugins
     """
-    from controller.tools.plugins import listed  # start-up: --help does without it
+    from controller.tools.plugins import list_plugins  # imported lazily: not needed for --help
 
     table, broken = Table(box=None, pad_edge=False), []
-    for head in ("sort", "kind", "what it is", "from"):
-        table.add_column(head, overflow="fold")
-    for each in listed():
-        table.add_row(each.sort, each.kind, escape(each.title) if each.works else "[red]cannot be loaded", each.package)
-        broken += [] if each.works else [each]
+    for header in ("registry", "kind", "description", "package"):
+        table.add_column(header, overflow="fold")
+    for each in list_plugins():
+        description = "[red]cannot be loaded" if each.fault else escape(each.title)
+        table.add_row(each.registry, each.kind, description, each.package)
+        broken += [each] if each.fault else []
     show_table(table)
     for each in broken:
-        console.print(f"{escape(each.title)}\n[bold]try:[/] {escape(each.hint)}", soft_wrap=True)
+        console.print(f"{escape(each.fault)}\n[bold]try:[/] {escape(each.hint)}", soft_wrap=True)

@@ -1,6 +1,7 @@
-"""Names that the shell completes: of configuration files, parameters, expressions, identities and models.
+"""Completes names in the shell: of configuration files, parameters, expressions, identities and servo models.
 
-Each function takes the beginning of a word. None raises: a shell would show the error in the middle of what is typed.
+Each completion takes the beginning of a word and never raises, because the shell would print the error into the line
+that the user is typing.
 """
 
 from __future__ import annotations
@@ -10,7 +11,9 @@ from collections.abc import Callable, Iterable
 Complete = Callable[[str], list[str]]
 
 
-def _quiet(names: Callable[[], Iterable[str]]) -> Complete:
+def _completion_from(names: Callable[[], Iterable[str]]) -> Complete:
+    """Return a completion of ``names``; if they cannot be read, it completes nothing."""
+
     def complete(incomplete: str) -> list[str]:
         try:
             return sorted(name for name in names() if name.startswith(incomplete))
@@ -21,24 +24,24 @@ def _quiet(names: Callable[[], Iterable[str]]) -> Complete:
 
 
 def names_of(kind: str) -> Complete:
-    """Names of a folder of configs; what else may stand there is a path, which the shell itself completes."""
+    """Return a completion of the names in the folder ``kind`` of configs; the shell itself completes paths."""
 
     def names() -> Iterable[str]:
-        from controller.base.paths import config_dir  # start-up: only completion needs it
+        from controller.base.paths import config_dir  # imported lazily: only completion needs it
 
         return (path.stem for path in (config_dir() / kind).iterdir() if not path.name.startswith("."))
 
-    return _quiet(names)
+    return _completion_from(names)
 
 
 def _settings() -> Iterable[str]:
-    from controller.base.parameters import PARAMETERS  # start-up: only completion needs it
+    from controller.base.parameters import PARAMETERS  # imported lazily: only completion needs it
 
     return (f"{name}=" for name in PARAMETERS.names)
 
 
 def _expressions() -> Iterable[str]:
-    # start-up: only completion needs them
+    # imported lazily: only completion needs them
     from controller.base.parameters import PARAMETERS
     from controller.vocabulary.vocabulary import Vocabulary
 
@@ -46,7 +49,7 @@ def _expressions() -> Iterable[str]:
 
 
 def _identities() -> Iterable[str]:
-    # start-up: only completion needs them
+    # imported lazily: only completion needs them
     from controller.base.paths import find_config
     from surface.head.model.identity import load_identities
 
@@ -54,9 +57,9 @@ def _identities() -> Iterable[str]:
 
 
 def _models() -> Iterable[str]:
-    from drivers.tables.tables import known_models  # start-up: only completion needs it
+    from drivers.tables.tables import known_models  # imported lazily: only completion needs it
 
     return known_models().values()
 
 
-settings, expressions, identities, models = map(_quiet, (_settings, _expressions, _identities, _models))
+settings, expressions, identities, models = map(_completion_from, (_settings, _expressions, _identities, _models))

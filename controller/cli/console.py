@@ -8,12 +8,13 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from controller.tools.tables import fitted
+from controller.tools.tables import fit_table
 
 
 class Screen(Console):
-    """Standard output. rich takes ``FORCE_COLOR`` for a terminal and would draw its progress bars into files and pipes;
-    here it means colours only.
+    """Standard output, on which ``FORCE_COLOR`` forces colours only.
+
+    rich itself would treat the output as a terminal and draw its progress bars into files and pipes.
     """
 
     def __init__(self) -> None:
@@ -33,11 +34,11 @@ console = Screen()
 
 
 def show_table(table: Table, console: Console = console) -> None:
-    """Print a table: in its natural width into a file or a pipe, with cells broken between words on a terminal.
+    """Print a table: in its natural width to a file or a pipe, wrapped between words on a terminal.
 
-    Where even the longest words of a row do not fit side by side, every row is a paragraph instead.
+    If the longest words of all columns do not fit side by side, every row is printed as a paragraph.
     """
     # only a terminal, or the variable COLUMNS, limits the width
     limit = console.width if console.is_terminal or os.environ.get("COLUMNS") else None
-    for piece in fitted(table, console, limit):
+    for piece in fit_table(table, console, limit):
         console.print(piece, crop=False, soft_wrap=isinstance(piece, str))

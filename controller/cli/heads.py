@@ -1,4 +1,4 @@
-"""``omote render``, ``fit`` and ``export``: pictures of heads, heads from meshes, heads for other programs."""
+"""``omote render``, ``fit`` and ``export``: draw a head, make a head from a mesh, write a head for other programs."""
 
 from __future__ import annotations
 
@@ -19,30 +19,32 @@ from controller.cli.film import FilmRate, FilmTake, Sound, check_film, render_fi
 from surface.base.extras import require
 
 if TYPE_CHECKING:
-    from controller.base.parameters import Parameters  # start-up: --help does without it
-    from controller.tools.surface_fit import SurfaceFit  # start-up: --help does without it
-    from surface.export.animation import Animation  # start-up: --help does without it
-    from surface.fit.points.report import FitReport  # start-up: --help does without it
-    from surface.fit.source.load import LoadOptions  # start-up: --help does without it
-    from surface.head import Head  # start-up: --help does without it
+    from controller.base.parameters import Parameters  # imported lazily: not needed for --help
+    from controller.tools.surface_fit import SurfaceFit  # imported lazily: not needed for --help
+    from surface.export.animation import Animation  # imported lazily: not needed for --help
+    from surface.fit.points.report import FitReport  # imported lazily: not needed for --help
+    from surface.fit.source.load import LoadOptions  # imported lazily: not needed for --help
+    from surface.head import Head  # imported lazily: not needed for --help
 
-_NO_SHADE = "no OpenGL here: the head has no baked shade; fit it again where there is, for a better picture"
-_NO_SHAPES = "the mesh has no shapes: --expressions-from ict gives it those of another head"
+_NO_SHADE = "no OpenGL here: the head has no baked shading; for a better picture, fit it on a machine with OpenGL"
+_NO_SHAPES = "the mesh has no shapes: --expressions-from ict transfers the expressions of another head to it"
 Identity = Annotated[
     str | None,
     typer.Option(
-        metavar="NAME=AMOUNT,...", help="Variations of the head to mix in, each 0 to 1.", autocompletion=identities
+        metavar="NAME=AMOUNT,...",
+        help="Variations of the head's shape to mix in, each 0 to 1.",
+        autocompletion=identities,
     ),
 ]
 Vocabularies = Annotated[
     list[str] | None,
-    typer.Option("--vocabulary", metavar="FILE", help="Expressions and parameters of your own; may be repeated."),
+    typer.Option("--vocabulary", metavar="FILE", help="File with your own expressions or parameters; may be repeated."),
 ]
 Person = Annotated[
     str | None,
     typer.Option(
-        metavar="NAME[=SHARE,...]",
-        help="Whom the face shows: configs/persons or a file.",
+        metavar="NAME[=WEIGHT,...]",
+        help="Person (skin, eyes, hair, identity) to show: a name from configs/persons or a file; or a mixture.",
         autocompletion=names_of("persons"),
     ),
 ]
@@ -56,7 +58,7 @@ Setting = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated.", autocompletion=setting_names),
 ]
-MOST_DRAWN = 1024
+MAX_CROWD = 1024
 HEAD = "Head: a name from configs/heads or a folder."
 
 
@@ -69,7 +71,7 @@ def render(
         str | None,
         typer.Option(help="front, three-quarter, three-quarter-right, profile or profile-right.", show_default="front"),
     ] = None,
-    quality: Annotated[str | None, typer.Option(help="full or fast; auto is full.", show_default="full")] = None,
+    quality: Annotated[str | None, typer.Option(help="full or fast; auto means full.", show_default="full")] = None,
     theme: Annotated[str | None, typer.Option(help="skin, mask or robot.", show_default="skin")] = None,
     background: Annotated[
         str | None, typer.Option(metavar="#RRGGBB[,#RRGGBB]", help="One colour, or a gradient from top to bottom.")
@@ -83,14 +85,14 @@ def render(
     stage: Annotated[
         str | None,
         typer.Option(
-            help="Stage that gives head, groups, expressions and look unless other options do.",
+            help="Stage file that sets the head, groups, expressions and picture, unless other options do.",
             autocompletion=names_of("stages"),
         ),
     ] = None,
     vocabulary: Vocabularies = None,
     group: Annotated[
         list[str] | None,
-        typer.Option(metavar="FILE[=AMOUNT]", help="Group added to the head, by -1 to 1; may be repeated."),
+        typer.Option(metavar="FILE[=AMOUNT]", help="Group of control points to move, amount -1 to 1; may be repeated."),
     ] = None,
     sheet: Annotated[
         bool, typer.Option("--sheet", help="Draw every parameter at its limit and every named expression.")
@@ -98,7 +100,7 @@ def render(
     crowd: Annotated[
         int | None,
         typer.Option(
-            metavar="HEADS", min=1, max=MOST_DRAWN, help="Draw so many heads on one sheet, each with a face of its own."
+            metavar="HEADS", min=1, max=MAX_CROWD, help="Draw this number of heads, each with another expression."
         ),
     ] = None,
     take: FilmTake = None,
@@ -112,9 +114,10 @@ def render(
     """
     check_film(take, sound, rate_hz, {"--sheet": sheet, "--crowd": crowd})
     require("a picture", "moderngl", "PIL")
-    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still  # start-up: --help does without it
-    from controller.stage.persons import parse_person  # start-up: --help does without it
-    from controller.stage.picture import parse_background  # start-up: --help does without it
+    # imported lazily: not needed for --help
+    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still
+    from controller.stage.persons import parse_person
+    from controller.stage.picture import parse_background
 
     look = {
         "camera": camera, "quality": quality, "theme": theme, "background": parse_background(background),
@@ -125,7 +128,7 @@ def render(
         stage=stage, vocabularies=vocabulary or (), groups=group or (),
     )  # fmt: skip
     if sheet and crowd:
-        raise ConfigError("--sheet and --crowd are two pictures", hint="leave out one of them")
+        raise ConfigError("--sheet and --crowd draw different pictures", hint="leave out one of them")
     if take is not None:
         render_film(still, out, take, sound, rate_hz)
         return
@@ -142,17 +145,20 @@ def fit(
     mesh: Annotated[
         Path,
         typer.Argument(
-            help="Mesh with UVs and shapes: .glb, .gltf, .vrm, .obj, a folder of .obj files, or .npz; "
-            "without them, also .ply, .stl and .off, with --expressions-from. "
-            "Or surfaces, which stay exactly as they are: .3dm, .tsm, .xml (G+Smo), .json."
+            help="Mesh with UVs and shapes: .glb, .gltf, .vrm, .obj, a folder of .obj files, or .npz. "
+            "With --expressions-from, also a mesh without them, also .ply, .stl and .off. "
+            "Or spline surfaces, which are kept exactly: .3dm, .tsm, .xml (G+Smo), .json."
         ),
     ],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder of the head to write.")],
-    name: Annotated[str | None, typer.Option(help="Name of the head; the folder's without it.")] = None,
-    shapes: Annotated[Path | None, typer.Option(help="Folder with one .obj a shape, for an .obj mesh.")] = None,
-    names: Annotated[Path | None, typer.Option(help="TOML table of shape names: [names] theirs = ARKit's.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name of the head. Default: the folder's name.")] = None,
+    shapes: Annotated[Path | None, typer.Option(help="Folder with one .obj per shape, for an .obj mesh.")] = None,
+    names: Annotated[
+        Path | None, typer.Option(help="TOML file with a table [names]: shape name of the mesh = ARKit's name.")
+    ] = None,
     unit: Annotated[
-        str | None, typer.Option(help="mm, cm, dm, m, in or ft; default: as the format says, else by the eyes.")
+        str | None,
+        typer.Option(help="mm, cm, dm, m, in or ft. Default: the format's unit, else estimated from the eyes."),
     ] = None,
     up: Annotated[str | None, typer.Option(help="Axis that points up: x, y, z, -x, -y or -z.")] = None,
     forward: Annotated[str | None, typer.Option(help="Axis that the face looks along.")] = None,
@@ -167,32 +173,32 @@ def fit(
         typer.Option(metavar="FILE", help="Groups of a surface's control points (.toml, .json); may be repeated."),
     ] = None,
     strict: Annotated[
-        bool, typer.Option("--strict", help="Refuse a surface file of which anything cannot be read.")
+        bool, typer.Option("--strict", help="Refuse a surface file if any part of it cannot be read.")
     ] = False,
     identities: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Identity modes of the mesh (.npz): adds named variations.")
+        Path | None, typer.Option(metavar="FILE", help="Identity modes of the mesh (.npz) to add as named variations.")
     ] = None,
     keep: Annotated[
-        bool, typer.Option("--keep", help="Keep the head that is there: measure it again, and add --identities.")
+        bool, typer.Option("--keep", help="Keep the existing head: only measure it again, and add --identities.")
     ] = False,
     expressions_from: Annotated[
         str | None,
         typer.Option(
             "--expressions-from",
             metavar="HEAD",
-            help="Head whose expressions a mesh without shapes, or surfaces, get: ict.",
+            help="Head, as ict, whose expressions are transferred to a mesh without shapes, or to surfaces.",
             autocompletion=names_of("heads"),
         ),
     ] = None,
     landmarks: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Places picked on the mesh (.toml, .json, .pp), for --expressions-from."),
+        typer.Option(metavar="FILE", help="Landmarks picked on the mesh (.toml, .json, .pp), for --expressions-from."),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for a report: figures, tables, error drawn on the face.")
+        Path | None, typer.Option(metavar="DIR", help="Folder for a report: numbers, tables, error drawn on the face.")
     ] = None,
     force: Annotated[
-        bool, typer.Option("--force", help="Write a head that does not follow its mesh, too; else it is refused.")
+        bool, typer.Option("--force", help="Write the head even if it differs too much from its mesh.")
     ] = False,
 ) -> None:
     """Turn a mesh with UVs and expression shapes, or a file of surfaces, into a head of control points.
@@ -201,8 +207,8 @@ def fit(
     omote fit scan.ply -o heads/scan --expressions-from ict; surfaces:
     omote fit face.3dm -o heads/face --groups groups.toml
     """
-    # start-up: --help does without any of these
-    from controller.tools.surface_fit import SurfaceFit, is_surface_file, refuse_surface_options
+    # imported lazily: not needed for --help
+    from controller.tools.surface_fit import SurfaceFit, is_surface_file, reject_surface_options
     from controller.tools.transfer import check_transfer
     from surface.fit.identities import add_identities
     from surface.fit.source.load import LoadOptions
@@ -210,21 +216,21 @@ def fit(
     if is_surface_file(mesh):
         meshes_only = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
         meshes_only |= {"--force": force}
-        wanted = SurfaceFit(
+        job = SurfaceFit(
             mesh, out, name, unit, up, forward, tuple(without or ()), tuple(only or ()), tuple(groups or ()),
             strict, expressions_from, landmarks, report,
         )  # fmt: skip
-        wanted.check(meshes_only)
-        _fit_surfaces(wanted)
+        job.check(meshes_only)
+        _fit_surfaces(job)
         return
-    refuse_surface_options(mesh, {"--only": only, "--groups": groups, "--strict": strict})
+    reject_surface_options(mesh, {"--only": only, "--groups": groups, "--strict": strict})
 
     given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
     check_transfer(expressions_from, landmarks, given)
     options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
     if keep:
-        _refuse_with_keep(mesh, out, {"--name": name, "--report": report, "--force": force})
-        _measure(mesh, out, options)
+        _reject_with_keep(mesh, out, {"--name": name, "--report": report, "--force": force})
+        _measure_head(mesh, out, options)
     else:
         _fit_mesh(mesh, out, name or out.resolve().name, options, expressions_from, landmarks, report, force)
     if identities is not None:
@@ -233,8 +239,8 @@ def fit(
         console.print(f"identities: {', '.join(added)}", soft_wrap=True)
 
 
-def _refuse_with_keep(mesh: Path, out: Path, given: Mapping[str, object]) -> None:
-    """Raise ConfigError for an option that only a new head has a use for."""
+def _reject_with_keep(mesh: Path, out: Path, given: Mapping[str, object]) -> None:
+    """Raise ConfigError for an option that only applies when a head is written."""
     instead = {
         "--name": f"change name in {out / 'head.toml'}",
         "--report": f"a report needs a new fit: omote fit {mesh} -o OTHER_FOLDER --report {given['--report']}",
@@ -249,8 +255,8 @@ def _fit_mesh(
     mesh: Path, out: Path, title: str, options: LoadOptions, expressions_from: str | None, landmarks: Path | None,
     report: Path | None, force: bool,
 ) -> None:  # fmt: skip
-    """Make a head of a mesh, by its own shapes or another head's, and say what was found."""
-    from controller.tools.transfer import transfer  # start-up: --help does without either
+    """Write a head made from a mesh, with its own shapes or the expressions of another head, and print the errors."""
+    from controller.tools.transfer import transfer  # imported lazily: not needed for --help
     from surface.fit.api import fit_head
 
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
@@ -267,32 +273,32 @@ def _fit_mesh(
             found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report, force=force)
     shaded = _decimate_and_shade(out)
     show_table(_error_table(found))
-    for line in _remarks(found, shaded) + _checked(out):
+    for line in _fit_remarks(found, shaded) + _check_lines(out):
         console.print(line, soft_wrap=True, markup=False)
     console.print(f"wrote {out}", soft_wrap=True)
 
 
-def _measure(mesh: Path, out: Path, options: LoadOptions) -> None:
-    """Measure a head beside the mesh that it was fitted to, and say how far it is off."""
-    import numpy as np  # start-up: --help does without either
+def _measure_head(mesh: Path, out: Path, options: LoadOptions) -> None:
+    """Measure and print the distances between a head at rest and the mesh that it was fitted to."""
+    import numpy as np  # imported lazily: not needed for --help
 
     from surface.fit.api import measure_head
 
     with console.status("measuring"):
         found = measure_head(out, mesh, options)
     table = Table("part", "vertices", "RMS", "99 %", "max", title=f"distance at rest from {mesh.name}, mm")
-    for name, every in found.items():
-        mm = every[np.isfinite(every)]
+    for name, distances in found.items():
+        mm = distances[np.isfinite(distances)]
         figures = np.sqrt(np.mean(mm**2)), np.percentile(mm, 99.0), mm.max()
         table.add_row(name, str(len(mm)), *(f"{each:.3f}" for each in figures))
     show_table(table)
 
 
-def _fit_surfaces(wanted: SurfaceFit) -> None:
-    """Make a head of a surface file, and say what was found."""
+def _fit_surfaces(job: SurfaceFit) -> None:
+    """Write a head made from a surface file, and print its parts."""
     with console.status("reading") as status:
-        found = wanted.run(lambda step, done: status.update(f"{step}: {100 * done:.0f} %"))
-    shaded = _decimate_and_shade(wanted.out)
+        found = job.run(lambda step, done: status.update(f"{step}: {100 * done:.0f} %"))
+    shaded = _decimate_and_shade(job.out)
     title = f"{found.name}: {found.points} control points, {len(found.parameters)} shapes"
     table = Table("part", "in the file", "material", "follows", "control points", title=title)
     for row in found.parts:
@@ -300,12 +306,12 @@ def _fit_surfaces(wanted: SurfaceFit) -> None:
     show_table(table)
     for line in [*found.lines(), *([] if shaded else [_NO_SHADE])]:
         console.print(line, soft_wrap=True, markup=False)
-    console.print(f"wrote {wanted.out}", soft_wrap=True)
+    console.print(f"wrote {job.out}", soft_wrap=True)
 
 
-def _remarks(found: FitReport, shaded: bool) -> list[str]:
-    """What is said below the table of a fit: bounds, pieces, notes, what is missing, the greatest errors last."""
-    from surface.fit.points.report import face_bounds, kinds_line  # start-up: --help does without it
+def _fit_remarks(found: FitReport, shaded: bool) -> list[str]:
+    """Return the lines below the table of a fit: bounds, pieces, notes, missing shapes, greatest errors, faults."""
+    from surface.fit.points.report import face_bounds, kinds_line  # imported lazily: not needed for --help
 
     missing, left_out = ", ".join(found.missing), ", ".join(found.left_out)
     lines = [face_bounds(found), *filter(None, [kinds_line(found)]), *found.notes]
@@ -317,9 +323,9 @@ def _remarks(found: FitReport, shaded: bool) -> list[str]:
     return lines + [f"written by --force: {fault}" for fault in found.faults]
 
 
-def _checked(out: Path) -> list[str]:
-    """What ``omote check`` would say of a head, in lines; how skin overlaps is among the remarks of a fit already."""
-    # start-up: --help does without these
+def _check_lines(out: Path) -> list[str]:
+    """Return what ``omote check`` reports of a head, without overlaps of skin, which the remarks of a fit contain."""
+    # imported lazily: not needed for --help
     from surface.check import check_head
     from surface.head import Head
 
@@ -328,16 +334,16 @@ def _checked(out: Path) -> list[str]:
 
 
 def _decimate_and_shade(out: Path) -> bool:
-    """Add to a head's folder its decimated triangles and how much light reaches each vertex; False without OpenGL."""
-    # start-up: --help does without any of these
+    """Add decimated triangles and baked shading to a head's folder; return False if there is no OpenGL for shading."""
+    # imported lazily: not needed for --help
     from surface.base.errors import MissingPackage, ViewError
     from surface.view.draw.decimate import decimate_head
     from surface.view.pictures.occlusion import shade_head
 
-    with console.status("finding fewer triangles for live pictures"):
+    with console.status("decimating triangles for live pictures"):
         decimate_head(out)
     try:
-        with console.status("baking shade"):
+        with console.status("baking the shading"):
             shade_head(out)
     except (ViewError, MissingPackage):
         return False
@@ -345,7 +351,7 @@ def _decimate_and_shade(out: Path) -> bool:
 
 
 def _error_table(report: FitReport) -> Table:
-    """Control points and errors (mm) of every fitted part."""
+    """Return a table of the control points and errors (mm) of every fitted part."""
     title = f"{report.name}: {report.points} control points, {len(report.parameters)} shapes"
     table = Table("part", "control points", "RMS", "99 %", "max", "mean RMS of shapes", title=title)
     for part in report.parts:
@@ -356,7 +362,7 @@ def _error_table(report: FitReport) -> Table:
 
 def export(
     out: Annotated[
-        Path, typer.Argument(metavar="OUT", help="File to write: .glb, .obj, .urdf or what a plug-in adds.")
+        Path, typer.Argument(metavar="OUT", help="File to write: .glb, .obj, .urdf or a format of a plug-in.")
     ],
     head: Annotated[str, typer.Option("--head", help=HEAD, autocompletion=names_of("heads"))] = "ict",
     settings: Setting = None,
@@ -365,22 +371,22 @@ def export(
     identity: Identity = None,
     person: Person = None,
     frame: Annotated[
-        str, typer.Option(help="head: millimetres or metres, y up, z forward; file: as in the mesh it was fitted to.")
+        str, typer.Option(help="Axes and origin. head: y up, z forward; file: those of the mesh it was fitted to.")
     ] = "head",
     take: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Take, recording or show that the .glb plays as an animation.")
+        Path | None, typer.Option(metavar="FILE", help="Take, recording or show to write as animation of the .glb.")
     ] = None,
     rate_hz: Annotated[
         float | None,
         typer.Option(
-            "--rate", min=1, max=1000, help="Frames a second of --take.", show_default="the take's own, or 60"
+            "--rate", min=1, max=1000, help="Frames per second of --take.", show_default="the take's own, or 60"
         ),
     ] = None,
-    web: Annotated[bool, typer.Option("--web", help="A small .glb for pages of browsers: fewer triangles.")] = False,
+    web: Annotated[bool, typer.Option("--web", help="Write a small .glb for web pages, with fewer triangles.")] = False,
     robot: Annotated[
         str | None,
         typer.Option(
-            help="Robot whose servos limit the joints of a .urdf: a name or a file.", autocompletion=names_of("robots")
+            help="Robot file whose servo limits become joint limits of the .urdf.", autocompletion=names_of("robots")
         ),
     ] = None,
 ) -> None:
@@ -388,7 +394,7 @@ def export(
 
     Example: omote export head.glb; with an animation: omote export head.glb --take alex_rom_3.csv
     """
-    # start-up: --help does without any of these
+    # imported lazily: not needed for --help
     from controller.face.still import Still
     from controller.stage.persons import parse_person
     from controller.tools.plugins import EXPORTERS, added_exporters
@@ -403,21 +409,21 @@ def export(
         values = zip(still.parameters.names, still.values, strict=True)
         pose = {name: float(value) for name, value in values if value and name in loaded.parameters}
         added = added_exporters()
-        kind = next((one.kind for one in added if out.suffix.lower() in one.suffixes), "")
+        kind = next((each.kind for each in added if out.suffix.lower() in each.suffixes), "")
         with EXPORTERS.blaming(kind):
             if robot is None:
                 written = export_head(
                     loaded, out, pose, added, frame, _animation(take, rate_hz, loaded, still.parameters), web
                 )
             else:
-                written = _with_limits(robot, loaded, out, pose)
+                written = _write_urdf_with_limits(robot, loaded, out, pose)
     for path in written:
         console.print(f"wrote {path}", soft_wrap=True)
 
 
-def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> list[Path]:
-    """Write a .urdf with the limits of a robot's servos. Raises ConfigError: another kind of file, or no such robot."""
-    # start-up: --help does without any of these
+def _write_urdf_with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> list[Path]:
+    """Write a .urdf with the limits of a robot's servos. Raises ConfigError: another suffix, or no such robot."""
+    # imported lazily: not needed for --help
     from controller.base.parameters import PARAMETERS
     from controller.base.paths import find_config
     from controller.robot.joint_limits import joint_limits
@@ -435,10 +441,10 @@ def _with_limits(robot: str, head: Head, out: Path, pose: dict[str, float]) -> l
 
 
 def _animation(take: Path | None, rate_hz: float | None, head: Head, parameters: Parameters) -> Animation | None:
-    """What a take shows, as an animation; None without one."""
-    import numpy as np  # start-up: --help does without any of these
+    """Return a take as an animation of ``head``, or None. Raises ConfigError: ``rate_hz`` without a take."""
+    import numpy as np  # imported lazily: not needed for --help
 
-    # start-up: the same
+    # imported lazily: as above
     from controller.face.face import head_indices
     from controller.tools.motion_file import load_motion
     from surface.export.animation import Animation

@@ -19,17 +19,17 @@ from drivers.base.errors import PluginError
 from drivers.base.options import REQUIRED, Entry, entries
 
 if TYPE_CHECKING:
-    from controller.tools.simulate import Serving  # start-up: --help does without it
+    from controller.tools.simulate import Serving  # imported lazily: not needed for --help
 
 log = logging.getLogger(__name__)
 
 
 class _Simulators(TyperGroup):
-    """The commands of this module, and one for each family of servos that has a simulator."""
+    """The commands of this module, and one for each bus family (kind of servo or board) that has a simulator."""
 
     def list_commands(self, ctx: Any) -> list[str]:
-        """Names of all commands; a family that cannot be loaded is logged and left out."""
-        # start-up: most commands need no families
+        """Return the names of all commands; a family that cannot be loaded is logged and omitted."""
+        # imported lazily: most commands need no families
         from drivers.core.registry import FAMILIES
         from drivers.sim.wire.simulator import simulator_of
 
@@ -44,8 +44,8 @@ class _Simulators(TyperGroup):
         return [*kinds, *super().list_commands(ctx)]
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        """The command of a name; None where there is none."""
-        from drivers.core.registry import kinds  # start-up: most commands need no families
+        """Return the command called ``cmd_name``, or None."""
+        from drivers.core.registry import kinds  # imported lazily: most commands need no families
 
         if cmd_name in self.commands or cmd_name not in kinds():
             return self.commands.get(cmd_name)
@@ -54,8 +54,8 @@ class _Simulators(TyperGroup):
         return typer.main.get_command(app)
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """The command that the words name; an unknown one is refused with the nearest of all."""
-        from drivers.core.registry import kinds  # start-up: most commands need no families
+        """Return the command that the arguments name; an unknown one is refused with the most similar name."""
+        from drivers.core.registry import kinds  # imported lazily: most commands need no families
 
         known = [*kinds(), *self.commands]
         close = difflib.get_close_matches(args[0], known, n=1) if args and args[0] not in known else []
@@ -65,7 +65,7 @@ class _Simulators(TyperGroup):
 
 
 def make_app() -> typer.Typer:
-    """The group of all these commands."""
+    """Return the group of all commands of ``omote simulate``."""
     simulators = typer.Typer(cls=_Simulators, no_args_is_help=True, help="Simulate hardware on a pseudo-terminal.")
     simulators.command("robot")(simulate_robot)
     simulators.command("host")(simulate_host)
@@ -85,17 +85,18 @@ Script = Annotated[Path | None, typer.Option("--script", help="File with a timel
 Record = Annotated[
     Path | None, typer.Option("--record", help="Write the traffic to this file: .pcapng, else a text log.")
 ]
-Wire = Annotated[bool, typer.Option("--wire", help="Bytes take the time they take at the baud rate.")]
+Wire = Annotated[bool, typer.Option("--wire", help="Delay bytes by their transmission time at the baud rate.")]
 Latency = Annotated[
-    float, typer.Option("--latency", min=0, max=1000, help="With --wire: latency timer of a USB adapter, in ms.")
+    float, typer.Option("--latency", min=0, max=1000, help="With --wire: latency timer of a USB adapter (ms).")
 ]
 Faults = Annotated[
     list[str] | None,
     typer.Option("--fault", metavar="SPEC", help="Fault to inject, as mute:7 or drop:*:p=0.01; may be repeated."),
 ]
-Look = Annotated[bool, typer.Option("--watch", help="Show the servos and the decoded traffic while it runs.")]
+Watch = Annotated[bool, typer.Option("--watch", help="Show the servos and the decoded traffic while it runs.")]
 Control = Annotated[
-    Path | None, typer.Option("--control", help="Unix socket for faults and the state of the servos while it runs.")
+    Path | None,
+    typer.Option("--control", help="Unix socket to create, which accepts faults and reports the servos while it runs."),
 ]
 
 
@@ -107,16 +108,16 @@ def _serving(
     latency: Latency = 0.0,
     fault: Faults = None,
     control: Control = None,
-    watch: Look = False,
+    watch: Watch = False,
     script: Script = None,
     record: Record = None,
 ) -> Serving:
-    """Where and how to serve: a link to a pseudo-terminal, or an address."""
-    from controller.tools.simulate import Serving  # start-up: --help does without it
+    """Return where and how to serve. Raises ConfigError: options exclude each other."""
+    from controller.tools.simulate import Serving  # imported lazily: not needed for --help
 
-    places = {"--link": link, "--tcp": tcp, "--rfc2217": rfc2217}
-    if len(given := [name for name, place in places.items() if place is not None]) > 1:
-        raise ConfigError(f"{' and '.join(given)} do not go together", hint="run it twice for two ports")
+    endpoints = {"--link": link, "--tcp": tcp, "--rfc2217": rfc2217}
+    if len(given := [name for name, endpoint in endpoints.items() if endpoint is not None]) > 1:
+        raise ConfigError(f"{' and '.join(given)} exclude each other", hint="run it twice for two ports")
     if latency and not wire:
         raise ConfigError("--latency is part of the time on the wire", hint="add --wire")
     where = f"socket://{tcp}" if tcp else f"rfc2217://{rfc2217}" if rfc2217 else link
@@ -124,7 +125,10 @@ def _serving(
 
 
 def _add_serving(command: Callable[..., None], own: list[inspect.Parameter] | None = None) -> Callable[..., None]:
-    """The command with the options of :func:`_serving` in the place of its first parameter, ``how``."""
+    """Return a command that has the options of :func:`_serving` instead of its first parameter, ``how``.
+
+    own : the other options; by default, the other parameters of ``command``.
+    """
     own, shared = _options(command)[1:] if own is None else own, _options(_serving)
 
     def run(**given: Any) -> None:
@@ -138,14 +142,14 @@ def _add_serving(command: Callable[..., None], own: list[inspect.Parameter] | No
 
 
 def _options(command: Callable[..., Any]) -> list[inspect.Parameter]:
-    """A function's parameters, with their annotations as objects."""
+    """Return a function's parameters, with annotations that are objects and not text."""
     hints = get_type_hints(command, localns={"Serving": object}, include_extras=True)
     return [p.replace(annotation=hints[p.name]) for p in inspect.signature(command).parameters.values()]
 
 
 def _simulate_family(kind: str) -> Callable[..., None]:
-    """The command that serves the simulator of a family."""
-    from controller.base.schema import from_command_line  # start-up: the command line shows its help without it
+    """Return the command that serves the simulator of a family."""
+    from controller.base.schema import from_command_line  # imported lazily: not needed for --help
     from controller.tools.simulate import serve_alone
     from drivers.core.registry import FAMILIES
     from drivers.sim.wire.simulator import simulator_of
@@ -156,18 +160,18 @@ def _simulate_family(kind: str) -> Callable[..., None]:
         serve_alone(kind, from_command_line(simulator.options, given), how, console)
 
     command.__doc__ = simulator.help
-    usual = {"baud": FAMILIES.get(kind).baud}
-    return _add_serving(command, [_parameter(entry, usual.get(entry.name)) for entry in entries(simulator.options)])
+    defaults = {"baud": FAMILIES.get(kind).baud}
+    return _add_serving(command, [_parameter(entry, defaults.get(entry.name)) for entry in entries(simulator.options)])
 
 
-def _parameter(entry: Entry, usual: Any) -> inspect.Parameter:
-    """An option of a simulator as an option of the command; ``usual`` replaces its default where it is given."""
+def _parameter(entry: Entry, default: Any) -> inspect.Parameter:
+    """Return an option of a simulator as an option of the command; ``default``, unless None or 0, replaces its own."""
     limits, name = entry.option, entry.name.replace("_", "-")
     flag = f"--{name}/--no-{name}" if entry.default is True else f"--{name}"
     complete = models if entry.name == "model" else None
     shown = typer.Option(flag, min=limits.at_least, max=limits.at_most, help=limits.help, autocompletion=complete)
     kind, empty = inspect.Parameter.POSITIONAL_OR_KEYWORD, inspect.Parameter.empty
-    default = usual or (empty if entry.default is REQUIRED else entry.default)
+    default = default or (empty if entry.default is REQUIRED else entry.default)
     return inspect.Parameter(entry.name, kind, default=default, annotation=Annotated[entry.type, shown])
 
 
@@ -177,13 +181,15 @@ def simulate_robot(
     robot: Annotated[
         str, typer.Argument(help="Robot: a name from configs/robots or a file.", autocompletion=names_of("robots"))
     ],
-    bus: Annotated[str | None, typer.Option("--bus", help="Name of the bus; the first without it.")] = None,
+    bus: Annotated[
+        str | None, typer.Option("--bus", help="Name of the bus. Default: the first one of the file.")
+    ] = None,
 ) -> None:
     """Serve the simulated servos or board of a robot file, until interrupted; prints `ready PATH`.
 
     Example: omote simulate robot head24 --link /tmp/head
     """
-    from controller.tools.simulate import serve_robot  # start-up: --help does without it
+    from controller.tools.simulate import serve_robot  # imported lazily: not needed for --help
 
     serve_robot(robot, bus, how, console)
 
@@ -197,7 +203,7 @@ def simulate_record(
 
     Example: omote simulate record desk.log --link /tmp/head
     """
-    from controller.tools.simulate import serve_record  # start-up: --help does without it
+    from controller.tools.simulate import serve_record  # imported lazily: not needed for --help
 
     serve_record(file, how, console)
 
@@ -208,10 +214,12 @@ def simulate_host(
     ] = "tour",
     link: Link = None,
 ) -> None:
-    """Serve a simulated robot host that writes omote line protocol, until interrupted; prints `ready PATH`.
+    """Serve a simulated robot host that sends the commands of a script (omote line protocol), until interrupted.
+
+    It prints `ready PATH` first.
 
     Example: omote simulate host tour --link /tmp/robot
     """
-    from controller.tools.simulate import serve_host  # start-up: --help does without it
+    from controller.tools.simulate import serve_host  # imported lazily: not needed for --help
 
     serve_host(script, link, console)

@@ -1,4 +1,4 @@
-"""``omote study``: conditions in a seeded order, with an event log and a recording."""
+"""``omote study``: shows the conditions of a study in a seeded order, with an event log and a recording."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ from controller.cli.console import console
 def study(
     file: Annotated[Path, typer.Argument(help="The study: a stage, conditions, repeats and a seed (TOML).")],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for event log, recording and report.")],
-    seed: Annotated[int | None, typer.Option("--seed", min=0, help="Instead of the file's: a participant's.")] = None,
-    lsl: Annotated[bool, typer.Option("--lsl", help="Send the marks as LSL markers, too.")] = False,
+    seed: Annotated[
+        int | None, typer.Option("--seed", min=0, help="Seed of a participant, instead of the file's.")
+    ] = None,
+    lsl: Annotated[bool, typer.Option("--lsl", help="Also send the marks as LSL markers.")] = False,
     headless: Annotated[bool, typer.Option("--headless", help="Draw without a window.")] = False,
     no_face: Annotated[bool, typer.Option("--no-face", help="Draw nothing: servos only, needs no OpenGL.")] = False,
 ) -> None:
-    """Show conditions in a seeded order, and write what happened when: events, recording, latencies, pose errors.
+    """Show the conditions of a study in a seeded order, and write events, a recording, latencies and pose errors.
 
     Example: omote study smiles.toml -o participant-7 --seed 7
     """
-    # start-up: --help does without them
+    # imported lazily: not needed for --help
     from controller.tools.stage_run import StageRun, has_display
     from controller.tools.study_run import run_study
     from surface.base.extras import require

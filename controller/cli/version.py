@@ -1,4 +1,4 @@
-"""``omote --version``: the option of the command itself."""
+"""``omote --version``: an option of the command itself."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from controller.cli.console import console
 
 
 def show_version(wanted: bool) -> None:
-    """Print omote's version and end, where the option was given."""
+    """Print omote's version and exit, if ``wanted``."""
     if not wanted:
         return
-    from importlib.metadata import PackageNotFoundError, version  # start-up: --help does without it
+    from importlib.metadata import PackageNotFoundError, version  # imported lazily: not needed for --help
 
     try:
         console.print(f"omote {version('omote')}")
     except PackageNotFoundError:
-        console.print("omote, started from a checkout that is not installed", soft_wrap=True)
+        console.print("omote, run from source code that is not installed", soft_wrap=True)
     raise typer.Exit
 
 
@@ -27,4 +27,4 @@ def root(
         bool, typer.Option("--version", callback=show_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Options before the name of a command."""
+    """Define the options that stand before the name of a command."""

@@ -1,10 +1,10 @@
-"""Meets a moving face within the limits of speed and acceleration, and then is exactly that face; no I/O here.
+"""Approaches a moving face within the limits of speed and acceleration, and then equals it exactly; no I/O here.
 
-A filter that follows a face lags behind it for as long as anything accelerates, so it would never be exactly there
-while the face lives. Here what is shown makes the face's own step, and beside it closes the distance that is left along
-the braking curve of :mod:`controller.motion.motion`. Each parameter is met by itself. What was met stays met while the
-face keeps within the limits; where it does not, as it jumps or stands still at once, the parameter is led to it again.
-No step passes a limit, whatever its length and whatever the face does: :mod:`controller.fleet.reach` says why.
+A filter that follows a face lags while the face accelerates, so it would never equal a moving face. Here each step has
+the face's own motion, and additionally closes the remaining distance along the braking curve of
+:mod:`controller.motion.motion`. Each parameter is handled separately. A parameter that has met the face stays equal
+while the face keeps within the limits; if the face jumps or stops suddenly, the parameter approaches it again. No step
+exceeds a limit, whatever its length and whatever the face does; :mod:`controller.fleet.reach` explains why.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from controller.fleet.reach import pursue
 
 
 class Approach:
-    """What is shown, on its way to a face that moves.
+    """The shown values, which approach a moving face.
 
     Attributes
     ----------
-    met : (P,) bool, which parameters are exactly those of the face.
+    met : (P,) bool, which parameters equal those of the face exactly.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -32,28 +32,28 @@ class Approach:
         self.begin(self._face)
 
     def begin(self, shown: Floats) -> None:
-        """Start from what is shown, (P,), at whatever speed; it is inside the range."""
+        """Start at the values ``shown`` : (P,), which are within their ranges, with any speed."""
         self._shown[:] = shown
         self._end_speeds[0][:], self._end_speeds[1][:] = -self._p.max_speed, self._p.max_speed
         self.follow(shown)
 
     def follow(self, face: Floats) -> None:
-        """Be on the way to another face, which is at ``face`` : (P,) now."""
+        """Approach another face, which is at ``face`` : (P,) now."""
         self._before[:] = face
         self.met[:] = False
 
     def step(self, time_s: float, face: Floats, out: Floats, *, stay: bool, passed_s: float | None = None) -> None:
-        """Write to ``out`` : (P,) what is shown ``time_s`` later, when the face is at ``face`` : (P,).
+        """Write to ``out`` : (P,) the values shown ``time_s`` later, when the face is at ``face`` : (P,).
 
-        In no time nothing moves, and only what the face already shows is met. A value of the face that is no finite
-        number counts as what is shown.
+        If ``time_s`` is 0, only parameters that equal the face are met. A value of the face that is not
+        finite is ignored.
 
-        stay : what meets the face is exactly there. passed_s : the time (s) in which the face moved so far, ``time_s``
-        where it is not given.
+        stay : whether parameters may meet the face and then equal it. passed_s : time (s) of the face's motion since
+        the last step. Default: ``time_s``.
         """
         if time_s > 0.0:
             passed_s = time_s if passed_s is None else passed_s
-            self._face[:] = face  # which may be read-only
+            self._face[:] = face  # a copy, because the compiled function needs a writable array
             pursue(time_s, passed_s, stay, self._face, self.met, self._motion, self._limits)
         else:
             self.met &= self._shown == face

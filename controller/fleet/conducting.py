@@ -1,4 +1,4 @@
-"""What a conductor does beside mixing: it holds the lease, sends faces, takes commands and reports what took effect."""
+"""The network side of a conductor: it holds the lease, sends faces, receives commands and publishes their effects."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from controller.base.errors import LinkError
 from controller.base.parameters import Floats
 from controller.fleet import journal
 from controller.fleet.lease import Lease, Token
-from controller.fleet.payload import MOST, Header, Payloads
+from controller.fleet.payload import MAX_NUMBER, Header, Payloads
 from controller.fleet.sending import FaceSender
 from controller.fleet.wire import ALL, Wire, header_of
 from controller.layers.commands import CommandState
@@ -21,15 +21,13 @@ from controller.links.line.session import LineSession
 if TYPE_CHECKING:
     import zenoh  # optional: the extra zenoh
 
-_BEATS = 5
-"""Signs of life in the length of a lease."""
+_HEARTBEATS_PER_LEASE = 5
 
 
 class Conducting:
-    """The lease, faces and commands of a process that conducts, or stands by to do so.
+    """The lease, faces and commands of a process that conducts, or is a standby.
 
-    heads : the layers by name. events : counts commands of another conductor that were heard as they took effect, by
-    head.
+    heads : the layers by name. events : counts, by head, the commands that were received from another conductor.
     """
 
     def __init__(
@@ -37,8 +35,9 @@ class Conducting:
         events: Counter[str],
     ) -> None:  # fmt: skip
         self._events = events
-        self._wire, self._heads, self._lease, self._every_s = wire, heads, lease, lease_s / _BEATS
-        self._beat_s, self._term = -1.0, 0
+        self._wire, self._heads, self._lease = wire, heads, lease
+        self._heartbeat_interval_s = lease_s / _HEARTBEATS_PER_LEASE
+        self._heartbeat_s, self._term = -1.0, 0
         self.sender = FaceSender(wire.outlets(heads, "parameters"), wire.outlet(ALL, "faces"), payloads, self._header)
         wire.hear(ALL, "lease", self._hear_lease)
         wire.hear(ALL, "state", self._hear_state)
@@ -50,24 +49,24 @@ class Conducting:
             state.on_event = self._tell(name)
 
     def tick(self, now_ns: int) -> bool:
-        """Called before each face is mixed: whether this process conducts; if so, the others hear a sign of life."""
+        """Return whether this process conducts, and if so, send a heartbeat when due. Call it before each mixing."""
         if not self._lease.tick(now_ns * 1e-9):
             return False
         if self._term != self._lease.terms:
             self._term = self._lease.terms
             self.sender.begin(now_ns)
-        if now_ns * 1e-9 - self._beat_s > self._every_s:
-            self._beat_s = now_ns * 1e-9
+        if now_ns * 1e-9 - self._heartbeat_s > self._heartbeat_interval_s:
+            self._heartbeat_s = now_ns * 1e-9
             header = self._header(now_ns=now_ns).encode()
             self._wire.session.put(self._wire.key(ALL, "lease"), b"", attachment=header, express=True)
         return True
 
     def send(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
-        """Send what a head shows, of the tick that was due at ``now_ns``; ``values`` : (P,)."""
+        """Send the face ``values`` : (P,) of a head, of the tick that was due at ``now_ns``."""
         self.sender.send(head, now_ns, values, stamp_ns)
 
     def close(self) -> None:
-        """Report no more commands."""
+        """Stop publishing commands."""
         for state in self._heads.values():
             state.on_event = None
 
@@ -83,9 +82,9 @@ class Conducting:
             fence, holder = json.loads(sample.payload.to_bytes())["token"]
             token = Token(int(fence), int(holder))
         except (ValueError, TypeError, KeyError, OverflowError) as error:
-            raise LinkError("a state that is not the JSON it should be") from error
-        if token.fence > MOST:
-            raise LinkError("a state with a fence that no conductor has")
+            raise LinkError("a malformed state") from error
+        if token.fence > MAX_NUMBER:
+            raise LinkError("a state with a fencing token out of range")
         self._lease.hear(token, time.monotonic(), alive=False)
 
     def _tell_time(self, query: zenoh.Query) -> None:
@@ -94,7 +93,7 @@ class Conducting:
             query.reply(query.key_expr, json.dumps([received, time.monotonic_ns(), self._lease.holder]))
 
     def _lines_of(self, head: str) -> LineSession:
-        """What takes lines for a head in one of Zenoh's threads; with another one's lines it would mix them up."""
+        """Return a new line session for a head. Each thread of Zenoh needs its own, or lines would be interleaved."""
         return LineSession(self._heads[head], 0, name=f"zenoh {head}")
 
     def _command_of(self, head: str) -> Callable[[zenoh.Sample], None]:
@@ -106,7 +105,7 @@ class Conducting:
         return act
 
     def _do(self, lines: LineSession, data: bytes) -> bytes:
-        """Carry out lines of a command for a head; only who conducts does. STOP works in any case."""
+        """Carry out a command line for a head and return the answer. Unless this process conducts, only STOP works."""
         line = data[:4096].rstrip(b"\r\n") + b"\n"
         if not self._lease.active and b"STOP" not in line.upper():
             return b""
@@ -127,7 +126,7 @@ class Conducting:
             if header.token.holder != self._lease.holder and header.token >= self._lease.highest:
                 state, on_event = self._heads[head], self._heads[head].on_event
                 self._events[head] += 1
-                state.on_event = None  # what another conductor said is not said again
+                state.on_event = None  # a command of another conductor must not be published again
                 try:
                     journal.apply(sample.payload.to_bytes(), state, time.monotonic_ns())
                 finally:

@@ -1,4 +1,4 @@
-"""Hears the faces of conductors, one by one or all of a tick in one message, and hands them to their heads."""
+"""Receives the faces of conductors, single or all of a tick in one message, and passes them to their heads."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     import zenoh  # optional: the extra zenoh
 
 MANY = 4
-"""A process with so many heads hears them all in one message; one with fewer only what is for its own."""
+"""A process with at least this many heads receives all faces in one message; with fewer, those of its own heads."""
 
 
 class Hearing:
-    """Faces for the heads of this process.
+    """Receives the faces for the heads of this process.
 
-    lease : of this process, which takes note of who conducts; it obeys nobody of its own number. clocks : of the
-    conductors. recordings : where faces are written, by head. hurry : called when one was taken that is shown at once.
+    lease : of this process, which notes who conducts; messages with its own number are ignored. clocks : of the
+    conductors. recordings : by head, to which faces are written. hurry : called when a face was accepted.
     """
 
     def __init__(
@@ -44,8 +44,10 @@ class Hearing:
                 wire.hear(name, "parameters", self._hear_one(name), direct=True)
 
     def silent(self) -> tuple[str, float]:
-        """The head that has heard nothing for the longest time, or :data:`controller.fleet.wire.ALL` where all hear
-        together, and since when (s)."""
+        """Return the head that has received nothing for the longest time, and since when (s).
+
+        It is :data:`controller.fleet.wire.ALL` if the faces come in one message.
+        """
         name = min(self._heard_s, key=self._heard_s.__getitem__)
         return name, self._heard_s[name]
 
@@ -70,7 +72,7 @@ class Hearing:
             self._hurry()
 
     def _is_for_us(self, header: Header, whose: str) -> bool:
-        """Whether a face is of another conductor, of whom the lease takes note."""
+        """Note a message in the lease and the clocks; return False, noting nothing, if this process has sent it."""
         if header.token.holder == self._lease.holder:
             return False
         now_s = time.monotonic()
@@ -80,7 +82,7 @@ class Hearing:
         return True
 
     def _take(self, head: str, header: Header, values: Floats) -> bool:
-        """Hand a face to its head; whether it takes it."""
+        """Pass a face to its head, and to its recording if accepted; return whether it was accepted."""
         taken = self._followers[head].take(header, values)
         if taken and head in self._recordings:
             self._recordings[head].add(header.time_ns, values)

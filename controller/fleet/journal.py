@@ -1,4 +1,4 @@
-"""Commands that took effect at one conductor, as JSON for another that stands by, also for one that is late."""
+"""Encodes commands that took effect at a conductor as JSON for a standby, and snapshots for one that starts later."""
 
 from __future__ import annotations
 
@@ -14,28 +14,28 @@ VERSION = 1
 _PLAIN = {
     "set_parameters": 2, "release": 1, "expression": 3, "gaze": 2, "gaze_at": 3, "gaze_off": 0, "neutral": 1,
 }  # fmt: skip
-"""Methods, and how many of their arguments say what is to be done; the time comes behind those."""
-_MOST = 65_536
+"""Methods, and the number of their arguments before the time."""
+_MAX_BYTES = 65_536
 
 
 def encode(method: str, arguments: tuple[Any, ...]) -> bytes | None:
-    """A call of a :class:`controller.layers.commands.CommandState` as JSON; None for ticks."""
+    """Encode a call of a :class:`controller.layers.commands.CommandState` as JSON; return None for other methods."""
     if method in _PLAIN:
-        given = [_plain(each) for each in arguments[: _PLAIN[method]]]
+        given = [_to_json(each) for each in arguments[: _PLAIN[method]]]
     elif method == "live":
         given = [arguments[0], *arguments[2:3]]
     elif method == "write_layer":
         name, values, mask, _, _, through = arguments
-        given = [name, *map(_plain, (values, mask, through))]
+        given = [name, *map(_to_json, (values, mask, through))]
     else:
         return None
     return json.dumps({"version": VERSION, "method": method, "arguments": given}).encode()
 
 
 def apply(data: bytes, state: CommandState, now_ns: int) -> None:
-    """Carry out at ``now_ns`` what :func:`encode` wrote. Raises LinkError: it is none of that, or does not fit."""
+    """Carry out at ``now_ns`` what :func:`encode` returned. Raises LinkError: it is malformed or does not fit."""
     try:
-        table = json.loads(data[:_MOST])
+        table = json.loads(data[:_MAX_BYTES])
         method, given = table["method"], table["arguments"]
         if table["version"] != VERSION:
             raise LinkError(f"version {table['version']!r} of an event is not understood")
@@ -46,13 +46,13 @@ def apply(data: bytes, state: CommandState, now_ns: int) -> None:
         elif method == "write_layer":
             _write_layer(state, given, now_ns)
         else:
-            raise LinkError(f"{str(method)[:40]!r} is no event")
+            raise LinkError(f"{str(method)[:40]!r} is not an event")
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, RecursionError, ParameterError) as error:
         raise LinkError(f"an event that cannot be carried out: {error}") from error
 
 
 def snapshot(state: CommandState) -> dict[str, Any]:
-    """What was commanded and still holds, for one that comes late."""
+    """Return what was commanded and is still in force, for a standby that starts later."""
     status, names = state.status(), state.parameters.names
     return {
         "held": {names[i]: value for i, value in state.held().items()},
@@ -63,7 +63,7 @@ def snapshot(state: CommandState) -> dict[str, Any]:
 
 
 def restore(given: dict[str, Any], state: CommandState, now_ns: int) -> None:
-    """Command what :func:`snapshot` found. Raises LinkError: it does not fit."""
+    """Command what :func:`snapshot` returned. Raises LinkError: it does not fit."""
     try:
         held = {state.parameters.index(name): float(value) for name, value in given["held"].items()}
         if held:
@@ -87,8 +87,8 @@ def _write_layer(state: CommandState, given: list[Any], now_ns: int) -> None:
     state.write_layer(str(name), arrays[0], arrays[1], now_ns, now_ns, through=shown)
 
 
-def _plain(value: Any) -> Any:
-    """Arrays and sequences as lists."""
+def _to_json(value: Any) -> Any:
+    """Convert arrays and sequences to lists."""
     if isinstance(value, np.ndarray):
         return value.tolist()
     return list(value) if isinstance(value, tuple | list | range) else value

@@ -1,8 +1,8 @@
-"""Who conducts: leases with fencing numbers, by the clock of whoever asks; no I/O here.
+"""Decides which process conducts, by leases with fencing tokens; times are the caller's, and there is no I/O here.
 
-A conductor is known by its token: a fencing number that grows with each change of conductor, and its own number.
-Tokens have a strict order, and whoever has seen one obeys no lower one ever after (M. Kleppmann, "How to do distributed
-locking", 2016): a conductor that was stopped and continues cannot move a head that has heard of its successor.
+A conductor is identified by its token: a fencing number that grows with each change of conductor, and its own number.
+Tokens are strictly ordered, and a process that has seen one obeys no lower one afterwards (M. Kleppmann, "How to do
+distributed locking", 2016). So a conductor that was suspended and resumes cannot move a head that knows its successor.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class Token(NamedTuple):
-    """fence : grows with each change of conductor. holder : number of the conductor, which orders equal fences."""
+    """Fencing token. fence : grows with each change of conductor. holder : conductor's number, orders equal fences."""
 
     fence: int
     holder: int
@@ -25,11 +25,11 @@ class Lease:
 
     Parameters
     ----------
-    holder : its own number, different from every other's, below 2^63.
-    lease_s : a conductor that is not heard for so long has lost its lease.
-    wait_s : what this one waits longer before it takes over; different for each, so that rarely two do.
-    now_s : the time, s, of any clock that does not jump. first_s : what it waits longer at first, so that one that has
-        just started, and knows nothing of what was commanded, replaces nobody whom it has not heard yet.
+    holder : its own number, unique, below 2^63.
+    lease_s : a conductor that is silent for this time has lost its lease.
+    wait_s : additional time before this one takes over; random, so that two rarely do at once.
+    now_s : the time (s) of any clock that does not jump. first_s : additional wait after the start, so that a new
+        process, which does not know what was commanded, does not replace a conductor that it has not heard yet.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Lease:
         self._heard_s, self._ticked_s = now_s + first_s, now_s
 
     def hear(self, token: Token, now_s: float, *, alive: bool = True) -> None:
-        """Take note of a token: of a conductor that is ``alive``, or one that a head has obeyed."""
+        """Note a token; ``alive`` : whether its conductor sent it, and not a head that has obeyed it."""
         if token.holder == self.holder:
             self.highest = max(self.highest, token)
             return
@@ -55,7 +55,7 @@ class Lease:
             self._heard_s = now_s
 
     def tick(self, now_s: float) -> bool:
-        """Whether this one conducts now. After a pause longer than the lease it does not: it listens first."""
+        """Update and return whether this one conducts. After a pause longer than the lease it steps down first."""
         if now_s - self._ticked_s > self._lease_s:
             self._step_down(now_s)
             self._heard_s = max(self._heard_s, now_s)

@@ -1,4 +1,4 @@
-"""What is sent: faces as exact numbers, as omote's binary frame, or as JSON, each with a header of who sent it when.
+"""Encodes faces as exact numbers, as omote's binary frame, or as JSON, and the header with sender and times.
 
 The header travels as the attachment of a sample, little-endian: version u8, flags u8, reserved u16, fence u64, holder
 u64, sequence u64, time i64 and stamp i64 (ns of the sender's monotonic clock).
@@ -20,25 +20,24 @@ from controller.formats.frame import Frame
 from controller.formats.kinds.binary_format import BinaryDecoder, BinaryEncoder
 
 VERSION = 1
-"""Of header and payloads; another one is refused."""
+"""Version of header and payloads; another version is refused."""
 ENCODINGS = {"exact": "omote/exact;1", "binary": "omote/binary;1", "json": "application/json"}
 _KINDS = {encoded: kind for kind, encoded in ENCODINGS.items()}
 _HEADER = struct.Struct("<BBHQQQqq")
 _COUNT = struct.Struct("<H")
 _STOPPED = 1
-_MOST_BYTES = 65_536
-MOST = 1 << 61
-"""Greatest fence, and greatest time of a clock (ns, 73 years), of a message that is not refused: what is computed with
-them stays within 64 bits."""
+_MAX_BYTES = 65_536
+MAX_NUMBER = 1 << 61
+"""Greatest fence, and greatest absolute time (ns, 73 years), that is accepted, so that sums stay within 64 bits."""
 
 
 @dataclass(frozen=True)
 class Header:
-    """Who sent a face, and when.
+    """Sender and times of a face.
 
-    sequence : grows by 1 with each face of a conductor. time_ns : when the tick was due that mixed it, which is how far
-    motion had come. stamp_ns : when the newest command in it came; both of the sender's clock. stopped : STOP keeps the
-    servos off.
+    token : of the sender. sequence : grows by 1 with each face of a conductor. time_ns : when the tick that mixed the
+    face was due. stamp_ns : when the newest command in it came; both by the sender's clock. stopped : whether STOP
+    keeps the servos off.
     """
 
     token: Token
@@ -48,27 +47,27 @@ class Header:
     stopped: bool = False
 
     def encode(self) -> bytes:
-        """The attachment."""
+        """Encode the header as attachment of a message."""
         flags = _STOPPED if self.stopped else 0
         return _HEADER.pack(VERSION, flags, 0, *self.token, self.sequence, self.time_ns, self.stamp_ns)
 
     @classmethod
     def decode(cls, data: bytes) -> Header:
-        """Raises LinkError: damaged, or of another version."""
+        """Decode a header. Raises LinkError: damaged, or of another version."""
         if len(data) != _HEADER.size:
             raise LinkError(f"a header has {_HEADER.size} bytes, not {len(data)}")
         version, flags, _, fence, holder, sequence, time_ns, stamp_ns = _HEADER.unpack(data)
         if version != VERSION:
             raise LinkError(f"version {version} of the header is not understood", hint="pip install --upgrade omote")
-        if fence > MOST or not -MOST <= time_ns <= MOST or not -MOST <= stamp_ns <= MOST:
-            raise LinkError("a header with a number that no conductor has")
+        if fence > MAX_NUMBER or not -MAX_NUMBER <= time_ns <= MAX_NUMBER or not -MAX_NUMBER <= stamp_ns <= MAX_NUMBER:
+            raise LinkError("a header with a number out of range")
         return cls(Token(fence, holder), sequence, time_ns, stamp_ns, bool(flags & _STOPPED))
 
 
 class Payloads:
-    """Encodes and decodes faces of some parameters.
+    """Encodes and decodes faces of ``parameters``.
 
-    kind : one of :data:`ENCODINGS`, for what is encoded; any of them is decoded.
+    kind : encoding to use, a key of :data:`ENCODINGS`; all of them are decoded.
     """
 
     def __init__(self, parameters: Parameters, kind: str = "exact") -> None:
@@ -77,7 +76,7 @@ class Payloads:
         self._all = np.ones(len(parameters), dtype=bool)
 
     def encode(self, values: Floats) -> bytes:
-        """``values`` : (P,). Exact and JSON keep every bit; the binary frame rounds to 1/16384."""
+        """Encode ``values`` : (P,). Exact and JSON keep every bit; the binary frame rounds to 1/16384."""
         if self.kind == "exact":
             return _COUNT.pack(len(values)) + values.astype("<f8").tobytes()
         if self.kind == "json":
@@ -86,8 +85,8 @@ class Payloads:
         return self._encoder.encode(Frame(values, self._all))[0]
 
     def decode(self, data: bytes, encoding: str) -> Floats:
-        """(P,) values in their ranges. Raises LinkError: damaged, not finite, or of an encoding that is not known."""
-        if len(data) > _MOST_BYTES:
+        """Return (P,) values clipped to their ranges. Raises LinkError: damaged, not finite, or an unknown encoding."""
+        if len(data) > _MAX_BYTES:
             raise LinkError(f"a face of {len(data)} bytes")
         kind = _KINDS.get(encoding)
         if kind == "exact":
@@ -103,7 +102,7 @@ class Payloads:
         return np.clip(values, self._parameters.low, self._parameters.high)
 
     def decode_exact(self, data: bytes, length: int) -> Floats:
-        """(k, P) values in their ranges of k exact faces of ``length`` bytes each, one after the other.
+        """Return (k, P) values, clipped to their ranges, of k concatenated exact faces of ``length`` bytes each.
 
         Raises LinkError: damaged, or not finite.
         """
@@ -137,7 +136,7 @@ class Payloads:
             version, given = table["version"], table["parameters"].items()
             pairs = [(self._parameters.find(name), float(value)) for name, value in given]
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
-            raise LinkError(f"a face that is not the JSON it should be: {type(error).__name__}") from error
+            raise LinkError(f"a face that is malformed JSON: {type(error).__name__}") from error
         if version != VERSION:
             raise LinkError(f"version {version!r} of a face is not understood", hint="pip install --upgrade omote")
         values = self._parameters.neutral()

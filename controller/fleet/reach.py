@@ -1,10 +1,11 @@
-"""What a motion can do in its next step without passing a limit of speed, acceleration or range; compiled.
+"""Computes how far a motion can go in its next step within limits of speed, acceleration and range; compiled.
 
-What counts of a step is its mean speed, which is what can be measured of it. After a step of ``t`` s with the mean
-speed ``m`` the motion may have any speed between ``m - a t / 2`` and ``m + a t / 2`` from which it can still stop
-inside its range, so that ``v^2 <= 2 a room``; these are its *end speeds*. The mean of the next step, of any length
-``T``, lies within ``a T / 2`` of one of them. So two mean speeds differ by ``a`` times the time between the middles of
-their steps at most. Braking at ``a`` from an end speed, and standing from then on, is always among the choices.
+A step is described by its mean speed, which can be measured. After a step of ``t`` s with the mean speed ``m`` and the
+acceleration limit ``a``, the motion may have any speed ``v`` between ``m - a t / 2`` and ``m + a t / 2`` from which it
+can still stop inside its range: ``v^2 <= 2 a room``, with the distance ``room`` to the end of the range. These are its
+*end speeds*. The mean speed of the next step, of any length ``T``, is within ``a T / 2`` of one of them. So two mean
+speeds differ at most by ``a`` times the time between the middles of their steps. Braking at ``a`` from an end speed to
+a standstill is always possible.
 """
 
 from __future__ import annotations
@@ -17,39 +18,39 @@ from numba.types import UniTuple  # type: ignore[attr-defined]  # its stubs lack
 from controller.base.parameters import Flags, Floats
 from surface.base.jit import declared
 
-_SHARE = 0.6
-"""How much of the limits closing a distance may use, beside the motion of the face itself."""
+_LIMIT_FRACTION = 0.6
+"""Fraction of the limits that closing a distance may use in addition to the motion of the face itself."""
 _SETTLE_S = 0.03
-"""Time constant of the end of the way."""
-_LONGEST_S = 0.1
-"""A step is no wider than top speed goes in this time: after a pause of the machine a face does not leap."""
-_MEET = 0.5
-"""So much of the acceleration may be needed afterwards to move along with a face that is met."""
+"""Time constant of the last part of the approach."""
+_MAX_STEP_S = 0.1
+"""A step is at most as wide as the top speed in this time, so a face does not jump after a pause of the computer."""
+_MEET_FRACTION = 0.5
+"""Fraction of the acceleration limit that changing to the face's speed may need when a parameter meets it."""
 _ROUNDING = 1e-9
 _ROW, _ROWS = float64[::1], float64[:, ::1]
 
 
 @declared(float64(float64, float64, float64))
 def _greatest(t: float, room: float, accel: float) -> float:
-    """Greatest mean speed of a step of ``t`` s that ends where braking ends within ``room``."""
+    """Return the greatest mean speed of a step of ``t`` s after which braking can end within the distance ``room``."""
     stoppable = math.sqrt(2.0 * accel * max(room, 0.0))
     return stoppable - 0.5 * accel * t if stoppable >= accel * t else max(room, 0.0) / t
 
 
 @declared(float64(float64, float64, float64, float64))
 def _closing(t: float, distance: float, speed: float, accel: float) -> float:
-    """Speed that closes a distance along the braking curve of :mod:`controller.motion.motion`."""
-    settle, size, brake = max(_SETTLE_S, t), abs(distance), _SHARE * accel
+    """Return the speed that closes a distance along the braking curve of :mod:`controller.motion.motion`."""
+    settle, size, brake = max(_SETTLE_S, t), abs(distance), _LIMIT_FRACTION * accel
     end = brake * settle * settle
     found = size / settle if size <= end else math.sqrt(2.0 * brake * (size - 0.5 * end))
-    return -math.copysign(min(found, _SHARE * speed), distance)
+    return -math.copysign(min(found, _LIMIT_FRACTION * speed), distance)
 
 
 @declared(UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64, float64, float64))
 def _means(t: float, shown: float, slowest: float, fastest: float, top: float, accel: float, low: float, high: float
            ) -> tuple[float, float]:  # fmt: skip
-    """Least and greatest mean speed of a step of ``t`` s from ``shown``, after which it can go on within the limits."""
-    farthest = top * min(1.0, _LONGEST_S / t)
+    """Return least and greatest mean speed of a step of ``t`` s from ``shown`` that lets it stay within the limits."""
+    farthest = top * min(1.0, _MAX_STEP_S / t)
     least = max(slowest - 0.5 * accel * t, -_greatest(t, shown - low, accel), -top)
     most = min(fastest + 0.5 * accel * t, _greatest(t, high - shown, accel), top)
     return min(max(least, -farthest), most), max(min(most, farthest), least)
@@ -58,7 +59,7 @@ def _means(t: float, shown: float, slowest: float, fastest: float, top: float, a
 @declared(UniTuple(float64, 2)(float64, float64, float64, float64, float64, float64, float64))
 def _ends(t: float, mean: float, shown: float, top: float, accel: float, low: float, high: float
           ) -> tuple[float, float]:  # fmt: skip
-    """Slowest and fastest end speed of a step of ``t`` s that ended at ``shown``."""
+    """Return slowest and fastest end speed of a step of ``t`` s that ended at ``shown``."""
     fastest = min(mean + 0.5 * accel * t, math.sqrt(2.0 * accel * max(high - shown, 0.0)), top)
     slowest = max(mean - 0.5 * accel * t, -math.sqrt(2.0 * accel * max(shown - low, 0.0)), -top)
     return min(slowest, fastest), fastest  # rounding can cross them
@@ -66,13 +67,13 @@ def _ends(t: float, mean: float, shown: float, top: float, accel: float, low: fl
 
 @declared(void(float64, float64, boolean, _ROW, boolean[::1], _ROWS, _ROWS))
 def pursue(t: float, passed_s: float, stay: bool, face: Floats, met: Flags, motion: Floats, limits: Floats) -> None:
-    """Move for ``t`` s towards ``face`` : (n,), which went there in ``passed_s``; in place.
+    """Move for ``t`` s towards ``face`` : (n,), which moved there in ``passed_s``; writes to ``met`` and ``motion``.
 
-    A value of the face that is no finite number counts as what is shown, and is not met.
+    A value of the face that is not finite is replaced by the shown value, and is not met.
 
-    met : (n,) bool, whether what is shown is exactly the face, which is only where ``stay`` says so. motion : (4, n)
-    what is shown, where the face was before, slowest and fastest end speed (units/s). limits : (4, n) of speed
-    (units/s) and acceleration (units/s^2), low and high end of the range.
+    stay : whether values may meet the face. met : (n,) bool, whether the shown value equals the face. motion : (4, n)
+    shown values, previous face, slowest and fastest end speed (units/s). limits : (4, n) of speed (units/s) and
+    acceleration (units/s^2), low and high end of the range.
     """
     shown, before, slowest, fastest = motion[0], motion[1], motion[2], motion[3]
     speed, accel, low, high = limits[0], limits[1], limits[2], limits[3]
@@ -83,7 +84,7 @@ def pursue(t: float, passed_s: float, stay: bool, face: Floats, met: Flags, moti
         drift = min(max((wanted - before[i]) / max(t, passed_s), -top), top)
         mean, rounding = (wanted - shown[i]) / t, _ROUNDING * a * t
         met[i] = known and stay and least - rounding <= mean <= most + rounding and (
-            met[i] or abs(mean - drift) <= _MEET * a * t
+            met[i] or abs(mean - drift) <= _MEET_FRACTION * a * t
         )  # fmt: skip
         if met[i]:
             shown[i] = wanted

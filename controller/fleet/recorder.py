@@ -1,4 +1,4 @@
-"""Writes the faces that a conductor published for one head: a take, ``time,jawOpen,...`` in seconds and values."""
+"""Writes the faces that a conductor publishes for one head to a take: a table with time (s), jawOpen and so on."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 class Recording:
     """A table ``<stem>-<head>.csv``, which ``omote play`` reads.
 
-    When it cannot be written any more, as on a full disk, it reports that once and keeps the rows that are in it.
+    If it cannot be written any more, as on a full disk, that is logged, and the rows written so far are kept.
 
     Raises ControllerError: the file cannot be written.
     """

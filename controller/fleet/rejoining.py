@@ -1,7 +1,7 @@
-"""Opens a process's session again where the network has lost what it declared.
+"""Reopens a process's Zenoh session if the network has lost its declarations.
 
-Over a link that loses messages (UDP) Zenoh sends a declaration once. Where that of a key is lost, the router refuses
-whatever is declared by the key's number later, as long as the session lasts; so only another session helps.
+Over a link that loses messages (UDP), Zenoh sends a declaration only once. If the declaration of a key is lost, the
+router refuses later declarations that use the key's number for the whole session, so only a new session helps.
 """
 
 from __future__ import annotations
@@ -21,33 +21,35 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 _SILENT_S = 0.4
-"""Without a face for so long a head is silent, longer than it takes to replace a conductor on an idle machine."""
-_DEAF_S, _DEAF_PAUSE_S = 0.3, 30.0
-"""A silent head whose conductor answers questions for so long is deaf; longest pause between two sessions, as a
-conductor may have no face for it at all."""
+"""A head that receives no face for this time is silent. Replacing a conductor on an idle machine takes less."""
+_DEAF_S = 0.3
+"""Time after which a silent head is deaf, if its conductor answers queries."""
+_MAX_PAUSE_S = 30.0
+"""Longest pause between two new sessions, since a conductor may have no face for the head at all."""
 _ANSWERED_S = 1.5
-"""A conductor that answered so long ago is there."""
+"""A conductor counts as present for this time after its last answer."""
 
 
 class Rejoining:
-    """Decides when the session of ``wire`` is opened again, by what ``hearing`` and ``clocks`` know.
+    """Decides when the session of ``wire`` is reopened, from the faces in ``hearing`` and the answers in ``clocks``.
 
-    open_again : opens another session; what cannot be opened is tried again. Not for a process that conducts: its
-    control loop sends by the session, and where it hears nobody it conducts by itself.
+    Not for a process that may conduct, because its control loop sends through the session.
+
+    open_again : opens another session; an error is raised by :meth:`check`, and a later call tries again.
     """
 
     def __init__(
         self, wire: Wire, hearing: Hearing, clocks: Clocks, open_again: Callable[[], zenoh.Session], now_s: float
     ) -> None:
         self._wire, self._hearing, self._clocks, self._open_again = wire, hearing, clocks, open_again
-        self._heard = Silence(_DEAF_S, _DEAF_PAUSE_S, now_s)
+        self._heard = Silence(_DEAF_S, _MAX_PAUSE_S, now_s)
 
     def silent(self, now_s: float) -> bool:
-        """Whether a head has heard no face for some time."""
+        """Whether a head has received no face for some time."""
         return now_s - self._hearing.silent()[1] >= _SILENT_S
 
     def check(self, now_s: float) -> None:
-        """Called often: open the session again if that is due."""
+        """Reopen the session if that is due; call it often."""
         name, since_s = self._hearing.silent()
         if not self._is_deaf(now_s, since_s):
             self._heard.hear(now_s)
@@ -58,6 +60,6 @@ class Rejoining:
             self._wire.move(self._open_again())
 
     def _is_deaf(self, now_s: float, since_s: float) -> bool:
-        """Whether a head is silent while a conductor answers, as it did after the silence had begun."""
+        """Whether a head is silent although a conductor has answered recently, and after the silence began."""
         answered_s = 1e-9 * self._clocks.answered_ns
         return answered_s - since_s > _SILENT_S and now_s - answered_s < _ANSWERED_S

@@ -1,7 +1,7 @@
-"""Sends faces: each by itself, and all of a tick together to processes that hear many.
+"""Sends faces: each separately, and all of a tick together for processes with many heads.
 
-Where there are many heads, nothing is sent that nobody is known to listen to. But Zenoh may take a while to say that
-somebody listens: so who begins to conduct sends every face both ways at first, and faces of a few heads in any case.
+If there are many heads, nothing is sent that has no known subscriber. But Zenoh may take a while to report a
+subscriber, so a new conductor sends every face both ways at first, and single faces of few heads always.
 """
 
 from __future__ import annotations
@@ -14,20 +14,23 @@ from controller.fleet.payload import Header, Payloads
 from controller.fleet.wire import Outlet
 
 FEW = 3
-"""Most heads of a stage whose faces are sent whether or not somebody is known to listen."""
+"""Greatest number of heads whose single faces are sent without a known subscriber."""
 FIRST_S = 3.0
-"""So long after it has begun to conduct, a process sends everything whether or not somebody is known to listen."""
-_ASK_NS = 50_000_000
-"""Whether somebody listens is asked again after this time: the question takes a tenth of what mixing a face does."""
+"""Time after it began to conduct in which a process sends everything without a known subscriber."""
+_STATUS_INTERVAL_NS = 50_000_000
+"""Interval of asking Zenoh for subscribers, which takes a tenth of the time of mixing a face."""
 Heading = Callable[[int, int, int], Header]
-"""Makes a header of a sequence, a time and a stamp (ns)."""
+"""Function that makes a header from a sequence, a time and a stamp (ns)."""
 
 
 class FaceSender:
-    """What a conductor sends faces by.
+    """Sends the faces of a conductor.
 
-    outlets : publishers of the heads by name. together : that of faces in one message. sent : how many faces.
-    sequences : of the last face of each head.
+    outlets : publishers of single faces by head. together : publisher of the faces of a tick in one message.
+
+    Attributes
+    ----------
+    sent : number of faces. sequences : of the last face of each head.
     """
 
     def __init__(self, outlets: Mapping[str, Outlet], together: Outlet, payloads: Payloads, heading: Heading) -> None:
@@ -40,11 +43,11 @@ class FaceSender:
         self._all_until_ns = 0
 
     def begin(self, now_ns: int) -> None:
-        """Begin to conduct: for some time everything is sent."""
+        """Begin to conduct: send everything for some time."""
         self._all_until_ns = now_ns + round(FIRST_S * 1e9)
 
     def send(self, head: str, now_ns: int, values: Floats, stamp_ns: int) -> None:
-        """Send what one head shows, of the tick that was due at ``now_ns``; ``values`` : (P,)."""
+        """Send the face ``values`` : (P,) of one head, of the tick that was due at ``now_ns``."""
         self.sequences[head] += 1
         self.sent += 1
         sequence, data, outlet = self.sequences[head], self._payloads.encode(values), self._outlets[head]
@@ -65,19 +68,19 @@ class FaceSender:
 
 
 class Listeners:
-    """Those who listen to a publisher, as was heard last."""
+    """Caches whether a publisher has subscribers."""
 
     def __init__(self, outlet: Outlet) -> None:
-        self._outlet, self._asked_ns, self._there = outlet, -_ASK_NS, False
+        self._outlet, self._asked_ns, self._there = outlet, -_STATUS_INTERVAL_NS, False
 
     def there(self, now_ns: int) -> bool:
-        """Whether anybody is there at a time (ns)."""
-        if not 0 <= now_ns - self._asked_ns < _ASK_NS:
+        """Whether there is a subscriber; Zenoh is asked if the last answer is old at ``now_ns``."""
+        if not 0 <= now_ns - self._asked_ns < _STATUS_INTERVAL_NS:
             self._asked_ns, self._there = now_ns, is_heard(self._outlet)
         return self._there
 
 
 def is_heard(outlet: Outlet) -> bool:
-    """Whether anybody listens to what a publisher sends."""
+    """Whether a publisher has subscribers."""
     status = outlet.matching_status
     return bool(getattr(status, "matching", status))  # some versions of the library wrap it

@@ -1,4 +1,4 @@
-"""Opens a session of Zenoh: explicit endpoints only, with TLS and access control where the stage says so."""
+"""Opens a Zenoh session with explicit endpoints only, and with TLS and access control if the stage sets them."""
 
 from __future__ import annotations
 
@@ -15,24 +15,26 @@ from surface.base.extras import importing
 if TYPE_CHECKING:
     import zenoh  # optional: the extra zenoh
 
-_CONNECT_S = 20.0
-"""A client waits so long for its router; afterwards whoever started it hears what is missing."""
-_TRY_MS = 4_000
-"""So long it waits with one session, then with another: where the last message of a router's greeting is lost, the
-router refuses that session as one that it has, for 10 s."""
+_CONNECT_TIMEOUT_S = 20.0
+"""Time that a client waits for its router before it reports an error."""
+_ATTEMPT_TIMEOUT_MS = 4_000
+"""Time that it waits with one session before it opens another one. If the last message of the handshake is lost, the
+router refuses that session as a duplicate for 10 s."""
 _RETRY = {"period_init_ms": 100, "period_max_ms": 500, "period_increase_factor": 2}
-"""Longest pause between two tries to reach a router that has gone; Zenoh's own would grow to 4 s."""
-_OPEN_MS = 2_000
-"""Longest time that a router may take to greet; Zenoh's 10 s are lost on one that takes a connection while it ends."""
-_AGAIN_MS, _AGAIN_OPEN_MS = 1_800, 600
-"""The same for a session beside one that is not answered: several tries, as a greeting may be lost."""
+"""Pauses between attempts to reach a router that has gone; Zenoh's default would grow to 4 s."""
+_HANDSHAKE_TIMEOUT_MS = 2_000
+"""Longest duration of a router's handshake. A router that is ending may accept a connection and not answer, and
+Zenoh's default of 10 s would be lost."""
+_REOPEN_TIMEOUT_MS, _REOPEN_HANDSHAKE_TIMEOUT_MS = 1_800, 600
+"""The same limits for a session that replaces one without answers; several attempts fit, as messages may be lost."""
 _NO_ROUTER_HINT = "start a router there, as zenohd -l tcp/0.0.0.0:7447, or correct [zenoh] connect"
 
 
 def open_session(settings: ZenohSettings, beside: Path, *, again: bool = False) -> zenoh.Session:
-    """A session by a stage's ``[zenoh]``; ``beside`` : the stage's file, from whose folder other files are named.
+    """Open a session with the settings of a stage's ``[zenoh]``.
 
-    again : another one beside one that is not answered, which takes 2 s at most.
+    beside : the stage's file, to whose folder other files are relative. again : open another session, to replace one
+    that gets no answers; takes 2 s at most.
 
     Raises LinkError: an endpoint cannot be used, or a file of certificates or settings cannot be read. MissingPackage:
     Zenoh is not installed.
@@ -42,7 +44,7 @@ def open_session(settings: ZenohSettings, beside: Path, *, again: bool = False) 
     zenoh.init_log_from_env_or("error")
     where = ", ".join([*settings.listen, *settings.connect]) or str(settings.config)
     waits = settings.way == "client" and not again
-    give_up_s = time.monotonic() + (_CONNECT_S if waits else 0.0)
+    give_up_s = time.monotonic() + (_CONNECT_TIMEOUT_S if waits else 0.0)
     while True:
         try:
             return zenoh.open(_configuration(settings, beside.parent, again))
@@ -51,7 +53,7 @@ def open_session(settings: ZenohSettings, beside: Path, *, again: bool = False) 
             if "connect" in why and time.monotonic() < give_up_s:
                 time.sleep(1e-3 * _RETRY["period_init_ms"])
                 continue
-            hint = _NO_ROUTER_HINT if "connect" in why else "look whether another program has the port: ss -ltnp"
+            hint = _NO_ROUTER_HINT if "connect" in why else "check whether another program uses the port: ss -ltnp"
             raise LinkError(f"zenoh at {where}: {why}", hint=hint) from error
 
 
@@ -66,8 +68,10 @@ def _configuration(settings: ZenohSettings, folder: Path, again: bool) -> zenoh.
 
 
 def _entries(settings: ZenohSettings, folder: Path, again: bool) -> dict[str, object]:
-    """What the table says, as Zenoh's own keys. Nothing is searched for: no multicast, and gossip connects nobody."""
-    connect_ms, open_ms = (_AGAIN_MS, _AGAIN_OPEN_MS) if again else (_TRY_MS, _OPEN_MS)
+    """Return the settings as Zenoh's keys, with discovery off: no multicast, and gossip connects to nobody."""
+    connect_ms, open_ms = _ATTEMPT_TIMEOUT_MS, _HANDSHAKE_TIMEOUT_MS
+    if again:
+        connect_ms, open_ms = _REOPEN_TIMEOUT_MS, _REOPEN_HANDSHAKE_TIMEOUT_MS
     found: dict[str, object] = {
         "mode": settings.way,
         "scouting/multicast/enabled": False,
@@ -101,7 +105,7 @@ def _tls(tls: TlsSettings, folder: Path) -> dict[str, object]:
 
 
 def _file(folder: Path, name: str, key: str) -> Path:
-    """A file that the table names. Raises LinkError: it cannot be read."""
+    """Return the path of a file that the table names. Raises LinkError: it cannot be read."""
     path = folder / name
     if not os.access(path, os.R_OK):
         raise LinkError(f"{key}: {path} cannot be read", hint=f"look at: ls -l {path}")

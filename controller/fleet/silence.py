@@ -1,12 +1,12 @@
-"""Says when silence has lasted so long that something is to be done about it; no I/O here."""
+"""Decides when a silence has lasted long enough to act on it; no I/O here."""
 
 from __future__ import annotations
 
 
 class Silence:
-    """How long nothing came. Whoever asks is told to act after ``first_s``, then after pauses that double.
+    """A timer of silence: an action is due after ``first_s``, and again after pauses that double.
 
-    longest_s : the longest pause between two acts. now_s : the time, s, of any clock that does not jump.
+    longest_s : longest pause between two actions. now_s : the time (s) of any clock that does not jump.
     """
 
     def __init__(self, first_s: float, longest_s: float, now_s: float) -> None:
@@ -14,14 +14,14 @@ class Silence:
         self._heard_s, self._since_s = now_s, now_s
         self._pause_s = self._next_s = 0.0
         self.acts = 0
-        """How often something was to be done since something came last."""
+        """Number of actions that were due since a message came last."""
 
     def hear(self, now_s: float) -> None:
-        """Something came; any thread may call it."""
+        """Note that a message came; any thread may call it."""
         self._heard_s = now_s
 
     def due(self, now_s: float) -> bool:
-        """Whether something is to be done now; one thread calls it, often."""
+        """Return whether an action is due now, and count it; a single thread calls it often."""
         if not self.acts or self._heard_s != self._since_s:
             self._since_s, self._pause_s, self.acts = self._heard_s, self._first_s, 0
             self._next_s = self._heard_s + self._first_s

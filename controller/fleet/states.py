@@ -1,4 +1,4 @@
-"""Says how the heads of a process are: to other processes, to whoever listens, and to whoever asks."""
+"""Publishes the states of the heads of a process, and answers queries for them."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class States:
         self._conducts = settings.role == "conductor"
         self._states = wire.outlets(heads, "state")
         self._servos = wire.outlets(heads, "servos") if self._role == "head" else {}
-        tail = "" if self._conducts else f"/{self._role}"  # equal keys would be one answer
+        tail = "" if self._conducts else f"/{self._role}"  # Zenoh merges answers with equal keys
         about = settings.model_dump(mode="json", exclude={"tls"})
         for name in heads:
             wire.answer(name, "state" + tail, self._answer(partial(self.state, name)))
             wire.answer(name, "configuration" + tail, self._answer(lambda: about))
             wire.live(name, f"alive/{self._role}")
 
-    def say(self) -> None:
-        """Tell conductors which one is obeyed here, once for all heads; and who listens to a head, how that is."""
+    def publish(self) -> None:
+        """Tell all conductors which token is obeyed here; publish the state of each head that has subscribers."""
         leads = self._lease.token if self._lease.active else None
         tokens = {name: leads or follower.highest for name, follower in self._followers.items()}
         short = {"version": journal.VERSION, "role": self._role}
@@ -53,7 +53,7 @@ class States:
                 outlet.put(json.dumps({"version": journal.VERSION, "servos": servos}), encoding="application/json")
 
     def state(self, head: str) -> dict[str, Any]:
-        """The full state of a head, as its queryable gives it."""
+        """Return the full state of a head, as its queryable answers."""
         state, follower = self._heads[head], self._followers[head]
         values = state.parameters.neutral()
         state.snapshot(values)
@@ -78,7 +78,7 @@ class States:
 
 
 def follower_report(follower: Follower) -> dict[str, Any]:
-    """What a head took and refused, and whether it follows."""
+    """Return whether a head follows a conductor, and counts of the faces that it accepted and refused."""
     return {
         "conducted": follower.conducted, "exact": follower.exact, "taken": follower.taken,
         "refused": dict(follower.refused),

@@ -1,6 +1,6 @@
-"""What a process declares at Zenoh: subscribers, publishers and answers, by keys, until it is closed.
+"""What a process declares at a Zenoh session: subscribers, publishers and queryables, by key, until it is closed.
 
-Callbacks of Zenoh run in its own threads; nothing that arrives ends them: what is refused is counted by its reason.
+Zenoh calls callbacks in its own threads. No message ends them: messages that are refused are counted by reason.
 """
 
 from __future__ import annotations
@@ -20,49 +20,49 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-_REFUSED = 200
-"""Kinds of refusals that are counted, at most."""
+_MAX_REASONS = 200
+"""Greatest number of different reasons of refusal that are counted."""
 ALL = "_"
-"""In a key in place of a head: what belongs to all of them."""
+"""Stands in keys instead of a head's name for what is common to all heads."""
 
 
 class Declared:
-    """Something that is declared at a session, and can be declared at another one."""
+    """An entity that is declared at a session, and can be declared again at another one."""
 
     def __init__(self, session: zenoh.Session, make: Callable[[zenoh.Session], Any]) -> None:
         self._make = make
         self._held: Any = make(session)
 
     def made_at(self, session: zenoh.Session) -> Any:
-        """The same at another session; it counts from :meth:`hold` on."""
+        """Declare and return the same at another session; it is used after :meth:`hold`."""
         return self._make(session)
 
     def hold(self, made: Any) -> None:
-        """Use what was made at another session; what was held ends with its own session."""
+        """Use what :meth:`made_at` returned; the entity before ends with its own session."""
         self._held = made
 
     def undeclare(self) -> None:
-        """Take it back."""
+        """Undeclare it at Zenoh."""
         self._held.undeclare()
 
 
 class Outlet(Declared):
-    """What sends something, and knows whether anybody listens."""
+    """A publisher, which knows whether anybody subscribes to it."""
 
     def put(self, data: bytes | str, **more: Any) -> None:
-        """Send something; ``more`` as Zenoh's own publisher takes it."""
+        """Publish data; ``more`` : options of Zenoh's publisher."""
         self._held.put(data, **more)
 
     @property
     def matching_status(self) -> Any:
-        """Whether anybody listens, as Zenoh says it."""
+        """Zenoh's status of whether anybody subscribes."""
         return self._held.matching_status
 
 
 class Wire:
-    """A session and what was declared at it. prefix : the beginning of all keys.
+    """A session and what was declared at it.
 
-    refused : how many messages were refused, by reason.
+    prefix : the beginning of all keys. refused : number of refused messages by reason.
     """
 
     def __init__(self, session: zenoh.Session, prefix: str) -> None:
@@ -71,50 +71,54 @@ class Wire:
         self._declared: list[Declared] = []
 
     def key(self, head: str, what: str) -> str:
-        """The key of something of a head, or of :data:`ALL`."""
+        """Return the key of something of a head, or of :data:`ALL`."""
         return f"{self._prefix}/{head}/{what}"
 
     def hear(self, head: str, what: str, act: Callable[[zenoh.Sample], object], *, direct: bool = False) -> None:
-        """Call ``act`` with every message; ``direct`` : in Zenoh's receiving thread, as waking another one costs more
-        than a face."""
+        """Subscribe: call ``act`` with every message.
+
+        direct : call it in Zenoh's receiving thread, because waking another thread takes longer than handling a face.
+        """
         from zenoh.handlers import Callback  # optional
 
         call, key = self._guarded(act), self.key(head, what)
         self._keep(lambda session: session.declare_subscriber(key, Callback(call, indirect=not direct)))
 
     def answer(self, head: str, what: str, act: Callable[[zenoh.Query], object]) -> None:
-        """Call ``act`` with every query."""
+        """Declare a queryable: call ``act`` with every query."""
         key = self.key(head, what)
         self._keep(lambda session: session.declare_queryable(key, act))
 
     def ask(self, head: str, what: str, act: Callable[[zenoh.Reply], object], timeout_s: float) -> None:
-        """Ask whoever answers, and call ``act`` with every reply.
+        """Send a query, and call ``act`` with every reply.
 
-        It is called in Zenoh's own threads. With a thread of Python's for each question, which Zenoh would start, one
-        that waits for its reply when Python ends aborts the process.
+        It is called in Zenoh's own threads. By default Zenoh would start a Python thread for each query, and a thread
+        that still waits for its reply when Python exits aborts the process.
         """
         from zenoh.handlers import Callback  # optional
 
         self.session.get(self.key(head, what), Callback(act, indirect=False), timeout=timeout_s)
 
     def live(self, head: str, what: str) -> None:
-        """A token that is there as long as this process; its key ends with the number of the session."""
+        """Declare a liveliness token for the lifetime of this session; its key ends with the session's id."""
         self._keep(lambda session: session.liveliness().declare_token(f"{self.key(head, what)}/{session.zid()}"))
 
     def outlet(self, head: str, what: str) -> Outlet:
-        """What sends something, and knows whether anybody listens."""
+        """Declare and return a publisher."""
         key = self.key(head, what)
         outlet = Outlet(self.session, lambda session: session.declare_publisher(key))
         self._declared.append(outlet)
         return outlet
 
     def outlets(self, heads: Iterable[str], what: str) -> dict[str, Outlet]:
-        """An outlet of each head."""
+        """Declare a publisher for each head; return them by head."""
         return {name: self.outlet(name, what) for name in heads}
 
     def move(self, session: zenoh.Session) -> None:
-        """Declare everything at another session, use that from now on, and end the one before. Not for a process that
-        sends faces meanwhile."""
+        """Declare everything at another session, use it from now on, and close the one before.
+
+        Not for a process that sends faces meanwhile.
+        """
         try:
             made = [declared.made_at(session) for declared in self._declared]
         except BaseException:
@@ -126,7 +130,7 @@ class Wire:
         before.close()  # type: ignore[no-untyped-call]
 
     def close(self) -> None:
-        """Take back what was declared, and end the session."""
+        """Undeclare everything, and close the session."""
         with ExitStack() as closers:
             closers.callback(self.session.close)
             for declared in self._declared:
@@ -141,24 +145,24 @@ class Wire:
                 act(sample)
             except OMOTE_ERRORS as error:
                 self.refuse(error)
-            except Exception as error:  # noqa: BLE001  as above
+            except Exception as error:  # noqa: BLE001  a message must not end Zenoh's thread
                 log.error("zenoh %s: %s: %s", sample.key_expr, type(error).__name__, error)
 
         return call
 
     def refuse(self, error: Exception) -> None:
-        """Count what was refused."""
+        """Count a refused message by the text of its error."""
         reason = str(error)
-        self.refused[reason if reason in self.refused or len(self.refused) < _REFUSED else "other"] += 1
+        self.refused[reason if reason in self.refused or len(self.refused) < _MAX_REASONS else "other"] += 1
 
 
 def header_of(sample: zenoh.Sample) -> Header:
-    """Raises LinkError: none, damaged, or of another version."""
+    """Decode the header of a message. Raises LinkError: it is missing, damaged, or of another version."""
     if sample.attachment is None:
-        raise LinkError("a message without a header, which is of no conductor")
+        raise LinkError("a message without a header, which no conductor sends")
     return Header.decode(sample.attachment.to_bytes())
 
 
 def reply_json(query: zenoh.Query, found: object) -> None:
-    """Answer a query."""
+    """Answer a query with JSON."""
     query.reply(query.key_expr, json.dumps(found), encoding="application/json")

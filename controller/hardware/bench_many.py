@@ -18,7 +18,7 @@ from typing import Any
 from controller.base.errors import ControllerError
 from controller.base.steal_time import StealTime
 from controller.tools.bench_bus import (
-    SHARES,
+    MIN_WIRE_FRACTIONS,
     WARM_UP_CYCLES,
     Cycle,
     Figure,
@@ -68,7 +68,7 @@ def bench_many(buses: int, servos: int, baud: int, seconds: float, log: Log) -> 
             alone = _at_once(paths, partial(bytes_alone, servos=servos, baud=baud, fast=fast), seconds, 0.0)
             log(f"{buses} buses at once, {kind}, each driven from a process of its own")
             apart = _at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0, processes=True)
-            figures += _free_figures(kind, limit_hz(servos, baud, fast), SHARES[fast], free, alone)
+            figures += _free_figures(kind, limit_hz(servos, baud, fast), MIN_WIRE_FRACTIONS[fast], free, alone)
             simulated = 1e6 * sum(used_s) / sum(loop.rate_hz * seconds + WARM_UP_CYCLES for loop in free)
             figures += _cost_figures(kind, limit_hz(servos, baud, fast), free, alone, apart)
             figures.append(Figure("  simulated servos, processor of a cycle", simulated, "us"))

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from controller.base.config import Number, Settings, Share, check, read_toml
+from controller.base.config import Fraction, Number, Settings, check, read_toml
 from controller.base.parameters import REGIONS, did_you_mean
 from controller.base.paths import config_dir
 from controller.layers.mixer import LayerSettings, Mode
@@ -25,7 +25,7 @@ _Gain = Annotated[Number, Field(ge=0, le=4)]
 class LayerTable(Settings):
     priority: int
     mode: Mode = "set"
-    weight: Share = 1.0
+    weight: Fraction = 1.0
     fade_in_s: _Seconds = 0.0
     fade_out_s: _Seconds = 0.4
     timeout_s: Annotated[float, Field(gt=0)] = math.inf

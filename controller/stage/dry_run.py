@@ -1,6 +1,6 @@
 """Dry run: computes what a stage would send to its servos, without opening a port or waiting for a clock.
 
-Layers, limits of motion, mixes and safety rules are those of a real run; nothing is measured, so load rules do not act.
+Layers, motion limits, mixes and safety rules are those of a real run. Nothing is measured, so load rules do not act.
 """
 
 from __future__ import annotations
@@ -27,17 +27,18 @@ from controller.takes.recording import SUFFIX, replay
 Feed = Callable[[int], object]
 """Writes to the layers what is due at a time (ns)."""
 
-_FIRST_NS = 1_000_000_000
-_LONGEST_S = 600.0
-_EACH_S = 1.5
+_START_NS = 1_000_000_000
+_MAX_S = 600.0
+_EXPRESSION_S = 1.5
+"""Time for each expression, and after the last step of a script."""
 
 
 @dataclass
 class Rehearsal:
     """What a dry run computed.
 
-    rows : what each channel was sent, in words. buses : for each bus every angle of every cycle (deg).
-    seconds : how much was played of ``length_s``, the length of what plays.
+    rows : for each channel a summary as text. buses : for each bus, the angles (deg) of every cycle.
+    seconds : computed time. length_s : length of the longest source.
     """
 
     rows: list[dict[str, str]] = field(default_factory=list)
@@ -55,20 +56,21 @@ def dry_run(
     *,
     alone: bool = False,
 ) -> Rehearsal:
-    """Play a take, or what a stage plays by itself, to each of the stage's robots.
+    """Compute what each robot of a stage is sent while a take, or the stage's own sources, play.
 
-    Without a take that is the scripts of its simulated hosts, its show, its take and its voice, or else every named
-    expression in turn.
+    The stage's own sources are the scripts of its simulated hosts, its show, its take and its voice. If there are none,
+    every named expression is shown in turn.
 
     Parameters
     ----------
-    take : a take or a recording. voice : plays as well; only it where ``alone``.
-    seconds : how much of it; without, the longest of what plays, a script that repeats once, 10 minutes at most.
+    take : a take or a recording; it replaces the stage's own sources. voice : plays in addition.
+    alone : with ``voice``, leave out the stage's own sources.
+    seconds : time to compute. Default: the length of the longest source (one repetition of a loop), at most 10 minutes.
 
-    Two robots may have buses of one name, so with more than one robot the rows have the robot's name before the bus's.
+    With several robots, the rows have the robot's name before the bus's, because two robots may use one name of a bus.
     """
     if stage.heads:
-        return _of_heads(stage, take, seconds, parameters, voice, alone)
+        return _dry_run_heads(stage, take, seconds, parameters, voice, alone)
     found = Rehearsal()
     for robot in stage.robots:
         state = stage.state(parameters)
@@ -77,7 +79,7 @@ def dry_run(
         anchors = load_anchors(robot, stage.head, parameters)
         offline = OfflineRun(robot, state, feed, stage.settings.control_hz, anchors)
         found.length_s = length_s
-        found.seconds = min(length_s, _LONGEST_S) if seconds is None else seconds
+        found.seconds = min(length_s, _MAX_S) if seconds is None else seconds
         offline.run(found.seconds)
         prefix = f"{robot.name}/" if len(stage.robots) > 1 else ""
         found.rows += [row | {"servo": prefix + row["servo"]} for row in offline.rows()]
@@ -85,14 +87,14 @@ def dry_run(
     return found
 
 
-def _of_heads(
+def _dry_run_heads(
     stage: Stage, take: Path | None, seconds: float | None, parameters: Parameters, voice: Take | None, alone: bool
 ) -> Rehearsal:
-    """A dry run of each head in turn; what is played goes to the first. Rows and buses have the head's name."""
+    """Dry-run each head in turn; take and voice go to the first head. Rows and buses have the head's name."""
     found = Rehearsal()
     for i, head in enumerate(stage.heads):
-        given = (take, voice) if i == 0 else (None, None)
-        one = dry_run(head.stage, given[0], seconds, parameters, given[1], alone=alone and i == 0)
+        source = (take, voice) if i == 0 else (None, None)
+        one = dry_run(head.stage, source[0], seconds, parameters, source[1], alone=alone and i == 0)
         found.rows += [row | {"servo": f"{head.name}/{row['servo']}"} for row in one.rows]
         found.buses += [{"head": head.name, **bus} for bus in one.buses]
         found.seconds, found.length_s = max(found.seconds, one.seconds), max(found.length_s, one.length_s)
@@ -128,13 +130,13 @@ class OfflineRun:
         }
         self._neutral = {name: bus.sent.copy() for name, bus in self._buses.items()}
         self._limited = {name: np.zeros(len(bus.sent), dtype=np.int64) for name, bus in self._buses.items()}
-        self.sent_rad: dict[str, Floats] = {}  # for each bus, the goals (c, n) of every cycle
+        self.sent_rad: dict[str, Floats] = {}  # by bus: the goals (c, n) of every cycle
 
     def run(self, seconds: float) -> None:
-        """Play so many seconds."""
+        """Compute this many seconds."""
         values, rows = self._state.parameters.neutral(), {name: [rest] for name, rest in self._neutral.items()}
         for tick in range(math.ceil(seconds / self._dt)):
-            now_ns = _FIRST_NS + round(tick * self._dt * 1e9)
+            now_ns = _START_NS + round(tick * self._dt * 1e9)
             self._feed(now_ns)
             self._state.tick(now_ns, self._dt, values)
             for name, bus in self._buses.items():
@@ -145,7 +147,7 @@ class OfflineRun:
         self.sent_rad = {name: np.array(each) for name, each in rows.items()}
 
     def rows(self) -> Iterator[dict[str, str]]:
-        """One row for each channel, in file order: servo, mix, neutral angle, what it was sent, what limited it."""
+        """Yield one row for each channel, in file order: servo, mix, neutral angle, sent range, and what limited it."""
         for channel in self._robot.channels:
             bus = self._buses[channel.bus]
             i = bus.table.names.index(channel.name)
@@ -163,7 +165,7 @@ class OfflineRun:
             }
 
     def _held_by(self, channel: ChannelSettings, i: int) -> Iterator[str]:
-        """What limited a channel: its limit of position, and the rules that name it."""
+        """Yield what limited a channel: its position limit, and the rules that name it, each with a time (s)."""
         bus = self._buses[channel.bus]
         if limited := self._limited[channel.bus][i]:
             yield f"limit {limited * bus.period_s:.1f} s"
@@ -173,7 +175,7 @@ class OfflineRun:
                 yield f"{kind} {rule['seconds']:.1f} s"
 
     def report(self) -> list[dict[str, object]]:
-        """What each bus would have been sent, a row for each cycle (deg), and the rules that acted."""
+        """Return what each bus would have been sent, a row for each cycle (deg), and the rules that acted."""
         return [
             {
                 "robot": self._robot.name,
@@ -196,7 +198,7 @@ def _mix(channel: ChannelSettings) -> str:
 
 
 def _feed(stage: Stage, take: Path | None, state: CommandState, voice: Take | None, alone: bool) -> tuple[Feed, float]:
-    """A function that writes to the layers what is due, and for how long it does (s)."""
+    """Return a function that writes to the layers what is due, and the length (s) of its longest source."""
     if take is not None and take.suffix == SUFFIX:
         return _recording_feed(stage, take, state)
     feeds: list[tuple[Feed, float]] = []
@@ -210,9 +212,9 @@ def _feed(stage: Stage, take: Path | None, state: CommandState, voice: Take | No
         feeds.append(_take_feed(load_take(take, state.parameters), state, reader_of(take).layer))
     if voice is not None:
         feeds.append(_take_feed(voice, state, "speech"))
-    if not feeds:  # nothing plays by itself: each named expression in turn
+    if not feeds:  # no source: show each named expression in turn
         expressions = [*state.vocabulary.names, "neutral"]
-        script = Script(tuple((i * _EACH_S, f"EXPR {name}") for i, name in enumerate(expressions)))
+        script = Script(tuple((i * _EXPRESSION_S, f"EXPR {name}") for i, name in enumerate(expressions)))
         feeds = [_script_feed(script, state)]
 
     def feed(now_ns: int) -> None:
@@ -223,7 +225,7 @@ def _feed(stage: Stage, take: Path | None, state: CommandState, voice: Take | No
 
 
 def _scripts(stage: Stage, state: CommandState) -> list[Script]:
-    """The scripts of a stage's simulated hosts, and its show."""
+    """Load the scripts of a stage's simulated hosts, and its show."""
     names = [script for link in stage.settings.links if (script := link.simulated) is not None]
     names += [stage.settings.show] if stage.settings.show is not None else []
     return [load_script(name, state.parameters, stage.vocabulary, beside=stage.path) for name in names]
@@ -232,7 +234,7 @@ def _scripts(stage: Stage, state: CommandState) -> list[Script]:
 def _script_feed(script: Script, state: CommandState) -> tuple[Feed, float]:
     show = Show(script, state)
     show.playing = True
-    return show.tick, script.loop_s or (script.steps[-1][0] if script.steps else 0.0) + _EACH_S
+    return show.tick, script.loop_s or (script.steps[-1][0] if script.steps else 0.0) + _EXPRESSION_S
 
 
 def _take_feed(take: Take, state: CommandState, layer: str) -> tuple[Feed, float]:
@@ -240,7 +242,7 @@ def _take_feed(take: Take, state: CommandState, layer: str) -> tuple[Feed, float
 
 
 def _recording_feed(stage: Stage, path: Path, state: CommandState) -> tuple[Feed, float]:
-    """Writes the recorded face to the highest layer: what a replay shows, except for the motion to its first face."""
+    """Return a feed that writes the recorded face to the highest layer; only the motion to the first face is added."""
     ticks = [(now_ns, values.copy()) for now_ns, values in replay(path, state.parameters, make=stage.state)]
     times = np.array([now_ns for now_ns, _ in ticks], dtype=np.int64)
     every, first = np.ones(len(state.parameters), dtype=bool), [0]
@@ -249,7 +251,7 @@ def _recording_feed(stage: Stage, path: Path, state: CommandState) -> tuple[Feed
         if not ticks:
             return
         first[0] = first[0] or now_ns
-        at = int(np.searchsorted(times - times[0], now_ns - first[0], side="right")) - 1
-        state.write_layer("manual", ticks[at][1], every, now_ns)
+        index = int(np.searchsorted(times - times[0], now_ns - first[0], side="right")) - 1
+        state.write_layer("manual", ticks[index][1], every, now_ns)
 
     return feed, float(times[-1] - times[0]) * 1e-9 if len(times) else 0.0

@@ -1,4 +1,4 @@
-"""The heads of a stage that has several: their tables, the groups they belong to, and where they stand in the room."""
+"""The heads of a stage that has several: their tables, the groups they belong to, and their places in the room."""
 
 from __future__ import annotations
 
@@ -8,33 +8,33 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from controller.base.config import Number, Settings, Share
+from controller.base.config import Fraction, Number, Settings
 from controller.base.parameters import did_you_mean
 from controller.base.placement import Placement
 from controller.layers.heads import EVERYBODY
 from controller.links.links import LinkTable
 from controller.stage.persons import PersonName
 
-MOST = 256
+MAX_HEADS = 256
 """Heads of one stage."""
-_APART_MM = 450.0
-"""Distance of heads that stand side by side because the stage does not place them."""
+_SPACING_MM = 450.0
+"""Distance between heads that the stage does not place, which stand side by side."""
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 _Millimetres = Annotated[Number, Field(ge=-1e5, le=1e5)]
-Names = Annotated[list[str], Field(min_length=1, max_length=MOST)]
+Names = Annotated[list[str], Field(min_length=1, max_length=MAX_HEADS)]
 
 
 class HeadSettings(Settings):
-    """One entry of ``[[heads]]``. What it leaves out is the stage's own."""
+    """One entry of ``[[heads]]``. A key that it omits has the stage's value; see :func:`own_settings`."""
 
     name: str
     person: PersonName | None = None
     head: str | None = None
-    identity: dict[str, Share] | None = None
+    identity: dict[str, Fraction] | None = None
     robots: Annotated[list[str], Field(max_length=32)] = []
     links: Annotated[list[LinkTable], Field(max_length=64)] = []
     layers: Annotated[dict[str, dict[str, Any]], Field(max_length=64)] = {}
-    liveliness: Share | None = None
+    liveliness: Fraction | None = None
     life: str | None = None
     manner: Literal["auto", "alone", "listen", "speak"] | None = None
     seed: Annotated[int, Field(ge=0)] | None = None
@@ -54,17 +54,17 @@ class HeadSettings(Settings):
         return value
 
     def placement(self, index: int, count: int) -> Placement:
-        """Where it stands: as it says, or in a row, the first one at the left of who looks at them."""
-        row = (0.5 * (count - 1) - index) * -_APART_MM
-        return Placement(self.position_mm or (row, 0.0, 0.0), self.yaw_deg)
+        """Return its place: as given, or in a row in which the first head is on the left of a viewer."""
+        x_mm = (0.5 * (count - 1) - index) * -_SPACING_MM
+        return Placement(self.position_mm or (x_mm, 0.0, 0.0), self.yaw_deg)
 
 
 def own_settings(stage: Mapping[str, Any], head: HeadSettings, index: int) -> dict[str, Any]:
-    """What changes in the stage's settings for one of its heads.
+    """Return the keys of the stage's settings that change for one of its heads.
 
-    What stands at the top of a stage (robots, links, show, take, voice) belongs to its first head.
+    The stage's own robots, links, show, take and voice belong to its first head.
 
-    stage : the stage's settings by key.
+    stage : the stage's settings by key. index : of the head in the stage.
     """
     first = index == 0
     found: dict[str, Any] = {"heads": [], "zenoh": None, "seed": stage["seed"] + index}
@@ -83,7 +83,7 @@ def own_settings(stage: Mapping[str, Any], head: HeadSettings, index: int) -> di
 
 
 def head_faults(heads: Sequence[HeadSettings], groups: Mapping[str, Sequence[str]]) -> list[str]:
-    """Two heads of one name, and groups that name a head which there is not, or have a head's name."""
+    """Return the faults of heads and groups: repeated or invalid names, and groups of unknown heads."""
     faults, seen = [], dict[str, int]()
     for i, head in enumerate(heads):
         if seen.setdefault(head.name.lower(), i) != i:
@@ -91,7 +91,7 @@ def head_faults(heads: Sequence[HeadSettings], groups: Mapping[str, Sequence[str
     names = [head.name for head in heads]
     for group, members in groups.items():
         if group.lower() in seen or group.lower() == EVERYBODY or not _NAME.fullmatch(group):
-            faults.append(f"groups.{group}: choose another name, which no head has and which is one word")
+            faults.append(f"groups.{group}: choose another name: one word, and not the name of a head")
         faults += [
             f"groups.{group}: no head called {name!r}{did_you_mean(name, names)}"
             for name in members

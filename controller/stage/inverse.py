@@ -1,8 +1,8 @@
-"""Inverse of the picture: from dragged or tracked points of the skin to parameters or control points that move them.
+"""Solves for parameters or control points that move dragged or tracked points of the skin to wanted positions.
 
-:class:`PointSolver` finds the parameters whose face brings the points to wanted places: bounded least squares with few
-values that are not zero. :class:`SculptSolver` moves control points where no parameter fits: the smallest and smoothest
-displacements that bring the points there exactly, which can be kept as a group file.
+:class:`PointSolver` finds parameters by sparse, bounded least squares. :class:`SculptSolver` moves control points where
+no parameter fits: it finds the smallest and smoothest displacements that bring the points to their positions exactly,
+which can be saved as a group file.
 """
 
 from __future__ import annotations
@@ -32,28 +32,28 @@ from surface.head.model.data import HeadData
 from surface.head.model.light import LightPoints, join_light
 
 if TYPE_CHECKING:
-    from scipy.sparse import csr_matrix  # start-up: only sculpting needs it
+    from scipy.sparse import csr_matrix  # imported lazily: only sculpting needs it
 
 _RIDGE = 1e-3
 _SPARSITY = 0.02
 _TOLERANCE = 1e-4
-_STRAIGHT_MM = 0.5
-_ROUNDS = 2  # solves again, at most, where shapes are not straight
-_SETTLED = 0.02
-_MOST_BYTES = 4 << 20
+_LINEAR_MM = 0.5  # a shape whose slopes differ by less is treated as linear
+_MAX_RESOLVES = 2  # repeated solves for shapes that are not linear
+_CONVERGED = 0.02  # change of parameters below which the solve is not repeated
+_MAX_BYTES = 4 << 20
 FORMAT = 1
 """Version of the group files that :func:`save_group` writes."""
 
 
 class PointSolver:
-    """Solves for parameters that bring points of the skin to wanted places.
+    """Solves for parameters that bring points of the skin to wanted positions.
 
-    Most shapes move the skin along straight lines; where they do not (jaw, lids) the solve is repeated with the slopes
-    at the face that was found.
+    Most shapes move the skin along straight lines. If one that does not (jaw, lids) is used, the solve is repeated with
+    the slopes at the solution.
 
     skin : m points. order : see :func:`controller.robot.anchors.head_order`. parameters : all of them, p.
-    sparsity : prefers few parameters; mm^2 per unit. weights : (m,) how much each point counts; 1 without.
-    start : (p,) parameters to begin from; neutral without.
+    sparsity : penalty that prefers few parameters, mm^2 per unit. weights : (m,) of the points. Default: 1.
+    start : (p,) initial parameters. Default: neutral.
     """
 
     def __init__(
@@ -66,10 +66,10 @@ class PointSolver:
         self._low, self._high = parameters.low[self.moved], parameters.high[self.moved]
         self._sparsity = sparsity
         self._weights = np.repeat(np.ones(len(skin.rest)) if weights is None else weights, 3)
-        # (3 m, s, levels): the slope of each shape on each quarter of its way
+        # (3 m, s, levels): the slope of each shape on each section of its range
         self._slopes = skin.moves.reshape(-1, count, levels) * levels
         self._solver = self._make_solver(self._slopes.mean(axis=2))
-        self._straight = np.abs(self._slopes - self._slopes[:, :, :1]).max(axis=(0, 2)) < _STRAIGHT_MM
+        self._linear = np.abs(self._slopes - self._slopes[:, :, :1]).max(axis=(0, 2)) < _LINEAR_MM
         start = parameters.neutral() if start is None else start
         self._last = np.clip(start[self.moved], self._low, self._high)
 
@@ -78,20 +78,20 @@ class PointSolver:
                              sparsity=self._sparsity, tolerance=_TOLERANCE)  # fmt: skip
 
     def solve(self, places: Floats) -> Floats:
-        """Parameters (p,) whose face brings the points to ``places`` : (m, 3) mm, head not turned.
+        """Return parameters (p,) whose face brings the points to ``places`` : (m, 3) mm, of a head that is not turned.
 
-        Starts from the last solution, so that it can follow a tracker. Raises ValueError when ``places`` has another
-        shape or is not finite.
+        Starts from the last solution, so that it can follow a tracker. Raises ValueError: ``places`` has another shape
+        or is not finite.
         """
         if np.shape(places) != self.skin.rest.shape or not np.isfinite(places).all():
             raise ValueError(f"places must be {self.skin.rest.shape} finite numbers")
         wanted = (places - self.skin.rest).ravel()
         x = self._solver.solve(wanted, start=self._last)
-        for _ in range(_ROUNDS):
-            if not (x[~self._straight] > 0.0).any():
+        for _ in range(_MAX_RESOLVES):
+            if not (x[~self._linear] > 0.0).any():
                 break
             before, x = x, self._solve_at(wanted, x)
-            if np.abs(x - before).max() < _SETTLED:
+            if np.abs(x - before).max() < _CONVERGED:
                 break
         self._last = x
         values = self._parameters.neutral()
@@ -101,19 +101,19 @@ class PointSolver:
     def _solve_at(self, wanted: Floats, x: Floats) -> Floats:
         """Solve with the slopes at ``x`` : (s,)."""
         levels = self._slopes.shape[2]
-        quarter = np.minimum((x * levels).astype(np.intp), levels - 1)
-        matrix = np.take_along_axis(self._slopes, quarter[None, :, None], axis=2)[:, :, 0]
-        here = self.skin.displacement(x).ravel() - matrix @ x
-        return self._make_solver(matrix).solve(wanted - here, start=x)
+        section = np.minimum((x * levels).astype(np.intp), levels - 1)
+        matrix = np.take_along_axis(self._slopes, section[None, :, None], axis=2)[:, :, 0]
+        offset = self.skin.displacement(x).ravel() - matrix @ x
+        return self._make_solver(matrix).solve(wanted - offset, start=x)
 
 
 @dataclass(frozen=True)
 class GroupMoves:
-    """Control points of one part that move together: what a head calls a group.
+    """A group: control points of one part of a head that move together.
 
-    part : the part. ids : (k,) int32 control points. moves : (k, 3) mm per unit.
-    light : control points that the group adds to the part, see :mod:`surface.head.model.light`; None for none.
-    light_moves : (j, 3) mm per unit of these.
+    part : name of the part. ids : (k,) int32 control points. moves : (k, 3) mm per unit.
+    light : control points that the group adds to the part, see :mod:`surface.head.model.light`; None if it adds none.
+    light_moves : (j, 3) mm per unit of the added control points.
     """
 
     part: str
@@ -124,7 +124,7 @@ class GroupMoves:
 
 
 class SculptSolver:
-    """Finds displacements of control points that bring points of a part exactly to wanted places.
+    """Finds displacements of control points that bring points of a part exactly to wanted positions.
 
     Minimises over the displacements D, with L the difference of each control point from the mean of its neighbours,
 
@@ -132,13 +132,13 @@ class SculptSolver:
 
     B being the rational basis at the points. More fairness spreads a pull wider.
 
-    part : one of its skin parts. fairness : relative to the size of the moves.
+    part : name of a skin part of ``head``. fairness : weight of smoothness relative to the size of the displacements.
     """
 
     def __init__(self, head: Head, part: str = "face", *, fairness: float = 10.0) -> None:
         require("moving control points by hand", "scipy")
-        from scipy.sparse import identity  # start-up: only sculpting needs it
-        from scipy.sparse.linalg import splu  # start-up: only sculpting needs it
+        from scipy.sparse import identity  # imported lazily: only sculpting needs it
+        from scipy.sparse.linalg import splu  # imported lazily: only sculpting needs it
 
         self.part, self._surface = part, head.part(part).surface
         points = self._surface.points
@@ -146,10 +146,10 @@ class SculptSolver:
         self._factor = splu((fairness * smoothness.T @ smoothness + identity(len(points))).tocsc())
 
     def solve(self, uv: Floats, wanted: Floats, *, least_mm: float = 0.01) -> GroupMoves:
-        """Control points and displacements that move the points ``uv`` : (m, 2) by ``wanted`` : (m, 3) mm.
+        """Return the control points and displacements that move the points ``uv`` : (m, 2) by ``wanted`` : (m, 3) mm.
 
-        Control points that move less than ``least_mm`` are left out. Raises ValueError when a point lies where the part
-        has no surface, two points coincide, or numbers are not finite.
+        Control points that move less than ``least_mm`` are omitted. Raises ValueError: a point lies where the part has
+        no surface, two points coincide, or numbers are not finite.
         """
         uv, wanted = np.atleast_2d(uv).astype(np.float64), np.atleast_2d(wanted).astype(np.float64)
         if wanted.shape != (len(uv), 3) or not (np.isfinite(wanted).all() and np.isfinite(uv).all()):
@@ -167,13 +167,13 @@ class SculptSolver:
 
 
 def _differences(points: Floats, jaw: NDArray[np.floating]) -> csr_matrix:
-    """(n, n) sparse: each control point minus the mean of its six nearest ones, never across the mouth."""
-    from scipy.sparse import coo_matrix, identity  # start-up: only sculpting needs it
-    from scipy.spatial import cKDTree  # start-up: only sculpting needs it
+    """Return (n, n) sparse: each control point minus the mean of its six neighbours, never across the mouth."""
+    from scipy.sparse import coo_matrix, identity  # imported lazily: only sculpting needs it
+    from scipy.spatial import cKDTree  # imported lazily: only sculpting needs it
 
-    # the lips lie close together but belong to different jaws: set them apart
-    apart = np.column_stack([points, 60.0 * np.asarray(jaw, np.float64)])
-    _, near = cKDTree(apart).query(apart, k=7)
+    # the lips are close together but move with different jaws, so a fourth coordinate separates them
+    separated = np.column_stack([points, 60.0 * np.asarray(jaw, np.float64)])
+    _, near = cKDTree(separated).query(separated, k=7)
     n = len(points)
     rows = np.repeat(np.arange(n), 6)
     mean = coo_matrix((np.full(6 * n, 1.0 / 6.0), (rows, near[:, 1:].ravel())), shape=(n, n))
@@ -181,7 +181,7 @@ def _differences(points: Floats, jaw: NDArray[np.floating]) -> csr_matrix:
 
 
 def add_group(head: Head, group: GroupMoves, amount: float = 1.0) -> None:
-    """Move a head's control points at rest by ``amount`` of a group; every pose starts from there."""
+    """Move a head's control points at rest by ``amount`` of a group; modifies ``head``, and all its later poses."""
     rig = head.part(group.part).rig  # type: ignore[attr-defined]
     rig.rest[group.ids] += amount * group.moves
     rig.invalidate()
@@ -196,7 +196,7 @@ class LightPoint(Settings, extra="ignore"):
 
 
 class GroupFile(Settings, extra="ignore"):
-    """The contents of a group file: control points ``ids`` of a part and their displacements, and those it adds."""
+    """The contents of a group file: control points of a part with their displacements, and control points to add."""
 
     name: str = ""
     part: str
@@ -206,7 +206,7 @@ class GroupFile(Settings, extra="ignore"):
 
 
 def save_group(path: Path, name: str, group: GroupMoves) -> None:
-    """Write a group file, whole or not at all; see docs/expression.md."""
+    """Write a group file atomically; see docs/expression.md."""
     table: dict[str, object] = {
         "format": FORMAT,
         "name": name,
@@ -222,31 +222,35 @@ def save_group(path: Path, name: str, group: GroupMoves) -> None:
 
 
 def load_group(path: Path, head: HeadData) -> tuple[str, GroupMoves]:
-    """Read a group file for a head without the control points that groups add; returns its name and content.
+    """Read a group file for a head to which no group has added control points; return its name and content.
 
-    Raises ConfigError, with every fault, when the file cannot be read, is no group file, or does not fit the head.
+    Raises ConfigError: the file cannot be read, is not a group file, or does not fit the head; lists every fault.
     """
     return read_group(path, {part.name: len(part.points) for part in head.parts})
 
 
 def read_group(path: Path, counts: Mapping[str, int] | None = None) -> tuple[str, GroupMoves]:
-    """Read a group file; returns its name and content. ``counts`` : control points of the head's parts, if it is to fit
-    one. Errors as :func:`load_group`."""
+    """Read a group file; return its name and content.
+
+    counts : numbers of control points by part, of the head that the group must fit. Default: any head.
+
+    Raises ConfigError as :func:`load_group`.
+    """
 
     def misfits(group: GroupFile) -> list[str]:
         faults = []
         if len(group.moves_mm) != len(group.ids):
             faults.append(f"moves_mm: must be {len(group.ids)} rows of 3")
         if any(b <= a for each in group.light for k in (each.u, each.v) for a, b in pairwise(k)):
-            faults.append("light: knots must rise")
+            faults.append("light: knots must ascend")
         if counts is not None and group.part not in counts:
             return [f"part: the head has no part {group.part!r}"]
         if counts is not None and max(group.ids, default=0) >= counts[group.part]:
-            faults.append(f"ids: a control point that is not there (0 to {counts[group.part] - 1})")
+            faults.append(f"ids: an unknown control point (0 to {counts[group.part] - 1})")
         return faults
 
     with files.reading(path, ConfigError, hint="make it again, or take it from a copy"):
-        table = files.read_json(path, _MOST_BYTES)
+        table = files.read_json(path, _MAX_BYTES)
     fault = format_fault(table.get("format"), FORMAT) if isinstance(table, dict) else "file: must hold a table"
     if fault is not None:
         raise config_error(path, [fault])
@@ -260,14 +264,16 @@ def read_group(path: Path, counts: Mapping[str, int] | None = None) -> tuple[str
 
 
 def light_of(groups: Sequence[GroupMoves]) -> list[LightPoints]:
-    """The control points that groups add to a head, in their order."""
+    """Return the control points that groups add to a head, in the order of the groups."""
     return [group.light for group in groups if group.light is not None]
 
 
 def placed_groups(groups: Sequence[GroupMoves], head: HeadData, more: Sequence[LightPoints] = ()) -> list[GroupMoves]:
-    """Groups with the numbers that their own control points have in a head that was loaded with :func:`light_of`
-    ``groups`` and, behind these, with ``more``."""
-    added = {name: len(own) for name, own in join_light([*light_of(groups), *more]).items()}
+    """Return groups whose added control points have the ids that they got in ``head``.
+
+    The head was loaded with ``light_of(groups)`` followed by ``more``.
+    """
+    added = {name: len(points) for name, points in join_light([*light_of(groups), *more]).items()}
     first = {part.name: len(part.points) - added.get(part.name, 0) for part in head.parts}
     out = []
     for group in groups:

@@ -1,4 +1,4 @@
-"""Remembers the stage that was run in a window last, so that it is opened where none is named."""
+"""Remembers the stage that was last run in a window, so that ``omote run`` without a name opens it again."""
 
 from __future__ import annotations
 
@@ -14,20 +14,20 @@ from controller.base.files import replacing
 from surface.base.files import read_text
 
 VARIABLE = "OMOTE_STATE"
-"""Environment variable that names another folder for what omote remembers."""
-_MOST_BYTES = 1 << 16
+"""Environment variable with another folder for omote's state."""
+_MAX_BYTES = 1 << 16
 
 
 @dataclass(frozen=True)
 class LastStage:
-    """A stage: its file, and vocabularies that it was run with behind its own ones."""
+    """A stage's file, and the vocabularies that were added to its own ones on the command line."""
 
     stage: Path
     vocabularies: tuple[Path, ...] = ()
 
 
 def state_dir() -> Path:
-    """The user's folder for what programs remember, by the custom of the operating system."""
+    """Return the user's folder for the state of programs, by the convention of the operating system."""
     if named := os.environ.get(VARIABLE):
         return Path(named)
     if sys.platform == "win32":
@@ -38,9 +38,9 @@ def state_dir() -> Path:
 
 
 def remember(stage: Path, vocabularies: tuple[Path, ...] = ()) -> None:
-    """Keep a stage as the last one; where nothing can be written it is not kept, which is no fault of the run."""
+    """Keep a stage as the last one. An error of writing is ignored, since it must not end the run."""
     table = {"stage": str(stage.resolve()), "vocabularies": [str(each.resolve()) for each in vocabularies]}
-    with suppress(OSError, RuntimeError, *OMOTE_ERRORS):  # RuntimeError: nobody's home
+    with suppress(OSError, RuntimeError, *OMOTE_ERRORS):  # Path.home raises RuntimeError for a user without one
         path = state_dir() / "last.json"
         path.parent.mkdir(parents=True, exist_ok=True)
         with replacing(path) as temporary:
@@ -48,9 +48,9 @@ def remember(stage: Path, vocabularies: tuple[Path, ...] = ()) -> None:
 
 
 def last_stage() -> LastStage | None:
-    """The stage that was kept, with those of its vocabularies that are still there; None where there is none."""
+    """Return the stage that was kept, with the vocabularies that still exist; None if there is none."""
     try:
-        table = json.loads(read_text(state_dir() / "last.json", _MOST_BYTES))
+        table = json.loads(read_text(state_dir() / "last.json", _MAX_BYTES))
         stage, more = Path(table["stage"]), [Path(each) for each in table["vocabularies"]]
     except (OSError, RuntimeError, ValueError, KeyError, TypeError):
         return None

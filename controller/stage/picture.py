@@ -1,4 +1,4 @@
-"""Settings of the picture: theme, lights, background, camera, evaluator of the vertices, kiosk."""
+"""Settings of the picture: theme, lights, background, camera, evaluator of the vertices, full screen (kiosk)."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from controller.base.errors import ParameterError
 from controller.stage.persons import HexColour, PersonName
 
 if TYPE_CHECKING:
-    from surface.view.scene.camera import Camera  # start-up: the body reads stages and draws nothing
-    from surface.view.scene.theme import Colour, Theme  # start-up: the body reads stages and draws nothing
+    from surface.view.scene.camera import Camera  # imported lazily: the body draws nothing
+    from surface.view.scene.theme import Colour, Theme  # imported lazily: the body draws nothing
 
-Share = Annotated[float, Field(ge=0, le=4)]
+Strength = Annotated[float, Field(ge=0, le=4)]
 CameraName = Literal["front", "three_quarter", "three_quarter_right", "profile", "profile_right"]
-_WARM = 0.35  # how much a warmth of 1 adds to red and takes from blue
+_WARMTH_FACTOR = 0.35  # relative change of red and blue by a warmth of 1
 
 
 class LightSettings(Settings):
@@ -26,17 +26,19 @@ class LightSettings(Settings):
 
     yaw_deg: Annotated[float | None, Field(ge=-180, le=180)] = None
     pitch_deg: Annotated[float | None, Field(ge=-90, le=90)] = None
-    key: Share = 1.0
-    fill: Share = 1.0
-    rim: Share = 1.0
-    ambient: Share = 1.0
+    key: Strength = 1.0
+    fill: Strength = 1.0
+    rim: Strength = 1.0
+    ambient: Strength = 1.0
     warmth: Annotated[float, Field(ge=-1, le=1)] = 0.0
     follows_camera: Annotated[float | None, Field(ge=0, le=1)] = None
 
 
 class PictureSettings(Settings):
-    """Look of the picture. ``background`` is one colour, or the upper and the lower one of a gradient; ``person`` a
-    name, or several with the share of each."""
+    """Settings of the picture.
+
+    background : one colour, or the upper and the lower one of a gradient. person : a name, or several with weights.
+    """
 
     quality: Literal["full", "fast", "auto"] = "full"
     camera: CameraName = "front"
@@ -50,54 +52,55 @@ class PictureSettings(Settings):
 
     @field_validator("camera", mode="before")
     @classmethod
-    def _hyphens(cls, name: object) -> object:
-        """``three-quarter`` is ``three_quarter``."""
+    def _replace_hyphens(cls, name: object) -> object:
+        """Accept ``three-quarter`` for ``three_quarter``."""
         return name.replace("-", "_") if isinstance(name, str) else name
 
     def make_theme(self) -> Theme:
-        """The theme with this background and these lights."""
-        from surface.view.scene.theme import THEMES  # start-up: the body reads stages and draws nothing
+        """Return the theme with this background and these lights."""
+        from surface.view.scene.theme import THEMES  # imported lazily: the body draws nothing
 
         theme, light = THEMES[self.theme], self.light
         red, green, blue = theme.key.colour
-        warm = red * (1 + _WARM * light.warmth), green, blue * (1 - _WARM * light.warmth)
-        own = {"yaw_deg": light.yaw_deg, "pitch_deg": light.pitch_deg}
-        direction = {key: value for key, value in own.items() if value is not None}
+        warmth = _WARMTH_FACTOR * light.warmth
+        key_colour = red * (1 + warmth), green, blue * (1 - warmth)
+        angles = {"yaw_deg": light.yaw_deg, "pitch_deg": light.pitch_deg}
+        direction = {key: value for key, value in angles.items() if value is not None}
         theme = replace(
             theme,
-            key=replace(theme.key, colour=_times(warm, light.key), **direction),
-            fill=replace(theme.fill, colour=_times(theme.fill.colour, light.fill)),
-            rim=replace(theme.rim, colour=_times(theme.rim.colour, light.rim)),
-            sky=_times(theme.sky, light.ambient),
-            ground=_times(theme.ground, light.ambient),
+            key=replace(theme.key, colour=_scale(key_colour, light.key), **direction),
+            fill=replace(theme.fill, colour=_scale(theme.fill.colour, light.fill)),
+            rim=replace(theme.rim, colour=_scale(theme.rim.colour, light.rim)),
+            sky=_scale(theme.sky, light.ambient),
+            ground=_scale(theme.ground, light.ambient),
             lights_follow=theme.lights_follow if light.follows_camera is None else light.follows_camera,
         )
         if self.background is None:
             return theme
         top, bottom = (self.background, self.background) if isinstance(self.background, str) else self.background
-        return replace(theme, background_top=_colour(top), background_bottom=_colour(bottom))
+        return replace(theme, background_top=_parse_colour(top), background_bottom=_parse_colour(bottom))
 
     @property
     def dressed(self) -> bool:
-        """Whether a person wears hair and clothes: only skin does."""
+        """Whether a person wears hair and clothes, which only the theme skin shows."""
         return self.theme == "skin"
 
     @property
     def still_quality(self) -> str:
-        """The quality of one picture, which has time: "auto" is "full"."""
+        """The quality of a still picture, for which "auto" means "full"."""
         return "full" if self.quality == "auto" else self.quality
 
     def make_camera(self) -> Camera:
-        """The camera of that name."""
-        from surface.view.scene.camera import PRESETS  # start-up: the body reads stages and draws nothing
+        """Return the camera called ``camera``."""
+        from surface.view.scene.camera import PRESETS  # imported lazily: the body draws nothing
 
         return PRESETS[self.camera.replace("_", "-")]()
 
 
 def with_options(settings: PictureSettings, wanted: Mapping[str, object]) -> Any:
-    """``settings`` with the values of command-line options; those that are None were not given.
+    """Return ``settings`` with the values of command-line options that are not None.
 
-    Raises ParameterError that names the option whose value is wrong.
+    Raises ParameterError: the value of an option is wrong; names the option.
     """
     given = {key: value for key, value in wanted.items() if value is not None}
     try:
@@ -113,17 +116,17 @@ def with_options(settings: PictureSettings, wanted: Mapping[str, object]) -> Any
 
 
 def parse_background(text: str | None) -> str | tuple[str, ...] | None:
-    """``#rrggbb`` or ``#rrggbb,#rrggbb`` as a value for the key ``background``."""
+    """Convert ``#rrggbb`` or ``#rrggbb,#rrggbb`` to a value of the key ``background``."""
     if text is None or "," not in text:
         return text
     return tuple(word.strip() for word in text.split(","))
 
 
-def _times(colour: Colour, factor: float) -> Colour:
+def _scale(colour: Colour, factor: float) -> Colour:
     return colour[0] * factor, colour[1] * factor, colour[2] * factor
 
 
-def _colour(text: str) -> Colour:
-    """``#rrggbb`` as sRGB 0..1."""
+def _parse_colour(text: str) -> Colour:
+    """Convert ``#rrggbb`` to sRGB 0..1."""
     red, green, blue = (int(text[i : i + 2], 16) / 255 for i in (1, 3, 5))
     return red, green, blue

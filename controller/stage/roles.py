@@ -1,4 +1,4 @@
-"""Reduces a stage to what a process runs that has one role of several: conductor, head, face or recorder."""
+"""Reduces a stage to what a process with one role runs: conductor, head, face or recorder."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from controller.stage.zenoh import ROLES, ZenohSettings
 
 
 def with_role(settings: ZenohSettings, role: str | None, heads: Sequence[str]) -> ZenohSettings:
-    """The table ``[zenoh]`` with the role and heads of a command line. Raises ConfigError: no such role."""
+    """Return ``[zenoh]`` with the role and heads of the command line, if given. Raises ConfigError: no such role."""
     if role is not None and role not in ROLES:
         raise ConfigError(f"--role {role}: no such role{did_you_mean(role, ROLES)}", hint=f"roles: {', '.join(ROLES)}")
     wanted: dict[str, object] = {"role": role} if role is not None else {}
@@ -21,7 +21,7 @@ def with_role(settings: ZenohSettings, role: str | None, heads: Sequence[str]) -
 
 
 def for_role(stage: Stage, role: str | None = None, heads: Sequence[str] = ()) -> Stage:
-    """A stage as the process with a role runs it, with only the heads that are its own.
+    """Reduce a stage to what the process with a role runs, with only the heads of this process.
 
     Only a conductor has links and plays takes, shows and voices; only a ``head`` drives servos.
 
@@ -33,15 +33,15 @@ def for_role(stage: Stage, role: str | None = None, heads: Sequence[str] = ()) -
             raise ConfigError("--role: the stage has no [zenoh]", hint='[zenoh]\nlisten = ["tcp/127.0.0.1:7447"]')
         return stage
     table = with_role(table, role, heads)
-    kept = _chosen(stage, table)
+    kept = _local_heads(stage, table)
     settings = stage.settings.model_copy(update={"zenoh": table, "heads": kept})
-    chosen = {head.name for head in kept}
-    own = tuple(replace(head, stage=_stripped(head.stage, table.role)) for head in stage.heads if head.name in chosen)
-    return replace(_stripped(replace(stage, settings=settings), table.role), heads=own)
+    names = {head.name for head in kept}
+    local = tuple(replace(head, stage=_strip(head.stage, table.role)) for head in stage.heads if head.name in names)
+    return replace(_strip(replace(stage, settings=settings), table.role), heads=local)
 
 
-def _chosen(stage: Stage, table: ZenohSettings) -> list[HeadSettings]:
-    """The tables of the heads that this process has. Raises ConfigError."""
+def _local_heads(stage: Stage, table: ZenohSettings) -> list[HeadSettings]:
+    """Return the settings of the heads of this process. Raises ConfigError: it names an unknown head."""
     known = {head.name.lower(): head for head in stage.settings.heads}
     unknown = [name for name in table.heads if name.lower() not in known]
     if unknown:
@@ -51,7 +51,8 @@ def _chosen(stage: Stage, table: ZenohSettings) -> list[HeadSettings]:
     return [head for head in stage.settings.heads if not wanted or head.name.lower() in wanted]
 
 
-def _stripped(stage: Stage, role: str) -> Stage:
+def _strip(stage: Stage, role: str) -> Stage:
+    """Remove links and sources, unless ``role`` is the conductor, and robots, unless it is ``head``."""
     update: dict[str, object] = {}
     if role != "conductor":
         update = {"links": [], "show": None, "take": None, "voice": None, "turns": "manual"}

@@ -1,4 +1,4 @@
-"""Reads stage files: one head, the links that command it and the robots that make the same face."""
+"""Reads stage files, which tie together one or more heads, the links that command them, and the robots that follow."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from controller.links.line.script import load_script
 from controller.links.links import LinkSettings, LinkTable
 from controller.robot.robot import load_robot, robot_parameters
 from controller.robot.settings import RobotSettings
-from controller.stage.heads import MOST, HeadSettings, Names, head_faults, own_settings
+from controller.stage.heads import MAX_HEADS, HeadSettings, Names, head_faults, own_settings
 from controller.stage.persons import Person, PersonName, mixed_identity, mixed_look, read_persons
 from controller.stage.picture import PictureSettings, with_options
 from controller.stage.zenoh import ZenohSettings
@@ -34,14 +34,14 @@ from controller.vocabulary.controls import ControlsFile, load_controls
 from controller.vocabulary.vocabulary import Vocabulary
 
 if TYPE_CHECKING:
-    from surface.head import Head  # start-up: the body reads stages and draws nothing
-    from surface.head.model.light import LightPoints  # start-up: the same
+    from surface.head import Head  # imported lazily: the body draws nothing
+    from surface.head.model.light import LightPoints  # imported lazily: as above
 
 Pixels = Annotated[int, Field(ge=16, le=16384)]
 
 
 class FaceSettings(PictureSettings):
-    """How the picture is drawn."""
+    """The table ``[face]``: settings of the picture, its size and rate, and files of controls."""
 
     size: tuple[Pixels, Pixels] = (1280, 720)
     fps: Annotated[float, Field(ge=1, le=1000)] = 60.0
@@ -52,9 +52,9 @@ IDENTITY_HINT = "--identity broad=0.6,young=0.4"
 
 
 def parse_identity(text: str | None) -> dict[str, float]:
-    """``broad=0.6,young=0.4`` of a command line as names and amounts; a name alone counts 1.
+    """Convert ``broad=0.6,young=0.4`` of the command line to amounts by name; a name without amount means 1.
 
-    Raises ParameterError for a word that is not NAME=AMOUNT, or an amount that is not 0 to 1.
+    Raises ParameterError: a word is not NAME=AMOUNT, or an amount is not from 0 to 1.
     """
     identity: dict[str, float] = {}
     for word in (text or "").split(","):
@@ -72,8 +72,8 @@ def parse_identity(text: str | None) -> dict[str, float]:
 
 
 def check_identity(head: Path, wanted: Mapping[str, float]) -> None:
-    """Raise ConfigError for a name that the head in folder ``head`` does not have."""
-    from surface.head.model.identity import load_identities  # start-up: few stages name any
+    """Raise ConfigError for a variation that the head in folder ``head`` does not have."""
+    from surface.head.model.identity import load_identities  # imported lazily: few stages name any
 
     known = load_identities(head) if wanted else {}
     for name in wanted:
@@ -86,7 +86,7 @@ def check_identity(head: Path, wanted: Mapping[str, float]) -> None:
 
 
 class StageSettings(Settings):
-    """The contents of a stage file; without ``name`` the file's own counts."""
+    """The contents of a stage file. ``name`` defaults to the name of the file."""
 
     name: str
     description: str = ""
@@ -107,31 +107,31 @@ class StageSettings(Settings):
     layers: Annotated[dict[str, dict[str, Any]], Field(max_length=64)] = {}
     face: FaceSettings = FaceSettings()
     links: Annotated[list[LinkTable], Field(max_length=64)] = []
-    heads: Annotated[list[HeadSettings], Field(max_length=MOST)] = []
+    heads: Annotated[list[HeadSettings], Field(max_length=MAX_HEADS)] = []
     turns: Literal["manual", "auto"] = "manual"
     zenoh: ZenohSettings | None = None
 
     @property
     def point_groups(self) -> dict[str, float]:
-        """Group files of control points that are added to the head, each with its amount."""
+        """Amounts of the groups of control points that change the head, by file."""
         return {name: value for name, value in self.groups.items() if not isinstance(value, list)}
 
     @property
     def head_groups(self) -> dict[str, list[str]]:
-        """Names of the heads of each group of them."""
+        """Names of the heads in each group of heads."""
         return {name: value for name, value in self.groups.items() if isinstance(value, list)}
 
 
 @dataclass(frozen=True)
 class Stage:
-    """A stage with everything it refers to found and checked.
+    """A stage, and everything it refers to, found and checked.
 
-    path : the stage's file. head : its folder. vocabulary : named expressions, those of ``vocabularies`` included.
-    parameters : of the base vocabulary, and those that its vocabularies and those of its robots add.
-    layers : the layers. life : settings of idle motion. groups : group files added to the head, each with its amount.
-    persons : whom the face shows, each with its share. controls : what gamepad and keys do in the window.
-    heads : the heads of a stage with ``[[heads]]``; the rest is that of the first of them. Empty for one head.
-    own_groups : control points that own parameters move, by the parameter's name.
+    path : the stage's file. head : folder of its head. vocabulary : named expressions, also those of ``vocabularies``.
+    parameters : of the base vocabulary, followed by those that its vocabularies and its robots' vocabularies add.
+    layers : the layers. life : settings of idle motion. groups : group files that change the head, with amounts.
+    persons : persons that the face shows, with weights. controls : what gamepad and keys do in the window.
+    heads : the heads of a stage with ``[[heads]]``, whose other attributes are those of the first head; empty for a
+    stage with one head. own_groups : control points that custom parameters move, by the parameter's name.
     """
 
     path: Path
@@ -150,17 +150,17 @@ class Stage:
     own_groups: Mapping[str, PointGroup] = field(default_factory=dict)
 
     def file(self, name: str) -> Path:
-        """A file that the stage names: relative to the stage's folder, or a path."""
+        """Return the path of a file that the stage names: relative to the stage's folder if it exists there."""
         beside = self.path.parent / name
         return beside if os.path.exists(beside) else Path(name)
 
     @property
     def period_s(self) -> float:
-        """Length of a control tick."""
+        """Period of the control loop."""
         return 1.0 / self.settings.control_hz
 
     def load_head(self, light: Sequence[LightPoints] = ()) -> Head:
-        """The stage's head with its persons, identity and groups; see :func:`load_head`."""
+        """Load the stage's head with its persons, identity and groups; see :func:`load_head`."""
         dressed = self.settings.face.dressed
         groups, own = self.groups, self.own_groups
         return load_head(self.head, self.settings.identity, groups, self.persons, dressed=dressed, own=own, light=light)
@@ -168,7 +168,7 @@ class Stage:
     def state(
         self, parameters: Parameters | None = None, seed: int | None = None, period_s: float | None = None
     ) -> CommandState:
-        """A new state of all layers with the stage's settings and parameters; nothing is commanded yet."""
+        """Return new layers with the stage's settings and parameters, to which nothing is commanded yet."""
         return CommandState(
             parameters or self.parameters,
             self.vocabulary,
@@ -181,7 +181,7 @@ class Stage:
 
 @dataclass(frozen=True)
 class StageHead:
-    """One head of a stage that has several. stage : as if it were the only one."""
+    """One head of a stage that has several. ``stage`` : as if it were the only head."""
 
     name: str
     stage: Stage
@@ -189,7 +189,7 @@ class StageHead:
 
 
 def heads_of(stage: Stage) -> tuple[Stage, ...]:
-    """Each head of a stage as a stage of its own; the stage itself where it has one head."""
+    """Return one stage for each head of a stage; if it has one head, the stage itself."""
     return tuple(head.stage for head in stage.heads) or (stage,)
 
 
@@ -198,25 +198,26 @@ def load_head(
     persons: Sequence[tuple[Person, float]] = (), *, dressed: bool = True,
     own: Mapping[str, PointGroup] = MappingProxyType({}), light: Sequence[LightPoints] = (),
 ) -> Head:  # fmt: skip
-    """A head as one of ``persons`` or their mixture, with identities and groups added, each by its amount.
+    """Load a head with the appearance of ``persons``, and with identities and groups added by their amounts.
 
-    dressed : with hair and clothes; a mask wears none. own : control points that own parameters move.
-    light : control points that are added behind those of the groups.
+    dressed : with hair and clothes. own : control points that custom parameters move.
+    light : control points to add after those of the groups.
 
-    Raises SurfaceError when the head cannot be read, ConfigError when a group does not fit it.
+    Raises SurfaceError: the head cannot be read. ConfigError: a group does not fit it.
     """
-    from controller.stage.inverse import add_group, light_of, placed_groups, read_group  # start-up: as Head
-    from surface.head import Head, OwnGroup  # start-up: the body reads stages and draws nothing
+    # imported lazily: the control process (body) draws nothing
+    from controller.stage.inverse import add_group, light_of, placed_groups, read_group
+    from surface.head import Head, OwnGroup
 
     files = [*(path for path, _ in groups), *(group.file for group in own.values())]
     found = [read_group(path)[1] for path in files]
-    every = [*light_of(found), *light]
+    added = [*light_of(found), *light]
     try:
-        head = Head.load(folder, mixed_identity(persons, identity), mixed_look(persons, dressed=dressed), every)
+        head = Head.load(folder, mixed_identity(persons, identity), mixed_look(persons, dressed=dressed), added)
     except ValueError as error:
         hint = "make the group again on this head, or take it out of the stage"
         raise ConfigError(f"{folder}: control points of a group do not fit this head: {error}", hint=hint) from error
-    _check_groups(files, head, every)
+    _check_groups(files, head, added)
     placed = placed_groups(found, head.data, light)
     for (_, amount), group in zip(groups, placed, strict=False):
         add_group(head, group, amount)
@@ -226,8 +227,8 @@ def load_head(
 
 
 def _check_groups(files: Sequence[Path], head: Head, light: Sequence[LightPoints]) -> None:
-    """Raise ConfigError for the first group file that does not fit a head, which has ``light`` besides its own."""
-    from controller.stage.inverse import read_group  # start-up: as Head
+    """Raise ConfigError for the first group file that does not fit a head, to which ``light`` was added."""
+    from controller.stage.inverse import read_group  # imported lazily: few stages add groups
 
     added = {part.name: sum(len(each) for each in light if each.part == part.name) for part in head.data.parts}
     counts = {part.name: len(part.points) - added[part.name] for part in head.data.parts}
@@ -236,7 +237,7 @@ def _check_groups(files: Sequence[Path], head: Head, light: Sequence[LightPoints
 
 
 def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
-    """``stage`` with command-line options over its ``[face]``; see :func:`controller.stage.picture.with_options`."""
+    """Return a stage with command-line options in its ``[face]``; see :func:`controller.stage.picture.with_options`."""
     face = with_options(stage.settings.face, wanted)
     same = face.person == stage.settings.face.person  # they have been read with the stage
     persons = stage.persons if same else tuple(find_persons(face.person, stage.head, beside=stage.path))
@@ -245,7 +246,10 @@ def with_picture(stage: Stage, wanted: Mapping[str, object]) -> Stage:
 
 
 def find_persons(person: PersonName, head: Path, beside: Path | None = None) -> list[tuple[Person, float]]:
-    """Whom a key names, as :func:`controller.stage.persons.read_persons`, for the head in folder ``head``."""
+    """Read persons with weights (:func:`controller.stage.persons.read_persons`), and check that they fit a head.
+
+    head : its folder. Raises ConfigError.
+    """
     found = read_persons(person, beside)
     for each, _ in found:
         check_identity(head, each.settings.identity)
@@ -253,19 +257,19 @@ def find_persons(person: PersonName, head: Path, beside: Path | None = None) -> 
 
 
 def load_stage(name: str, parameters: Parameters, vocabularies: Sequence[Path] = ()) -> Stage:
-    """Find, read and cross-check a stage and all it refers to; ``name`` : a path, or a file in ``configs/stages``.
+    """Find, read and check a stage and everything it refers to.
 
-    ``parameters`` : of the base vocabulary; those of the stage's own vocabularies are added to them.
-    ``vocabularies`` : files that it has behind its own ones.
+    name : a path, or a file in ``configs/stages``. parameters : of the base vocabulary, to which the stage's
+    vocabularies may add. vocabularies : files to add after the stage's own ones.
 
-    Raises ConfigError that lists every fault of the stage and of the files it names.
+    Raises ConfigError: lists every fault of the stage and of the files that it names.
     """
     path = find_config("stages", name)
     found: list[Stage] = []
 
     def check(settings: StageSettings) -> list[str]:
         faults: list[str] = []
-        more = [str(each) for each in vocabularies if not _names(settings, path, each)]
+        more = [str(each) for each in vocabularies if not _has_vocabulary(settings, path, each)]
         settings = settings.model_copy(update={"vocabularies": [*settings.vocabularies, *more]})
         found[:] = [_gather_all(path, settings, parameters, faults)]
         return faults
@@ -274,21 +278,21 @@ def load_stage(name: str, parameters: Parameters, vocabularies: Sequence[Path] =
     return found[0]
 
 
-def _names(settings: StageSettings, path: Path, vocabulary: Path) -> bool:
-    """Whether the settings of the stage ``path`` name a vocabulary themselves."""
+def _has_vocabulary(settings: StageSettings, path: Path, vocabulary: Path) -> bool:
+    """Whether the settings of the stage in ``path`` already name a vocabulary."""
     places = (place for each in settings.vocabularies for place in (path.parent / each, Path(each)))
     return vocabulary.resolve() in (place.resolve() for place in places)
 
 
 def at_rest(stage: Stage) -> Stage:
-    """The first head of a stage without links, robots and whatever moves it by itself."""
+    """Return the stage of the first head without links, robots, take, show, voice and idle motion."""
     first = heads_of(stage)[0]
     nothing: dict[str, Any] = {"links": [], "robots": [], "heads": [], "show": None, "take": None, "voice": None}
     return replace(first, robots=(), heads=(), settings=first.settings.model_copy(update=nothing | {"liveliness": 0.0}))
 
 
 def _layer_faults(links: Sequence[LinkSettings], layers: Sequence[LayerSettings]) -> list[str]:
-    """Links that write a layer which there is not, or one that another link writes: the two would take turns."""
+    """Return faults of links that write an unknown layer, or the layer of another link, which would alternate."""
     faults, names = [], [layer.name for layer in layers]
     writers: dict[str, int] = {}
     for i, link in enumerate(links):
@@ -309,7 +313,7 @@ def _layer_faults(links: Sequence[LinkSettings], layers: Sequence[LayerSettings]
 
 
 def _gain_faults(links: Sequence[LinkSettings], regions: Sequence[str]) -> list[str]:
-    """Links with gains of regions that there are not."""
+    """Return faults of links with gains of unknown regions."""
     return [
         f"links[{i}].gains: no region called {name!r}{did_you_mean(name, regions)}"
         for i, link in enumerate(links)
@@ -318,15 +322,15 @@ def _gain_faults(links: Sequence[LinkSettings], regions: Sequence[str]) -> list[
     ]
 
 
-def _robot(name: str, beside: Path, parameters: Parameters) -> tuple[RobotSettings, Parameters]:
-    """A robot, and the parameters with those of its own."""
+def _load_robot(name: str, beside: Path, parameters: Parameters) -> tuple[RobotSettings, Parameters]:
+    """Load a robot; return it, and the parameters with those that its vocabularies add."""
     path = find_config("robots", name, beside=beside)
     robot = load_robot(path, parameters)
     return robot, robot_parameters(robot, path, parameters)
 
 
 def _gather_all(path: Path, settings: StageSettings, parameters: Parameters, faults: list[str]) -> Stage:
-    """All that a stage and each of its heads refer to; all heads have the parameters of all their vocabularies."""
+    """Read everything that a stage and its heads refer to; all heads share the parameters of all their vocabularies."""
     faults += head_faults(settings.heads, settings.head_groups)
     if settings.head_groups and not settings.heads:
         faults.append("groups: groups of heads need [[heads]]")
@@ -350,7 +354,7 @@ def _gather_all(path: Path, settings: StageSettings, parameters: Parameters, fau
 
 
 def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults: _Faults) -> Stage:
-    """All that a stage refers to; faults are added to ``faults``, and leave the stage unfit for use."""
+    """Read everything that a stage refers to. If anything is added to ``faults``, the returned stage is incomplete."""
     read = faults.read
     head = read("head", (settings.head,), lambda: find_config("heads", settings.head, beside=path))
     if head is not None and settings.identity:
@@ -362,7 +366,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     parameters = read("vocabularies", ("parameters", files, more), lambda: parameters.with_files(more)) or parameters
     robots: list[Any] = []
     for i, name in enumerate(settings.robots):
-        found = read(f"robots[{i}]", (name, parameters.files), lambda n=name, p=parameters: _robot(n, path, p))
+        found = read(f"robots[{i}]", (name, parameters.files), lambda n=name, p=parameters: _load_robot(n, path, p))
         robot, parameters = found or (None, parameters)
         robots.append(robot)
     groups = _files(faults, "groups", list(settings.point_groups), path)
@@ -378,8 +382,8 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
     ]
     for key, script in scripts:
         if script is not None:
-            what = ("script", script, files, more)
-            read(key, what, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
+            cache_key = ("script", script, files, more)
+            read(key, cache_key, lambda name=script: load_script(name, parameters, vocabulary, beside=path))
     controls = tuple(
         read(f"face.controls[{i}]", (file, files, more), lambda f=file: load_controls(f, parameters, vocabulary))
         for i, file in enumerate(_files(faults, "controls", settings.face.controls, path) if vocabulary else ())
@@ -397,7 +401,7 @@ def _gather(path: Path, settings: StageSettings, parameters: Parameters, faults:
 
 
 def _files(faults: _Faults, kind: str, names: list[str], path: Path) -> tuple[Path, ...]:
-    """The files of one kind that a stage names, those that exist."""
+    """Return the existing files among those of one kind that a stage names."""
     found = [
         faults.read(f"{kind}[{i}]", (kind, name), lambda name=name: find_config(kind, name, beside=path))
         for i, name in enumerate(names)
@@ -406,25 +410,25 @@ def _files(faults: _Faults, kind: str, names: list[str], path: Path) -> tuple[Pa
 
 
 _Known = dict[str, tuple[Any, str]]
-"""What was read, by what it is: itself and, where it is wrong, its fault."""
+"""Cache of what was read, by its cache key: the value, and its fault or an empty text."""
 
 
 @dataclass(frozen=True)
 class _Faults:
-    """Reads what a stage names and collects what is wrong with it; what many heads name is read once.
+    """Reads what a stage names, and collects the faults; what several heads name is read once.
 
-    found : the faults. known : what was read for this head and those before it.
+    found : the faults. known : cache, shared by the heads.
     """
 
     found: list[str]
     known: _Known
 
-    def read(self, key: str, what: tuple[Any, ...], read: Callable[..., object]) -> Any:
-        """Run ``read``; a configuration error becomes a fault of ``key``, so that all are reported at once.
+    def read(self, key: str, dependencies: tuple[Any, ...], read: Callable[..., object]) -> Any:
+        """Return ``read()``, from the cache if possible; a configuration error becomes a fault of ``key``, and None.
 
-        what : all that the result depends on.
+        dependencies : everything that the result depends on, as cache key.
         """
-        name = repr((key.partition("[")[0], *what))
+        name = repr((key.partition("[")[0], *dependencies))
         if name not in self.known:
             self.known[name] = self._run(read)
         value, fault = self.known[name]

@@ -1,4 +1,4 @@
-"""Studies: conditions in a seeded order, as one script with a mark where each begins and ends."""
+"""Studies: arranges conditions in a seeded order as one script, with a mark where each trial begins and ends."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 _Seconds = Annotated[float, Field(ge=0, le=3600, allow_inf_nan=False)]
 _Name = Annotated[str, Field(pattern=r"^[!-)+-~]{1,64}$")]
-_RETURN_S = 0.4  # time of the return to a neutral face, less where the pause is shorter
-MOST_TRIALS = 2000
+_RETURN_S = 0.4  # time of the return to the neutral face, at most the pause between trials
+MAX_TRIALS = 2000
 
 
 class Condition(Settings):
-    """One condition: timed lines of the line protocol, as in a script, or the name of a script; and how long it is.
+    """One condition: timed lines of the line protocol, as in a script, or the name of a script; and its length.
 
-    What a script does after ``length_s`` is left out, and so are its marks.
+    Steps of a script after ``length_s``, and its marks, are omitted.
     """
 
     steps: Annotated[list[str], Field(max_length=1000)] = []
@@ -39,10 +39,10 @@ class Condition(Settings):
 
 
 class StudySettings(Settings):
-    """A study's file.
+    """The contents of a study's file.
 
-    order : ``shuffled``, all trials shuffled together; ``blocks``, every condition once before any comes again;
-    ``given``, as in the file.
+    order : ``shuffled`` shuffles all trials together; ``blocks`` shows every condition once, in random order, before
+    any is repeated; ``given`` keeps the order of the file.
     """
 
     name: str
@@ -58,7 +58,7 @@ class StudySettings(Settings):
 
 @dataclass(frozen=True)
 class Trial:
-    """One showing of a condition: its number from 1, and when it begins and ends (s) after the study's beginning."""
+    """One presentation of a condition: its number from 1, and its begin and end (s) after the start of the study."""
 
     number: int
     condition: str
@@ -70,7 +70,7 @@ class Trial:
 class Study:
     """A study with its trials in order.
 
-    length_s : how long it takes. steps : (time s, line), rising. marks : names of moments (s).
+    length_s : duration. steps : (time s, line), ascending in time. marks : times (s) by name.
     """
 
     settings: StudySettings
@@ -83,14 +83,14 @@ class Study:
 def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> Study:
     """Read a study. ``seed`` : overrides the file's, for example by the number of a participant.
 
-    Raises ConfigError: the file, its stage or a script of it cannot be read or is wrong; every fault with its key.
+    Raises ConfigError: the file, its stage or one of its scripts cannot be read or is wrong; lists every fault.
     """
     settings = load(path, StudySettings, _faults)
     vocabulary = load_stage(str(find_config("stages", settings.stage, beside=path)), parameters).vocabulary
     grammar = Grammar(parameters, lambda name: vocabulary[name].name, scripted=True)
-    load(path, StudySettings, lambda settings: _wrong_lines(settings, grammar))
+    load(path, StudySettings, lambda settings: _line_faults(settings, grammar))
     lines = {name: _lines(path, each, parameters, vocabulary, grammar) for name, each in settings.conditions.items()}
-    order = _order(settings, settings.seed if seed is None else seed)
+    order = _order_trials(settings, settings.seed if seed is None else seed)
     trials, at_s = [], settings.before_s
     for number, name in enumerate(order, 1):
         end_s = at_s + settings.conditions[name].length_s
@@ -98,8 +98,8 @@ def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> S
         at_s = end_s + settings.pause_s
     return_s = min(_RETURN_S, settings.pause_s)
     steps = [step for trial in trials for step in _steps(trial, lines[trial.condition], return_s)]
-    marks = {f"{trial.number}:{trial.condition}:{what}": at for trial in trials
-             for what, at in (("begin", trial.begin_s), ("end", trial.end_s))}  # fmt: skip
+    marks = {f"{trial.number}:{trial.condition}:{event}": time_s for trial in trials
+             for event, time_s in (("begin", trial.begin_s), ("end", trial.end_s))}  # fmt: skip
     if len(steps) > MOST_STEPS:
         fault = f"{path}: repeats: {len(steps)} lines in all are more than {MOST_STEPS}"
         raise ConfigError(fault, hint="repeat the conditions less often")
@@ -118,13 +118,13 @@ def write_script(study: Study, path: Path) -> None:
 
 
 def _steps(trial: Trial, lines: list[tuple[float, str]], return_s: float) -> list[tuple[float, str]]:
-    """The lines of a trial at their times, and the return to a neutral face, in ``return_s``, at its end."""
-    own = [(trial.begin_s + at_s, line) for at_s, line in lines if trial.begin_s + at_s <= trial.end_s]
-    return [*own, (trial.end_s, f"NEUTRAL {return_s:g}")]
+    """Return the lines of a trial at their times, and at its end the return to the neutral face in ``return_s``."""
+    steps = [(trial.begin_s + at_s, line) for at_s, line in lines if trial.begin_s + at_s <= trial.end_s]
+    return [*steps, (trial.end_s, f"NEUTRAL {return_s:g}")]
 
 
-def _order(settings: StudySettings, seed: int) -> list[str]:
-    """The names of the conditions, one for each trial; the same seed gives the same order."""
+def _order_trials(settings: StudySettings, seed: int) -> list[str]:
+    """Return the name of the condition of each trial; the same seed gives the same order."""
     draw, names = random.Random(seed), list(settings.conditions)
     if settings.order == "given":
         return names * settings.repeats
@@ -138,14 +138,14 @@ def _order(settings: StudySettings, seed: int) -> list[str]:
 def _lines(
     path: Path, condition: Condition, parameters: Parameters, vocabulary: Vocabulary, grammar: Grammar
 ) -> list[tuple[float, str]]:
-    """The timed lines of a condition, in rising time."""
+    """Return the timed lines of a condition, ascending in time."""
     if condition.script is not None:
         return list(load_script(condition.script, parameters, vocabulary, beside=path).steps)
     return sorted((read_step(text, grammar) for text in condition.steps), key=lambda step: step[0])
 
 
-def _wrong_lines(settings: StudySettings, grammar: Grammar) -> list[str]:
-    """What is wrong with the steps of conditions, each with its key."""
+def _line_faults(settings: StudySettings, grammar: Grammar) -> list[str]:
+    """Return the faults of the steps of conditions, each with its key."""
     faults = []
     for name, condition in settings.conditions.items():
         for i, text in enumerate(condition.steps):
@@ -165,6 +165,6 @@ def _faults(settings: StudySettings) -> list[str]:
         if (each.script is None) == (not each.steps)
     ]
     trials = settings.repeats * len(settings.conditions)
-    if trials > MOST_TRIALS:
-        faults.append(f"repeats: {trials} trials are more than {MOST_TRIALS}")
+    if trials > MAX_TRIALS:
+        faults.append(f"repeats: {trials} trials are more than {MAX_TRIALS}")
     return faults

@@ -1,4 +1,4 @@
-"""The table ``[zenoh]`` of a stage: which part of it this process runs, and how it meets the others."""
+"""The table ``[zenoh]`` of a stage: which part of it this process runs, and how it connects to the others."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import Field, field_validator, model_validator
 from controller.base.config import Number, Settings
 
 ROLES = ("conductor", "head", "face", "recorder")
-"""Mixes and publishes; drives servos; draws; writes what was published to files."""
+"""A conductor mixes the layers and publishes faces; a head drives servos; a face draws; a recorder writes files."""
 Role = Literal["conductor", "head", "face", "recorder"]
 Endpoint = Annotated[str, Field(pattern=r"^(tcp|tls|udp|quic|unixsock-stream)/.+$")]
 
@@ -49,7 +49,7 @@ class ZenohSettings(Settings):
 
     @property
     def way(self) -> str:
-        """The mode of Zenoh: who listens routes between those that connect, who only connects is a client."""
+        """The mode of Zenoh. For ``auto``, a process that listens is a router, and one that only connects a client."""
         return self.mode if self.mode != "auto" else "router" if self.listen else "client"
 
     @field_validator("prefix")
@@ -60,10 +60,10 @@ class ZenohSettings(Settings):
     @model_validator(mode="after")
     def _fits(self) -> ZenohSettings:
         if not self.connect and not self.listen and self.config is None:
-            raise ValueError('give listen or connect, as listen = ["tcp/127.0.0.1:7447"]: nothing is searched for')
+            raise ValueError('give listen or connect, as listen = ["tcp/127.0.0.1:7447"]: there is no discovery')
         far = [each for each in self.listen if not _is_local(each)]
         if far and not self.open_to_network:
-            raise ValueError(f"listen: others can reach {far[0]}; set open_to_network = true where they shall")
+            raise ValueError(f"listen: other machines can reach {far[0]}; set open_to_network = true to allow that")
         return self
 
 

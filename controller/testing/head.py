@@ -1,4 +1,4 @@
-"""All simulated buses of a robot file, for tests of what drives a whole head."""
+"""Simulates all buses of a robot file, for tests of programs that drive a whole robot."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class RobotHead:
     """The simulated hardware of a robot.
 
     buses : servos or board of each bus, by the bus's name in the robot file.
-    file : the robot file with these ports in it, for ``omote run`` and others that drive real ports.
+    file : a copy of the robot file with these ports, for ``omote run`` and other programs.
     """
 
     def __init__(self, robot: RobotSettings, buses: dict[str, Hardware], file: Path) -> None:
@@ -46,7 +46,7 @@ class RobotHead:
         return next(iter(self.buses.values())).port
 
     def servo(self, channel: str) -> ServoView:
-        """State of a channel's servo. Raises KeyError: there is no such channel, or its board measures nothing."""
+        """Return the state of a channel's servo. Raises KeyError: no such channel, or its board measures nothing."""
         for each in self._robot.channels:
             bus = self.buses[each.bus]
             if each.name == channel and isinstance(bus, ServoBus):
@@ -64,14 +64,14 @@ class RobotHead:
             bus.clear(kind)
 
     def forget(self) -> None:
-        """Start the records again."""
+        """Clear the records."""
         for bus in self.buses.values():
             bus.forget()
 
     def never_beyond_limits(self) -> None:
         """Assert that no servo got a goal, or moved, beyond ``limit_deg`` of its channel.
 
-        Outputs of a board that takes no pulses are not looked at.
+        Outputs of a board that does not use pulses are not checked.
         """
         __tracebackhide__ = True
         for name, bus in self.buses.items():
@@ -82,13 +82,13 @@ class RobotHead:
                 bus.never_beyond_limits(_pulses(specs))
 
     def torque_off_at_exit(self) -> None:
-        """Assert that every motor is off."""
+        """Assert that the torque of every servo is off."""
         __tracebackhide__ = True
         for bus in self.buses.values():
             bus.torque_off_at_exit()
 
     def no_jump(self, deg: float = 5.0, deg_s: float = 200.0) -> None:
-        """Assert that no servo jumped (:meth:`drivers.testing.ServoBus.no_jump`); boards by 11 us a degree."""
+        """Assert that no servo jumped (:meth:`drivers.testing.ServoBus.no_jump`); for boards, 1 degree is 11.1 us."""
         __tracebackhide__ = True
         for bus in self.buses.values():
             if isinstance(bus, ServoBus):
@@ -97,13 +97,13 @@ class RobotHead:
                 bus.no_jump(_US_PER_DEG * deg)
 
     def bus_load_below(self, share: float, over_s: float = 0.2) -> None:
-        """Assert that no wire was busier than a share of its time."""
+        """Assert that no bus was busier than the fraction ``share`` in any ``over_s`` seconds."""
         __tracebackhide__ = True
         for bus in self.buses.values():
             bus.bus_load_below(share, over_s)
 
     def close(self) -> None:
-        """Take the ports away."""
+        """Close and remove the ports."""
         for bus in self.buses.values():
             bus.close()
 
@@ -115,7 +115,7 @@ class RobotHead:
 
 
 _US_PER_DEG = 11.1
-"""Of a common hobby servo: 1000 us for 90 degrees."""
+"""Pulse width per degree of a common hobby servo: 1000 us for 90 degrees."""
 
 
 def _ticks(specs: Sequence[ServoSpec]) -> dict[int, tuple[float, float]]:
@@ -129,12 +129,12 @@ def _pulses(specs: Sequence[ServoSpec]) -> dict[int, tuple[float, float]]:
 
 
 def open_head(robot: str, *, folder: Path, faults: Iterable[str] = (), port: str = "", wire: bool = False) -> RobotHead:
-    """The simulated hardware of a robot, each bus at a port of its own, with what the robot's drivers expect there.
+    """Open the simulated hardware of a robot, each bus at its own port, with the settings the robot's drivers expect.
 
-    robot : a name of configs/robots, or a file. folder : in a new folder below it the changed robot file is written.
-    faults, port, wire : see :func:`drivers.testing.open_servos`; for all buses.
+    robot : a name from configs/robots, or a file. folder : the changed robot file is written to a new folder in it.
+    faults, port, wire : for all buses; see :func:`drivers.testing.open_servos`.
 
-    Raises ConfigError: there is no such robot, or its file is wrong. DriverError: as `open_servos`.
+    Raises ConfigError: no such robot, or its file is wrong. DriverError: as ``open_servos``.
     """
     path = find_config("robots", robot)
     settings = load_robot(path, PARAMETERS)
@@ -151,7 +151,7 @@ def open_head(robot: str, *, folder: Path, faults: Iterable[str] = (), port: str
 
 
 def _with_ports(path: Path, settings: RobotSettings, buses: dict[str, Hardware]) -> dict[str, Any]:
-    """The table of a robot file with real ports in the place of simulated buses."""
+    """Return the table of a robot file with real ports instead of simulated buses."""
     table = read_toml(path)
     for entry, bus in zip(table["buses"], settings.buses, strict=True):
         for key in SIMULATION:

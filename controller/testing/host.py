@@ -1,4 +1,4 @@
-"""A simulated robot host at a port, for tests of faces and other programs that take the omote line protocol."""
+"""A simulated robot host at a port, for tests of programs that receive the omote line protocol, as a face."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ _END_S = 5.0
 
 
 class ScriptedHost:
-    """A robot host that sends a script to whatever opens its port, and counts the answers.
+    """A robot host that sends the commands of a script to the program that opens its port, and counts the answers.
 
-    script : what it sends. link : path that shall point at the pseudo-terminal, or None.
+    script : its timed commands. link : path of a symbolic link to the pseudo-terminal, or None.
     """
 
     def __init__(self, script: Script, link: Path | None = None) -> None:
@@ -36,15 +36,15 @@ class ScriptedHost:
 
     @property
     def port(self) -> str:
-        """What a program opens."""
+        """Path that the tested program opens."""
         return str(self._link or self._port.path)
 
     def report(self) -> dict[str, Any]:
-        """Lines ``sent``, ``accepted``, ``refused``, ``unanswered``, ``damaged`` so far, ``refusals`` and more."""
+        """Return the numbers of lines ``sent``, ``accepted``, ``refused``, ``unanswered``, ``damaged`` and more."""
         return self._host.report()
 
     def wait_until(self, condition: Callable[[dict[str, Any]], object], timeout_s: float = 10.0) -> None:
-        """Wait until a condition on the report holds. Raises AssertionError after a time, with the report."""
+        """Wait until a condition on the report holds. Raises AssertionError after ``timeout_s``, with the report."""
         __tracebackhide__ = True
         end_s = time.monotonic() + timeout_s
         while not condition(self.report()):
@@ -63,7 +63,7 @@ class ScriptedHost:
             )
 
     def close(self) -> None:
-        """End the script and take the port away."""
+        """End the script, and close and remove the port."""
         self._over.set()
         self._thread.join(_END_S)
         self._port.close()
@@ -78,11 +78,12 @@ class ScriptedHost:
 def open_host(
     script: str = "tour", *, folder: Path, steps: Sequence[str] = (), loop_s: float = 0.0, link: Path | None = None
 ) -> ScriptedHost:
-    """A robot host that plays a script of configs/scripts or a file, or ``steps`` as ``"0.5 SET jawOpen 0.5"``.
+    """Open a robot host that plays a script (a name from configs/scripts or a file), or ``steps``.
 
-    loop_s : after how long the steps begin again, 0 for once. folder : in a new folder below it the steps are written.
+    steps : as ``"0.5 SET jawOpen 0.5"``, time (s) and command; they are written to a new folder in ``folder``.
+    loop_s : period after which the steps are repeated; 0 plays them once.
 
-    Raises ConfigError: there is no such script, or it is wrong. PortError: no pseudo-terminals here.
+    Raises ConfigError: no such script, or it is wrong. PortError: the system has no pseudo-terminals.
     """
     name = script
     if steps:

@@ -1,6 +1,6 @@
-"""pytest's fixtures of omote: ``servo_bus``, ``servo_board``, ``robot_head`` and ``robot_host``.
+"""omote's pytest fixtures: ``servo_bus``, ``servo_board``, ``robot_head`` and ``robot_host``.
 
-Each gives a function that opens simulated hardware at a port, as often as a test calls it; after the test all of it is
+Each is a function that opens simulated hardware at a port, as often as a test calls it; after the test all of it is
 closed. docs/testing-your-robot.md has examples.
 """
 
@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-if TYPE_CHECKING:  # start-up: tests that use no fixture load nothing of omote
+if TYPE_CHECKING:  # imported lazily: tests that use no fixture load nothing of omote
     from controller.testing.head import RobotHead
     from controller.testing.host import ScriptedHost
     from drivers.testing import ServoBoard, ServoBus
 
 
 def _opener(stack: ExitStack, open_it: Callable[..., Any]) -> Callable[..., Any]:
-    """``open_it``, with what it opens closed by the stack, and the hint of an error shown."""
+    """Return a function as ``open_it``, whose results the stack closes, and whose errors show their hint."""
 
     def opened(*words: Any, **options: Any) -> Any:
         __tracebackhide__ = True
@@ -36,7 +36,7 @@ def _opener(stack: ExitStack, open_it: Callable[..., Any]) -> Callable[..., Any]
 @pytest.fixture
 def servo_bus() -> Iterator[Callable[..., ServoBus]]:
     """Opens simulated Dynamixel or Feetech servos: ``bus = servo_bus("xl330-m288", [1, 2])``, then ``bus.port``."""
-    from drivers.testing import open_servos  # start-up: as above
+    from drivers.testing import open_servos  # imported lazily: as above
 
     with ExitStack() as stack:
         yield _opener(stack, open_servos)
@@ -45,7 +45,7 @@ def servo_bus() -> Iterator[Callable[..., ServoBus]]:
 @pytest.fixture
 def servo_board() -> Iterator[Callable[..., ServoBoard]]:
     """Opens a simulated board of hobby servos: ``board = servo_board("maestro", channels=12)``, then ``board.port``."""
-    from controller.base.parameters import PARAMETERS  # start-up: as above
+    from controller.base.parameters import PARAMETERS  # imported lazily: as above
     from drivers.testing import open_board
 
     def with_names(kind: str = "maestro", **options: Any) -> ServoBoard:
@@ -58,7 +58,7 @@ def servo_board() -> Iterator[Callable[..., ServoBoard]]:
 @pytest.fixture
 def robot_head(tmp_path: Any) -> Iterator[Callable[..., RobotHead]]:
     """Opens all simulated buses of a robot file: ``head = robot_head("head24")``, then ``head.port``."""
-    from controller.testing.head import open_head  # start-up: as above
+    from controller.testing.head import open_head  # imported lazily: as above
 
     with ExitStack() as stack:
         yield _opener(stack, lambda robot, **options: open_head(robot, folder=tmp_path, **options))
@@ -67,7 +67,7 @@ def robot_head(tmp_path: Any) -> Iterator[Callable[..., RobotHead]]:
 @pytest.fixture
 def robot_host(tmp_path: Any) -> Iterator[Callable[..., ScriptedHost]]:
     """Opens a simulated robot host that sends the line protocol: ``host = robot_host("tour")``, then ``host.port``."""
-    from controller.testing.host import open_host  # start-up: as above
+    from controller.testing.host import open_host  # imported lazily: as above
 
     with ExitStack() as stack:
         yield _opener(stack, lambda script="tour", **options: open_host(script, folder=tmp_path, **options))

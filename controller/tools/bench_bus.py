@@ -1,8 +1,8 @@
 """Benchmark of ``omote bench bus``: a simulated bus of 24 servos, driven by omote and by the bare Dynamixel SDK.
 
-Bytes take their time in both directions (``drivers.sim``, ``wire=True``), so the limit of a loop is known: bytes times
-ten bits over the baud rate, as the servos' return delay is 0. The simulated servos (in a process of their own) use this
-machine's processors, too.
+Bytes are delayed by their transmission time in both directions (``drivers.sim``, ``wire=True``). The servos' return
+delay is 0, so the shortest cycle is known: ten bits per byte at the baud rate. The simulated servos run in another
+process, which uses the processors of this machine, too.
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ PACED_HZ = 50
 JITTER_HZ = 100
 GOAL, POSITION, WIDTH = 116, 132, 4
 ROUNDS = 3
-SHARES = (0.92, 0.85)
-"""Of the wire's limit that a loop of sync reads, and of fast ones, shall reach."""
+MIN_WIRE_FRACTIONS = (0.92, 0.85)
+"""Lower bounds of the rate relative to the wire's limit: of a loop with sync reads, and with fast sync reads."""
 _SWING_RAD = 0.3
 WARM_UP_CYCLES = 40
 _UNLIMITED_FPS, _PACED_FPS = 1000, 30
-_FACE_SECONDS = 10.0
-"""Least time of a run with the face: of a shorter one, the first second, when servos start, is the worst hundredth."""
+_MIN_FACE_S = 10.0
+"""Shortest run with the face. In a shorter one, the ticks while servos start would decide the 99th percentile."""
 _FACE_RUNS = (
     ("as fast as it can, ordinary priority", _UNLIMITED_FPS, True),
     ("as fast as it can", _UNLIMITED_FPS, False),
@@ -68,12 +68,13 @@ for _ in clock.run(lambda: not select.select([sys.stdin], [], [], 0)[0]):
     pass
 print(clock.jitter_ms.summary()["p99"])
 """
-"""Sleeps from tick to tick until its standard input ends, then prints how late the newest ticks were (ms)."""
+"""Program that sleeps from tick to tick until its standard input ends, then prints the lateness (ms) of the newest
+ticks, 99th percentile."""
 
 
 @dataclass(frozen=True)
 class Figure:
-    """One row of the report: a measured value, the bound ``reach`` that it should keep, if any, and whether it does."""
+    """One row of the report: a measured value, its bound ``reach`` as text or empty, and whether it keeps the bound."""
 
     name: str
     value: float
@@ -86,8 +87,9 @@ class Figure:
 class Loop:
     """Measurements of a loop of one write and one read.
 
-    rate_hz : cycles per second in which every servo answered. processor : share of a core that the thread used.
-    cycle_ms : wall time of one write and one read. late_ms : how late each tick began; empty where nothing was paced.
+    rate_hz : cycles per second in which every servo answered. processor : fraction of a core that the thread used.
+    cycle_ms : percentiles of the time of one write and one read. late_ms : percentiles of how late ticks began; empty
+    for a loop without pauses.
     """
 
     rate_hz: float
@@ -97,7 +99,7 @@ class Loop:
 
 
 def limit_hz(servos: int, baud: int, fast: bool) -> float:
-    """Cycles per second that the wire allows: a sync write and a sync read of 4 bytes for each servo.
+    """Return the cycles per second that the wire allows, each a sync write and a sync read of 4 bytes per servo.
 
     Bytes (ROBOTIS e-Manual, Protocol 2.0): 14 + n (1 + 4) for the write, 14 + n for the request, n (11 + 4) for
     the replies or 8 + n (4 + 4) for one joint reply.
@@ -108,9 +110,9 @@ def limit_hz(servos: int, baud: int, fast: bool) -> float:
 
 
 def bench_bus(seconds: float, log: Log, *, face: bool = False) -> list[tuple[str, list[Figure]]]:
-    """Tables of rates, processor time, latency and jitter, measured for ``seconds`` each.
+    """Return tables of rates, processor time, latency and jitter, each measured for ``seconds``.
 
-    ``face`` : also run the whole program, face and body, and measure the jitter of its bus.
+    ``face`` : also run the whole program, face and control process, and measure the jitter of its bus.
     """
     specs = [ServoSpec(i + 1, f"servo{i + 1}", "xl330-m288", -1.0, 1.0, 6.0, 60.0) for i in range(SERVOS)]
     shorten_thread_switches()
@@ -136,18 +138,18 @@ def bench_bus(seconds: float, log: Log, *, face: bool = False) -> list[tuple[str
         ticks = _run_omote(bus.path, specs, seconds, False, JITTER_HZ)
         log(f"the bare SDK, {PACED_HZ} Hz")
         sdk_paced = _run_sdk(bus.path, seconds, PACED_HZ)
-    # of each kind of loop the median, as a host that is busy elsewhere may slow down any round
+    # the median of the rounds, because other load of the machine may slow down any of them
     rates = {kind: float(np.median([each[kind] for each in rounds])) for kind in rounds[0]}
     figures = _rate_figures(rates) + _loop_figures(paced, sdk_paced, ticks, realtime)
     tables = [(title, figures + steal_figures(steal))]
     if face:
-        restore_priority()  # programs that are started would inherit it, the one that draws among them
+        restore_priority()  # otherwise the programs that are started would inherit the real-time priority
         tables.append(("the whole program: face and body, simulated head of 24 servos", _bench_face(seconds, log)))
     return tables
 
 
 def _run_omote(path: str, specs: list[ServoSpec], seconds: float, fast: bool, rate_hz: float) -> Loop:
-    """Omote's own loop by sync reads or fast ones; ``rate_hz`` 0 for as many cycles as there can be."""
+    """Measure omote's driver with sync reads or fast ones; ``rate_hz`` 0 means without pauses."""
     options: dict[str, Any] = {"fast": fast, "feedback": "position", "slow_group": 0, "watchdog_ms": 0}
     with open_bus("dynamixel", specs, port=path, baud=BAUD, **options) as bus:
 
@@ -166,8 +168,9 @@ def _run_bytes(path: str, seconds: float, fast: bool) -> Loop:
 
 @contextmanager
 def bytes_alone(path: str, servos: int, baud: int, fast: bool) -> Iterator[Cycle]:
-    """A cycle that sends the same packets and awaits as many bytes, without making or decoding packets: the least that
-    there can be.
+    """Yield a cycle that sends ready packets and waits for as many bytes as the answers have.
+
+    It neither encodes nor decodes, so its rate is the upper limit for a driver on this machine.
     """
     ids = tuple(range(1, servos + 1))
     goals = GoalFrame(ids, GOAL, WIDTH, np.arange(servos)).encode(np.full(servos, 2048, np.int32))
@@ -189,10 +192,10 @@ def bytes_alone(path: str, servos: int, baud: int, fast: bool) -> Iterator[Cycle
 
 
 def _run_sdk(path: str, seconds: float, rate_hz: float) -> Loop:
-    """The same goals and positions through the SDK's own group classes, at ordinary priority.
+    """Measure the same goals and positions through the SDK's own group classes, at ordinary priority.
 
-    The SDK waits by polling: with a higher priority it would keep the system from carrying the bytes it waits for, give
-    up, and take late replies for those to its next question.
+    The SDK waits by polling. At a higher priority it would keep the system from transferring the bytes that it waits
+    for, time out, and mistake late replies for those to its next request.
     """
     port, packets = sdk.PortHandler(path), sdk.PacketHandler(2.0)
     port.openPort()
@@ -221,8 +224,8 @@ def _run_sdk(path: str, seconds: float, rate_hz: float) -> Loop:
 
 
 def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
-    """Run cycles for some time, paced or, with ``rate_hz`` 0, without pause."""
-    swing = np.repeat(_SWING_RAD * np.sin(np.arange(314) / 50)[:, None], SERVOS, axis=1)  # a slow one of all servos
+    """Run ``cycle`` for ``seconds`` at ``rate_hz`` or, with 0, without pauses, and measure it."""
+    swing = np.repeat(_SWING_RAD * np.sin(np.arange(314) / 50)[:, None], SERVOS, axis=1)  # a slow sine for all servos
     for angles in swing[:WARM_UP_CYCLES]:
         cycle(angles)
     clock = Clock(rate_hz or 1.0)
@@ -242,8 +245,8 @@ def measure_loop(cycle: Cycle, seconds: float, rate_hz: float) -> Loop:
 def _rate_figures(rate: dict[str, float]) -> list[Figure]:
     figures = []
     for kind, prefix in (("plain", ""), ("fast", "fast ")):
-        limit, share = limit_hz(SERVOS, BAUD, kind == "fast"), SHARES[kind == "fast"]
-        reach, kept = f">= {share:.0%} of {limit:.0f} Hz", rate[kind] >= share * limit
+        limit, fraction = limit_hz(SERVOS, BAUD, kind == "fast"), MIN_WIRE_FRACTIONS[kind == "fast"]
+        reach, kept = f">= {fraction:.0%} of {limit:.0f} Hz", rate[kind] >= fraction * limit
         figures += [
             Figure(f"write and {prefix}sync read", rate[kind], "Hz"),
             Figure("  of the wire limit", 100 * rate[kind] / limit, "%", reach, kept),
@@ -258,10 +261,10 @@ def _rate_figures(rate: dict[str, float]) -> list[Figure]:
 
 
 def _loop_figures(paced: Loop, sdk_paced: Loop, ticks: Loop, realtime: bool) -> list[Figure]:
-    share, ratio = 100 * paced.processor, sdk_paced.processor / paced.processor
+    percent, ratio = 100 * paced.processor, sdk_paced.processor / paced.processor
     worst, bound = ticks.late_ms["p99"], 2.0 if realtime else 3.0
     return [
-        Figure(f"processor at {PACED_HZ} Hz", share, "% of a core", "<= 12 %", share <= 12.0),
+        Figure(f"processor at {PACED_HZ} Hz", percent, "% of a core", "<= 12 %", percent <= 12.0),
         Figure("bare SDK, the same", 100 * sdk_paced.processor, "% of a core"),
         Figure("  omote uses less by", ratio, "x", ">= 2", ratio >= 2.0),
         Figure("write and read, median", paced.cycle_ms["p50"], "ms"),
@@ -274,9 +277,9 @@ def _loop_figures(paced: Loop, sdk_paced: Loop, ticks: Loop, realtime: bool) -> 
 
 
 def steal_figures(steal: StealTime, indent: str = "") -> list[Figure]:
-    """The processor time that the host of a virtual machine used for others meanwhile."""
-    share = steal.share()
-    return [] if share is None else [Figure(f"{indent}taken by the host meanwhile", 100 * share, "% of all cores")]
+    """Return a row with the processor time that the host of a virtual machine took meanwhile, if it is reported."""
+    stolen = steal.fraction()
+    return [] if stolen is None else [Figure(f"{indent}taken by the host meanwhile", 100 * stolen, "% of all cores")]
 
 
 def _bench_face(seconds: float, log: Log) -> list[Figure]:
@@ -284,14 +287,14 @@ def _bench_face(seconds: float, log: Log) -> list[Figure]:
     for name, rate, ordinary in _FACE_RUNS:
         log(f"beside the face, {name}")
         steal = StealTime()
-        report, sleeper = _run_program(rate, max(seconds, _FACE_SECONDS), ordinary)
+        report, sleeper_ms = _run_program(rate, max(seconds, _MIN_FACE_S), ordinary)
         bus = report["buses"][0]
         bound = 0.5 if rate == _PACED_FPS else 2.0 if bus["realtime"] else 3.0
         worst = bus["jitter_ms"]["p99"]
         figures += [
             Figure(f"face, {name}", report["face"]["frames_per_second"], "frames/s"),
             Figure(f"  bus tick at {JITTER_HZ} Hz late by, 99 of 100", worst, "ms", f"<= {bound:g} ms", worst <= bound),
-            Figure("  beside it a program that only sleeps", sleeper, "ms"),
+            Figure("  beside it a program that only sleeps", sleeper_ms, "ms"),
             Figure("  ticks left out", bus["skipped"], f"of {bus['ticks'] + bus['skipped']}"),
             *steal_figures(steal, "  "),
         ]
@@ -299,8 +302,10 @@ def _bench_face(seconds: float, log: Log) -> list[Figure]:
 
 
 def _run_program(frames_per_second: int, seconds: float, ordinary: bool) -> tuple[dict[str, Any], float]:
-    """Run ``omote run everything`` with the bus at 100 Hz and the face at a rate; its report, and how late a program is
-    meanwhile that only sleeps from tick to tick (ms, 99 of 100): the least that this machine allows.
+    """Run ``omote run everything`` with the bus at 100 Hz and the face at a rate; return its report and a reference.
+
+    The reference is the lateness (ms, 99th percentile) of a program that meanwhile only sleeps from tick to tick, which
+    is the best that this machine allows.
     """
     environment = child_environment("controller") | ({NO_REALTIME: "1"} if ordinary else {})
     with tempfile.TemporaryDirectory(prefix="omote-") as folder:
@@ -326,6 +331,6 @@ def _run_program(frames_per_second: int, seconds: float, ordinary: bool) -> tupl
 
 
 def to_json(tables: list[tuple[str, list[Figure]]]) -> str:
-    """The tables as JSON: by title, a list of figures."""
+    """Return the tables as JSON: lists of figures by title."""
     plain = {title: [{**asdict(row), "name": row.name.strip()} for row in figures] for title, figures in tables}
     return json.dumps(plain, indent=2)

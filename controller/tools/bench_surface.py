@@ -1,4 +1,4 @@
-"""Benchmarks of ``omote bench``: a head's engine, part by part and as a whole, and other libraries beside it."""
+"""Benchmarks of ``omote bench``: the surface engine on heads and other surfaces, compared with other libraries."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ from surface.head.model.meshes import domain_of
 Log = Callable[[str], None]
 Tables = list[tuple[str, list[Measure]]]
 
-_MOVING = ("jawOpen", "eyeBlinkLeft", "browInnerUp")
+_MOVED_PARAMETERS = ("jawOpen", "eyeBlinkLeft", "browInnerUp")
 _POSES = 8
-_AREA = 0.99
-UNIFORM_LEVEL = 7  # quarterings of the uniform mesh that adaptive ones are compared with
-VERTICES = 100_000  # of the sheet that the bounds are for
+_AREA_QUANTILE = 0.99
+UNIFORM_LEVEL = 7  # subdivision levels of the uniform mesh with which adaptive ones are compared
+VERTICES = 100_000  # size of the sheet for which the bounds hold
 
 
 def bench_head(name: str, seconds: float, log: Log) -> Tables:
-    """Tables of a head: how long posing takes, and the engine on its largest surface."""
+    """Return tables of a head: how long posing takes, and the engine on its largest surface."""
     log("loading")
     started = time.perf_counter()
     head = Head.load(find_config("heads", name))
@@ -43,13 +43,15 @@ def bench_head(name: str, seconds: float, log: Log) -> Tables:
     title = f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, loaded in {loading:.0f} ms"
     about = f"{largest.name}: {largest.surface.n} control points, {len(largest.mesh.vertices)} vertices"
     engine = measure(largest.surface, largest.mesh, seconds=seconds, report=log)
-    # The bounds are for the large sheet; on a small mesh everything fits the cache.
+    # The bounds hold for the large sheet; a small mesh fits into the cache, so its rows have none.
     return [(title, pose_rows(head, seconds, log)), (about, [replace(row, reach="") for row in engine])]
 
 
 def bench_surface(seconds: float, log: Log, vertices: int = VERTICES, name: str = "ict") -> Tables:
-    """The engine with cold caches on surfaces of several kinds, one of them a head; then, with warm caches, at its
-    limit, on a plain sheet of about so many vertices."""
+    """Return tables of the engine with cold caches on several surfaces, one of them a head, and with warm caches.
+
+    vertices : approximate number of vertices of each surface but the head; the warm table is of a plain sheet.
+    """
     head = Head.load(find_config("heads", name))
     deforming = [(part.surface, part.mesh) for part in head.parts if part.follows == "skin"]
     kinds: list[tuple[str, list[cold.Body], str]] = [
@@ -65,8 +67,7 @@ def bench_surface(seconds: float, log: Log, vertices: int = VERTICES, name: str 
 
 
 def bench_large(seconds: float, log: Log, progress: Progress, vertices: int = VERTICES) -> Tables:
-    """Building trees and lists for that many control points; the sheet with cold caches; two threads against one; ten
-    times ``vertices``."""
+    """Return tables for ten times ``vertices``: cold caches, building trees and lists, two threads against one."""
     large = 10 * vertices
     level = max(0, round(np.log2(np.sqrt(large) / 8)))  # under 8 x 8 roots
     built = build_table(vertices, level, progress)
@@ -76,13 +77,13 @@ def bench_large(seconds: float, log: Log, progress: Progress, vertices: int = VE
 
 
 def bench_growth(seconds: float, log: Log, out: Path, vertices: int = VERTICES) -> Tables:
-    """Slopes of time and memory against size on logarithmic scales; draws them as SVG, too.
+    """Return the slopes of time and memory against size on logarithmic scales; also draw the curves to ``out``.
 
     Sizes run from a tenth to ten times ``vertices``, and from a thousandth of it to as many control points.
     """
-    share = vertices / VERTICES
-    sizes = tuple(max(256, round(share * count)) for count in growth.VERTICES)
-    points = tuple(max(25, round(share * count)) for count in growth.POINTS)
+    scale = vertices / VERTICES
+    sizes = tuple(max(256, round(scale * count)) for count in growth.VERTICES)
+    points = tuple(max(25, round(scale * count)) for count in growth.POINTS)
     series = growth.growth(sizes, points, seconds, log)
     growth.plot(series, out)
     title = f"from {sizes[0]:,} to {sizes[-1]:,} vertices and from {points[0]:,} to {points[-1]:,} control points"
@@ -90,7 +91,7 @@ def bench_growth(seconds: float, log: Log, out: Path, vertices: int = VERTICES) 
 
 
 def bench_drift(name: str, updates: int, log: Log) -> Tables:
-    """Random updates of every kind on a head's largest surface, against a fresh evaluation."""
+    """Return the error that random updates of every kind leave on a head's largest surface."""
     log("loading")
     head = Head.load(find_config("heads", name))
     part = max(head.parts, key=lambda part: part.surface.n)
@@ -107,17 +108,18 @@ def bench_drift(name: str, updates: int, log: Log) -> Tables:
 
 
 def bench_quadtree(name: str, log: Log, level: int = UNIFORM_LEVEL, out: Path | None = None) -> Tables:
-    """The paper's figures 2 and 3 on a head's face: a uniform mesh, and adaptive ones that deviate no more.
+    """Repeat the paper's figures 2 and 3 on a head's face: a uniform mesh, and adaptive ones that deviate no more.
 
-    Once by the greatest deviation anywhere, as in the paper, once by the deviation that 99 % of the area keeps, of
-    which the picture ``out`` is drawn. A method that finds no mesh within the bound is left out. The uniform mesh is
-    quartered ``level`` times.
+    One table compares meshes by their greatest deviation, as in the paper. The other compares them by the deviation
+    that 99 % of the area keeps; the picture ``out`` shows these. A method that finds no mesh within the bound is
+    omitted. The uniform mesh is subdivided ``level`` times.
     """
     log("loading")
     head = Head.load(find_config("heads", name))
     domain = domain_of(next(part for part in head.data.parts if part.name == "face"))
     tables = []
-    for quantile, title in ((1.0, "greatest deviation"), (_AREA, f"deviation of {_AREA:.0%} of the area")):
+    by_area = _AREA_QUANTILE, f"deviation of {_AREA_QUANTILE:.0%} of the area"
+    for quantile, title in ((1.0, "greatest deviation"), by_area):
         log(title)
         face = head.part("face").surface
         variants = compare(face, domain, level=level, quantile=quantile, report=log)
@@ -128,7 +130,7 @@ def bench_quadtree(name: str, log: Log, level: int = UNIFORM_LEVEL, out: Path | 
 
 
 def bench_savings(name: str, log: Log, level: int = UNIFORM_LEVEL) -> Tables:
-    """What quad trees save on a head's face and nine other surfaces, least first, two levels above ``level``."""
+    """Return what quad trees save on a face and nine other surfaces, least first; uniform meshes have level - 2."""
     log("loading")
     head = Head.load(find_config("heads", name))
     domain = domain_of(next(part for part in head.data.parts if part.name == "face"))
@@ -152,13 +154,13 @@ def _saving(variant: Variant) -> Measure:
 
 
 def pose_rows(head: Head, seconds: float, log: Log) -> list[Measure]:
-    """Posing with everything, one parameter and nothing changing."""
+    """Measure posing when every parameter changes, when one changes and when nothing changes."""
     count = len(head.parameters)
     rng = np.random.default_rng(1)
     log("every parameter")
     whole = least(poser(head, rng.uniform(0, 0.5, (_POSES, count))), seconds)
     rows = [Measure("pose, every parameter changed", whole)]
-    for parameter in _MOVING:
+    for parameter in _MOVED_PARAMETERS:
         log(parameter)
         poses = np.zeros((_POSES, count))
         poses[:, head.parameters.index(parameter)] = np.arange(_POSES) / _POSES
@@ -169,42 +171,42 @@ def pose_rows(head: Head, seconds: float, log: Log) -> list[Measure]:
 
 
 def bench_crowd(name: str, count: int, seconds: float, log: Log) -> Tables:
-    """Posing a crowd of ``count`` heads with everything changed, beside one head alone, in turn; and its memory."""
+    """Compare posing a crowd of ``count`` heads, every parameter changed, with posing one head; measure its memory."""
     log("loading")
     folder = find_config("heads", name)
     alone, crowd = Head.load(folder), Crowd(Head.load(folder), count)
     poses = np.random.default_rng(1).uniform(0, 0.5, (_POSES, count, len(alone.parameters)))
     each = cycle(poses)
     log(f"{count} heads")
-    moves = [poser(alone, poses[:, 0]), lambda: crowd.pose(next(each)), mover(count)]
-    one, together, mixed = least_of(moves, seconds)
-    share = together / count
+    calls = [poser(alone, poses[:, 0]), lambda: crowd.pose(next(each)), ticker(count)]
+    one, together, ticks = least_of(calls, seconds)
+    per_head = together / count
     arrays = sum(part.vertices.nbytes + part.normals.nbytes for part in alone.parts)
     rows = [
         Measure("one head alone, every parameter changed", one),
-        Measure("a head of the crowd, every parameter changed", share, share / one, "one alone"),
-        Measure("its tick: layers, idle motion, limits", mixed / count, mixed / together, "posing it"),
-        Measure("memory of a further head", 0.0, crowd.nbytes / count / arrays, "its vertices and normals", "<= 3"),
+        Measure("a head of the crowd, every parameter changed", per_head, per_head / one, "one alone"),
+        Measure("its tick: layers, idle motion, limits", ticks / count, ticks / together, "posing it"),
+        Measure("memory per head", 0.0, crowd.nbytes / count / arrays, "its vertices and normals", "<= 3"),
     ]
     return [(f"{count} heads like {alone.name}, {arrays / 1e6:.1f} MB of vertices and normals each", rows)]
 
 
-def mover(count: int) -> Callable[[], object]:
-    """A call that ticks the layers of ``count`` heads, each with an idle motion of its own, 10 ms later each time."""
+def ticker(count: int) -> Callable[[], object]:
+    """Return a function that ticks the layers of ``count`` heads, each with its own idle motion, by 10 ms per call."""
     states = [CommandState(PARAMETERS, seed=seed) for seed in range(count)]
     for state in states:
         state.live(1.0, 0)
-    shown, times = PARAMETERS.neutral(), iter(range(10**9, 10**15, 10**7))
+    values, times = PARAMETERS.neutral(), iter(range(10**9, 10**15, 10**7))
 
-    def move() -> None:
+    def tick() -> None:
         now_ns = next(times)
         for state in states:
-            state.tick(now_ns, 0.01, shown)
+            state.tick(now_ns, 0.01, values)
 
-    return move
+    return tick
 
 
 def poser(head: Head, poses: Floats) -> Callable[[], object]:
-    """A call that poses ``head`` with the next of ``poses`` : (n, h)."""
+    """Return a function that poses ``head`` with the next of ``poses`` : (n, h), again and again."""
     each = cycle(poses)
     return lambda: head.pose(next(each))

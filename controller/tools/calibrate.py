@@ -1,4 +1,4 @@
-"""Runs a calibration: reads the buses and single key presses from the terminal, and shows the screen."""
+"""Runs a calibration: reads the buses and single key presses on the terminal, and draws the screen."""
 
 from __future__ import annotations
 
@@ -35,23 +35,24 @@ from drivers.base.errors import DriverError
 ARROWS = {"[A": "up", "[B": "down", "[C": "right", "[D": "left", "OA": "up", "OB": "down", "OC": "right", "OD": "left"}
 
 PERIOD_S = 0.03
+"""Time that each cycle waits for keys."""
 STALE_S = 0.5
-"""An older angle counts as unknown; a single read that was missed does not matter."""
-SLOW_RAD_S = 0.5
-"""Nothing moves faster than this while it is calibrated."""
+"""An older angle counts as unknown. It is long enough for a single missed read not to matter."""
+MAX_SPEED_RAD_S = 0.5
+"""Limit of the speed of every servo during a calibration."""
 
 BusChannels = tuple[Bus, NDArray[np.intp]]
-"""A bus and the indices of its channels."""
+"""A bus, and the indices of its channels among those of the calibration."""
 
 
 def run_calibration(
     robot: RobotSettings, channels: Sequence[ChannelSettings], name: str, target: Path, margin_deg: float,
     console: Console,
 ) -> bool:  # fmt: skip
-    """Let a person capture ``channels``; the motors are off whenever it ends. Returns whether the file was written.
+    """Let a person capture the angles of ``channels``; return whether the file was written.
 
-    Channels that ``target`` holds already and that are not captured now stay in it. Where a signal or an error ends it,
-    what was captured and not saved goes into a file beside ``target``.
+    The torque is off whenever it ends. Channels in an existing ``target`` that are not captured now are kept. If a
+    signal or an error ends it, unsaved angles are written to a new file beside ``target``.
 
     Raises DriverError or ControllerError.
     """
@@ -69,8 +70,8 @@ def run_calibration(
                 while not (screen.done or ended.is_set()):
                     try:
                         _cycle(buses, screen)
-                    except DriverError as error:  # what was captured is still here: s saves it
-                        screen.fail(f"{error}; the motors are to be off; trying again")
+                    except DriverError as error:  # the captured angles are kept, and s saves them
+                        screen.fail(f"{error}; torque is switched off; trying again")
                     live.update(screen.picture(title), refresh=True)
                     for key in read_keys(PERIOD_S):
                         screen.handle_key(key)
@@ -83,9 +84,9 @@ def run_calibration(
 
 
 def _known_channels(target: Path, robot: RobotSettings) -> dict[str, CapturedAngles]:
-    """The channels of the robot in a calibration that is there already; none where it is another robot's or damaged.
+    """Return the channels of an existing calibration; none if it is of another robot, or damaged.
 
-    Raises ConfigError for one that a newer omote has written: replaced by this one, it would lose what only that reads.
+    Raises ConfigError: a newer omote has written it, and replacing it would lose what this omote cannot read.
     """
     try:
         found = load(target, CalibrationFile) if target.exists() else None
@@ -101,14 +102,14 @@ def _known_channels(target: Path, robot: RobotSettings) -> dict[str, CapturedAng
 
 def _open_bus(stack: ExitStack, bus: BusSettings, channels: Sequence[ChannelSettings]) -> BusChannels:
     indices = [i for i, channel in enumerate(channels) if channel.bus == bus.name]
-    own = [channels[i] for i in indices]
-    specs = servo_specs(own, np.radians([rest_deg(channel) + channel.trim_deg for channel in own]))
-    slow = [replace(spec, max_speed_rad_s=min(spec.max_speed_rad_s, SLOW_RAD_S)) for spec in specs]
+    on_bus = [channels[i] for i in indices]
+    specs = servo_specs(on_bus, np.radians([rest_deg(channel) + channel.trim_deg for channel in on_bus]))
+    slow = [replace(spec, max_speed_rad_s=min(spec.max_speed_rad_s, MAX_SPEED_RAD_S)) for spec in specs]
     return stack.enter_context(open_bus(bus.kind, slow, **bus.options())), np.array(indices, dtype=np.intp)
 
 
 def _cycle(buses: Sequence[BusChannels], screen: CalibrationScreen) -> None:
-    """Switch the motors as the keys ask, move those that hold, and read where everything is."""
+    """Switch the torque on or off as the screen says, move servos that hold, and read all angles."""
     angles = np.full(len(screen.channels), np.nan)
     for bus, indices in buses:
         if not bus.is_open:
@@ -125,17 +126,20 @@ def _cycle(buses: Sequence[BusChannels], screen: CalibrationScreen) -> None:
 
 def _save(
     screen: CalibrationScreen, robot: RobotSettings, name: str, target: Path, before: Mapping[str, CapturedAngles],
-    own: bool,
+    written: bool,
 ) -> bool:  # fmt: skip
-    """Write the file, or ask first if it exists and this run did not write it. ``before`` : what it held then."""
+    """Write the file, or ask first if it exists and this run has not ``written`` it; return whether it was written now.
+
+    before : the channels that the file had when the run began.
+    """
     captured = screen.captured()
     kept = len(before.keys() - captured.keys())
-    if target.exists() and not own and not screen.may_replace:
-        screen.ask(f"replace {target}{f', in which {kept} other channels stay' if kept else ''}? (y/n)")
+    if target.exists() and not written and not screen.may_replace:
+        screen.ask(f"replace {target}{f' and keep {kept} other channels in it' if kept else ''}? (y/n)")
         return False
     try:
         save_calibration(target, name, robot.name, {**before, **captured})
-    except ControllerError as error:  # what was captured is still here: once there is room, s saves it
+    except ControllerError as error:  # the captured angles are kept, and s saves them once there is room
         screen.not_saved(f"not saved: {error}")
         return False
     wrong = screen.in_wrong_order()
@@ -150,16 +154,16 @@ def _save_aside(
     screen: CalibrationScreen, robot: RobotSettings, name: str, target: Path, before: Mapping[str, CapturedAngles],
     console: Console,
 ) -> None:  # fmt: skip
-    """Write what was captured and not saved to a new file beside ``target``, and say so; nothing without such."""
+    """Write angles that were captured and not saved, if any, to a new file beside ``target``, and print its path."""
     captured = screen.captured()
     if not screen.changed or not captured:
         return
     stem = target.name.removesuffix(SUFFIX if target.name.endswith(SUFFIX) else target.suffix)
-    places = (target.with_name(f"{stem}.unsaved{number or ''}{SUFFIX}") for number in itertools.count())
-    place = next(path for path in places if not path.exists())
+    paths = (target.with_name(f"{stem}.unsaved{number or ''}{SUFFIX}") for number in itertools.count())
+    free = next(path for path in paths if not path.exists())
     try:
-        save_calibration(place, name, robot.name, {**before, **captured})
-        text = f"ended before it was saved: what was captured of {len(captured)} channels is in {place}"
+        save_calibration(free, name, robot.name, {**before, **captured})
+        text = f"ended before it was saved: the captured angles of {len(captured)} channels are in {free}"
     except ControllerError as error:
         text = f"ended before it was saved: {error}"
     with suppress(OSError):  # the terminal is gone
@@ -168,10 +172,13 @@ def _save_aside(
 
 @contextmanager
 def keyboard(descriptor: int | None = None) -> Iterator[Callable[[float], list[str]]]:
-    """A function that returns the keys pressed within a time (s): characters, ``up``, ``down``, ``left``, ``right``.
+    """Yield a function that returns the keys pressed within a time (s).
 
-    ``descriptor`` : of a terminal, standard input without; its settings are restored at the end. Raises ControllerError
-    where it is no terminal.
+    Keys are characters, ``up``, ``down``, ``left`` and ``right``.
+
+    ``descriptor`` : of a terminal; None means standard input. The terminal's settings are restored at the end.
+
+    Raises ControllerError: it is not a terminal.
     """
     fd = (sys.stdin.fileno() if sys.stdin is not None else -1) if descriptor is None else descriptor
     if not os.isatty(fd):
@@ -205,7 +212,7 @@ def _terminal_keys(fd: int, wait_s: float) -> list[str]:
 
 
 def split_keys(text: str) -> list[str]:
-    """The input of a terminal, key by key; escape sequences of other keys are left out."""
+    """Split the input of a terminal into keys; escape sequences of other keys are omitted."""
     keys = [ARROWS.get(key[1:], "") if key[0] == "\x1b" else key for key in re.findall("\x1b.{0,2}|.", text, re.DOTALL)]
     return [key for key in keys if key]
 

@@ -1,4 +1,4 @@
-"""The screen of a calibration: handles keys, collects captured angles and draws them. Opens no port."""
+"""The screen of a calibration: handles keys, collects captured angles and draws them. It opens no port."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from controller.robot.calibration import CapturedAngles
 from controller.robot.settings import ChannelSettings
 
 STEP_DEG = 0.5
-"""How far an arrow key moves a servo that holds."""
-BAR = 44
-SLACK_DEG = 1.0  # of one angle that is measured twice
+"""How far an arrow key moves a servo whose torque is on."""
+BAR_LENGTH = 44
+MEASURING_TOLERANCE_DEG = 1.0  # two measurements of one angle may differ by this
 HELP = (
     "up/down channel   n neutral   N neutral of all   [ lowest   ] highest   t follow the extremes\n"
     "h hold / release   left/right move while it holds   c clear   s save   q leave"
@@ -27,7 +27,7 @@ HELP = (
 
 @dataclass
 class Marks:
-    """Captured angles of one channel, degrees; NaN before they are captured."""
+    """The captured angles of one channel, degrees; NaN until they are captured."""
 
     low: float = math.nan
     neutral: float = math.nan
@@ -35,7 +35,7 @@ class Marks:
 
     @property
     def missing(self) -> list[str]:
-        """Names of the angles that are still to be captured."""
+        """Names of the angles that are not captured yet."""
         found = {"lowest": self.low, "neutral": self.neutral, "highest": self.high}
         return [name for name, value in found.items() if math.isnan(value)]
 
@@ -44,12 +44,12 @@ class Marks:
 class CalibrationScreen:
     """State of a calibration, from key presses to the captured angles.
 
-    channels : n channels. measures : whether their servos measure their position; others are moved by keys alone.
-    margin_deg : kept away from the captured ends, so that nothing is driven into its stop.
-    angle_deg : (n,) newest angles, NaN where not known. target_deg : (n,) where the servos shall hold.
-    holding : whether the motors shall be on. tracking : whether new angles widen lowest and highest.
-    question : one that only y or n answers, or empty. done : whether to leave. saving : whether to save.
-    may_replace : whether an existing file may be replaced.
+    channels : n channels. measures : whether all servos measure their position; else keys alone move them.
+    margin_deg : moves the captured ends inwards, so that no servo is driven into its stop.
+    angle_deg : (n,) newest angles, NaN if unknown. target_deg : (n,) goals of servos whose torque is on.
+    holding : whether the torque is to be on. tracking : whether new angles widen lowest and highest.
+    changed : whether angles were captured since the file was saved. question : a question that only y or n answers, or
+    empty. done : whether to end. saving : whether to save now. may_replace : whether an existing file may be replaced.
     """
 
     channels: Sequence[ChannelSettings]
@@ -74,9 +74,9 @@ class CalibrationScreen:
         self.marks = [Marks() for _ in self.channels]
 
     def set_angles(self, angle_deg: Floats) -> None:
-        """Update the angles (n,), NaN where nothing fresh is known."""
+        """Update the angles (n,), NaN if unknown; widen the captured ends while tracking with the torque off."""
         self.angle_deg = np.array(angle_deg, dtype=np.float64)
-        if self.holding:  # a board knows the angle of a servo only after it has moved it
+        if self.holding:  # a board that does not measure knows an angle only after it has moved the servo
             self.target_deg = np.where(np.isnan(self.target_deg), self.angle_deg, self.target_deg)
         if not self.tracking or self.holding:
             return
@@ -108,7 +108,7 @@ class CalibrationScreen:
         }.get(key, lambda: None)()
 
     def captured(self) -> dict[str, CapturedAngles]:
-        """The channels whose three angles are known and in order, ends moved inwards by the margin."""
+        """Return the channels whose three angles are captured and in order, with ends moved inwards by the margin."""
         found = {}
         for channel, mark in zip(self.channels, self.marks, strict=True):
             if not mark.missing and self._in_order(mark):
@@ -119,7 +119,7 @@ class CalibrationScreen:
         return found
 
     def in_wrong_order(self) -> list[str]:
-        """Names of channels whose three angles are known, but neutral lies outside of lowest and highest."""
+        """Return the names of channels whose three angles are captured, but neutral is not between the ends."""
         return [
             channel.name
             for channel, mark in zip(self.channels, self.marks, strict=True)
@@ -127,22 +127,22 @@ class CalibrationScreen:
         ]
 
     def _in_order(self, mark: Marks) -> bool:
-        """Whether neutral lies between the ends; an end may be neutral itself, and measured twice."""
-        slack = max(self.margin_deg, SLACK_DEG)
-        return mark.low - slack <= mark.neutral <= mark.high + slack
+        """Whether neutral lies between the ends; a tolerance allows an end at neutral, which is measured twice."""
+        tolerance = max(self.margin_deg, MEASURING_TOLERANCE_DEG)
+        return mark.low - tolerance <= mark.neutral <= mark.high + tolerance
 
     def fail(self, message: str) -> None:
-        """Nothing is known of the servos: show why. The motors do not come on again by themselves."""
+        """Show why the servos cannot be used, forget their angles, and keep the torque off until h is pressed."""
         self.angle_deg = np.full(len(self.channels), np.nan)
         self.holding, self.message = False, message
 
     def saved(self, message: str) -> None:
-        """The file was written: show a message."""
+        """Note that the file was written, and show a message."""
         self.saving = self.changed = False
         self.message = message
 
     def not_saved(self, message: str) -> None:
-        """The file could not be written: show why; what was captured stays."""
+        """Show why the file could not be written; the captured angles are kept."""
         self.saving, self.message = False, message
 
     def ask(self, question: str) -> None:
@@ -165,7 +165,7 @@ class CalibrationScreen:
 
     def _move(self, step_deg: float) -> None:
         if not self.holding:
-            self.message = "h switches the motors on where they stand; then the arrows move"
+            self.message = "press h first: it switches the torque on at the present angles; then the arrows move"
             return
         low, high = self.channels[self.selected].limit_deg
         target = self.target_deg[self.selected] + step_deg
@@ -185,11 +185,11 @@ class CalibrationScreen:
 
     def _toggle_tracking(self) -> None:
         self.tracking = not self.tracking and self.measures
-        self.message = "" if self.measures else "these servos do not say where they are: use the arrows"
+        self.message = "" if self.measures else "these servos do not measure their angle: use the arrows"
 
     def _toggle_holding(self) -> None:
         if not self.holding and np.isnan(self.angle_deg).any() and self.measures:
-            self.message = "not every servo says where it is"
+            self.message = "the angle of a servo is unknown"
             return
         self.holding = not self.holding
         self.target_deg = self.angle_deg.copy()
@@ -201,8 +201,8 @@ class CalibrationScreen:
         self.saving = bool(self.captured())
         if not self.saving:
             mark = self.marks[self.selected]
-            between = [] if mark.missing or self._in_order(mark) else ["a neutral angle between lowest and highest"]
-            missing = mark.missing or between or ["a way between its ends"]
+            disordered = [] if mark.missing or self._in_order(mark) else ["a neutral angle between lowest and highest"]
+            missing = mark.missing or disordered or ["room between its ends"]
             self.message = f"nothing to save yet: {self.channels[self.selected].name} lacks {', '.join(missing)}"
 
     def _leave(self) -> None:
@@ -212,31 +212,31 @@ class CalibrationScreen:
             self.done = True
 
     def picture(self, title: str) -> Group:
-        """The screen: a bar for each channel, and help for the keys."""
+        """Return the screen: a row with a bar for each channel, a message, and help for the keys."""
         table = Table("", "channel", "now", "", "lowest", "neutral", "highest", box=None, pad_edge=False)
         for i, channel in enumerate(self.channels):
             mark = self.marks[i]
-            now, *words = [_degrees(value) for value in (self.angle_deg[i], mark.low, mark.neutral, mark.high)]
+            now, *marks = [_degrees(value) for value in (self.angle_deg[i], mark.low, mark.neutral, mark.high)]
             pointer, style = (">", "bold") if i == self.selected else ("", "")
-            table.add_row(pointer, channel.name, now, self._bar(i), *words, style=style)
-        motors = "motors on" if self.holding else "motors off: move it by hand"
+            table.add_row(pointer, channel.name, now, self._bar(i), *marks, style=style)
+        motors = "torque on" if self.holding else "torque off: move it by hand"
         state = motors + (", following the extremes" if self.tracking else "")
         message = Text(self.question or self.message, style="yellow")
         return Group(Text(f"{title}   {state}", style="bold"), table, message, Text(HELP, style="dim"))
 
     def _bar(self, i: int) -> Text:
-        """The channel's range with its captured angles and its present one."""
+        """Draw the channel's range with its captured angles and its present angle."""
         mark, limit = self.marks[i], self.channels[i].limit_deg
         known = [v for v in (*limit, mark.low, mark.neutral, mark.high, self.angle_deg[i]) if not math.isnan(v)]
         low, high = min(known), max(known)
 
-        def place(value: float) -> int:
-            return round((value - low) / (high - low) * (BAR - 1))
+        def position(value: float) -> int:
+            return round((value - low) / (high - low) * (BAR_LENGTH - 1))
 
-        cells = ["·"] * BAR
+        cells = ["·"] * BAR_LENGTH
         for value, sign in ((mark.low, "["), (mark.high, "]"), (mark.neutral, "|"), (self.angle_deg[i], "●")):
             if not math.isnan(value):
-                cells[place(value)] = sign
+                cells[position(value)] = sign
         return Text("".join(cells))
 
 

@@ -1,4 +1,4 @@
-"""Checks any file omote reads: finds out what it is, reads it whole, and describes it."""
+"""Checks any file that omote reads: finds out its kind, reads it whole, and describes it."""
 
 from __future__ import annotations
 
@@ -47,21 +47,23 @@ TRAFFIC = (".pcapng", ".log")
 
 @dataclass(frozen=True)
 class _Known:
-    """What a file may name: ``parameters``, and the expressions of the files ``more`` beside the shipped ones."""
+    """What a file may refer to: ``parameters``, the shipped expressions, and those of the files ``more``."""
 
     parameters: Parameters
     more: tuple[Path, ...] = ()
 
     def vocabulary(self, *more: Path) -> Vocabulary:
-        """The expressions, with those of further files."""
+        """Return all these expressions, with those of further files."""
         return Vocabulary.load(self.parameters.with_files(more), more=(*self.more, *more))
 
 
 def check_anything(name: str, vocabularies: Sequence[Path] = ()) -> list[str]:
-    """Check any file omote reads; returns what it is, in a line or two.
+    """Check any file that omote reads; return lines that describe it.
 
-    ``name`` : a path, or the name of a shipped stage, robot or head. ``vocabularies`` : files with expressions and
-    parameters that it may name. Raises ConfigError or SurfaceError.
+    ``name`` : a path, or the name of a shipped stage, robot, head or other file of configs. ``vocabularies`` : files
+    with expressions and parameters that it may refer to.
+
+    Raises ConfigError or SurfaceError: the file cannot be read or is wrong.
     """
     with ports_forbidden("a check"):
         path = _find(name)
@@ -80,13 +82,13 @@ def _find(name: str) -> Path:
             continue
     hint = "omote check demo"
     raise ConfigError(
-        f"{name}: no such file, and no stage, robot, head, script, vocabulary, life, person or controls of it",
+        f"{name}: no such file, and no stage, robot, head, script, vocabulary, life, person or controls of that name",
         hint=hint,
     )
 
 
 def _describe(path: Path, known: _Known) -> Iterator[str]:
-    """Lines on a file; one that begins with a space continues the line before it."""
+    """Yield lines that describe a file; one that begins with a space adds to the line before it."""
     suffix = path.suffix.lower()
     if _is_head(path):
         yield from _check_head(path if path.is_dir() else path.parent)
@@ -98,37 +100,40 @@ def _describe(path: Path, known: _Known) -> Iterator[str]:
             yield f"surface {summary(item)}"
         for error in left_out:
             yield f"  left out: {error}"
-    elif path.suffix == SUFFIX:  # replayed as fast as possible; every tick has to give the recorded values
+    elif path.suffix == SUFFIX:  # replayed as fast as possible; every tick must reproduce the recorded values
         times = [now_ns for now_ns, _ in replay(path, known.parameters)]
         seconds = (times[-1] - times[0]) * 1e-9 if times else 0.0
-        yield f"recording {path.name}: {len(times)} ticks, {seconds:.1f} s, all came out again bit by bit"
+        yield f"recording {path.name}: {len(times)} ticks, {seconds:.1f} s, all reproduced exactly"
     elif suffix in TRAFFIC:
         yield describe_traffic(path)
     elif suffix in suffixes():
         take = load_take(path, known.parameters)
         yield f"take {path.name}: {take.frames} frames, {take.duration_s:.1f} s at {take.rate_hz:.0f} Hz"
     elif suffix in MESHES:
-        why = f"{path}: is a mesh; what is checked is the head that is made from it"
+        why = f"{path}: is a mesh; omote check checks the head that is made from it"
         raise ConfigError(why, hint=f"omote fit {path} -o HEAD; omote check HEAD")
     else:
         yield from _describe_toml(path, known)
 
 
 def _is_head(path: Path) -> bool:
-    """A head's folder, or the file in it; robots of that name are robots."""
+    """Whether a path is a head's folder or its head.toml; a robot file may be called head.toml, too."""
     if path.name != "head.toml" or path.is_dir():
         return path.is_dir()
     try:
         return not {"buses", "channels"} & set(read_toml(path))
     except ConfigError:
-        return True  # whoever reads heads says more of what is wrong
+        return True  # the reader of heads reports the fault in detail
 
 
 def _check_head(folder: Path) -> Iterator[str]:
-    """Look at the head at rest and with every parameter at its end; every defect is one line of the error."""
-    from surface.check import check_head  # start-up: only heads need it
-    from surface.head import Head  # start-up: only heads and groups need it
-    from surface.head.model.identity import load_identities, with_identities  # start-up: the same
+    """Check the head at rest and with every parameter at its limit.
+
+    Raises ConfigError: the head has defects, one line each, or cannot be posed.
+    """
+    from surface.check import check_head  # imported lazily: only heads need it
+    from surface.head import Head  # imported lazily: only heads and groups need it
+    from surface.head.model.identity import load_identities, with_identities  # imported lazily: as above
 
     head = Head.load(folder)
     known = load_identities(folder)
@@ -153,8 +158,8 @@ def _is_group(path: Path) -> bool:
 
 
 def _check_group(path: Path) -> str:
-    from controller.stage.inverse import load_group  # start-up: as Head
-    from surface.head.model.file import load_data  # start-up: as Head
+    from controller.stage.inverse import load_group  # imported lazily: only heads and groups need it
+    from surface.head.model.file import load_data  # imported lazily: only heads and groups need it
 
     head = load_data(find_config("heads", DEFAULT_HEAD))
     name, group = load_group(path, head)
@@ -166,7 +171,7 @@ def _describe_toml(path: Path, known: _Known) -> Iterator[str]:
     kind = file_kinds.kind_of(table)
     if kind is None and table:
         why = f"no kind of file has the keys {', '.join(table)[:200]}"
-        raise ConfigError(f"{path}: {why}", hint="compare it with the file of its kind in omote's folder configs")
+        raise ConfigError(f"{path}: {why}", hint="compare it with a file of the same kind in omote's folder configs")
     yield from _READERS.get(kind or file_kinds.STAGE, _describe_stage)(path, known)
 
 
@@ -211,7 +216,7 @@ def _describe_person(path: Path, known: _Known) -> Iterator[str]:
 
 
 def _describe_parameters(path: Path, known: _Known) -> Iterator[str]:
-    """A base vocabulary, which has the shipped names, or one that adds parameters to it, perhaps with expressions."""
+    """Describe a base vocabulary, which has the shipped names, or one that adds parameters and perhaps expressions."""
     named = read_toml(path).get("parameters")
     if isinstance(named, Mapping) and set(PARAMETERS.names) & set(named):
         yield f"parameters {path.name}: {len(Parameters.load(path))}"
@@ -235,7 +240,7 @@ def _describe_presets(path: Path, known: _Known) -> Iterator[str]:
 
 def _describe_controls(path: Path, known: _Known) -> Iterator[str]:
     found = load_controls(path, known.parameters, known.vocabulary())
-    counts = (f"{len(getattr(found, what))} {what}" for what in ("controllers", "axes", "buttons", "keys"))
+    counts = (f"{len(getattr(found, table))} {table}" for table in ("controllers", "axes", "buttons", "keys"))
     yield f"controls {path.name}: {', '.join(text for text in counts if not text.startswith('0 ')) or 'nothing'}"
 
 
@@ -267,14 +272,14 @@ def _describe_stage(path: Path, known: _Known) -> Iterator[str]:
     if stage.heads:
         yield f"{name}: heads {', '.join(head.name for head in stage.heads)}"
     else:
-        yield f"{name}: {_parts_of(stage)}"
+        yield f"{name}: {_stage_parts(stage)}"
     for head in stage.heads:
-        yield f"head {head.name}: {_parts_of(head.stage)}"
+        yield f"head {head.name}: {_stage_parts(head.stage)}"
     for each in heads_of(stage):
         yield from _warnings(each.robots)
 
 
-def _parts_of(stage: Stage) -> str:
+def _stage_parts(stage: Stage) -> str:
     links = ", ".join(map(str, stage.settings.links)) or "none"
     robots = ", ".join(robot.name for robot in stage.robots) or "none"
     own = f", parameters of its own: {', '.join(stage.parameters.own)}" if stage.parameters.own else ""
@@ -286,23 +291,26 @@ def _warnings(robots: Sequence[RobotSettings]) -> Iterator[str]:
 
 
 def _describe_robot(path: Path, known: _Known) -> Iterator[str]:
-    """A robot; with anchors, by region how far emotions move the skin and the servos fall short (rms, mm)."""
+    """Describe a robot. If it has anchors (servos that pull the skin), also how far its servos fall short.
+
+    For each region, the lines give how far emotions move the skin, and the part that servos miss (rms, mm).
+    """
     robot = load_robot(path, known.parameters)
     parameters = robot_parameters(robot, path, known.parameters)
     yield f"robot {robot.name}: {len(robot.buses)} buses, {len(robot.channels)} channels"
     yield from _warnings([robot])
     if not robot.anchored_channels:
         return
-    from controller.robot.anchors import load_anchors, residual_rows  # start-up: as Head
-    from controller.robot.suggest_servos import described, suggest_servos  # start-up: as Head
+    from controller.robot.anchors import load_anchors, residual_rows  # imported lazily: for anchors
+    from controller.robot.suggest_servos import described, suggest_servos  # imported lazily: for anchors
 
     anchors = load_anchors(robot, find_config("heads", DEFAULT_HEAD), parameters, where=str(path))
     vocabulary = Vocabulary.load(parameters, more=known.more)
     emotions = {n: vocabulary[n].weights for n in vocabulary.names if vocabulary[n].kind == "emotion"}
     if anchors is None:
         return
-    for region, wanted, left in residual_rows(anchors, emotions, parameters):
-        yield f"  {region}: emotions move it {wanted:.1f} mm, the servos stay {left:.1f} mm behind (rms)"
+    for region, wanted, residual in residual_rows(anchors, emotions, parameters):
+        yield f"  {region}: emotions move it {wanted:.1f} mm, the servos fall {residual:.1f} mm short (rms)"
     yield from (f"  {described(found)}" for found in suggest_servos(anchors, emotions, parameters))
 
 

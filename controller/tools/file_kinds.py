@@ -1,7 +1,6 @@
-"""Finds out which kind of settings a TOML file holds, by its keys and not by its name.
+"""Finds out which kind of settings a TOML file holds, from its keys and not from its name.
 
-Every kind of file has keys that belong to it; the kind that has most of a file's keys is the file's, so that a file
-with a misspelt key is still checked as what it is meant to be.
+A file is of the kind that shares the most keys with it, so that a file with a misspelt key is still recognised.
 """
 
 from __future__ import annotations
@@ -26,7 +25,8 @@ from controller.vocabulary.controls import ControlsFile
 class FileKind:
     """A kind of file.
 
-    name : for people. keys : that it may have. inside : keys of its tables, where their names are the user's own.
+    name : for people. keys : top-level keys that it may have. inside : keys of its tables, for kinds whose table names
+    are chosen by the user.
     """
 
     name: str
@@ -34,7 +34,7 @@ class FileKind:
     inside: frozenset[str] = frozenset()
 
     def likeness(self, table: Mapping[str, Any]) -> float:
-        """How much of a file is of this kind: a key counts less where other kinds have it, too."""
+        """Return a score of how well a file fits this kind: a key that several kinds have counts a fraction."""
         own = sum(1.0 / sum(key in kind.keys for kind in KINDS) for key in self.keys & set(table))
         return own + sum(bool(self.inside & set(each)) for each in table.values() if isinstance(each, Mapping))
 
@@ -66,7 +66,7 @@ KINDS = (
 
 
 def kind_of(table: Mapping[str, Any]) -> FileKind | None:
-    """The kind of a file's table; None where no kind has any of its keys."""
+    """Return the kind of a file's table, or None if no kind has any of its keys."""
     likeness = {kind: kind.likeness(table) for kind in KINDS}
     if isinstance(table.get("channels"), Mapping):
         del likeness[ROBOT]  # its channels are a list

@@ -1,4 +1,4 @@
-"""Monitors a working bus: its servos, their states and the packets that pass. Nothing is switched on or moved."""
+"""Monitors a bus in operation: its servos, their states and the packets on it. Enables no torque and moves nothing."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from rich.table import Table
 from rich.text import Text
 
 from controller.tools.scan import scan_port
-from controller.tools.tables import fitted
-from controller.tools.traffic_files import TrafficWriter, all_of, decoder_of, read_traffic
+from controller.tools.tables import fit_table
+from controller.tools.traffic_files import TrafficWriter, combine_taps, decoder_of, read_traffic
 from drivers import open_bus
 from drivers.base.bus import Bus, BusState, ServoInfo, ServoSpec
 from drivers.base.errors import DriverError, NoReply, PortLost
@@ -27,23 +27,26 @@ from drivers.core.trafficlog import Wire
 from drivers.port.serialport import SerialPort, tapped
 from drivers.tables.tables import FEETECH, ControlTable, load_table
 
-SHOWN = ("Present Position", "Goal Position")
-WAIT_S = 0.1
+SHOWN_REGISTERS = ("Present Position", "Goal Position")
+READ_TIMEOUT_S = 0.1
 Rows = Callable[[], Iterable[Mapping[str, Any]]]
 
 REFRESH_S = 0.1
-KEPT = 4096
-"""Pieces of traffic kept between two refreshes; older ones of a busy bus are dropped, and the view shows how many."""
+MAX_PIECES = 4096
+"""Pieces of traffic kept between two refreshes. Beyond it the oldest are dropped, and the view shows how many."""
 
 
 def make_decoder(protocol: int, tables: Mapping[int, ControlTable], model: str = "") -> Decoder:
-    """A decoder that knows the registers of servos by id, and takes all others for ``model``; raises DriverError."""
+    """Return a decoder with the registers of servos by id; a servo without a table is decoded as ``model``.
+
+    Raises DriverError: no such model.
+    """
     default = load_table(model) if model else None
     return Decoder1(tables, default) if protocol == 1 else Decoder2(tables, default)
 
 
 def replay_traffic(path: Path, protocol: int | None, console: Console, model: str = "") -> None:
-    """Print a record of traffic, decoded. ``protocol``, ``model`` : what it does not say itself.
+    """Print a record of traffic, decoded. ``protocol``, ``model`` : override those of the record.
 
     Raises ConfigError: it cannot be read. DriverError: no such model.
     """
@@ -65,8 +68,8 @@ def listen_to_bus(
 ) -> None:
     """Show the traffic of a bus without sending a byte: an adapter that only receives is enough.
 
-    ``protocol`` : None is that of ``model``, or 2 without one.
-    ``model`` : of servos whose model is not seen in the traffic, for the names of registers; may be empty.
+    ``protocol`` : if None, that of ``model``, or 2 if ``model`` is empty, too.
+    ``model`` : names the registers of servos whose model does not appear in the traffic; may be empty.
     ``record`` : file for the traffic, or None.
     Raises PortError, DriverError when there is no such model, or ConfigError when the file cannot be written.
     """
@@ -79,13 +82,13 @@ def listen_to_bus(
         stack.callback(link.close)
         writer = stack.enter_context(TrafficWriter(record, wire)) if record else None
 
-        def heard(sent: bool, data: bytes) -> None:
+        def tap(sent: bool, data: bytes) -> None:
             view.tap(None, data)
             if writer is not None:
                 writer.tap(None, data)
 
-        link.tap = heard
-        view.run(keep_going, lambda: link.read(time.monotonic() + WAIT_S))
+        link.tap = tap
+        view.run(keep_going, lambda: link.read(time.monotonic() + READ_TIMEOUT_S))
 
 
 def poll_servos(
@@ -99,7 +102,7 @@ def poll_servos(
 ) -> None:
     """Find the servos on a port, then read their states at a rate and show them with all traffic.
 
-    ``protocol`` : None tries both and takes the first in which servos answer, 2 before 1.
+    ``protocol`` : None tries 2, then 1, and uses the first in which servos answer.
     ``record`` : file for the traffic, or None.
     Raises PortError, NoReply when no servo answers, or ConfigError when the file cannot be written.
     """
@@ -119,7 +122,7 @@ def poll_servos(
     wire = Wire(kind, baud, {info.id: tables[info.id].model for info in known})
     with ExitStack() as stack:
         writer = stack.enter_context(TrafficWriter(record, wire)) if record else None
-        with tapped(all_of(view.tap, *([writer.tap] if writer else []))):
+        with tapped(combine_taps(view.tap, *([writer.tap] if writer else []))):
             bus = stack.enter_context(open_bus(kind, specs, port=port, baud=baud))
         reader = _Reader(bus, 1.0 / rate_hz)
         view.rows = reader.rows
@@ -127,7 +130,7 @@ def poll_servos(
 
 
 def _find_servos(port: str, baud: int, protocols: Sequence[int]) -> tuple[int, list[ServoInfo]]:
-    """The first protocol in which servos answer, and what answered."""
+    """Return the first protocol in which servos answer, and the servos; the last protocol and none if none answers."""
     for protocol in protocols:
         found = [item.servo for item in scan_port(port, [(protocol, baud)]) if item.servo]
         if found:
@@ -144,7 +147,7 @@ class _Reader:
         self._next_s = time.monotonic()
 
     def step(self) -> None:
-        """Wait until a read is due, and read; a lost port is tried again."""
+        """Wait until a read is due, and read; if the port is lost, reconnect."""
         time.sleep(max(0.0, self._next_s - time.monotonic()))
         self._next_s = max(self._next_s + self._period_s, time.monotonic())
         try:
@@ -157,7 +160,7 @@ class _Reader:
                 self._state = None
 
     def rows(self) -> list[dict[str, Any]]:
-        """One row a servo."""
+        """Return one row for each servo."""
         state = self._state
         if state is None:
             return [{"id": servo.id, "model": servo.model, "state": "port lost"} for servo in self._bus.servos]
@@ -187,11 +190,11 @@ def _state(state: BusState, i: int) -> str:
 
 
 def _heard_rows(decoder: Decoder) -> list[dict[str, Any]]:
-    """One row for each servo whose answers were received."""
+    """Return one row for each servo whose answers were received."""
     return [
-        {"id": servo, "answers": heard.packets, "error": heard.error}
-        | {name: heard.values[name] for name in SHOWN if name in heard.values}
-        for servo, heard in sorted(decoder.heard.items())
+        {"id": servo, "answers": record.packets, "error": record.error}
+        | {name: record.values[name] for name in SHOWN_REGISTERS if name in record.values}
+        for servo, record in sorted(decoder.heard.items())
     ]
 
 
@@ -201,23 +204,23 @@ class BusView:
     ``tap`` may be called from any thread and only stores the bytes; decoding and drawing happen in :meth:`run`.
 
     title : of the view. rows : returns one mapping for each servo, values by column. decoder : of the bus's protocol.
-    console : to print to; where it is no terminal, lines are printed as they come. lines : lines of traffic shown.
+    console : to print to; if it is not a terminal, lines are printed as they arrive. lines : lines of traffic shown.
     """
 
     def __init__(self, title: str, rows: Rows, decoder: Decoder, console: Console, lines: int = 16) -> None:
         self.title, self.rows, self._decoder, self._console = title, rows, decoder, console
-        self._pieces: deque[tuple[float, bool | None, bytes]] = deque(maxlen=KEPT)
+        self._pieces: deque[tuple[float, bool | None, bytes]] = deque(maxlen=MAX_PIECES)
         self._log: deque[str] = deque(maxlen=lines)
         self._begun_s = time.monotonic()
         self._taken = self._passed = 0
 
     def tap(self, sent: bool | None, data: bytes) -> None:
-        """Store bytes that passed; ``sent`` None where the direction is not known."""
+        """Store bytes that passed; ``sent`` is None if the direction is not known."""
         self._passed += 1
         self._pieces.append((time.monotonic(), sent, bytes(data)))
 
     def lines(self) -> list[str]:
-        """Lines decoded since the last call, with the time since the beginning."""
+        """Decode the stored bytes; return the new lines, each with the time since the beginning."""
         new = []
         while self._pieces:
             time_s, sent, data = self._pieces.popleft()
@@ -226,7 +229,7 @@ class BusView:
         return new
 
     def run(self, keep_going: Callable[[], bool], step: Callable[[], object] = lambda: time.sleep(REFRESH_S)) -> None:
-        """Show until ``keep_going()`` is false; calls ``step`` in a loop, which waits a moment each time."""
+        """Show the view until ``keep_going()`` is false; calls ``step``, which waits a moment, in a loop."""
         if self._console.is_terminal:
             with Live(self._picture(), console=self._console, auto_refresh=False, screen=True) as live:
                 self._loop(keep_going, step, lambda: live.update(self._picture(), refresh=True))
@@ -251,16 +254,16 @@ class BusView:
         left_out = self._passed - self._taken - len(self._pieces)
         note = f"  ({left_out} pieces left out)" if left_out > 0 else ""
         title = Text(f"{self.title}   Ctrl-C ends{note}", style="bold")
-        servos = fitted(table_of(self.rows()), self._console, self._console.width)
+        servos = fit_table(table_of(self.rows()), self._console, self._console.width)
         return Group(title, *servos, Text("\n".join(self._log), overflow="fold"))
 
 
 def table_of(rows: Iterable[Mapping[str, Any]]) -> Table:
-    """Mappings as a table; unknown values stay empty."""
-    listed = list(rows)
-    names = list(dict.fromkeys(name for row in listed for name in row))
+    """Return mappings as a table; missing and NaN values stay empty."""
+    found = list(rows)
+    names = list(dict.fromkeys(name for row in found for name in row))
     table = Table(*names, box=None, pad_edge=False)
-    for row in listed:
+    for row in found:
         table.add_row(*(_cell(row.get(name)) for name in names))
     return table
 

@@ -1,4 +1,4 @@
-"""What a take, a show or a recording shows over time, as values of parameters; for other programs."""
+"""Converts a take, a show (timed script) or a recording to parameter values over time, for other programs."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from controller.takes.voices.network import network_take
 
 SHOW_HZ = 60.0
 """Rows per second of shows and recordings."""
-_LONGEST_S = 3600.0
-_AFTER_S = 2.0  # for which a show that ends is followed to its last expression
+_MAX_SHOW_S = 3600.0
+_SETTLE_S = 2.0  # time after the last step of a show, in which its last expression is reached
 _SCRIPT = ".toml"
 _WRITERS = {".csv": write_plain, ".mcap": write_mcap}
 
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """Values over time.
+    """Parameter values over time.
 
-    name : for people. times_s : (n,) float64 from 0, rising. values : (n, P) float64 in range. mask : (P,) bool, the
-    parameters that it moves.
+    name : for people. times_s : (n,) float64, ascending from 0. values : (n, P) float64 in range. mask : (P,) bool,
+    the parameters that it moves.
     """
 
     name: str
@@ -42,41 +42,41 @@ class Motion:
     mask: Flags
 
     def with_rest(self) -> Floats:
-        """(n, P + 1) the values, and a column of zeros for names that are no parameters."""
+        """Return (n, P + 1): the values, and a last column of zeros for names that are not parameters."""
         return np.append(self.values, np.zeros((len(self.values), 1)), axis=1)
 
 
 def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None, model: Path | None = None) -> Motion:
-    """What a file shows: a take of any kind, a recording (.rec), or a script (.toml) as a show.
+    """Read the motion of a file: a take of any kind, a recording (.rec), or a script (.toml), which is played.
 
-    rate_hz : rows per second; without it those of a take are its own, those of shows and recordings 60.
-    model : network in ONNX that makes the face of a voice (WAV); see :mod:`controller.takes.voices.network`.
+    rate_hz : rows per second; None keeps those of a take, and means 60 for shows and recordings.
+    model : network (ONNX) that computes the face from a voice (WAV); see :mod:`controller.takes.voices.network`.
 
     Raises TakeError, ConfigError or ControllerError: the file cannot be read or is wrong.
     """
     if path.suffix.lower() == _SCRIPT:
-        return _of_ticks(path.name, *_show(path, parameters), rate_hz or SHOW_HZ)
+        return _resample(path.name, *_play_show(path, parameters), rate_hz or SHOW_HZ)
     if path.suffix == SUFFIX:
         ticks = [(now_ns * 1e-9, values.copy()) for now_ns, values in replay(path, parameters)]
         if not ticks:
             raise TakeError(f"{path}: nothing is recorded in it", hint="record it again")
-        times, rows = np.array([at for at, _ in ticks]), np.array([row for _, row in ticks])
-        return _of_ticks(path.name, times - times[0], rows, rate_hz or SHOW_HZ)
+        times, rows = np.array([time for time, _ in ticks]), np.array([row for _, row in ticks])
+        return _resample(path.name, times - times[0], rows, rate_hz or SHOW_HZ)
     take = load_take(path, parameters) if model is None else network_take(path, model, parameters)
     times = take.times_s if rate_hz is None else _grid(take.duration_s, rate_hz)
     values = np.array([take.sample(float(t), parameters.neutral()) for t in times])
-    return Motion(take.name, *_rising(times, values), take.mask)
+    return Motion(take.name, *_drop_repeated_times(times, values), take.mask)
 
 
-def _show(path: Path, parameters: Parameters) -> tuple[Floats, Floats]:
-    """Every tick of a show from its beginning to its end, or once through where it begins again."""
+def _play_show(path: Path, parameters: Parameters) -> tuple[Floats, Floats]:
+    """Return times (n,) and values (n, P) of every tick of a show, to its end, or one repetition of a loop."""
     read_toml(path)
     state = CommandState(parameters)
     script = load_script(str(path), parameters)
     show = Show(script, state)
     show.playing = True
     last_s = script.steps[-1][0] if script.steps else 0.0
-    length_s = min(script.loop_s or last_s + _AFTER_S, _LONGEST_S)
+    length_s = min(script.loop_s or last_s + _SETTLE_S, _MAX_SHOW_S)
     ticks, out, rows = round(length_s * 100), parameters.neutral(), []
     for k in range(ticks + 1):
         now_ns = 10_000_000 * (k + 1)
@@ -86,11 +86,11 @@ def _show(path: Path, parameters: Parameters) -> tuple[Floats, Floats]:
     return np.arange(ticks + 1) / 100.0, np.array(rows)
 
 
-def _of_ticks(name: str, times: Floats, rows: Floats, rate_hz: float) -> Motion:
-    """Rows at a rate, straight between ticks."""
-    at = _grid(float(times[-1]), rate_hz)
-    values = np.stack([np.interp(at, times, column) for column in rows.T], axis=1)
-    return Motion(name, at, values, np.logical_or.reduce(values != 0.0, axis=0))
+def _resample(name: str, times: Floats, rows: Floats, rate_hz: float) -> Motion:
+    """Interpolate ticks linearly at a constant rate."""
+    grid = _grid(float(times[-1]), rate_hz)
+    values = np.stack([np.interp(grid, times, column) for column in rows.T], axis=1)
+    return Motion(name, grid, values, np.logical_or.reduce(values != 0.0, axis=0))
 
 
 def _grid(length_s: float, rate_hz: float) -> Floats:
@@ -98,8 +98,8 @@ def _grid(length_s: float, rate_hz: float) -> Floats:
     return times
 
 
-def _rising(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Times and values without rows at the time of the row before."""
+def _drop_repeated_times(times: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Return times and values without rows that are not later than the row before."""
     later = np.append(True, np.diff(times) > 0.0)
     return times[later], values[later]
 
@@ -112,12 +112,12 @@ def convert(
     model: Path | None = None,
     ranges: Path | None = None,
 ) -> Motion:
-    """Write what a file shows as a plain table (.csv) or as MCAP (.mcap); returns it.
+    """Write the motion of a file as a plain table (.csv) or as MCAP (.mcap), and return it.
 
     ``ranges`` : file with the ranges of a person's face; see :mod:`controller.takes.retarget`.
 
-    Raises as :func:`load_motion`; TakeError: another suffix, or a place that cannot be written to. MissingPackage: mcap
-    is not installed.
+    Raises what :func:`load_motion` raises. TakeError: another suffix, or a path that cannot be written.
+    MissingPackage: mcap is not installed.
     """
     write = _WRITERS.get(out.suffix.lower())
     if write is None:
@@ -125,7 +125,7 @@ def convert(
             f"{out}: tables of parameters are .csv files, or .mcap", hint=f"omote convert {path.name} {path.stem}.csv"
         )
     if out.exists() and out.samefile(path):
-        raise TakeError(f"{out}: is the file that is read", hint="choose another name")
+        raise TakeError(f"{out}: is the input file", hint="choose another name")
     motion = load_motion(path, parameters, rate_hz, model)
     if ranges is not None:
         low, high = load_ranges(ranges, parameters)

@@ -1,4 +1,4 @@
-"""Lists every plug-in: the kinds of bus, linkage, link, take and export of omote and of other packages."""
+"""Lists every plug-in: the kinds of bus, linkage, link, format, take and export of omote and of other packages."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ EXPORTERS: Registry[Exporter] = Registry(
     check=_check_exporter,
 )
 
-SORTS: dict[str, Registry[Any]] = {
+REGISTRIES: dict[str, Registry[Any]] = {
     "bus": FAMILIES,
     "linkage": LINKAGES,
     "link": LINKS,
@@ -42,40 +42,40 @@ SORTS: dict[str, Registry[Any]] = {
     "take": TAKES,
     "export": EXPORTERS,
 }
-"""The registry of every sort of plug-in."""
+"""Every registry of plug-ins, by its name in lists."""
 
 
 def added_exporters() -> list[Exporter]:
-    """Exporters of other packages; where two have the same suffix, only the first."""
-    own, suffixes, found = {one.kind for one in exporters()}, set[str](), []
+    """Return the exporters of other packages; of two that share a suffix, only the first."""
+    builtin, suffixes, found = {one.kind for one in exporters()}, set[str](), []
     for one in EXPORTERS.all():
-        if one.kind not in own and not suffixes & {*one.suffixes}:
+        if one.kind not in builtin and not suffixes & {*one.suffixes}:
             suffixes |= {*one.suffixes}
             found.append(one)
     return found
 
 
 @dataclass(frozen=True)
-class Listed:
-    """One plug-in; where it does not work, ``title`` is the reason and ``hint`` what to type."""
+class ListedPlugin:
+    """One plug-in. If it cannot be used, ``fault`` says why and ``hint`` what to type next; else both are empty."""
 
-    sort: str
+    registry: str
     kind: str
     title: str
     package: str
-    works: bool = True
+    fault: str = ""
     hint: str = ""
 
 
-def listed() -> Iterator[Listed]:
-    """Every plug-in, those that cannot be loaded included."""
-    for sort, registry in SORTS.items():
+def list_plugins() -> Iterator[ListedPlugin]:
+    """Yield every plug-in, also those that cannot be used."""
+    for name, registry in REGISTRIES.items():
         for kind in registry.kinds():
             package = registry.package_of(kind) or "omote"
             try:
-                yield Listed(sort, kind, registry.get(kind).title, package)
+                yield ListedPlugin(name, kind, registry.get(kind).title, package)
             except PluginError as error:
-                yield Listed(sort, kind, str(error), package, False, error.hint)
+                yield ListedPlugin(name, kind, "", package, str(error), error.hint)
         for kind, package in registry.shadowed():
-            why = f"{registry.what} {kind!r} of the package {package} is never used: omote has that kind itself"
-            yield Listed(sort, kind, why, package, False, f"pip uninstall {package}, or give it another kind")
+            fault = f"{registry.what} {kind!r} of the package {package} is never used: omote has that kind itself"
+            yield ListedPlugin(name, kind, "", package, fault, f"pip uninstall {package}, or give it another kind")

@@ -1,4 +1,4 @@
-"""Scans a port for servos, at every baud rate and in both protocols; nothing moves."""
+"""Scans a serial port for servos, at every baud rate and in both protocols; nothing moves."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ BAUDS = {
     2: (1_000_000, 57_600, 115_200, 2_000_000, 3_000_000, 4_000_000, 9_600),
     1: (1_000_000, 500_000, 57_600, 115_200, 250_000, 128_000, 76_800, 38_400, 400_000, 200_000, 19_200, 9_600),
 }
-"""Rates by protocol, the usual ones first: Dynamixel's baud register, and those of AX, MX and Feetech."""
+"""Baud rates by protocol, the most common ones first: those of Dynamixel X, and those of AX, MX and Feetech."""
 
 STEPS = 254
-"""Progress steps of one rate and protocol."""
+"""Progress steps of one baud rate and protocol."""
 
-# A bus needs a servo to be made; a scan uses nothing of this one.
-_ANY = ServoSpec(0, "any", "xl330-m288", -1.0, 1.0, 1.0, 1.0)
+# A bus cannot be created without a servo; the scan does not use this one.
+_PLACEHOLDER = ServoSpec(0, "any", "xl330-m288", -1.0, 1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
 class Found:
-    """An answer at a rate in a protocol: a servo, or None for bytes that are no answer."""
+    """What answered at a baud rate in a protocol: a servo, or None for bytes that are not a valid answer."""
 
     baud: int
     protocol: int
@@ -33,7 +33,7 @@ class Found:
 
     @property
     def row(self) -> tuple[str, ...]:
-        """Rate, protocol, id, model, firmware, voltage, temperature, error and torque as text."""
+        """Baud rate, protocol, id, model, firmware, voltage, temperature, error and torque as text."""
         head = (str(self.baud), f"{self.protocol}.0")
         info = self.servo
         if info is None:
@@ -51,17 +51,18 @@ class Found:
 
 
 def plan_scan(bauds: Sequence[int] | None, protocols: Sequence[int]) -> list[tuple[int, int]]:
-    """(protocol, rate) in the order in which they are tried; ``bauds`` None tries :data:`BAUDS`."""
+    """Return (protocol, baud rate) in the order of the scan; with ``bauds`` None, all of :data:`BAUDS`."""
     return [(protocol, baud) for protocol in protocols for baud in bauds or BAUDS[protocol]]
 
 
 def scan_port(
     port: str, plan: Sequence[tuple[int, int]], progress: Callable[[str, int], object] = lambda text, step: None
 ) -> Iterator[Found]:
-    """Everything that answers on a port; ``plan`` : what to try, see :func:`plan_scan`.
+    """Yield everything that answers on a port; ``plan`` : see :func:`plan_scan`.
 
-    ``progress`` is called with what is being tried and how far it is, in :data:`STEPS` for each entry of the plan.
-    Raises PortError when the port cannot be opened or is lost.
+    ``progress`` is called with the present attempt as text, and the steps done: :data:`STEPS` for each of the plan.
+
+    Raises PortError: the port cannot be opened or is lost.
     """
     for done, (protocol, baud) in enumerate(plan):
         text = f"{baud} baud, Protocol {protocol}.0"
@@ -73,7 +74,7 @@ def scan_port(
         if protocol == 1:
             yield from _scan_protocol_1(port, baud, step)
         else:
-            with open_bus("dynamixel", [_ANY], port=port, baud=baud) as bus:
+            with open_bus("dynamixel", [_PLACEHOLDER], port=port, baud=baud) as bus:
                 yield from (Found(baud, 2, info) for info in bus.discover())
     progress("done", len(plan) * STEPS)
 
@@ -82,10 +83,10 @@ def _scan_protocol_1(port: str, baud: int, step: Callable[[int], None]) -> Itera
     link = SerialPort(port, baud)
     link.open()
     try:
-        heard = ping_all(link, step)
-        for servo in heard.ids:
+        answers = ping_all(link, step)
+        for servo in answers.ids:
             yield Found(baud, 1, describe(link, servo))
-        if heard.noise and not heard.ids:
+        if answers.noise and not answers.ids:
             yield Found(baud, 1, None)
     finally:
         link.close()

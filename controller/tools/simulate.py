@@ -27,7 +27,7 @@ from controller.robot.fault_script import load_fault_script
 from controller.robot.robot import load_robot
 from controller.robot.settings import ChannelSettings
 from controller.tools.monitor import BusView
-from controller.tools.traffic_files import Tap, TrafficWriter, all_of, decoder_of, read_traffic
+from controller.tools.traffic_files import Tap, TrafficWriter, combine_taps, decoder_of, read_traffic
 from drivers import open_bus
 from drivers.core.traffic import Decoder
 from drivers.core.trafficlog import Wire
@@ -42,9 +42,9 @@ from drivers.sim.wire.simulator import Setting, make_line, simulator_of
 class Serving:
     """Options of a server.
 
-    link : path that becomes a link to the pseudo-terminal, or ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT`` to
+    link : path of a symbolic link to the pseudo-terminal, or ``socket://HOST:PORT`` or ``rfc2217://HOST:PORT`` to
         listen at instead.
-    wire : bytes take the time they take at the baud rate. latency_s : latency timer of a USB adapter, added to it.
+    wire : delay bytes by their transmission time at the baud rate. latency_s : latency timer of a USB adapter, added.
     faults : faults to inject, see docs/simulated-buses.md. control : path of a socket that takes faults while it runs.
     watch : show the servos and the traffic while it runs.
     script : timeline of faults. record : file for the traffic.
@@ -72,14 +72,14 @@ def serve_alone(kind: str, options: Any, how: Serving, console: Console) -> None
 
 
 def wire_of(line: Line, family: str, baud: int) -> Wire:
-    """What a record says of a simulated wire."""
+    """Return the description of a simulated bus for the header of a traffic record."""
     return Wire(family, baud, {servo.id: servo.table.model for servo in line.servos} if isinstance(line, Chain) else {})
 
 
 def serve_record(path: Path, how: Serving, console: Console) -> None:
     """Serve a recorded bus; prints ``ready PATH``, and its counts when it is interrupted.
 
-    Raises ConfigError or DriverError: the record cannot be read, or nothing in it could be answered.
+    Raises ConfigError or DriverError: the record cannot be read, or contains no request with an answer.
     """
     record = read_traffic(path)
     line = Replay(record)
@@ -88,9 +88,9 @@ def serve_record(path: Path, how: Serving, console: Console) -> None:
 
 
 def _serve(line: Line, wire: Wire, how: Serving, console: Console, decoder: Decoder) -> None:
-    def look(server: PortServer) -> None:
+    def attach_taps(server: PortServer) -> None:
         taps: list[Tap] = [stack.enter_context(TrafficWriter(how.record, wire)).tap] if how.record else []
-        server.tap = all_of(*taps, *([start_view(server)] if how.watch else []))
+        server.tap = combine_taps(*taps, *([start_view(server)] if how.watch else []))
 
     def start_view(server: PortServer) -> Tap:
         def rows() -> list[dict[str, Any]]:
@@ -118,16 +118,16 @@ def _serve(line: Line, wire: Wire, how: Serving, console: Console, decoder: Deco
             commands=how.control,
             timeline=timeline,
             stop=stop,
-            on_server=look,
+            on_server=attach_taps,
         )
 
 
 @contextmanager
 def _stop_socket() -> Iterator[socket.socket]:
-    """A socket that becomes readable on SIGINT or SIGTERM.
+    """Yield a socket that becomes readable on SIGINT or SIGTERM.
 
     The interpreter writes to it at the moment of the signal. A handler in Python would run only after the call that
-    waits for the socket, which waits for ever when the signal comes just before it.
+    waits for the socket, and that call would wait forever if the signal came just before it.
     """
     reading, writing = socket.socketpair()
     writing.setblocking(False)
@@ -146,9 +146,9 @@ def _stop_socket() -> Iterator[socket.socket]:
 
 
 def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSettings]]:
-    """One bus of a robot file and the channels on it; the first bus without a name.
+    """Return the bus called ``bus`` of a robot file, or the first if it is None, and the channels on it.
 
-    Raises ConfigError when the file is wrong or has no such bus.
+    Raises ConfigError: the file is wrong or has no such bus.
     """
     robot = load_robot(find_config("robots", name), PARAMETERS)
     names = [entry.name for entry in robot.buses]
@@ -159,15 +159,18 @@ def robot_bus(name: str, bus: str | None) -> tuple[BusSettings, list[ChannelSett
 
 
 def serve_robot(name: str, bus: str | None, how: Serving, console: Console) -> None:
-    """Serve simulated servos for a bus of a robot file (:func:`robot_bus`), set up as its driver expects them."""
+    """Serve simulated servos for a bus of a robot file (:func:`robot_bus`), with the settings its driver expects."""
     chosen, channels = robot_bus(name, bus)
-    simulator = simulator_of(chosen.family)  # before the driver, which may not be there
+    simulator = simulator_of(chosen.family)  # first, since its error is clearer where the family is not installed
     line = far_end(chosen, channels)
     _serve(line, wire_of(line, chosen.family, chosen.baud), how, console, simulator.decoder(line))
 
 
 def far_end(bus: BusSettings, channels: Sequence[ChannelSettings]) -> Line:
-    """Simulated servos or board of a robot's bus, set up as its driver expects them. Raises DriverError."""
+    """Return the simulated servos or board of a robot's bus, with the settings its driver expects.
+
+    Raises DriverError.
+    """
     options = {key: value for key, value in bus.options().items() if key not in SIMULATION}
     driver = open_bus(bus.family, servo_specs(channels), **{"port": "", **options})
     servos = [(channel.id, channel.model) for channel in channels]
@@ -177,7 +180,7 @@ def far_end(bus: BusSettings, channels: Sequence[ChannelSettings]) -> Line:
 def serve_host(script: str, link: Path | None, console: Console) -> None:
     """Serve a simulated robot host; prints ``ready PATH``, and its counts when it is interrupted.
 
-    Raises ConfigError when the script is unknown or wrong.
+    Raises ConfigError: the script is unknown or wrong.
     """
     loaded = load_script(script, PARAMETERS)
     with HostPort(link) as port, stop_flag() as flag:

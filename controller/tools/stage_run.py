@@ -1,4 +1,4 @@
-"""Runs one stage from start to end, with or without a window, and returns its report."""
+"""Runs one stage (head, links and robots) from start to end, with or without a window, and returns its report."""
 
 from __future__ import annotations
 
@@ -37,17 +37,17 @@ from drivers.base.priority import lower_process_priority
 from surface.base.extras import require
 
 if TYPE_CHECKING:
-    from controller.face.wall import WallFace  # start-up: the body gets its orders first
-    from controller.panels.session.next_run import NextRun  # start-up: the body gets its orders first
-    from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
-    from controller.panels.window.heads import HeadSource  # start-up: the same
-    from controller.panels.window.panel import PanelOptions  # start-up: the same
-    from surface.head import Head  # start-up: the same
+    from controller.face.wall import WallFace  # imported lazily: the body starts first
+    from controller.panels.session.next_run import NextRun  # imported lazily: the body starts first
+    from controller.panels.window.face import WindowFace  # imported lazily: the body starts first
+    from controller.panels.window.heads import HeadSource  # imported lazily: as above
+    from controller.panels.window.panel import PanelOptions  # imported lazily: as above
+    from surface.head import Head  # imported lazily: as above
 
 REPORT_FORMAT = 1
-"""Version of a report's keys: raised when one changes its meaning or is removed; older reports state none."""
+"""Version of a report's keys, raised when a key changes its meaning or is removed. Old reports state no version."""
 
-_IDLE_S = 0.05
+_POLL_S = 0.05
 
 
 def has_display() -> bool:
@@ -58,16 +58,19 @@ def has_display() -> bool:
 
 
 class StageRun:
-    """One stage, ready to run; every method runs it once and returns the report.
+    """One stage, ready to run once by one of the methods ``run_...``, which return the report.
 
-    Finds and checks the stage and the take of ``options``; raises before anything is opened.
+    Creating it finds and checks the stage and the take of ``options``, and raises before anything is opened.
 
-    name : of the stage, or its file. identity : replaces the stage's own. look : command-line options over its picture.
-    web : HOST:PORT of a web panel.
-    status : called with what is being done, in a few words. preloaded : the body's process, if it was started already.
-    measured : after a run, also one that ended with an error, what the body measured, and ``failed`` with that error.
-    carried : what was set in a window before, with which this one goes on.
-    next_run : after a run, what the user wants to go on with.
+    name : of the stage, or its file. identity : replaces the stage's own. look : command-line options that replace
+        settings of its picture. web : HOST:PORT of a web panel.
+    status : called with a short text about the present step. preloaded : the control process (body), if it was started
+        already. carried : settings of the previous window, which this one continues with.
+
+    Attributes
+    ----------
+    measured : after a run, what the body measured, and under ``failed`` the error that ended it, if any.
+    next_run : after a run in a window, the stage and settings that the user wants to continue with; None to end.
     """
 
     def __init__(
@@ -103,9 +106,9 @@ class StageRun:
         self.next_run: NextRun | None = None
 
     def run_headless(self, seconds: float | None, pictures: Path | None = None) -> dict[str, Any]:
-        """Run without a display for ``seconds``; None runs until the take ends or Ctrl-C.
+        """Run headless for ``seconds``; None runs until the take ends or Ctrl-C.
 
-        ``pictures`` : folder for a contact sheet and a clip; None reads no picture back.
+        ``pictures`` : folder for a contact sheet and a clip; None writes neither.
         """
         recorder = None
         if pictures:
@@ -120,9 +123,9 @@ class StageRun:
         return report
 
     def _headless_face(self, body: BodyProcess, recorder: Recorder | None) -> HeadlessFace | WallFace:
-        """What draws the head, or the wall of heads."""
+        """Return what draws the head, or the wall of several heads."""
         if self.stage.heads:
-            from controller.face.wall import WallFace  # start-up: the body gets its orders first
+            from controller.face.wall import WallFace  # imported lazily: the body starts first
 
             lower_process_priority()
             return WallFace(self.stage, self.stage.parameters, body.mailboxes, recorder)
@@ -133,13 +136,13 @@ class StageRun:
         """Run with a window until it is closed, the take ends or ``seconds`` are over."""
         with self._body() as (body, flag):
             values, head = self._load_head(body)
-            from controller.panels.window.face import WindowFace  # start-up: the body gets its orders first
+            from controller.panels.window.face import WindowFace  # imported lazily: the body starts first
 
             stage = self.stage
             face = WindowFace(
                 head, stage.settings.face, values, body.send, body.panel_state, stage.load_head, _panel_options(stage),
                 stage.controls, stage=stage, details=lambda: body.details, carried=self._carried,
-                heads=self._sources(body),
+                heads=self._head_sources(body),
             )  # fmt: skip
             if self._options.take is None:
                 remember(stage.path, self._options.vocabularies)
@@ -147,24 +150,24 @@ class StageRun:
             self.next_run = face.next_run
             return self._end(body, None if failed else face.report(), failed)
 
-    def _sources(self, body: BodyProcess) -> list[HeadSource]:
-        """The heads that the window can show; none where there is one."""
-        from controller.panels.window.heads import HeadSource  # start-up: the body gets its orders first
+    def _head_sources(self, body: BodyProcess) -> list[HeadSource]:
+        """Return the heads among which the window can choose; none for a stage with one head."""
+        from controller.panels.window.heads import HeadSource  # imported lazily: the body starts first
 
         boxes = zip(self.stage.heads, body.mailboxes, body.panel_states, strict=True) if self.stage.heads else ()
         return [HeadSource(head.name, head.stage, mailbox, state) for head, mailbox, state in boxes]
 
     def run_without_face(self, seconds: float | None) -> dict[str, Any]:
-        """Run links and servos only, as on a robot without OpenGL."""
+        """Run links and servos only, for a computer without OpenGL."""
         with self._body() as (body, flag):
             keep_going = self._begin(body, flag, seconds)
             while keep_going():
-                time.sleep(_IDLE_S)
+                time.sleep(_POLL_S)
             return self._end(body, None)
 
     @contextmanager
     def _body(self) -> Iterator[tuple[BodyProcess, threading.Event]]:
-        """The body's process and a flag that Ctrl-C sets."""
+        """Yield the control process (body) and a flag that Ctrl-C sets."""
         self._status("starting")
         preloaded, self._preloaded = self._preloaded, None
         with stop_flag() as flag, self._with_web() as options:
@@ -177,7 +180,7 @@ class StageRun:
 
     @contextmanager
     def _with_web(self) -> Iterator[RunOptions]:
-        """The options, with a web panel whose face is being made where one is wanted."""
+        """Yield the options; if a web panel is wanted, with its settings, while its face file is made in background."""
         if self._web is None:
             yield self._options
             return
@@ -186,43 +189,43 @@ class StageRun:
             yield replace(self._options, web=WebPanel(self._web, face))
 
     def _load_head(self, body: BodyProcess) -> tuple[HeadValues, Head]:
-        """The head and its values, while the servos start in the body's process."""
+        """Load the head, while the servos start in the control process; return its values and the head."""
         lower_process_priority()
         head = self.stage.load_head()
         return HeadValues(body.mailbox, self.stage.parameters, head.parameters), head
 
     def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:
-        """Wait for the servos and let commands in; returns a function that is true while the run shall go on."""
+        """Wait for the servos and accept commands; return a function that is true while the run is to continue."""
         gc.enable()
-        gc.freeze()  # loaded objects are not garbage: no collection has to check them while pictures are drawn
+        gc.freeze()  # objects that are loaded by now stay, so no collection has to check them while pictures are drawn
         body.wait_ready()
         body.begin()
         self._status("running" + (f" for {seconds:g} s" if seconds else ""))
         in_time = deadline(seconds)
         self._manager.ready()
 
-        def goes_on() -> bool:
+        def keep_going() -> bool:
             if self._manager.watches:
                 self._manager.alive(body.mailbox.sequence)
             return not flag.is_set() and in_time() and body.alive()
 
-        return goes_on
+        return keep_going
 
     def _show(self, face: HeadlessFace | WallFace | WindowFace, keep_going: Callable[[], bool]) -> Part | None:
-        """Show the face while the run goes on; returns the part of a face that failed while servos follow.
+        """Show the face while the run continues. If it fails and there are robots, run on and return it as a part.
 
-        Raises what ends the run, and an error of the face where no servo follows.
+        Raises an error that ends the run, and an error of the face if the stage has no robot.
         """
-        asked = _Asked(keep_going)
+        condition = _Condition(keep_going)
         try:
-            face.run(asked)
+            face.run(condition)
         except Exception as error:
-            if asked.ended or not any(stage.robots for stage in heads_of(self.stage)):
+            if condition.failed or not any(stage.robots for stage in heads_of(self.stage)):
                 raise
             part = Part("the picture", remedy="it comes back with the next start", effect="links and servos go on")
             part.fail(error, time.monotonic())
             while keep_going():
-                time.sleep(_IDLE_S)
+                time.sleep(_POLL_S)
             return part
         return None
 
@@ -237,7 +240,10 @@ class StageRun:
 
 
 def check_web(listen: str, *, alone: bool) -> None:
-    """Raises ConfigError: no address for a web panel, no packages for it, or a take plays ``alone`` without links."""
+    """Check the address of a web panel. ``alone`` : a take plays, without the links of the stage.
+
+    Raises ConfigError: ``listen`` is not an address, or a take plays alone. MissingPackage: websockets is missing.
+    """
     if alone:
         raise ConfigError("--web: a take plays without links", hint="omote run STAGE --web")
     require("a web panel", "websockets")
@@ -249,8 +255,8 @@ def check_web(listen: str, *, alone: bool) -> None:
 
 
 def _panel_options(stage: Stage) -> PanelOptions:
-    """What the window's panel shows of a stage."""
-    from controller.panels.window.panel import PanelOptions  # start-up: the body gets its orders first
+    """Return what the window's panel shows of a stage."""
+    from controller.panels.window.panel import PanelOptions  # imported lazily: the body starts first
 
     own = [file for file in stage.vocabularies if not file.resolve().is_relative_to(config_dir().resolve())]
     return PanelOptions(
@@ -259,31 +265,28 @@ def _panel_options(stage: Stage) -> PanelOptions:
     )  # fmt: skip
 
 
-class _Asked:
-    """Asks whether the run goes on.
-
-    ended : the answer was an error, which ends the run; any other error is one of who asks.
-    """
+class _Condition:
+    """Calls ``keep_going`` for the face. ``failed`` : it raised, so the error is of the run and not of the face."""
 
     def __init__(self, keep_going: Callable[[], bool]) -> None:
-        self._keep_going, self.ended = keep_going, False
+        self._keep_going, self.failed = keep_going, False
 
     def __call__(self) -> bool:
         try:
             return self._keep_going()
         except BaseException:
-            self.ended = True
+            self.failed = True
             raise
 
 
 def _voice(stage: Stage, options: RunOptions) -> Voice | None:
-    """The voice that a run listens to; that of the options goes before that of the stage."""
+    """Return the voice that a run listens to: of the options, else, unless a take plays, of the stage."""
     if options.voice is not None or options.take is not None or stage.settings.voice is None:
         return options.voice
     return Voice(str(stage.file(stage.settings.voice)))
 
 
 def write_report(report: dict[str, Any], path: Path) -> None:
-    """Write a report as JSON with the version of its keys, whole or not at all."""
+    """Write a report as JSON with the version of its keys; the file is replaced atomically."""
     with replacing(path) as temporary:
         temporary.write_text(json.dumps({"format": REPORT_FORMAT, **report}, indent=2) + "\n", encoding="utf-8")

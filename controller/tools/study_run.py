@@ -17,7 +17,7 @@ from controller.stage.study import Study, load_study, write_script
 from controller.tools.stage_run import StageRun, write_report
 from surface.base.extras import require
 
-_AFTER_S = 0.5
+_SETTLE_S = 0.5  # the run goes on after the last trial
 
 
 def run_study(
@@ -29,15 +29,17 @@ def run_study(
     show: Callable[[StageRun, float], dict[str, Any]] = StageRun.run_without_face,
     status: Callable[[str], object] = lambda _: None,
 ) -> dict[str, Any]:
-    """Run a study; writes ``trials.csv``, ``events.csv``, ``run.rec``, ``report.json`` and ``study.toml`` to a folder.
+    """Run a study, and return the report.
 
-    seed : replaces the file's. lsl : also send the marks as LSL markers. show : runs a stage for so many seconds.
-    status : called with what is being done.
+    Writes ``trials.csv``, ``events.csv``, ``run.rec``, ``report.json`` and ``study.toml`` to ``folder``.
 
-    Raises ConfigError: the study is wrong, or the folder holds one already. MissingPackage: ``lsl`` without pylsl;
-    whatever the stage raises.
+    seed : replaces the file's. lsl : also send the marks as LSL markers. show : runs a stage for a number of seconds.
+    status : called with a short text about the present step.
+
+    Raises ConfigError: the study is wrong, or the folder already has a study. MissingPackage: ``lsl`` without pylsl.
+    Also raises what the stage raises.
     """
-    if lsl:  # checked before the folder is made, since a second try into it would be refused
+    if lsl:  # checked before the folder is made, because a second attempt with that folder would be refused
         require("sending markers of LSL", "pylsl")
     study = load_study(path, PARAMETERS, seed)
     if os.path.exists(folder / "run.rec"):  # Path.exists raises where the folder cannot be read
@@ -47,7 +49,7 @@ def run_study(
     _write_trials(study, folder / "trials.csv")
     options = RunOptions(record=folder / "run.rec", show=script, events=folder / "events.csv", lsl=lsl)
     stage = find_config("stages", study.settings.stage, beside=path)
-    report = show(StageRun(str(stage), options, status=status), study.length_s + _AFTER_S)
+    report = show(StageRun(str(stage), options, status=status), study.length_s + _SETTLE_S)
     report["study"] = {
         "name": study.settings.name,
         "seed": study.settings.seed if seed is None else seed,
@@ -59,7 +61,7 @@ def run_study(
 
 
 def measured(report: dict[str, Any]) -> dict[str, Any]:
-    """From a run's report: latency of the face and of the servos, and how far the servos were from the wanted face."""
+    """Extract from a run's report the latency of the face and of the servos, and the pose error of the servos."""
     face = report.get("face") or {}
     buses = report.get("buses", [])
     return {

@@ -1,4 +1,4 @@
-"""``omote fit`` of a surface file: options in words to a head's folder."""
+"""``omote fit`` of a surface file: checks the options and writes the head."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from controller.base.paths import find_config
 from surface.base.progress import Progress
 
 if TYPE_CHECKING:
-    from surface.fit.surfaces import SurfaceReport  # start-up: only surface files need it
+    from surface.fit.surfaces import SurfaceReport  # imported lazily: only surface files need it
 
 SUFFIXES = (".3dm", ".tsm", ".xml", ".json")
 
 
 def is_surface_file(path: Path) -> bool:
-    """Whether a file is one of surfaces, by its name."""
+    """Whether a path has the suffix of a surface file."""
     return path.suffix.lower() in SUFFIXES and not path.is_dir()
 
 
-def refuse_surface_options(mesh: Path, given: Mapping[str, object]) -> None:
-    """Raise ConfigError for an option that only surface files have."""
+def reject_surface_options(mesh: Path, given: Mapping[str, object]) -> None:
+    """Raise ConfigError for an option that was given and applies only to surface files."""
     for option, value in given.items():
         if value:
             why = f"{option}: is for files of surfaces ({', '.join(SUFFIXES)}), not for {mesh}"
@@ -32,7 +32,7 @@ def refuse_surface_options(mesh: Path, given: Mapping[str, object]) -> None:
 
 @dataclass(frozen=True)
 class SurfaceFit:
-    """What the user asked for; see ``omote fit --help``."""
+    """The options of ``omote fit`` for a surface file; see its ``--help``."""
 
     path: Path
     out: Path
@@ -49,7 +49,7 @@ class SurfaceFit:
     report: Path | None
 
     def check(self, meshes_only: Mapping[str, object]) -> None:
-        """Raise ConfigError for options that do not go together; ``meshes_only`` are those of meshes, by name."""
+        """Raise ConfigError for options that exclude each other. ``meshes_only`` : options of meshes, by name."""
         for option, value in meshes_only.items():
             if value:
                 why = f"{option}: is for meshes; the control points of {self.path} stay as they are"
@@ -58,8 +58,12 @@ class SurfaceFit:
             raise ConfigError("--landmarks: only a transfer of expressions uses them", hint="--expressions-from ict")
 
     def run(self, progress: Progress) -> SurfaceReport:
-        """Make the head. Raises ConfigError: no such head; others as :func:`surface.fit.surfaces.fit_surfaces`."""
-        from surface.fit.surfaces import SurfaceOptions, fit_surfaces  # start-up: only surface files need it
+        """Write the head, and return a report.
+
+        Raises ConfigError: no head called ``expressions_from``; and what :func:`surface.fit.surfaces.fit_surfaces`
+        raises.
+        """
+        from surface.fit.surfaces import SurfaceOptions, fit_surfaces  # imported lazily: only surface files need it
 
         source = None if self.expressions_from is None else find_config("heads", self.expressions_from)
         options = SurfaceOptions(

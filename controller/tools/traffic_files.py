@@ -1,4 +1,4 @@
-"""Writes and reads records of the traffic on a bus: text logs, and pcapng by the suffix of the file."""
+"""Writes and reads records of the traffic on a bus: pcapng for files with that suffix, else text logs."""
 
 from __future__ import annotations
 
@@ -25,38 +25,38 @@ log = logging.getLogger(__name__)
 
 
 class TrafficWriter:
-    """Writes what passes to a file, piece by piece; a context manager. ``tap`` may be called from any thread.
+    """Writes the traffic of a bus to a file, piece by piece; a context manager. Any thread may call ``tap``.
 
-    path : file, replaced; a pcapng file where its name ends so, else a text log. wire : what is on the wire.
+    path : file to replace; pcapng if its name ends in .pcapng, else a text log. wire : description of the bus.
 
-    What goes beyond the size that omote reads again, or comes after the disk is full, is left out, with one message.
+    Once the file has the size that omote can still read, or cannot be written, the rest is omitted, with one message.
 
     Raises ConfigError: the file cannot be written.
     """
 
     def __init__(self, path: Path, wire: Wire) -> None:
-        self._path, self._network = path, path.suffix.lower() == SUFFIX
+        self._path, self._is_pcapng = path, path.suffix.lower() == SUFFIX
         self._begun_s, self._begun_ns = time.monotonic(), time.time_ns()
-        self._room, self._pieces = files.DATA_LIMIT if self._network else files.TEXT_LIMIT, MOST_PIECES
+        self._room, self._pieces = files.DATA_LIMIT if self._is_pcapng else files.TEXT_LIMIT, MOST_PIECES
         try:
-            self._file = path.open("wb", buffering=0)  # it is wanted most when the program ends unexpectedly
-            self._write_head(pcapng.file_head(wire) if self._network else wire.head().encode())
+            self._file = path.open("wb", buffering=0)  # unbuffered, since it matters most when the program crashes
+            self._write_header(pcapng.file_head(wire) if self._is_pcapng else wire.head().encode())
         except OSError as error:
             raise ConfigError(f"{path}: cannot be written: {error.strerror}", hint=place_hint(error, path)) from error
 
-    def _write_head(self, head: bytes) -> None:
-        """Raises OSError; the file is closed then."""
-        self._room, self._pieces = self._room - len(head), self._pieces - 1
+    def _write_header(self, header: bytes) -> None:
+        """Write the header. If that raises OSError, the file is closed."""
+        self._room, self._pieces = self._room - len(header), self._pieces - 1
         try:
-            self._file.write(head)
+            self._file.write(header)
         except OSError:
             self._file.close()
             raise
 
     def tap(self, sent: bool | None, data: bytes) -> None:
-        """Keep bytes that passed; ``sent`` None where the direction is not known."""
+        """Write bytes that passed; ``sent`` is None if the direction is not known."""
         piece = Piece(time.monotonic() - self._begun_s, sent, bytes(data))
-        self._write(pcapng.packet(piece, self._begun_ns) if self._network else format_piece(piece).encode())
+        self._write(pcapng.packet(piece, self._begun_ns) if self._is_pcapng else format_piece(piece).encode())
 
     def _write(self, data: bytes) -> None:
         if self._file.closed or self._room < 0:
@@ -69,7 +69,7 @@ class TrafficWriter:
             return
         try:
             self._file.write(data)
-        except OSError as error:  # the bus goes on
+        except OSError as error:  # an error of the record must not stop the bus
             log.error("%s: %s; what passes from now on is not recorded", self._path, error.strerror)
             self._room = -1
 
@@ -81,23 +81,26 @@ class TrafficWriter:
 
 
 def read_traffic(path: Path) -> TrafficRecord:
-    """A record, whichever of the two it is. Raises ConfigError: it cannot be read, or is no such record."""
+    """Read a record in either format. Raises ConfigError: it cannot be read, or is not such a record."""
     with files.reading(path, ConfigError, hint="record it again"):
         data = files.read_file(path)
-        network = data.startswith(pcapng.MAGIC)
+        is_pcapng = data.startswith(pcapng.MAGIC)
         if path.suffix.lower() == SUFFIX and not data.startswith((pcapng.MAGIC, b"#")):  # a text log begins with #
             raise ValueError(f"it is damaged: a pcapng file begins with {pcapng.MAGIC.hex(' ')}")
-        if not network and len(data) > files.TEXT_LIMIT:
+        if not is_pcapng and len(data) > files.TEXT_LIMIT:
             raise ValueError(f"is larger than {files.TEXT_LIMIT >> 20} MB")
-        text = "" if network else files.decode(data)
+        text = "" if is_pcapng else files.decode(data)
     try:
-        return pcapng.read_pcapng(data) if network else read_log(text)
+        return pcapng.read_pcapng(data) if is_pcapng else read_log(text)
     except DriverError as error:
         raise ConfigError(f"{path}: {error}", hint=error.hint) from error
 
 
 def decoder_of(record: TrafficRecord, protocol: int | None = None, model: str = "") -> Decoder:
-    """A decoder for a record. protocol, model : what it does not say itself, or None and empty. Raises DriverError."""
+    """Return a decoder for a record. ``protocol`` and ``model``, unless None and empty, override the record's.
+
+    Raises DriverError: no such model.
+    """
     wire = record.wire
     tables = {number: load_table(name) for number, name in wire.servos.items()}
     default = load_table(model or wire.model) if model or wire.model else None
@@ -109,7 +112,7 @@ def decoder_of(record: TrafficRecord, protocol: int | None = None, model: str = 
 
 
 def describe_traffic(path: Path) -> str:
-    """What a record holds, in a line; raises ConfigError."""
+    """Describe a record in one line. Raises ConfigError: it cannot be read."""
     record = read_traffic(path)
     seconds = record.pieces[-1].time_s if record.pieces else 0.0
     size = sum(len(piece.data) for piece in record.pieces)
@@ -119,8 +122,8 @@ def describe_traffic(path: Path) -> str:
 Tap = Callable[[bool, bytes], None]
 
 
-def all_of(*taps: Tap) -> Tap:
-    """One tap that calls all."""
+def combine_taps(*taps: Tap) -> Tap:
+    """Return a tap that calls all ``taps``."""
 
     def call(sent: bool, data: bytes) -> None:
         for tap in taps:

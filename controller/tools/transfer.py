@@ -1,4 +1,4 @@
-"""``omote fit --expressions-from``: give a mesh without shapes the expressions of a head."""
+"""``omote fit --expressions-from``: transfers the expressions of a head to a mesh without shapes."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from surface.fit.transfer.api import transfer_head
 
 
 def check_transfer(source: str | None, landmarks: Path | None, others: Mapping[str, object]) -> None:
-    """Check that options of ``omote fit`` go together; ``others`` are those that a transfer has no use for, by name.
+    """Check options of ``omote fit``. ``others`` : options that cannot be used with a transfer, by name.
 
-    Raises ConfigError.
+    Raises ConfigError: options exclude each other.
     """
     if source is None and landmarks is not None:
         raise ConfigError("--landmarks: only a transfer of expressions uses them", hint="--expressions-from ict")
@@ -31,7 +31,7 @@ def transfer(
 ) -> FitReport:  # fmt: skip
     """Write a head in the form of a mesh with the expressions of the head ``source``, a name or a folder.
 
-    Raises ConfigError: no such head. Others as :func:`surface.fit.transfer.api.transfer_head` does.
+    Raises ConfigError: no such head; and what :func:`surface.fit.transfer.api.transfer_head` raises.
     """
     head = find_config("heads", source)
     made = transfer_head(

@@ -1,4 +1,4 @@
-"""Translates faces from one format to another, without stage, face or servos."""
+"""Forwards faces from one format to another, without a stage, a picture or servos."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ from controller.links.net.senders import Sender, open_sender
 from controller.takes.reader import load_take, suffixes
 from drivers.base.errors import PluginError
 
-_WAIT_S = 0.02
-_LARGEST = 100.0  # times a whole movement
+_RECEIVE_TIMEOUT_S = 0.02
+_MAX_VALUE = 100.0  # 1 is a parameter's whole movement; formats cannot encode any number
 _HINT = "write it as KIND:ADDRESS, for example livelink:127.0.0.1:11111; omote plugins lists the kinds"
 
 
@@ -34,11 +34,10 @@ _HINT = "write it as KIND:ADDRESS, for example livelink:127.0.0.1:11111; omote p
 class Options:
     """How to translate.
 
-    mirror : left and right change places. connect : call the input's address. baud : of serial ports.
-    open_to_network : listen where other machines reach. token : what TCP streams, and datagrams of omote's own formats,
-        begin with, in and out.
-    seconds : how long; None until the input ends.
-    stop : ends it when it is set.
+    mirror : swap left and right. connect : connect to the input's address instead of listening. baud : of serial ports.
+    open_to_network : listen at an address that other machines reach. token : shared password with which TCP streams,
+        and datagrams of omote's own formats, begin, both of the input and of the output.
+    seconds : time limit; None runs until the input ends. stop : ends the translation when it is set.
     """
 
     mirror: bool = False
@@ -52,10 +51,10 @@ class Options:
 
 @dataclass
 class Counts:
-    """What was translated.
+    """Counts of a translation.
 
-    frames : that came. sent, dropped : messages that went out, and those that found no room or nobody.
-    refused : what was left out of the input, by reason.
+    frames : received. sent, dropped : messages that were sent, and those dropped because the queue was full or nobody
+    was connected. refused : parts of the input that were refused, by reason. meter : rate of the frames.
     """
 
     frames: int = 0
@@ -68,43 +67,44 @@ class Counts:
         refused = ", ".join(f"{count} {reason}" for reason, count in self.refused.items()) or "nothing"
         figures = self.meter.report(time.monotonic())
         return (
-            f"{self.frames} frames came at {figures['rate_hz']}/s; {self.sent} messages went out, {self.dropped} found "
-            f"no room or nobody; refused: {refused}"
+            f"{self.frames} frames received at {figures['rate_hz']}/s; {self.sent} messages sent, {self.dropped} "
+            f"dropped (full or no receiver); refused: {refused}"
         )
 
 
 class Input(Protocol):
-    """Frames until they end; ``counts.refused`` is kept up to date."""
+    """A source of frames."""
 
     def frames(self, counts: Counts) -> Iterator[Frame | None]:
-        """Frames as they come; None when for a while none came."""
+        """Yield frames until the input ends, and None whenever none came for a while; updates ``counts.refused``."""
 
 
 def translate(source: str, target: str, parameters: Parameters, options: Options = Options(),
               ready: Callable[[str], None] = lambda text: None) -> Counts:  # fmt: skip
-    """Translate until the input ends, the time is up, or Ctrl-C.
+    """Translate until the input ends, the time is over, or Ctrl-C.
 
-    source : ``kind:address``, or the path of a take. target : ``kind:address``. ready : called once both are open.
+    source : ``kind:address``, or the path of a take. target : ``kind:address``. ready : called with a message once both
+    are open.
 
-    Raises LinkError, PortError, TakeError, PluginError: one of them is wrong or cannot be opened.
+    Raises LinkError, PortError, TakeError, PluginError: source or target is wrong or cannot be opened.
     """
     counts = Counts()
     form, address = parse_end(target)
     with ExitStack() as closers:
-        given = _open_input(source, parameters, options, closers)
+        frames = _open_input(source, parameters, options, closers)
         token = options.token if has_token(form, address) else None
         sender = open_sender(address, form.delimiter, options.baud, token)
         closers.callback(sender.close)
-        ready(f"translating {source} to {form.kind} at {address}{_opened(source, options)}")
+        ready(f"translating {source} to {form.kind} at {address}{_network_notice(source, options)}")
         with suppress(KeyboardInterrupt):
-            _pass_on(given, form, sender, parameters, options, counts)
+            _forward(frames, form, sender, parameters, options, counts)
     return counts
 
 
 def parse_end(text: str) -> tuple[Format, Address]:
-    """The format and the address of one end.
+    """Parse ``kind:address`` to a format and an address.
 
-    Raises LinkError: the text is none. PluginError: there is no such format.
+    Raises LinkError: the text is not of this form, or there is no such format.
     """
     kind, _, rest = text.partition(":")
     try:
@@ -116,8 +116,8 @@ def parse_end(text: str) -> tuple[Format, Address]:
         raise LinkError(f"{text}: {error}", hint=_HINT) from error
 
 
-def _opened(source: str, options: Options) -> str:
-    """What a live input opens to other machines, in words; nothing for what they do not reach."""
+def _network_notice(source: str, options: Options) -> str:
+    """Return a notice that other machines can send to a live input; empty if they cannot reach it."""
     if not options.open_to_network or _is_take(source):
         return ""
     form, address = parse_end(source)
@@ -139,17 +139,17 @@ def _open_input(source: str, parameters: Parameters, options: Options, closers: 
     if not (options.connect or address.is_local or options.open_to_network):
         raise LinkError(
             f"{source}: every machine that reaches this one could send faces there",
-            hint="add --open-to-network where that is meant",
+            hint="add --open-to-network if you want that",
         )
     if not address.is_local and form.takes_token and options.token is None:
         raise LinkError(f"{source}: other machines need a token there", hint="choose one and add --token TOKEN")
     if options.connect and not is_called(form, address):
-        raise LinkError(f"{source}: only TCP is called", hint=f"write it as {form.kind}:tcp:HOST:PORT")
+        raise LinkError(f"{source}: --connect needs a TCP address", hint=f"write it as {form.kind}:tcp:HOST:PORT")
     return LiveInput(form, address, parameters, options, closers)
 
 
 class LiveInput:
-    """Messages of another program."""
+    """Frames that another program sends."""
 
     def __init__(
         self, form: Format, address: Address, parameters: Parameters, options: Options, closers: ExitStack
@@ -162,7 +162,7 @@ class LiveInput:
 
     def frames(self, counts: Counts) -> Iterator[Frame | None]:
         while True:
-            arrived = self._decoding.feed(self._receiver.receive(_WAIT_S))
+            arrived = self._decoding.feed(self._receiver.receive(_RECEIVE_TIMEOUT_S))
             counts.refused = dict(self._decoding.refused)
             yield from (each.frame for each in arrived)
             if isinstance(self._receiver, InputReceiver) and self._receiver.ended:
@@ -171,7 +171,7 @@ class LiveInput:
 
 
 class TakeInput:
-    """A take, at its own rate."""
+    """The frames of a take, at its own rate."""
 
     def __init__(self, path: Path, parameters: Parameters) -> None:
         self._take = load_take(path, parameters)
@@ -180,21 +180,21 @@ class TakeInput:
         take, start_s = self._take, time.monotonic()
         for time_s, values in zip(take.times_s, take.values, strict=True):
             while (left_s := start_s + time_s - time.monotonic()) > 0.0:
-                time.sleep(min(left_s, _WAIT_S))
+                time.sleep(min(left_s, _RECEIVE_TIMEOUT_S))
                 yield None
             yield Frame(values, take.mask, float(time_s))
 
 
-def _pass_on(
-    given: Input, form: Format, sender: Sender, parameters: Parameters, options: Options, counts: Counts
+def _forward(
+    source: Input, form: Format, sender: Sender, parameters: Parameters, options: Options, counts: Counts
 ) -> None:
     encoder, end_s = form.encoder(parameters), time.monotonic() + (options.seconds or float("inf"))
-    turn = _prepared(parameters, options.mirror)
-    for frame in given.frames(counts):
+    prepare = _make_preparation(parameters, options.mirror)
+    for frame in source.frames(counts):
         if frame is not None:
             counts.frames += 1
             counts.meter.note(time.monotonic(), frame.sequence)
-            for message in encoder.encode(turn(frame)):
+            for message in encoder.encode(prepare(frame)):
                 if sender.send(message):
                     counts.sent += 1
                 else:
@@ -203,13 +203,13 @@ def _pass_on(
             return
 
 
-def _prepared(parameters: Parameters, mirror: bool) -> Callable[[Frame], Frame]:
-    """What happens to each frame: no format has room for any number, and sides may change places."""
+def _make_preparation(parameters: Parameters, mirror: bool) -> Callable[[Frame], Frame]:
+    """Return a function that clips the values of a frame and, if ``mirror``, swaps left and right."""
     order = parameters.mirror() if mirror else np.arange(len(parameters))
-    turned = [-1.0 if mirror and name.endswith(("Yaw", "Roll")) else 1.0 for name in parameters.names]
+    signs = [-1.0 if mirror and name.endswith(("Yaw", "Roll")) else 1.0 for name in parameters.names]
 
     def prepare(frame: Frame) -> Frame:
-        values = np.clip(frame.values[order] * turned, -_LARGEST, _LARGEST)
+        values = np.clip(frame.values[order] * signs, -_MAX_VALUE, _MAX_VALUE)
         return replace(frame, values=values, mask=frame.mask[order])
 
     return prepare

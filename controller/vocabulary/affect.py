@@ -1,7 +1,7 @@
-"""Converts moods, points of valence, arousal and dominance, to blends of named expressions, and back.
+"""Converts moods (points of valence, arousal and dominance) to blends of named expressions, and back.
 
-The blend is Shepard's (1968): weights fall with the distance to each anchor, and an anchor is met exactly. Neutral
-is an anchor at the origin.
+The blend is inverse distance weighting (Shepard 1968) of the expressions at the anchors, and exact at an anchor. The
+neutral face is an anchor at the origin.
 """
 
 from __future__ import annotations
@@ -18,7 +18,9 @@ from controller.base.paths import config_dir
 from controller.vocabulary.expression import Expressions
 
 _POWER = 3.0
-_NEAR = 1e-6
+"""Exponent of the inverse distance."""
+_SAME_POINT = 1e-6
+"""Distance below which a mood is the nearest anchor itself."""
 _Signed = Annotated[Number, Field(ge=-1, le=1)]
 
 
@@ -34,8 +36,8 @@ class _File(Settings):
 class Affect:
     """The space of moods of one file.
 
-    names : expressions at the anchors, ``neutral`` first. points : (n, 3) their valence, arousal and dominance.
-    faces : (n, P) their parameters.
+    names : of the n expressions at the anchors, ``neutral`` first. points : (n, 3) their valence, arousal and
+    dominance. faces : (n, P) their parameter values.
     """
 
     def __init__(self, names: tuple[str, ...], points: Floats, faces: Floats) -> None:
@@ -45,7 +47,7 @@ class Affect:
 
     @classmethod
     def load(cls, expressions: Expressions, path: Path | None = None) -> Affect:
-        """Read a space of moods; the shipped one without ``path``. Raises ConfigError with every fault."""
+        """Read a space of moods; by default, the shipped one. Raises ConfigError that lists every fault."""
 
         def faults(file: _File) -> list[str]:
             return [f"anchors.{name}: unknown expression{did_you_mean(name, expressions.names)}"
@@ -57,11 +59,11 @@ class Affect:
         return cls(tuple(points), np.array(list(points.values())), faces)
 
     def weights(self, valence: float, arousal: float, dominance: float | None = None) -> Floats:
-        """(n,) weights of the anchors, summing to 1; without ``dominance`` only valence and arousal count."""
+        """Return (n,) weights of the anchors with the sum 1; if ``dominance`` is None, distances ignore it."""
         point = np.array([valence, arousal] if dominance is None else [valence, arousal, dominance])
         distance = np.linalg.norm(self.points[:, : len(point)] - point, axis=1)
         nearest = int(np.argmin(distance))
-        if distance[nearest] < _NEAR:
+        if distance[nearest] < _SAME_POINT:
             only: Floats = np.eye(len(distance))[nearest]
             return only
         weights: Floats = distance**-_POWER
@@ -69,11 +71,11 @@ class Affect:
         return weights
 
     def expand(self, valence: float, arousal: float, dominance: float | None = None) -> Floats:
-        """(P,) parameters of a mood."""
+        """Return (P,) parameter values of a mood."""
         return self.weights(valence, arousal, dominance) @ self._faces
 
     def read(self, levels: dict[str, float]) -> Floats:
-        """(3,) valence, arousal and dominance of a face that shows expressions at intensities 0..1."""
+        """Return (3,) valence, arousal and dominance of a face that shows expressions at intensities 0..1."""
         shown = np.array([max(levels.get(name, 0.0), 0.0) for name in self.names])
         total = max(shown.sum(), 1.0)
         read: Floats = shown @ self.points / total

@@ -1,4 +1,4 @@
-"""Reads files of named expressions: what a name means in parameters, and how it rises and falls."""
+"""Reads files of named expressions: the parameter values of each, and how fast it appears and disappears."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Annotated, Any, Literal, Protocol
 import numpy as np
 from pydantic import BeforeValidator, Field, RootModel, ValidationInfo, field_validator
 
-from controller.base.config import Number, Settings, Share, load
+from controller.base.config import Fraction, Number, Settings, load
 from controller.base.errors import ConfigError
 from controller.base.parameters import TABLE_KEYS, Floats, Parameters, describes_parameters, did_you_mean, fold
 from controller.vocabulary.sides import sides, unknown_names
 
-_RISE_S = 0.4
-_MOST_CIRCLES = 20
+_TRANSITION_S = 0.4
+_MAX_CYCLES = 20
 _Seconds = Annotated[Number, Field(ge=0, le=60)]
 _Override = Literal["keep", "block", "blend"]
 
@@ -28,30 +28,30 @@ class Expression:
 
     name : canonical name. kind : ``"emotion"``, ``"gesture"`` or ``"user"``. source : where it comes from.
     weights : (P,) float64, what it adds to the neutral face at intensity 1; read-only.
-    onset_s, offset_s : times to rise and to fall.
-    blink, gaze, mouth : ``"keep"``, ``"block"`` or ``"blend"``: what it does to blinks, gaze and speech meanwhile.
-    response : exponent of the intensity; below 1, weak intensities show more than in proportion.
+    onset_s, offset_s : times in which it appears and disappears.
+    blink, gaze, mouth : effect on blinks, gaze and speech while it shows: ``"keep"``, ``"block"`` or ``"blend"``.
+    response : exponent of the intensity; below 1, low intensities show more than in proportion.
     """
 
     name: str
     weights: Floats
     kind: str = "user"
     source: str = ""
-    onset_s: float = _RISE_S
-    offset_s: float = _RISE_S
+    onset_s: float = _TRANSITION_S
+    offset_s: float = _TRANSITION_S
     blink: str = "keep"
     gaze: str = "keep"
     mouth: str = "keep"
     response: float = 1.0
 
     def pose(self, intensity: float) -> Floats:
-        """(P,) what it adds to the neutral face at an intensity, 0 to 1."""
+        """Return (P,): what it adds to the neutral face at an intensity from 0 to 1."""
         pose: Floats = self.weights * intensity**self.response
         return pose
 
 
 class Expressions(Protocol):
-    """Named expressions by name, as the player of expressions uses them."""
+    """A collection of named expressions, as the player of expressions needs it."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -65,13 +65,13 @@ class _Table(Settings):
     kind: Literal["emotion", "gesture", "user"] = "user"
     aliases: list[str] = []
     source: str = ""
-    onset_s: _Seconds = _RISE_S
-    offset_s: _Seconds = _RISE_S
+    onset_s: _Seconds = _TRANSITION_S
+    offset_s: _Seconds = _TRANSITION_S
     blink: _Override = "keep"
     gaze: _Override = "keep"
     mouth: _Override = "keep"
     response: Annotated[Number, Field(ge=0.2, le=5)] = 1.0
-    of: dict[str, Share] = {}
+    of: dict[str, Fraction] = {}
     weights: dict[str, Number] = Field(default=None, validate_default=True)
 
     @field_validator("weights", mode="before")
@@ -83,7 +83,7 @@ class _Table(Settings):
 
 
 def _without_parameters(table: Any) -> Any:
-    """The expressions of a vocabulary; its parameters are read by :meth:`Parameters.with_files`."""
+    """Return a vocabulary's table without its parameters, which :meth:`Parameters.with_files` reads."""
     if not isinstance(table, Mapping) or not describes_parameters(table):
         return table
     return {key: value for key, value in table.items() if key not in TABLE_KEYS}
@@ -93,11 +93,11 @@ _File = RootModel[Annotated[dict[str, _Table], BeforeValidator(_without_paramete
 
 
 def read_expressions(parameters: Parameters, files: Iterable[Path]) -> tuple[dict[str, Expression], dict[str, str]]:
-    """The expressions of files, in order, and folded other names to canonical ones.
+    """Return the expressions of files, in order, and a table from aliases (folded) to canonical names.
 
-    ``files`` : may mix the expressions of those before them.
+    ``files`` : each may mix expressions of the files before it.
 
-    Raises ConfigError: a file cannot be read or is wrong; every fault of every file with its key.
+    Raises ConfigError: a file cannot be read or is wrong; lists every fault of every file with its key.
     """
     known: dict[str, Expression] = {}
     aliases: dict[str, str] = {}
@@ -123,15 +123,15 @@ def read_expressions(parameters: Parameters, files: Iterable[Path]) -> tuple[dic
 def _expressions(
     parameters: Parameters, tables: Mapping[str, _Table], known: Mapping[str, Expression]
 ) -> dict[str, Expression]:
-    """The expressions of a file without faults, in its order."""
+    """Return the expressions of a file without faults, in its order."""
     weights = {name: expression.weights for name, expression in known.items()}
     for name in TopologicalSorter({name: table.of for name, table in tables.items()}).static_order():
         if name in tables:
-            mixed = sum((share * weights[part] for part, share in tables[name].of.items()), np.zeros(len(parameters)))
+            mixed = sum((amount * weights[part] for part, amount in tables[name].of.items()), np.zeros(len(parameters)))
             weights[name] = np.clip(mixed, parameters.low - parameters.rest, parameters.high - parameters.rest)
             for key, value in tables[name].weights.items():
-                at = sides(parameters, key)
-                weights[name][at] = value - parameters.rest[at]
+                indices = sides(parameters, key)
+                weights[name][indices] = value - parameters.rest[indices]
             weights[name].flags.writeable = False
     options = {"kind", "source", "onset_s", "offset_s", "blink", "gaze", "mouth", "response"}
     return {
@@ -142,7 +142,7 @@ def _expressions(
 def _faults(
     parameters: Parameters, tables: Mapping[str, _Table], known: Iterable[str], aliases: Mapping[str, str]
 ) -> list[str]:
-    """Names that are taken, unknown parameters and weights out of their range."""
+    """Return the faults of a file: names that are in use, unknown parameters, and weights out of range."""
     faults = [f"{name}: is already in an earlier file; choose another name" for name in tables if name in known]
     taken = {fold(name): name for name in (*known, *tables)} | dict(aliases)
     for name, table in tables.items():
@@ -159,20 +159,20 @@ def _faults(
 
 
 def _mixing_faults(tables: Mapping[str, _Table], known: Iterable[str], *, complete: bool) -> list[str]:
-    """Circles in what expressions are mixed of, and unknown ones where the ``known`` expressions are ``complete``.
+    """Return cyclic mixtures and, if the ``known`` expressions are ``complete``, unknown expressions in mixtures.
 
-    Of circles, only the first :data:`_MOST_CIRCLES` are looked for: each takes a pass over the whole file.
+    At most :data:`_MAX_CYCLES` cycles are searched for, because each takes a pass over the whole file.
     """
     names = {**tables, **dict.fromkeys(known)}
     faults = [f"{name}.of.{part}: unknown expression {part!r}{did_you_mean(part, names)}"
               for name, table in tables.items() for part in table.of if complete and part not in names]  # fmt: skip
     graph = {name: list(table.of) for name, table in tables.items()}
-    for _ in range(_MOST_CIRCLES):
+    for _ in range(_MAX_CYCLES):
         try:
             TopologicalSorter(graph).prepare()
             break
         except CycleError as error:
-            circle = error.args[1][::-1]
-            faults.append(f"{circle[0]}.of.{circle[1]}: goes in a circle: {' -> '.join(circle)}")
-            graph[circle[0]].remove(circle[1])
+            cycle = error.args[1][::-1]
+            faults.append(f"{cycle[0]}.of.{cycle[1]}: goes in a circle: {' -> '.join(cycle)}")
+            graph[cycle[0]].remove(cycle[1])
     return faults

@@ -19,20 +19,20 @@ from controller.base.plain_numbers import plain_number
 from controller.vocabulary.sides import sides, spread, unknown_names
 
 if TYPE_CHECKING:
-    from controller.base.solve import BoundedSolver  # start-up: numba and scipy, only for reading back
+    from controller.base.solve import BoundedSolver  # imported lazily: it loads numba and scipy
 
 LETTERS = "ABCDE"
-"""Letters of intensities of FACS, from 0.2 to 1.0."""
+"""FACS's letters of intensity, which mean 0.2 to 1.0."""
 
 _PREFIX = r"(?:AU|AD)"
 _TERM = re.compile(rf"([LR]?){_PREFIX}?([LR]?)([0-9]{{1,2}})([LR]?)([A-E]?)(?::(.*))?", re.IGNORECASE)
 _FORMULA = re.compile(rf"{_PREFIX}[LR]?[0-9]", re.IGNORECASE)
 _SPARSITY = 2e-3
-_LEAST_INTENSITY = 0.1
-_LEAST_LIKENESS = 0.35  # cosine to the nearest emotion below which a face shows none
+_MIN_INTENSITY = 0.1
+_MIN_COSINE = 0.35  # cosine to the most similar emotion below which a face shows no emotion
 _TOLERANCE = 1e-5
-_TURNS = range(51, 65)
-"""Units that turn the head and the eyes, and say nothing of the emotion."""
+_ROTATIONS = range(51, 65)
+"""Numbers of the units that turn the head and the eyes, which are ignored in emotions."""
 
 
 def _not_zero(weight: float) -> float:
@@ -71,7 +71,7 @@ class _File(Settings):
 
 @dataclass(frozen=True)
 class _Column:
-    """One unknown of the solver: a unit, or one side of it."""
+    """One unknown of the solver: a unit, or one side of it. ``read`` : whether :meth:`Facs.read` may use it."""
 
     unit: str
     side: str
@@ -84,7 +84,7 @@ class Facs:
 
     Parameters
     ----------
-    columns : units and their sides, in file order. aliases : other numbers of units.
+    columns : units and their sides, in file order. aliases : other numbers of units, to those in use.
     emotions : formulas of emotions, by name.
 
     Attributes
@@ -100,14 +100,14 @@ class Facs:
         self.emotions = dict(emotions)
         self._aliases = aliases
         self._read = np.array([column.read for column in columns])
-        self._facial = np.array([int(column.unit) not in _TURNS for column in columns])
-        self._of_unit: dict[str, list[int]] = {}
+        self._facial = np.array([int(column.unit) not in _ROTATIONS for column in columns])
+        self._columns_by_unit: dict[str, list[int]] = {}
         for i, column in enumerate(columns):
-            self._of_unit.setdefault(column.unit, []).append(i)
+            self._columns_by_unit.setdefault(column.unit, []).append(i)
 
     @classmethod
     def load(cls, parameters: Parameters, path: Path | None = None) -> Facs:
-        """Read action units; the shipped ones without ``path``. Raises ConfigError with every fault."""
+        """Read action units; by default, the shipped ones. Raises ConfigError that lists every fault."""
         path = path or config_dir() / "vocabularies" / "facs.toml"
         return cls._build(parameters, load(path, _File, lambda file: cls._faults(parameters, file)))
 
@@ -119,7 +119,7 @@ class Facs:
 
     @classmethod
     def _faults(cls, parameters: Parameters, file: _File) -> list[str]:
-        """Unknown parameters, and formulas of emotions that are wrong."""
+        """Return the faults of a file: unknown parameters, and wrong formulas of emotions."""
         faults = [
             fault
             for name, unit in file.units.items()
@@ -135,12 +135,13 @@ class Facs:
         return faults
 
     def levels(self, formula: str, intensity: float = 1.0) -> Floats:
-        """(n,) levels of a formula: units with optional side and intensity, joined by ``+``; nothing for an empty one.
+        """Return (n,) levels of a formula: units with optional side and intensity, joined by ``+``; zeros if empty.
 
         ``12`` is both sides at full intensity, ``L12B`` the face's own left side at 0.4, ``12:0.35`` both at 0.35. The
-        side may also follow the number, ``12LB``, and each unit may begin with ``AU`` or ``AD``.
+        side may also follow the number, ``12LB``, and each unit may begin with ``AU`` or ``AD``. All levels are
+        multiplied by ``intensity``.
 
-        Raises ParameterError: a term is not understood or no unit has its number.
+        Raises ParameterError: a term is not understood, or no unit has its number.
         """
         levels = np.zeros(len(self.names))
         terms = formula.replace(" ", "")
@@ -150,24 +151,29 @@ class Facs:
         return levels
 
     def columns_of(self, unit: str) -> list[int]:
-        """Positions of a unit's columns, one or one for each side, by its number, as "12", or of one side alone, as
-        "L12"; none for an unknown one."""
+        """Return the indices of a unit's columns: one, or one for each side; empty for an unknown unit.
+
+        unit : its number, as "12", or one side, as "L12".
+        """
         side = unit[:1] if unit[:1] in ("L", "R") else ""
         number = unit.removeprefix(side)
         number = self._aliases.get(number, number)
-        return [i for i in self._of_unit.get(number, []) if not side or self.names[i] == side + number]
+        return [i for i in self._columns_by_unit.get(number, []) if not side or self.names[i] == side + number]
 
     def expand(self, formula: str, intensity: float = 1.0) -> Floats:
-        """(P,) parameters of a formula, clipped to -1..1. Raises ParameterError."""
+        """Return (P,) parameter values of a formula, clipped to -1..1. Raises ParameterError."""
         return np.clip(self.matrix @ self.levels(formula, intensity), -1.0, 1.0)
 
     def read(self, values: Floats) -> Floats:
-        """(n,) levels 0..1 that show ``values`` : (P,) best, with few units."""
+        """Return (n,) levels 0..1 of few units that reproduce ``values`` : (P,) best."""
         levels: Floats = self._solver.solve(np.asarray(values, dtype=np.float64)) * self._read
         return levels
 
     def read_emotion(self, values: Floats) -> tuple[str, float]:
-        """The emotion whose units ``values`` : (P,) show most, and its intensity 0..1; neutral when little shows."""
+        """Return the emotion whose units are most similar to those of ``values`` : (P,), and its intensity 0..1.
+
+        If the face shows little, or no emotion is similar, that is ``("neutral", 1.0)``.
+        """
         levels = self.read(values) * self._facial
         names, templates = self._templates
         if not names:
@@ -176,20 +182,20 @@ class Facs:
         likeness = templates @ levels / sizes
         best = int(np.argmax(likeness))
         intensity = float(likeness[best] / sizes[best])
-        if intensity < _LEAST_INTENSITY or likeness[best] < _LEAST_LIKENESS * np.linalg.norm(levels):
+        if intensity < _MIN_INTENSITY or likeness[best] < _MIN_COSINE * np.linalg.norm(levels):
             return "neutral", 1.0
         return names[best], min(intensity, 1.0)
 
     @cached_property
     def _templates(self) -> tuple[list[str], Floats]:
-        """Emotions that show something in the face, and what a read-out of them gives: (k, n)."""
+        """Names of the k emotions that any unit shows, and (k, n) the levels that are read from their faces."""
         found = {name: self.read(self.expand(formula)) * self._facial for name, formula in self.emotions.items()}
         shown = {name: levels for name, levels in found.items() if levels.any()}
         return list(shown), np.array(list(shown.values())).reshape(len(shown), len(self.names))
 
     @cached_property
     def _solver(self) -> BoundedSolver:
-        from controller.base.solve import BoundedSolver  # start-up: numba and scipy, only for reading back
+        from controller.base.solve import BoundedSolver  # imported lazily: it loads numba and scipy
 
         high = self._read.astype(np.float64)
         return BoundedSolver(
@@ -202,10 +208,10 @@ class Facs:
         if match is None or not number or len(side) > 1 or (letter and match[6] is not None):
             raise ParameterError(f"{term!r} is not an action unit", hint='write it like "12", "L12B" or "12:0.35"')
         unit = self._aliases.get(number, number)
-        if unit not in self._of_unit:
-            raise ParameterError(f"unknown action unit {number!r}{did_you_mean(number, self._of_unit)}",
+        if unit not in self._columns_by_unit:
+            raise ParameterError(f"unknown action unit {number!r}{did_you_mean(number, self._columns_by_unit)}",
                                  hint="configs/vocabularies/facs.toml lists the units")  # fmt: skip
-        indices = self._of_unit[unit]
+        indices = self._columns_by_unit[unit]
         if side:
             indices = [i for i in indices if self.names[i] == side + unit]
             if not indices:
@@ -216,18 +222,18 @@ class Facs:
 
 
 def is_formula(text: str) -> bool:
-    """Whether a text is meant as a formula of action units and not as a name: it begins like ``AU12``."""
+    """Whether a text is a formula of action units and not a name: it begins like ``AU12``."""
     return _FORMULA.match(text) is not None
 
 
 def _parts(match: re.Match[str]) -> tuple[str, str, str]:
-    """Number, sides and letter of a term."""
+    """Return number, side and letter of a term."""
     first, second, number, third, letter = (match[i].upper() for i in range(1, 6))
     return number, first + second + third, letter
 
 
 def _intensity(term: str, text: str) -> float:
-    """The number behind a colon. Raises ParameterError."""
+    """Parse the intensity after a colon. Raises ParameterError: it is not a number from 0 to 1."""
     value = plain_number(text)
     if value is None or not 0.0 <= value <= 1.0:
         raise ParameterError(f"{term!r}: the intensity must be 0 to 1, not {text!r}", hint='write it like "12:0.35"')
@@ -235,19 +241,19 @@ def _intensity(term: str, text: str) -> float:
 
 
 def _columns(parameters: Parameters, name: str, unit: _Unit) -> list[_Column]:
-    """The columns of a unit: one, or two where it has sides."""
+    """Return the columns of a unit: one, or two if it has sides."""
     if unit.left or unit.right:
         halves = {"L": spread(parameters, unit.left), "R": spread(parameters, unit.right)}
     else:
         halves = {"": spread(parameters, unit.weights)}
         found = [sides(parameters, key) for key in unit.weights]
         if all(len(positions) == 2 for positions in found):
-            halves = {side: _only(halves[""], [each[i] for each in found]) for i, side in enumerate("LR")}
+            halves = {side: _keep_only(halves[""], [each[i] for each in found]) for i, side in enumerate("LR")}
     return [_Column(name, side, weights, unit.read) for side, weights in halves.items()]
 
 
-def _only(weights: Floats, positions: list[int]) -> Floats:
-    """(P,) weights at some positions, 0 elsewhere."""
+def _keep_only(weights: Floats, indices: list[int]) -> Floats:
+    """Return (P,) weights at ``indices``, and 0 elsewhere."""
     kept = np.zeros_like(weights)
-    kept[positions] = weights[positions]
+    kept[indices] = weights[indices]
     return kept

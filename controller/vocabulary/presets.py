@@ -1,4 +1,4 @@
-"""Reads presets, the expressions that avatars of one kind have by name, as parameters."""
+"""Reads presets (the named expressions that every avatar of one format has, as VRM's) as parameter values."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from controller.base.config import Settings, Share, load
+from controller.base.config import Fraction, Settings, load
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, fold
 from controller.base.paths import config_dir
@@ -21,7 +21,7 @@ class _Preset(Settings):
     aliases: list[str] = []
     expression: str | None = None
     viseme: str | None = None
-    weights: dict[str, Share] = {}
+    weights: dict[str, Fraction] = {}
     tracked: bool = False
 
 
@@ -33,8 +33,8 @@ class _File(Settings):
 class Preset:
     """One preset.
 
-    name : its canonical name. weights : (P,) float64, the parameters at 1; read-only.
-    tracked : whether the 52 names of ARKit show the same.
+    name : its canonical name. weights : (P,) float64, the parameter values of the preset at 1; read-only.
+    tracked : whether ARKit's 52 parameters express the same, so that face tracking already contains it.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Preset:
 
 
 class Presets:
-    """The presets of one file by name, any case; :attr:`names` in file order."""
+    """The presets of one file by name, in any case. ``names`` : canonical names, in file order."""
 
     def __init__(self, presets: list[Preset], aliases: dict[str, str]) -> None:
         self.names = tuple(preset.name for preset in presets)
@@ -53,7 +53,7 @@ class Presets:
 
     @classmethod
     def load(cls, parameters: Parameters, path: Path | None = None) -> Presets:
-        """Read presets; those of VRM avatars without ``path``. Raises ConfigError with every fault."""
+        """Read presets; by default, those of VRM avatars. Raises ConfigError that lists every fault."""
         path = path or config_dir() / "vocabularies" / "vrm.toml"
         reader = _Reader(parameters)
         file = load(path, _File, reader.faults)
@@ -61,19 +61,19 @@ class Presets:
         return cls([reader.preset(name, preset) for name, preset in file.presets.items()], aliases)
 
     def find(self, name: str) -> Preset | None:
-        """The preset of a name, any case; None for what is no preset."""
+        """Return the preset called ``name``, in any case, or None."""
         return self._lookup.get(fold(name))
 
 
 class _Reader:
-    """Looks up what presets name."""
+    """Resolves the expressions, visemes and parameters that presets name."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
         self._vocabulary, self._visemes = Vocabulary.load(parameters), Visemes.load(parameters)
 
     def preset(self, name: str, given: _Preset) -> Preset:
-        """A preset with its weights. Raises ParameterError: it names an expression or a viseme that is not known."""
+        """Return a preset with its weights. Raises ParameterError: it names an unknown expression or viseme."""
         weights = spread(self._parameters, given.weights)
         if given.expression is not None:
             weights = self._vocabulary[given.expression].weights.copy()
@@ -83,7 +83,7 @@ class _Reader:
         return Preset(name, weights, given.tracked)
 
     def faults(self, file: _File) -> list[str]:
-        """Everything in a file that is not known, and presets that are given twice or not at all."""
+        """Return the faults of a file: unknown names, and presets that are defined in more than one way."""
         faults = []
         for name, given in file.presets.items():
             faults += unknown_names(self._parameters, f"presets.{name}.weights", given.weights)

@@ -1,4 +1,4 @@
-"""Reads a face in other vocabularies: action units, emotions, visemes, moods."""
+"""Describes a face in other vocabularies: as action units, an emotion, visemes or a mood."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from controller.vocabulary.facs import Facs
 from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
 
-_SHOWN = 0.05
+_MIN_LEVEL = 0.05
 _RIDGE, _SPARSITY = 1e-4, 2e-3
 
 
 class Readings:
-    """Says what a face shows in named expressions; can be called from any thread."""
+    """Finds the action units, emotions, visemes and moods that a face shows; any thread may call it."""
 
     def __init__(self, parameters: Parameters, expressions: Vocabulary) -> None:
         self._parameters, self._expressions = parameters, expressions
         self._lock = threading.Lock()
 
     def read(self, what: str, values: Floats) -> list[tuple[str, float]]:
-        """Names and values 0..1 (moods -1..1) of what the face ``values`` : (P,) shows.
+        """Return names and values 0..1 (of moods, -1..1) of what the face ``values`` : (P,) shows.
 
         ``what`` : ``UNITS``, ``EMOTION``, ``VISEMES`` or ``MOOD``.
 
@@ -36,12 +36,12 @@ class Readings:
         with self._lock:
             match what:
                 case "UNITS":
-                    return _shown(self._facs.names, self._facs.read(values))
+                    return _visible(self._facs.names, self._facs.read(values))
                 case "EMOTION":
                     return [self._facs.read_emotion(values)]
                 case "VISEMES":
                     visemes, solver = self._visemes
-                    return _shown(visemes.names, solver.solve(values * visemes.mask)[: len(visemes.names)])
+                    return _visible(visemes.names, solver.solve(values * visemes.mask)[: len(visemes.names)])
                 case "MOOD":
                     affect, solver = self._affect
                     levels = dict(zip(affect.names[1:], solver.solve(values).tolist(), strict=True))
@@ -53,30 +53,30 @@ class Readings:
         return Facs.load(self._parameters)
 
     @cached_property
-    def _visemes(self) -> tuple[Visemes, _Levels]:
-        """The visemes, and a solver for them and for each mouth shape that an expression may add during speech.
+    def _visemes(self) -> tuple[Visemes, _LevelSolver]:
+        """The visemes, and a solver for them and for each mouth parameter that an expression may move during speech.
 
-        Without the latter a smile would be read as the viseme that smiles most.
+        Without these parameters, a smile would be read as the viseme that is most similar to a smile.
         """
         visemes = Visemes.load(self._parameters)
-        lent = np.flatnonzero(visemes.mask & (visemes.through > 0.0))
-        return visemes, _Levels(np.concatenate([visemes.matrix, np.eye(len(visemes.mask))[:, lent]], axis=1))
+        shared = np.flatnonzero(visemes.mask & (visemes.through > 0.0))
+        return visemes, _LevelSolver(np.concatenate([visemes.matrix, np.eye(len(visemes.mask))[:, shared]], axis=1))
 
     @cached_property
-    def _affect(self) -> tuple[Affect, _Levels]:
+    def _affect(self) -> tuple[Affect, _LevelSolver]:
         affect = Affect.load(self._expressions)
         faces = np.stack([self._expressions[name].weights for name in affect.names[1:]], axis=1)
-        return affect, _Levels(faces)
+        return affect, _LevelSolver(faces)
 
 
-def _shown(names: Sequence[str], levels: Floats) -> list[tuple[str, float]]:
-    return [(name, level) for name, level in zip(names, levels.tolist(), strict=True) if level >= _SHOWN]
+def _visible(names: Sequence[str], levels: Floats) -> list[tuple[str, float]]:
+    return [(name, level) for name, level in zip(names, levels.tolist(), strict=True) if level >= _MIN_LEVEL]
 
 
-class _Levels:
-    """Levels 0..1 of the columns of a matrix (P, n), few of them not zero.
+class _LevelSolver:
+    """Finds sparse levels 0..1 of the columns of a matrix (P, n).
 
-    Columns are normalised to one length first: otherwise two long ones would be preferred to the short one that fits.
+    Columns are normalised to one length first; otherwise two long ones would be preferred to a short one that fits.
     """
 
     def __init__(self, matrix: Floats) -> None:
@@ -86,6 +86,6 @@ class _Levels:
         )
 
     def solve(self, values: Floats) -> Floats:
-        """(n,) levels that give ``values`` : (P,) best."""
+        """Return (n,) levels that reproduce ``values`` : (P,) best."""
         levels: Floats = self._solver.solve(values) / self._size
         return levels

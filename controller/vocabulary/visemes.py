@@ -1,4 +1,4 @@
-"""Reads visemes, what the mouth does for a sound, and the tables from phonemes and other names of sounds to them."""
+"""Reads visemes (mouth shapes of sounds), and the tables from phonemes and other symbols of sounds to visemes."""
 
 from __future__ import annotations
 
@@ -11,21 +11,22 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from controller.base.config import Number, Settings, Share, load
+from controller.base.config import Fraction, Number, Settings, load
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Parameters, did_you_mean
 from controller.base.paths import config_dir
 from controller.vocabulary.sides import spread, unknown_names
 
-_LONGEST_LETTERS = 3
+_MAX_LETTERS = 3
+"""Length of the longest group of letters that the table ``letters`` may map to a viseme."""
 
 
 class _Viseme(Settings):
     sounds: str = ""
     duration: Annotated[Number, Field(ge=0, le=10)] = 0.5
-    hold: Share = 0.5
+    hold: Fraction = 0.5
     aliases: list[str] = []
-    weights: dict[str, Share] = {}
+    weights: dict[str, Fraction] = {}
 
 
 class _File(Settings):
@@ -35,19 +36,18 @@ class _File(Settings):
     ipa: dict[str, str] = {}
     sapi: dict[Annotated[str, Field(pattern=r"^\d+$")], str] = {}
     letters: dict[str, str] = {}
-    through: dict[str, Share] = {}
+    through: dict[str, Fraction] = {}
 
 
 @dataclass(frozen=True, eq=False)
 class Visemes:
-    """The visemes of one file, in wire order.
+    """The visemes of one file, in the order of network formats.
 
-    names : of the n visemes. matrix : (P, n) float64, parameters of each at full weight.
-    hold : (n,) how firmly each keeps its shape, 0..1. duration : (n,) relative lengths.
-    through : (P,) how much of the face below shows through speech; 1 where no viseme moves a parameter.
-    rhubarb : mouth shape to weights (n,). phonemes : phoneme of ARPAbet to weights (n,). aliases : other names of
-    visemes. ipa : symbol of the IPA to weights (n,). sapi : viseme of SAPI, by its number, to weights (n,).
-    letters : letters of a written word to weights (n,).
+    names : of the n visemes. matrix : (P, n) float64, parameter values of each at full weight.
+    hold : (n,) 0..1, how strongly each keeps its shape beside its neighbours. duration : (n,) relative durations.
+    through : (P,) 0..1, how much of lower layers remains during speech; by default, 1 if no viseme moves the parameter.
+    rhubarb, phonemes, ipa, letters : weights (n,) by mouth shape of Rhubarb, phoneme of ARPAbet, symbol of the IPA, and
+    group of written letters. sapi : weights (n,) by number of SAPI's visemes. aliases : other names of visemes.
     """
 
     names: tuple[str, ...]
@@ -64,22 +64,22 @@ class Visemes:
 
     @classmethod
     def load(cls, parameters: Parameters, path: Path | None = None) -> Visemes:
-        """Read visemes; the shipped ones without ``path``. Raises ConfigError with every fault."""
+        """Read visemes; by default, the shipped ones. Raises ConfigError that lists every fault."""
         path = path or config_dir() / "vocabularies" / "visemes.toml"
         return _build(parameters, load(path, _File, lambda file: _faults(parameters, file)))
 
     @property
     def mask(self) -> np.ndarray:
-        """(P,) bool, the parameters that any viseme moves or that speech holds back."""
+        """(P,) bool: the parameters that any viseme moves, or of which speech reduces lower layers."""
         moved: np.ndarray = (self.matrix != 0.0).any(axis=1) | (self.through < 1.0)
         return moved
 
     def weights(self, name: str) -> Floats:
-        """(n,) weights of a viseme by name, or of a phoneme with or without stress digit.
+        """Return (n,) weights of a viseme by name, or of a phoneme of ARPAbet with or without stress digit.
 
-        Raises ParameterError: neither is known.
+        Raises ParameterError: there is neither.
         """
-        found = self._named(name)
+        found = self._find_named(name)
         if found is None:
             known = [*self.names, *self.phonemes]
             raise ParameterError(
@@ -89,7 +89,7 @@ class Visemes:
         return found
 
     def viseme(self, name: str) -> str:
-        """The canonical name of a viseme, in any case. Raises ParameterError: it is none."""
+        """Return the canonical name of a viseme, given in any case. Raises ParameterError: no such viseme."""
         known = {each.lower(): each for each in self.names} | {k.lower(): v for k, v in self.aliases.items()}
         found = known.get(name.lower())
         if found is None:
@@ -97,65 +97,69 @@ class Visemes:
         return found
 
     def sounds(self, names: Sequence[str], *, guess: bool = False) -> list[Floats]:
-        """Weights (n,) of each sound of an alignment: visemes, phonemes of ARPAbet, or symbols of the IPA.
+        """Return weights (n,) of each sound of an alignment: visemes, phonemes of ARPAbet, or symbols of the IPA.
 
-        All are symbols of the IPA where any of them can be nothing else: "y" is another sound there.
-        guess : what is unknown is read as a symbol in small letters, as "PT".
+        If any name can only be a symbol of the IPA, all are read as such, because "y" is another sound there.
+        guess : read an unknown sound, as "PT", as a symbol of the IPA in lower case.
 
         Raises ParameterError: a sound is unknown.
         """
-        plain = {name: self._named(name) for name in names}
+        plain = {name: self._find_named(name) for name in names}
         if all(found is not None for found in plain.values()):
             return [self.weights(name) for name in names]
-        found = {name: self._mixed(name, plain[name], guess) for name in plain}
+        found = {name: self._find_among_ipa(name, plain[name], guess) for name in plain}
         return [self.weights(name) if (weights := found[name]) is None else weights for name in names]
 
     def knows(self, name: str) -> bool:
         """Whether :meth:`sounds` knows a sound."""
-        return self._named(name) is not None or self._symbol(name) is not None
+        return self._find_named(name) is not None or self._find_symbol(name) is not None
 
     def spell(self, text: str) -> Floats:
-        """(k, n) weights of the sounds of a written text, guessed from its letters; (1, n) silence without any."""
+        """Return (k, n) weights of the sounds of a written text, guessed from its letters; (1, n) silence if none."""
         rows, rest = [], text.lower()
         while rest:
-            taken = next((rest[:size] for size in range(_LONGEST_LETTERS, 0, -1) if rest[:size] in self.letters), "")
-            if taken:
-                rows.append(self.letters[taken])
-            rest = rest[len(taken) or 1 :]
+            group = next((rest[:size] for size in range(_MAX_LETTERS, 0, -1) if rest[:size] in self.letters), "")
+            if group:
+                rows.append(self.letters[group])
+            rest = rest[len(group) or 1 :]
         return np.stack(rows) if rows else self.weights(self.names[0])[None]
 
-    def _named(self, name: str) -> Floats | None:
+    def _find_named(self, name: str) -> Floats | None:
+        """Return the weights of a viseme or a phoneme of ARPAbet, or None."""
         name = self.aliases.get(name, name)
         if name in self.names:
             only: Floats = np.eye(len(self.names))[self.names.index(name)]
             return only
         return self.phonemes.get(name.upper().rstrip("012"))
 
-    def _mixed(self, name: str, plain: Floats | None, guess: bool) -> Floats | None:
-        """Weights of a sound among symbols of the IPA; names of ARPAbet beside them, as "DH", keep their meaning."""
-        arpabet = plain is not None and name.isascii() and (len(name) > 1 or name.isupper())
-        if arpabet:
+    def _find_among_ipa(self, name: str, plain: Floats | None, guess: bool) -> Floats | None:
+        """Return the weights of a sound in a list of IPA symbols; plain names of ARPAbet, as "DH", are kept.
+
+        plain : the weights of ``name`` as a viseme or phoneme, or None.
+        """
+        is_arpabet = plain is not None and name.isascii() and (len(name) > 1 or name.isupper())
+        if is_arpabet:
             return plain
-        symbol = self._symbol(name)
+        symbol = self._find_symbol(name)
         if symbol is None and guess:
-            symbol = self._symbol(name.lower())
+            symbol = self._find_symbol(name.lower())
         return plain if symbol is None else symbol
 
-    def _symbol(self, name: str) -> Floats | None:
-        """Weights of a symbol of the IPA, by the longest beginning that is listed."""
-        bare = _bare(name)
+    def _find_symbol(self, name: str) -> Floats | None:
+        """Return the weights of a symbol of the IPA, by its longest prefix in the table, or None."""
+        bare = _strip_marks(name)
         sizes = range(len(bare), 0, -1)
         return next((self.ipa[bare[:size]] for size in sizes if bare[:size] in self.ipa), None)
 
 
-def _bare(symbol: str) -> str:
-    """A symbol of the IPA without marks of stress, length, tone and articulation."""
+def _strip_marks(symbol: str) -> str:
+    """Remove the marks of stress, length, tone and articulation from a symbol of the IPA."""
     whole = unicodedata.normalize("NFD", symbol.strip())
     return "".join(sign for sign in whole if unicodedata.category(sign) not in ("Mn", "Lm", "Sk", "Po") or sign == "_")
 
 
 def _faults(parameters: Parameters, file: _File) -> list[str]:
-    """Unknown parameters, and shapes and phonemes that mean an unknown viseme."""
+    """Return the faults of a file: unknown parameters and visemes, and groups of letters that are too long."""
     faults = unknown_names(parameters, "through", file.through)
     for name, viseme in file.visemes.items():
         faults += unknown_names(parameters, f"visemes.{name}.weights", viseme.weights)
@@ -169,10 +173,10 @@ def _faults(parameters: Parameters, file: _File) -> list[str]:
         if name not in file.visemes
     ]
     return faults + [
-        f"letters.{name}: {letters!r} has more than {_LONGEST_LETTERS} letters"
+        f"letters.{name}: {letters!r} has more than {_MAX_LETTERS} letters"
         for name, each in file.letters.items()
         for letters in each.split()
-        if len(letters) > _LONGEST_LETTERS
+        if len(letters) > _MAX_LETTERS
     ]
 
 
@@ -194,14 +198,14 @@ def _build(parameters: Parameters, file: _File) -> Visemes:
         {shape: _weights(mix, given) for shape, mix in file.rhubarb.items()},
         {phoneme: _weights({name: 1.0}, given) for phoneme, name in file.phonemes.items()},
         {alias: name for name, viseme in given.items() for alias in viseme.aliases},
-        _listed(file.ipa, given),
+        _weights_of_words(file.ipa, given),
         {int(number): _weights({name: 1.0}, given) for number, name in file.sapi.items()},
-        _listed(file.letters, given),
+        _weights_of_words(file.letters, given),
     )
 
 
-def _listed(table: Mapping[str, str], names: Iterable[str]) -> dict[str, Floats]:
-    """Weights of every word of the lists of a table."""
+def _weights_of_words(table: Mapping[str, str], names: Iterable[str]) -> dict[str, Floats]:
+    """Return the weights of every word in a table that lists words, separated by spaces, by viseme."""
     return {word: _weights({name: 1.0}, names) for name, words in table.items() for word in words.split()}
 
 

@@ -26,7 +26,7 @@ class Vocabulary:
     """Expressions by name, or by a formula: ``AU1+2+5B``, ``VA:0.6,-0.2``, ``VAD:-0.5,0.6,0.3`` or ``VISEME:aa``.
 
     expressions : the named expressions, in file order; moods are blended from them.
-    aliases : folded other names to canonical ones.
+    aliases : canonical names by folded alias.
     """
 
     def __init__(
@@ -37,11 +37,11 @@ class Vocabulary:
 
     @classmethod
     def load(cls, parameters: Parameters, path: Path | None = None, more: Sequence[Path] = ()) -> Vocabulary:
-        """Read a vocabulary of expressions; the shipped one without ``path``.
+        """Read a vocabulary of expressions; by default, the shipped one.
 
-        ``more`` : further files whose expressions are added, such as a user's own; they may combine those before them.
+        ``more`` : further files whose expressions are added; each may mix expressions of the files before it.
 
-        Raises ConfigError: a file cannot be read or is wrong; every fault of every file with its key.
+        Raises ConfigError: a file cannot be read or is wrong; lists every fault of every file with its key.
         """
         files = (path or config_dir() / "vocabularies" / "expressions.toml", *more)
         return cls(parameters, *read_expressions(parameters, files))
@@ -52,9 +52,9 @@ class Vocabulary:
         return tuple(self._expressions)
 
     def add(self, expression: Expression) -> None:
-        """Add an expression, or replace that of its name; it takes effect at the next lookup.
+        """Add an expression, or replace the one with its name; the next lookup finds it.
 
-        May be called while others look expressions up. Raises ParameterError: its name is an alias of another one.
+        Other threads may look expressions up meanwhile. Raises ParameterError: its name is an alias of another one.
         """
         known = self._lookup.get(fold(expression.name), expression.name)
         if known != expression.name:
@@ -63,13 +63,13 @@ class Vocabulary:
         self._lookup = {**self._lookup, fold(expression.name): expression.name}
 
     def __getitem__(self, name: str) -> Expression:
-        """The expression called ``name``, in any case, or that of a formula where no expression is called so.
+        """Return the expression called ``name``, in any case, or else the expression of the formula ``name``.
 
-        Raises ParameterError: unknown name, with the nearest ones, or a wrong formula. ConfigError: a file is wrong.
+        Raises ParameterError: an unknown name (suggests similar ones) or a wrong formula. ConfigError: a file is wrong.
         """
-        own = self._lookup.get(name) or self._lookup.get(fold(name))
-        if own is not None:
-            return self._expressions[own]
+        known = self._lookup.get(name) or self._lookup.get(fold(name))
+        if known is not None:
+            return self._expressions[known]
         if is_formula(name):
             return Expression(name.upper(), self._facs.expand(name), source="FACS")
         if mood := _MOOD.fullmatch(name):
@@ -87,7 +87,7 @@ class Vocabulary:
         )
 
     def expand(self, name: str, intensity: float = 1.0) -> dict[int, float]:
-        """Parameter index to value for ``name`` at ``intensity`` 0..1. Raises ParameterError."""
+        """Return the parameter values of ``name`` at ``intensity`` 0..1, by index. Raises ParameterError."""
         expression = self[name]
         if not 0.0 <= intensity <= 1.0:
             raise ParameterError(f"intensity must be 0 to 1, not {intensity}", hint="0.5 is half of the expression")
@@ -108,7 +108,7 @@ class Vocabulary:
 
 
 def _point(kind: str, text: str) -> list[float]:
-    """The numbers of a mood, each -1..1. Raises ParameterError."""
+    """Parse the numbers of a mood, each -1..1. Raises ParameterError."""
     hint = f"like {kind}:{','.join(['0.5', '-0.2', '0.1'][: len(kind)])}"
     cells = text.split(",")
     if len(cells) != len(kind):

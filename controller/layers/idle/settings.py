@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field
 
-from controller.base.config import Number, Settings, Share, check, read_toml
+from controller.base.config import Fraction, Number, Settings, check, read_toml
 from controller.base.errors import ParameterError
 from controller.base.parameters import Parameters, did_you_mean
 from controller.base.paths import config_dir, find_config
@@ -28,7 +28,7 @@ Degrees = Annotated[Number, Field(ge=0, le=45)]
 Angle = Annotated[Number, Field(ge=-45, le=45)]
 Weight = Annotated[Number, Field(ge=0, le=1000)]
 Factor = Annotated[Number, Field(ge=0, le=10)]
-Shares = Annotated[tuple[Share, Share], AfterValidator(in_order)]
+Fractions = Annotated[tuple[Fraction, Fraction], AfterValidator(in_order)]
 Angles = Annotated[tuple[Degrees, Degrees], AfterValidator(in_order)]
 Period = Annotated[Number, Field(ge=0.1, le=3600)]
 Periods = Annotated[tuple[Period, Period], AfterValidator(in_order)]  # times are divided by them
@@ -47,18 +47,18 @@ def check_manner(name: str | None) -> Manner | None:
 
 class BlinkSettings(Settings):
     interval_s: Draw
-    double_share: Share
+    double_share: Fraction
     double_gap_s: Span
     close_s: Seconds
     hold_s: Span
     open_s: Seconds
     shift_deg: Degrees
-    shift_share: Share
-    partial_share: Share
-    partial_amount: Shares
+    shift_share: Fraction
+    partial_share: Fraction
+    partial_amount: Fractions
     lag_s: Annotated[Number, Field(ge=0, le=0.05)]
-    uneven_share: Share
-    along: dict[str, Share]
+    uneven_share: Fraction
+    along: dict[str, Fraction]
 
 
 class EyeSettings(Settings):
@@ -100,8 +100,8 @@ class MannerSettings(Settings):
 
 class TurnSettings(Settings):
     comfort_deg: Degrees
-    share: Share
-    pitch_share: Share
+    share: Fraction
+    pitch_share: Fraction
     delay_s: Delay
     base_s: Seconds
     per_deg_s: Delay
@@ -135,7 +135,7 @@ class NodSettings(Settings):
     depth_deg: Angles
     cycle_s: Annotated[tuple[Seconds, Seconds], AfterValidator(in_order)]
     most_cycles: Annotated[int, Field(ge=1, le=10)]
-    fade: Share
+    fade: Fraction
 
 
 class PoseSettings(Settings):
@@ -149,7 +149,7 @@ class GestureSettings(Settings):
     rise_s: Seconds
     hold_s: Span
     fall_s: Seconds
-    amount: Share
+    amount: Fraction
     poses: dict[str, PoseSettings]
 
 
@@ -158,22 +158,22 @@ class FidgetSettings(GestureSettings):
 
 
 class SpeechSettings(Settings):
-    gate: Share
+    gate: Fraction
     pause_s: Seconds
-    stress: Share
+    stress: Fraction
     stress_gap_s: Seconds
-    brow_share: Share
-    nod_share: Share
-    blink_share: Share
-    end_blink_share: Share
-    away_share: Share
+    brow_share: Fraction
+    nod_share: Fraction
+    blink_share: Fraction
+    end_blink_share: Fraction
+    away_share: Fraction
     listen_s: Seconds
     nod_deg: Angles
     nod_s: Seconds
     rise_s: Seconds
     hold_s: Span
     fall_s: Seconds
-    amount: Share
+    amount: Fraction
     brows: dict[str, PoseSettings]
 
 

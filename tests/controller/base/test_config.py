@@ -8,7 +8,7 @@ from typing import Annotated
 import pytest
 from pydantic import Field, RootModel, ValidationError
 
-from controller.base.config import Positive, Settings, Share, key_path, load
+from controller.base.config import Fraction, Positive, Settings, key_path, load
 from controller.base.errors import ConfigError
 from controller.base.files import NEWER
 
@@ -61,7 +61,7 @@ def test_a_missing_file_and_a_folder_are_one_message(tmp_path: Path) -> None:
 
 
 class Part(Settings):
-    share: Share = 0.5
+    share: Fraction = 0.5
     size: Positive = 1.0
 
 
@@ -141,7 +141,7 @@ def test_unknown_keys_are_compared_with_those_of_their_own_table(tmp_path: Path)
 
 def test_a_value_of_several_kinds_has_one_fault_without_the_names_of_kinds(tmp_path: Path) -> None:
     class Look(Settings):
-        colour: Share | Annotated[str, Field(min_length=2)] | tuple[Share, Share] = 0.0
+        colour: Fraction | Annotated[str, Field(min_length=2)] | tuple[Fraction, Fraction] = 0.0
 
     (tmp_path / "a.toml").write_text("colour = [1, 2, 3]\nwidth = 1\n")
     with pytest.raises(ConfigError) as caught:

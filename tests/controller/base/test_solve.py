@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import lsq_linear
 
-from controller.base.solve import BoundedSolver, _newton_step, _reach, _solve
+from controller.base.solve import BoundedSolver, _newton_step, _solve, _step_fraction
 
 
 def problem(seed: int, m: int = 150, n: int = 52) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
@@ -134,7 +134,7 @@ def test_the_ridge_decides_what_rows_leave_open() -> None:
     ],
 )
 def test_a_step_ends_at_a_bound_and_at_zero(x: float, step: float, low: float, high: float, share: float) -> None:
-    assert _reach(x, step, low, high) == share
+    assert _step_fraction(x, step, low, high) == share
 
 
 def test_linear_systems_are_solved_with_every_sign_and_order_of_rows() -> None:

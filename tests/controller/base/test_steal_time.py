@@ -28,7 +28,7 @@ def test_the_share_is_of_all_processors(tmp_path: Path, monkeypatch: pytest.Monk
     monkeypatch.setattr(time, "monotonic", lambda: next(now))
     counted = StealTime()
     told(tmp_path, 1000 + round(0.8 / TICK_S))
-    assert counted.share() == pytest.approx(0.8 / 2.0 / 4)
+    assert counted.fraction() == pytest.approx(0.8 / 2.0 / 4)
 
 
 @pytest.mark.parametrize("text", ["", "cpu 1 2 3\n", "cpu a b c d e f g h\n"])
@@ -38,7 +38,7 @@ def test_a_system_that_does_not_tell(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert steal_time_s() is None
     path.write_text(text, encoding="ascii")
     assert steal_time_s() is None
-    assert StealTime().share() is None
+    assert StealTime().fraction() is None
 
 
 def test_a_report_that_comes_or_goes_while_it_is_measured_is_no_share(
@@ -48,10 +48,10 @@ def test_a_report_that_comes_or_goes_while_it_is_measured_is_no_share(
     monkeypatch.setattr(steal_time, "STAT", path)
     counted = StealTime()
     path.unlink()
-    assert counted.share() is None
+    assert counted.fraction() is None
     counted = StealTime()
     told(tmp_path, 1000)
-    assert counted.share() is None
+    assert counted.fraction() is None
 
 
 def test_a_short_time_has_a_share_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -61,10 +61,10 @@ def test_a_short_time_has_a_share_too(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.setattr(time, "monotonic", lambda: next(now))
     counted = StealTime()
     told(tmp_path, 1000 + round(0.25 / TICK_S))
-    assert counted.share() == pytest.approx(0.5)
+    assert counted.fraction() == pytest.approx(0.5)
 
 
 def test_no_time_has_no_share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(steal_time, "STAT", told(tmp_path, 1000))
     monkeypatch.setattr(time, "monotonic", lambda: 5.0)
-    assert StealTime().share() is None
+    assert StealTime().fraction() is None

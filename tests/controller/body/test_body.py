@@ -441,7 +441,7 @@ def test_a_full_disk_ends_the_recording_and_nothing_else(tmp_path: Path, caplog:
         until(lambda: body.state.parts.failed)
         assert ticks_on(body)
         (said,) = (message for message in caplog.messages if message.startswith("recording"))
-        assert said.startswith("recording /dev/full failed: /dev/full: No space left on device; what came before")
+        assert said.startswith("recording /dev/full failed: /dev/full: No space left on device; the earlier ticks")
         (part,) = body.report()["parts"]  # type: ignore[misc]
         assert part["part"] == "recording /dev/full" and part["state"] == "failed"  # type: ignore[index]
 

@@ -159,7 +159,7 @@ def test_a_report_that_raises_says_so_and_leaves_the_others_alone(link: LinkPart
 def test_a_link_that_hangs_while_it_is_closed_does_not_keep_the_servos_waiting(
     link: LinkPart, made: list[Any], caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(link_part, "_CLOSE_S", 0.05)
+    monkeypatch.setattr(link_part, "_CLOSE_TIMEOUT_S", 0.05)
     release = threading.Event()
     link._closers.callback(lambda: release.wait(60.0))
     link.close()

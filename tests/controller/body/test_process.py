@@ -134,7 +134,7 @@ def test_a_body_that_is_told_to_end_stops_the_servos_first(
 
 @pytest.mark.slow
 def test_a_body_that_is_killed_leaves_the_rest_to_the_bus_watchdog(stage: Stage, servos: SimulatedBus) -> None:
-    with pytest.raises(ControllerError, match="ended by itself"), BodyProcess(stage, PARAMETERS) as body:
+    with pytest.raises(ControllerError, match="ended unexpectedly"), BodyProcess(stage, PARAMETERS) as body:
         body.wait_ready()
         body.send(Hold(PARAMETERS.index("jawOpen"), 1.0))
         body._process.kill()
@@ -286,7 +286,7 @@ def test_messages_that_come_too_late_or_out_of_order_are_errors() -> None:
         body_of(Ended(1, messages.Finished())).wait_ready()
     for error in (EOFError(), OSError()):
         end = Ended(1, error)
-        with pytest.raises(ControllerError, match=r"the body process ended by itself \(exit code 3\)"):
+        with pytest.raises(ControllerError, match=r"the body process ended unexpectedly \(exit code 3\)"):
             body_of(end).alive()
         assert end.asked == [("join", 1.0)]
     body = body_of(Ended(1, messages.Ready(), messages.Finished(), messages.Report({"a": 1})))
@@ -322,7 +322,7 @@ def test_a_body_that_a_signal_ended_has_left_its_report() -> None:
     body = body_of(Gone(1, messages.Ready(), messages.Report({"a": 1})))
     body.stop()
     assert body.report == {"a": 1}
-    with pytest.raises(ControllerError, match="ended by itself"):
+    with pytest.raises(ControllerError, match="ended unexpectedly"):
         body_of(Gone(1, EOFError())).stop()
 
 

@@ -207,8 +207,8 @@ def test_a_show_that_fails_gives_back_what_it_moved_and_nothing_else(
     sources.tick(2 * SECOND, True)
     sources.tick(3 * SECOND, True)
     assert caplog.messages == [
-        "show tour failed: ZeroDivisionError: division by zero; the face gives back what it moved; "
-        "SHOW tour begins it again"
+        "show tour failed: ZeroDivisionError: division by zero; the parameters that it moved are released; "
+        "SHOW tour starts it again"
     ]
     status = state.status()
     assert (status["manual"], status["expression"], status["gaze"]) == (1, "neutral", "off")

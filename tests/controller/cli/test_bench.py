@@ -80,7 +80,9 @@ def test_quad_trees_are_drawn_side_by_side(tmp_path: Path, head: str) -> None:
         assert drawn.width > 900
 
 
-@pytest.mark.parametrize(("place", "why"), [("file/a.svg", "cannot be written"), ("a.doc", "no picture is named so")])
+@pytest.mark.parametrize(
+    ("place", "why"), [("file/a.svg", "cannot be written"), ("a.doc", "unknown suffix of a picture")]
+)
 def test_places_that_cannot_be_written_are_refused_at_once(tmp_path: Path, place: str, why: str) -> None:
     (tmp_path / "file").touch()
     words = ["bench", "surface", "--growth", str(tmp_path / place)]
@@ -122,8 +124,8 @@ def test_without_options_the_shipped_head_is_measured(calls: list[tuple[Any, ...
     rows = text.replace("│", " ").replace("┃", " ")
     words = " ".join(rows.split())
     assert "one 1.235 2.00 the other <= 1.5 missed" in words
-    assert "two 0.50 <= 1 kept" in words  # no time was taken
-    assert "three 4.000" in words and "measure ms ratio to reach" in words
+    assert "two 0.50 <= 1 met" in words  # no time was taken
+    assert "three 4.000" in words and "measure ms ratio ratio to bound" in words
 
 
 @pytest.mark.slow
@@ -177,8 +179,8 @@ def test_the_bus_is_measured_for_a_second_at_least_and_told_as_a_table_or_json(m
     monkeypatch.setattr(bus_module, "bench_bus", bench_bus)
     words = said("bus").replace("│", " ").replace("┃", " ")
     text = " ".join(words.split())
-    assert "24 servos" in text and "measure reach" in text
-    for row in ("late by 1.24 ms <= 2 ms kept", "ticks 7.00 Hz >= 9 missed", "frames 5.00 frames/s"):
+    assert "24 servos" in text and "measure bound" in text
+    for row in ("late by 1.24 ms <= 2 ms met", "ticks 7.00 Hz >= 9 missed", "frames 5.00 frames/s"):
         assert row in text
     result = CliRunner().invoke(make_app(), ["bench", "bus", "--json", "--face", "--seconds", "2.5"])
     assert result.stderr.startswith("measuring loops")

@@ -217,11 +217,11 @@ def test_a_calibration_is_given_its_channels_and_place(
     robot, names, name, target, margin = calls[0]
     assert (robot, len(names), name, margin) == ("head24", 24, "default", 1.0)
     assert target == root / "configs/robots/head24.default.calibration.toml"
-    assert text == f'wrote {target} The robot file takes it with: calibration = "default"'
+    assert text == f'wrote {target} To use it, write in the robot file: calibration = "default"'
     out = str(tmp_path / "c.toml")
     text = said("calibrate", "head24", "-c", "jawOpen", "--out", out, "--margin", "0", "--name", "desk")
     assert calls[1] == ("head24", ["jawOpen"], "desk", Path(out), 0.0)
-    assert text == f'wrote {out} The robot file takes it with: calibration = "{out}"'
+    assert text == f'wrote {out} To use it, write in the robot file: calibration = "{out}"'
     written[0] = False
     assert said("calibrate", "head24", "--margin", "20") == "" and calls[2][-1] == 20.0
     for wrong in ("-0.1", "20.1"):

@@ -11,7 +11,7 @@ from controller.base.errors import ConfigError
 from controller.cli.app import make_app
 from controller.cli.console import console
 from controller.tools import plugins as module
-from controller.tools.plugins import Listed
+from controller.tools.plugins import ListedPlugin
 
 
 @pytest.fixture(autouse=True)
@@ -30,11 +30,11 @@ def test_check_prints_a_line_for_each_thing_and_raises_every_fault(tmp_path: Pat
 
 def test_plugins_are_listed_and_broken_ones_explained(monkeypatch: pytest.MonkeyPatch) -> None:
     text = " ".join(CliRunner().invoke(make_app(), ["plugins"]).output.split())
-    for words in ("sort kind what it is from", "bus dynamixel", "link line", "take livelink", "export glb"):
+    for words in ("registry kind description package", "bus dynamixel", "link line", "take livelink", "export glb"):
         assert words in text
     assert "cannot be loaded" not in text and "try:" not in text
-    broken = Listed("take", "odd", "take kind 'odd' [x] is wrong", "odd-package 1", False, "pip uninstall odd")
-    monkeypatch.setattr(module, "listed", lambda: iter([broken]))
+    broken = ListedPlugin("take", "odd", "", "odd-package 1", "take kind 'odd' [x] is wrong", "pip uninstall odd")
+    monkeypatch.setattr(module, "list_plugins", lambda: iter([broken]))
     text = " ".join(CliRunner().invoke(make_app(), ["plugins"]).output.split())
     assert "take odd cannot be loaded odd-package 1" in text
     assert text.endswith("take kind 'odd' [x] is wrong try: pip uninstall odd")

@@ -40,7 +40,7 @@ def film(folder: Path, out: str, *more: str, take: str = "hello.toml") -> str:
 @needs_ffmpeg
 def test_a_show_becomes_a_film_with_its_sound(folder: Path) -> None:
     said = film(folder, "hello.mp4")
-    assert "12 frames at 5 a second, with the sound of" in said and "wrote" in said
+    assert "12 frames at 5 per second, with the sound of" in said and "wrote" in said
     assert abs(heard(folder / "hello.mp4")[1600:14_000]).max() > 3000
     command = [str(ffmpeg.find_ffmpeg()), "-i", str(folder / "hello.mp4"), "-f", "null", "-"]
     told = subprocess.run(command, capture_output=True, text=True, check=True, timeout=60).stderr
@@ -70,7 +70,7 @@ def test_without_ffmpeg_the_message_says_what_to_type(folder: Path, monkeypatch:
 def test_what_a_film_cannot_have_is_named(folder: Path) -> None:
     with pytest.raises(ViewError, match="has no sound"):
         film(folder, "hello.gif", "--sound", str(folder / "hello.wav"))
-    with pytest.raises(ConfigError, match="--take and --sheet are two pictures"):
+    with pytest.raises(ConfigError, match="--take and --sheet draw different pictures"):
         film(folder, "hello.mp4", "--sheet")
     said = CliRunner().invoke(make_app(), ["render", "-o", "a.png", "--sound", "hello.wav"])
     assert isinstance(said.exception, ConfigError) and "there is no --take" in str(said.exception)

@@ -65,7 +65,7 @@ def test_a_preflight_on_a_terminal_asks_first_and_for_every_direction(
     head: tuple[SimulatedBus, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     _, path = head
-    monkeypatch.setattr("controller.cli.hardware._is_asked", lambda: True)
+    monkeypatch.setattr("controller.cli.hardware._is_interactive", lambda: True)
     refused = omote("preflight", str(path), input="n\n")
     assert "nothing was moved" in str(refused.exception)
     report = tmp_path / "report.toml"

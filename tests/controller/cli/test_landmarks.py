@@ -40,7 +40,7 @@ def test_landmarks_are_listed_by_how_they_were_found_and_paths_are_whole(asked: 
     assert said.output.splitlines()[-3:] == [
         "found: chin, mouth_left",
         "kept: nose_tip",
-        f"wrote marks.toml and {PICTURE}: look at the picture",  # in one line, to be copied
+        f"wrote marks.toml and {PICTURE}: check the landmarks in the picture",  # in one line, to be copied
     ]
 
 

@@ -14,7 +14,7 @@ from controller.body.messages import RunOptions
 from controller.body.sources import Voice
 from controller.cli.app import make_app
 from controller.cli.console import console
-from controller.cli.run import _link, report_rows
+from controller.cli.run import _describe_link, report_rows
 from controller.panels.session.commands import History, Settings
 from controller.panels.session.next_run import NextRun
 from controller.stage.last import remember
@@ -46,7 +46,7 @@ def test_every_part_of_a_run_has_its_rows() -> None:
     link = {"port": "/dev/x", "accepted": 7, "refused": {"E_NAME": 1}}
     found = dict(report_rows({"stage": "s", "face": FACE, "control": LOOP, "links": [link], "buses": [bus]}))
     assert found["frames per second"] == "30.0"
-    assert found["milliseconds a frame"] == "p50 1.00  p95 2.00  p99 3.25  max 4.00"
+    assert found["milliseconds per frame"] == "p50 1.00  p95 2.00  p99 3.25  max 4.00"
     assert found["start to first frame"] == "2.50 s"
     assert found["link /dev/x"] == "7 accepted, 1 refused"
     assert found["bus head: 24 servos"] == "50.0 Hz of 50 wanted, 2 skipped"
@@ -75,7 +75,7 @@ def test_rules_takes_voices_and_differences_have_rows() -> None:
     found = report_rows({"stage": "s", "take": take, "voice": {"heard_s": 2.0}, "buses": [bus]})
     assert found[:2] == [("take", "0.5 of 1.0 s played, 60 rows at 60 Hz"), ("voice", "2.0 s heard")]
     assert found[-3:] == [
-        ("bus head: measured face is away from the wanted one by", "rms 1.2 deg, most at jaw: rms 4.0 deg"),
+        ("bus head: measured minus commanded face", "rms 1.2 deg, most at jaw: rms 4.0 deg"),
         ("bus head: by region (rms deg)", "jaw 2.0  mouth 0.5"),
         ("bus head: rule", "timing jaw toward high: 2 times, 3.2 s"),
     ]
@@ -159,7 +159,7 @@ def test_rows_come_in_the_order_of_a_run_and_name_the_picture() -> None:
     link = {"port": "/dev/x", "accepted": 7, "refused": {"E_NAME": 1, "E_RANGE": 2}}
     rows = report_rows({"stage": "s", "face": face, "control": LOOP, "links": [link], "buses": [bus]})
     assert [name for name, _ in rows] == [
-        "picture", "frames", "frames per second", "milliseconds a frame", "control loop", "link /dev/x",
+        "picture", "frames", "frames per second", "milliseconds per frame", "control loop", "link /dev/x",
         "bus b: 2 servos", "bus b: jitter (ms)", "bus b: command to wire (ms)", "bus b: errors",
         "bus b: targets held at a limit",
     ]  # fmt: skip
@@ -171,7 +171,7 @@ def test_rows_come_in_the_order_of_a_run_and_name_the_picture() -> None:
     away = {"rms_deg": 1.0, "worst": [{"channel": "a", "rms_deg": 2.0}, {"channel": "b", "rms_deg": 1.0}]}
     rows = report_rows({"stage": "s", "buses": [{**bus, "face_difference": away}]})
     assert rows[-2:] == [
-        ("bus b: measured face is away from the wanted one by", "rms 1.0 deg, most at a: rms 2.0 deg"),
+        ("bus b: measured minus commanded face", "rms 1.0 deg, most at a: rms 2.0 deg"),
         ("bus b: by region (rms deg)", ""),
     ]
 
@@ -330,14 +330,14 @@ def test_options_have_limits(display: dict[str, bool], words: tuple[str, ...]) -
 @pytest.mark.parametrize(
     ("more", "shown"),
     [
-        ({"rate_hz": 60.0, "lost": 2, "error": ""}, "7 faces taken, 2 lost, 1 refused"),
+        ({"rate_hz": 60.0, "lost": 2, "error": ""}, "7 frames received, 2 lost, 1 refused"),
         ({"sent": 300, "dropped": 1, "send_error": "gone"}, "300 messages sent, 1 dropped; gone"),
         (
             {"rate_hz": 60.0, "lost": 0, "error": "", "sent": 5, "dropped": 0, "send_error": ""},
-            "7 faces taken, 0 lost, 1 refused; 5 messages sent, 0 dropped",
+            "7 frames received, 0 lost, 1 refused; 5 messages sent, 0 dropped",
         ),
     ],
 )
 def test_links_that_take_and_send_faces_are_reported_as_such(more: dict[str, object], shown: str) -> None:
     link = {"port": "udp:127.0.0.1:5", "accepted": 7, "refused": {"too short": 1}, **more}
-    assert _link(link) == shown
+    assert _describe_link(link) == shown

@@ -77,8 +77,8 @@ def test_a_robot_and_a_host_are_served_by_name(served: dict[str, Any], tmp_path:
 @pytest.mark.parametrize(
     ("words", "message", "hint"),
     [
-        (["--link", "x", "--tcp", ":1"], "--link and --tcp do not go together", "run it twice"),
-        (["--rfc2217", ":2", "--tcp", ":1"], "--tcp and --rfc2217 do not go together", "run it twice"),
+        (["--link", "x", "--tcp", ":1"], "--link and --tcp exclude each other", "run it twice"),
+        (["--rfc2217", ":2", "--tcp", ":1"], "--tcp and --rfc2217 exclude each other", "run it twice"),
         (["--latency", "16"], "--latency is part of the time on the wire", "add --wire"),
     ],
 )

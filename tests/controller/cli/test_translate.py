@@ -18,7 +18,7 @@ def test_a_take_is_translated_and_counted(tmp_path: Path, root: Path) -> None:
         cwd=root, capture_output=True, text=True, timeout=60, env={**os.environ, "FORCE_COLOR": "1"},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr  # and figures have no colours of their own
-    assert done.stdout == "" and "2 frames came" in done.stderr and "2 messages went out" in done.stderr
+    assert done.stdout == "" and "2 frames received" in done.stderr and "2 messages sent" in done.stderr
 
 
 def test_a_wrong_end_is_one_message(root: Path) -> None:

@@ -346,7 +346,7 @@ def skin_of(stage: object, wanted: np.ndarray, rest: np.ndarray) -> np.ndarray:
     ("light", "why"),
     [
         ([{"u": [0, 1, 2, 3], "v": [0, 1, 2, 3, 4], "move_mm": [0, 0, 1]}], r"light\[0\].u"),
-        ([{"u": [0, 1, 2, 3, 3], "v": [0, 1, 2, 3, 4], "move_mm": [0, 0, 1]}], "knots must rise"),
+        ([{"u": [0, 1, 2, 3, 3], "v": [0, 1, 2, 3, 4], "move_mm": [0, 0, 1]}], "knots must ascend"),
         ([{"u": [0, 1, 2, 3, 4], "v": [0, 1, 2, 3, 4]}], "move_mm"),
     ],
 )

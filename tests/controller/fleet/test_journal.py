@@ -82,9 +82,9 @@ def event(**other: Any) -> bytes:
     ("data", "why"),
     [
         (event(version=2), "version 2 of an event is not understood"),
-        (event(method="stop"), "'stop' is no event"),
-        (event(method="__init__"), "'__init__' is no event"),
-        (event(arguments=[0.1]), "'gaze' is no event"),
+        (event(method="stop"), "'stop' is not an event"),
+        (event(method="__init__"), "'__init__' is not an event"),
+        (event(arguments=[0.1]), "'gaze' is not an event"),
         (event(method="set_parameters", arguments=[[len(P)], [0.5]]), "cannot be carried out"),
         (event(method="write_layer", arguments=["capture", [0.0], [True], None]), "a layer of other parameters"),
         (event(method="write_layer", arguments=["capture"]), "cannot be carried out"),

@@ -366,7 +366,7 @@ def test_endpoints_and_files_that_cannot_be_used_are_named(
 ) -> None:
     with pytest.raises(LinkError, match=r"zenoh at tcp/127\.0\.0\.1"):
         Running("", "head", folder=tmp_path, connect=[], listen=[hub]).node.close()
-    monkeypatch.setattr("controller.fleet.session._TRY_MS", 200)
+    monkeypatch.setattr("controller.fleet.session._ATTEMPT_TIMEOUT_MS", 200)
     nowhere = f"tcp/127.0.0.1:{free_port()}"
     with pytest.raises(LinkError, match=f"zenoh at {nowhere}: Unable to connect") as caught:
         Running(nowhere, "head", folder=tmp_path).node.close()

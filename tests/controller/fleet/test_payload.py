@@ -65,7 +65,7 @@ LARGEST = 2**63 - 1
                                     Header(Token(1, 5), 1, 1, -LARGEST - 1)])  # fmt: skip
 def test_a_header_is_refused_with_which_computing_would_leave_64_bits(header: Header) -> None:
     """As the fence of the next conductor, and the time of a command by one's own clock."""
-    with pytest.raises(LinkError, match="no conductor has"):
+    with pytest.raises(LinkError, match="out of range"):
         Header.decode(header.encode())
 
 

@@ -68,26 +68,26 @@ def test_every_head_answers_and_is_alive_under_keys_of_its_role(role: str, tail:
 
 def test_conductors_are_told_the_highest_token_that_is_obeyed_here() -> None:
     process = Process("head")
-    process.states.say()
+    process.states.publish()
     (said,) = process.wire.session.sent[f"omote/{ALL}/state"]
     assert json.loads(said) == {"version": 1, "role": "head", "token": list(OTHER)}
     process = Process("conductor")
     own = process.conduct()
-    process.states.say()
+    process.states.publish()
     (said,) = process.wire.session.sent[f"omote/{ALL}/state"]
     assert json.loads(said)["token"] == list(own)
 
 
 def test_how_a_head_is_is_said_to_who_listens_and_servos_where_there_are_some() -> None:
     process = Process("head")
-    process.states.say()
+    process.states.publish()
     (maple,), (oak,) = process.said("maple", "state"), process.said("oak", "state")
     assert maple["token"] == [0, 0] and oak["token"] == list(OTHER)
     assert oak == {"version": 1, "role": "head", "token": list(OTHER), **follower_report(process.followers["oak"])}
     assert process.said("oak", "servos") == [{"version": 1, "servos": [{"name": "jaw"}]}]
     assert process.said("maple", "servos") == []  # it has none
     deaf = Process("head", listens=False)
-    deaf.states.say()
+    deaf.states.publish()
     assert not any(outlet.sent for outlet in deaf.wire.outlets_of.values())
     assert len(deaf.wire.session.sent) == 1  # conductors are told in any case
 

@@ -127,7 +127,7 @@ def test_a_long_take_says_how_much_of_it_was_played(tmp_path: Path, monkeypatch:
     take.write_text("0.0\taa\n2.0\tsil\n")
     whole = dry_run(load_stage(str(stage_file(tmp_path)), PARAMETERS), take, None, PARAMETERS)
     assert whole.seconds == whole.length_s >= 2.0
-    monkeypatch.setattr("controller.stage.dry_run._LONGEST_S", 1.0)
+    monkeypatch.setattr("controller.stage.dry_run._MAX_S", 1.0)
     words = ["play", str(take), "--stage", str(stage_file(tmp_path)), "--dry-run", "--report", str(report)]
     said = " ".join(CliRunner().invoke(make_app(), words).output.split())
     assert f"dry run: no port was opened; computed the first 1.0 s of {whole.length_s:.1f} s" in said

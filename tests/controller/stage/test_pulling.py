@@ -203,8 +203,8 @@ def test_slopes_are_those_of_the_quarter_that_a_shape_is_in() -> None:
     for value, slope in ((0.0, -4.0), (0.24, -4.0), (0.26, -8.0), (0.6, -10.0), (1.0, -10.0)):
         found = Slopes(samples)(np.array([value, 0.5]))
         np.testing.assert_allclose(found, [[[0.0, 4.0], [slope, 0.0], [0.0, 0.0]]])
-    np.testing.assert_allclose(module._reach(samples), [8.0, 4.0])
-    assert module._reach(samples.subset(slice(0, 0))).tolist() == [0.0, 0.0]
+    np.testing.assert_allclose(module._max_displacements(samples), [8.0, 4.0])
+    assert module._max_displacements(samples.subset(slice(0, 0))).tolist() == [0.0, 0.0]
 
 
 def test_the_gap_goes_from_the_lower_lip_to_the_upper() -> None:
@@ -240,10 +240,10 @@ def test_points_near_a_pin_do_not_stay_and_its_other_side_does() -> None:
     samples = made(rest, {"a": [[1, 0, 0]] * 6})
     solver = solver_of(samples, "mouthSmileLeft")
     chosen = np.array([0])
-    assert solver._stay(chosen).tolist() == [2, 3, 4, 5]  # beyond 28 mm
-    assert solver._other_side(chosen).tolist() == [3]
-    assert solver._other_side(np.array([5])).tolist() == []  # its mirror image is as near as itself
-    assert solver_of(samples, "mouthSmileLeft", tied=True)._other_side(chosen).tolist() == []
+    assert solver._points_to_keep(chosen).tolist() == [2, 3, 4, 5]  # beyond 28 mm
+    assert solver._mirrored_points(chosen).tolist() == [3]
+    assert solver._mirrored_points(np.array([5])).tolist() == []  # its mirror image is as near as itself
+    assert solver_of(samples, "mouthSmileLeft", tied=True)._mirrored_points(chosen).tolist() == []
 
 
 def test_only_shapes_that_are_at_home_at_a_pin_take_part() -> None:

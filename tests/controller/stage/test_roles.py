@@ -72,7 +72,7 @@ def test_wrong_options_are_named(tmp_path: Path, role: str, heads: tuple[str, ..
     ("table", "said"),
     [
         ("", "give listen or connect"),
-        ('listen = ["tcp/0.0.0.0:7447"]', "others can reach tcp/0.0.0.0:7447"),
+        ('listen = ["tcp/0.0.0.0:7447"]', "other machines can reach tcp/0.0.0.0:7447"),
         ('listen = ["7447"]', "zenoh.listen[0]"),
         ('connect = ["tcp/a:1"]\nrole = "boss"', "zenoh.role"),
         ('connect = ["tcp/a:1"]\nlease_ms = 5', "zenoh.lease_ms"),

@@ -142,7 +142,7 @@ def figures_of(monkeypatch: pytest.MonkeyPatch, rates: dict[str, list[float]], *
     monkeypatch.setattr(module, "_run_bytes", plain_bytes)
     monkeypatch.setattr(module, "request_realtime", lambda: loops["realtime"])
     monkeypatch.setattr(module, "shorten_thread_switches", lambda: None)
-    monkeypatch.setattr(module, "StealTime", lambda: SimpleNamespace(share=lambda: loops["share"]))
+    monkeypatch.setattr(module, "StealTime", lambda: SimpleNamespace(fraction=lambda: loops["share"]))
     ((title, figures),) = bench_bus(1.5, lambda text: None)
     priority = ", real-time priority" if loops["realtime"] else ""
     assert title == f"24 servos at 1000000 baud, wire-timed{priority}"
@@ -266,7 +266,7 @@ def test_the_face_is_run_beside_the_bus(monkeypatch: pytest.MonkeyPatch) -> None
 
     monkeypatch.setattr(module, "_run_program", program)
     monkeypatch.setattr(module, "restore_priority", lambda: None)
-    monkeypatch.setattr(module, "StealTime", lambda: SimpleNamespace(share=lambda: 0.5))
+    monkeypatch.setattr(module, "StealTime", lambda: SimpleNamespace(fraction=lambda: 0.5))
     told: list[str] = []
 
     def tables(seconds: float) -> list[Figure]:

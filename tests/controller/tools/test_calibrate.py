@@ -330,7 +330,7 @@ def test_an_angle_is_known_for_half_a_second(
 ) -> None:
     _, servos, _, shown = calibrated(monkeypatch, tmp_path, [["h"], []], age_s=np.array([0.0, age_s]))
     assert ("start" in servos.asked) is known
-    assert ("not every servo says where it is" in shown) is not known
+    assert ("the angle of a servo is unknown" in shown) is not known
 
 
 def test_angles_of_servos_that_measure_nothing_count_whatever_their_age(
@@ -444,7 +444,7 @@ def test_channels_that_are_not_captured_again_stay_in_the_file(
     found = tomllib.loads((tmp_path / "c.toml").read_text())
     assert written and set(found["channels"]) == kept and found["robot"] == "pair"
     assert found["channels"]["jaw"]["max_deg"] == pytest.approx(20)
-    assert ("in which 1 other channels stay?" in shown) == (len(kept) == 2)
+    assert ("and keep 1 other channels in it?" in shown) == (len(kept) == 2)
 
 
 def test_a_file_of_a_newer_omote_is_refused_before_anything_is_captured(

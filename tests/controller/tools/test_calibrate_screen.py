@@ -145,13 +145,13 @@ def test_the_screen_tells_angles_state_questions_and_keys() -> None:
     state = seen(CalibrationScreen(CHANNELS), 1.25, -2.04, np.nan)
     pressed(state, "n", "down", "[")
     lines = drawn(state)
-    assert lines[0].rstrip() == "head24   motors off: move it by hand"
+    assert lines[0].rstrip() == "head24   torque off: move it by hand"
     assert lines[1].split() == ["channel", "now", "lowest", "neutral", "highest"]
     assert lines[2].split()[:2] == [CHANNELS[0].name, "1.2"] and lines[2].split()[-1] == "1.2"
     assert lines[3].split()[:3] == [">", CHANNELS[1].name, "-2.0"] and lines[3].split()[-1] == "-2.0"
     assert "up/down channel" in lines[-2] and "q leave" in lines[-1]
     pressed(seen(state, 0.0, 0.0, 0.0), "t", "h")
-    assert drawn(state)[0].rstrip() == "head24   motors on, following the extremes"
+    assert drawn(state)[0].rstrip() == "head24   torque on, following the extremes"
     pressed(state, "q")
     assert any("leave without saving? (y/n)" in line for line in drawn(state))
 
@@ -167,7 +167,7 @@ def test_steps_limits_and_selection() -> None:
     low = CHANNELS[0].limit_deg[0]
     assert state.target_deg[0] == low and state.message == f"limit_deg of the robot file ends at {low:g}"
     pressed(state, "h", "left")
-    assert state.message == "h switches the motors on where they stand; then the arrows move"
+    assert state.message == "press h first: it switches the torque on at the present angles; then the arrows move"
     assert not state.holding
     pressed(state, "?")
     assert state.message == ""
@@ -200,7 +200,7 @@ def test_a_margin_keeps_neutral_inside_and_a_channel_without_a_way_is_left_out()
     assert list(state.captured()) == []
     pressed(state, "down", "s")
     assert not state.saving
-    assert state.message == f"nothing to save yet: {CHANNELS[2].name} lacks a way between its ends"
+    assert state.message == f"nothing to save yet: {CHANNELS[2].name} lacks room between its ends"
 
 
 def test_a_neutral_angle_outside_of_the_ends_is_named_and_not_made_an_end() -> None:
@@ -239,6 +239,6 @@ def test_extremes_are_not_followed_while_the_motors_hold_or_where_nothing_is_mea
     pressed(state, "t")
     assert not state.tracking and state.message == ""
     silent = pressed(CalibrationScreen(CHANNELS, measures=False), "t")
-    assert silent.message == "these servos do not say where they are: use the arrows"
+    assert silent.message == "these servos do not measure their angle: use the arrows"
     silent = pressed(CalibrationScreen(CHANNELS), "h")
-    assert silent.message == "not every servo says where it is"
+    assert silent.message == "the angle of a servo is unknown"

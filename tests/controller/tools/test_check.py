@@ -104,7 +104,7 @@ def test_every_kind_of_file_is_told_apart(tmp_path: Path) -> None:
             state.tick(10**9 + i * 10_000_000, 0.01, PARAMETERS.neutral())
     assert check_anything(str(tmp_path / "own.toml")) == ["expressions own.toml: 2: good"]
     assert check_anything(str(tmp_path / "script.toml")) == ["script script: 2 steps, 1 marks: good"]
-    assert check_anything(str(tmp_path / "a.rec"))[0].startswith("recording a.rec: 50 ticks, 0.5 s, all came out again")
+    assert check_anything(str(tmp_path / "a.rec"))[0].startswith("recording a.rec: 50 ticks, 0.5 s, all reproduced")
     text = (tmp_path / "a.rec").read_text().replace('["tick"', '["live",1.0,1000000000]\n["tick"', 1)
     (tmp_path / "b.rec").write_text(text)
     with pytest.raises(ControllerError, match="came out differently"):
@@ -114,7 +114,7 @@ def test_every_kind_of_file_is_told_apart(tmp_path: Path) -> None:
 def test_a_recording_without_a_tick_and_a_json_that_is_no_text(tmp_path: Path) -> None:
     with recorded(CommandState(PARAMETERS), tmp_path / "a.rec"):
         pass
-    assert check_anything(str(tmp_path / "a.rec"))[0].startswith("recording a.rec: 0 ticks, 0.0 s, all came out")
+    assert check_anything(str(tmp_path / "a.rec"))[0].startswith("recording a.rec: 0 ticks, 0.0 s, all reproduced")
     (tmp_path / "b.json").write_bytes(b'\xff"moves_mm"')
     with pytest.raises((TakeError, SurfaceFileError), match=r"b\.json"):
         check_anything(str(tmp_path / "b.json"))

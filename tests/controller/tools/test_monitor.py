@@ -18,7 +18,15 @@ import pytest
 from rich.console import Console
 
 from controller.tools import monitor as module
-from controller.tools.monitor import KEPT, BusView, listen_to_bus, make_decoder, poll_servos, replay_traffic, table_of
+from controller.tools.monitor import (
+    MAX_PIECES,
+    BusView,
+    listen_to_bus,
+    make_decoder,
+    poll_servos,
+    replay_traffic,
+    table_of,
+)
 from drivers.base.bus import BusState
 from drivers.base.errors import DriverError, NoReply, PortLost, PortMissing
 from drivers.core.traffic import Decoder1, Decoder2
@@ -158,7 +166,7 @@ def test_a_terminal_shows_servos_and_the_last_lines_only() -> None:
 
 def test_a_bus_that_is_faster_than_the_view_is_told() -> None:
     view = watch()
-    for _ in range(KEPT + 7):
+    for _ in range(MAX_PIECES + 7):
         view.tap(True, WRITE)
     assert "7 pieces left out" in shown(view)
 
@@ -308,7 +316,7 @@ def test_decoders_are_of_their_protocol_and_know_a_usual_model() -> None:
     with pytest.raises(DriverError):
         make_decoder(2, {}, "nothing")
     view = watch()
-    assert view._log.maxlen == 16 and KEPT == 4096
+    assert view._log.maxlen == 16 and MAX_PIECES == 4096
 
 
 @pytest.mark.parametrize(("model", "listen"), [("xl330-m288", False), ("sts3215", False), ("xl330-m288", True)])

@@ -79,7 +79,7 @@ def test_what_cannot_be_converted_is_named(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(TAKE)
     with pytest.raises(TakeError, match=r"tables of parameters are \.csv files"):
         convert(tmp_path / "a.csv", tmp_path / "a.json", P)
-    with pytest.raises(TakeError, match="is the file that is read"):
+    with pytest.raises(TakeError, match="is the input file"):
         convert(tmp_path / "a.csv", tmp_path / "a.csv", P)
     with pytest.raises(ControllerError, match="cannot be written"):
         convert(tmp_path / "a.csv", tmp_path / "a.csv" / "b.csv", P)

@@ -12,7 +12,7 @@ import pytest
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS
 from controller.takes.reader import TAKES, load_take, reader_of
-from controller.tools.plugins import EXPORTERS, SORTS, Listed, added_exporters, listed
+from controller.tools.plugins import EXPORTERS, REGISTRIES, ListedPlugin, added_exporters, list_plugins
 from drivers import open_bus
 from drivers.base.bus import ServoSpec
 from drivers.base.errors import PluginError
@@ -57,7 +57,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
     yield add
     for name in [name for name in sys.modules if name.startswith("plugin_")]:
         del sys.modules[name]
-    for registry in SORTS.values():
+    for registry in REGISTRIES.values():
         registry.forget()
 
 
@@ -108,23 +108,23 @@ def test_a_simulator_must_be_one(install: Install) -> None:
 
 
 def test_what_cannot_be_used_is_listed_with_the_reason_and_the_rest_as_ever(install: Install) -> None:
-    before = {(each.sort, each.kind) for each in listed()}
+    before = {(each.registry, each.kind) for each in list_plugins()}
     install("drivers", "wrong", "PLUGIN = 3\n")
-    found = {(each.sort, each.kind): each for each in listed()}
+    found = {(each.registry, each.kind): each for each in list_plugins()}
     assert set(found) == before | {("bus", "wrong")}
     wrong = found["bus", "wrong"]
-    assert not wrong.works and "wrong-package must be a Family, not 3" in wrong.title and wrong.hint
-    assert all(found[key].works for key in before)
+    assert "wrong-package must be a Family, not 3" in wrong.fault and wrong.hint
+    assert not any(found[key].fault for key in before)
 
 
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
-        object.__new__(Listed).anything = 1
+        object.__new__(ListedPlugin).anything = 1
 
 
 def test_a_kind_that_omote_has_itself_is_listed_as_never_used(install: Install) -> None:
     install("drivers", "dynamixel", FAMILY.format(kind="dynamixel", simulator=""))
-    own, foreign = (each for each in listed() if (each.sort, each.kind) == ("bus", "dynamixel"))
-    assert own.works and own.package == "omote"
-    assert not foreign.works and foreign.package == "dynamixel-package"
-    assert "is never used" in foreign.title and foreign.hint.startswith("pip uninstall dynamixel-package")
+    own, foreign = (each for each in list_plugins() if (each.registry, each.kind) == ("bus", "dynamixel"))
+    assert not own.fault and own.package == "omote"
+    assert foreign.fault and foreign.package == "dynamixel-package"
+    assert "is never used" in foreign.fault and foreign.hint.startswith("pip uninstall dynamixel-package")

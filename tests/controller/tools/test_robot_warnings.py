@@ -47,7 +47,7 @@ def test_two_buses_on_one_port(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "port")
     one = robot(tmp_path, {"port": tmp_path / "port"}, {"port": tmp_path / "link"})
     (told,) = robot_warnings([one])
-    assert told.startswith("r: buses[1].port: ") and "the port of r: buses[0], too" in told
+    assert told.startswith("r: buses[1].port: ") and "also the port of r: buses[0]" in told
     other = robot(tmp_path, {"port": tmp_path / "port"}, name="other")
     assert robot_warnings([other, one])[0].startswith("r: buses[0].port: ")
     assert robot_warnings([robot(tmp_path, {}, {"port": "/dev/ttyUSB1"})]) == []
@@ -70,13 +70,13 @@ def test_rates_of_servos(tmp_path: Path) -> None:
 @pytest.mark.parametrize(("speed", "told"), [(618, 0), (700, 1)])
 def test_speeds_beyond_the_models(tmp_path: Path, speed: float, told: int) -> None:
     found = robot_warnings([robot(tmp_path, {"speed": speed})])
-    assert found == ["r: channels[0].max_speed_deg_s: 700 is beyond the 618 of xl330-m288 without load"][:told]
+    assert found == ["r: channels[0].max_speed_deg_s: 700 is above the 618 of xl330-m288 without load"][:told]
 
 
 def test_check_prints_them_and_finds_no_fault(tmp_path: Path) -> None:
     robot(tmp_path, {"speed": 700})
     result = CliRunner().invoke(make_app(), ["check", str(tmp_path / "r.toml")])
-    assert result.exit_code == 0 and "  warning: r: channels[0].max_speed_deg_s: 700 is beyond" in result.output
+    assert result.exit_code == 0 and "  warning: r: channels[0].max_speed_deg_s: 700 is above" in result.output
     (tmp_path / "s.toml").write_text('name = "s"\nrobots = ["r.toml"]\n')
     result = CliRunner().invoke(make_app(), ["check", str(tmp_path / "s.toml")])
-    assert result.exit_code == 0 and "  warning: r: channels[0].max_speed_deg_s: 700 is beyond" in result.output
+    assert result.exit_code == 0 and "  warning: r: channels[0].max_speed_deg_s: 700 is above" in result.output

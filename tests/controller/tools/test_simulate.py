@@ -98,7 +98,7 @@ def test_a_port_is_a_terminal_or_an_address() -> None:
     command = [sys.executable, "-c", "from controller.cli.app import main; main()", "simulate", "maestro"]
     done = subprocess.run([*command, "--link", "/tmp/x", "--tcp", ":1"], capture_output=True, text=True, check=False)
     assert done.returncode == 1
-    assert "--link and --tcp do not go together" in done.stderr + done.stdout
+    assert "--link and --tcp exclude each other" in done.stderr + done.stdout
 
 
 @pytest.mark.slow

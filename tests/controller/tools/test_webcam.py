@@ -148,7 +148,7 @@ def test_a_camera_that_is_not_there_is_told(model: Path) -> None:
 @pytest.mark.usefixtures("there")
 def test_a_model_that_is_none_is_told(model: Path) -> None:
     model.write_bytes(b"something else")
-    with pytest.raises(LinkError, match=r"no face landmarker of MediaPipe: Unable to open zip archive\.$") as caught:
+    with pytest.raises(LinkError, match=r"not a face landmarker of MediaPipe: Unable to open zip archive\.$") as caught:
         send_webcam(model, "json", P)
     assert "downloads nothing" in caught.value.hint
 

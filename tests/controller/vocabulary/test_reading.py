@@ -8,7 +8,7 @@ import pytest
 from controller.base.parameters import PARAMETERS as P
 from controller.vocabulary.affect import Affect
 from controller.vocabulary.facs import Facs
-from controller.vocabulary.reading import Readings, _Levels
+from controller.vocabulary.reading import Readings, _LevelSolver
 from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
 
@@ -64,7 +64,7 @@ def test_visemes(readings: Readings) -> None:
 
 
 def test_levels_stay_between_nothing_and_everything() -> None:
-    levels = _Levels(np.diag([1.0, 2.0, 0.5, 1.0])).solve(np.array([-1.0, 3.0, 0.25, 0.0]))
+    levels = _LevelSolver(np.diag([1.0, 2.0, 0.5, 1.0])).solve(np.array([-1.0, 3.0, 0.25, 0.0]))
     assert levels == pytest.approx([0.0, 1.0, 0.5, 0.0], abs=0.01)
     assert (levels[0], levels[1], levels[3]) == (0.0, 1.0, 0.0) and levels[2] < 0.5  # few and small ones are preferred
 

@@ -1,4 +1,4 @@
-"""controller.fleet.asking: answers that no conductor gives are refused."""
+"""controller.fleet.queries: answers that no conductor gives are refused."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from controller.fleet.asking import Asking
 from controller.fleet.lease import Lease, Token
 from controller.fleet.offset import Clocks
+from controller.fleet.queries import ConductorQueries
 
 
 @pytest.mark.parametrize("answer", [b"[1, 2]", b"[1e999, 2, 5]", b"[%d, %d, 5]" % (2**63, 2**63), b"[2, 1, 5]", b"{}"])
@@ -17,7 +17,7 @@ def test_a_time_that_no_clock_has_is_refused(answer: bytes) -> None:
     """With a huge one the time of a command left 64 bits, which ended the head's run."""
     heard, refused, clocks = list[Any](), list[Exception](), Clocks()
     wire = SimpleNamespace(ask=lambda head, what, act, *more: heard.append(act), refuse=refused.append)
-    Asking(wire, clocks, Lease(1, 0.2, 0.0, 0.0), {}, {}).ask()  # type: ignore[arg-type]
+    ConductorQueries(wire, clocks, Lease(1, 0.2, 0.0, 0.0), {}, {}).poll()  # type: ignore[arg-type]
     heard[0](SimpleNamespace(ok=SimpleNamespace(payload=SimpleNamespace(to_bytes=lambda: answer))))
     assert len(refused) == 1
     assert clocks.answers(5) == 0
@@ -31,6 +31,6 @@ def test_a_state_that_is_no_conductors_is_refused(answer: bytes) -> None:
     wire = SimpleNamespace(ask=lambda head, what, act, *more: asked.update({what: act}), refuse=refused.append)
     lease = Lease(1, 0.2, 0.0, 0.0)
     lease.hear(Token(1, 7), 0.0)
-    Asking(wire, Clocks(), lease, {"maple": None}, {}).ask()  # type: ignore[arg-type, dict-item]
+    ConductorQueries(wire, Clocks(), lease, {"maple": None}, {}).poll()  # type: ignore[arg-type, dict-item]
     asked["state"](SimpleNamespace(ok=SimpleNamespace(payload=SimpleNamespace(to_bytes=lambda: answer))))
     assert len(refused) == 1
