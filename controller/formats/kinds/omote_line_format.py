@@ -64,9 +64,8 @@ class LineDecoder:
                 raise ValueError(f"lines without {len(self._parameters)} values")
             yield from enumerate(map(_parse_value, numbers))
         elif name == "SET" and given and len(given) % 2 == 0:
-            yield from (
-                (self._index(word), _parse_value(text)) for word, text in zip(given[::2], given[1::2], strict=True)
-            )
+            words = zip(given[::2], given[1::2], strict=True)
+            yield from ((self._index(word), _parse_value(text)) for word, text in words)
         elif name == "P" and given:
             parts = (each.partition("=") for each in given[1:])
             yield from ((self._index(word), _parse_value(text)) for word, _, text in parts)
