@@ -143,9 +143,9 @@ class Shows:
 
     def start(self, name: str) -> None:
         """Play the script of a name from its beginning. Raises ConfigError."""
-        self.prepared(name)()
+        self.prepare_start(name)()
 
-    def prepared(self, name: str) -> Callable[[], None]:
+    def prepare_start(self, name: str) -> Callable[[], None]:
         """What :meth:`start` does, once the script has been read. Raises ConfigError."""
         return partial(self.play, self._find(name))
 
@@ -161,9 +161,9 @@ class Shows:
 
         Raises ParameterError: there is no show, or no such mark or time.
         """
-        self.prepared_control(what, to)()
+        self.prepare_control(what, to)()
 
-    def prepared_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
+    def prepare_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
         """What :meth:`control` does, once nothing can refuse it. Raises ParameterError as that."""
         show = self._show
         if show is None:
