@@ -23,9 +23,7 @@ from controller.takes.livelink import Take
 from controller.vocabulary.sides import sides
 
 _HINT = "a plain take begins with the line time,jawOpen,mouthSmileLeft,..., and the time is in seconds"
-_UNKNOWN = (
-    "correct it, or remove the column; a parameter of your own needs --vocabulary FILE or --stage STAGE"
-)
+_UNKNOWN = "correct it, or remove the column; a parameter of your own needs --vocabulary FILE or --stage STAGE"
 _TIMES = {"time": 1.0, "t": 1.0, "seconds": 1.0, "timestamp": 1.0, "ms": 1e-3, "milliseconds": 1e-3}
 _TIMES |= {f"{name}_{unit}": scale for name in ("time", "t", "timestamp")
            for unit, scale in (("s", 1.0), ("sec", 1.0), ("seconds", 1.0), ("ms", 1e-3))}  # fmt: skip

@@ -97,7 +97,7 @@ class LineSession:
         return b"".join(self.answers(data, now_ns))
 
     def answers(self, data: bytes, now_ns: int) -> Iterator[bytes]:
-        """Like :meth:`feed`, but yield each reply as soon as its line has been acted on. A STOP acts before all others."""
+        """Like :meth:`feed`, but yield each reply as soon as its line has been acted on; a STOP acts first."""
         lines = self._decoder.feed(data)
         self._stops_waiting = 0 if self.locked else sum(map(is_stop, lines))
         if self._stops_waiting:
