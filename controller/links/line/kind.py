@@ -35,7 +35,7 @@ class LineSettings:
         other machines reach without permission.
         """
         if (self.port is None) == (self.listen is None):
-            raise ValueError(f'give either port, as "/dev/ttyUSB0", or listen, as "127.0.0.1:{PORT}"')
+            raise ValueError(f'give port, as "/dev/ttyUSB0", or listen, as "127.0.0.1:{PORT}"')
         if self.listen is not None:
             check_reach(self.where[0], self.token, open_to_network=self.open_to_network)
             if self.token is not None:

@@ -39,8 +39,8 @@ def test_an_address_instead_of_a_port() -> None:
 @pytest.mark.parametrize(
     ("keys", "part"),
     [
-        ({}, "give either port"),
-        ({"port": "/dev/ttyUSB0", "listen": "127.0.0.1:9404"}, "give either port"),
+        ({}, "give port"),
+        ({"port": "/dev/ttyUSB0", "listen": "127.0.0.1:9404"}, "give port"),
         ({"listen": "9404"}, "is not an address"),
         ({"listen": "0.0.0.0:9404"}, "open_to_network = true allows it, with a token"),
         ({"listen": "127.0.0.1:9404", "token": "short"}, "at least 12 characters"),
