@@ -33,4 +33,4 @@ class LayerPart:
 
     def _end(self) -> None:
         self._layer.release()
-        self._renew()  # at once: other layers read the remaining values of this source
+        self._renew()  # now, because other layers read the remaining values of this source

@@ -23,7 +23,7 @@ from surface.base import files
 RATE_HZ = 100.0
 """Rows per second of the takes made here."""
 
-LONGEST_S = 3600.0
+MAX_LENGTH_S = 3600.0
 """Length of the longest take made here."""
 
 _MAX_FILE_BYTES = 4 << 20
@@ -51,8 +51,8 @@ def speech_take(name: str, cues: Sequence[Cue], end_s: float, parameters: Parame
     starts = np.array([cue.start_s for cue in cues])
     if len(cues) == 0 or not (np.diff(starts) >= 0).all() or not starts[-1] <= end_s:
         raise TakeError(f"{name}: needs at least one sound, with ascending times", hint="sort the sounds by time")
-    if not 0.0 <= starts[0] <= end_s <= LONGEST_S:
-        why = f"its sounds are at {starts[0]:g} to {end_s:g} s; 0 to {LONGEST_S:g} s are read"
+    if not 0.0 <= starts[0] <= end_s <= MAX_LENGTH_S:
+        why = f"its sounds are at {starts[0]:g} to {end_s:g} s; 0 to {MAX_LENGTH_S:g} s are read"
         raise TakeError(f"{name}: {why}", hint="give the times in seconds")
     ends = np.append(starts[1:], end_s)
     weights = np.stack([cue.weights for cue in cues])

@@ -45,7 +45,7 @@ class Turn:
             self._steps.move_to(goal, shift.time_s + turn.delay_s, turn.base_s + turn.per_deg_s * distance_deg)
 
     def at(self, now_s: float) -> tuple[float, float, float]:
-        """The angles at ``now_s``."""
+        """Return the angles at ``now_s``."""
         yaw, pitch = self._steps.at(now_s)
         return yaw, pitch, 0.0
 
@@ -77,7 +77,7 @@ class Posture:
         self._steps.drop_finished(now_s - MEMORY_S)
 
     def at(self, now_s: float) -> tuple[float, float, float]:
-        """The angles at ``now_s``."""
+        """Return the angles at ``now_s``."""
         yaw, pitch, roll = self._steps.at(now_s)
         return yaw, pitch, roll
 
@@ -107,7 +107,7 @@ class Sway:
         self._gain.drop_finished(now_s - MEMORY_S)
 
     def at(self, now_s: float) -> tuple[float, float, float]:
-        """The angles at ``now_s``."""
+        """Return the angles at ``now_s``."""
         waves = np.sin(now_s * self._speeds + self._phases).sum(axis=1)
         yaw, pitch, roll = ((1.0 + self._gain.at(now_s)[0]) * self._reach * waves).tolist()
         return yaw, pitch - self._breath_rad * lung_volume(self._breath, now_s), roll
@@ -177,5 +177,5 @@ class Nods:
         self.nods.append(Nod(now_s, depth_rad, cycle_s))
 
     def at(self, now_s: float) -> tuple[float, float, float]:
-        """The angles at ``now_s``."""
+        """Return the angles at ``now_s``."""
         return 0.0, sum(nod.at(now_s) for nod in self.nods), 0.0

@@ -164,11 +164,11 @@ class Grammar:
         return Command("SUB", values=(rate,), question=question)
 
     def names_or_all(self, given: Sequence[str]) -> tuple[int, ...]:
-        """Positions of names; all for ``ALL`` and for none."""
+        """Return the indices of names; of all parameters for ``ALL`` or no names."""
         return self._all if [word.upper() for word in given] in ([], ["ALL"]) else self.names(given)
 
     def names(self, given: Sequence[str]) -> tuple[int, ...]:
-        """Positions of names that must all be known and differ."""
+        """Return the indices of names. Raises LineError: a name is unknown or repeated."""
         try:
             indices = tuple(self._parameters.index(text) for text in given)
         except ParameterError as error:

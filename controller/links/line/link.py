@@ -94,7 +94,7 @@ class LineLink:
             except PortError:
                 self._reconnect()
             except Exception as error:  # noqa: BLE001  nothing that arrives may end the link
-                self._session.fault(error, "it goes on with the next line")
+                self._session.fault(error, "the link continues with the next line")
                 self._session.drop()
                 self._stopping.wait(_FAULT_PAUSE_S)
 

@@ -159,7 +159,7 @@ class LineServer:
         try:
             client.talk.serve(data, client.put, _TURN_S)
         except Exception as error:  # noqa: BLE001  nothing that arrives may end the link
-            session.fault(error, "it goes on with the next line")
+            session.fault(error, "the link continues with the next line")
             client.talk.lose()
         self._last_fault = session.last_fault or self._last_fault
 

@@ -201,7 +201,7 @@ class LineSession:
             return error
         if isinstance(error, OMOTE_ERRORS):
             return LineError(Code.BUSY, str(error))
-        self.fault(error, "it goes on with the next line")
+        self.fault(error, "the link continues with the next line")
         return LineError(Code.FAULT, f"an error in omote, see its log: {self.last_fault[:_MAX_SHOWN]}")
 
     def _do(self, request: Request, now_ns: int) -> str:
@@ -229,7 +229,7 @@ class LineSession:
         return _receipt(command)
 
     def fault(self, error: Exception, consequence: str) -> None:
-        """Count an error of omote itself, and log it once for each kind, at most some kinds."""
+        """Count an error of omote itself; log each different one once, up to 50."""
         self.faults, self.last_fault = self.faults + 1, f"{type(error).__name__}: {error}"
         if self.last_fault not in self._logged and len(self._logged) < _MAX_LOGGED:
             self._logged.add(self.last_fault)
@@ -237,7 +237,7 @@ class LineSession:
             log.error("%s: %s; %s", self._name, self.last_fault, consequence, exc_info=shown)
 
     def _act(self, command: Command, now_ns: int) -> bool:
-        """Pass a command that changes the face to the sink; False when it is a question."""
+        """Pass a command that changes the face to the sink; return False if it is a query."""
         sink, values = self._sink, command.values
         match command.name:
             case "SET":

@@ -66,7 +66,7 @@ class GraphNode:
         return f"{node}/{_mangle(topic.name)}/{topic.dds_type}/{topic.type_hash}/{_QUALITY_OF_SERVICE}"
 
     def _token(self, number: int, entity_kind: str) -> str:
-        """The numbers are those of node and entity within the session; ``%`` stands for an empty enclave."""
+        """Return the token of an entity of the node, which is node 0 of its session; ``%`` is an empty enclave."""
         node = f"{_mangle(self.namespace)}/{self.name}"
         return f"{_ADMIN_SPACE}/{self.domain}/{self.session}/0/{number}/{entity_kind}/%/{node}"
 

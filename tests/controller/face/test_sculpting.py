@@ -270,7 +270,7 @@ def test_moves_of_another_head_are_not_worn(editor: PointEditor, folder: Path) -
     (light,) = found.light
     moves = np.zeros((editor.own + 1, 3))
     moves[[3, -1]] = 1.0
-    assert editor.convert_moves(moves[:50], (light,)) is None and editor.fitted(None, ()) is None
+    assert editor.convert_moves(moves[:50], (light,)) is None and editor.convert_moves(None, ()) is None
     before = editor.convert_moves(moves, (light,))  # while the head with the point is being loaded
     assert before is not None and before.shape == (editor.own, 3) and before[3, 0] == 1.0
     assert found.convert_moves(moves, (light,)) is moves
