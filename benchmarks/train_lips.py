@@ -184,7 +184,7 @@ def main() -> None:
     plain, spoken = examples(speech, None)
     for turn, weights in enumerate(train(speech, visemes, given.rounds, given.hidden, given.seed), 1):
         if turn % 10 == 0 or turn == given.rounds:
-            judged = lips.LipModel(visemes.names, *weights).judge(plain).argmax(axis=1)
+            judged = lips.LipModel(visemes.names, *weights).classify(plain).argmax(axis=1)
             print(f"round {turn}: {(judged == spoken).mean():.2f} of {len(spoken)} frames", flush=True)
     write(given.out, weights, visemes)
     print(f"wrote {given.out}")

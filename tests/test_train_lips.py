@@ -61,7 +61,7 @@ def test_it_learns_from_one_voice_what_another_says(program: ModuleType, tmp_pat
     assert {visemes.names[i] for i in np.concatenate([s.spoken for s in speech])} == set(SOUNDS.values())
     *_, weights = program.train(speech, visemes, rounds=120, hidden=12)
     heard, said = program.examples([program.read_speech(tmp_path / "another.wav", visemes)], None)
-    judged = lips.LipModel(visemes.names, *weights).judge(heard).argmax(axis=1)
+    judged = lips.LipModel(visemes.names, *weights).classify(heard).argmax(axis=1)
     assert (judged == said).mean() > 0.7, "by chance it would be 0.2"
     program.write(tmp_path / "lips.npz", weights, visemes)
     with np.load(tmp_path / "lips.npz") as file:

@@ -34,7 +34,7 @@ class PanelState:
 
     @staticmethod
     def size(parameters: Parameters) -> int:
-        """Return the length of the mailbox's vector: layers and values that hold (P, P), measured (P), regions, a name."""
+        """Return the length of the mailbox's vector: layers, held and measured values (P each), regions, a name."""
         return 3 * len(parameters) + len(parameters.region_names) + _NAME_LENGTH
 
     def publish(self, state: CommandState, measured_face: MeasuredFace | None) -> None:

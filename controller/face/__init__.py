@@ -1,4 +1,4 @@
-"""The picture of a run: frames from the mailbox, points of the face that are dragged, stills.
+"""Draws the picture of a run frame by frame, lets the mouse drag points of the face, and draws stills and films.
 
 In: parameters. Out: pictures, and parameters or control points for what is dragged. Imports base to body.
 """

@@ -14,14 +14,14 @@ from controller.body.messages import Hold, PanelRequest, Show
 from controller.vocabulary.controls import Action, ControlsFile
 from controller.vocabulary.sides import sides
 
-_STEP = 0.004
+_MIN_CHANGE = 0.004
 """Smallest change of a parameter that is sent."""
 
 
 class Controls:
     """The parameters and expressions that sticks, buttons and keys request now; :meth:`update` is called once a frame.
 
-    files : what each of them does. Of several files all count; where two name one button or key, the last one does.
+    files : what each of them does. All files apply; if two of them name the same button or key, the last one counts.
     """
 
     def __init__(self, files: Collection[ControlsFile], parameters: Parameters) -> None:
@@ -41,7 +41,7 @@ class Controls:
     def update(
         self, axes: Mapping[str, float], buttons: Collection[str], keys: Collection[str]
     ) -> Iterator[PanelRequest]:
-        """Requests for what changed: expressions of buttons that went down, parameters to hold and to release.
+        """Yield requests for what changed: expressions of buttons that went down, parameters to hold or release.
 
         axes : position of each, -1 to 1, those of triggers 0 to 1. buttons, keys : names of those that are down.
         """
@@ -54,11 +54,11 @@ class Controls:
         yield from self._hold(self._wanted(axes, down))
 
     def _wanted(self, axes: Mapping[str, float], down: Collection[str]) -> dict[int, float]:
-        """Values, within their ranges, of all parameters that sticks, buttons and keys move now."""
+        """Return the values, clipped to their ranges, of all parameters that sticks, buttons and keys move now."""
         wanted: dict[int, float] = {}
         for file in self._files:
             for name, weights in file.axes.items():
-                amount = _beyond(axes.get(name, 0.0), file.dead_zone)
+                amount = _apply_dead_zone(axes.get(name, 0.0), file.dead_zone)
                 if amount:
                     self._add(wanted, weights, amount)
         for name in down:
@@ -78,13 +78,13 @@ class Controls:
             del self._held[index]
             yield Hold(index, None)
         for index, value in wanted.items():
-            if abs(value - self._held.get(index, np.inf)) >= _STEP:
+            if abs(value - self._held.get(index, np.inf)) >= _MIN_CHANGE:
                 self._held[index] = value
                 yield Hold(index, value)
 
 
-def _beyond(amount: float, dead_zone: float) -> float:
-    """How far a stick is out of its dead zone, -1 to 1."""
+def _apply_dead_zone(amount: float, dead_zone: float) -> float:
+    """Return how far a stick is outside its dead zone, -1 to 1."""
     if abs(amount) <= dead_zone or dead_zone >= 1.0:
         return 0.0
     return float(np.copysign((min(abs(amount), 1.0) - dead_zone) / (1.0 - dead_zone), amount))

@@ -1,4 +1,4 @@
-"""Draws the face of a run frame by frame, from the newest parameters in a mailbox; keeps pictures and statistics.
+"""Draws the face of a run frame by frame, from the newest parameters in a mailbox, and records pictures and statistics.
 
 It never waits for links or servos.
 """
@@ -21,28 +21,31 @@ from controller.base.parameters import Floats, Parameters
 from controller.stage.stage import FaceSettings
 
 if TYPE_CHECKING:
-    from surface.head import Head  # start-up: the body gets its orders first
-    from surface.view.pictures.offscreen import AdaptiveOffscreen, Offscreen  # start-up: the same
-    from surface.view.scene.choice import QualityChoice  # start-up: the same
+    from surface.head import Head  # imported lazily, so that the control process (body) starts first
+    from surface.view.pictures.offscreen import AdaptiveOffscreen, Offscreen  # imported lazily for the same reason
+    from surface.view.scene.choice import QualityChoice  # imported lazily for the same reason
 
 Image = NDArray[np.uint8]
 
-_MOMENTS = 12  # pictures on the contact sheet
-_COLUMNS = 4
+_SHEET_PICTURES = 12
+_SHEET_COLUMNS = 4
 
 
 def head_indices(parameters: Parameters, wanted: Sequence[str]) -> NDArray[np.intp]:
-    """(h,) index of each of a head's parameters in the full vector with a zero behind it: unknown names lead there."""
-    place = {name: i for i, name in enumerate(parameters.names)}
-    return np.array([place.get(name, len(place)) for name in wanted], dtype=np.intp)
+    """Return the (h,) index of each of a head's parameters in the full vector (p,) with one more element at its end.
+
+    The extra element is 0; unknown names have its index.
+    """
+    indices = {name: i for i, name in enumerate(parameters.names)}
+    return np.array([indices.get(name, len(indices)) for name in wanted], dtype=np.intp)
 
 
 class HeadValues:
-    """Selects a head's parameters from the full vector that a mailbox holds; names that omote does not know stay 0.
+    """Selects a head's parameters from the full vector in a mailbox; names that omote does not know stay 0.
 
-    full : (p,) float64, the full vector of the last call.
-    values : (h,) float64, those of the head. stamp_ns : when the newest command in them came (monotonic clock).
-    replaced : changes the full vector after it was read, as by what servos show.
+    full : (p,) float64, the full vector of the last call. values : (h,) float64, those of the head.
+    stamp_ns : arrival of the newest command in them (monotonic clock). replaced : called with the full vector, which it
+    may modify, for instance by the face that the servos show; None: it is used unchanged.
     """
 
     def __init__(self, mailbox: Mailbox, parameters: Parameters, wanted: Sequence[str]) -> None:
@@ -54,7 +57,7 @@ class HeadValues:
         self.follow(wanted)
 
     def follow(self, wanted: Sequence[str]) -> None:
-        """Select for another head, whose parameters ``wanted`` are."""
+        """Select the parameters of another head; ``wanted`` : their names."""
         self._indices, self.values = head_indices(self._parameters, wanted), np.zeros(len(wanted))
 
     def listen(self, mailbox: Mailbox) -> None:
@@ -62,7 +65,7 @@ class HeadValues:
         self._mailbox = mailbox
 
     def __call__(self) -> Floats:
-        """The newest values in the head's order, (h,) float64; the same array each time."""
+        """Return the newest values in the head's order, (h,) float64, always in the same array."""
         _, self.stamp_ns = self._mailbox.read(self.full)
         if self.replaced is not None:
             self.replaced(self.full)
@@ -70,11 +73,11 @@ class HeadValues:
 
 
 class Recorder:
-    """Keeps a few small pictures of a run, for a clip and a contact sheet.
+    """Keeps a limited number of small pictures of a run, for a clip and a contact sheet.
 
-    clip_hz : pictures per second in the clip. height : height of the kept pictures (pixels).
-    most : pictures kept. A longer run keeps every second one, then every fourth, and so on.
-    whole : keep whole pictures, not their middle squares.
+    clip_hz : pictures per second in the clip. height : approximate height of the kept pictures (pixels).
+    most : number of pictures kept; a longer run keeps only every second one, then every fourth, and so on.
+    whole : whether to keep whole pictures instead of their central squares.
     """
 
     def __init__(self, *, clip_hz: float = 12.5, height: int = 360, most: int = 400, whole: bool = False) -> None:
@@ -88,7 +91,7 @@ class Recorder:
         return time_s >= self._next_s
 
     def keep(self, picture: Image, time_s: float) -> None:
-        """Keep the middle square of one picture (h, w, 3) uint8, or all of it, made smaller."""
+        """Keep a picture (h, w, 3) uint8, reduced in size, or its central square."""
         height, width = picture.shape[:2] if self._whole else [min(picture.shape[:2])] * 2
         top, left = (picture.shape[0] - height) // 2, (picture.shape[1] - width) // 2
         step = max(1, picture.shape[0] // self.height)
@@ -103,12 +106,12 @@ class Recorder:
         self._next_s = (int(time_s * self.clip_hz) + 1) / self.clip_hz
 
     def write(self, folder: Path) -> list[str]:
-        """Write ``sheet.png`` and ``face.webp`` into ``folder``; returns their paths, none without pictures.
+        """Write ``sheet.png`` and ``face.webp`` into ``folder`` and return their paths; none without pictures.
 
-        Raises ControllerError when the folder cannot be made, ViewError when a picture cannot be written.
+        Raises ControllerError: the folder cannot be made. ViewError: a picture cannot be written.
         """
-        from surface.view.pictures.clip import write_clip  # start-up: few runs write pictures
-        from surface.view.pictures.sheet import compose, write_png  # start-up: few runs write pictures
+        from surface.view.pictures.clip import write_clip  # imported lazily: few runs write pictures
+        from surface.view.pictures.sheet import compose, write_png  # imported lazily: few runs write pictures
 
         if not self.frames:
             return []
@@ -117,18 +120,20 @@ class Recorder:
         except OSError as error:
             hint = "choose another folder for the pictures"
             raise ControllerError(f"{folder}: cannot be made: {error.strerror}", hint=hint) from error
-        chosen = np.unique(np.linspace(0, len(self.frames) - 1, _MOMENTS).round().astype(int))
+        chosen = np.unique(np.linspace(0, len(self.frames) - 1, _SHEET_PICTURES).round().astype(int))
         labels = [f"{self.times_s[i]:.1f} s" for i in chosen]
         sheet, clip = folder / "sheet.png", folder / "face.webp"
-        write_png(compose([self.frames[i] for i in chosen], labels, columns=_COLUMNS), sheet)
+        write_png(compose([self.frames[i] for i in chosen], labels, columns=_SHEET_COLUMNS), sheet)
         write_clip(self.frames, clip, fps=self.clip_hz)
         return [str(sheet), str(clip)]
 
 
 class FrameLog:
-    """Statistics of frames: how many, how many differed from the one before (``moved``), and the time of each (ms).
+    """Statistics of frames.
 
-    command_to_picture_ms : from a command's arrival to the end of the first frame that shows it.
+    frames : number of frames. moved : number of frames whose values differ from those of the frame before.
+    frame_ms : time of each frame. command_to_picture_ms : time from the arrival of a command to the end of the first
+    frame that shows it.
     """
 
     def __init__(self) -> None:
@@ -140,9 +145,9 @@ class FrameLog:
         self._start_to_first_s = 0.0
 
     def add(self, values: Floats, began_ns: int, ended_ns: int, stamp_ns: int = 0) -> None:
-        """Add one frame of ``values`` : (h,), drawn between two monotonic times (ns).
+        """Add a frame of ``values`` : (h,), drawn between two monotonic times (ns).
 
-        ``stamp_ns`` : when the newest command came that the frame shows; 0 for none.
+        stamp_ns : arrival of the newest command that the frame shows; 0 for none.
         """
         if stamp_ns > self._stamp_ns:
             self._stamp_ns = stamp_ns
@@ -158,7 +163,7 @@ class FrameLog:
         self.frame_ms.add((ended_ns - began_ns) / 1e6)
 
     def report(self, settings: FaceSettings, renderer: str) -> dict[str, object]:
-        """Frames, frames per second, milliseconds a frame, and how many frames differed from the one before."""
+        """Return the statistics for a report."""
         seconds = (self._last_ns - self._first_ns) / 1e9
         return {
             "frames": self.frames,
@@ -175,7 +180,7 @@ class FrameLog:
 
 
 def process_age_s() -> float:
-    """Seconds since the operating system started this process; 0 where that is not known."""
+    """Return the seconds since the operating system started this process; 0 if that is not known."""
     try:
         fields = Path("/proc/self/stat").read_text().rsplit(")", 1)[1].split()
         uptime = float(Path("/proc/uptime").read_text().split()[0])
@@ -185,9 +190,11 @@ def process_age_s() -> float:
 
 
 class HeadlessFace:
-    """Draws frame after frame without a display; raises ViewError when there is no OpenGL.
+    """Draws frame after frame without a display (headless).
 
-    ``values`` returns the head's newest values, (h,) float64. Without ``recorder``, no picture is read back.
+    values : returns the head's newest values, (h,) float64. recorder : keeps pictures; None: none is read back.
+
+    Raises ViewError: OpenGL is missing.
     """
 
     def __init__(
@@ -197,19 +204,19 @@ class HeadlessFace:
         values: Callable[[], Floats],
         recorder: Recorder | None = None,
     ) -> None:
-        from surface.head.model.parameters import head_angles  # start-up: the body gets its orders first
+        from surface.head.model.parameters import head_angles  # imported lazily, so that the body starts first
         from surface.view.scene.framing import framed
 
         self._angles = head_angles
-        self._screen = _screen(head, settings)
+        self._screen = _open_screen(head, settings)
         self._head, self._camera, self._settings = head, framed(settings.make_camera(), head), settings
         self._values, self._recorder = values, recorder
         self._log = FrameLog()
         self._screen.go_live()
-        self._screen.draw(np.zeros(len(head.parameters)), self._camera)  # loads more code
+        self._screen.draw(np.zeros(len(head.parameters)), self._camera)  # loads code before the first frame is timed
 
     def run(self, keep_going: Callable[[], bool]) -> None:
-        """Draw until ``keep_going()`` is false, at most ``fps`` times a second."""
+        """Draw while ``keep_going()`` returns True, at most ``fps`` times a second."""
         started = time.monotonic_ns()
         for now in Clock(self._settings.fps, prompt=True).run(keep_going):
             values, time_s = self._values(), (now - started) / 1e9
@@ -224,7 +231,7 @@ class HeadlessFace:
         self._screen.close()
 
     def report(self) -> dict[str, object]:
-        """Frames that were drawn; see :meth:`FrameLog.report`."""
+        """Return the statistics of the frames; see :meth:`FrameLog.report`."""
         evaluator = self._screen.renderer.evaluator
         return {
             **self._log.report(self._settings, self._screen.ctx.info["GL_RENDERER"]),
@@ -234,9 +241,9 @@ class HeadlessFace:
         }
 
 
-def _screen(head: Head, settings: FaceSettings) -> Offscreen | AdaptiveOffscreen:
-    """What draws the picture in the quality that the settings name."""
-    from surface.view.pictures.offscreen import AdaptiveOffscreen, Offscreen  # start-up: the body gets its orders first
+def _open_screen(head: Head, settings: FaceSettings) -> Offscreen | AdaptiveOffscreen:
+    """Return what draws the picture in the quality of the settings."""
+    from surface.view.pictures.offscreen import AdaptiveOffscreen, Offscreen  # imported lazily: the body starts first
 
     theme = settings.make_theme()
     if settings.quality == "auto":
@@ -245,5 +252,5 @@ def _screen(head: Head, settings: FaceSettings) -> Offscreen | AdaptiveOffscreen
 
 
 def qualities(choice: QualityChoice | None) -> dict[str, object]:
-    """How long each quality was drawn, and how often it changed, for a report; nothing where none was chosen."""
+    """Return how long each quality was used and how often it changed, for a report; empty for a fixed quality."""
     return {} if choice is None else {"quality_seconds": dict(choice.seconds), "quality_switches": choice.switches}

@@ -1,4 +1,4 @@
-"""Draws a face in motion as a film, frame by frame, however long each takes."""
+"""Draws a face in motion as a film, frame by frame, not in real time."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from surface.view.pictures.offscreen import Offscreen
 from surface.view.scene.framing import framed
 
 FPS = 30.0
-"""Frames per second unless somebody names others."""
+"""Default number of frames per second."""
 
 
 def draw_film(
@@ -26,14 +26,14 @@ def draw_film(
     sound: Path | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
 ) -> int:
-    """Draw the head of ``still`` with each row of values, and write the clip, whole or not at all.
+    """Draw the head of ``still`` with each row of values, and write the clip, completely or not at all.
 
-    rows : (n, P) float64, one for each frame. out : .mp4, .webp or .gif. sound : file with what is heard (.mp4).
+    rows : (n, P) float64, one for each frame. out : .mp4, .webp or .gif. sound : sound file for a .mp4.
     progress : called with (done, total).
 
-    Returns how many frames were written.
+    Returns the number of frames that were written.
 
-    Raises ViewError: as :func:`surface.view.pictures.clip.write_clip`, or there is no OpenGL.
+    Raises ViewError: see :func:`surface.view.pictures.clip.write_clip`, or OpenGL is missing.
     """
     return write_clip(_pictures(still, rows, fps, progress), out, fps=fps, sound=sound)
 
@@ -52,5 +52,8 @@ def _pictures(still: Still, rows: Floats, fps: float, progress: Callable[[int, i
 
 
 def base_of(still: Still, values: Floats, mask: np.ndarray) -> Floats:
-    """(n, P) rows of a motion ``values`` : (n, P) that leave what its ``mask`` : (P,) does not move as in ``still``."""
+    """Return the rows (n, P) of a motion, with the values of ``still`` for the parameters that it does not move.
+
+    values : (n, P) of the motion. mask : (P,) bool, which parameters it moves.
+    """
     return np.clip(np.where(mask, values, still.values), still.parameters.low, still.parameters.high)

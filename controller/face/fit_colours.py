@@ -1,6 +1,6 @@
-"""Paints a head by how far its surface lies from the mesh that it was fitted to, and takes the paint off again.
+"""Colours a head by the distance of its surface from the mesh that it was fitted to, and restores its colours.
 
-Independent of any window library.
+This module does not depend on any window library.
 """
 
 from __future__ import annotations
@@ -19,13 +19,15 @@ from surface.view.scene.theme import Theme, find_theme
 
 NOT_MEASURED = np.array([0.30, 0.30, 0.30])
 """Linear RGB of skin that was not measured."""
-_DRAWN_APART = ("lips", "freckles")  # these would tint the colours
+_TINTS = ("lips", "freckles")  # attributes that would tint the colours
 
 
 @dataclass(frozen=True)
 class FitFigures:
-    """How far the vertices of a part of a head at rest lie from its mesh, mm: their root mean square, the distance
-    within which 99 % lie, and the greatest."""
+    """Distances (mm) of the vertices of a part at rest from the mesh that it was fitted to.
+
+    rms : root mean square. p99 : 99th percentile. most : maximum.
+    """
 
     part: str
     rms: float
@@ -37,7 +39,7 @@ class FitFigures:
 
 
 def figures_of(head: Head) -> FitFigures | None:
-    """Of the face; of a head whose face was not measured, of the skin that comes next; None without measured skin."""
+    """Return the distances of the face, or, if the face was not measured, of other skin; None without measured skin."""
     part = face_of([each for each in head.parts if np.isfinite(_mm(each)).any()], head.data.contacts)
     if part is None:
         return None
@@ -52,7 +54,7 @@ def unmeasured(head: Head) -> bool:
 
 
 def plain_theme(theme: Theme) -> Theme:
-    """A theme that shows the painted colours as they are, on the background of another."""
+    """Return a theme that shows the distance colours unchanged, on the background of ``theme``."""
     skin = find_theme("skin")
     even = (skin.wrap[0],) * 3
     return replace(
@@ -62,38 +64,38 @@ def plain_theme(theme: Theme) -> Theme:
 
 
 class FitColours:
-    """The paint on one head."""
+    """The distance colours of one head."""
 
     def __init__(self) -> None:
         self._own: list[tuple[HeadPart, dict[str, Array]]] = []
 
     def paint(self, head: Head) -> bool:
-        """Paint the skin of a head, whoever draws it begins afterwards; False, and no paint, without measured skin."""
+        """Colour the skin of a head, which must be loaded into a renderer afterwards; return False if not measured."""
         self.clear()
         if figures_of(head) is None:
             return False
         for part in head.parts:
             if part.material == "skin":
                 self._own.append((part, part.attributes))
-                plain = {name: np.zeros_like(part.attributes[name]) for name in _DRAWN_APART if name in part.attributes}
+                plain = {name: np.zeros_like(part.attributes[name]) for name in _TINTS if name in part.attributes}
                 part.attributes = {**part.attributes, **plain, "albedo": _colours(_mm(part))}
         return True
 
     def clear(self) -> None:
-        """Take the paint off."""
+        """Restore the original colours."""
         for part, attributes in self._own:
             part.attributes = attributes
         self._own = []
 
 
 def _mm(part: HeadPart) -> Floats:
-    """(m,) mm, NaN where a vertex was not measured."""
+    """Return the distances (m,) mm; NaN where a vertex was not measured."""
     mm: Floats = np.asarray(part.attributes.get(ATTRIBUTE, np.full(len(part.vertices), np.nan)), np.float64)
     return mm
 
 
 def _colours(mm: Floats) -> Array:
-    """(m, 3) float32 linear RGB of distances."""
+    """Return the colours (m, 3) float32, linear RGB, of distances (m,) mm."""
     colours = error_colours(np.nan_to_num(mm))
     colours[np.isnan(mm)] = NOT_MEASURED
     return colours.astype(np.float32)

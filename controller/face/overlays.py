@@ -1,8 +1,8 @@
-"""What can be drawn over the picture: control points, the influence of one, the quad tree's triangles, vertices that
-the last update moved, servo anchors, and the face that the servos show.
+"""Computes overlays for the picture.
 
-A second copy of the head is posed for them, so that they are of the whole tessellation whatever the picture draws.
-Independent of any window library.
+They are: control points, the influence of one of them, the quad tree's triangles, vertices that the last update moved,
+servo anchors, and the difference to the face that the servos show. They are computed from a second copy of the head, so
+that they show the full tessellation whatever the picture draws. This module does not depend on any window library.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ from surface.head.model.parameters import rotation
 PART = "face"
 Kind = Literal["control points", "influence", "quad tree", "touched", "anchors", "measured"]
 KINDS: tuple[Kind, ...] = ("control points", "influence", "quad tree", "touched", "anchors", "measured")
-MOST = 1500
-"""Points, or lines, that are drawn of one kind."""
-_LEAST_WEIGHT = 0.01
-_LEAST_MM = 0.05  # a vertex that moved by less has not moved to the eye
+MAX_MARKS = 1500
+"""Number of points of one kind that are drawn; four times as many edges of the quad tree."""
+_MIN_WEIGHT = 0.01
+_MIN_MOVE_MM = 0.05  # a smaller movement is not visible
 
 
 @dataclass(frozen=True)
 class Marks:
-    """Something to draw.
+    """Points or lines to draw.
 
-    points : (m, 3) mm. lines : (k, 2, 3) mm. shades : (m,) or (k,) 0..1, of how much each counts.
-    families : (m,) which colour each point has, the same for one group. labels : by point.
+    points : (m, 3) mm. lines : (k, 2, 3) mm. shades : (m,) or (k,) 0..1, intensity of each.
+    families : (m,) colour number of each point, equal for points of one group. labels : texts by point index.
     """
 
     points: Floats = field(default_factory=lambda: np.zeros((0, 3)))
@@ -43,9 +43,9 @@ class Marks:
 
 
 class Overlays:
-    """Computes them for a face.
+    """Computes the overlays of a face.
 
-    head : a copy of the head that is drawn, of its own. anchors : (uv, name) of each servo's anchor on the skin.
+    head : a separate copy of the head that is drawn. anchors : (uv, name) of each servo's anchor on the skin.
     """
 
     def __init__(self, head: Head, anchors: Sequence[tuple[Floats, str]] = ()) -> None:
@@ -62,18 +62,18 @@ class Overlays:
         self.chosen = 0
 
     def pose(self, values: Floats, measured: Floats | None = None) -> None:
-        """Pose the copy: ``values`` (h,) of the face, and ``measured`` (h,), which the servos show, where known."""
+        """Pose the copy. values : (h,) of the face. measured : (h,) of the face that the servos show; None: unknown."""
         self._measured = None
         if measured is not None:
             self._head.pose(measured)
             self._measured = self._part.vertices.astype(np.float64)
         self._head.pose(values)
         self._values = values
-        self._moved = np.abs(self._part.vertices - self._before).max(axis=1) > _LEAST_MM
+        self._moved = np.abs(self._part.vertices - self._before).max(axis=1) > _MIN_MOVE_MM
         self._before = self._part.vertices.copy()
 
     def marks(self, kind: Kind) -> Marks:
-        """What there is to draw of one kind."""
+        """Return the marks of one kind."""
         makers: dict[Kind, Callable[[], Marks]] = {
             "control points": self._control_points,
             "influence": self._influence,
@@ -85,7 +85,7 @@ class Overlays:
         return makers[kind]()
 
     def _places(self) -> Floats:
-        """(n, 3) mm: the control points, with the head's rotation."""
+        """Return the control points (n, 3) mm, with the head's rotation."""
         turn, pivot = rotation(*self._head.read_pose(self._values).head), np.array(self._head.data.neck.pivot)
         local = np.asarray(self._head.place_points(self._values)[0][self._index], np.float64)
         places: Floats = pivot + (local - pivot) @ turn.T
@@ -93,58 +93,58 @@ class Overlays:
 
     def _control_points(self) -> Marks:
         places = self._places()
-        step = max(1, -(-len(places) // MOST))
+        step = max(1, -(-len(places) // MAX_MARKS))
         shown = places[::step]
         return Marks(points=shown, shades=np.ones(len(shown)), families=self._families[::step])
 
     def _influence(self) -> Marks:
-        """Vertices by the weight of the chosen control point (paper, figure 4), and the point itself."""
+        """Mark vertices by their weight of the chosen control point (paper, figure 4), and the control point."""
         column = self._part.surface.basis_matrix(self._part.mesh.uv).tocsc()[:, self.chosen].toarray().ravel()
-        reached = np.flatnonzero(column > _LEAST_WEIGHT)
-        reached = reached[np.argsort(-column[reached])][: MOST - 1]
+        reached = np.flatnonzero(column > _MIN_WEIGHT)
+        reached = reached[np.argsort(-column[reached])][: MAX_MARKS - 1]
         points = np.vstack([self._places()[self.chosen], self._part.vertices[reached].astype(np.float64)])
         return Marks(points=points, shades=np.append(1.0, column[reached]), labels={0: f"{self.chosen}"},
                      families=np.append(1, np.zeros(len(reached), np.intp)))  # fmt: skip
 
     def choose(self, place: Floats) -> None:
-        """Choose the control point nearest to a place (3,) mm, for its influence."""
+        """Choose the control point nearest to a position (3,) mm, whose influence is then shown."""
         self.chosen = int(np.argmin(np.linalg.norm(self._places() - place, axis=1)))
 
     def _quad_tree(self) -> Marks:
         vertices = self._part.vertices.astype(np.float64)
         ahead = vertices[:, 2] > np.median(vertices[:, 2])
         edges = self._edges[ahead[self._edges].all(axis=1)]
-        lines = vertices[edges[:: max(1, -(-len(edges) // (4 * MOST)))]]
+        lines = vertices[edges[:: max(1, -(-len(edges) // (4 * MAX_MARKS)))]]
         return Marks(lines=lines, shades=np.full(len(lines), 0.5))
 
     def _touched(self) -> Marks:
         ids = np.flatnonzero(self._moved)
-        points = self._part.vertices[ids[:: max(1, -(-len(ids) // MOST))]].astype(np.float64)
+        points = self._part.vertices[ids[:: max(1, -(-len(ids) // MAX_MARKS))]].astype(np.float64)
         return Marks(points=points, shades=np.ones(len(points)), families=np.ones(len(points), np.intp))
 
     def _anchor_marks(self) -> Marks:
         if not self._anchors:
             return Marks()
-        uv = np.array([at for at, _ in self._anchors])
+        uv = np.array([each for each, _ in self._anchors])
         basis = self._part.surface.basis_matrix(uv)
         points = np.asarray(basis @ self._places())
         return Marks(points=points, shades=np.ones(len(points)), families=np.ones(len(points), np.intp),
                      labels={i: name for i, (_, name) in enumerate(self._anchors)})  # fmt: skip
 
     def _differences(self) -> Marks:
-        """Lines from where the skin is wanted to where the servos show it, where they are apart."""
+        """Draw lines from the commanded to the measured positions of vertices, where they differ."""
         if self._measured is None:
             return Marks()
         wanted = self._part.vertices.astype(np.float64)
         apart = np.linalg.norm(self._measured - wanted, axis=1)
         seen = np.flatnonzero(apart > 0.1)
-        seen = seen[:: max(1, -(-len(seen) // MOST))]
+        seen = seen[:: max(1, -(-len(seen) // MAX_MARKS))]
         lines = np.stack([wanted[seen], self._measured[seen]], axis=1)
         return Marks(lines=lines, shades=np.clip(apart[seen] / 5.0, 0.2, 1.0))
 
 
 def _families(count: int, groups: Sequence[object]) -> NDArray[np.intp]:
-    """(n,) the group that moves each control point farthest, from 1 on; 0 for one that none moves."""
+    """Return (n,) the number, from 1 on, of the group that moves each control point farthest; 0 if none does."""
     farthest, family = np.zeros(count), np.zeros(count, np.intp)
     for i, group in enumerate(groups, 1):
         ids, moves = np.asarray(group.ids), np.linalg.norm(np.asarray(group.moves), axis=-1)  # type: ignore[attr-defined]

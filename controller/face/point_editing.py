@@ -1,7 +1,8 @@
-"""Points of the face that the mouse picks on the picture and drags in the plane of the screen.
+"""Lets the mouse pick points of the face in the picture and drag them in the plane of the screen.
 
 Dragging moves parameters; sculpting moves control points of the drawn head, which can be saved as a group file. Light
-control points, which the user added to the head, are moved one by one. Independent of the window library.
+control points, which the user has added to the head, are moved one by one. This module does not depend on the window
+library.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from numpy.typing import NDArray
 
 from controller.base.parameters import Floats, Parameters
 from controller.face.sculpting import LightDrag, SculptDrag
-from controller.face.skin_lines import even_line, knots_round, mirrored
-from controller.face.skin_model import PART, Screen, SkinModels, turn_of
+from controller.face.skin_lines import even_line, knots_around, mirror_uv
+from controller.face.skin_model import PART, Screen, SkinModels, head_rotation
 from controller.face.skin_model import SkinModel as _Model
 from controller.stage.inverse import GroupMoves, save_group
 from controller.stage.pulling import Pin, PullSolver
@@ -25,21 +26,22 @@ from surface.head.model.furrow import Furrow, even_moves, furrow_knots
 from surface.head.model.light import WEIGHT, LightPoints, join_light, with_points
 from surface.head.model.meshes import make_surface
 
-_PICK_PIXELS, _HIDING_PIXELS, _HIDDEN_MM = 16.0, 48.0, 40.0
-_LEAST_CHANGE, _LEAST_MM = 0.004, 0.01
-_MIDDLE_MM = 2.0  # a line whose mirror image lies nearer is its own mirror image
+_PICK_PIXELS = 16.0  # greatest distance of a picked point from the mouse
+_HIDING_PIXELS, _HIDDEN_MM = 48.0, 40.0  # a point this much deeper than another one within these pixels is hidden
+_MIN_CHANGE, _MIN_MOVE_MM = 0.004, 0.01
+_MIDDLE_MM = 2.0  # points nearer to the plane of symmetry count as their own mirror images
 
 
 class PointEditor:
-    """Takes points of a head in a picture and drags them.
+    """Picks points of a head in a picture and drags them.
 
     It samples a copy of the head, in a separate thread, when the user first picks a point.
 
-    head : the head that is drawn; sculpting moves its control points. models : of the head without ``light``.
+    head : the head that is drawn; sculpting moves its control points. models : makes the skin model of the head.
     light : the control points that the user has added, which are the head's last ones.
 
-    Between the head's own control points and these there may be light ones that saved groups have added. They move with
-    their groups alone: :attr:`moves` and :meth:`set_moves` leave them out.
+    Between the head's own control points and these, saved groups may have added other light ones, which move only with
+    their groups: :attr:`moves` and :meth:`set_moves` do not include them.
     """
 
     def __init__(self, head: Head, models: SkinModels, light: Sequence[LightPoints] = ()) -> None:
@@ -47,7 +49,7 @@ class PointEditor:
         self._models, self._parameters = models, models.parameters
         self._rest, self.light = self._rig.rest.copy(), tuple(light)
         n, added = len(self._rest), sum(len(each) for each in light)
-        self._free = np.arange(n) >= n - added  # the user's own, then also the head's own
+        self._free = np.arange(n) >= n - added  # those that the user added; the head's own follow below
         self._heavy: NDArray[np.bool_] = head.part(PART).surface.weights > WEIGHT
         self._free |= self._heavy
         self._set: Floats = np.zeros((int(self._free.sum()), 3))
@@ -55,7 +57,7 @@ class PointEditor:
         self._before = self._moves
         self._model: _Model | None = None
         self._held: _PointDrag | SculptDrag | LightDrag | None = None
-        self._asked: tuple[tuple[float, float], Screen, Floats, bool, bool, float | None] | None = None
+        self._pending: tuple[tuple[float, float], Screen, Floats, bool, bool, float | None] | None = None
         self._pins: dict[int, Floats] = {}
         self._settled = False
         self._last: int | None = None
@@ -63,27 +65,27 @@ class PointEditor:
 
     @property
     def ready(self) -> bool:
-        """Whether points can be taken."""
+        """Whether points can be picked."""
         return self._model is not None
 
     @property
     def dragging(self) -> bool:
-        """Whether a point is held, or will be once points can be taken."""
-        return self._held is not None or self._asked is not None
+        """Whether a point is held, or will be as soon as points can be picked."""
+        return self._held is not None or self._pending is not None
 
     @property
     def settled(self) -> bool:
-        """Whether the last drag was carried out: not while points get ready."""
+        """Whether the last drag was carried out; False while the points are being prepared."""
         return self._settled
 
     @property
     def moves(self) -> Floats:
-        """(n, 3) mm that control points were moved by, those the user added last; another array after each change."""
+        """(n, 3) mm, moves of the head's own control points, then of those the user added; a new array per change."""
         return self._set
 
     @property
     def own(self) -> int:
-        """How many control points the head has without those that were added."""
+        """Number of the head's control points without added ones."""
         return int(self._heavy.sum())
 
     @property
@@ -92,7 +94,7 @@ class PointEditor:
         return bool(self._moves.any())
 
     def prepare(self) -> None:
-        """Start to get ready; may be called again."""
+        """Start preparing the points; may be called repeatedly."""
         if self._thread.ident is None:
             self._thread.start()
 
@@ -100,16 +102,16 @@ class PointEditor:
         self, pixel: tuple[float, float], screen: Screen, values: Floats, *, sculpt: bool = False, tied: bool = False,
         falloff_mm: float | None = None,
     ) -> bool:  # fmt: skip
-        """Take the point of the skin under a pixel; False when there is none.
+        """Pick the point of the skin under a pixel; return False if there is none.
 
-        One that is asked for while points get ready is taken by :meth:`drag` as soon as they are, where it was then.
+        While the points are being prepared, the request is kept and carried out by :meth:`drag` afterwards.
 
-        ``values`` : (P,) parameters of the shown face. ``sculpt`` : move control points instead of parameters.
-        ``tied`` : both sides of the face change alike. ``falloff_mm`` : see :class:`.sculpting.SculptDrag`.
+        values : (P,) parameters of the shown face. sculpt : whether to move control points instead of parameters.
+        tied : whether both sides of the face change alike. falloff_mm : see :class:`.sculpting.SculptDrag`.
         """
         self._settled = False
         if self._model is None:
-            self._asked = (pixel, screen, values.copy(), sculpt, tied, falloff_mm)
+            self._pending = (pixel, screen, values.copy(), sculpt, tied, falloff_mm)
             self.prepare()
             return True
         return self._take(self._model, pixel, screen, values, sculpt, tied, falloff_mm)
@@ -141,7 +143,7 @@ class PointEditor:
         self, model: _Model, point: int, pixel: tuple[float, float], screen: Screen, values: Floats, tied: bool,
         falloff_mm: float | None,
     ) -> None:  # fmt: skip
-        """Take the very place of the skin under a pixel; beside its edge, the sampled point."""
+        """Pick the exact place of the skin under a pixel, or, just outside the face, the sampled point."""
         uv = model.under(np.array([pixel]), screen, values, self._moves)
         if not np.isfinite(uv).all():
             uv = model.skin.uv[point : point + 1]
@@ -152,8 +154,10 @@ class PointEditor:
     def take_light(
         self, pixel: tuple[float, float], screen: Screen, values: Floats, *, tied: bool = False
     ) -> int | None:  # fmt: skip
-        """Take the control point that the user added nearest to a pixel, with that on the other side where ``tied``;
-        returns its number among these. None where there is none, or points are not ready."""
+        """Pick the user's control point nearest to a pixel, if ``tied`` with that on the other side.
+
+        Returns its number among the user's control points; None if there is none near, or points are not ready.
+        """
         self._settled = False
         model, found = self._model, self.light_at(pixel, screen, values)
         if model is None or found is None:
@@ -169,7 +173,7 @@ class PointEditor:
         return found
 
     def light_at(self, pixel: tuple[float, float], screen: Screen, values: Floats) -> int | None:
-        """Number of the control point that the user added nearest to a pixel; None for none near."""
+        """Return the number of the user's control point nearest to a pixel; None if none is near."""
         shown = self.light_pixels(screen, values)
         if not shown:
             return None
@@ -177,7 +181,7 @@ class PointEditor:
         return int(np.argmin(away)) if away.min() < _PICK_PIXELS else None
 
     def light_pixels(self, screen: Screen, values: Floats) -> list[tuple[float, float]]:
-        """Where the control points that the user added are in the picture."""
+        """Return the pixels of the control points that the user has added."""
         centres = self._centres()
         if self._model is None or not len(centres):
             return []
@@ -191,25 +195,28 @@ class PointEditor:
     def point_at(
         self, pixel: tuple[float, float], screen: Screen, values: Floats, reach_mm: float, *, tied: bool = False
     ) -> LightPoints | None:
-        """A control point to add under a pixel, and on the other side of the face where ``tied``; None beside the face.
+        """Return a control point to add under a pixel, if ``tied`` also on the other side; None outside the face.
 
-        reach_mm : how far from its middle it moves the skin.
+        reach_mm : how far from its centre it moves the skin.
         """
         model = self._model
         uv = np.zeros((0, 2)) if model is None else model.under(np.array([pixel]), screen, values, self._moves)
         if model is None or not np.isfinite(uv).all():
             return None
-        at = [uv, *([mirrored(model.surface, uv, *model.mesh_rest)] if tied and self._aside(model, uv) else [])]
-        knots = [knots_round(model.surface, each[0], reach_mm) for each in at]
+        centres = [
+            uv,
+            *([mirror_uv(model.surface, uv, *model.mesh_rest)] if tied and self._is_off_centre(model, uv) else []),
+        ]
+        knots = [knots_around(model.surface, each[0], reach_mm) for each in centres]
         return LightPoints(PART, *(np.concatenate([pair[k] for pair in knots]) for k in range(2)))
 
     def wrinkle(
         self, pixels: Sequence[tuple[float, float]], screen: Screen, values: Floats, depth_mm: float, width_mm: float,
         *, tied: bool = False,
     ) -> tuple[LightPoints, Floats] | None:  # fmt: skip
-        """Control points (k) to add along a line of pixels, and how they sink the skin to a furrow, (k, 3) mm.
+        """Return k control points to add along a line of pixels, and their moves (k, 3) mm that make a furrow.
 
-        None where the line is too short, or not on the face. ``tied`` : another one on the other side of the face.
+        None if the line is too short or not on the face. tied : whether to make another one on the other side.
         """
         model = self._model
         if model is None:
@@ -217,8 +224,8 @@ class PointEditor:
         line = even_line(model.surface, model.under(np.array(pixels), screen, values, self._moves), width_mm)
         if not len(line):
             return None
-        other = tied and self._aside(model, line)
-        lines = [line, *([mirrored(model.surface, line, *model.mesh_rest)] if other else [])]
+        other = tied and self._is_off_centre(model, line)
+        lines = [line, *([mirror_uv(model.surface, line, *model.mesh_rest)] if other else [])]
         furrows = [Furrow(each, depth_mm, width_mm) for each in lines]
         knots = [furrow_knots(each, model.surface) for each in furrows]
         light = LightPoints(PART, *(np.concatenate([pair[k] for pair in knots]) for k in range(2)))
@@ -228,24 +235,24 @@ class PointEditor:
         return light, np.concatenate(moves)
 
     @staticmethod
-    def _aside(model: _Model, uv: Floats) -> bool:
-        """Whether places (k, 2) are not their own mirror images."""
+    def _is_off_centre(model: _Model, uv: Floats) -> bool:
+        """Whether all points (k, 2) are away from the plane of symmetry."""
         places = model.surface.evaluate(uv)
         return bool(np.abs(places[:, 0]).min() > _MIDDLE_MM)
 
     def drag(self, pixel: tuple[float, float], screen: Screen, values: Floats) -> dict[int, float]:
-        """Move the held point under a pixel; returns indices of parameters and the values to hold them at."""
+        """Move the held point to a pixel; return the values at which to hold parameters, by index."""
         model = self._model
-        if model is not None and self._asked is not None:
-            asked, self._asked = self._asked, None
-            self._take(model, *asked)
+        if model is not None and self._pending is not None:
+            pending, self._pending = self._pending, None
+            self._take(model, *pending)
         elif model is None and not self._thread.is_alive():
-            self._asked = None  # it failed
-        self._settled, held = self._asked is None, self._held
+            self._pending = None  # the preparation has failed
+        self._settled, held = self._pending is None, self._held
         if held is None or model is None:
             return {}
         wanted = screen.place(pixel, held.place) + held.offset
-        turn = turn_of(values[model.order])
+        turn = head_rotation(values[model.order])
         local = model.pivot + turn.T @ (wanted - model.pivot)
         if isinstance(held, _PointDrag):
             return held.solve(local, turn.T @ (wanted - np.array(screen.camera.eye)))
@@ -256,51 +263,51 @@ class PointEditor:
 
     @property
     def missed_mm(self) -> float:
-        """How far the farthest held or pinned point is from where it shall be, as it is seen; 0 without a pull."""
+        """Largest visible distance of a held or pinned point from its goal; 0 without a drag of parameters."""
         return self._held.missed_mm if isinstance(self._held, _PointDrag) else 0.0
 
     def pin(self, values: Floats) -> None:
-        """Pin the held point where it is in the face ``values`` (P,); later pulls of others leave it there."""
+        """Pin the held point at its position in the face ``values`` : (P,), which later drags of other points keep."""
         if isinstance(self._held, _PointDrag) and self._model is not None:
             self._pins[self._held.point] = self._model.local(values, self._moves)[self._held.point]
 
     def unpin(self) -> None:
-        """Let go of all pinned points."""
+        """Unpin all points."""
         self._pins = {}
 
     @property
     def pinned(self) -> int:
-        """How many points are pinned."""
+        """Number of pinned points."""
         return len(self._pins)
 
     def pin_pixels(self, screen: Screen, values: Floats) -> list[tuple[float, float]]:
-        """Where the pinned points shall be in the picture."""
+        """Return the pixels of the goals of the pinned points."""
         if self._model is None or not self._pins:
             return []
-        turn, pivot = turn_of(values[self._model.order]), self._model.pivot
+        turn, pivot = head_rotation(values[self._model.order]), self._model.pivot
         shown = screen.project(pivot + (np.array(list(self._pins.values())) - pivot) @ turn.T)
         return [(float(x), float(y)) for x, y, _ in shown]
 
     def release(self) -> None:
-        """Release the point; moved control points stay."""
-        self._held, self._asked, self._before = None, None, self._moves
+        """Release the held point; moved control points stay moved."""
+        self._held, self._pending, self._before = None, None, self._moves
 
     def undo(self) -> None:
-        """Move all control points back."""
+        """Move all control points back to their original positions."""
         self.set_moves(None)
 
     def set_moves(self, moves: Floats | None) -> None:
-        """Move the control points by (n, 3) mm from where they were at first; None for not at all."""
+        """Set the moves of the control points, (n, 3) mm from their original positions; None: no moves."""
         every = np.zeros_like(self._rest)
         if moves is not None:
             every[self._free] = moves
         self._set_moves(every, moves)
         self.release()
 
-    def fitted(self, moves: Floats | None, light: Sequence[LightPoints]) -> Floats | None:
-        """(n, 3) moves that were made of a head with the added points ``light``, for this one; None for another head.
+    def convert_moves(self, moves: Floats | None, light: Sequence[LightPoints]) -> Floats | None:
+        """Return moves of a head with other added points ``light`` as moves (n, 3) of this head.
 
-        Points that only one of the two has do not move.
+        Points that only one of the two has do not move. None if the heads have different control points of their own.
         """
         own, added = self.own, sum(len(each) for each in light)
         if moves is None or len(moves) - added != own:
@@ -317,8 +324,8 @@ class PointEditor:
         return out
 
     def group(self) -> GroupMoves:
-        """The control points that were moved, and those that were added and moved."""
-        moved = np.linalg.norm(self._set, axis=1) >= _LEAST_MM
+        """Return the moves of the head's own control points and of added ones, as far as they were moved."""
+        moved = np.linalg.norm(self._set, axis=1) >= _MIN_MOVE_MM
         own = self.own
         ids = np.flatnonzero(moved[:own]).astype(np.int32)
         found, added = GroupMoves(PART, ids, self._set[ids]), np.flatnonzero(moved[own:])
@@ -328,15 +335,18 @@ class PointEditor:
         return GroupMoves(PART, ids, found.moves, light, self._set[own + added])
 
     def last_pull(self, values: Floats) -> tuple[Floats, Floats]:
-        """(3,) mm where the point that was held last lies at rest, and (3,) mm how far the face ``values`` (P,) and
-        moved control points bring it; the head not turned. No pull, where none was held."""
+        """Return the rest position (3,) mm of the last held point, and its displacement (3,) mm in the face ``values``.
+
+        values : (P,). The displacement includes moved control points but not the rotation of the head. Both are 0 if no
+        point was held.
+        """
         if self._model is None or self._last is None:
             return np.zeros(3), np.zeros(3)
         place = self._model.skin.rest[self._last]
         return place, self._model.local(values, self._moves)[self._last] - place
 
     def save(self, path: Path, name: str) -> None:
-        """Write the moved control points as a group file; a stage adds it with ``groups``. Raises ControllerError."""
+        """Write the moved control points as a group file, for ``groups`` in a stage file. Raises ControllerError."""
         save_group(path, name, self.group())
 
     def _set_moves(self, moves: Floats, free: Floats | None = None) -> None:
@@ -345,7 +355,7 @@ class PointEditor:
         self._rig.invalidate()
 
     def _places(self, model: _Model, values: Floats) -> tuple[Floats, Floats]:
-        """(m, 3) mm where the points are in the picture, and the head's rotation (3, 3)."""
+        """Return the positions (m, 3) mm of the sampled points, and the head's rotation (3, 3)."""
         return model.turned(model.local(values, self._moves), values)
 
     def _prepare(self) -> None:
@@ -353,9 +363,9 @@ class PointEditor:
 
 
 class _PointDrag:
-    """A held point whose place determines parameters, among pinned ones and others that shall stay where they are.
+    """A held point whose position determines parameters, while pinned points keep their positions.
 
-    pins : goals of the pinned points (3,) mm, by point.
+    pins : goals (3,) mm of the pinned points, by point.
     """
 
     def __init__(
@@ -370,16 +380,16 @@ class _PointDrag:
 
     @property
     def missed_mm(self) -> float:
-        """How far the farthest point is from its goal, as it is seen."""
+        """Largest visible distance of a point from its goal."""
         return self._solver.missed_mm
 
     def solve(self, local: Floats, sight: Floats) -> dict[int, float]:
-        """Parameters that changed since the last call, for the point at ``local`` : (3,), head not turned.
+        """Return the parameters that changed since the last call, by index, for the point at ``local`` : (3,) mm.
 
-        ``sight`` : (3,) the line of sight to it.
+        local : before the rotation of the head. sight : (3,) the line of sight to it.
         """
         found = self._solver.solve([*self._pins, Pin(self.point, local - self._sculpted[self.point], sight)])
-        at = self._solver.moved
-        changed = at[np.abs(found[at] - self._returned[at]) > _LEAST_CHANGE]
+        moved = self._solver.moved
+        changed = moved[np.abs(found[moved] - self._returned[moved]) > _MIN_CHANGE]
         self._returned[changed] = found[changed]
         return {int(i): float(found[i]) for i in changed}

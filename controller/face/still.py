@@ -41,9 +41,9 @@ class Still:
 
     values : (p,) float64, the full parameter vector. size : width and height (pixels). look : theme, camera and so on.
     head : folder of the head. identity : its variations, by name. groups : group files and their amounts.
-    vocabulary : the named expressions. persons : whom it shows, each with its share.
-    parameters : of the stage and the vocabularies that were named.
-    wall : a stage of several heads, all of which are drawn; None for one head.
+    vocabulary : the named expressions. persons : the persons that it shows, each with its weight.
+    parameters : those of the stage and of the named vocabularies.
+    wall : a stage of several heads, which are all drawn; None for one head.
     """
 
     values: NDArray[np.float64]
@@ -63,9 +63,9 @@ class Still:
         look: Mapping[str, object] | None = None, head: str | None = None, identity: str | None = None, *,
         stage: str | None = None, vocabularies: Sequence[str] = (), groups: Sequence[str] = (),
     ) -> Still:  # fmt: skip
-        """Read the options of a command line; what they leave out is taken from the stage, if there is one.
+        """Read the options of a command line; omitted options are taken from the stage, if there is one.
 
-        Raises ParameterError or ConfigError that names the word that is wrong and what would be right.
+        Raises ParameterError or ConfigError, which names the invalid word and what is expected.
         """
         base = load_stage(stage, PARAMETERS) if stage else None
         files = [*(base.vocabularies if base else ()), *(find_config("vocabularies", name) for name in vocabularies)]
@@ -91,14 +91,14 @@ class Still:
         return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons, parameters, wall)
 
     def load_head(self) -> Head:
-        """The head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
+        """Load the head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
         dressed = self.look.dressed
         own = self.parameters.point_groups
         return load_head(self.head, self.identity, self.groups, self.persons, dressed=dressed, own=own)
 
 
 def parse_group(word: str) -> tuple[Path, float]:
-    """``FILE=AMOUNT`` as path and amount, -1 to 1; a file alone counts 1."""
+    """Parse ``FILE=AMOUNT``, with an amount from -1 to 1, by default 1."""
     name, amount = _name_and_amount(word, "--group")
     if not -1.0 <= amount <= 1.0:
         raise ParameterError(f"--group {word}: the amount goes from -1 to 1")
@@ -106,7 +106,7 @@ def parse_group(word: str) -> tuple[Path, float]:
 
 
 def parse_setting(word: str, parameters: Parameters | None = None) -> tuple[int, float]:
-    """``NAME=VALUE`` as parameter index and value; the value must lie in the parameter's range."""
+    """Parse ``NAME=VALUE`` as parameter index and value, which must be in the parameter's range."""
     name, equals, text = word.partition("=")
     if not equals:
         raise ParameterError(f"--set {word}: expected NAME=VALUE", hint="for example --set jawOpen=0.8")
@@ -120,7 +120,7 @@ def parse_setting(word: str, parameters: Parameters | None = None) -> tuple[int,
 
 
 def _number(where: str, text: str) -> float:
-    """A finite number; raises ParameterError that begins with ``where``."""
+    """Parse a finite number. Raises ParameterError, whose message begins with ``where``."""
     try:
         value = float(text)
     except ValueError:
@@ -131,7 +131,7 @@ def _number(where: str, text: str) -> float:
 
 
 def parse_size(text: str) -> tuple[int, int]:
-    """``800x600`` as (800, 600)."""
+    """Parse ``800x600`` as (800, 600)."""
     match = re.fullmatch(r"(\d{1,5})[xX](\d{1,5})", text.strip())
     size = (int(match[1]), int(match[2])) if match else (0, 0)
     if min(size) < 16 or max(size) > 16384:
@@ -140,7 +140,7 @@ def parse_size(text: str) -> tuple[int, int]:
 
 
 def _name_and_amount(word: str, option: str) -> tuple[str, float]:
-    """``NAME=AMOUNT``; a name alone counts 1."""
+    """Parse ``NAME=AMOUNT``, with the default amount 1."""
     name, equals, text = word.rpartition("=")
     return (name, _number(f"{option} {word}", text)) if equals else (word, 1.0)
 
@@ -154,7 +154,7 @@ def _add_expression(parameters: Parameters, vocabulary: Vocabulary, values: NDAr
 
 
 def draw_still(still: Still, out: Path) -> None:
-    """Draw ``still`` and write it to ``out`` (PNG), whole or not at all."""
+    """Draw ``still`` and write it to ``out`` (PNG), completely or not at all."""
     if still.wall is not None:
         _draw_wall(still.wall, still, out)
         return
@@ -178,9 +178,9 @@ def _draw_wall(stage: Stage, still: Still, out: Path) -> None:
 def for_head(
     values: NDArray[np.float64], wanted: tuple[str, ...], parameters: Parameters | None = None
 ) -> NDArray[np.float64]:
-    """The full vector (p,) in a head's own order (h,); names that omote does not know stay 0.
+    """Return the values of a full vector (p,) in the order of a head (h,); 0 for names that omote does not know.
 
-    parameters : of the vector; those of the base vocabulary without.
+    wanted : names of the head's parameters. parameters : of the vector. Default: the base vocabulary.
     """
     return np.append(values, 0.0)[head_indices(parameters or PARAMETERS, wanted)]
 
@@ -188,7 +188,7 @@ def for_head(
 def sheet_poses(
     vocabulary: Vocabulary | None = None, parameters: Parameters | None = None
 ) -> list[tuple[str, NDArray[np.float64]]]:
-    """Label and full parameter vector of every picture of the sheet: expressions first, then every parameter."""
+    """Return label and full parameter vector of every picture on the sheet: expressions, then parameters."""
     parameters = parameters or PARAMETERS
     vocabulary = vocabulary or Vocabulary.load(parameters)
     poses = [(name, parameters.rest + vocabulary[name].pose(1.0)) for name in vocabulary.names]
@@ -201,7 +201,7 @@ def sheet_poses(
 
 
 def _vector(parameters: Parameters, index: int, value: float) -> NDArray[np.float64]:
-    """The neutral face but for one parameter."""
+    """Return the neutral face with one parameter set."""
     vector = parameters.neutral()
     vector[index] = value
     return vector
@@ -220,8 +220,10 @@ def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | N
 
 
 def crowd_poses(still: Still, count: int) -> list[tuple[str, NDArray[np.float64]]]:
-    """Label and full parameter vector of ``count`` heads: each shows what ``still`` shows and the next of its named
-    expressions, and looks somewhere else, the same in every picture."""
+    """Return label and full parameter vector of ``count`` heads.
+
+    Each shows the face of ``still`` with the next named expression, and a random but reproducible head direction.
+    """
     rng, names = np.random.default_rng(count), still.vocabulary.names
     parameters = still.parameters
     looks = [parameters.index(name) for name in ("headYaw", "headPitch", "headRoll")]
@@ -235,12 +237,12 @@ def crowd_poses(still: Still, count: int) -> list[tuple[str, NDArray[np.float64]
 
 
 def draw_crowd(still: Still, count: int, out: Path, progress: Callable[[int, int], None] | None = None) -> None:
-    """Draw ``count`` heads that are posed in one batch on one sheet (PNG); calls ``progress(done, total)``.
+    """Draw ``count`` heads, which are posed in one batch, on one sheet (PNG); calls ``progress(done, total)``.
 
-    Raises ParameterError: a still whose vertices are to be computed by the graphics processor.
+    Raises ParameterError: the still is to be evaluated by the GPU.
     """
     if still.look.evaluator == "gpu":
-        raise ParameterError("a crowd is posed by the processor", hint="leave out --evaluator gpu")
+        raise ParameterError("a crowd is posed by the CPU", hint="leave out --evaluator gpu")
     head, look, poses = still.load_head(), still.look, crowd_poses(still, count)
     crowd = Crowd(head, count)
     crowd.pose(np.stack([for_head(values, head.parameters, still.parameters) for _, values in poses]))

@@ -25,24 +25,28 @@ from surface.view.scene.camera import Camera
 from surface.view.scene.framing import framed
 
 _ASPECT = 0.8
-"""Width over height of the tile that a head with its shoulders fills best."""
+"""Width divided by height of the tile that a head with its shoulders fills best."""
 
 
 def grid(count: int, size: tuple[int, int]) -> tuple[int, int]:
-    """Columns and rows of ``count`` tiles in a picture of a size, so that the heads in them are as large as can be."""
+    """Return columns and rows of ``count`` tiles in a picture of a size (pixels), so that the heads are largest."""
     width, height = size
 
-    def tall(columns: int) -> float:
+    def head_height(columns: int) -> float:
         rows = -(-count // columns)
         return min(width / columns / _ASPECT, height / rows)
 
-    columns = max(range(1, count + 1), key=tall)
+    columns = max(range(1, count + 1), key=head_height)
     return columns, -(-count // columns)
 
 
 @dataclass
 class _Alike:
-    """Heads that look alike. places : their numbers in the stage. crowd : poses them where they are several."""
+    """Heads that look alike.
+
+    order : index of each of the head's parameters in the full vector. places : positions of the heads in the stage.
+    crowd : poses the heads in one batch; None for a single one.
+    """
 
     head: Head
     camera: Camera
@@ -52,7 +56,7 @@ class _Alike:
     screen: Offscreen | None = None
 
     def begin(self, tile: tuple[int, int], face: FaceSettings, first: Offscreen | None) -> Offscreen:
-        """Open what draws it, in the context of the first one."""
+        """Open and return the screen that draws the heads, in the OpenGL context of the first screen."""
         if len(self.places) > 1:
             self.crowd = Crowd(self.head, len(self.places))
         self.screen = Offscreen(
@@ -62,16 +66,16 @@ class _Alike:
         return self.screen
 
     def draw(self, rows: Floats, time_s: float) -> None:
-        """Begin a frame of a moving picture of a single head, without reading it back."""
+        """Draw a frame of a single head without reading it back; does nothing for a crowd."""
         if self.crowd is None and self.screen is not None:
-            values = self._ordered(rows)[0]
+            values = self._select(rows)[0]
             self.head.sway.advance(head_angles(values), time_s)
             self.screen.draw(values, self.camera)
 
     def pictures(self, rows: Floats, *, drawn: bool) -> list[Image]:
-        """One picture for each of its heads, which show ``rows`` : (h, P); the one that was begun where ``drawn``."""
+        """Return one picture for each head; ``rows`` : (h, P) values. drawn : whether :meth:`draw` has drawn them."""
         assert self.screen is not None
-        values = self._ordered(rows)
+        values = self._select(rows)
         if self.crowd is None:
             return [self.screen.read() if drawn else self.screen.render(values[0], self.camera)]
         self.crowd.pose(values)
@@ -81,8 +85,8 @@ class _Alike:
             found.append(self.screen.render_present(self.camera))
         return found
 
-    def _ordered(self, rows: Floats) -> Floats:
-        """(h, p) in the head's own order; names that omote does not know stay 0."""
+    def _select(self, rows: Floats) -> Floats:
+        """Return the values (h, p) in the head's order; 0 for names that omote does not know."""
         return np.hstack([rows, np.zeros((len(rows), 1))])[:, self.order]
 
 
@@ -111,7 +115,7 @@ def load_heads(
     """
     found: dict[object, LoadedHead] = {}
     for i, stage in enumerate(stages):
-        look = _look_of(stage)
+        look = _look_key(stage)
         if look not in found:
             if not wanted():
                 break
@@ -128,9 +132,10 @@ class Wall:
 
     Attributes
     ----------
-    names : of the heads, in the order of the stage. columns, tile : how the picture is divided, and the size of a part.
+    names : of the heads, in the order of the stage file. columns : number of tiles in a row. tile : width and height of
+    a tile (pixels).
 
-    Raises SurfaceError: a head cannot be read. ViewError: there is no OpenGL.
+    Raises SurfaceError: a head cannot be read. ViewError: OpenGL is missing.
     """
 
     def __init__(self, stage: Stage, parameters: Parameters, size: tuple[int, int]) -> None:
@@ -148,7 +153,7 @@ class Wall:
         self.renderer = first.ctx.info["GL_RENDERER"]
 
     def draw(self, rows: Floats, time_s: float) -> None:
-        """Begin a frame of a moving picture of heads that are like no other; the others wait for :meth:`pictures`.
+        """Draw a frame of the heads that look like no other; the others are drawn by :meth:`pictures`.
 
         rows : (n, P) full parameter vectors, in the order of the stage.
         """
@@ -156,9 +161,9 @@ class Wall:
             alike.draw(rows[alike.places], time_s)
 
     def pictures(self, rows: Floats, *, drawn: bool = False) -> list[Image]:
-        """A picture (h, w, 3) uint8 of each head, in the order of the stage.
+        """Return a picture (h, w, 3) uint8 of each head, in the order of the stage file.
 
-        drawn : :meth:`draw` has begun them.
+        rows : (n, P) full parameter vectors. drawn : whether :meth:`draw` has drawn this frame.
         """
         found: dict[int, Image] = {}
         for alike in self._alike:
@@ -170,8 +175,8 @@ class Wall:
         """Whether some heads look alike, so that :meth:`draw` does not draw all of them."""
         return any(alike.crowd is not None for alike in self._alike)
 
-    def joined(self, pictures: Sequence[Image]) -> Image:
-        """Pictures of the heads as one, (h, w, 3) uint8."""
+    def join(self, pictures: Sequence[Image]) -> Image:
+        """Join the pictures of the heads into one, (h, w, 3) uint8."""
         missing = -len(pictures) % self.columns
         filled = [*pictures, *[np.zeros_like(pictures[0])] * missing]
         return np.vstack([np.hstack(filled[i : i + self.columns]) for i in range(0, len(filled), self.columns)])
@@ -188,9 +193,9 @@ class Wall:
 
 
 class WallFace:
-    """Draws frame after frame of all heads without a display; as :class:`controller.face.face.HeadlessFace`.
+    """Draws frame after frame of all heads without a display, like :class:`controller.face.face.HeadlessFace`.
 
-    mailboxes : of the heads, in the order of the stage. Raises as :class:`Wall`.
+    mailboxes : of the heads, in the order of the stage file. Raises: see :class:`Wall`.
     """
 
     def __init__(
@@ -200,17 +205,17 @@ class WallFace:
         self._wall = Wall(stage, parameters, self._settings.size)
         self._rows = np.zeros((len(mailboxes), len(parameters)))
         self._log = FrameLog()
-        self._wall.draw(self._rows, 0.0)  # loads more code
+        self._wall.draw(self._rows, 0.0)  # loads code before the first frame is timed
 
     def run(self, keep_going: Callable[[], bool]) -> None:
-        """Draw until ``keep_going()`` is false, at most ``fps`` times a second."""
+        """Draw while ``keep_going()`` returns True, at most ``fps`` times a second."""
         started = time.monotonic_ns()
         for now in Clock(self._settings.fps, prompt=True).run(keep_going):
             stamps = [mailbox.read(row)[1] for mailbox, row in zip(self._mailboxes, self._rows, strict=True)]
             time_s = (now - started) / 1e9
             self._wall.draw(self._rows, time_s)
             if self._recorder is not None and self._recorder.wants(time_s):
-                self._recorder.keep(self._wall.joined(self._wall.pictures(self._rows, drawn=True)), time_s)
+                self._recorder.keep(self._wall.join(self._wall.pictures(self._rows, drawn=True)), time_s)
             elif self._wall.crowded:
                 self._wall.pictures(self._rows, drawn=True)
             self._log.add(self._rows, now, time.monotonic_ns(), max(stamps))
@@ -220,11 +225,11 @@ class WallFace:
         self._wall.close()
 
     def report(self) -> dict[str, object]:
-        """Frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""
+        """Return the statistics of the frames; see :meth:`controller.face.face.FrameLog.report`."""
         return {**self._log.report(self._settings, self._wall.renderer), "heads": list(self._wall.names)}
 
 
-def _look_of(stage: Stage) -> object:
-    """Equal for stages whose heads look alike."""
+def _look_key(stage: Stage) -> object:
+    """Return a key that is equal for stages whose heads look alike."""
     identity = tuple(sorted(stage.settings.identity.items()))
     return stage.head, identity, stage.groups, tuple((person.path, share) for person, share in stage.persons)

@@ -16,7 +16,7 @@ from controller.formats.frame import Decoder, Encoder
 from drivers.base.plugins import Registry, modules_in
 
 API = 1
-"""Version of what a format must keep: this module and :mod:`controller.formats.frame`."""
+"""Version of the interface of formats: this module and :mod:`controller.formats.frame`."""
 
 TRANSPORTS = ("udp", "tcp", "serial", "lines", "midi")
 """How messages travel: datagrams, TCP streams, serial ports, lines of text on standard input and output, MIDI ports."""
@@ -25,42 +25,43 @@ _SUFFIX = "_format"
 
 
 def nothing(parameters: Parameters) -> Flags:
-    """No parameter."""
+    """Return a mask (P,) of no parameter."""
     return np.zeros(len(parameters), dtype=bool)
 
 
 def everything(parameters: Parameters) -> Flags:
-    """Every parameter, somebody's own included: for messages with names."""
+    """Return a mask (P,) of every parameter, including user-defined ones; for messages that name parameters."""
     return np.ones(len(parameters), dtype=bool)
 
 
 def base_only(parameters: Parameters) -> Flags:
-    """Those of the base vocabulary: for messages that number them, or have names of their own for them."""
+    """Return a mask (P,) of the base vocabulary; for messages that number parameters or rename them."""
     return np.arange(len(parameters)) < parameters.base
 
 
 @dataclass(frozen=True, kw_only=True)
 class Format:
-    """One sort of messages.
+    """A message format.
 
-    api : version of the registry it is made for; see :data:`API`.
-    kind : its name in stages and commands. title : its name for people.
-    transports : how its messages travel, of :data:`TRANSPORTS`; the first is used where nobody names one.
-    port : UDP or TCP port that its programs use; 0 where there is none.
-    decoder, encoder : make a decoder or encoder for some parameters; one serves one source or receiver.
-    carries : says which parameters its messages can hold, (P,) bool.
-    about : says which others they hold only in effect, as one number for a smile and a frown.
-    quantum : how far a value may be rounded, in units of a parameter, besides the 1e-4 that every format keeps.
-    delimiter : what ends a message of a stream; empty where the format has datagrams only.
-    pieces : whether its decoder takes a stream in any pieces, so that it needs no delimiter.
-    most : bytes of the longest message.
-    timeout_s : a source that is silent for so long is usually lost; infinity where messages are sent on changes only.
-    takes_token : whether a TCP stream that other machines may open, and each datagram that they may send, must begin
-        with a token: not where programs that know nothing of tokens send them.
-    greeting : what is sent to a program that is called for faces, before it is read; a whole message with its end.
-    measured : whether its messages have room for what the servos show, beside the face.
-    note : one sentence on what the format cannot carry, for people.
-    install : what ``pip install`` takes where a package is missing.
+    api : version of the registry that the format is made for; see :data:`API`.
+    kind : its name in stage files and commands. title : its name for people.
+    transports : how its messages travel, of :data:`TRANSPORTS`; the first is the default.
+    port : UDP or TCP port that programs with this format use; 0 if there is none.
+    decoder, encoder : make a decoder or encoder for given parameters, for one source or receiver.
+    carries : returns which parameters its messages can hold, (P,) bool.
+    about : returns which further ones they hold only approximately, such as one number for both a smile and a frown.
+    quantum : greatest rounding error of a value, in units of a parameter, in addition to the 1e-4 of every format.
+    delimiter : ends a message of a stream; empty if the format has datagrams only.
+    pieces : whether its decoder takes a stream in pieces of any length, so that it needs no delimiter.
+    most : length of the longest message, in bytes.
+    timeout_s : a source that has been silent for this long counts as lost; infinity if messages are sent on changes
+        only.
+    takes_token : whether a TCP stream from another machine, and each datagram from one, must begin with a token; False
+        if the usual senders know nothing of tokens.
+    greeting : sent to a program that omote connects to for faces, before reading; a whole message with its delimiter.
+    measured : whether its messages can hold, beside the face, the face that the servos show.
+    note : one sentence, for people, on what the format cannot carry.
+    install : argument of ``pip install`` if a package is missing.
     """
 
     api: int
@@ -84,14 +85,14 @@ class Format:
     install: str = ""
 
 
-def _own() -> dict[str, str]:
-    """Modules of the built-in formats by kind."""
+def _built_in() -> dict[str, str]:
+    """Return the modules of the built-in formats by kind."""
     found = modules_in("controller.formats.kinds").items()
     return {stem.removesuffix(_SUFFIX).replace("_", "-"): module for stem, module in found if stem.endswith(_SUFFIX)}
 
 
 def _check(found: Format) -> None:
-    """ValueError for transports that are none, and for a stream whose messages have no end."""
+    """Raise ValueError for unknown transports, and for a stream whose messages have no delimiter."""
     unknown = [each for each in found.transports if each not in TRANSPORTS]
     if unknown or not found.transports:
         raise ValueError(f"transports must be of {', '.join(TRANSPORTS)}, not {', '.join(unknown) or 'none'}")
@@ -99,4 +100,4 @@ def _check(found: Format) -> None:
         raise ValueError("a stream needs a delimiter that ends each message")
 
 
-FORMATS: Registry[Format] = Registry(Format, "format", "omote.formats", API, _own, "FORMAT", check=_check)
+FORMATS: Registry[Format] = Registry(Format, "format", "omote.formats", API, _built_in, "FORMAT", check=_check)

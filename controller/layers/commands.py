@@ -1,7 +1,7 @@
 """Applies commands to the face: layers, expressions, gaze and idle motion behind the interface that links call.
 
 Links call the methods of :class:`CommandSink` from their own threads; the control loop calls
-:meth:`CommandState.tick`. Each holds one short lock.
+:meth:`CommandState.tick`. One lock, which each call holds only briefly, keeps them apart.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from controller.layers.idle.settings import AUTO, IdleSettings, check_manner
 from controller.layers.mixer import LayerSettings, Mixer
 from controller.layers.settings import default_layers
 from controller.layers.sink import CommandSink, Directory, Player, StatusValue
-from controller.layers.sources import Sources, finite
+from controller.layers.sources import Sources, require_finite
 from controller.motion.motion import MotionLimiter
 from controller.vocabulary.visemes import Visemes
 from controller.vocabulary.vocabulary import Vocabulary
@@ -33,17 +33,17 @@ from controller.vocabulary.vocabulary import Vocabulary
 __all__ = ["CommandSink", "CommandState", "Journal", "Player", "ServoMonitor", "StatusValue"]
 
 Journal = Callable[..., None]
-"""Gets the name of a method and its arguments, in the order in which calls took effect."""
+"""Receives the name and the arguments of each call, in the order in which the calls took effect."""
 
 
 class ServoMonitor(Protocol):
     """Measures the servos; see :class:`controller.robot.following.MeasuredFace`."""
 
     def measured(self, out: Floats) -> bool:
-        """Copy the parameters that the servos show to ``out`` : (P,); False when none is known."""
+        """Copy the parameters that the servos show to ``out`` : (P,); return False if none is known."""
 
     def status(self) -> Mapping[str, StatusValue]:
-        """The state of the servos, as short words and numbers."""
+        """Return the state of the servos, as short words and numbers."""
 
 
 class CommandState:
@@ -51,20 +51,20 @@ class CommandState:
 
     Parameters
     ----------
-    vocabulary : the named expressions; the shipped ones without.
-    layers : the layers; the shipped ones without. Must have those of :data:`controller.layers.settings.NEEDED`.
-    life : settings of idle motion; the natural ones without. seed : the same seed gives the same idle motion.
+    vocabulary : the named expressions. Default: the shipped ones.
+    layers : must include those of :data:`controller.layers.settings.NEEDED`. Default: the shipped ones.
+    life : settings of idle motion. Default: ``natural``. seed : the same seed gives the same idle motion.
     period_s : length of a tick.
 
     Attributes
     ----------
-    link_status : says how links are, for STATUS.
-    servo_records, link_records : every servo and link, for :meth:`overview`.
-    servo_monitor : measures the servos; None without any. shows : plays scripts; None where none can be.
-    on_command : called after each command, in the thread that gave it. on_event : as a journal, but without ticks.
-    parts : what fails alone; a source of a layer that fails lets its layer fade out, and begins again.
-    stop_latch : keeps the servos off from STOP to START; that of all heads where there are several.
-    name : of the head, empty where the stage has one head. heads : all of them by name. placement : where it stands.
+    link_status : returns the state of the links, for STATUS.
+    servo_records, link_records : return every servo and link, for :meth:`overview`.
+    servo_monitor : measures the servos; None without servos. shows : the player of scripts; None if there is none.
+    on_command : called after each command, in the thread that gave it. on_event : like a journal, but without ticks.
+    parts : registers what can fail alone; the layer of a source that failed fades out, and the source begins again.
+    stop_latch : keeps the servos off from STOP to START; several heads share one.
+    name : of the head; empty if the stage has one head. heads : all heads by name. placement : its place in the room.
 
     Raises ConfigError: the shipped expressions or figures cannot be read.
     """
@@ -115,8 +115,8 @@ class CommandState:
     def tick(self, now_ns: int, dt: float, out: Floats) -> int:
         """Advance to ``now_ns`` (monotonic clock), ``dt`` seconds after the last tick.
 
-        Writes the parameters to ``out`` : (P,) and returns the arrival time (ns) of the newest command in them,
-        0 before the first.
+        Writes the parameters to ``out`` : (P,) and returns the arrival time (ns) of the newest command that they
+        include; 0 before the first command.
         """
         with self._journaled("tick", now_ns, dt, out):
             now_s = self._now_s = now_ns * 1e-9
@@ -128,7 +128,7 @@ class CommandState:
             return self._stamp_ns
 
     def show(self, values: Floats) -> None:
-        """Let the present parameters be ``values`` : (P,), which another process decided."""
+        """Set the current parameters to ``values`` : (P,), which another process computed."""
         with self._lock:
             self._present[:] = values
 
@@ -139,7 +139,7 @@ class CommandState:
 
     @contextmanager
     def _journaled(self, name: str, *arguments: Any, stamp_ns: int = 0) -> Iterator[None]:
-        """Hold the lock; at the end note when the command arrived, and pass it to the journal."""
+        """Hold the lock; afterwards record the arrival of the command, and pass it to the journal and listeners."""
         with self._lock:
             yield
             self._stamp_ns = max(self._stamp_ns, stamp_ns)
@@ -152,7 +152,7 @@ class CommandState:
 
     @property
     def gaze_rad(self) -> tuple[float, float] | None:
-        """Yaw and pitch of what it looks at; None where it looks at nothing in particular."""
+        """Yaw and pitch of the commanded gaze; None without one."""
         gaze = self._sources.gaze
         yaw, pitch = gaze.direction_deg
         return (math.radians(yaw), math.radians(pitch)) if gaze.active else None
@@ -169,7 +169,7 @@ class CommandState:
 
     @property
     def loudness(self) -> float:
-        """How loud the face speaks, 0..1, as the jaw of speech shows; 0 without speech."""
+        """How loud the face speaks, 0..1: the jaw opening of the speech layer; 0 without speech."""
         return self._sources.loudness
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
@@ -205,7 +205,7 @@ class CommandState:
     def gaze_head(self, name: str, stamp_ns: int) -> None:
         other = self.heads.head(name)
         if other is self:
-            raise ParameterError(f"{name} is the head that shall look", hint="name another head")
+            raise ParameterError(f"{name} cannot look at itself", hint="name another head")
         self.gaze_room(*other.placement.position_mm, stamp_ns)
 
     def gaze_off(self, stamp_ns: int) -> None:
@@ -241,19 +241,19 @@ class CommandState:
         return Visemes.load(self.parameters)
 
     def capture(self, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0) -> None:
-        """Give the live-capture layer ``values`` : (P,) where ``mask`` : (P,) bool; released after 1 s of silence."""
+        """Write the capture layer, which is released when nothing comes any more; see :meth:`write_layer`."""
         self.write_layer("capture", values, mask, now_ns, stamp_ns)
 
     def write_layer(
         self, name: str, values: Floats, mask: Flags, now_ns: int, stamp_ns: int = 0, *, through: Floats | None = None
     ) -> None:
-        """Give a layer ``values`` : (P,) where ``mask`` : (P,) bool, and release the rest.
+        """Set the values of a layer to ``values`` : (P,) where ``mask`` : (P,) is True, and release the others.
 
-        ``through`` : (P,) how much of the layers below shows through, 0..1; nothing without.
+        through : (P,) weight 0..1 with which the layers below show through; None for 0.
 
-        Raises KeyError: no layer of that name. ParameterError: not all values are finite; nothing changes then.
+        Raises KeyError: no layer has this name. ParameterError: not all values are finite; nothing changes then.
         """
-        finite(values[mask] if through is None else np.concatenate([values[mask], through]))
+        require_finite(values[mask] if through is None else np.concatenate([values[mask], through]))
         with self._journaled("write_layer", name, values, mask, now_ns, stamp_ns, through, stamp_ns=stamp_ns):
             layer = self.mixer[name]
             layer.write_masked(values, mask, now_ns * 1e-9)
@@ -263,7 +263,7 @@ class CommandState:
                 np.subtract(1.0, through, out=layer.share)
 
     def release_layer(self, name: str) -> None:
-        """Let a layer fade out, whose source has failed. Raises KeyError: no layer of that name."""
+        """Fade out a layer whose source has failed. Raises KeyError: no layer has this name."""
         with self._lock:
             self.mixer[name].release()
 
@@ -285,7 +285,7 @@ class CommandState:
         with self._lock:
             yaw, pitch = self._sources.gaze.direction_deg
             return {
-                **self._who(),
+                **self._head_status(),
                 "expression": self._sources.player.name,
                 "intensity": round(self._sources.player.intensity, 3),
                 "gaze": f"{yaw:.1f},{pitch:.1f}" if self._sources.gaze.active else "off",
@@ -301,8 +301,8 @@ class CommandState:
                 **self.link_status(),
             }
 
-    def _who(self) -> dict[str, StatusValue]:
-        """Which head this is, and who speaks, where there are several."""
+    def _head_status(self) -> dict[str, StatusValue]:
+        """Return the name of this head and of the one that has the turn, if there are several heads."""
         if not self.name:
             return {}
         turns = self.heads.turns
@@ -317,12 +317,12 @@ class CommandState:
             return {int(i): float(manual.values[i]) for i in np.flatnonzero(manual.held)}
 
     def _time(self, stamp_ns: int) -> float:
-        """When a command takes effect: when it came, but not before the last tick."""
+        """Return when a command takes effect (s): at its arrival, but not before the last tick."""
         return max(stamp_ns * 1e-9, self._now_s)
 
 
 def _nothing() -> None:
-    """What commands call where nothing waits for them."""
+    """Do nothing; the default of ``on_command``."""
 
 
 def _check_finite(what: str, *numbers: float) -> None:

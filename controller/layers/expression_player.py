@@ -1,7 +1,7 @@
-"""Plays named expressions: they rise, hold and fall, starting at the present face, so that interrupting never jumps.
+"""Plays named expressions: they rise, hold and fall, starting at the current face, so that interrupting never jumps.
 
-There is one mood, held until the next, and at most one timed expression over it; when its time is over the face
-returns to the mood. A timed gesture moves only what it names, so a wink keeps the smile it is given with.
+There is one mood, held until the next one, and at most one timed expression over it; when its time is over, the face
+returns to the mood. A timed gesture moves only what it names, so that a wink during a smile keeps the smile.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ _OVERRIDES = 3
 
 @dataclass
 class _Pose:
-    """Where the face is going: an expression at an intensity; (P + 3,) with the overrides at the end."""
+    """A target of the face: an expression at an intensity.
+
+    goal : (P + 3,) values, then how much blinks, gaze and speech are suppressed. offset_s : time in which it falls.
+    """
 
     name: str
     intensity: float
@@ -40,7 +43,7 @@ class ExpressionPlayer:
 
     @property
     def name(self) -> str:
-        """The expression shown or being reached."""
+        """Name of the expression that is shown or approached."""
         return self._target.name
 
     @property
@@ -50,12 +53,12 @@ class ExpressionPlayer:
 
     @property
     def blocks(self) -> tuple[float, float, float]:
-        """How much blinks, gaze and speech are held back, 0..1 each."""
+        """How much blinks, gaze and speech are suppressed, 0..1 each."""
         blink, gaze, mouth = self._now[-_OVERRIDES:].tolist()
         return blink, gaze, mouth
 
     def play(self, expression: Expression, intensity: float, duration_s: float | None, now_s: float) -> None:
-        """Show an expression for ``duration_s`` from now until it falls, or as the new mood without one.
+        """Show an expression for ``duration_s`` until it falls; None: as the new mood.
 
         Raises ParameterError: its values are not finite.
         """
@@ -64,37 +67,37 @@ class ExpressionPlayer:
         if duration_s is None:
             self._mood = pose
             self._fall_at_s = np.inf
-            self._go(pose, expression.onset_s, now_s)
+            self._move_to(pose, expression.onset_s, now_s)
         else:
             if expression.kind == "gesture":
                 stronger = np.abs(pose.goal) > np.abs(self._mood.goal)
                 pose.goal = np.where(stronger, pose.goal, self._mood.goal)
             self._fall_at_s = now_s + duration_s
-            self._go(pose, min(expression.onset_s, duration_s), now_s)
+            self._move_to(pose, min(expression.onset_s, duration_s), now_s)
 
     def rest(self, seconds: float, now_s: float) -> None:
         """Return to the neutral mood over ``seconds``."""
         self.update(now_s)
         self._mood = self._neutral
         self._fall_at_s = np.inf
-        self._go(self._mood, seconds, now_s)
+        self._move_to(self._mood, seconds, now_s)
 
     def update(self, now_s: float) -> Floats:
-        """(P,) float64, the face at ``now_s``; a view."""
+        """Advance to ``now_s`` and return the face, (P,) float64; a view that later calls overwrite."""
         if now_s >= self._fall_at_s:
             self._blend(self._fall_at_s)
             fall_at, self._fall_at_s = self._fall_at_s, np.inf
-            self._go(self._mood, self._target.offset_s, fall_at)
+            self._move_to(self._mood, self._target.offset_s, fall_at)
         self._blend(now_s)
         return self._now[:-_OVERRIDES]
 
-    def _go(self, pose: _Pose, length_s: float, now_s: float) -> None:
+    def _move_to(self, pose: _Pose, length_s: float, now_s: float) -> None:
         self._from[:] = self._now
         self._target = pose
         self._start_s, self._length_s = now_s, length_s
 
     def _blend(self, now_s: float) -> None:
-        passed = max(now_s - self._start_s, 0.0)  # a command can be newer than the tick that shows it first
+        passed = max(now_s - self._start_s, 0.0)  # a command can be newer than the first tick that shows it
         if passed >= self._length_s:
             self._now[:] = self._target.goal
             return
@@ -112,7 +115,10 @@ class ExpressionPlayer:
 
 
 def _override(kind: str, intensity: float) -> float:
-    """VRM 1.0 rule: block holds back all as soon as the expression shows, blend as much as it shows."""
+    """Return how much an override suppresses, by the rule of VRM 1.0.
+
+    "block" suppresses completely as soon as the expression shows, "blend" in proportion to its intensity.
+    """
     if kind == "blend":
         return intensity
     return 1.0 if kind == "block" and intensity > 0.0 else 0.0

@@ -1,7 +1,7 @@
-"""The heads of a run by name, groups of them, and turn-taking: which heads a command addresses.
+"""Keeps the heads of a run by name, groups of heads, and turn-taking, and resolves which heads a command addresses.
 
-Every head is a :class:`controller.layers.commands.CommandSink` of its own. :meth:`Heads.find` gives the sink of a name,
-a group, or everybody; links pass on commands to what it gives.
+Every head is a :class:`controller.layers.commands.CommandSink`. :meth:`Heads.find` returns the sink of a head, of a
+group or of all heads, and links pass commands to it.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ EVERYBODY = "all"
 
 
 class Heads:
-    """The heads of a run, which it fills with :meth:`add`; empty where there is one head without a name.
+    """The heads of a run, which are registered with :meth:`add`; empty if there is one head without a name.
 
-    groups : names of the heads of each group.
+    groups : names of the heads in each group.
 
     Attributes
     ----------
-    turns : who speaks; None where nobody takes turns.
+    turns : turn-taking; None if the heads do not take turns.
     """
 
     def __init__(self, groups: Mapping[str, Sequence[str]] | None = None) -> None:
@@ -52,7 +52,10 @@ class Heads:
         return tuple(name for name, _ in self._groups.values())
 
     def find(self, name: str) -> CommandSink:
-        """Whom a name means, in any case; ``@`` may stand before it. Raises ParameterError: nobody."""
+        """Return the head, the group or all heads that a name means; case and a leading ``@`` do not matter.
+
+        Raises ParameterError: unknown name.
+        """
         wanted = name.removeprefix("@").lower()
         if wanted in self._members:
             return self._members[wanted]
@@ -62,13 +65,13 @@ class Heads:
             group, members = self._groups[wanted]
             return Group(group, tuple(self._members[member.lower()] for member in members))
         if not self._members:
-            raise ParameterError(f"{name}: there is one head here, which has no name", hint="leave the name out")
+            raise ParameterError(f"{name}: there is only one head, which has no name", hint="leave the name out")
         known = [*self.names, *self.groups, EVERYBODY]
         raise ParameterError(f"no head or group called {name!r}{did_you_mean(wanted, known)}",
                              hint=f"there are {', '.join(known)}")  # fmt: skip
 
     def head(self, name: str) -> HeadSink:
-        """The one head of a name. Raises ParameterError: no head is called so."""
+        """Return the head of a name. Raises ParameterError: no head has this name."""
         found = self._members.get(name.removeprefix("@").lower())
         if found is None:
             raise ParameterError(f"no head called {name!r}{did_you_mean(name, self.names)}",
@@ -77,10 +80,9 @@ class Heads:
 
 
 class Group:
-    """Several heads as one :class:`controller.layers.commands.CommandSink`: each gets every command, or none of them.
+    """Several heads as one :class:`controller.layers.commands.CommandSink`, which passes every command to each of them.
 
-    What one head refuses reaches no other one, and the error names that head. Questions need one head: they raise
-    ParameterError.
+    A command that the first head refuses reaches no other. Queries, which need one head, raise ParameterError.
     """
 
     def __init__(self, name: str, members: Sequence[HeadSink]) -> None:
@@ -91,7 +93,7 @@ class Group:
 
     @property
     def shows(self) -> Player | None:
-        """The shows of all of them; None where none plays any."""
+        """The players of all heads as one; None if no head has a player."""
         players = {state.name: state.shows for state in self.members if state.shows is not None}
         return _Players(players) if players else None
 
@@ -124,7 +126,7 @@ class Group:
     def gaze_head(self, name: str, stamp_ns: int) -> None:
         target = self.heads.head(name)
         for state in self.members:
-            if state is not target:  # nobody can look at itself
+            if state is not target:  # no head can look at itself
                 state.gaze_head(name, stamp_ns)
 
     def gaze_off(self, stamp_ns: int) -> None:
@@ -151,7 +153,7 @@ class Group:
         return None
 
     def layer_names(self) -> tuple[str, ...]:
-        """Layers that all of them have, in the order of the first one."""
+        """Return the names of the layers that all heads have, in the order of the first head."""
         others = [set(state.layer_names()) for state in self.members]
         return tuple(name for name in self.members[0].layer_names() if all(name in each for each in others))
 
@@ -168,16 +170,17 @@ class Group:
         return {}
 
     def _check_layer(self, name: str) -> None:
-        """Raises ParameterError: a head has no layer of that name."""
+        """Raise ParameterError if a head has no layer of that name."""
         without = [state.name for state in self.members if name not in state.layer_names()]
         if without:
             raise ParameterError(f"{', '.join(without)}: no layer {name!r}; nothing has changed at {self._names}",
                                  hint=f"layers that all have: {', '.join(self.layer_names())}")  # fmt: skip
 
     def _each(self, command: Callable[[HeadSink], object]) -> None:
-        """Give each a command that the first one refuses before anything has changed, if any of them does.
+        """Pass a command to each head.
 
-        Heads of a stage share parameters and expressions, so all of them refuse the same.
+        Heads of a stage share parameters and expressions and so refuse the same commands: the first head does, before
+        anything has changed.
         """
         for state in self.members:
             command(state)
@@ -187,12 +190,12 @@ class Group:
         return ", ".join(state.name for state in self.members)
 
     def _refuse(self) -> None:
-        raise ParameterError(f"@{self.name} addresses several heads; a question needs one of {self._names}",
+        raise ParameterError(f"@{self.name} addresses several heads; a query needs one of {self._names}",
                              hint=f"ask one: @{self.members[0].name}")  # fmt: skip
 
 
 class _Players:
-    """The shows of several heads as one :class:`controller.layers.commands.Player`: all do what is asked, or none.
+    """The players of several heads as one :class:`controller.layers.commands.Player`: all obey a command, or none.
 
     players : by the name of the head.
     """
@@ -201,26 +204,29 @@ class _Players:
         self._named, self._players = players, tuple(players.values())
 
     def start(self, name: str) -> None:
-        self.prepared(name)()
+        self.prepare_start(name)()
 
-    def prepared(self, name: str) -> Callable[[], None]:
-        return self._all(self._named, lambda player: player.prepared(name))
+    def prepare_start(self, name: str) -> Callable[[], None]:
+        return self._prepare_all(self._named, lambda player: player.prepare_start(name))
 
     def names(self) -> Sequence[str]:
         return self._players[0].names()
 
     def control(self, what: str, to: str | float = 0.0) -> None:
-        self.prepared_control(what, to)()
+        self.prepare_control(what, to)()
 
-    def prepared_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
-        """For those that play something; where nobody does, that is refused."""
+    def prepare_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
+        """Address the heads that play a show; if none does, all of them, which refuse."""
         playing = {head: player for head, player in self._named.items() if player.name is not None}
-        return self._all(playing or self._named, lambda player: player.prepared_control(what, to))
+        return self._prepare_all(playing or self._named, lambda player: player.prepare_control(what, to))
 
-    def _all(
+    def _prepare_all(
         self, players: Mapping[str, Player], prepare: Callable[[Player], Callable[[], None]]
     ) -> Callable[[], None]:
-        """What all do, once none has refused it. Raises the error of the first that does, with its name."""
+        """Return a function that makes all players act, once none has refused.
+
+        Raises the error of the first player that refuses, with the name of its head.
+        """
         ready = []
         for head, player in players.items():
             try:
@@ -236,7 +242,7 @@ class _Players:
         return act
 
     def tick(self, now_ns: int) -> None:
-        """Nothing: each head ticks its own."""
+        """Do nothing: each head ticks its own player."""
 
     @property
     def name(self) -> str | None:
@@ -250,38 +256,39 @@ class _Players:
         return self._players[0].status()
 
 
-_LOUD = 0.04
-"""How far speech opens the jaw of a head that counts as speaking."""
+_SPEAKING_LOUDNESS = 0.04
+"""A head counts as speaking if speech opens its jaw further than this."""
 _PAUSE_S = 0.7
-"""A speaker that is silent for so long can lose its turn: longer than pauses within a sentence."""
+"""A speaker that is silent for this long can lose its turn; pauses within a sentence are shorter."""
 
 
 class Turns:
-    """Who speaks: that head behaves as one who speaks, the others listen to it and look at it.
+    """Turn-taking: the head that has the turn behaves as a speaker, and the others listen to it and look at it.
 
-    heads : all heads. auto : whoever begins to speak while nobody else does has the turn.
+    heads : all heads. auto : whether a head that begins to speak while no other does gets the turn.
 
     Attributes
     ----------
-    speaker : the name of who has the turn; None where nobody has.
+    speaker : the name of the head that has the turn; None if none has it.
     """
 
     def __init__(self, heads: Heads, *, auto: bool = False) -> None:
         self._heads, self._auto = heads, auto
         self.speaker: str | None = None
         self._manners: dict[str, str] = {}
-        self._heard_ns: dict[str, int] = {}
-        self._passed_over: set[str] = set()  # spoke when the turn was taken from everybody, and have not paused since
+        self._spoke_ns: dict[str, int] = {}
+        self._must_pause: set[str] = set()  # spoke when the turn was withdrawn from all, and have not paused since
 
     def give(self, name: str | None, stamp_ns: int) -> None:
-        """Give the turn to a head; None: to nobody, and everybody behaves and looks as before. A head that is speaking
-        then has to pause before it takes the turn by itself.
+        """Give the turn to a head. None: withdraw it, so that all heads behave and look as before.
 
-        Raises ParameterError: no head is called so.
+        A head that is speaking when the turn is withdrawn has to pause before it can get the turn automatically.
+
+        Raises ParameterError: no head has this name.
         """
         speaker = None if name is None else self._heads.head(name)
         if speaker is None:
-            self._passed_over = set(self._heard_ns)
+            self._must_pause = set(self._spoke_ns)
             self._end(stamp_ns)
             return
         for state in self._heads.members:
@@ -290,21 +297,21 @@ class Turns:
             if state is not speaker:
                 state.gaze_head(speaker.name, stamp_ns)
         if self.speaker != speaker.name:
-            speaker.gaze_off(stamp_ns)  # it no longer looks at who spoke before
+            speaker.gaze_off(stamp_ns)  # so that it no longer looks at the previous speaker
         self.speaker = speaker.name
 
     def tick(self, now_ns: int) -> None:
-        """Hear who speaks, and give the turn to who begins."""
+        """Detect which heads speak, and give the turn to one that begins; does nothing unless ``auto``."""
         if not self._auto:
             return
         for state in self._heads.members:
-            if state.loudness > _LOUD:
-                self._heard_ns[state.name] = now_ns
-        loud = [name for name, at_ns in self._heard_ns.items() if now_ns - at_ns < _PAUSE_S * 1e9]
-        self._passed_over.intersection_update(loud)
-        loud = [name for name in loud if name not in self._passed_over]
-        if self.speaker not in loud and loud:
-            self.give(max(loud, key=lambda name: self._heard_ns[name]), now_ns)
+            if state.loudness > _SPEAKING_LOUDNESS:
+                self._spoke_ns[state.name] = now_ns
+        speaking = [name for name, time_ns in self._spoke_ns.items() if now_ns - time_ns < _PAUSE_S * 1e9]
+        self._must_pause.intersection_update(speaking)
+        speaking = [name for name in speaking if name not in self._must_pause]
+        if self.speaker not in speaking and speaking:
+            self.give(max(speaking, key=lambda name: self._spoke_ns[name]), now_ns)
 
     def _end(self, stamp_ns: int) -> None:
         if self.speaker is None:

@@ -1,4 +1,4 @@
-"""A layer whose source can fail: the layer fades out then, and a new source begins from nothing."""
+"""Runs the source of a layer so that it can fail alone: the layer fades out, and a new source takes its place."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from controller.layers.mixer import Layer
 class LayerPart:
     """One source of values and the layer that it writes.
 
-    name : of the source, for messages. write : writes what the layer shows at a time (s).
-    renew : puts a new source in the place of one that failed.
+    name : of the source, for messages. write : writes the layer for a time (s).
+    renew : replaces a source that failed by a new one.
     """
 
     def __init__(
@@ -23,14 +23,14 @@ class LayerPart:
 
     @property
     def share(self) -> float:
-        """1 while the source is at work, and how far its layer has still to fade after a failure."""
+        """1 while the source works; after a failure the level to which its layer has faded out so far."""
         return self._layer.level if self._part.failed else 1.0
 
     def update(self, now_s: float) -> None:
-        """Let the source write; one that failed begins again after its pause, once its layer has faded out."""
+        """Let the source write; a source that failed restarts after a pause, once its layer has faded out."""
         if not self._part.failed or not self._layer.level:
             self._part.run(lambda: self._write(now_s), now_s)
 
     def _end(self) -> None:
         self._layer.release()
-        self._renew()  # at once: other layers read the remaining values of this source
+        self._renew()  # now, because other layers read the remaining values of this source

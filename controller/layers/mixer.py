@@ -1,7 +1,8 @@
-"""Mixes layers, the values of many sources, into one parameter vector, and says which layer holds each parameter.
+"""Mixes layers, the values of many sources, into one parameter vector, and reports which layer holds each parameter.
 
-A layer keeps the latest value of each parameter it was given; nothing queues. From the lowest priority to the
-highest, with s the layer's share of a parameter (weight x fade) and v its value, out begins with the neutral face:
+A layer keeps the latest value of each parameter that its source has given; nothing queues. ``out`` begins as the
+neutral face. Then the layers are applied from the lowest priority to the highest. With v the layer's value and s its
+effective weight for a parameter (weight x fade):
 
     set  out <- out + s (v - out)      add  out <- out + s v      max  out <- max(out, s v)
 """
@@ -20,17 +21,17 @@ from controller.base.parameters import Flags, Floats, Indices, Parameters, did_y
 Mode = Literal["set", "add", "max"]
 Which = Indices | Sequence[int] | slice
 
-_SHORTEST_S = 1e-9
+_MIN_FADE_S = 1e-9
 
 
 @dataclass(frozen=True)
 class LayerSettings:
     """Name, priority and timing of a layer; :class:`controller.layers.settings.LayerTable` checks those of files.
 
-    name : unique name. priority : higher goes over lower. mode : how it joins what lies below.
-    weight : 0..1. fade_in_s, fade_out_s : times to fade a parameter in and to release it.
-    timeout_s : a parameter not written for so long is released; infinity keeps it.
-    gains : factors on its values by region, 1 where none is given.
+    name : unique name. priority : layers with a higher one are applied later. mode : how it is combined with the layers
+    below. weight : 0..1. fade_in_s, fade_out_s : times in which a parameter fades in, and out when it is released.
+    timeout_s : a parameter that has not been written for this long is released; infinity: never.
+    gains : factors on its values by region; 1 for regions that are not named.
     """
 
     name: str
@@ -44,12 +45,11 @@ class LayerSettings:
 
 
 class Layer:
-    """The values of one source in a :class:`Mixer`; all arrays are rows of the mixer's, (P,) each.
+    """The values of one source in a :class:`Mixer`; all arrays are views of the mixer's rows, (P,) each.
 
     values : latest values. held : which parameters the source has given and not released.
-    gain : factor on the values, for instance per region.
-    share : factor on the weight, for what blocks or fades the layer.
-    applied : share it had in the last mix.
+    gain : factor on the values, for instance per region. share : factor 0..1 on the weight of each parameter.
+    applied : effective weight of each parameter in the last mix.
     """
 
     def __init__(self, settings: LayerSettings, table: _Table, row: int) -> None:
@@ -61,7 +61,7 @@ class Layer:
         self._fresh, self._positions = np.zeros(len(self.values), dtype=bool), np.arange(len(self.values))
 
     def write(self, indices: Which, values: Floats | Sequence[float] | float, now_s: float) -> None:
-        """Hold some parameters at ``values`` from ``now_s`` on; what is not finite changes nothing."""
+        """Hold some parameters at ``values`` from ``now_s`` on; values that are not finite are ignored."""
         positions, given = self._positions[indices], np.asarray(values, dtype=np.float64)
         finite = np.isfinite(given)
         if not finite.all():
@@ -72,7 +72,10 @@ class Layer:
         self.held[positions] = True
 
     def write_masked(self, values: Floats, mask: Flags, now_s: float) -> None:
-        """Hold the parameters of ``mask`` : (P,) bool at ``values`` : (P,); all others are released."""
+        """Hold the parameters in ``mask`` : (P,) bool at ``values`` : (P,), and release all others.
+
+        A parameter whose value is not finite keeps its earlier value.
+        """
         np.isfinite(values, out=self._fresh)
         self._fresh &= mask
         np.copyto(self.values, values, where=self._fresh)
@@ -80,27 +83,27 @@ class Layer:
         np.copyto(self.held, mask)
 
     def release(self, indices: Which = slice(None), *, fade_s: float | None = None) -> None:
-        """Give parameters back to the layers below, over ``fade_s`` or the layer's own fade."""
+        """Release parameters to the layers below, over ``fade_s``; None: over the layer's own fade-out time."""
         self.held[indices] = False
         self._fade_out[:] = self.settings.fade_out_s if fade_s is None else fade_s
 
     def attenuate(self, amount: float) -> None:
-        """Reduce the layer's weight by ``amount`` 0..1, for an expression that blocks it."""
+        """Reduce the layer's weight by a fraction ``amount`` 0..1, for an expression that suppresses it."""
         self._block[:] = 1.0 - amount
 
     @property
     def holding(self) -> int:
-        """How many parameters the layer holds."""
+        """Number of parameters that the layer holds."""
         return int(np.count_nonzero(self.held))
 
     @property
     def level(self) -> float:
-        """How far it has faded in where that is most, 0..1."""
+        """How far its most visible parameter has faded in, 0..1."""
         return float(self._level.max())
 
 
 class _Table:
-    """What ``n`` layers hold of ``p`` parameters, and how they fade; (n, p) or (n, 1) each."""
+    """The values of ``n`` layers for ``p`` parameters, and the state of their fades; arrays (n, p) or (n, 1)."""
 
     def __init__(self, settings: Sequence[LayerSettings], p: int) -> None:
         shape = (len(settings), p)
@@ -114,10 +117,10 @@ class _Table:
         self._rate, self.block = np.zeros(shape), np.ones((len(settings), 1))
 
     def advance(self, now_s: float, dt: float) -> Flags:
-        """Advance fades and time-outs; (n,) which layers have any effect."""
+        """Advance fades and time-outs; return (n,) bool, which layers have faded in at all."""
         np.greater(self.stamp, now_s - self._timeout_s, out=self._fresh)
         self.held &= self._fresh
-        rise, fall = (dt / np.maximum(fade, max(dt, _SHORTEST_S)) for fade in (self._fade_in_s, self.fade_out_s))
+        rise, fall = (dt / np.maximum(fade, max(dt, _MIN_FADE_S)) for fade in (self._fade_in_s, self.fade_out_s))
         np.copyto(self._rate, -fall)
         np.copyto(self._rate, rise, where=self.held)
         self.level += self._rate
@@ -133,9 +136,9 @@ class _Table:
 class Mixer:
     """Mixes layers into one (P,) vector.
 
-    layers : what layers there are; order in priority, not in the list.
+    layers : in any order; they are applied by priority.
 
-    Raises ValueError: two layers of one name. ParameterError: gains of a region that is none.
+    Raises ValueError: two layers have one name. ParameterError: a gain names an unknown region.
     """
 
     def __init__(self, parameters: Parameters, layers: Sequence[LayerSettings]) -> None:
@@ -157,7 +160,7 @@ class Mixer:
         return tuple(self._by_name)
 
     def __getitem__(self, name: str) -> Layer:
-        """The layer called ``name``. Raises KeyError with the nearest names."""
+        """Return the layer of a name. Raises KeyError, with the most similar names."""
         try:
             return self._by_name[name]
         except KeyError:
@@ -177,9 +180,9 @@ class Mixer:
         return tuple(layer.name for layer in self.layers if layer.applied.any())
 
     def holder(self, index: int) -> str | None:
-        """Name of the layer that decides a parameter since the last mix; None when none does.
+        """Return the name of the layer that decided a parameter in the last mix; None if none did.
 
-        The highest ``set`` or winning ``max`` layer; where only ``add`` layers act, the highest of those.
+        It is the highest ``set`` layer or ``max`` layer with an effect, or else the highest ``add`` layer.
         """
         adding = None
         for layer in reversed(self.layers):
@@ -206,5 +209,5 @@ class Mixer:
 
 
 def by_priority(layers: Sequence[LayerSettings]) -> list[LayerSettings]:
-    """Layers in the order in which they are mixed, lowest priority first."""
+    """Return the layers in the order in which they are mixed, lowest priority first."""
     return sorted(layers, key=lambda layer: layer.priority)

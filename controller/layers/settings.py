@@ -16,7 +16,7 @@ from controller.base.paths import config_dir
 from controller.layers.mixer import LayerSettings, Mode
 
 NEEDED = ("expression", "idle", "gaze", "speech", "capture", "manual")
-"""Layers that every stage has, because the code writes to them by name."""
+"""Layers that every stage must have, because the code writes to them by name."""
 
 _Seconds = Annotated[Number, Field(ge=0, le=3600)]
 _Gain = Annotated[Number, Field(ge=0, le=4)]
@@ -40,28 +40,28 @@ def load_layers(
     changes: Mapping[str, Mapping[str, Any]] | None = None, *, where: Path | None = None, base: Path | None = None,
     regions: Sequence[str] = REGIONS,
 ) -> tuple[LayerSettings, ...]:  # fmt: skip
-    """The shipped layers, with the ``changes`` of a stage: other values for some keys, or more layers.
+    """Return the shipped layers, with the ``changes`` of a stage file: other values for some keys, or more layers.
 
-    ``where`` : the file the changes are from, for messages. ``base`` : a file instead of the shipped one.
-    ``regions`` : those that gains may name.
+    where : the file of the changes, for messages. base : a file to read instead of the shipped one.
+    regions : regions of the face that gains may name.
 
-    Raises ConfigError: a wrong key or value; two layers of one priority. The message lists every fault with its key.
+    Raises ConfigError: an invalid key or value, or two layers with one priority; it lists every fault with its key.
     """
     path = base or config_dir() / "vocabularies" / "layers.toml"
     shipped, changes = read_toml(path), changes or {}
-    merged = {name: _merged(shipped.get(name, {}), changes.get(name, {})) for name in {**shipped, **changes}}
+    merged = {name: _merge(shipped.get(name, {}), changes.get(name, {})) for name in {**shipped, **changes}}
     tables = check({"layers": merged}, LayersTable, where or path, partial(_faults, regions)).layers
     return tuple(LayerSettings(name, **dict(table)) for name, table in tables.items())
 
 
-def _merged(own: Any, changes: Mapping[str, Any]) -> Any:
-    """A layer's table with changes; what is no table stays as it is, a fault of its file."""
-    return {**own, **changes} if isinstance(own, Mapping) else own
+def _merge(shipped: Any, changes: Mapping[str, Any]) -> Any:
+    """Return a layer's table with changes; anything but a table is returned unchanged, for the check to report."""
+    return {**shipped, **changes} if isinstance(shipped, Mapping) else shipped
 
 
 @cache
 def default_layers() -> tuple[LayerSettings, ...]:
-    """The shipped layers. Raises ConfigError."""
+    """Return the shipped layers, which are read only once. Raises ConfigError."""
     return load_layers()
 
 

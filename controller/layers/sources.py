@@ -1,4 +1,4 @@
-"""The face's built-in sources: expressions, gaze and idle motion, each of which writes its layer."""
+"""Joins the face's built-in sources of values: expressions, gaze and idle motion, each of which writes its layer."""
 
 from __future__ import annotations
 
@@ -19,15 +19,16 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 
 class Sources:
-    """Expressions, gaze and idle motion, and how much expressions suppress blinks, gaze and speech.
+    """Expressions, gaze and idle motion; expressions can suppress blinks, gaze and speech.
 
-    present : (P,) the parameters shown now, which gaze reads. seed : the same seed gives the same idle motion.
-    parts : a source that fails lets its layer fade out, and begins again.
+    present : (P,) the parameters shown now, which gaze reads. life : settings of idle motion. seed : the same seed
+    gives the same idle motion. parts : registers the sources, so that each fails alone; the layer of one that failed
+    fades out, and the source begins again.
 
     Attributes
     ----------
-    player : plays expressions. gaze : looks in a direction or at a point. life : moves the face by itself.
-    Each is another object after it failed.
+    player : plays expressions. gaze : looks in a direction or at a point. life : idle motion. Each is replaced by a new
+    object after it failed.
     """
 
     def __init__(
@@ -50,7 +51,7 @@ class Sources:
         self._idle, self._speech, self._jaw = mixer["idle"], mixer["speech"], parameters.index("jawOpen")
         self._everything = np.ones(len(parameters), dtype=bool)
         self._blocks = (0.0, 0.0, 0.0)  # how much the expression suppresses blinks, gaze and speech
-        self._suppression = (0.0, 0.0)  # of blinks and gaze, as far as the expression's layer shows
+        self._suppression = (0.0, 0.0)  # of blinks and gaze, scaled by how far the expression's layer shows
         self._expressions = self._part("expressions", self._expression, self._write_expression, self._renew_expression)
         self._others = (
             self._part("idle motion", self._idle, self._write_idle, self._renew_idle),
@@ -58,7 +59,7 @@ class Sources:
         )
 
     def write(self, now_s: float) -> None:
-        """Let each source write its layer, as it is at a time (s)."""
+        """Let each source write its layer for a time (s)."""
         self._expressions.update(now_s)
         blink, gaze, mouth = (block * self._expressions.share for block in self._blocks)
         self._suppression = blink, gaze
@@ -68,7 +69,7 @@ class Sources:
             source.update(now_s)
 
     def stop_looking(self, fade_s: float | None = None) -> None:
-        """Look at nothing, and let the layer fade out, in its own time without `fade_s`."""
+        """Look at nothing, and fade out the layer over ``fade_s``; None: over the layer's own fade-out time."""
         self.gaze.off()
         self._looking.release(fade_s=fade_s)
 
@@ -76,7 +77,7 @@ class Sources:
         return LayerPart(name, layer, self._parts, write, renew)
 
     def _write_expression(self, now_s: float) -> None:
-        values = finite(self._parameters.rest + self.player.update(now_s))
+        values = require_finite(self._parameters.rest + self.player.update(now_s))
         self._expression.write_masked(values, self._everything, now_s)
         self._blocks = self.player.blocks
 
@@ -86,7 +87,7 @@ class Sources:
     def _write_gaze(self, now_s: float) -> None:
         if self.gaze.active:
             eyes_rad = self.life.eye_yaw_rad, self.life.eye_pitch_rad
-            values = finite(self.gaze.update(self._present, eyes_rad, self.life.head_rad[:2]))
+            values = require_finite(self.gaze.update(self._present, eyes_rad, self.life.head_rad[:2]))
             self._looking.write(self.gaze.indices, values, now_s)
 
     def _renew_gaze(self) -> None:
@@ -97,14 +98,14 @@ class Sources:
         if life.liveliness > 0.0:
             how = {"blink_block": blink_block, "gaze_block": gaze_block, "loudness": self.loudness}
             life.update(now_s, looking=self.gaze.active, **how)
-            self._idle.write_masked(finite(life.values), self._everything, now_s)
+            self._idle.write_masked(require_finite(life.values), self._everything, now_s)
         elif self._idle.holding:
             life.update(now_s, looking=False)
             self._idle.release()
 
     @property
     def loudness(self) -> float:
-        """How loud the face speaks, 0..1, as the jaw of speech shows; 0 without speech."""
+        """How loud the face speaks, 0..1: the jaw opening of the speech layer; 0 without speech."""
         return float(self._speech.values[self._jaw]) if self._speech.held[self._jaw] else 0.0
 
     def _renew_idle(self) -> None:
@@ -112,8 +113,8 @@ class Sources:
         self.life.liveliness, self.life.chosen = old.liveliness, old.chosen
 
 
-def finite(values: Floats) -> Floats:
-    """``values`` unchanged. Raises ParameterError: not all of them are finite."""
+def require_finite(values: Floats) -> Floats:
+    """Return ``values`` unchanged. Raises ParameterError: not all of them are finite."""
     if not np.isfinite(values).all():
-        raise ParameterError("it gave values that are no finite numbers")
+        raise ParameterError("it gave values that are not finite numbers")
     return values

@@ -18,17 +18,17 @@ from drivers.base.options import check_options
 from drivers.base.plugins import Registry, folders_with
 
 API = 1
-"""Version of what a link must keep: this module and :class:`controller.layers.commands.CommandSink`."""
+"""Version of the interface of links: this module and :class:`controller.layers.commands.CommandSink`."""
 
 
 @dataclass(frozen=True)
 class LinkContext:
-    """Where the commands of a link go, and what it may use.
+    """What a link needs of the run that it belongs to.
 
-    sink : where accepted commands go, with the time they arrived.
-    closers : gets what closes the link and all that was started with it; called in reverse order.
-    vocabularies : files of further expressions that the stage names. beside : the stage's file. head : the folder of
-        the head that is moved.
+    sink : receives accepted commands, with the time they arrived.
+    closers : the link adds to it what closes it and everything it started; called in reverse order.
+    vocabularies : files of further expressions that the stage names. beside : the stage file, to whose folder paths are
+        relative. head : the folder of the head that is moved.
     """
 
     sink: CommandSink
@@ -39,24 +39,24 @@ class LinkContext:
 
 
 class Link(Protocol):
-    """A link that is open; it takes commands in its own thread until it is closed."""
+    """An open link; it receives commands in its own thread until it is closed."""
 
     def report(self) -> dict[str, object]:
-        """Counts: ``port`` (the name of its far end), ``accepted``, ``refused`` (counts by reason)."""
+        """Return ``port`` (the name of its far end), ``accepted`` (a count) and ``refused`` (counts by reason)."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class LinkKind:
     """A kind of link.
 
-    api : version of the registry it is made for; see :data:`API`.
-    kind : its name in stages. title : its name for people.
-    settings : dataclass of its options in a stage (:mod:`drivers.base.options`). It may have a method ``check()``
+    api : version of the registry that the kind is made for; see :data:`API`.
+    kind : its name in stage files. title : its name for people.
+    settings : dataclass of its options in a stage file (:mod:`drivers.base.options`). It may have a method ``check()``
         that raises ValueError, a property ``address`` (where it listens, for people), and a property ``simulated``
         (the script that a simulated far end plays, or None).
     open : ``"module:name"`` of a function that takes such settings and a :class:`LinkContext`, and returns a
         :class:`Link`; it raises LinkError or PortError.
-    install : what ``pip install`` takes where a package is missing.
+    install : argument of ``pip install`` if a package is missing.
     """
 
     api: int
@@ -67,8 +67,8 @@ class LinkKind:
     install: str = ""
 
 
-def _own() -> dict[str, str]:
-    """Links with a folder of their own, and one for each format."""
+def _built_in() -> dict[str, str]:
+    """Return the modules of the built-in kinds: those with their own folder, and one for each format."""
     formats = {kind: f"controller.links.net.kinds:LINK_{kind}" for kind in FORMATS.builtin()}
     return formats | folders_with("controller.links", "kind")
 
@@ -78,7 +78,7 @@ LINKS: Registry[LinkKind] = Registry(
     "link kind",
     "omote.links",
     API,
-    _own,
+    _built_in,
     "LINK",
     check=lambda link: check_options(link.settings, {"kind"}),
 )

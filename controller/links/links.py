@@ -1,4 +1,4 @@
-"""Reads the links of a stage from their tables, and opens them."""
+"""Reads the links of a stage file from their tables, and opens them."""
 
 from __future__ import annotations
 
@@ -21,23 +21,23 @@ class LinkSettings(Settings):
 
     @classmethod
     def known_keys(cls) -> list[str]:
-        """Keys of such a table, those of all kinds included."""
+        """Return the keys of such a table, including those of all kinds of links."""
         own = {key for kind in LINKS.all() for key in fields_of(kind.settings)}
         return [*super().known_keys(), *sorted(own)]
 
     @property
     def own(self) -> Any:
-        """The options of its kind: an instance of its settings."""
+        """The options of its kind: an instance of the kind's settings."""
         return to_options(self, LINKS.get(self.kind).settings)
 
     @property
     def simulated(self) -> str | None:
-        """The script that a simulated far end plays; None where there is none."""
+        """The script that a simulated far end plays; None if there is none."""
         return getattr(self.own, "simulated", None)
 
     @property
     def takes_input(self) -> bool:
-        """Whether it listens at standard input."""
+        """Whether it reads standard input."""
         return bool(getattr(self.own, "takes_input", False))
 
     def __str__(self) -> str:
@@ -59,9 +59,9 @@ class LinkSettings(Settings):
 
 
 def read_link(table: dict[str, Any]) -> LinkSettings:
-    """A link from its table in a stage, with the options of its kind.
+    """Return a link from its table in a stage file, with the options of its kind.
 
-    Raises pydantic.ValidationError: every fault with its key.
+    Raises pydantic.ValidationError: lists every fault with its key.
     """
     try:
         kind = LINKS.get(str(table.get("kind", "line")))
@@ -71,9 +71,9 @@ def read_link(table: dict[str, Any]) -> LinkSettings:
 
 
 def open_links(choices: Sequence[LinkSettings], context: LinkContext) -> list[Link]:
-    """Open every link of a stage; ``context.closers`` gets what closes them.
+    """Open every link of a stage; what closes them is added to ``context.closers``.
 
-    Raises LinkError, PortError: one does not come up. PluginError: a package that it needs is not installed.
+    Raises LinkError, PortError: a link cannot be opened. PluginError: a package that it needs is not installed.
     """
     found = []
     for choice in choices:
@@ -86,7 +86,7 @@ def open_links(choices: Sequence[LinkSettings], context: LinkContext) -> list[Li
 
 
 class _Unknown(LinkSettings, extra="ignore"):
-    """A link of an unknown kind: nothing is known of its other keys."""
+    """A link of an unknown kind, whose other keys cannot be checked."""
 
 
 @cache
@@ -97,4 +97,4 @@ def _model_of(kind: LinkKind) -> type[LinkSettings]:
 
 
 LinkTable = Annotated[LinkSettings, parse_with(read_link)]
-"""An entry of ``[[links]]``: read by its kind's own options."""
+"""An entry of ``[[links]]``, read with the options of its kind."""

@@ -1,7 +1,7 @@
-"""Moves values one step along the braking curve of :mod:`controller.motion.motion`; compiled.
+"""Moves values one step along the braking curve of :mod:`controller.motion.motion`, in compiled code.
 
-Each function has explicit types so that it is compiled on import, which is before servos are under torque: compiled
-at the first tick, on a new machine, it would hold up the bus for longer than the servos' watchdog waits.
+Each function has explicit types so that numba compiles it on import, before any servo has torque. Compiled at the
+first tick, on a new machine, it would delay the bus for longer than the timeout of the servos' watchdog.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ _ROW = float64[::1]
 
 @declared(float64(float64, float64, float64, float64))
 def _braking_speed(dt: float, distance: float, accel: float, response: float) -> float:
-    """Greatest speed at the end of a step of ``dt`` from which ``distance`` is enough to brake.
+    """Return the greatest speed at the end of a step of ``dt`` s from which ``distance`` is enough to brake.
 
-    Near the target speed is proportional to the distance, with the time constant ``response``.
+    Near the target, the speed is proportional to the distance, with the time constant ``response`` (s).
     """
     linear = distance / (response + 0.5 * dt)
     squared_s = 2.0 * (distance - 0.5 * accel * response**2) / accel + 0.25 * dt * dt
@@ -34,8 +34,8 @@ def move(dt: float, target: Floats, position: Floats, velocity: Floats, limited:
          response: Floats, low: Floats, high: Floats) -> None:  # fmt: skip
     """Move ``position`` and ``velocity`` towards ``target`` for ``dt`` s, in place; all are (n,).
 
-    ``limited`` : (n,) bool, set where a limit of speed or acceleration made a value slower. The acceleration is
-    constant over the step; a value that reaches its target within the limits stops there.
+    ``limited`` : (n,) bool, set to whether a limit of speed or acceleration made a value slower. The acceleration is
+    constant over the step. A value that can reach its target within the limits during the step stops there.
     """
     for i in range(len(position)):
         sign = math.copysign(1.0, target[i] - position[i])

@@ -1,8 +1,8 @@
 """Limits jerk by a moving mean.
 
-Motion whose acceleration never exceeds A, averaged over a window of T seconds, changes its acceleration by no more
-than 2 A / T a second: the oldest value leaves the mean while the newest comes in. So T = 2 A / J keeps a limit J
-strictly, and a mean keeps range, speed and acceleration as well. It delays by T / 2.
+If acceleration never exceeds A, the mean over a window of T seconds changes its acceleration by at most 2 A / T per
+second: the newest value enters the mean while the oldest leaves it. So a window of T = 2 A / J keeps the jerk below J.
+A mean also stays inside the limits of range, speed and acceleration. The delay is T / 2.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ class JerkFilter:
 
     Parameters
     ----------
-    max_acceleration : (n,) units/s^2, what the values keep already.
-    max_jerk : (n,) units/s^3; infinity for none.
+    max_acceleration : (n,) units/s^2, a limit that the given values already keep.
+    max_jerk : (n,) units/s^3; infinity for no limit.
 
     Attributes
     ----------
-    window_s : (n,) lengths of the windows.
+    window_s : (n,) length of each value's window (s).
     """
 
     def __init__(self, max_acceleration: Floats, max_jerk: Floats) -> None:
@@ -35,53 +35,54 @@ class JerkFilter:
 
     @property
     def active(self) -> bool:
-        """Whether anything has a limit."""
+        """Whether the jerk of any value is limited."""
         return self._longest_s > 0.0
 
     def reset(self, values: Floats) -> None:
-        """Be at rest at ``values`` : (n,)."""
+        """Start again from rest at ``values`` : (n,)."""
         self._history[:] = values
         self._steps_s.fill(np.inf)
         self._uniform = False
 
     def reset_some(self, where: Flags, values: Floats) -> None:
-        """Let those of ``where`` : (n,) be at rest at ``values`` : (n,)."""
+        """Start again from rest the values for which ``where`` : (n,) is True, at those of ``values`` : (n,)."""
         self._history[:, where] = values[where]
 
     def step(self, dt: float, values: Floats, out: Floats) -> Floats:
-        """Take ``values`` : (n,) that were reached in ``dt`` s; write their mean to ``out`` : (n,)."""
-        steady = self._uniform and self._steps_s[0] == dt
-        if not steady and self._steps_s[:-2].sum() < self._longest_s - dt:
+        """Add ``values`` : (n,), reached ``dt`` s after the last ones, and write their mean to ``out`` : (n,)."""
+        unchanged = self._uniform and self._steps_s[0] == dt  # equal steps leave the weights as they are
+        if not unchanged and self._steps_s[:-2].sum() < self._longest_s - dt:
             self._grow()
         self._history[1:] = self._history[:-1]
         self._history[0] = values
-        if not steady:
+        if not unchanged:
             self._steps_s[1:] = self._steps_s[:-1]
             self._steps_s[0] = dt
-            self._uniform = bool((self._steps_s == dt).all())  # equal steps leave the weights as they are
-            self._weigh()
+            self._uniform = bool((self._steps_s == dt).all())
+            self._update_weights()
         np.multiply(self._weights, self._history, out=self._work)
         return np.add.reduce(self._work, axis=0, out=out)
 
-    def _weigh(self) -> None:
-        """Weights of the stored rows in the mean over the window of the straight lines between them.
+    def _update_weights(self) -> None:
+        """Compute the weight of each stored row in the mean over the window.
 
-        The oldest row gets the rest.
+        The mean is that of the piecewise linear curve through the rows. Where the window is longer than the stored
+        history, the oldest row gets the remaining weight.
         """
-        share, before = self._weights, 0.0
-        share.fill(0.0)
+        weights, before_s = self._weights, 0.0
+        weights.fill(0.0)
         for i, step_s in enumerate(self._steps_s[:-1].tolist()):
-            part = np.clip(self.window_s - before, 0.0, step_s)  # time of the window between this row and the next
-            next_ = part * part / (2.0 * step_s)
-            share[i] += part - next_
-            share[i + 1] += next_
-            before += step_s
-        share[-1] += np.maximum(self.window_s - before, 0.0)
-        share /= np.where(self.window_s > 0.0, self.window_s, 1.0)
-        share[0, self.window_s == 0.0] = 1.0
+            part_s = np.clip(self.window_s - before_s, 0.0, step_s)  # time of the window between this row and the next
+            next_ = part_s * part_s / (2.0 * step_s)
+            weights[i] += part_s - next_
+            weights[i + 1] += next_
+            before_s += step_s
+        weights[-1] += np.maximum(self.window_s - before_s, 0.0)
+        weights /= np.where(self.window_s > 0.0, self.window_s, 1.0)
+        weights[0, self.window_s == 0.0] = 1.0
 
     def _grow(self) -> None:
-        """Keep more rows; happens while the length of the steps settles, never afterwards."""
+        """Double the number of stored rows; happens only until the length of the steps is steady."""
         more = len(self._steps_s)
         self._history = np.concatenate([self._history, np.repeat(self._history[-1:], more, axis=0)])
         self._steps_s = np.concatenate([self._steps_s, np.full(more, self._steps_s[-1])])

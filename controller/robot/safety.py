@@ -205,7 +205,8 @@ class Guard:
         Parameters
         ----------
         target : (n,) rad, the angles of the face. position : (n,) rad, the last goals.
-        rest : (n,) rad, where they would come to rest; see :meth:`controller.motion.motion.MotionLimiter.rest`.
+        rest : (n,) rad, where they would come to rest; from
+            :meth:`controller.motion.motion.MotionLimiter.stopping_position`.
         state : the newest measurement. dt : s.
         """
         low, high = self._table.low_rad, self._table.high_rad
@@ -276,6 +277,6 @@ class GoalFilter:
         """
         dt = self.period_s if dt is None else dt
         smooth = self._filter.apply(wanted, dt)
-        allowed = self.guard.apply(smooth, self.sent, self._limiter.rest(dt), state, dt)
-        self._limiter.slow(np.minimum(self._slow_start.step(dt), self.guard.speed_share))
+        allowed = self.guard.apply(smooth, self.sent, self._limiter.stopping_position(dt), state, dt)
+        self._limiter.set_speed_fraction(np.minimum(self._slow_start.step(dt), self.guard.speed_share))
         return self._limiter.step(dt, allowed, self.sent)

@@ -17,7 +17,7 @@ from controller.base.parameters import Parameters
 from controller.base.paths import find_config
 from controller.links.line.commands import Grammar
 from controller.links.line.protocol import LineError
-from controller.links.line.script import MOST_STEPS, load_script, read_step
+from controller.links.line.script import MAX_STEPS, load_script, read_step
 from controller.stage.stage import load_stage
 from controller.vocabulary.vocabulary import Vocabulary
 
@@ -100,8 +100,8 @@ def load_study(path: Path, parameters: Parameters, seed: int | None = None) -> S
     steps = [step for trial in trials for step in _steps(trial, lines[trial.condition], return_s)]
     marks = {f"{trial.number}:{trial.condition}:{event}": time_s for trial in trials
              for event, time_s in (("begin", trial.begin_s), ("end", trial.end_s))}  # fmt: skip
-    if len(steps) > MOST_STEPS:
-        fault = f"{path}: repeats: {len(steps)} lines in all are more than {MOST_STEPS}"
+    if len(steps) > MAX_STEPS:
+        fault = f"{path}: repeats: {len(steps)} lines in all are more than {MAX_STEPS}"
         raise ConfigError(fault, hint="repeat the conditions less often")
     return Study(settings, tuple(trials), tuple(steps), marks, at_s)
 

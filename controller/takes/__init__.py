@@ -1,4 +1,4 @@
-"""Reads recorded faces and voices: takes of Live Link Face, speech, recordings of omote.
+"""Reads recorded faces and voices as takes (values of parameters over time), and omote's own recordings.
 
-In: files and sound. Out: values of parameters over time. Imports base to links.
+In: files and sound. Out: takes. Imports base to links.
 """

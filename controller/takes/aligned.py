@@ -1,11 +1,10 @@
-"""Reads speech whose sounds, words or sentences have times: TextGrid of Praat and of the Montreal Forced Aligner, and
-the JSON of aeneas.
+"""Reads speech with timed sounds, words or sentences: TextGrid of Praat and the Montreal Forced Aligner, and aeneas.
 
-Where a file has the times of sounds, they are used. Where it has those of words or sentences alone, the sounds are
-guessed from the letters and spread over the time.
+If a file has the times of sounds, they are used. If it has only those of words or sentences, the sounds are guessed
+from the letters and spread over the time.
 
-TextGrid (Praat's manual, "TextGrid file formats"): what counts in a text file are free-standing numbers, texts in
-double quotes and flags in angle brackets, in order; all else is comment. So the long and the short form are one.
+In a TextGrid (Praat's manual, "TextGrid file formats") only free-standing numbers, strings in double quotes and flags
+in angle brackets count, in their order; everything else is a comment. So the long and the short form are read alike.
 """
 
 from __future__ import annotations
@@ -31,12 +30,12 @@ _TOKEN = re.compile(r'"((?:[^"]|"")*)"|(?<!\S)(<\w+>|[-+]?(?:\d+\.?\d*|\.\d+)(?:
 _SOUND_TIERS = re.compile(r"(?:.* - )?(?:phon(?:e|eme|emic|etic)?s?|sounds?|segments?|visemes?|ipa|mau|kan-mau)", re.I)
 _WORD_TIERS = re.compile(r"(?:.* - )?(?:words?|ort(?:-mau)?|text|sentences?|utterances?)", re.I)
 _SILENT = {"", "sil", "sp", "spn", "nsn", "pau", "h#", "#", "_", "*", "noise", "<eps>", "<sil>", "<p:>", "<unk>"}
-_MOST_BYTES = 16 << 20
+_MAX_FILE_BYTES = 16 << 20
 
 
 @dataclass(frozen=True)
 class Interval:
-    """A text with its times (s)."""
+    """A label with its start and end (s)."""
 
     start_s: float
     end_s: float
@@ -44,12 +43,12 @@ class Interval:
 
 
 def is_aeneas(start: bytes) -> bool:
-    """Whether a file begins as the output of aeneas does."""
+    """Whether a file that begins with these bytes is the output of aeneas."""
     return b'"fragments"' in start
 
 
 def textgrid_take(path: Path, parameters: Parameters) -> Take:
-    """A take from a TextGrid: its tier of sounds, or else one of words. Raises TakeError."""
+    """Read a take from a TextGrid: from its tier of sounds, or else from one of words. Raises TakeError."""
     visemes = Visemes.load(parameters)
     try:
         tiers = dict(_tiers(path))
@@ -60,14 +59,14 @@ def textgrid_take(path: Path, parameters: Parameters) -> Take:
 
 
 def sounds_of(path: Path, visemes: Visemes) -> list[tuple[float, float, str, Floats]]:
-    """Start and end (s), label and weights (n,) of every sound in a TextGrid's tier of sounds, without silence.
+    """Return start (s), end (s), label and weights (n,) of every sound in a TextGrid's tier of sounds, without silence.
 
     Raises TakeError: there is no such tier, or a sound is unknown.
     """
     try:
         tiers = dict(_tiers(path))
-        sounds = _longest({name: tier for name, tier in tiers.items() if _SOUND_TIERS.fullmatch(name.strip())})
-        spoken = [each for each in sounds or [] if _speaks(each)]
+        sounds = _longest_tier({name: tier for name, tier in tiers.items() if _SOUND_TIERS.fullmatch(name.strip())})
+        spoken = [each for each in sounds or [] if _is_sound(each)]
         if not spoken:
             raise ValueError("no tier of sounds")
         weights = visemes.sounds([each.text for each in spoken], guess=True)
@@ -77,7 +76,7 @@ def sounds_of(path: Path, visemes: Visemes) -> list[tuple[float, float, str, Flo
 
 
 def aeneas_take(path: Path, parameters: Parameters) -> Take:
-    """A take from the fragments of aeneas, each with the letters of its lines. Raises TakeError."""
+    """Read a take from the fragments of aeneas, by the letters of their lines. Raises TakeError."""
     visemes = Visemes.load(parameters)
     with files.reading(path, TakeError, hint=_AENEAS):
         fragments = [_fragment(f"fragments[{i}]", each) for i, each in enumerate(_fragments(path))]
@@ -86,7 +85,7 @@ def aeneas_take(path: Path, parameters: Parameters) -> Take:
 
 
 def _fragments(path: Path) -> list[Any]:
-    found = files.read_json(path, _MOST_BYTES)
+    found = files.read_json(path, _MAX_FILE_BYTES)
     listed = found.get("fragments") if isinstance(found, dict) else None
     if not isinstance(listed, list):
         raise ValueError("there is no list fragments")
@@ -94,7 +93,7 @@ def _fragments(path: Path) -> list[Any]:
 
 
 def _fragment(where: str, found: Any) -> Interval:
-    """A fragment of aeneas, whose times are texts. Raises ValueError."""
+    """Parse a fragment of aeneas, whose times are strings. Raises ValueError."""
     if not isinstance(found, dict):
         raise ValueError(f"{where} must be an object")
     lines = found.get("lines", [])
@@ -116,12 +115,15 @@ def _interval(where: str, start_s: float, end_s: float, text: str) -> Interval:
 
 
 def _tiers(path: Path) -> Iterator[tuple[str, list[Interval]]]:
-    """Name and intervals of each tier; a point lasts until the next. Raises ValueError, OSError as TakeError."""
+    """Yield the name and intervals of each tier; a point lasts until the next one.
+
+    Raises ValueError: it is not a TextGrid. TakeError: the file cannot be read.
+    """
     with files.reading(path, TakeError, hint=_TEXTGRID):
-        data = files.read_file(path, _MOST_BYTES)
+        data = files.read_file(path, _MAX_FILE_BYTES)
     if data.startswith(b"ooBinaryFile"):
         raise ValueError("it is a binary file")
-    tokens = _Tokens(_decoded(data))
+    tokens = _Tokens(_decode(data))
     if tokens.text() not in ("ooTextFile", "ooTextFile short") or tokens.text() != "TextGrid":
         raise ValueError('it begins without "ooTextFile" and "TextGrid"')
     tokens.number(), tokens.number()
@@ -136,13 +138,14 @@ def _tiers(path: Path) -> Iterator[tuple[str, list[Interval]]]:
             yield name, [_interval(each, tokens.time(), tokens.time(), tokens.text()) for each in named]
         elif kind == "TextTier":
             points = [(tokens.time(), tokens.text()) for _ in range(count)]
-            ends = [*(at for at, _ in points[1:]), end_s]
-            yield name, [_interval(f"tier {k}", at, end, text) for (at, text), end in zip(points, ends, strict=False)]
+            ends = [*(start for start, _ in points[1:]), end_s]
+            pairs = zip(points, ends, strict=False)
+            yield name, [_interval(f"tier {k}", start, end, text) for (start, text), end in pairs]
         else:
             raise ValueError(f"tier {k} is a {kind!r}, neither IntervalTier nor TextTier")
 
 
-def _decoded(data: bytes) -> str:
+def _decode(data: bytes) -> str:
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         try:
             return data.decode("utf-16")
@@ -152,7 +155,7 @@ def _decoded(data: bytes) -> str:
 
 
 class _Tokens:
-    """What counts in a TextGrid, one after another; each method raises ValueError where something else comes."""
+    """Reads the tokens of a TextGrid in order; each method raises ValueError if the next token is of another kind."""
 
     def __init__(self, text: str) -> None:
         self._found = (match for match in _TOKEN.finditer(text) if match[1] is not None or match[2] is not None)
@@ -164,44 +167,44 @@ class _Tokens:
         return found
 
     def text(self) -> str:
-        """A text."""
+        """Read a string."""
         found = self._next()
         if found[1] is None:
-            raise ValueError(f"{found[2]!r} stands where a text should")
+            raise ValueError(f"{found[2]!r} instead of a string")
         return found[1].replace('""', '"')
 
     def flag(self) -> str:
-        """A flag, with its angle brackets."""
+        """Read a flag, with its angle brackets; for any other token the result is not a flag."""
         return self._next()[2] or ""
 
     def number(self) -> float:
-        """A number."""
+        """Read a number."""
         found = self._next()
         try:
             return float(found[2])
         except (TypeError, ValueError):
-            raise ValueError(f"{found[0][:40]!r} stands where a number should") from None
+            raise ValueError(f"{found[0][:40]!r} instead of a number") from None
 
     def time(self) -> float:
-        """A time (s); 0 for one that rounding made a little less."""
+        """Read a time (s); one that rounding has made slightly negative becomes 0."""
         found = self.number()
         return 0.0 if -1e-6 < found < 0.0 else found
 
     def count(self) -> int:
-        """How many follow."""
+        """Read the number of items that follow."""
         found = self.number()
         if not 0 <= found < 1e7 or found != int(found):
-            raise ValueError(f"{found:g} is no count")
+            raise ValueError(f"{found:g} is not a count")
         return int(found)
 
 
 def _cues_of_tiers(path: Path, tiers: dict[str, list[Interval]], visemes: Visemes) -> tuple[list[Cue], float]:
-    """The cues of the tier of sounds, else of the tier of words, and the end of the last (s)."""
-    spoken = {name: tier for name, tier in tiers.items() if any(_speaks(each) for each in tier)}
+    """Return the cues of the tier of sounds, or else of the tier of words, and the end of the last cue (s)."""
+    spoken = {name: tier for name, tier in tiers.items() if any(_is_sound(each) for each in tier)}
     if not spoken:
         raise TakeError(f"{path}: no tier has any text", hint=_TEXTGRID)
-    sounds = _longest({name: tier for name, tier in spoken.items() if _SOUND_TIERS.fullmatch(name.strip())})
-    words = _longest({name: tier for name, tier in spoken.items() if _WORD_TIERS.fullmatch(name.strip())})
+    sounds = _longest_tier({name: tier for name, tier in spoken.items() if _SOUND_TIERS.fullmatch(name.strip())})
+    words = _longest_tier({name: tier for name, tier in spoken.items() if _WORD_TIERS.fullmatch(name.strip())})
     if sounds is not None:
         try:
             return _cues_of_sounds(sounds, visemes)
@@ -215,37 +218,37 @@ def _cues_of_tiers(path: Path, tiers: dict[str, list[Interval]], visemes: Viseme
     return _cues_of_words(words or max(spoken.values(), key=len), visemes)
 
 
-def _longest(tiers: dict[str, list[Interval]]) -> list[Interval] | None:
+def _longest_tier(tiers: dict[str, list[Interval]]) -> list[Interval] | None:
     return max(tiers.values(), key=len, default=None)
 
 
-def _speaks(interval: Interval) -> bool:
+def _is_sound(interval: Interval) -> bool:
     return interval.text.lower() not in _SILENT
 
 
 def _cues_of_sounds(tier: Sequence[Interval], visemes: Visemes) -> tuple[list[Cue], float]:
-    """A cue for each sound, and silence between sounds that do not follow each other. Raises ParameterError."""
+    """Return a cue for each sound, with silence in the gaps, and the end (s). Raises ParameterError: unknown sound."""
     tier = sorted(tier, key=lambda each: each.start_s)
-    weights = iter(visemes.sounds([each.text for each in tier if _speaks(each)], guess=True))
+    weights = iter(visemes.sounds([each.text for each in tier if _is_sound(each)], guess=True))
     rest, cues, end_s = visemes.weights(visemes.names[0]), list[Cue](), 0.0
     for each in tier:
         if each.start_s > end_s + 1e-3:
             cues.append(Cue(end_s, rest))
-        cues.append(Cue(each.start_s, next(weights) if _speaks(each) else rest))
+        cues.append(Cue(each.start_s, next(weights) if _is_sound(each) else rest))
         end_s = max(end_s, each.end_s)
     return cues, end_s
 
 
 def _cues_of_words(tier: Sequence[Interval], visemes: Visemes) -> tuple[list[Cue], float]:
-    """Cues of the letters of each text, spread over its time by the usual lengths of their visemes."""
+    """Return cues for the letters of each label, spread over its time by the usual lengths of their visemes."""
     rest, cues, end_s = visemes.weights(visemes.names[0]), list[Cue](), 0.0
     for each in sorted(tier, key=lambda each: each.start_s):
         if each.start_s > end_s + 1e-3:
             cues.append(Cue(end_s, rest))
-        sounds = visemes.spell(each.text) if _speaks(each) else rest[None]
+        sounds = visemes.spell(each.text) if _is_sound(each) else rest[None]
         lengths = sounds @ visemes.duration
         step_s = (each.end_s - each.start_s) / max(float(lengths.sum()), 1e-9)
         starts = each.start_s + step_s * (lengths.cumsum() - lengths)
-        cues += [Cue(float(at), sound) for at, sound in zip(starts, sounds, strict=True)]
+        cues += [Cue(float(start), sound) for start, sound in zip(starts, sounds, strict=True)]
         end_s = max(end_s, each.end_s)
     return cues, end_s

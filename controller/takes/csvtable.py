@@ -1,4 +1,4 @@
-"""Reads tables of comma-separated values: a line of names, then lines of numbers."""
+"""Reads tables of comma-separated values: a header line, then rows of cells."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _CORRECT = "correct or remove that line"
 
 @dataclass(frozen=True)
 class CsvTable:
-    """A table of texts.
+    """A table of strings.
 
-    header : names of the columns, without blanks around them. rows : number of the line, and a cell for each column.
-    decimal_comma : whether numbers are written with commas, as beside semicolons.
+    header : names of the columns, stripped. rows : for each row its line number and its cells, one for each column.
+    decimal_comma : whether numbers have decimal commas, as in files that are separated by semicolons.
     """
 
     path: Path
@@ -34,14 +34,15 @@ class CsvTable:
     decimal_comma: bool = False
 
     def texts(self, column: int) -> list[str]:
-        """The cells of a column."""
+        """Return the cells of a column."""
         return [row[column] for _, row in self.rows]
 
     def numbers(self, columns: Sequence[int], *, gaps: bool = False, blanks: bool = False) -> Floats:
-        """(n, k) float64 cells of columns.
+        """Return the cells of k columns as (n, k) float64.
 
-        gaps : cells that hold no number are NaN. blanks : empty ones are. Raises TakeError, with line and column, for
-        such a cell otherwise.
+        gaps : whether every cell without a finite number becomes NaN. blanks : whether only empty cells do.
+
+        Raises TakeError: another cell is not a finite number; it names line and column.
         """
         found = [
             [math.nan if blanks and not row[column].strip() else self._number(line, column, row[column], gaps)
@@ -51,7 +52,7 @@ class CsvTable:
         return np.array(found, dtype=np.float64).reshape(len(self.rows), len(columns))
 
     def fault(self, line: int, column: int, why: str) -> TakeError:
-        """The error for a cell."""
+        """Return the error for a cell."""
         return TakeError(f"{self.path}, line {line}, column {self.header[column]}: {why}", hint=_CORRECT)
 
     def _number(self, line: int, column: int, text: str, gaps: bool) -> float:
@@ -67,12 +68,14 @@ class CsvTable:
 
 
 def read_csv(path: Path, hint: str) -> CsvTable:
-    """Read a table of a file in UTF-8 whose cells are separated by commas, semicolons or tabs.
+    """Read a table from a file in UTF-8 whose cells are separated by commas, semicolons or tabs.
 
-    A header that comes again, as in a stream that is saved, is passed over.
+    A repetition of the header, as in a saved stream, is ignored.
 
-    ``hint`` : what such a file should be. Raises TakeError: it cannot be read, is empty, has no rows, or a row has
-    another number of cells than the header.
+    hint : says what such a file should be.
+
+    Raises TakeError: the file cannot be read, is empty or has no rows, or a row has another number of cells than the
+    header.
     """
     with files.reading(path, TakeError, hint=hint):
         text = files.read_text(path)
@@ -97,6 +100,6 @@ def read_csv(path: Path, hint: str) -> CsvTable:
 
 
 def header_of(start: bytes) -> list[str]:
-    """Names of the columns in the first bytes of a table, in small letters; none where it is no text."""
+    """Return the column names, in lower case, from the first bytes of a table; never fails, whatever the bytes are."""
     first = start.decode("utf-8-sig", "replace").lstrip("\r\n").partition("\n")[0]
     return [name.strip().strip('"').lower() for name in first.split(max(_DELIMITERS, key=first.count))]

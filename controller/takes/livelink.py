@@ -1,8 +1,8 @@
-"""Reads takes of Live Link Face from CSV files, and plays takes at their own rate.
+"""Defines takes (recorded faces), reads those of Live Link Face from CSV files, and plays takes at their own rate.
 
-What the format hides (measured on public takes): the timecode counts frames of 1/60 s even in takes of 30 Hz; rows
-are missing; values may exceed 1; head angles that are zero throughout mean "not recorded"; eye angles repeat what the
-eyeLook columns say; and the labels JawLeft/JawRight and MouthLeft/MouthRight are swapped against the smile's.
+Undocumented properties of Live Link Face, measured on public takes: the timecode counts frames of 1/60 s even in takes
+of 30 Hz; rows are missing; values may exceed 1; head angles that are zero throughout mean "not recorded"; eye angles
+repeat the eyeLook columns; and left and right are swapped in JawLeft/JawRight and MouthLeft/MouthRight.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _SWAPPED = {"jawLeft": "jawRight", "jawRight": "jawLeft", "mouthLeft": "mouthRig
 _HEAD = ("headYaw", "headPitch", "headRoll")
 _EYES = ("leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
 _NEGATED = ("headYaw", "leftEyeYaw", "rightEyeYaw")
-"""Live Link counts yaw positive to the subject's right (seen in the eyes; taken to hold for the head)."""
+"""Angles of the opposite sign: yaw is positive to the subject's right (measured for the eyes, assumed for the head)."""
 _HINT = "a Live Link Face take begins with the line Timecode,BlendShapeCount,EyeBlinkLeft,..."
 
 
@@ -34,9 +34,9 @@ _HINT = "a Live Link Face take begins with the line Timecode,BlendShapeCount,Eye
 class Take:
     """A recorded take.
 
-    name : file name. times_s : (n,) float64, from 0, rising. values : (n, P) float64, normalised but not clipped.
-    mask : (P,) bool, which parameters the take drives. low, high : (P,) range that :meth:`sample` keeps to.
-    through : (P,) how much of the layers below shows through, 0..1; None for nothing.
+    name : file name. times_s : (n,) float64, ascending, beginning at 0. values : (n, P) float64, normalised but not
+    clipped. mask : (P,) bool, which parameters the take drives. low, high : (P,) range to which :meth:`sample` clips.
+    through : (P,) weight 0..1 with which the layers below show through; None for 0.
     """
 
     name: str
@@ -53,21 +53,21 @@ class Take:
     ) -> Take:
         """Read a CSV take.
 
-        swap_jaw_mouth_lr : swap the labels left and right of jaw and mouth, which the format has the wrong way round.
-        use_eye_angles : take the eyes from the eye angle columns, not from the eyeLook columns, where both carry data.
+        swap_jaw_mouth_lr : swap left and right of jaw and mouth, which the format has the wrong way round.
+        use_eye_angles : read the eyes from the eye angle columns, not from the eyeLook columns, if both have data.
 
-        Raises TakeError: the file cannot be read or a cell is wrong; names file, line and column.
+        Raises TakeError: the file cannot be read or a cell is invalid; it names file, line and column.
         """
         columns, times, table = _read(Path(path))
-        values, present = _by_parameter(columns, table, parameters, swap_jaw_mouth_lr)
-        _leave_out(values, present, parameters, use_eye_angles)
+        values, present = _sort_columns(columns, table, parameters, swap_jaw_mouth_lr)
+        _drop_redundant(values, present, parameters, use_eye_angles)
         for array in (times, values, present):
             array.flags.writeable = False
         return cls(Path(path).name, times, values, present, parameters.low, parameters.high)
 
     @property
     def frames(self) -> int:
-        """How many rows there are."""
+        """Number of rows."""
         return len(self.times_s)
 
     @property
@@ -77,24 +77,24 @@ class Take:
 
     @property
     def rate_hz(self) -> float:
-        """Rows per second where none is missing, from the median step of the timecode; 0 for a single row."""
+        """Rows per second where no row is missing, from the median step of the timecode; 0 for a single row."""
         return float(1.0 / np.median(np.diff(self.times_s))) if self.frames > 1 else 0.0
 
     @property
     def gaps(self) -> int:
-        """How many steps are longer than one and a half rows."""
+        """Number of steps between rows that are longer than one and a half times the median step."""
         steps = np.diff(self.times_s)
         return int(np.count_nonzero(steps > 1.5 * np.median(steps))) if len(steps) else 0
 
     def sample(self, t: float, out: Floats) -> Floats:
-        """Write the parameters at ``t`` s into ``out`` : (P,), straight between rows, kept in range."""
+        """Write the parameters at ``t`` s to ``out`` : (P,), interpolated linearly between rows and clipped."""
         t = min(max(t, 0.0), self.duration_s)
         after = min(int(np.searchsorted(self.times_s, t, side="right")), self.frames - 1)
         before = max(after - 1, 0)
         span = self.times_s[after] - self.times_s[before]
-        share = (t - self.times_s[before]) / span if span > 0.0 else 1.0
+        weight = (t - self.times_s[before]) / span if span > 0.0 else 1.0
         np.subtract(self.values[after], self.values[before], out=out)
-        out *= share
+        out *= weight
         out += self.values[before]
         return np.clip(out, self.low, self.high, out=out)
 
@@ -104,11 +104,12 @@ class TakePlayer:
 
     Parameters
     ----------
-    take : what to play. state : where. layer : ``"capture"``, or ``"speech"`` for a mouth that leaves the rest alone.
+    take : the take to play. state : whose layer is written. layer : ``"capture"``, or ``"speech"`` for a take that
+    drives only the mouth.
 
     Attributes
     ----------
-    position_s : how far it has played. finished : the last row has been given.
+    position_s : time since the beginning of the take. finished : whether the last row has been played.
     """
 
     def __init__(self, take: Take, state: CommandState, layer: str = "capture") -> None:
@@ -121,7 +122,7 @@ class TakePlayer:
         self.position_s = 0.0
 
     def tick(self, now_ns: int) -> None:
-        """Give the layer the values of ``now_ns`` (monotonic clock); the first call is the take's beginning."""
+        """Write the values of ``now_ns`` (monotonic clock) to the layer; the first call begins the take."""
         if self._start_ns is None:
             self._start_ns = now_ns
         self.position_s = (now_ns - self._start_ns) * 1e-9
@@ -133,24 +134,24 @@ class TakePlayer:
 
 
 def is_livelink(start: bytes) -> bool:
-    """Whether a file begins as the takes of Live Link Face do."""
+    """Whether a file that begins with these bytes is a take of Live Link Face."""
     return "timecode" in header_of(start)
 
 
 def _read(path: Path) -> tuple[list[str], Floats, Floats]:
-    """Column names (folded, without timecode and count), times from the first row (s) and cells (n, columns)."""
-    read = read_csv(path, _HINT)
-    folded = [fold(cell) for cell in read.header]
+    """Return column names (folded, without timecode and count), times from the first row (s) and cells (n, columns)."""
+    table = read_csv(path, _HINT)
+    folded = [fold(cell) for cell in table.header]
     if "timecode" not in folded:
         raise TakeError(f"{path}, line 1: no column Timecode", hint=_HINT)
-    codes = read.texts(folded.index("timecode"))
-    times = _times(path, [(line, code) for (line, _), code in zip(read.rows, codes, strict=True)])
+    codes = table.texts(folded.index("timecode"))
+    times = _times(path, [(line, code) for (line, _), code in zip(table.rows, codes, strict=True)])
     keep = [i for i, name in enumerate(folded) if name not in ("timecode", "blendshapecount", "framerate")]
-    return [folded[i] for i in keep], times, read.numbers(keep)
+    return [folded[i] for i in keep], times, table.numbers(keep)
 
 
 def _times(path: Path, lines: list[tuple[int, str]]) -> Floats:
-    """Seconds from the first line, of line numbers and timecodes; a fall by more than half a day is midnight."""
+    """Return the times since the first row (s) for line numbers and timecodes, also across midnight."""
     seconds = np.empty(len(lines))
     for i, (number, text) in enumerate(lines):
         match = _TIMECODE.fullmatch(text)
@@ -168,15 +169,15 @@ def _times(path: Path, lines: list[tuple[int, str]]) -> Floats:
     return since_first
 
 
-def _by_parameter(columns: list[str], table: Floats, parameters: Parameters, swap: bool) -> tuple[Floats, Flags]:
-    """Cells (n, P) under their parameters, angles normalised, and which parameters there are columns for."""
+def _sort_columns(columns: list[str], table: Floats, parameters: Parameters, swap: bool) -> tuple[Floats, Flags]:
+    """Return the cells as values (n, P), with normalised angles, and which parameters have a column."""
     values = np.zeros((len(table), len(parameters)))
     present = np.zeros(len(parameters), dtype=bool)
     for column, cells in zip(columns, table.T, strict=True):
         try:
             i = parameters.index(column)
         except ParameterError:
-            continue  # emotion columns of other programs, eye rolls: nothing here moves by them
+            continue  # such as eye rolls, and emotion columns of other programs
         if swap:
             i = parameters.index(_SWAPPED.get(parameters.names[i], parameters.names[i]))
         full = parameters.full_scale_rad[i]
@@ -186,8 +187,8 @@ def _by_parameter(columns: list[str], table: Floats, parameters: Parameters, swa
     return values, present
 
 
-def _leave_out(values: Floats, present: Flags, parameters: Parameters, use_eye_angles: bool) -> None:
-    """Drop columns that carry nothing or say the same as others; changes both arrays."""
+def _drop_redundant(values: Floats, present: Flags, parameters: Parameters, use_eye_angles: bool) -> None:
+    """Drop head angles that were not recorded, and the eye columns that repeat others; modifies both arrays."""
     head, eyes = parameters.indices(_HEAD), parameters.indices(_EYES)
     looks = _looks(parameters)
     if not values[:, head].any():
@@ -198,7 +199,7 @@ def _leave_out(values: Floats, present: Flags, parameters: Parameters, use_eye_a
 
 
 def hold_looks(values: Floats, present: Flags, parameters: Parameters) -> None:
-    """Hold the eyeLook parameters of a take whose eyes are angles at zero; changes both arrays."""
+    """Hold the eyeLook parameters of a take with eye angles at zero; modifies both arrays."""
     _hold(values, present, _looks(parameters))
 
 
@@ -206,7 +207,7 @@ def _looks(parameters: Parameters) -> Indices:
     return np.array([i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")])
 
 
-def _hold(values: Floats, present: Flags, at: Indices) -> None:
+def _hold(values: Floats, present: Flags, indices: Indices) -> None:
     """Hold parameters at zero, so that no lower layer adds its own gaze."""
-    values[:, at] = 0.0
-    present[at] = True
+    values[:, indices] = 0.0
+    present[indices] = True

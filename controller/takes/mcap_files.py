@@ -1,7 +1,7 @@
-"""Takes in MCAP files, which Foxglove and other tools of robotics read: JSON messages with a schema (the extra mcap).
+"""Reads and writes takes in MCAP files, which Foxglove and other robotics tools read (the extra mcap).
 
-Source of the container: the MCAP format specification 1.0; it is read and written by the package ``mcap``. A message is
-an object with ``parameters`` by name, at the time it is logged at.
+The package ``mcap`` reads and writes the container, MCAP format specification 1.0. Messages are JSON with a schema. A
+message is an object with ``parameters`` by name; its time is its log time.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ from surface.base import files
 from surface.base.extras import importing
 
 TOPIC = "/omote/face"
-MOST_MESSAGES = 1_000_000
-_CHUNK_LIMIT = 64 << 20
+MAX_MESSAGES = 1_000_000
+_MAX_CHUNK_BYTES = 64 << 20
 _HINT = 'it needs messages of JSON such as {"parameters": {"jawOpen": 0.5}}; omote convert writes such files'
 
 
 def write_mcap(path: Path, times: Floats, values: Floats, mask: Flags, parameters: Parameters) -> None:
-    """Write times (n,) s and values (n, P) of the parameters in ``mask`` : (P,); six decimals.
+    """Write times (n,) s and values (n, P) of the parameters in ``mask`` : (P,), with six decimals.
 
     Raises MissingPackage: mcap is not installed. ControllerError: the file cannot be written.
     """
@@ -42,13 +42,13 @@ def write_mcap(path: Path, times: Floats, values: Floats, mask: Flags, parameter
         channel = writer.register_channel(TOPIC, "json", schema)
         for n, (time_s, row) in enumerate(zip(times.tolist(), values.tolist(), strict=True)):
             message = {"parameters": {name: round(row[i], 6) for name, i in chosen}}
-            at_ns = round(time_s * 1e9)
-            writer.add_message(channel, at_ns, json.dumps(message).encode(), at_ns, n)
+            time_ns = round(time_s * 1e9)
+            writer.add_message(channel, time_ns, json.dumps(message).encode(), time_ns, n)
         writer.finish()  # type: ignore[no-untyped-call]
 
 
 def mcap_take(path: Path, parameters: Parameters) -> Take:
-    """A take from the first topic of a file whose messages hold parameters.
+    """Return a take of the first topic in a file whose messages hold parameters.
 
     Raises MissingPackage: mcap is not installed. TakeError: the file cannot be read, or has no such topic.
     """
@@ -56,65 +56,67 @@ def mcap_take(path: Path, parameters: Parameters) -> Take:
         import mcap.exceptions  # optional: the extra mcap
     try:
         with files.reading(path, TakeError, hint=_HINT), files.open_file(path) as file:
-            rows = _rows(_plain(_messages(file), path), parameters)
+            rows = _rows(_explain_errors(_messages(file), path), parameters)
     except (mcap.exceptions.McapError, *files.DAMAGED) as error:
         if isinstance(error, TakeError):
             raise
         why = str(error) or type(error).__name__
-        raise TakeError(f"{path}: no whole MCAP file: {why[:200]}", hint=_HINT) from error
+        raise TakeError(f"{path}: not a complete MCAP file: {why[:200]}", hint=_HINT) from error
     if not rows:
         raise TakeError(f"{path}: no message in it holds parameters", hint=_HINT)
     return _take(path.name, rows, parameters)
 
 
-def _plain(messages: Iterator[tuple[str, int, bytes]], path: Path) -> Iterator[tuple[str, int, bytes]]:
-    """The same messages; a text that the package cannot read is reported in plain words. Raises TakeError."""
+def _explain_errors(messages: Iterator[tuple[str, int, bytes]], path: Path) -> Iterator[tuple[str, int, bytes]]:
+    """Yield the same messages. Raises TakeError: the file contains a string that is not UTF-8."""
     try:
         yield from messages
     except UnicodeDecodeError as error:
-        raise TakeError(f"{path}: no whole MCAP file: a text in it is not UTF-8", hint=_HINT) from error
+        raise TakeError(
+            f"{path}: not a complete MCAP file: it contains a string that is not UTF-8", hint=_HINT
+        ) from error
 
 
 def _messages(file: IO[bytes]) -> Iterator[tuple[str, int, bytes]]:
-    """Topics, times (ns) and contents of all messages in JSON, as they stand in the file."""
+    """Yield the topic, time (ns) and content of each JSON message, in the order of the file."""
     from mcap.records import Channel, Chunk, Message  # optional: the extra mcap
     from mcap.stream_reader import StreamReader, breakup_chunk
 
     topics: dict[int, str] = {}
     count = 0
-    for record in StreamReader(file, emit_chunks=True, record_size_limit=_CHUNK_LIMIT).records:
-        for each in breakup_chunk(_unpacked(record)) if isinstance(record, Chunk) else [record]:
+    for record in StreamReader(file, emit_chunks=True, record_size_limit=_MAX_CHUNK_BYTES).records:
+        for each in breakup_chunk(_decompress(record)) if isinstance(record, Chunk) else [record]:
             if isinstance(each, Channel) and each.message_encoding == "json":
                 topics[each.id] = each.topic
             elif isinstance(each, Message) and each.channel_id in topics:
                 count += 1
-                if count > MOST_MESSAGES:
-                    raise ValueError(f"more than {MOST_MESSAGES} messages")
+                if count > MAX_MESSAGES:
+                    raise ValueError(f"more than {MAX_MESSAGES} messages")
                 yield topics[each.channel_id], each.log_time, each.data
 
 
-def _unpacked(chunk: Any) -> Any:
-    """A chunk whose records are not compressed, of bounded size whatever it says. Raises ValueError: it is larger."""
+def _decompress(chunk: Any) -> Any:
+    """Decompress the records of a chunk in place and return it. Raises ValueError: they are too large or damaged."""
     data = chunk.data
     if chunk.compression == "zstd":
         import zstandard  # comes with mcap
 
         try:
-            data = zstandard.ZstdDecompressor().stream_reader(data).read(_CHUNK_LIMIT + 1)
+            data = zstandard.ZstdDecompressor().stream_reader(data).read(_MAX_CHUNK_BYTES + 1)
         except zstandard.ZstdError as error:
             raise ValueError(f"a damaged chunk: {error}") from error
     elif chunk.compression == "lz4":
         import lz4.frame  # comes with mcap
 
-        data = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=_CHUNK_LIMIT + 1)
-    if len(data) > _CHUNK_LIMIT:
-        raise ValueError(f"a chunk of more than {_CHUNK_LIMIT / (1 << 20):g} MB")
+        data = lz4.frame.LZ4FrameDecompressor().decompress(data, max_length=_MAX_CHUNK_BYTES + 1)
+    if len(data) > _MAX_CHUNK_BYTES:
+        raise ValueError(f"a chunk of more than {_MAX_CHUNK_BYTES / (1 << 20):g} MB")
     chunk.data, chunk.compression = data, ""
     return chunk
 
 
 def _rows(messages: Iterator[tuple[str, int, bytes]], parameters: Parameters) -> list[tuple[int, dict[int, float]]]:
-    """Times (ns) and values by position of the topic that holds parameters first."""
+    """Return times (ns) and values, by parameter index, of the first topic that holds parameters, sorted by time."""
     wanted, rows = "", list[tuple[int, dict[int, float]]]()
     for topic, time_ns, content in messages:
         if wanted in ("", topic) and (found := _values(content, parameters)):
@@ -124,7 +126,7 @@ def _rows(messages: Iterator[tuple[str, int, bytes]], parameters: Parameters) ->
 
 
 def _values(content: bytes, parameters: Parameters) -> dict[int, float]:
-    """Values by position; none for what is no object with parameters."""
+    """Return the values of a message by parameter index; an empty dict if it holds no parameters."""
     try:
         found = json.loads(content)
     except (ValueError, RecursionError):
@@ -132,8 +134,8 @@ def _values(content: bytes, parameters: Parameters) -> dict[int, float]:
     table = found.get("parameters") if isinstance(found, dict) else None
     if not isinstance(table, dict):
         return {}
-    places = ((parameters.find(name), value) for name, value in table.items())
-    return {at: float(value) for at, value in places if at is not None and _is_number(value)}
+    pairs = ((parameters.find(name), value) for name, value in table.items())
+    return {index: float(value) for index, value in pairs if index is not None and _is_number(value)}
 
 
 def _is_number(value: object) -> bool:
@@ -141,7 +143,10 @@ def _is_number(value: object) -> bool:
 
 
 def _take(name: str, rows: list[tuple[int, dict[int, float]]], parameters: Parameters) -> Take:
-    """A value that a message does not name stays as it was; of messages at one time the last counts."""
+    """Return a take in which parameters that a message does not name keep their value.
+
+    Of several messages with the same time, the last value of each parameter counts.
+    """
     by_time: dict[int, dict[int, float]] = {time_ns: {} for time_ns, _ in rows}
     for time_ns, given in rows:
         by_time[time_ns] |= given
@@ -149,9 +154,9 @@ def _take(name: str, rows: list[tuple[int, dict[int, float]]], parameters: Param
     values, mask = np.zeros((len(times), len(parameters))), np.zeros(len(parameters), dtype=bool)
     held = np.zeros(len(parameters))
     for n, given in enumerate(by_time.values()):
-        at = [*given]
-        held[at] = [*given.values()]
-        mask[at] = True
+        indices = [*given]
+        held[indices] = [*given.values()]
+        mask[indices] = True
         values[n] = held
     return Take(name, (times - times[0]) * 1e-9, values, mask, parameters.low, parameters.high)
 

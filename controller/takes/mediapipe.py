@@ -1,9 +1,9 @@
-"""Reads results of MediaPipe's face landmarker as takes: blend shapes, landmarks or both, a frame for each; and the
-messages of the link ``json``.
+"""Reads saved results of MediaPipe's face landmarker, or messages of the link ``json``, as takes.
 
-A file is a list of results, ``{"frames": [...]}``, or one result a line. Each is as the link ``json`` reads it. Its
-time is ``"time"`` (s), or ``"timestamp"``, ``"timestampMs"`` or ``"timestamp_ms"`` (ms), of all or of none: without,
-they follow each other at 30 a second, or at ``"fps"`` of the file. Frames without a face are left out.
+A file is a list of results, ``{"frames": [...]}``, or one result per line. Each result has blend shapes, landmarks or
+both, and is read as by the link ``json``. Its time is ``"time"`` (s), or ``"timestamp"``, ``"timestampMs"`` or
+``"timestamp_ms"`` (ms), in all results or in none. Without times there are 30 results a second, or ``"fps"`` of the
+file. Results without a face are left out.
 """
 
 from __future__ import annotations
@@ -22,19 +22,22 @@ from surface.base import files
 
 _RATE_HZ = 30.0
 _TIMES = {"time": 1.0, "timestamp": 1e-3, "timestampMs": 1e-3, "timestamp_ms": 1e-3}
-_HINT = "save the results of the face landmarker as a list of JSON, or one a line, each with a time"
+_HINT = "save the results of the face landmarker as a JSON list, or one per line, each with a time"
 _KEYS = re.compile(
     rb'"(?:(?:multi_?)?face_?landmarks|landmarks|face_?blendshapes)"|"category_?name"|"parameters"\s*:', re.IGNORECASE
 )
 
 
 def is_mediapipe(start: bytes) -> bool:
-    """Whether a file begins as results of the face landmarker do, or messages of the link ``json``."""
+    """Whether a file that begins with these bytes holds results of the face landmarker or messages of ``json``."""
     return _KEYS.search(start) is not None
 
 
 def mediapipe_take(path: Path, parameters: Parameters) -> Take:
-    """A take from a file of results. Raises TakeError: it is none, no frame has a face, or times do not rise."""
+    """Read a take from a file of results.
+
+    Raises TakeError: the file cannot be read, no result has a face, or the times are not ascending.
+    """
     results, rate_hz = _results(path)
     decoder, frames, times = JsonDecoder(parameters), [], []
     for number, result in enumerate(results):
@@ -44,14 +47,15 @@ def mediapipe_take(path: Path, parameters: Parameters) -> Take:
     if not frames:
         why = "; ".join(f"{count} {reason}" for reason, count in decoder.refused.items())
         raise TakeError(f"{path}: no result has a face{f' ({why})' if why else ''}", hint=_HINT)
-    at = np.array(times, dtype=np.float64)
-    if (np.diff(at) <= 0.0).any():
-        raise TakeError(f"{path}: the times of its results do not rise", hint=_HINT)
+    times_s = np.array(times, dtype=np.float64)
+    if (np.diff(times_s) <= 0.0).any():
+        raise TakeError(f"{path}: the times of its results are not ascending", hint=_HINT)
     values, mask = np.stack([frame.values for frame in frames]), frames[-1].mask
-    return Take(path.name, at - at[0], values, mask, parameters.low, parameters.high)
+    return Take(path.name, times_s - times_s[0], values, mask, parameters.low, parameters.high)
 
 
 def _results(path: Path) -> tuple[list[Any], float]:
+    """Return the results of a file, and their rate where they have no times (Hz)."""
     with files.reading(path, TakeError, hint=_HINT):
         text = files.read_text(path)
         lines = [line for line in text.splitlines() if line.strip()]
@@ -66,8 +70,8 @@ def _results(path: Path) -> tuple[list[Any], float]:
     return (found if isinstance(found, list) else [found]), rate_hz
 
 
-def _time_s(result: Any, otherwise_s: float) -> float:
+def _time_s(result: Any, default_s: float) -> float:
     for key, scale in _TIMES.items():
         if isinstance(result, dict) and is_number(result.get(key)):
             return scale * float(result[key])
-    return otherwise_s
+    return default_s

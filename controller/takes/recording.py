@@ -1,7 +1,7 @@
 """Records every command and every tick of a run to a file, and replays it bit by bit.
 
-A recording is a text file, one JSON list a line: a header, then ``["name", ...arguments]`` of each call in the order it
-took effect. A tick also carries the CRC-32 of the parameters that came out of it.
+A recording is a text file with one JSON list per line: a header, then ``["name", ...arguments]`` for each call in the
+order in which the calls took effect. A tick also has the CRC-32 of the resulting parameters.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from controller.takes.line_writer import LineWriter
 from surface.base import files
 
 SUFFIX = ".rec"
-"""What names of recordings end in."""
+"""File name suffix of recordings."""
 
 _KIND, _VERSION = "omote recording", 1
-_LONGEST_LINE = 1 << 20
-_SHORTEST_TICK_S, _LONGEST_TICK_S = 1e-4, 1.0
+_MAX_LINE_BYTES = 1 << 20
+_MIN_TICK_S, _MAX_TICK_S = 1e-4, 1.0
 _COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze_off", "neutral", "live")
 
 
@@ -35,7 +35,7 @@ Maker = Callable[[Parameters, int, float], CommandState]
 
 
 def _default_state(parameters: Parameters, seed: int, period_s: float) -> CommandState:
-    """A command state with the shipped layers, expressions and idle motion."""
+    """Return a command state with the shipped layers, expressions and idle motion."""
     return CommandState(parameters, seed=seed, period_s=period_s)
 
 
@@ -50,16 +50,16 @@ def recorded(
 ) -> Iterator[CommandState]:
     """Record the calls of ``state`` until the block ends.
 
-    ``path`` : the file to write; ``seed`` and ``period_s`` : those of ``state``, for the replay.
-    ``failed`` : called from another thread when the file cannot be written any more; it can be played as far as it
-    goes. Without it, that error is raised when the block ends.
+    path : the file to write. seed, period_s : those of ``state``, for the replay.
+    failed : called, perhaps from another thread, when the file cannot be written any more; what has been written can
+    still be replayed. If None, that error is raised when the block ends.
 
     Raises ControllerError: the file cannot be written.
     """
     try:
         writer = LineWriter(path, failed or (lambda _: None))
     except OSError as error:
-        raise _not_written(path, error) from error
+        raise _write_error(path, error) from error
     writer.put(_line(_KIND, _VERSION, seed, period_s, state.parameters.names))
     state.record(lambda name, *arguments: writer.put(_entry(name, *arguments)))
     try:
@@ -68,11 +68,11 @@ def recorded(
         state.record(None)
         writer.close()
     if writer.error is not None and failed is None:
-        raise _not_written(path, writer.error) from writer.error
+        raise _write_error(path, writer.error) from writer.error
 
 
 def _entry(name: str, *arguments: Any) -> bytes:
-    """The line of a call."""
+    """Return the line of a call."""
     if name == "tick":
         now_ns, dt, out = arguments
         return _line(name, now_ns, dt, zlib.crc32(out.tobytes()))
@@ -87,16 +87,16 @@ def _line(*items: Any) -> bytes:
     return json.dumps(items, separators=(",", ":"), default=lambda array: array.tolist()).encode("ascii") + b"\n"
 
 
-def _not_written(path: Path, error: OSError) -> ControllerError:
+def _write_error(path: Path, error: OSError) -> ControllerError:
     return ControllerError(f"{path}: cannot be written: {error.strerror}", hint="choose another path")
 
 
 def replay(path: Path, parameters: Parameters, *, make: Maker = _default_state) -> Iterator[tuple[int, Floats]]:
-    """Play a recording again: time (ns) and parameters (P,) of each tick; the array is used again for the next.
+    """Replay a recording and yield the time (ns) and parameters (P,) of each tick, always in the same array.
 
-    ``make`` : makes the state to play into, of the parameters, a seed and the length of a tick (s).
+    make : returns the state to play into, for parameters, a seed and the length of a tick (s).
 
-    Raises ControllerError: the file cannot be read, is damaged, or a tick comes out differently.
+    Raises ControllerError: the file cannot be read or is damaged, or the result of a tick is not the recorded one.
     """
     lines = _lines(path)
     seed, period_s = _header(path, lines, parameters)
@@ -119,20 +119,21 @@ def replay(path: Path, parameters: Parameters, *, make: Maker = _default_state) 
 
 
 class Replay:
-    """Plays a recording, see :func:`replay`, at its own pace; ticks where a command state would, takes no commands.
+    """Plays a recording in real time in place of a command state, without taking commands; see :func:`replay`.
 
-    finished : the last tick has been given. ticks : how many were. played_s : how far it is.
+    finished : whether the last tick has been played. ticks : number of ticks played. played_s : time of the last one
+    since the first.
     """
 
     def __init__(self, path: Path, parameters: Parameters, make: Maker = _default_state) -> None:
         self._ticks = replay(path, parameters, make=make)
-        self._next = self._pull()
+        self._next = self._read_next()
         self._start_ns = (0, 0)
         self.finished = False
         self.ticks, self.played_s = 0, 0.0
 
     def tick(self, now_ns: int, dt: float, out: Floats) -> int:
-        """Write the recorded parameters of this time to ``out`` : (P,); returns 0, for no command came."""
+        """Write the recorded parameters of this time to ``out`` : (P,); return 0, because no command arrived."""
         if not self.ticks and self._next is not None:
             self._start_ns = now_ns, self._next[0]
         start_ns, first = self._start_ns
@@ -140,11 +141,11 @@ class Replay:
             out[:] = self._next[1]
             self.played_s = (self._next[0] - first) * 1e-9
             self.ticks += 1
-            self._next = self._pull()
+            self._next = self._read_next()
         self.finished = self._next is None
         return 0
 
-    def _pull(self) -> tuple[int, Floats] | None:
+    def _read_next(self) -> tuple[int, Floats] | None:
         found = next(self._ticks, None)
         return None if found is None else (found[0], found[1].copy())
 
@@ -164,7 +165,7 @@ def _apply(state: CommandState, items: list[Any]) -> None:
 
 def _lines(path: Path) -> Iterator[tuple[int, list[Any]]]:
     with files.reading(path, ControllerError), files.open_file(path) as file:
-        for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE), b""), 1):
+        for number, line in enumerate(iter(lambda: file.readline(_MAX_LINE_BYTES), b""), 1):
             try:
                 items = files.parse_json(line.decode("ascii"))
             except ValueError as error:
@@ -175,7 +176,7 @@ def _lines(path: Path) -> Iterator[tuple[int, list[Any]]]:
 
 
 def _header(path: Path, lines: Iterator[tuple[int, list[Any]]], parameters: Parameters) -> tuple[int, float]:
-    """Seed and length of a tick (s), once the header says that this is a recording of these parameters."""
+    """Read the seed and the length of a tick (s), and check that this is a recording of these parameters."""
     _, items = next(lines, (1, []))
     if items[:1] == [_KIND] and (fault := format_fault(items[1:2] and items[1], _VERSION)):
         raise ControllerError(f"{path}: {fault}", hint="bring omote up to date, or record it again")
@@ -185,7 +186,7 @@ def _header(path: Path, lines: Iterator[tuple[int, list[Any]]], parameters: Para
         raise ControllerError(f"{path}: recorded with other parameters", hint="use the vocabulary it was recorded with")
     seed, period_s = items[2:4]
     numbers = not isinstance(seed, bool) and isinstance(period_s, int | float) and not isinstance(period_s, bool)
-    if not (numbers and seed >= 0 and _SHORTEST_TICK_S <= period_s <= _LONGEST_TICK_S):
+    if not (numbers and seed >= 0 and _MIN_TICK_S <= period_s <= _MAX_TICK_S):
         raise _damaged(path, 1)
     return seed, float(period_s)
 

@@ -1,7 +1,7 @@
-"""Makes takes of timed visemes, timed phonemes and the output of Rhubarb Lip Sync.
+"""Makes takes from timed visemes, timed phonemes and the output of Rhubarb Lip Sync.
 
-Timed sounds are blended by dominance (after Cohen and Massaro 1993): each sound reaches into its neighbours, the less
-the firmer they hold their own shape, so that lips meet for a short "p" between two open vowels.
+Sounds are blended by dominance functions (after Cohen and Massaro 1993): each sound influences its neighbours, but less
+those that hold their own shape firmly, so that the lips meet for a short "p" between two open vowels.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from surface.base import files
 RATE_HZ = 100.0
 """Rows per second of the takes made here."""
 
-LONGEST_S = 3600.0
+MAX_LENGTH_S = 3600.0
 """Length of the longest take made here."""
 
-_MOST_BYTES = 4 << 20
-_BEFORE_S = 0.12
-_AFTER_S = 0.08
-_FIRM = 0.85
-_NEIGHBOURS = 3
+_MAX_FILE_BYTES = 4 << 20
+_ONSET_S = 0.12  # how long before its beginning a sound shows
+_OFFSET_S = 0.08  # how long after its end a sound shows
+_FIRMNESS = 0.85  # fraction by which a sound with the firmest hold shortens both times of its neighbours
+_NEIGHBOURS = 3  # on each side
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,60 +42,60 @@ class Cue:
 
 
 def speech_take(name: str, cues: Sequence[Cue], end_s: float, parameters: Parameters, visemes: Visemes) -> Take:
-    """A take of timed sounds.
+    """Return a take of timed sounds.
 
-    ``cues`` : rising in time; the last lasts until ``end_s``.
+    cues : ascending in time; the last one lasts until ``end_s``.
 
-    Raises TakeError: no cue, or times that do not rise.
+    Raises TakeError: there is no cue, or the times are not ascending or not within 0 to an hour.
     """
     starts = np.array([cue.start_s for cue in cues])
     if len(cues) == 0 or not (np.diff(starts) >= 0).all() or not starts[-1] <= end_s:
-        raise TakeError(f"{name}: needs at least one sound, with times that rise", hint="sort the sounds by time")
-    if not 0.0 <= starts[0] <= end_s <= LONGEST_S:
-        why = f"its sounds are at {starts[0]:g} to {end_s:g} s; 0 to {LONGEST_S:g} s are read"
+        raise TakeError(f"{name}: needs at least one sound, with ascending times", hint="sort the sounds by time")
+    if not 0.0 <= starts[0] <= end_s <= MAX_LENGTH_S:
+        why = f"its sounds are at {starts[0]:g} to {end_s:g} s; 0 to {MAX_LENGTH_S:g} s are read"
         raise TakeError(f"{name}: {why}", hint="give the times in seconds")
     ends = np.append(starts[1:], end_s)
     weights = np.stack([cue.weights for cue in cues])
     hold = weights @ visemes.hold
-    times = np.arange(0.0, end_s + _AFTER_S + 1 / RATE_HZ, 1 / RATE_HZ)
+    times = np.arange(0.0, end_s + _OFFSET_S + 1 / RATE_HZ, 1 / RATE_HZ)
     values = _mix(times, starts, ends, weights, hold) @ visemes.matrix.T
     return Take(name, times, np.minimum(values, 1.0), visemes.mask, parameters.low, parameters.high, visemes.through)
 
 
 def _mix(times: Floats, starts: Floats, ends: Floats, weights: Floats, hold: Floats) -> Floats:
-    """(t, n) weights of the visemes at times (t,): the sounds near each, each by its dominance there."""
-    here = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
-    room = 1.0 - _FIRM * hold[here]
+    """Return the (t, n) weights of the visemes at times (t,): the sounds around each, weighted by their dominance."""
+    current = np.maximum(np.searchsorted(starts, times, side="right") - 1, 0)
+    room = 1.0 - _FIRMNESS * hold[current]
     mixed, total = np.zeros((len(times), weights.shape[1])), np.zeros(len(times))
     for step in range(-_NEIGHBOURS, _NEIGHBOURS + 1):
-        near = np.clip(here + step, 0, len(starts) - 1)
+        near = np.clip(current + step, 0, len(starts) - 1)
         dominance = _dominance(times, starts[near], ends[near], room) * (0.2 + 0.8 * hold[near])
-        dominance[near != here + step] = 0.0
+        dominance[near != current + step] = 0.0
         mixed += dominance[:, None] * weights[near]
         total += dominance
-    beside = total == 0.0  # before the first sound and after the last, farther away than these reach
-    mixed[beside], total[beside] = weights[here[beside]], 1.0
+    outside = total == 0.0  # so long before the first sound or after the last one that none shows
+    mixed[outside], total[outside] = weights[current[outside]], 1.0
     mixed /= total[:, None]
-    everything: Floats = _dominance(times, starts[0], ends[-1], 1.0)
-    return mixed * np.minimum(1.0, everything)[:, None]
+    whole: Floats = _dominance(times, starts[0], ends[-1], 1.0)
+    return mixed * np.minimum(1.0, whole)[:, None]
 
 
 def _dominance(t: Floats, start: Floats, end: Floats, room: Floats | float) -> Floats:
-    """1 during a sound, falling to 0 before and after it over a time that ``room`` scales."""
-    away = np.maximum((start - t) / (_BEFORE_S * room), (t - end) / (_AFTER_S * room))
-    away = np.clip(away, 0.0, 1.0)
-    level: Floats = 1.0 - away**3 * (10.0 + away * (6.0 * away - 15.0))
+    """Return 1 during a sound, falling to 0 before and after it; ``room`` scales the onset and offset times."""
+    distance = np.maximum((start - t) / (_ONSET_S * room), (t - end) / (_OFFSET_S * room))
+    distance = np.clip(distance, 0.0, 1.0)
+    level: Floats = 1.0 - distance**3 * (10.0 + distance * (6.0 * distance - 15.0))
     return level
 
 
 def cue_take(path: Path, parameters: Parameters) -> Take:
-    """A take from Rhubarb's TSV or JSON, or from a TSV of sounds (time, tab, name). Raises TakeError.
+    """Read a take from Rhubarb's TSV or JSON, or from a TSV of sounds (time, tab, name). Raises TakeError.
 
-    Sounds are visemes, phonemes of ARPAbet or symbols of the IPA. Rhubarb's letters mean its shapes only where every
-    name in the file is one: B and F are phonemes, too.
+    Sounds are visemes, ARPAbet phonemes or IPA symbols. Letters mean Rhubarb's shapes only if every name in the file is
+    one of them, because B and F are also phonemes.
     """
     with files.reading(path, TakeError, hint="save it as UTF-8"):
-        text = files.read_text(path, _MOST_BYTES)
+        text = files.read_text(path, _MAX_FILE_BYTES)
     visemes = Visemes.load(parameters)
     rows, end_s = _json_rows(path, text) if path.suffix.lower() == ".json" else _tsv_rows(path, text)
     shapes = all(name in visemes.rhubarb for _, _, name in rows)
@@ -105,7 +105,7 @@ def cue_take(path: Path, parameters: Parameters) -> Take:
 
 
 def _sounds(path: Path, rows: Sequence[tuple[str, float, str]], visemes: Visemes) -> list[Floats]:
-    """Weights of the sounds of rows. Raises TakeError, with the place of the first that is unknown."""
+    """Return the weights of the sounds of rows. Raises TakeError, with the place of the first unknown sound."""
     try:
         return visemes.sounds([name for _, _, name in rows])
     except ParameterError as error:
@@ -144,7 +144,7 @@ def _json_rows(path: Path, text: str) -> tuple[list[tuple[str, float, str]], flo
 
 
 def _json_cue(where: str, cue: Any) -> tuple[str, float, float, str]:
-    """Place, start (s), end (s) and name of a cue. Raises ValueError, which names the key."""
+    """Return the place, start (s), end (s) and name of a cue. Raises ValueError, which names the key."""
     if not isinstance(cue, dict):
         raise ValueError(f"{where} must be a table")
     for key in ("start", "end"):

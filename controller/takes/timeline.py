@@ -1,6 +1,7 @@
-"""Keyframes on a timeline, with easing between them; a timeline becomes a show (a script) and is read back from it.
+"""Defines timelines: key frames with easing between them, which are saved as a show (a script) and loaded from it.
 
-Independent of any window. A timeline is never changed: every edit returns another, so that undo keeps the earlier ones.
+This module does not depend on any window. Timelines are immutable: every edit returns a new one, which makes undo
+possible.
 """
 
 from __future__ import annotations
@@ -25,16 +26,16 @@ from controller.vocabulary.vocabulary import Vocabulary
 Ease = Literal["linear", "smooth", "in", "out", "hold"]
 EASES: tuple[Ease, ...] = get_args(Ease)
 RATE_HZ = 25.0
-_LEAST = 0.002
-_MOST_KEYS, _LONGEST_S = 1000, 3600.0
+_MIN_CHANGE = 0.002  # smaller values and changes are not written
+_MAX_KEYS, _MAX_LENGTH_S = 1000, 3600.0
 
 
 @dataclass(frozen=True)
 class Key:
     """A face at a moment.
 
-    at_s : when. values : parameters by name; the others are 0 there. ease : how it is reached from the key before.
-    name : for people, as of the expression that it is.
+    at_s : time of the key. values : parameters by name; the others are 0. ease : easing from the previous key to this
+    one. name : for people, such as that of the expression.
     """
 
     at_s: float
@@ -45,7 +46,7 @@ class Key:
 
 @dataclass(frozen=True)
 class Timeline:
-    """Keys in rising time, and marks: names of moments (s). sound : a WAV file that plays with it."""
+    """Keys sorted by time. marks : times (s) by name. sound : a WAV file that plays with the timeline."""
 
     keys: tuple[Key, ...] = ()
     marks: Mapping[str, float] = field(default_factory=dict)
@@ -53,73 +54,76 @@ class Timeline:
 
     @property
     def length_s(self) -> float:
-        """When the last key is."""
+        """Time of the last key; 0 without keys."""
         return self.keys[-1].at_s if self.keys else 0.0
 
     def with_key(self, key: Key) -> Timeline:
-        """With another key, in place of one at the same moment. Raises ParameterError: no time from 0 to an hour."""
-        if not 0.0 <= key.at_s <= _LONGEST_S:
+        """Return a timeline with another key, which replaces a key at the same time.
+
+        Raises ParameterError: its time is not from 0 to an hour, or there are too many keys.
+        """
+        if not 0.0 <= key.at_s <= _MAX_LENGTH_S:
             raise ParameterError(
-                f"a key is from 0 to {_LONGEST_S:g} s, not at {key.at_s:g}", hint="move the line first"
+                f"a key is from 0 to {_MAX_LENGTH_S:g} s, not at {key.at_s:g}", hint="move the line first"
             )
         kept = [each for each in self.keys if abs(each.at_s - key.at_s) > 1e-6]
-        if len(kept) >= _MOST_KEYS:
-            raise ParameterError(f"a timeline has {_MOST_KEYS} keys at most", hint="begin another show")
+        if len(kept) >= _MAX_KEYS:
+            raise ParameterError(f"a timeline has {_MAX_KEYS} keys at most", hint="begin another show")
         return replace(self, keys=tuple(sorted([*kept, key], key=lambda each: each.at_s)))
 
     def without_key(self, number: int) -> Timeline:
-        """Without the key of a number."""
+        """Return a timeline without the key of this index."""
         return replace(self, keys=self.keys[:number] + self.keys[number + 1 :])
 
-    def moved(self, number: int, at_s: float) -> Timeline:
-        """With a key at another moment."""
-        return self.without_key(number).with_key(replace(self.keys[number], at_s=min(max(at_s, 0.0), _LONGEST_S)))
+    def with_time(self, number: int, at_s: float) -> Timeline:
+        """Return a timeline in which the key of this index has another time, clipped to 0..1 hour."""
+        return self.without_key(number).with_key(replace(self.keys[number], at_s=min(max(at_s, 0.0), _MAX_LENGTH_S)))
 
-    def eased(self, number: int, ease: Ease) -> Timeline:
-        """With a key that is reached in another way."""
+    def with_ease(self, number: int, ease: Ease) -> Timeline:
+        """Return a timeline in which the key of this index has another easing."""
         return self.without_key(number).with_key(replace(self.keys[number], ease=ease))
 
     def with_mark(self, name: str, at_s: float | None) -> Timeline:
-        """With a mark, or without it for None. Raises ParameterError: the name is empty."""
+        """Return a timeline with a mark at a time; ``at_s`` None: without that mark. Raises ParameterError: no name."""
         if not name.strip():
-            raise ParameterError("a mark needs a name", hint="as: hello")
+            raise ParameterError("a mark needs a name", hint="for example: hello")
         marks = {key: value for key, value in self.marks.items() if key != name}
         return replace(self, marks=marks if at_s is None else {**marks, name: round(max(at_s, 0.0), 3)})
 
     def at(self, time_s: float, parameters: Parameters) -> Floats:
-        """(P,) the face at a moment; before the first and after the last key it is theirs."""
+        """Return the face (P,) at a time; before the first key and after the last one it is that of the key."""
         if not self.keys:
             return parameters.neutral()
         after = bisect.bisect_right([key.at_s for key in self.keys], time_s)
         if after == 0 or after == len(self.keys):
             return _face(self.keys[min(after, len(self.keys) - 1)], parameters)
         first, second = self.keys[after - 1], self.keys[after]
-        share = eased((time_s - first.at_s) / (second.at_s - first.at_s), second.ease)
-        return (1.0 - share) * _face(first, parameters) + share * _face(second, parameters)
+        weight = ease_fraction((time_s - first.at_s) / (second.at_s - first.at_s), second.ease)
+        return (1.0 - weight) * _face(first, parameters) + weight * _face(second, parameters)
 
 
-def eased(share: float, ease: Ease) -> float:
-    """The way that is done after a share 0..1 of the time."""
-    ways = {
-        "linear": share,
-        "smooth": share * share * (3.0 - 2.0 * share),
-        "in": share * share,
-        "out": share * (2.0 - share),
-        "hold": 0.0 if share < 1.0 else 1.0,
+def ease_fraction(time: float, ease: Ease) -> float:
+    """Return the fraction 0..1 of the way that is done after a fraction ``time`` 0..1 of the time."""
+    fractions = {
+        "linear": time,
+        "smooth": time * time * (3.0 - 2.0 * time),
+        "in": time * time,
+        "out": time * (2.0 - time),
+        "hold": 0.0 if time < 1.0 else 1.0,
     }
-    return ways[ease]
+    return fractions[ease]
 
 
 def key_of_face(at_s: float, face: Floats, parameters: Parameters, ease: Ease = "smooth", name: str = "") -> Key:
-    """A key of the face ``face`` (P,); values below 0.002 are left out."""
-    there = np.flatnonzero(np.abs(face) >= _LEAST)
-    return Key(round(at_s, 3), {parameters.names[i]: round(float(face[i]), 3) for i in there}, ease, name)
+    """Return a key with the values of ``face`` (P,); values below 0.002 are left out."""
+    moved = np.flatnonzero(np.abs(face) >= _MIN_CHANGE)
+    return Key(round(at_s, 3), {parameters.names[i]: round(float(face[i]), 3) for i in moved}, ease, name)
 
 
 def steps_of(timeline: Timeline, parameters: Parameters, rate_hz: float = RATE_HZ) -> list[str]:
-    """The steps of a script that plays a timeline: ``SET`` lines of what changes, at ``rate_hz`` while it does.
+    """Return the steps of a script that plays a timeline: ``SET`` lines for the changes, ``rate_hz`` times a second.
 
-    The first sets every parameter that any key has, so that a show which loops begins alike.
+    The first step sets every parameter of any key, so that every repetition of a looped show begins alike.
     """
     used = [i for i, name in enumerate(parameters.names) if any(name in key.values for key in timeline.keys)]
     count = int(np.floor(timeline.length_s * rate_hz + 1e-9))
@@ -129,7 +133,7 @@ def steps_of(timeline: Timeline, parameters: Parameters, rate_hz: float = RATE_H
     for time_s in times if used else ():
         face = timeline.at(float(time_s), parameters)
         is_key = any(abs(key.at_s - time_s) < 1e-6 for key in timeline.keys)
-        least = 1e-4 if is_key else _LEAST
+        least = 1e-4 if is_key else _MIN_CHANGE
         changed = [i for i in used if not abs(face[i] - written[i]) < least]
         if changed:
             written[changed] = face[changed]
@@ -139,7 +143,7 @@ def steps_of(timeline: Timeline, parameters: Parameters, rate_hz: float = RATE_H
 
 
 class _KeyTable(Settings):
-    at_s: Annotated[Number, Field(ge=0, le=_LONGEST_S)]
+    at_s: Annotated[Number, Field(ge=0, le=_MAX_LENGTH_S)]
     ease: Ease = "smooth"
     name: str = ""
     values: dict[str, Number] = {}
@@ -150,16 +154,16 @@ class _File(Settings, extra="ignore"):
 
     marks: dict[str, Number] = {}
     sound: str | None = None
-    keys: Annotated[list[_KeyTable], Field(max_length=_MOST_KEYS)] = []
+    keys: Annotated[list[_KeyTable], Field(max_length=_MAX_KEYS)] = []
 
 
 def save_show(
     path: Path, timeline: Timeline, parameters: Parameters, vocabulary: Vocabulary | None = None, *, loop: bool = False
 ) -> None:
-    """Write a timeline as a script, which plays it, with its keys, which :func:`load_timeline` reads.
+    """Write a timeline as a script that plays it and that also has its keys, for :func:`load_timeline`.
 
-    Raises ParameterError: there is no key, or its sound is not in the folder. ControllerError: the file cannot be
-    written, or could not be read again.
+    Raises ParameterError: no key moves anything, or the sound is not in the script's folder. ControllerError: the file
+    cannot be written, or the script cannot be read back.
     """
     steps = steps_of(timeline, parameters)
     if not steps:
@@ -168,7 +172,7 @@ def save_show(
     if loop:
         table["loop_s"] = round(timeline.length_s + 1.0 / RATE_HZ, 3)
     if timeline.sound is not None:
-        table["sound"] = _beside(timeline.sound, path)
+        table["sound"] = _relative_to_show(timeline.sound, path)
     table |= {"steps": steps, "marks": dict(timeline.marks)}
     table["keys"] = [
         {"at_s": key.at_s, "ease": key.ease, "name": key.name, "values": dict(key.values)} for key in timeline.keys
@@ -179,9 +183,9 @@ def save_show(
 
 
 def load_timeline(path: Path, parameters: Parameters) -> Timeline:
-    """The timeline of a script that was saved from one; without keys for any other script.
+    """Return the timeline from which a script was saved; it has no keys for any other script.
 
-    Raises ConfigError: it cannot be read, or a key names no parameter.
+    Raises ConfigError: the file cannot be read, or a key has an unknown parameter.
     """
 
     def faults(file: _File) -> list[str]:
@@ -198,11 +202,11 @@ def load_timeline(path: Path, parameters: Parameters) -> Timeline:
     return timeline
 
 
-def _beside(sound: Path, show: Path) -> str:
-    """A sound as a show names it: in its folder or below. Raises ParameterError: it is elsewhere."""
+def _relative_to_show(sound: Path, show: Path) -> str:
+    """Return the path of a sound relative to the show's folder. Raises ParameterError: it is not in that folder."""
     folder = show.parent.resolve()
     if not sound.resolve().is_relative_to(folder):
-        raise ParameterError(f"{sound}: a show's sound lies beside it", hint=f"copy it to {folder}")
+        raise ParameterError(f"{sound}: the sound of a show must be in its folder", hint=f"copy it to {folder}")
     return sound.resolve().relative_to(folder).as_posix()
 
 

@@ -1,7 +1,8 @@
-"""Moves a mouth by the sound of a voice: of a WAV file as a take, of a stream while it plays.
+"""Moves the mouth by the sound of a voice: a WAV file becomes a take, and a stream is followed while it plays.
 
-The lips form the viseme that the sound is most like (:mod:`controller.takes.voices.lips`), the jaw opens the further
-the louder the voice is. A file is compared with its own loud parts, a stream with the loudest of the last few seconds.
+The lips form the viseme that the sound resembles most (:mod:`controller.takes.voices.lips`), and the jaw opens the
+further, the louder the voice is. Loudness is relative to the loud parts of a file, or to the loudest of the last few
+seconds of a stream.
 """
 
 from __future__ import annotations
@@ -30,28 +31,28 @@ from controller.takes.voices.lips import (
     lip_model,
     loudness_db,
 )
-from controller.takes.voices.pcm import HINT, LOWEST_HZ, Sound, open_sound
+from controller.takes.voices.pcm import HINT, MIN_HZ, Sound, open_sound
 from controller.vocabulary.visemes import Visemes
 from surface.base import files
 
 __all__ = ["HOP_S", "VoiceEnvelope", "VoiceListener", "voice_take", "wav_take"]
 
 _RATE_HZ = round(1 / HOP_S)
-_TAU_S = 0.01
-_SHARPNESS = 2.0  # power of the shares: mouths between all visemes look like none
-_CLOSING = 2.0  # lips that do not meet are noticed more than lips that meet too often
-_MEMORY_S = 4.0
-_LONGEST_S = 3600.0
-_QUIET_DB = -53.0  # what is never louder counts as silence whatever came before
-_HUSHED_DB = 28.0  # below the loudest: silence, where a tenth of a second holds nothing louder
-_SOFT_DB, _SOFT_JAW = 26.0, 0.6  # a voice softer by so much opens the jaw by this share
+_LIP_TIME_CONSTANT_S = 0.01
+_SHARPNESS = 2.0  # power of the viseme probabilities, because a mixture of many visemes looks like no sound
+_CLOSURE_WEIGHT = 2.0  # lips that do not meet for a closure are more noticeable than lips that meet too often
+_LOUDEST_DECAY_S = 4.0  # time constant with which the loudest level of a stream is forgotten
+_MAX_SOUND_S = 3600.0
+_QUIET_DB = -53.0  # absolute level up to which sound counts as silence
+_HUSHED_DB = 28.0  # sound more than this below the loudest, for the whole context of a frame, counts as silence
+_SOFT_DB, _SOFT_JAW = 26.0, 0.6  # a voice this much below the loudest opens the jaw by this fraction
 _LOUD_PERCENTILE = 95.0
-_BLOCK = 4096
-_NOTHING_DB = -140.0
+_BLOCK = 4096  # frames
+_SILENCE_DB = -140.0
 
 
 def wav_take(path: Path, parameters: Parameters) -> Take:
-    """A take of a WAV file, a row every 10 ms. Raises TakeError: not a WAV file that omote decodes, or an empty one."""
+    """Read a take of a WAV file, with a row every 10 ms. Raises TakeError: omote cannot decode it, or it is empty."""
     with files.reading(path, TakeError), files.open_file(path) as stream:
         return voice_take(stream, str(path), parameters)
 
@@ -59,24 +60,26 @@ def wav_take(path: Path, parameters: Parameters) -> Take:
 def voice_take(
     stream: IO[bytes], name: str, parameters: Parameters, *, raw_hz: int | None = None, longest_s: float | None = None
 ) -> Take:
-    """A take of a voice, a row every 10 ms, of the first ``longest_s`` (at most an hour).
+    """Return a take of a voice, with a row every 10 ms.
 
-    ``raw_hz``: samples per second of signed 16 bit mono PCM without a header; None for WAV. ``name`` : for errors.
-    Raises TakeError: not WAV that omote decodes, or empty. OSError: the stream cannot be read.
+    stream : open for reading bytes. name : for errors. raw_hz : samples per second of signed 16 bit mono PCM without a
+    header; None for WAV. longest_s : how much of the sound to read, at most and by default an hour.
+
+    Raises TakeError: omote cannot decode the sound, or it is empty. OSError: the stream cannot be read.
     """
     sound = open_sound(stream, name, raw_hz)
     rate = sound.format.rate_hz
-    levels = levels_of(_seconds(sound, min(longest_s or _LONGEST_S, _LONGEST_S)), rate)
+    levels = levels_of(_seconds(sound, min(longest_s or _MAX_SOUND_S, _MAX_SOUND_S)), rate)
     if not len(levels):
         raise TakeError(f"{name}: no sound in it", hint=HINT)
     mouth = _Mouth(parameters)
     loudness = loudness_db(levels)
     loud = max(float(np.percentile(loudness, _LOUD_PERCENTILE)), _QUIET_DB)
-    shares = np.concatenate([mouth.rest[None], *_judged(levels, loud, mouth)])  # a frame's middle is a hop later
-    share = mouth.rest
-    for i, goal in enumerate(shares):
-        shares[i] = share = _follow(share, goal)
-    values = mouth.pose(shares[:-1], loudness - loud)
+    weights = np.concatenate([mouth.rest[None], *_classify(levels, loud, mouth)])  # a frame's middle is a hop later
+    current = mouth.rest
+    for i, goal in enumerate(weights):
+        weights[i] = current = _follow(current, goal)
+    values = mouth.pose(weights[:-1], loudness - loud)
     times: Floats = np.arange(len(values)) / _RATE_HZ
     return Take(
         Path(name).name, times, values, mouth.visemes.mask, parameters.low, parameters.high, mouth.visemes.through
@@ -84,7 +87,7 @@ def voice_take(
 
 
 def _seconds(sound: Sound, seconds: float) -> Iterator[Floats]:
-    """The first ``seconds`` of a sound, a second at a time: a file may say that it is longer than it is."""
+    """Yield the samples of the first ``seconds`` of a sound, one second at a time."""
     left = math.ceil(seconds * sound.format.rate_hz)
     while left > 0 and (piece := sound.read(min(sound.format.rate_hz, left))):
         yield sound.format.samples(piece)
@@ -92,99 +95,105 @@ def _seconds(sound: Sound, seconds: float) -> Iterator[Floats]:
 
 
 def levels_of(seconds: Iterator[Floats], rate: int) -> Floats:
-    """(k, BANDS) levels (dB) every 10 ms of a sound that comes a second, (rate,), at a time."""
+    """Return the (k, BANDS) levels (dB), every 10 ms, of a sound that is given one second, (rate,), at a time."""
     size = int(WINDOW_S * rate)
     window = np.arange(size)
-    out, here = [np.zeros((0, BANDS))], next(seconds, np.zeros(0))
-    while len(here):
-        after = next(seconds, np.zeros(0))
-        hops = _RATE_HZ if len(after) else max(len(here) * _RATE_HZ // rate, not out[1:])
+    out, current = [np.zeros((0, BANDS))], next(seconds, np.zeros(0))
+    while len(current):
+        following = next(seconds, np.zeros(0))
+        hops = _RATE_HZ if len(following) else max(len(current) * _RATE_HZ // rate, not out[1:])
         starts = np.arange(hops) * rate // _RATE_HZ
-        sound = np.concatenate([here, after[:size], np.zeros(size)])
+        sound = np.concatenate([current, following[:size], np.zeros(size)])
         out.append(band_levels(sound[starts[:, None] + window], rate))
-        here = after
+        current = following
     return np.concatenate(out)
 
 
-def _judged(levels: Floats, loud: float, mouth: _Mouth) -> Iterator[Floats]:
-    """Shares of the visemes (k, n) of levels (k, BANDS), some thousand frames at a time."""
-    silence = np.full((BEFORE, BANDS), _NOTHING_DB)
+def _classify(levels: Floats, loud: float, mouth: _Mouth) -> Iterator[Floats]:
+    """Yield the weights of the visemes (k, n) for levels (k, BANDS), in blocks of frames."""
+    silence = np.full((BEFORE, BANDS), _SILENCE_DB)
     padded = np.concatenate([silence, levels, silence[:AHEAD]])
-    for at in range(0, len(levels), _BLOCK):
-        part = padded[at : at + _BLOCK + BEFORE + AHEAD]
+    for begin in range(0, len(levels), _BLOCK):
+        part = padded[begin : begin + _BLOCK + BEFORE + AHEAD]
         near = np.lib.stride_tricks.sliding_window_view(loudness_db(part), BEFORE + AHEAD + 1).max(axis=1)
-        yield mouth.shares(part, loud, near)
+        yield mouth.weights(part, loud, near)
 
 
 class _Mouth:
-    """Shares of visemes, and the parameters that they move.
+    """Computes weights of visemes from sound, and parameters from weights.
 
-    visemes : of the vocabulary. rest : (n,) share of silence alone.
+    visemes : the vocabulary. rest : (n,) weights of silence.
     """
 
     def __init__(self, parameters: Parameters) -> None:
         self.visemes = Visemes.load(parameters)
         self._model = lip_model()
         known = self.visemes.names
-        at = [known.index(name) if name in known else 0 for name in self._model.visemes]
-        self._columns = self.visemes.matrix[:, at].T
-        self._firmness = self.visemes.hold[at] * np.where(np.array(self._model.visemes) == "PP", _CLOSING, 1.0)
+        columns = [known.index(name) if name in known else 0 for name in self._model.visemes]
+        self._columns = self.visemes.matrix[:, columns].T
+        self._firmness = self.visemes.hold[columns] * np.where(
+            np.array(self._model.visemes) == "PP", _CLOSURE_WEIGHT, 1.0
+        )
         self.rest = np.eye(len(self._columns))[0]
         self._jaw = parameters.index("jawOpen")
 
-    def shares(self, levels: Floats, loud: Floats | float, near: Floats) -> Floats:
-        """(k, n) shares in levels (k + BEFORE + AHEAD, BANDS); silence where ``near``, the loudest around, is low."""
-        judged = self._model.judge(features(levels, loud)) ** _SHARPNESS * self._firmness
-        judged /= np.maximum(judged.sum(axis=1, keepdims=True), 1e-9)
-        heard = (near > _QUIET_DB) & (near > loud - _HUSHED_DB)
-        return np.where(heard[:, None], judged, self.rest)
+    def weights(self, levels: Floats, loud: Floats | float, near: Floats) -> Floats:
+        """Return the weights (k, n) of the visemes in k frames.
 
-    def pose(self, shares: Floats, level_db: Floats) -> Floats:
-        """(k, P) parameters of shares (k, n), whose frames are by ``level_db`` louder than the loudest."""
-        values: Floats = shares @ self._columns
+        levels : (k + BEFORE + AHEAD, BANDS) dB. loud : the loudest level of the voice (dB). near : (k,) the loudest
+        level around each frame (dB); if that is too low, the frame is silence.
+        """
+        found = self._model.classify(features(levels, loud)) ** _SHARPNESS * self._firmness
+        found /= np.maximum(found.sum(axis=1, keepdims=True), 1e-9)
+        is_voice = (near > _QUIET_DB) & (near > loud - _HUSHED_DB)
+        return np.where(is_voice[:, None], found, self.rest)
+
+    def pose(self, weights: Floats, level_db: Floats) -> Floats:
+        """Return the parameters (k, P) for weights (k, n); ``level_db`` : (k,) loudness relative to the loudest."""
+        values: Floats = weights @ self._columns
         loud = np.clip(1.0 + level_db / _SOFT_DB, 0.0, 1.0)
         values[:, self._jaw] *= _SOFT_JAW + (1.0 - _SOFT_JAW) * loud
         return np.clip(values, 0.0, 1.0, out=values)
 
 
 class VoiceEnvelope:
-    """Turns sound of ``rate_hz`` samples per second into a mouth, a hop of 10 ms at a time.
+    """Turns sound of ``rate_hz`` samples per second into the parameters of a mouth, one hop of 10 ms at a time.
 
-    The mouth is about 60 ms behind the sound: 40 ms of it to hear what follows a closure.
+    The mouth lags the sound by about 60 ms, of which 40 ms are the context after a frame.
 
-    mask : (P,) bool, the parameters it moves.
+    mask : (P,) bool, the parameters that it moves. hop : number of samples in 10 ms.
     """
 
     def __init__(self, parameters: Parameters, rate_hz: int) -> None:
-        if rate_hz < LOWEST_HZ:
-            raise ValueError(f"rate_hz must be {LOWEST_HZ} or more, not {rate_hz}")
+        if rate_hz < MIN_HZ:
+            raise ValueError(f"rate_hz must be {MIN_HZ} or more, not {rate_hz}")
         self.hop = round(rate_hz * HOP_S)
         self._mouth = _Mouth(parameters)
         self.mask = self._mouth.visemes.mask
         self._rate_hz, self._window = rate_hz, np.zeros(int(rate_hz * WINDOW_S))
-        self._levels = np.full((BEFORE + 1 + AHEAD, BANDS), _NOTHING_DB)
-        self._loudness = np.full(len(self._levels), _NOTHING_DB)
-        self._loudest, self._share = _QUIET_DB, self._mouth.rest
+        self._levels = np.full((BEFORE + 1 + AHEAD, BANDS), _SILENCE_DB)
+        self._loudness = np.full(len(self._levels), _SILENCE_DB)
+        self._loudest, self._weights = _QUIET_DB, self._mouth.rest
 
     def process(self, sound: Floats) -> Floats:
-        """(P,) the mouth after one hop of samples -1..1, (hop,) float64; shorter at the end of a stream."""
+        """Return the parameters (P,) after one hop of samples -1..1, (hop,) float64; the last hop may be shorter."""
         self._window = np.concatenate([self._window, sound])[-len(self._window) :]
         self._levels[:-1], self._loudness[:-1] = self._levels[1:], self._loudness[1:]
         self._levels[-1] = band_levels(self._window, self._rate_hz)
         self._loudness[-1] = loudness_db(self._levels[-1])
-        faded = self._loudest - 20.0 * math.log10(math.e) * HOP_S / _MEMORY_S
+        faded = self._loudest - 20.0 * math.log10(math.e) * HOP_S / _LOUDEST_DECAY_S
         self._loudest = max(faded, float(self._loudness[-1]), _QUIET_DB)
         near = self._loudness.max(keepdims=True)
-        self._share = _follow(self._share, self._mouth.shares(self._levels, self._loudest, near)[0])
+        self._weights = _follow(self._weights, self._mouth.weights(self._levels, self._loudest, near)[0])
         level_db = self._loudness[BEFORE : BEFORE + 1] - self._loudest
-        pose: Floats = self._mouth.pose(self._share[None], level_db)[0]
+        pose: Floats = self._mouth.pose(self._weights[None], level_db)[0]
         return pose
 
 
 class VoiceListener:
     """Writes the speech layer from a WAV stream; the layer's time-out releases it when the stream ends.
 
-    A stream that comes faster than sound, such as a file, is taken at the pace of its rate.
+    A stream that comes faster than real time, such as a file, is read in real time.
 
     Parameters
     ----------
@@ -193,7 +202,7 @@ class VoiceListener:
 
     Attributes
     ----------
-    hops : how many pieces of 10 ms were processed.
+    hops : number of pieces of 10 ms that were processed.
 
     Raises TakeError: the stream does not begin as WAV that omote decodes.
     """
@@ -206,7 +215,7 @@ class VoiceListener:
         self.hops = 0
 
     def stop(self) -> None:
-        """Stop listening; a blocked read ends when the stream does."""
+        """Stop listening; a read that is blocked returns only when the stream sends data or ends."""
         self._stopping.set()
 
     def run(self) -> None:
@@ -222,6 +231,6 @@ class VoiceListener:
             self._state.write_layer("speech", values, self._envelope.mask, now, now, through=self._through)
 
 
-def _follow(share: Floats, goal: Floats) -> Floats:
-    """Shares (n,) a hop later: lips need a little time from shape to shape."""
-    return share + (goal - share) * (1.0 - math.exp(-HOP_S / _TAU_S))
+def _follow(weights: Floats, goal: Floats) -> Floats:
+    """Return the weights (n,) one hop later: lips need a little time from shape to shape."""
+    return weights + (goal - weights) * (1.0 - math.exp(-HOP_S / _LIP_TIME_CONSTANT_S))

@@ -71,7 +71,7 @@ def attack(form: Format, count: int, seed: int, good: Sequence[bytes] = ()) -> F
         found.slowest_s = max(found.slowest_s, spent_s if spent_s <= LONGEST_S else again_s(form, message))
         found.frames += len(frames)
         if not all(np.isfinite(frame.values[frame.mask]).all() for frame in frames):
-            found.fault(f"{form.kind}: values that are no numbers", message)
+            found.fault(f"{form.kind}: values that are not numbers", message)
         faces = (each for _ in range(_UNTIL) for each in encoder.encode(_face(draw)))
         if n % _PROBE == 0 and not any(decoder.feed(each) for each in faces):
             found.fault(f"{form.kind}: good messages are not taken any more", message)

@@ -1,7 +1,8 @@
-"""omote's binary frame: a whole face in 139 bytes, for microcontrollers and radio links; docs/links.md specifies it.
+"""Format of omote's binary frame: a whole face in 139 bytes, for microcontrollers and radio links.
 
-59 parameters at 60 Hz are 83,400 of 115,200 baud. COBS (Cheshire and Baker, "Consistent Overhead Byte Stuffing", 1999)
-keeps zero bytes for the end of a frame; CRC-16/CCITT-FALSE finds damage.
+It is specified in docs/links.md. 59 parameters at 60 Hz need 83,400 of 115,200 baud. COBS (Cheshire and Baker,
+"Consistent Overhead Byte Stuffing", 1999) reserves zero bytes for the end of a frame, and CRC-16/CCITT-FALSE detects
+damage.
 """
 
 from __future__ import annotations
@@ -17,26 +18,27 @@ from controller.formats.frame import Frame, Refusals
 
 VERSION = 1
 UNIT = 16_384
-"""What a value of 1 is in a frame: 16 bits with sign hold nearly -2 to 2."""
+"""Integer that stands for a value of 1, so that signed 16 bits hold nearly -2 to 2."""
 LARGEST = 32_767
+"""Largest integer of a value."""
 
 _HEAD = struct.Struct("<BHIBB")  # version, sequence, milliseconds, flags, count
 _CRC = struct.Struct("<H")
-_FACE = 1
-_TIME = 2
+_FACE_FLAG = 1
+_TIME_FLAG = 2
 _MILLISECONDS = 1 << 32
 
 
 class BinaryDecoder:
-    """Reads frames with or without the zero that ends them: a program may send it in a datagram, too."""
+    """Decodes frames with or without the zero byte that ends them, which programs may also send in a datagram."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
         self._size, self._base = len(parameters), parameters.base
-        self._turns, self._last = 0, 0
+        self._wraps, self._last = 0, 0
 
     def feed(self, message: bytes) -> list[Frame]:
-        """The frames of a message, without those that are damaged."""
+        """Return the undamaged frames of a message."""
         return [frame for stuffed in message.strip(b"\0").split(b"\0") for frame in self._read(stuffed)]
 
     def _read(self, stuffed: bytes) -> list[Frame]:
@@ -53,34 +55,35 @@ class BinaryDecoder:
         version, sequence, milliseconds, flags, count = _HEAD.unpack_from(body)
         if version != VERSION:
             raise ValueError(f"version {version}; this omote reads version {VERSION}")
-        at = _HEAD.size + (count + 7) // 8
-        given = np.unpackbits(np.frombuffer(body[_HEAD.size : at], np.uint8), bitorder="little")[:count].astype(bool)
-        if len(body) != at + 2 * int(given.sum()):
+        offset = _HEAD.size + (count + 7) // 8
+        bits = np.frombuffer(body[_HEAD.size : offset], np.uint8)
+        given = np.unpackbits(bits, bitorder="little")[:count].astype(bool)
+        if len(body) != offset + 2 * int(given.sum()):
             raise ValueError("a wrong length")
         values, mask = np.zeros(max(self._size, count)), np.zeros(max(self._size, count), dtype=bool)
-        values[:count][given] = np.frombuffer(body, "<i2", offset=at) / UNIT
-        mask[: min(count, self._base)] = given[: self._base]  # a number means one of the base vocabulary
-        time_s = milliseconds / 1000.0 if flags & _TIME else None
-        face = bool(flags & _FACE)
-        return Frame(values[: self._size], mask[: self._size], time_s, self._count(sequence), face)
+        values[:count][given] = np.frombuffer(body, "<i2", offset=offset) / UNIT
+        mask[: min(count, self._base)] = given[: self._base]  # only parameters of the base vocabulary have numbers
+        time_s = milliseconds / 1000.0 if flags & _TIME_FLAG else None
+        face = bool(flags & _FACE_FLAG)
+        return Frame(values[: self._size], mask[: self._size], time_s, self._unwrap(sequence), face)
 
-    def _count(self, sequence: int) -> int:
-        """The number of a frame, which goes on rising where its 16 bits begin again."""
+    def _unwrap(self, sequence: int) -> int:
+        """Return the number of a frame, which continues to increase where its 16 bits wrap round."""
         if sequence < self._last and self._last - sequence > 1 << 15:
-            self._turns += 1
+            self._wraps += 1
         self._last = sequence
-        return self._turns << 16 | sequence
+        return self._wraps << 16 | sequence
 
 
 class BinaryEncoder:
-    """Writes frames without the zero that ends them; values beyond -2 to 2 are cut off."""
+    """Encodes frames without the zero byte that ends them; values are clipped to about -2..2."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._sequence, self._base = 0, parameters.base
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """One message."""
-        flags = _FACE * frame.face | (_TIME if frame.time_s is not None else 0)
+        """Return one message."""
+        flags = _FACE_FLAG * frame.face | (_TIME_FLAG if frame.time_s is not None else 0)
         milliseconds = round((frame.time_s or 0.0) * 1000.0) % _MILLISECONDS
         mask = (frame.mask if frame.face else np.zeros_like(frame.mask))[: self._base]
         head = _HEAD.pack(VERSION, self._sequence, milliseconds, flags, len(mask))
@@ -91,7 +94,7 @@ class BinaryEncoder:
 
 
 def stuff(data: bytes) -> bytes:
-    """Bytes without any zero: each block of up to 254 others stands behind its length."""
+    """Return the COBS encoding of bytes, which has no zero: blocks of up to 254 other bytes follow their length."""
     out = bytearray()
     for block in data.split(b"\0"):
         while len(block) >= 254:
@@ -103,7 +106,7 @@ def stuff(data: bytes) -> bytes:
 
 
 def unstuff(data: bytes) -> bytes:
-    """What :func:`stuff` was given. Raises ValueError: its blocks do not fit."""
+    """Return the bytes that :func:`stuff` encoded. Raises ValueError: they are not a COBS encoding."""
     out, at = bytearray(), 0
     while at < len(data):
         code = data[at]

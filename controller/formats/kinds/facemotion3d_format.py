@@ -1,4 +1,4 @@
-"""Facemotion3d: the text of iFacialMocap with ``&`` between name and value and ARKit's own names."""
+"""Format of Facemotion3d: the text of iFacialMocap, but with ``&`` between name and value and with ARKit's names."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FORMAT = Format(
     transports=("udp",),
     port=49993,
     decoder=IFacialMocapDecoder,
-    encoder=partial(IFacialMocapEncoder, between="&", suffixed=False),
+    encoder=partial(IFacialMocapEncoder, separator="&", suffixed=False),
     carries=base_only,
     quantum=0.005,
     greeting=b"FACEMOTION3D_OtherStreaming",

@@ -1,8 +1,8 @@
-"""Words that iCub's face knows: ``set all hap``, ``set mou sad``, one command a line.
+"""Format of iCub's face: commands ``set all hap``, ``set mou sad``, one per line.
 
-Source: robotology/icub-main, app/faceExpressions (doc.dox, conf/emotions.ini): parts ``mou``, ``eli``, ``leb``,
-``reb`` and ``all``, emotions of three letters. ``configs/vocabularies/icub.toml`` says what they are here. Only the
-words are those of its RPC port: YARP's own framing is not spoken, and nothing is answered.
+Source: robotology/icub-main, app/faceExpressions (doc.dox, conf/emotions.ini), with the parts ``mou``, ``eli``,
+``leb``, ``reb`` and ``all`` and emotions of three letters. ``configs/vocabularies/icub.toml`` defines the emotions as
+parameters. Only the commands are those of iCub's RPC port: YARP's framing is not used, and nothing is answered.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ from controller.formats.format import API, Format, nothing
 from controller.formats.frame import Frame, Held, Refusals
 from controller.vocabulary.presets import Presets
 
-_WORDS = 3
+_WORD_COUNT = 3
 _MOUTH, _LIDS, _BROWS = ("mouth", "jaw", "cheeks", "nose"), ("lids",), ("brows",)
 _TALK = ("ta1", "ta2")
-"""Shapes of a speaking mouth; they leave the rest of the face alone."""
+"""Shapes of a speaking mouth, which do not change the rest of the face."""
 
 
 class IcubDecoder:
-    """Reads commands; what is not set keeps its face."""
+    """Decodes commands; parts of the face that are not set keep their values."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused, self._held = Refusals(), Held(parameters)
@@ -33,9 +33,9 @@ class IcubDecoder:
         self._held.mask[:] = self._parts["all"]
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame for a command that sets something."""
+        """Return one frame for a valid command, else none."""
         words = message[:64].decode("ascii", "replace").lower().split()
-        if len(words) != _WORDS or words[0] != "set" or words[1] not in self._parts:
+        if len(words) != _WORD_COUNT or words[0] != "set" or words[1] not in self._parts:
             self.refused.add("no command that sets an emotion")
             return []
         preset = self._presets.find(words[2])
@@ -48,7 +48,7 @@ class IcubDecoder:
 
 
 class IcubEncoder:
-    """Writes the emotion that a face is most like."""
+    """Encodes the emotion that a face resembles most."""
 
     def __init__(self, parameters: Parameters) -> None:
         presets, self._all = _presets(parameters), _parts(parameters)["all"]
@@ -57,12 +57,12 @@ class IcubEncoder:
         self._weights = np.array([preset.weights[self._all] for preset in found if preset is not None])
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """One command; none for a frame without a face."""
+        """Return one command; none for a frame without a face."""
         if not frame.face:
             return []
         values = np.clip(np.where(frame.mask, frame.values, 0.0), 0.0, 1.0)[self._all]
-        away = np.linalg.norm(self._weights - values, axis=1)
-        return [f"set all {self._names[int(np.argmin(away))]}".encode()]
+        distances = np.linalg.norm(self._weights - values, axis=1)
+        return [f"set all {self._names[int(np.argmin(distances))]}".encode()]
 
 
 @cache
@@ -72,7 +72,7 @@ def _presets(parameters: Parameters) -> Presets:
 
 @cache
 def _parts(parameters: Parameters) -> dict[str, Flags]:
-    """(P,) bool of each part of the face; eyes and head are no part of it."""
+    """Return a mask (P,) of each part of the face; eyes and head belong to none."""
     regions, names = np.array(parameters.regions), np.array(parameters.names)
     brows = np.isin(regions, _BROWS)
     right = np.char.endswith(names, "Right")
@@ -93,7 +93,7 @@ def _about(parameters: Parameters) -> Flags:
 FORMAT = Format(
     api=API,
     kind="icub",
-    title="emotions by name, as iCub's face knows them",
+    title="commands of iCub's face, emotions by name",
     transports=("tcp", "udp", "serial", "lines"),
     port=9405,
     decoder=IcubDecoder,
@@ -102,5 +102,5 @@ FORMAT = Format(
     about=_about,
     delimiter=b"\n",
     timeout_s=math.inf,
-    note="one of ten emotions, whichever the face is most like; no eyes and head",
+    note="only the most similar of ten emotions; no eyes and head",
 )

@@ -1,8 +1,8 @@
-"""iFacialMocap and Facemotion3d: text that phones send, an entry for each blend shape.
+"""Format of the phone apps iFacialMocap and Facemotion3d: text with an entry for each blend shape.
 
-``mouthSmile_R-50|...|=head#ex,ey,ez,px,py,pz|rightEye#ex,ey,ez|leftEye#ex,ey,ez|``: whole numbers of 0 to 100, and
-angles in degrees. Facemotion3d has ``&`` between name and value. Yaw is positive to the subject's left, as in omote
-(inferred from published frames). Sources: ifacialmocap.com/for-developer and facemotion3d.net/for-developer.
+``mouthSmile_R-50|...|=head#ex,ey,ez,px,py,pz|rightEye#ex,ey,ez|leftEye#ex,ey,ez|``: values are whole numbers from 0 to
+100, and angles are in degrees. Facemotion3d has ``&`` between name and value. Yaw is positive to the subject's left, as
+in omote (inferred from published frames). Sources: ifacialmocap.com/for-developer and facemotion3d.net/for-developer.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from controller.base.parameters import Flags, Floats, Parameters
 from controller.formats.format import API, Format, base_only
 from controller.formats.frame import Frame, Refusals
 
-_FULL = 100.0
-_MOST = 10.0  # times a whole movement; no face goes further, and text has no room for it
-_LONGEST_VALUE = 24
-_SHAPES = 52
+_VALUE_SCALE = 100.0
+_MAX_VALUE = 10.0  # times a full movement, so that a wrong value does not make the message too long
+_MAX_VALUE_LENGTH = 24  # characters
+_SHAPE_COUNT = 52
 _ENTRY = re.compile(r"=?\s*([A-Za-z_][A-Za-z0-9_]*)\s*[-&]\s*(-?[0-9.]+(?:[eE]-?[0-9]+)?)\s*")
-_OPTIONAL = re.compile(r"trackingStatus|hapihapi|FM_\w*")
-_WHOLE = ("jawLeft", "jawRight", "mouthLeft", "mouthRight")
-_TURNS = {
+_IGNORED = re.compile(r"trackingStatus|hapihapi|FM_\w*")
+_UNSUFFIXED = ("jawLeft", "jawRight", "mouthLeft", "mouthRight")
+_ROTATIONS = {
     "head": ("headPitch", "headYaw", "headRoll"),
     "leftEye": ("leftEyePitch", "leftEyeYaw"),
     "rightEye": ("rightEyePitch", "rightEyeYaw"),
@@ -31,14 +31,14 @@ _TURNS = {
 
 
 class IFacialMocapDecoder:
-    """Reads frames; an entry that is broken is left out and counted, and the rest of the frame is taken."""
+    """Decodes frames; an invalid entry is counted, and the other entries of the frame are used."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
         self._parameters = parameters
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame, or none where no entry can be read."""
+        """Return one frame, or none if no entry can be read."""
         values, mask = self._parameters.neutral(), np.zeros(len(self._parameters), dtype=bool)
         for entry in message.decode("utf-8", "replace").split("|"):
             self._take(entry.strip(), values, mask)
@@ -49,74 +49,74 @@ class IFacialMocapDecoder:
 
     def _take(self, entry: str, values: Floats, mask: Flags) -> None:
         if "#" in entry:
-            self._turn(entry, values, mask)
+            self._take_rotation(entry, values, mask)
             return
         match = _ENTRY.fullmatch(entry)
         number = _number(match[2]) if match else None
         if match is None or number is None:
-            if any(each.isalpha() for each in entry) and not _OPTIONAL.match(entry):
+            if any(each.isalpha() for each in entry) and not _IGNORED.match(entry):
                 self.refused.add("entries without a name and a number")
             return
-        at = self._parameters.find(match[1])
-        if at is not None:
-            values[at], mask[at] = number / _FULL, True
-        elif not _OPTIONAL.match(match[1]):
+        index = self._parameters.find(match[1])
+        if index is not None:
+            values[index], mask[index] = number / _VALUE_SCALE, True
+        elif not _IGNORED.match(match[1]):
             self.refused.add("unknown names")
 
-    def _turn(self, entry: str, values: Floats, mask: Flags) -> None:
-        """``head#1.5,-2,0,...``: pitch, yaw and roll in degrees."""
+    def _take_rotation(self, entry: str, values: Floats, mask: Flags) -> None:
+        """Store the angles of an entry ``head#1.5,-2,0,...``: pitch, yaw and roll in degrees."""
         name, _, rest = entry.partition("#")
-        names = _TURNS.get(name.lstrip("= "))
+        names = _ROTATIONS.get(name.lstrip("= "))
         numbers = [_number(text.strip()) for text in rest.split(",")[:3]]
         if names is None or len(numbers) < len(names):
-            self.refused.add("rotations that are none")
+            self.refused.add("invalid rotations")
             return
         for each, degrees in zip(names, numbers, strict=False):
-            at = self._parameters.index(each)
+            index = self._parameters.index(each)
             if degrees is not None:
-                values[at] = math.radians(degrees) / self._parameters.full_scale_rad[at]
-                mask[at] = True
+                values[index] = math.radians(degrees) / self._parameters.full_scale_rad[index]
+                mask[index] = True
 
 
 class IFacialMocapEncoder:
-    """Writes frames in the spelling of one of the two apps.
+    """Encodes frames as one of the two apps writes them.
 
-    between : what stands between name and value. suffixed : sides as ``_L`` and ``_R``.
+    separator : text between name and value. suffixed : whether sides are written as ``_L`` and ``_R``.
     """
 
-    def __init__(self, parameters: Parameters, between: str = "-", *, suffixed: bool = True) -> None:
-        self._parameters, self._between = parameters, between
-        names = parameters.names[:_SHAPES]
+    def __init__(self, parameters: Parameters, separator: str = "-", *, suffixed: bool = True) -> None:
+        self._parameters, self._separator = parameters, separator
+        names = parameters.names[:_SHAPE_COUNT]
         self._names = [_suffixed(name) if suffixed else name for name in names]
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """One message; none for a frame without a face, which these apps do not send."""
+        """Return one message; none for a frame without a face, which these apps do not send."""
         if not frame.face:
             return []
-        values = np.clip(np.where(frame.mask, frame.values, 0.0), -_MOST, _MOST)
-        whole = np.rint(values * _FULL).astype(int).tolist()
-        entries = [f"{name}{self._between}{number}" for name, number in zip(self._names, whole, strict=False)]
+        values = np.clip(np.where(frame.mask, frame.values, 0.0), -_MAX_VALUE, _MAX_VALUE)
+        whole = np.rint(values * _VALUE_SCALE).astype(int).tolist()
+        entries = [f"{name}{self._separator}{number}" for name, number in zip(self._names, whole, strict=False)]
         parts = [self._rotation(bone, values) for bone in ("head", "rightEye", "leftEye")]
         return ["|".join([*entries, "=" + parts[0], *parts[1:], ""]).encode()]
 
     def _rotation(self, bone: str, values: Floats) -> str:
-        at = self._parameters.indices(_TURNS[bone])
-        degrees = [*np.degrees(values[at] * self._parameters.full_scale_rad[at]).tolist(), 0.0][:3]
-        place = [0.0, 0.0, 0.0] if bone == "head" else []
-        return f"{bone}#" + ",".join(f"{number:.5g}" for number in [*degrees, *place])
+        indices = self._parameters.indices(_ROTATIONS[bone])
+        degrees = [*np.degrees(values[indices] * self._parameters.full_scale_rad[indices]).tolist(), 0.0][:3]
+        position = [0.0, 0.0, 0.0] if bone == "head" else []
+        return f"{bone}#" + ",".join(f"{number:.5g}" for number in [*degrees, *position])
 
 
 def _number(text: str) -> float | None:
     try:
-        value = float(text) if len(text) <= _LONGEST_VALUE else math.nan
+        value = float(text) if len(text) <= _MAX_VALUE_LENGTH else math.nan
     except ValueError:
         return None
     return value if abs(value) < 1e6 else None
 
 
 def _suffixed(name: str) -> str:
-    """The app's spelling; of jaw and mouth as a whole the side is no suffix."""
-    return name if name in _WHOLE else re.sub("Left$", "_L", re.sub("Right$", "_R", name))
+    """Return the app's spelling of a name; in the names of whole jaw and mouth movements the side is no suffix."""
+    return name if name in _UNSUFFIXED else re.sub("Left$", "_L", re.sub("Right$", "_R", name))
 
 
 FORMAT = Format(

@@ -1,11 +1,11 @@
-"""JSON: an object for each message, with parameters by name.
+"""Format JSON: one object per message, with parameters by name.
 
-``{"type": "set", "parameters": {"jawOpen": 0.5}}`` and plain ``{"jawOpen": 0.5}`` are the same; ``null`` releases a
-parameter, and what is not named stays as it was; ``"to"`` names the head or group of heads that is meant.
-Blend shapes as MediaPipe's face landmarker gives them are read, too:
-``[{"categoryName": "jawOpen", "score": 0.5}, ...]``, and so are its landmarks, by :mod:`controller.formats.landmarks`;
-of a result with both, the shapes count and the landmarks turn the head. The encoder adds ``"measured"``, what the
-servos show, where it is given.
+``{"type": "set", "parameters": {"jawOpen": 0.5}}`` and plain ``{"jawOpen": 0.5}`` mean the same. ``null`` releases a
+parameter, one that is not named keeps its value, and ``"to"`` names the head or group of heads that is meant.
+The decoder also reads results of MediaPipe's face landmarker: blend shapes
+``[{"categoryName": "jawOpen", "score": 0.5}, ...]``, and landmarks, by :mod:`controller.formats.landmarks`. If a result
+has both, only the angles of the head are taken from the landmarks. The encoder adds ``"measured"``, the face that the
+servos show, if a frame has it.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from controller.formats.landmarks import COUNTS, face_of
 
 _KINDS = ("set", "state")
 _SKIPPED = {"_neutral", "time", "type", "face", "subject", "to"}
-_MOST_HEADS = 512
-"""Heads and groups whose values are kept; a stranger cannot name more."""
+_MAX_HEADS = 512
+"""Greatest number of heads and groups whose values are kept, whatever a sender names."""
 _LISTS = ("blendshapes", "categories", "faceBlendshapes", "face_blendshapes")
 _POINTS = ("faceLandmarks", "face_landmarks", "multiFaceLandmarks", "multi_face_landmarks", "landmarks", "landmark")
 _ANGLES = ("headYaw", "headPitch", "headRoll")
@@ -34,7 +34,7 @@ _ASPECT = 4 / 3
 
 
 class JsonDecoder:
-    """Reads objects; what is wrong in one is counted, and the rest of it is taken."""
+    """Decodes objects; an invalid entry is counted, and the other entries of the object are used."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
@@ -42,7 +42,7 @@ class JsonDecoder:
         self._heads = {"": self._held}
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame for each object that gives or releases something."""
+        """Return one frame for an object that sets or releases a parameter, else none."""
         try:
             found = json.loads(message)
         except (ValueError, RecursionError):
@@ -51,7 +51,7 @@ class JsonDecoder:
         return self.read(found)
 
     def read(self, found: Any) -> list[Frame]:
-        """As :meth:`feed`, of a message that was parsed before."""
+        """Return the same as :meth:`feed` for a message that is parsed already."""
         table = {_key_of(found): found} if isinstance(found, list) else found
         if not isinstance(table, dict) or table.get("type", "set") not in _KINDS:
             self.refused.add("no object that sets parameters")
@@ -59,7 +59,7 @@ class JsonDecoder:
         to = table["to"][:64] if isinstance(table.get("to"), str) else ""
         if table.get("face") is False or (isinstance(found, dict) and _is_empty(table)):
             return [Frame(self._parameters.neutral(), np.zeros(len(self._parameters), dtype=bool), face=False, to=to)]
-        if not self._choose(to):
+        if not self._select_head(to):
             return []
         shapes = [name for name, value in self._given(table) if self._take(name, value)]
         if not shapes + self._take_points(table, angles_only=bool(shapes)):
@@ -74,10 +74,10 @@ class JsonDecoder:
             )
         ]
 
-    def _choose(self, to: str) -> bool:
-        """Let the next values be those of a head; False where too many were named."""
+    def _select_head(self, to: str) -> bool:
+        """Store the next values for a head; return False if too many heads were named."""
         if to not in self._heads:
-            if len(self._heads) >= _MOST_HEADS:
+            if len(self._heads) >= _MAX_HEADS:
                 self.refused.add("too many heads")
                 return False
             self._heads[to] = Held(self._parameters)
@@ -85,7 +85,7 @@ class JsonDecoder:
         return True
 
     def _given(self, table: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-        """Names and values, wherever in the object they stand."""
+        """Yield names and values from wherever they are in the object."""
         listed = next((table[key] for key in _LISTS if isinstance(table.get(key), list)), None)
         if listed is not None:
             inside = (
@@ -101,54 +101,54 @@ class JsonDecoder:
         yield from inner.items() if isinstance(inner, dict) else ()
 
     def _take_points(self, table: dict[str, Any], *, angles_only: bool) -> list[str]:
-        """Take what landmarks show, or the head's angles alone; names of what that changed."""
+        """Store the values that landmarks show, or only the head's angles; return the names of those parameters."""
         listed = next((table[key] for key in _POINTS if isinstance(table.get(key), list)), None)
         if listed is None:
             return []
         points = _points(listed, table)
         found = {} if points is None else face_of(points, self._parameters)
         if not found:
-            self.refused.add("landmarks that are no face of 468 or 478 points")
-        kept = {self._parameters.names[at]: (at, value) for at, value in found.items()}
-        names = [name for name in kept if not angles_only or name in _ANGLES]
-        self._held.update(dict(kept[name] for name in names))
+            self.refused.add("landmarks that are not a face of 468 or 478 points")
+        by_name = {self._parameters.names[index]: (index, value) for index, value in found.items()}
+        names = [name for name in by_name if not angles_only or name in _ANGLES]
+        self._held.update(dict(by_name[name] for name in names))
         return names
 
     def _take(self, name: str, value: Any) -> bool:
-        """Take one value; whether that changed anything."""
+        """Set or release a parameter; return whether name and value are valid."""
         if name in _SKIPPED:
             return False
-        at = self._parameters.find(name)
-        if at is None:
+        index = self._parameters.find(name)
+        if index is None:
             self.refused.add("unknown names")
         elif value is None:
-            self._held.mask[at] = False
+            self._held.mask[index] = False
             return True
         elif is_number(value):
-            self._held.update({at: float(value)})
+            self._held.update({index: float(value)})
             return True
         else:
-            self.refused.add("values that are no numbers")
+            self.refused.add("values that are not numbers")
         return False
 
 
 class JsonEncoder:
-    """Writes one object for each frame, without blanks; what was given before and is not any more is ``null``."""
+    """Encodes each frame as one object without spaces; parameters that are no longer given are ``null``."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._names = parameters.names
-        self._once = np.zeros(len(parameters), dtype=bool)
+        self._given_before = np.zeros(len(parameters), dtype=bool)
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """One message; values have six digits after the point."""
+        """Return one message; values have six decimal places."""
         table: dict[str, Any] = {"type": "set"}
         if frame.time_s is not None:
             table["time"] = round(frame.time_s, 6)
         if not frame.face:
             table["face"] = False
-        gone = np.flatnonzero(self._once & ~frame.mask)
-        self._once |= frame.mask
-        table["parameters"] = self._named(frame.values, frame.mask) | {self._names[i]: None for i in gone}
+        released = np.flatnonzero(self._given_before & ~frame.mask)
+        self._given_before |= frame.mask
+        table["parameters"] = self._named(frame.values, frame.mask) | {self._names[i]: None for i in released}
         if frame.measured is not None:
             table["measured"] = self._named(frame.measured, frame.mask)
         return [json.dumps(table, separators=(",", ":")).encode()]
@@ -159,7 +159,7 @@ class JsonEncoder:
 
 
 def _key_of(found: list[Any]) -> str:
-    """Whether a list is of landmarks or of shapes."""
+    """Return the key, "landmarks" or "blendshapes", for what a list contains."""
     first = found[0] if found else None
     while isinstance(first, list) and first and not is_number(first[0]):
         first = first[0]
@@ -167,13 +167,13 @@ def _key_of(found: list[Any]) -> str:
 
 
 def _is_empty(table: dict[str, Any]) -> bool:
-    """Whether a result of a tracker says that it sees no face."""
+    """Whether a tracker's result reports that it sees no face."""
     given = [table[key] for key in (*_LISTS, *_POINTS) if key in table]
     return bool(given) and all(each == [] for each in given)
 
 
 def _points(listed: list[Any], table: dict[str, Any]) -> Floats | None:
-    """(n, 3) points of the first face, in one unit for all axes; None where they are not 468 or 478 triples."""
+    """Return (n, 3) points of the first face, in one unit for all axes; None if they are not 468 or 478 triples."""
     if len(listed) not in COUNTS:
         first = listed[0] if listed else None
         inside = first.get("landmark", first.get("landmarks")) if isinstance(first, dict) else first
@@ -184,20 +184,20 @@ def _points(listed: list[Any], table: dict[str, Any]) -> Floats | None:
     if not all(isinstance(row, list) and len(row) == 3 and all(map(is_number, row)) for row in rows):
         return None
     points = np.array(rows, dtype=np.float64)
-    if np.abs(points[:, :2]).max() <= 4.0:  # shares of the picture, not pixels; z has the unit of x
+    if np.abs(points[:, :2]).max() <= 4.0:  # fractions of the picture, not pixels; z has the unit of x
         points[:, 1] /= _aspect(table.get("width"), table.get("height"))
     return points
 
 
 def _aspect(width: Any, height: Any) -> float:
-    """Width over height of the picture."""
+    """Return the width of the picture divided by its height."""
     if is_number(width) and is_number(height) and 1.0 <= width <= 1e6 and 1.0 <= height <= 1e6:
         return width / height
     return _ASPECT
 
 
 def is_number(value: Any) -> TypeGuard[float]:
-    """Whether a value is a finite number that fits into 64 bits of a float."""
+    """Whether a value is a finite number below 1e15."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
     return abs(value) < 1e15 and math.isfinite(value)

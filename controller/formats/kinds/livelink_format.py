@@ -1,7 +1,7 @@
-"""Live Link Face: datagrams that an iPhone sends to Unreal Engine, version 6.
+"""Format of Live Link Face, version 6: datagrams that an iPhone sends to Unreal Engine.
 
-Layout and order of the values: EARFaceBlendShape of Unreal Engine, and public captures. Angles are radians and yaw is
-positive to the subject's right, both inferred from those captures.
+The layout and order of the values are from EARFaceBlendShape of Unreal Engine and from public captures. Angles are in
+radians and yaw is positive to the subject's right; both are inferred from those captures.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ ANGLES = (
     "headYaw", "headPitch", "headRoll",
     "leftEyeYaw", "leftEyePitch", "leftEyeRoll", "rightEyeYaw", "rightEyePitch", "rightEyeRoll",
 )  # fmt: skip
-"""Names of the values after the 52 shapes, which stand in the order of the base vocabulary."""
+"""Names of the values after the 52 shapes, which are in the order of the base vocabulary."""
 SHAPES = 52
 COUNT = SHAPES + len(ANGLES)
 YAWS = ("headYaw", "leftEyeYaw", "rightEyeYaw")
@@ -27,7 +27,7 @@ YAWS = ("headYaw", "leftEyeYaw", "rightEyeYaw")
 _VERSION = 6
 _RATE_HZ = 60
 _DAY_S = 86_400.0
-_LONGEST_NAME = 1024
+_MAX_NAME_BYTES = 1024
 _LENGTH = struct.Struct(">i")
 _TIME = struct.Struct(">ifii")
 _DEVICE = b"6F6D6F74-6500-4000-8000-000000000001"
@@ -36,7 +36,11 @@ _HEAD = struct.pack(">Bi", _VERSION, len(_DEVICE)) + _DEVICE + _LENGTH.pack(len(
 
 
 class _Table:
-    """Where each of the 61 values belongs: its parameter, and what a parameter of 1 is in the datagram."""
+    """Maps the 61 values of a datagram to parameters.
+
+    source : (n,) indices of values that have a parameter. target : (n,) indices of those parameters. scale : (n,)
+    value in the datagram for a parameter of 1.
+    """
 
     def __init__(self, parameters: Parameters) -> None:
         names = (*parameters.names[:SHAPES], *ANGLES)
@@ -48,7 +52,7 @@ class _Table:
 
 
 class LiveLinkDecoder:
-    """Reads datagrams of version 6; a short one, which ends after the frame rate, says that no face is seen."""
+    """Decodes datagrams of version 6; one that ends after the frame rate reports that no face is seen."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
@@ -57,7 +61,7 @@ class LiveLinkDecoder:
         self._table = _Table(parameters)
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame, or none for a datagram that is wrong."""
+        """Return one frame, or none for an invalid datagram."""
         try:
             return [self._frame(message)]
         except (struct.error, IndexError):
@@ -69,31 +73,31 @@ class LiveLinkDecoder:
     def _frame(self, message: bytes) -> Frame:
         if message[0] != _VERSION:
             raise ValueError(_version_fault(message[0]))
-        _, at = _text(message, 1)
-        subject, at = _text(message, at)
-        number, part, numerator, denominator = _TIME.unpack_from(message, at)
-        at += _TIME.size
+        _, offset = _read_text(message, 1)
+        subject, offset = _read_text(message, offset)
+        number, part, numerator, denominator = _TIME.unpack_from(message, offset)
+        offset += _TIME.size
         time_s = (number + part) * denominator / numerator if numerator > 0 and 0.0 <= part <= 1.0 else None
-        if at == len(message):
+        if offset == len(message):
             return Frame(self._neutral, self._nothing, time_s, number, False, subject)
-        values, mask = self._values(message, at)
+        values, mask = self._values(message, offset)
         return Frame(values, mask, time_s, number, True, subject)
 
-    def _values(self, message: bytes, at: int) -> tuple[Floats, Flags]:
-        count = message[at]
-        if len(message) - at - 1 != 4 * count:
+    def _values(self, message: bytes, offset: int) -> tuple[Floats, Flags]:
+        count = message[offset]
+        if len(message) - offset - 1 != 4 * count:
             raise ValueError("the count does not fit the length")
         if not count:
             raise ValueError("no values")
-        given = np.frombuffer(message, ">f4", count, at + 1)
+        given = np.frombuffer(message, ">f4", count, offset + 1)
         table, values, mask = self._table, self._neutral.copy(), self._nothing.copy()
         known = slice(None) if count >= COUNT else table.source < count
-        with np.errstate(invalid="ignore"):  # what is no number is left out below
+        with np.errstate(invalid="ignore"):  # values that are not finite are left out below
             found = given[table.source[known]] / table.scale[known]
         finite = np.isfinite(found)
         target = table.target[known]
         if not finite.all():
-            self.refused.add("values that are no numbers")
+            self.refused.add("values that are not numbers")
             found, target = found[finite], target[finite]
         values[target] = found
         mask[target] = True
@@ -101,14 +105,14 @@ class LiveLinkDecoder:
 
 
 class LiveLinkEncoder:
-    """Writes datagrams of version 6, at 60 frames a second of the frame's time, or of a count without one."""
+    """Encodes datagrams of version 6; without a time of their own, frames are timed at 60 Hz."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._table = _Table(parameters)
         self._sent = 0
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """One datagram; parameters that the frame does not give are 0."""
+        """Return one datagram; parameters that the frame does not give are 0."""
         seconds = self._sent / _RATE_HZ if frame.time_s is None else frame.time_s % _DAY_S
         self._sent += 1
         number, part = divmod(seconds * _RATE_HZ, 1.0)
@@ -121,15 +125,15 @@ class LiveLinkEncoder:
         return [head + bytes((COUNT,)) + values.tobytes()]
 
 
-def _text(message: bytes, at: int) -> tuple[str, int]:
-    """A text behind its length, and where it ends."""
-    (length,) = _LENGTH.unpack_from(message, at)
-    at += _LENGTH.size
-    if not 0 <= length <= _LONGEST_NAME:
+def _read_text(message: bytes, offset: int) -> tuple[str, int]:
+    """Read a string that follows its length; return it with the offset behind it."""
+    (length,) = _LENGTH.unpack_from(message, offset)
+    offset += _LENGTH.size
+    if not 0 <= length <= _MAX_NAME_BYTES:
         raise ValueError("the length of a name is wrong")
-    if at + length > len(message):
+    if offset + length > len(message):
         raise ValueError("too short")
-    return message[at : at + length].decode("utf-8", "replace"), at + length
+    return message[offset : offset + length].decode("utf-8", "replace"), offset + length
 
 
 def _version_fault(version: int) -> str:
@@ -153,5 +157,5 @@ FORMAT = Format(
     decoder=LiveLinkDecoder,
     encoder=LiveLinkEncoder,
     carries=_carries,
-    most=2048 + 2 * _LONGEST_NAME,
+    most=2048 + 2 * _MAX_NAME_BYTES,
 )

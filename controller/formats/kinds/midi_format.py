@@ -1,8 +1,8 @@
-"""MIDI: each controller (control change) moves a parameter, by ``configs/controls/midi.toml``.
+"""Format MIDI: each controller (control change) moves a parameter, by ``configs/controls/midi.toml``.
 
-Source of the bytes: MIDI 1.0 Detailed Specification: status bytes from 0x80 on, data bytes below, running status, and
-real-time messages of one byte that may come between any two bytes. A stream needs no delimiter. Channels are not
-distinguished. A controller has 128 steps over the whole range of its parameter; an angle is 0 at 64.
+The bytes are those of the MIDI 1.0 Detailed Specification: status bytes from 0x80 on, data bytes below, running status,
+and real-time messages of one byte that may come between any two bytes. A stream needs no delimiter. Channels are not
+distinguished. A controller has 128 steps over the whole range of its parameter; an angle is 0 at step 64.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from controller.formats.format import API, Format
 from controller.formats.frame import Frame, Held, Refusals
 from controller.vocabulary.controls import load_controls
 
-_CHANGE = 0xB0
+_CONTROL_CHANGE = 0xB0
 _REAL_TIME, _EXCLUSIVE, _SYSTEM = 0xF8, 0xF0, 0xF0
-_HIGHEST, _MIDDLE = 127, 64
-_DATA = {0x80: 2, 0x90: 2, 0xA0: 2, 0xB0: 2, 0xC0: 1, 0xD0: 1, 0xE0: 2}
-"""Data bytes of each kind of message."""
+_MAX_STEP, _MIDDLE_STEP = 127, 64
+_DATA_BYTES = {0x80: 2, 0x90: 2, 0xA0: 2, 0xB0: 2, 0xC0: 1, 0xD0: 1, 0xE0: 2}
+"""Number of data bytes by the upper half of a status byte."""
 
 
 class MidiDecoder:
-    """Reads pieces of a stream; what is not a control change of the table is passed over."""
+    """Decodes pieces of a stream; messages other than the table's control changes have no effect."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused, self._held = Refusals(), Held(parameters)
-        self._at, self._parameters = _table(parameters), parameters
+        self._indices, self._parameters = _table(parameters), parameters
         self._status, self._data = 0, bytearray()
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame where the piece changes anything."""
+        """Return one frame if the piece holds a control change of the table, else none."""
         changed = [self._take(byte) for byte in message]
         return [self._held.frame()] if any(changed) else []
 
@@ -44,17 +44,20 @@ class MidiDecoder:
         if byte >= 0x80:
             self._status, self._data = byte, bytearray()
             return False
-        wanted = _DATA.get(self._status & 0xF0)
-        if wanted is None or self._status >= _SYSTEM:  # of a system message, or of one whose beginning was not heard
+        wanted = _DATA_BYTES.get(self._status & 0xF0)
+        if wanted is None or self._status >= _SYSTEM:  # of a system message, or of one whose status byte was missed
             return False
         self._data.append(byte)
         if len(self._data) < wanted:
             return False
-        (controller, value), self._data = (*self._data, 0)[:2], bytearray()  # running status: the next begins
-        return self._status & 0xF0 == _CHANGE and self._change(controller, value)
+        (controller, value), self._data = (
+            (*self._data, 0)[:2],
+            bytearray(),
+        )  # running status
+        return self._status & 0xF0 == _CONTROL_CHANGE and self._change(controller, value)
 
     def _change(self, controller: int, value: int) -> bool:
-        index = self._at.get(controller)
+        index = self._indices.get(controller)
         if index is None:
             self.refused.add("controllers that move nothing")
             return False
@@ -63,7 +66,7 @@ class MidiDecoder:
 
 
 class MidiEncoder:
-    """Writes the controllers that changed since the frame before, on channel 1, and of the others one after another."""
+    """Encodes the controllers that changed since the last frame, on channel 1, and repeats the others in turn."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._numbers = {index: number for number, index in _table(parameters).items()}
@@ -72,7 +75,7 @@ class MidiEncoder:
         self._turn = 0
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """One message; none for a frame without a face."""
+        """Return one message; none for a frame without a face."""
         if not frame.face or not frame.mask.any():
             return []
         found = {index: _step(float(self._low[index]), float(frame.values[index]))
@@ -81,26 +84,26 @@ class MidiEncoder:
         again = list(found)[self._turn]
         changed = {index: step for index, step in found.items() if self._sent.get(index) != step or index == again}
         self._sent |= changed
-        return [b"".join(bytes((_CHANGE, self._numbers[index], step)) for index, step in changed.items())]
+        return [b"".join(bytes((_CONTROL_CHANGE, self._numbers[index], step)) for index, step in changed.items())]
 
 
 def _value(low: float, step: int) -> float:
-    """The value of a step: 0 to 1, or -1 to 1 with 0 in the middle."""
+    """Return the value of a step: 0 to 1, or -1 to 1 with 0 in the middle."""
     if low >= 0.0:
-        return step / _HIGHEST
-    return (step - _MIDDLE) / (_HIGHEST - _MIDDLE if step > _MIDDLE else _MIDDLE)
+        return step / _MAX_STEP
+    return (step - _MIDDLE_STEP) / (_MAX_STEP - _MIDDLE_STEP if step > _MIDDLE_STEP else _MIDDLE_STEP)
 
 
 def _step(low: float, value: float) -> int:
     if low >= 0.0:
-        return round(min(max(value, 0.0), 1.0) * _HIGHEST)
+        return round(min(max(value, 0.0), 1.0) * _MAX_STEP)
     value = min(max(value, -1.0), 1.0)
-    return _MIDDLE + round(value * (_HIGHEST - _MIDDLE if value > 0.0 else _MIDDLE))
+    return _MIDDLE_STEP + round(value * (_MAX_STEP - _MIDDLE_STEP if value > 0.0 else _MIDDLE_STEP))
 
 
 @cache
 def _table(parameters: Parameters) -> dict[int, int]:
-    """Positions of parameters by numbers of controllers."""
+    """Return the parameter indices by controller number."""
     file = load_controls(config_dir() / "controls" / "midi.toml", parameters)
     return {number: parameters.index(name) for name, number in file.controllers.items()}
 

@@ -1,7 +1,7 @@
-"""OSC faders: ``/omote/jawOpen 0.5``, one parameter for each address.
+"""Format of OSC faders: ``/omote/jawOpen 0.5``, one address for each parameter.
 
-Only the last part of an address counts: it names the parameter. So the addresses of other programs are understood, too,
-such as ``/avatar/parameters/JawOpen``. Parameters that a packet does not name keep their value.
+The last part of an address names the parameter and the rest is ignored, so that addresses of other programs such as
+``/avatar/parameters/JawOpen`` are accepted. Parameters that a packet does not name keep their value.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ _FACE, _TIME = "/omote/face", "/omote/time"
 
 
 class OscDecoder:
-    """Reads messages and bundles; a datagram is one frame."""
+    """Decodes messages and bundles; a datagram is one frame."""
 
     def __init__(self, parameters: Parameters) -> None:
         self.refused = Refusals()
         self._parameters, self._held = parameters, Held(parameters)
 
     def feed(self, message: bytes) -> list[Frame]:
-        """One frame for a datagram that sets a parameter or says that no face is seen; else none."""
+        """Return one frame for a datagram that sets a parameter or reports that no face is seen, else none."""
         given: dict[int, float] = {}
         time_s: float | None = None
         for address, arguments in read_packet(message, self.refused):
@@ -37,8 +37,8 @@ class OscDecoder:
                 return [Frame(self._parameters.neutral(), np.zeros(len(self._parameters), dtype=bool), face=False)]
             elif address == _TIME:
                 time_s = float(value)
-            elif (at := self._parameters.find(address.rpartition("/")[2])) is not None:
-                given[at] = float(value)
+            elif (index := self._parameters.find(address.rpartition("/")[2])) is not None:
+                given[index] = float(value)
             elif address != _FACE:
                 self.refused.add("unknown names")
         if not given:
@@ -48,13 +48,13 @@ class OscDecoder:
 
 
 class OscEncoder:
-    """Writes one bundle for each frame."""
+    """Encodes each frame as one bundle, or as one message if no face is seen."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._addresses = [f"/omote/{name}" for name in parameters.names]
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """One datagram."""
+        """Return one datagram."""
         if not frame.face:
             return [message(_FACE, 0)]
         messages = [] if frame.time_s is None else [message(_TIME, float(frame.time_s))]

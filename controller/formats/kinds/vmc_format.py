@@ -1,7 +1,8 @@
-"""VMC, the protocol of VTuber programs: blend shapes and bones as OSC messages.
+"""Format VMC, the protocol of VTuber programs: blend shapes and bones as OSC messages.
 
-Addresses and arguments: protocol.vmc.info/specification. Values are collected until Apply; one that is not named keeps
-its value. Names are those of ARKit ("Perfect Sync") and the presets of VRM 0 and 1, in any case.
+Addresses and arguments are from protocol.vmc.info/specification. Values are collected until the message Apply; a blend
+shape that is not named keeps its value. Names are those of ARKit ("Perfect Sync") and the presets of VRM 0 and 1, in
+upper or lower case.
 """
 
 from __future__ import annotations
@@ -23,15 +24,15 @@ _VALUE, _APPLY, _BONE, _TIME = "/VMC/Ext/Blend/Val", "/VMC/Ext/Blend/Apply", "/V
 _HEAD = ("headYaw", "headPitch", "headRoll")
 _EYES = {"lefteye": ("leftEyeYaw", "leftEyePitch"), "righteye": ("rightEyeYaw", "rightEyePitch")}
 _BONES = {"head", "neck", *_EYES}
-_MOST_NAMES = 4096
-_SHAPES = 52
+_MAX_NAMES = 4096
+_SHAPE_COUNT = 52
 
 
 class VmcDecoder:
-    """Collects values and bones, and gives a frame at every Apply.
+    """Collects values and bones, and returns a frame at every Apply.
 
-    A sender that never sends Apply gives a frame when a name comes again. Bones without values give one with the next
-    time message.
+    From a sender that never sends Apply, a name that comes again ends a frame. If only bones come, the next time
+    message ends it.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -42,37 +43,37 @@ class VmcDecoder:
         self._levels: dict[str, tuple[Preset, float]] = {}
         self._pending: dict[str, float] = {}
         self._bones: dict[str, Quaternion] = {}
-        self._turned = False
-        self._applies = False
-        self._shapes = False  # names of ARKit have come
+        self._has_new_bones = False
+        self._sends_apply = False
+        self._has_arkit_shapes = False
         self._time_s: float | None = None
 
     def feed(self, message: bytes) -> list[Frame]:
-        """The frames that a datagram completes."""
+        """Return the frames that a datagram completes."""
         frames: list[Frame] = []
         for address, arguments in read_packet(message, self.refused):
             if address == _VALUE:
-                self._value(arguments, frames)
+                self._take_value(arguments, frames)
             elif address == _APPLY:
-                self._applies = True
-                frames.append(self._frame())
+                self._sends_apply = True
+                frames.append(self._finish_frame())
             elif address == _BONE:
-                self._bone(arguments)
+                self._take_bone(arguments)
             elif address == _TIME:
-                self._time(arguments, frames)
+                self._take_time(arguments, frames)
         return frames
 
-    def _value(self, arguments: list[Argument], frames: list[Frame]) -> None:
+    def _take_value(self, arguments: list[Argument], frames: list[Frame]) -> None:
         if len(arguments) < 2 or not isinstance(arguments[0], str) or not _is_number(arguments[1]):
             self.refused.add("Blend/Val without a name and a number")
             return
         name = arguments[0]
-        if name in self._pending and not self._applies:
-            frames.append(self._frame())
-        if name in self._pending or len(self._pending) < _MOST_NAMES:
+        if name in self._pending and not self._sends_apply:
+            frames.append(self._finish_frame())
+        if name in self._pending or len(self._pending) < _MAX_NAMES:
             self._pending[name] = float(arguments[1])  # type: ignore[arg-type]
 
-    def _bone(self, arguments: list[Argument]) -> None:
+    def _take_bone(self, arguments: list[Argument]) -> None:
         name = arguments[0].lower() if arguments and isinstance(arguments[0], str) else ""
         numbers = arguments[4:8]
         if not name or len(numbers) < 4 or not all(map(_is_number, numbers)):
@@ -85,67 +86,67 @@ class VmcDecoder:
                 self.refused.add(str(error))
             else:
                 self._bones[name] = (x, y, z, w)
-                self._turned = True
+                self._has_new_bones = True
 
-    def _time(self, arguments: list[Argument], frames: list[Frame]) -> None:
-        if self._turned and not self._pending:
-            frames.append(self._frame())
+    def _take_time(self, arguments: list[Argument], frames: list[Frame]) -> None:
+        if self._has_new_bones and not self._pending:
+            frames.append(self._finish_frame())
         if arguments and _is_number(arguments[0]):
             self._time_s = float(arguments[0])  # type: ignore[arg-type]
 
-    def _frame(self) -> Frame:
+    def _finish_frame(self) -> Frame:
         for name, value in self._pending.items():
-            self._take(name, value)
+            self._store(name, value)
         self._pending.clear()
-        if self._turned:
-            self._turn()
+        if self._has_new_bones:
+            self._store_rotations()
         frame = self._held.frame(time_s=self._time_s)
         for preset, level in self._levels.values():
-            if level and not (preset.tracked and self._shapes):
-                _raise(frame, preset.weights * level)
+            if level and not (preset.tracked and self._has_arkit_shapes):
+                _add_preset(frame, preset.weights * level)
         return frame
 
-    def _take(self, name: str, value: float) -> None:
+    def _store(self, name: str, value: float) -> None:
         found = self._lookup(name)
         if isinstance(found, Preset):
             self._levels[found.name] = found, value
         elif found is not None:
             self._held.values[found] = value
-            self._held.mask[found] = self._shapes = True
+            self._held.mask[found] = self._has_arkit_shapes = True
 
     def _lookup(self, name: str) -> int | Preset | None:
-        """What a name means; None for a name of the avatar's own."""
-        if name not in self._names and len(self._names) < _MOST_NAMES:
+        """Return the parameter index or preset that a name means; None for an avatar's own blend shape."""
+        if name not in self._names and len(self._names) < _MAX_NAMES:
             found = self._parameters.find(name)
             self._names[name] = _presets(self._parameters).find(name) if found is None else found
         return self._names.get(name)
 
-    def _turn(self) -> None:
-        """Write the angles of head and eyes."""
-        self._turned = False
+    def _store_rotations(self) -> None:
+        """Convert the rotations of the bones to angles of head and eyes."""
+        self._has_new_bones = False
         if "head" in self._bones or "neck" in self._bones:
             whole = product(self._bones.get("neck", IDENTITY), self._bones.get("head", IDENTITY))
-            self._angles(_HEAD, from_unity(whole))
+            self._store_angles(_HEAD, from_unity(whole))
         for bone, names in _EYES.items():
             if bone in self._bones:
-                self._angles(names, from_unity(self._bones[bone]))
+                self._store_angles(names, from_unity(self._bones[bone]))
 
-    def _angles(self, names: Sequence[str], angles: Sequence[float]) -> None:
+    def _store_angles(self, names: Sequence[str], angles: Sequence[float]) -> None:
         for index, angle in zip(self._parameters.indices(names), angles, strict=False):
             self._held.values[index] = angle / self._parameters.full_scale_rad[index]
             self._held.mask[index] = True
 
 
 class VmcEncoder:
-    """Writes one bundle for each frame: time, bones of head and eyes, ARKit's 52 names, Apply."""
+    """Encodes each frame as one bundle: time, bones of head and eyes, ARKit's 52 blend shapes, Apply."""
 
     def __init__(self, parameters: Parameters) -> None:
         self._parameters = parameters
-        self._names = [name[0].upper() + name[1:] for name in parameters.names[:_SHAPES]]
+        self._names = [name[0].upper() + name[1:] for name in parameters.names[:_SHAPE_COUNT]]
         self._sent = 0
 
     def encode(self, frame: Frame) -> list[bytes]:
-        """One datagram; a frame without a face gives the values that hold, and says that nothing is tracked."""
+        """Return one datagram; for a frame without a face it has no values and reports that nothing is tracked."""
         time_s = self._sent / 60.0 if frame.time_s is None else frame.time_s
         self._sent += 1
         messages = [message("/VMC/Ext/OK", 1, 3, 0, int(frame.face)), message(_TIME, float(time_s))]
@@ -161,9 +162,9 @@ class VmcEncoder:
         bones = {"Head": _HEAD, "LeftEye": _EYES["lefteye"], "RightEye": _EYES["righteye"]}
         found = []
         for bone, names in bones.items():
-            at = self._parameters.indices(names)
-            if frame.mask[at].any():
-                angles = np.where(frame.mask, frame.values, 0.0)[at] * self._parameters.full_scale_rad[at]
+            indices = self._parameters.indices(names)
+            if frame.mask[indices].any():
+                angles = np.where(frame.mask, frame.values, 0.0)[indices] * self._parameters.full_scale_rad[indices]
                 yaw, pitch, roll = (*map(float, angles), 0.0)[:3]
                 found.append(message(_BONE, bone, 0.0, 0.0, 0.0, *to_unity(yaw, pitch, roll)))
         return found
@@ -173,8 +174,8 @@ def _is_number(value: Argument) -> bool:
     return isinstance(value, (int, float)) and math.isfinite(value)
 
 
-def _raise(frame: Frame, weights: Floats) -> None:
-    """Write a preset over a frame wherever it moves a parameter further from neutral."""
+def _add_preset(frame: Frame, weights: Floats) -> None:
+    """Replace the values of a frame by those of a preset where the preset is further from neutral; in place."""
     further = np.abs(weights) > np.abs(frame.values)
     np.copyto(frame.values, weights, where=further)
     frame.mask[weights != 0.0] = True

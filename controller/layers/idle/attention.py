@@ -1,7 +1,7 @@
-"""What the gaze rests on: the listener's face, points of interest, or somewhere else, and for how long.
+"""Chooses what the gaze rests on (the listener's face, points of interest, or somewhere else) and for how long.
 
-A glance at the listener goes to and fro between the parts of a face; a glance away goes to points of interest or
-wanders. How long glances last belongs to the manner: alone, listening, speaking.
+During a glance at the listener, the fixations alternate between parts of the face; during a glance away, they are on
+points of interest or wander. How long glances last depends on the manner: alone, listening or speaking.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from controller.layers.idle.settings import GazeSettings, MannerSettings, PointS
 
 Choice = TypeVar("Choice")
 
-_HIGHEST = 0.8
-"""Vertical glances go this share as far as horizontal ones of the same draw."""
+_VERTICAL_FACTOR = 0.8
+"""Vertical amplitude of a random glance, relative to the horizontal one."""
 
 
 @dataclass(frozen=True)
 class Shift:
-    """The gaze goes to a direction (degrees; yaw + left, pitch + down) at a time."""
+    """A gaze shift to a direction (degrees; yaw positive to the left, pitch positive downwards) at a time."""
 
     time_s: float
     yaw_deg: float
@@ -33,7 +33,7 @@ class Shift:
 class Attention:
     """Chooses what to look at, one fixation after another.
 
-    on_listener : whether the present glance is at the listener's face.
+    on_listener : whether the current glance is at the listener's face.
     """
 
     def __init__(self, settings: GazeSettings, numbers: random.Random) -> None:
@@ -47,7 +47,7 @@ class Attention:
         yield from self._glance(now_s, manner, on_listener=True)
 
     def advance(self, now_s: float, manner: MannerSettings) -> Iterator[Shift]:
-        """What the gaze does until ``now_s``, in order."""
+        """Yield the gaze shifts that are due until ``now_s``, in order."""
         while min(self._glance_end_s, self._fixation_end_s) <= now_s:
             if self._glance_end_s <= self._fixation_end_s:
                 yield from self._glance(self._glance_end_s, manner, on_listener=not self.on_listener)
@@ -55,19 +55,18 @@ class Attention:
                 yield self._fixate(self._fixation_end_s, manner)
 
     def turn(self, now_s: float, manner: MannerSettings, *, on_listener: bool) -> Iterator[Shift]:
-        """Look at the listener, or away, for a whole glance from now on; no shift where it does already."""
+        """Begin a glance at the listener, or away; if the current glance is that already, only extend it."""
         if self.on_listener != on_listener:
             yield from self._glance(now_s, manner, on_listener=on_listener)
         else:
-            self._last(now_s, manner)
+            self._draw_glance_end(now_s, manner)
 
     def _glance(self, now_s: float, manner: MannerSettings, *, on_listener: bool) -> Iterator[Shift]:
         self.on_listener = on_listener
-        self._last(now_s, manner)
+        self._draw_glance_end(now_s, manner)
         yield self._fixate(now_s, manner)
 
-    def _last(self, now_s: float, manner: MannerSettings) -> None:
-        """Draw how long the glance lasts."""
+    def _draw_glance_end(self, now_s: float, manner: MannerSettings) -> None:
         self._glance_end_s = now_s + draw(manner.look_s if self.on_listener else manner.away_s, self._random)
 
     def _fixate(self, now_s: float, manner: MannerSettings) -> Shift:
@@ -76,7 +75,7 @@ class Attention:
         return Shift(now_s, yaw_deg, pitch_deg)
 
     def _on_face(self) -> tuple[float, float]:
-        """A part of the listener's face other than the last one."""
+        """Return a direction on the listener's face, on another part than the last one."""
         parts = list(self._settings.listener.values())
         others = [part for part in parts if part is not self._place] or parts
         self._place = self._choose(others, [part.weight for part in others])
@@ -92,13 +91,13 @@ class Attention:
         return point.yaw_deg + yaw_deg, point.pitch_deg + pitch_deg
 
     def _wander(self, farthest_deg: float) -> tuple[float, float]:
-        """Exponential amplitudes in eight directions (Lee, Badler and Badler 2002)."""
+        """Return a direction with an exponential amplitude in one of eight sectors (Lee, Badler and Badler 2002)."""
         wander = self._settings.wander
         amplitude = wander.least_deg + self._random.expovariate(1.0 / wander.mean_deg)
         amplitude = min(amplitude, max(farthest_deg, wander.least_deg))
-        eighth = self._choose(range(8), wander.directions)
-        angle = (eighth + self._random.uniform(-0.5, 0.5)) * math.pi / 4
-        return amplitude * math.cos(angle), -_HIGHEST * amplitude * math.sin(angle)
+        sector = self._choose(range(8), wander.directions)
+        angle = (sector + self._random.uniform(-0.5, 0.5)) * math.pi / 4
+        return amplitude * math.cos(angle), -_VERTICAL_FACTOR * amplitude * math.sin(angle)
 
-    def _choose(self, what: Sequence[Choice], weights: Sequence[float]) -> Choice:
-        return self._random.choices(what, weights if sum(weights) > 0.0 else None)[0]
+    def _choose(self, choices: Sequence[Choice], weights: Sequence[float]) -> Choice:
+        return self._random.choices(choices, weights if sum(weights) > 0.0 else None)[0]

@@ -1,4 +1,4 @@
-"""Blinks: complete and partial ones, single and double, a little different left and right."""
+"""Generates blinks: complete and partial ones, single and double ones, slightly different on both sides."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ from controller.layers.idle.draws import draw
 from controller.layers.idle.settings import BlinkSettings
 from controller.motion.motion import Envelope
 
-_LEAST_GAP_S = 0.3
-"""Between the end of a blink and one that something else brings about."""
+_MIN_GAP_S = 0.3
+"""Shortest time from the end of a blink to a blink with an external cause."""
 
 
 @dataclass(frozen=True)
 class Blink:
-    """One blink: the motion of each lid (left, right), how far each closes, and a number 0..1 that rates it."""
+    """One blink.
+
+    lids : motion of the left and the right lid. amounts : how far each closes, 0..1. rank : random number 0..1; the
+    blink shows only if the liveliness is above it.
+    """
 
     lids: tuple[Envelope, Envelope]
     amounts: tuple[float, float]
@@ -24,49 +28,49 @@ class Blink:
 
     @property
     def end_s(self) -> float:
-        """When both lids are open again."""
+        """Time at which both lids are open again."""
         return max(lid.end_s for lid in self.lids)
 
 
 class Blinks:
     """The blinks of one face.
 
-    blinks : those that are going on or about to come. next_s : when the next one is due by itself.
+    blinks : current and coming blinks. next_s : time of the next spontaneous blink.
     """
 
     def __init__(self, settings: BlinkSettings, numbers: random.Random) -> None:
         self._settings, self._random = settings, numbers
-        self._weaker = numbers.randrange(2)  # the side that closes later and less: the same for life
+        self._weaker = numbers.randrange(2)  # the side that closes later and less, always the same one
         self.blinks: list[Blink] = []
         self.next_s, self._free_s = math.inf, -math.inf
 
     def begin(self, now_s: float, rate: float = 1.0) -> None:
-        """Start with open lids; ``rate`` : factor on how often it blinks."""
+        """Start with open lids; ``rate`` : factor on the blink rate."""
         self.blinks, self._free_s = [], -math.inf
         self.next_s = now_s + self._interval(rate)
 
     def advance(self, now_s: float, rate: float = 1.0) -> None:
-        """Begin what is due until ``now_s``."""
+        """Start the blinks that are due until ``now_s``."""
         while self.next_s <= now_s:
-            self._blink(self.next_s)
+            self._start_blink(self.next_s)
             end_s = self.blinks[-1].end_s
-            self.next_s, self._free_s = end_s + self._interval(rate), end_s + _LEAST_GAP_S
+            self.next_s, self._free_s = end_s + self._interval(rate), end_s + _MIN_GAP_S
         if self.blinks and self.blinks[-1].end_s < now_s:
             self.blinks = []
 
-    def hurry(self, now_s: float) -> None:
-        """Blink at ``now_s``, unless a blink is going on or due before."""
+    def request(self, now_s: float) -> None:
+        """Blink at ``now_s``, unless a blink is going on, has just ended or is due before."""
         if now_s >= self._free_s:
             self.next_s = min(self.next_s, now_s)
 
     def shift(self, angle_rad: float, now_s: float) -> None:
-        """The gaze jumps by an angle; a large jump may bring a blink (Evinger et al. 1994)."""
+        """React to a jump of the gaze by an angle: a large jump may cause a blink (Evinger et al. 1994)."""
         large = math.degrees(abs(angle_rad)) >= self._settings.shift_deg
         if large and self._random.random() < self._settings.shift_share:
-            self.hurry(now_s)
+            self.request(now_s)
 
     def levels(self, now_s: float, liveliness: float = 1.0) -> tuple[float, float]:
-        """How far the left and the right lid are closed, 0..1; at less liveliness blinks are fewer, not smaller."""
+        """Return how far the left and the right lid are closed, 0..1; liveliness changes how often, not how far."""
         left = right = 0.0
         for blink in self.blinks:
             if blink.rank < liveliness:
@@ -77,13 +81,15 @@ class Blinks:
     def _interval(self, rate: float) -> float:
         return draw(self._settings.interval_s, self._random) / rate
 
-    def _blink(self, start_s: float) -> None:
-        self.blinks.append(self._one(start_s))
+    def _start_blink(self, start_s: float) -> None:
+        self.blinks.append(self._draw_blink(start_s))
         if self._random.random() < self._settings.double_share:
-            self.blinks.append(self._one(self.blinks[-1].end_s + draw(self._settings.double_gap_s, self._random)))
+            self.blinks.append(
+                self._draw_blink(self.blinks[-1].end_s + draw(self._settings.double_gap_s, self._random))
+            )
 
-    def _one(self, start_s: float) -> Blink:
-        """A partial blink takes as long as a complete one, so its lids are slower (main sequence, Evinger 1991)."""
+    def _draw_blink(self, start_s: float) -> Blink:
+        """Return a random blink; a partial one lasts as long, so it is slower (main sequence, Evinger 1991)."""
         settings, numbers = self._settings, self._random
         lag_s, hold_s = numbers.uniform(0.0, settings.lag_s), draw(settings.hold_s, numbers)
         partial = numbers.random() < settings.partial_share

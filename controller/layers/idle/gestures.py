@@ -1,4 +1,4 @@
-"""Small movements of the face: poses of several parameters that rise, hold and fall, now and then or when asked for."""
+"""Makes small movements of the face (fidgets, smiles, swallows) at random times: poses that rise, hold and fall."""
 
 from __future__ import annotations
 
@@ -16,16 +16,19 @@ from controller.motion.motion import Envelope
 from controller.vocabulary.sides import sides
 
 _OTHER_SIDE = 0.35
-"""How much of a one-sided pose the other side shows."""
-_UNEVEN = 0.15
-"""How much less one side of a pose for both sides shows at most."""
-_LEAST = 0.6
-"""Share of its full amount that a gesture has at least."""
+"""Factor on the values of the weaker side of a one-sided pose."""
+_MAX_UNEVENNESS = 0.15
+"""Greatest fraction by which one side of a two-sided pose is weaker."""
+_MIN_AMOUNT = 0.6
+"""Smallest fraction of its full amount with which a gesture shows."""
 
 
 @dataclass(frozen=True)
 class Pose:
-    """Values (P,) of a pose, and which of them are of the left and the right side, (P,) 0 or 1 each."""
+    """A pose.
+
+    values : (P,). left, right : (P,) 1 for the parameters of that side, else 0. often : relative frequency.
+    """
 
     values: Floats
     left: Floats
@@ -35,7 +38,7 @@ class Pose:
 
     @classmethod
     def of(cls, parameters: Parameters, settings: PoseSettings) -> Pose:
-        """The pose of a table of names; a name without a side means both."""
+        """Return the pose of a table of names; a name without a side means both sides."""
         values, left, right = parameters.neutral(), parameters.neutral(), parameters.neutral()
         for name, weight in settings.weights.items():
             found = sides(parameters, name)
@@ -44,18 +47,18 @@ class Pose:
                 left[found[0]] = right[found[1]] = 1.0
         return cls(values, left, right, settings.side == "either", settings.often)
 
-    def drawn(self, numbers: random.Random) -> Floats:
-        """(P,) the pose as it comes out this time: a side of its own where it is one-sided, else nearly even."""
-        less = 1.0 - _OTHER_SIDE if self.one_sided else numbers.uniform(0.0, _UNEVEN)
+    def draw(self, numbers: random.Random) -> Floats:
+        """Return a random variation (P,) of the pose: one side is weaker, much so if the pose is one-sided."""
+        less = 1.0 - _OTHER_SIDE if self.one_sided else numbers.uniform(0.0, _MAX_UNEVENNESS)
         weaker = self.left if numbers.random() < 0.5 else self.right
-        drawn: Floats = numbers.uniform(_LEAST, 1.0) * self.values * (1.0 - less * weaker)
+        drawn: Floats = numbers.uniform(_MIN_AMOUNT, 1.0) * self.values * (1.0 - less * weaker)
         return drawn
 
 
 class Gestures:
-    """Poses of one table, at most one at a time.
+    """Shows the poses of one table at random times, at most one at a time.
 
-    next_s : when the next comes by itself.
+    next_s : time of the next one.
     """
 
     def __init__(self, parameters: Parameters, settings: GestureSettings, numbers: random.Random) -> None:
@@ -67,36 +70,36 @@ class Gestures:
         self.next_s = math.inf
 
     def begin(self, now_s: float) -> None:
-        """Start without any."""
+        """Start with no pose."""
         self._envelope = Envelope(-math.inf, 1.0, 0.0, 1.0)
         self.next_s = now_s + draw(self._settings.interval_s, self._random)
 
     def advance(self, now_s: float, *, wanted: bool = True) -> None:
-        """Begin what is due until ``now_s``; nothing where none is wanted, but the next is drawn all the same."""
+        """Begin the poses that are due until ``now_s``; unless ``wanted``, they are drawn but not shown."""
         gesture, numbers = self._settings, self._random
         while self.next_s <= now_s:
             new = Envelope(self.next_s, gesture.rise_s, draw(gesture.hold_s, numbers), gesture.fall_s)
-            shown = chosen(self._poses, numbers)
+            shown = draw_pose(self._poses, numbers)
             self.next_s = new.end_s + draw(gesture.interval_s, numbers)
             if wanted and shown is not None:
                 self._envelope, self._shown = new, shown
 
     def add(self, out: Floats, now_s: float, liveliness: float) -> None:
-        """Add what shows at ``now_s`` to ``out`` : (P,)."""
+        """Add the pose at ``now_s`` to ``out`` : (P,)."""
         level = self._envelope.level(now_s)
         if level > 0.0:
             out += level * self._settings.amount * liveliness * self._shown
 
 
 def poses(parameters: Parameters, table: Mapping[str, PoseSettings]) -> list[Pose]:
-    """The poses of a table."""
+    """Return the poses of a table."""
     return [Pose.of(parameters, settings) for settings in table.values()]
 
 
-def chosen(among: Sequence[Pose], numbers: random.Random) -> Floats | None:
-    """(P,) one of some poses as it comes out this time; None where there is none."""
-    weights = [pose.often for pose in among]
+def draw_pose(candidates: Sequence[Pose], numbers: random.Random) -> Floats | None:
+    """Return a random variation (P,) of a random pose; None if there is no pose."""
+    weights = [pose.often for pose in candidates]
     if not sum(weights) > 0.0:
         return None
-    drawn = numbers.choices(among, weights)[0].drawn(numbers)
+    drawn = numbers.choices(candidates, weights)[0].draw(numbers)
     return drawn if np.isfinite(drawn).all() else None

@@ -1,6 +1,7 @@
-"""Moves the head: its share of large gaze shifts, changes of posture, slow sway, breath and nods.
+"""Moves the head: its part of large gaze shifts, changes of posture, slow sway, breath and nods.
 
-Angles are yaw, pitch and roll in rad; yaw + left, pitch + down, roll + the subject's left side up.
+Angles are yaw, pitch and roll in rad. Yaw is positive to the left, pitch downwards, and roll with the subject's left
+side up.
 """
 
 from __future__ import annotations
@@ -17,14 +18,14 @@ from controller.layers.idle.settings import BreathSettings, HeadSettings, NodSet
 from controller.motion.motion import minimum_jerk
 
 MEMORY_S = 0.5
-"""How long before the present the head's angles can still be asked for."""
+"""How far in the past the head's angles can still be queried."""
 
-_WAVES = 3
-_BUSY_S = 0.8  # over which sway grows when speech begins
+_WAVES = 3  # for each axis
+_GAIN_CHANGE_S = 0.8  # time in which the amplitude of sway changes, for instance when speech begins
 
 
 class Turn:
-    """The head's share of gaze shifts: it follows the eyes, later and slower."""
+    """The head's part of gaze shifts: it follows the eyes, later and more slowly."""
 
     def __init__(self, settings: TurnSettings) -> None:
         self._settings, self._steps = settings, Steps(2)
@@ -34,55 +35,55 @@ class Turn:
         self._steps.reset()
 
     def follow(self, shift: Shift) -> None:
-        """Take its share of a shift, beyond what the eyes reach in comfort."""
+        """Turn by the head's part of a shift: a fraction of what exceeds a comfortable eye angle."""
         turn, size = self._settings, math.hypot(shift.yaw_deg, shift.pitch_deg)
         beyond = max(0.0, 1.0 - turn.comfort_deg / size) if size > 0.0 else 0.0
         yaw_deg, pitch_deg = turn.share * shift.yaw_deg, turn.pitch_share * shift.pitch_deg
         goal = [math.radians(beyond * yaw_deg), math.radians(beyond * pitch_deg)]
-        way = math.degrees(math.dist(goal, self._steps.goal))
-        if way > 0.0:
-            self._steps.go(goal, shift.time_s + turn.delay_s, turn.base_s + turn.per_deg_s * way)
+        distance_deg = math.degrees(math.dist(goal, self._steps.goal))
+        if distance_deg > 0.0:
+            self._steps.move_to(goal, shift.time_s + turn.delay_s, turn.base_s + turn.per_deg_s * distance_deg)
 
     def at(self, now_s: float) -> tuple[float, float, float]:
-        """The angles at ``now_s``."""
+        """Return the angles at ``now_s``."""
         yaw, pitch = self._steps.at(now_s)
         return yaw, pitch, 0.0
 
-    def settle(self, now_s: float) -> None:
-        """Forget what is over."""
-        self._steps.settle(now_s - MEMORY_S)
+    def drop_finished(self, now_s: float) -> None:
+        """Drop steps that ended before the times that can be queried."""
+        self._steps.drop_finished(now_s - MEMORY_S)
 
 
 class Posture:
-    """How the head is held: a little turned, lowered and tilted, and after a while otherwise."""
+    """The posture of the head: slightly turned, lowered and tilted; it changes from time to time."""
 
     def __init__(self, settings: PostureSettings, numbers: random.Random) -> None:
         self._settings, self._random, self._steps = settings, numbers, Steps(3)
         self._next_s = math.inf
 
     def begin(self, now_s: float) -> None:
-        """Be upright."""
+        """Start upright."""
         self._steps.reset()
         self._next_s = now_s + draw(self._settings.interval_s, self._random) / 2
 
     def advance(self, now_s: float) -> None:
-        """Begin what is due until ``now_s``."""
+        """Begin the changes of posture that are due until ``now_s``."""
         posture, numbers = self._settings, self._random
         while self._next_s <= now_s:
             reach = (posture.yaw_deg, posture.pitch_deg, posture.roll_deg)
             goal = [math.radians(each) * min(max(numbers.gauss(0.0, 0.5), -1.0), 1.0) for each in reach]
-            self._steps.go(goal, self._next_s, draw(posture.length_s, numbers))
+            self._steps.move_to(goal, self._next_s, draw(posture.length_s, numbers))
             self._next_s += draw(posture.interval_s, numbers)
-        self._steps.settle(now_s - MEMORY_S)
+        self._steps.drop_finished(now_s - MEMORY_S)
 
     def at(self, now_s: float) -> tuple[float, float, float]:
-        """The angles at ``now_s``."""
+        """Return the angles at ``now_s``."""
         yaw, pitch, roll = self._steps.at(now_s)
         return yaw, pitch, roll
 
 
 class Sway:
-    """Three incommensurable waves for each axis, and the breath; it depends on time alone but for how busy the face is.
+    """Three incommensurable waves for each axis, and the breath. They depend only on time and on the gain.
 
     waves : (3, 3, 2) period (s) and phase (rad) of the waves of yaw, pitch and roll.
     """
@@ -96,24 +97,24 @@ class Sway:
         self._gain = Steps(1)
 
     def begin(self) -> None:
-        """Sway as the settings say."""
+        """Start with the gain 1."""
         self._gain.reset()
 
-    def busy(self, gain: float, now_s: float) -> None:
-        """Sway ``gain`` times as far from now on."""
+    def set_gain(self, gain: float, now_s: float) -> None:
+        """Change the amplitude of the sway to ``gain`` times that of the settings, from now on."""
         if abs(gain - 1.0 - self._gain.goal[0]) > 1e-9:
-            self._gain.go([gain - 1.0], now_s, _BUSY_S)
-        self._gain.settle(now_s - MEMORY_S)
+            self._gain.move_to([gain - 1.0], now_s, _GAIN_CHANGE_S)
+        self._gain.drop_finished(now_s - MEMORY_S)
 
     def at(self, now_s: float) -> tuple[float, float, float]:
-        """The angles at ``now_s``."""
+        """Return the angles at ``now_s``."""
         waves = np.sin(now_s * self._speeds + self._phases).sum(axis=1)
         yaw, pitch, roll = ((1.0 + self._gain.at(now_s)[0]) * self._reach * waves).tolist()
-        return yaw, pitch - self._breath_rad * fullness(self._breath, now_s), roll
+        return yaw, pitch - self._breath_rad * lung_volume(self._breath, now_s), roll
 
 
-def fullness(breath: BreathSettings, now_s: float) -> float:
-    """How full the lungs are, 0..1."""
+def lung_volume(breath: BreathSettings, now_s: float) -> float:
+    """Return how full the lungs are, 0..1."""
     t = now_s % (breath.inhale_s + breath.hold_s + breath.exhale_s + breath.pause_s)
     if t < breath.inhale_s + breath.hold_s:
         return minimum_jerk(t / breath.inhale_s)
@@ -122,9 +123,9 @@ def fullness(breath: BreathSettings, now_s: float) -> float:
 
 @dataclass(frozen=True)
 class Nod:
-    """Some cycles down and up, each a share ``fade`` of the one before.
+    """A nod of several cycles down and up.
 
-    depth_rad : of the first. cycle_s : length of each.
+    depth_rad : of the first cycle. cycle_s : length of a cycle. fade : depth of a cycle relative to the previous one.
     """
 
     start_s: float
@@ -135,11 +136,11 @@ class Nod:
 
     @property
     def end_s(self) -> float:
-        """When it is over."""
+        """Time at which the nod ends."""
         return self.start_s + self.cycles * self.cycle_s
 
     def at(self, now_s: float) -> float:
-        """Pitch (rad) at ``now_s``."""
+        """Return the pitch (rad) at ``now_s``."""
         passed = (now_s - self.start_s) / self.cycle_s
         if not 0.0 < passed < self.cycles:
             return 0.0
@@ -147,7 +148,7 @@ class Nod:
 
 
 class Nods:
-    """Nods: a listener's, which come by themselves, and those that others ask for."""
+    """Spontaneous nods of a listener, and requested nods."""
 
     def __init__(self, settings: NodSettings, numbers: random.Random) -> None:
         self._settings, self._random = settings, numbers
@@ -155,12 +156,12 @@ class Nods:
         self._next_s = math.inf
 
     def begin(self, now_s: float) -> None:
-        """Start without any."""
+        """Start without nods."""
         self.nods = []
         self._next_s = now_s + draw(self._settings.interval_s, self._random)
 
     def advance(self, now_s: float, *, listening: bool) -> None:
-        """Begin what is due until ``now_s``; only a listener nods by itself."""
+        """Begin the nods that are due until ``now_s``; only a listener nods spontaneously."""
         nod, numbers = self._settings, self._random
         while self._next_s <= now_s:
             depth, cycle = math.radians(numbers.uniform(*nod.depth_deg)), numbers.uniform(*nod.cycle_s)
@@ -172,9 +173,9 @@ class Nods:
             self.nods.pop(0)
 
     def nod(self, now_s: float, depth_rad: float, cycle_s: float) -> None:
-        """Nod once, now."""
+        """Nod once, at ``now_s``."""
         self.nods.append(Nod(now_s, depth_rad, cycle_s))
 
     def at(self, now_s: float) -> tuple[float, float, float]:
-        """The angles at ``now_s``."""
+        """Return the angles at ``now_s``."""
         return 0.0, sum(nod.at(now_s) for nod in self.nods), 0.0

@@ -1,7 +1,7 @@
-"""Joins the behaviours of idle motion into the values that one face adds.
+"""Joins the behaviours of idle motion into the values that are added to one face.
 
-It depends on nothing but the seed, the times it is updated to, and what it is given: gaze shifts, loudness, manners.
-The settings are in ``configs/life``.
+The result depends only on the settings (``configs/life``), the seed, the times of the updates, and the given gaze
+shifts, loudness and manners.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ import numpy as np
 from controller.base.parameters import Floats, Parameters
 from controller.layers.idle.attention import Attention, Shift
 from controller.layers.idle.blinks import Blinks
-from controller.layers.idle.draws import LONGEST_GAP_S, generator
+from controller.layers.idle.draws import MAX_GAP_S, generator
 from controller.layers.idle.eyes import Eyes
 from controller.layers.idle.gestures import Gestures
 from controller.layers.idle.head import Nods, Posture, Sway, Turn
 from controller.layers.idle.settings import IdleSettings, Manner, MannerSettings
-from controller.layers.idle.speech import Emphasis, Hearing
+from controller.layers.idle.speech import Emphasis, SpeechDetector
 from controller.vocabulary.sides import spread
 
 _EYES = ("leftEyeYaw", "leftEyePitch", "rightEyeYaw", "rightEyePitch")
@@ -37,10 +37,10 @@ class IdleMotion:
 
     Attributes
     ----------
-    liveliness : 0..1, scales everything; at 0 nothing moves. values : (P,) float64, what it adds to the face.
-    chosen : how it behaves; None for: speaking while it speaks, listening for a time after that, else alone.
-    manner : how it behaves at present.
-    eye_yaw_rad, eye_pitch_rad : micro-saccades and drift, how far the eyes are off what they look at.
+    liveliness : 0..1, scales everything; at 0 nothing moves. values : (P,) float64, added to the face.
+    chosen : the commanded manner; None: ``speak`` while the face speaks, ``listen`` for a time after that, else
+    ``alone``. manner : the current manner.
+    eye_yaw_rad, eye_pitch_rad : offset of the eyes from their target by micro-saccades and drift.
     head_rad : (3,) yaw, pitch, roll of the head.
     """
 
@@ -68,29 +68,29 @@ class IdleMotion:
         self._fidgets = Gestures(parameters, settings.fidget, generator(seed, "fidgets"))
         self._smiles = Gestures(parameters, settings.smile, generator(seed, "smiles"))
         self._swallows = Gestures(parameters, settings.swallow, generator(seed, "swallows"))
-        self._hearing = Hearing(settings.speech)
+        self._speech = SpeechDetector(settings.speech)
         self._emphasis = Emphasis(parameters, settings.speech, generator(seed, "emphasis"))
 
     def shift(self, angle_rad: float, now_s: float) -> None:
-        """The gaze is commanded to jump by an angle; a large jump may bring a blink."""
+        """React to a commanded jump of the gaze by an angle; a large jump may cause a blink."""
         self._blinks.shift(angle_rad, now_s)
 
     def update(self, now_s: float, *, looking: bool, blink_block: float = 0.0, gaze_block: float = 0.0,
                loudness: float = 0.0) -> Floats:  # fmt: skip
-        """Move to ``now_s``; returns :attr:`values`.
+        """Advance to ``now_s`` and return :attr:`values`.
 
-        looking : something is looked at: no glances, and no eye angles in ``values``.
-        blink_block, gaze_block : how much an expression holds back blinks and glances, 0..1.
+        looking : whether a gaze is commanded; if so, there are no glances, and no eye angles in ``values``.
+        blink_block, gaze_block : how much an expression suppresses blinks and glances, 0..1.
         loudness : how loud the face speaks, 0..1.
         """
         self.values.fill(0.0)
         if self.liveliness <= 0.0:
             self._rest()
             return self.values
-        if not 0.0 <= now_s - self._last_s <= LONGEST_GAP_S:
+        if not 0.0 <= now_s - self._last_s <= MAX_GAP_S:
             self._begin(now_s)
         self._last_s = now_s
-        self._hear(loudness, now_s, looking)
+        self._follow_speech(loudness, now_s, looking)
         self._advance(now_s, looking)
         self._write_face(now_s, 1.0 - blink_block)
         self._write_head(now_s, 1.0 - gaze_block, looking)
@@ -106,8 +106,8 @@ class IdleMotion:
         return self._settings.manner(self.manner)
 
     def _begin(self, now_s: float) -> None:
-        """Start every behaviour again; what they draw goes on."""
-        self._hearing.reset()
+        """Start every behaviour again; their random numbers continue."""
+        self._speech.reset()
         self.manner = self.chosen or "alone"
         self._turn.begin()
         self._sway.begin()
@@ -118,32 +118,32 @@ class IdleMotion:
         self._blinks.begin(now_s, self._table.blink_rate)
         self._look(self._attention.begin(now_s, self._table), looking=False)
 
-    def _hear(self, loudness: float, now_s: float, looking: bool) -> None:
-        """Go along with speech, and behave as it asks."""
-        heard, before = self._hearing.hear(loudness, now_s), self.manner
-        self.manner = self.chosen or self._fitting(now_s)
-        if heard.stressed:
+    def _follow_speech(self, loudness: float, now_s: float, looking: bool) -> None:
+        """Choose the manner by the face's speech, and start the movements that accompany it."""
+        events, before = self._speech.update(loudness, now_s), self.manner
+        self.manner = self.chosen or self._choose_manner(now_s)
+        if events.stressed:
             beat = self._emphasis.stress(now_s)
             if beat.nod_rad > 0.0:
                 self._nods.nod(now_s, beat.nod_rad, self._settings.speech.nod_s)
             self._blink_now(beat.blink, now_s)
-        if heard.ended:
+        if events.ended:
             self._blink_now(self._emphasis.end().blink, now_s)
-        away = heard.began and self.manner == "speak" and self._emphasis.looks_away()
-        if away or heard.ended or (self.manner == "listen" and before != "listen"):
+        away = events.began and self.manner == "speak" and self._emphasis.draw_look_away()
+        if away or events.ended or (self.manner == "listen" and before != "listen"):
             self._look(self._attention.advance(now_s, self._table), looking)
             self._look(self._attention.turn(now_s, self._table, on_listener=not away), looking)
 
-    def _fitting(self, now_s: float) -> Manner:
-        """The manner that fits what was heard."""
-        if self._hearing.speaking:
+    def _choose_manner(self, now_s: float) -> Manner:
+        """Return the manner that fits the face's speech."""
+        if self._speech.speaking:
             return "speak"
-        return "listen" if now_s - self._hearing.silent_since_s < self._settings.speech.listen_s else "alone"
+        return "listen" if now_s - self._speech.silent_since_s < self._settings.speech.listen_s else "alone"
 
     def _blink_now(self, wanted: bool, now_s: float) -> None:
         if wanted:
             self._blinks.advance(now_s, self._table.blink_rate)
-            self._blinks.hurry(now_s)
+            self._blinks.request(now_s)
 
     def _advance(self, now_s: float, looking: bool) -> None:
         """Let every behaviour begin what is due."""
@@ -152,18 +152,18 @@ class IdleMotion:
         self._was_looking = looking
         self._look(self._attention.advance(now_s, self._table), looking)
         self._eyes.advance(now_s)
-        self._turn.settle(now_s)
-        self._sway.busy(self._table.sway, now_s)
+        self._turn.drop_finished(now_s)
+        self._sway.set_gain(self._table.sway, now_s)
         self._posture.advance(now_s)
         self._nods.advance(now_s, listening=self.manner == "listen")
         self._blinks.advance(now_s, self._table.blink_rate)
-        quiet = not self._hearing.speaking
+        quiet = not self._speech.speaking
         self._fidgets.advance(now_s, wanted=quiet)
         self._smiles.advance(now_s, wanted=quiet and self.manner == "listen")
         self._swallows.advance(now_s, wanted=quiet)
 
     def _look(self, shifts: Iterable[Shift], looking: bool) -> None:
-        """Move eyes and head; where a command says what to look at, idle motion keeps straight ahead of it."""
+        """Move eyes and head to each shift in turn; while a gaze is commanded, idle motion looks straight ahead."""
         for shift in shifts:
             goal = Shift(shift.time_s, 0.0, 0.0) if looking else shift
             size_rad = self._eyes.look(goal)
@@ -182,27 +182,28 @@ class IdleMotion:
             self.values[self._lids] += left * blinking, right * blinking
 
     def _write_head(self, now_s: float, glancing: float, looking: bool) -> None:
-        """Head and eyes: the eyes turn back by as much as the head turns, when it arrives (the limits delay it).
+        """Write the angles of head and eyes.
 
-        Sway is so slow that the delay does not matter: 0.2 degrees at most.
+        The eyes turn back by the angle of the head, which lags the eyes because of its motion limits. Sway is so slow
+        that its lag, 0.2 degrees at most, does not matter.
         """
-        alive, sway = self.liveliness, self._sway.at(now_s)
+        liveliness, sway = self.liveliness, self._sway.at(now_s)
         self.head_rad[:] = self._head_at(now_s, glancing, sway)
-        self.head_rad *= alive
+        self.head_rad *= liveliness
         self.values[self._head_indices] += self.head_rad / self._head_scale
-        self.eye_yaw_rad, self.eye_pitch_rad = (alive * angle for angle in self._eyes.unrest(now_s))
+        self.eye_yaw_rad, self.eye_pitch_rad = (liveliness * angle for angle in self._eyes.fixational_offset(now_s))
         if looking:
             return
         yaw, pitch, _ = self._head_at(now_s - self._lag_s, glancing, sway)
         gaze_yaw, gaze_pitch = self._eyes.direction(now_s)
-        yaw = alive * (glancing * gaze_yaw - yaw) + self.eye_yaw_rad
-        pitch = alive * (glancing * gaze_pitch - pitch) + self.eye_pitch_rad
+        yaw = liveliness * (glancing * gaze_yaw - yaw) + self.eye_yaw_rad
+        pitch = liveliness * (glancing * gaze_pitch - pitch) + self.eye_pitch_rad
         angles = (yaw, pitch, yaw, pitch)
         for index, angle, full in zip(self._eye_indices, angles, self._eye_scale, strict=True):
             self.values[index] = min(max(angle / full, -1.0), 1.0)
 
     def _head_at(self, now_s: float, glancing: float, sway: Angles) -> Angles:
-        """Yaw, pitch and roll (rad) of the head at full liveliness, with its ``sway``."""
+        """Return yaw, pitch and roll (rad) of the head at full liveliness, including ``sway``."""
         posture, nods = self._posture.at(now_s), self._nods.at(now_s)
         turn_yaw, turn_pitch, _ = self._turn.at(now_s)
         yaw = sway[0] + posture[0] + glancing * turn_yaw
@@ -210,7 +211,7 @@ class IdleMotion:
 
 
 def _lag_s(parameters: Parameters) -> float:
-    """How much later the head arrives than the eyes, by the time constants of their motion limits."""
+    """Return how far the head lags the eyes (s), by the time constants of their motion limits."""
     head, eye = parameters.index("headYaw"), parameters.index("leftEyeYaw")
     later = parameters.response_s[head] - parameters.response_s[eye]
     smoothing = parameters.max_acceleration[head] / parameters.max_jerk[head] / 2

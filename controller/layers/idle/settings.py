@@ -1,4 +1,4 @@
-"""Reads the settings of idle motion: a file in ``configs/life`` on top of the shipped one, which is complete."""
+"""Reads the settings of idle motion from a file in ``configs/life``; missing keys are those of ``natural``."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from controller.layers.idle.draws import Draw, Span, in_order
 from controller.vocabulary.sides import unknown_names
 
 Manner = Literal["alone", "listen", "speak"]
-"""What a face does beside others: nothing in particular, listening to somebody, speaking."""
+"""How a face behaves: with nobody in particular, listening to somebody, or speaking."""
 
 MANNERS: tuple[Manner, ...] = ("alone", "listen", "speak")
 
 AUTO = "auto"
-"""The manner that fits: speaking while the face speaks, listening for a time after that, else alone."""
+"""Chooses the manner: ``speak`` while the face speaks, ``listen`` for a time after that, else ``alone``."""
 
 Seconds = Annotated[Number, Field(gt=0, le=3600)]
 Delay = Annotated[Number, Field(ge=0, le=10)]
@@ -35,7 +35,7 @@ Periods = Annotated[tuple[Period, Period], AfterValidator(in_order)]  # times ar
 
 
 def check_manner(name: str | None) -> Manner | None:
-    """The manner of a name; None for ``auto`` and for None. Raises ParameterError: there is none of that name."""
+    """Return the manner of a name; None for ``auto`` and for None. Raises ParameterError: unknown name."""
     if name is None or name == AUTO:
         return None
     for manner in MANNERS:
@@ -197,24 +197,24 @@ class IdleSettings(Settings):
     speech: SpeechSettings
 
     def manner(self, name: Manner) -> MannerSettings:
-        """The table of a manner."""
+        """Return the settings of a manner."""
         table: MannerSettings = getattr(self, name)
         return table
 
     @classmethod
     def named(cls, name: str, parameters: Parameters) -> IdleSettings:
-        """The settings at a path or of a name in ``configs/life``; what its tables leave out is as in ``natural``.
+        """Read the settings at a path or of a name in ``configs/life``; missing keys are those of ``natural``.
 
-        Raises ConfigError: it cannot be read, or does not fit; every fault with its key.
+        Raises ConfigError: the file cannot be read or is invalid; it lists every fault with its key.
         """
         path, shipped = find_config("life", name), config_dir() / "life" / "natural.toml"
         table = read_toml(path)
-        merged = table if path == shipped else _merged(read_toml(shipped), table)
+        merged = table if path == shipped else _merge(read_toml(shipped), table)
         return check(merged, cls, path, lambda settings: list(_faults(settings, parameters)))
 
 
-def _merged(shipped: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
-    """The tables of both; a key of ``own`` replaces that of ``shipped``."""
+def _merge(shipped: Mapping[str, Any], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the tables of both; a key of ``own`` replaces that of ``shipped``."""
     merged = {**shipped, **own}
     for name in set(shipped) & set(own):
         if isinstance(shipped[name], Mapping) and isinstance(own[name], Mapping):

@@ -1,4 +1,4 @@
-"""Implements the line protocol: commands, sessions, the serial port, scripts, simulated hosts.
+"""Implements the line protocol: commands, sessions, serial and TCP links, scripts, and simulated robot hosts.
 
 In: bytes. Out: commands to the layers, and answers. Imports base to layers.
 """

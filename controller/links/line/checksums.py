@@ -1,7 +1,7 @@
-"""Decides whether a line without a checksum is taken on a link.
+"""Decides whether a link accepts a line without a checksum.
 
-A single wrong bit can turn the ``*`` before a checksum into another character, and a line with a checksum into one
-without, whose number has more digits. So a link whose other end sends checksums takes no lines without one.
+A single wrong bit can turn the ``*`` before a checksum into another character, so that a line with a checksum becomes
+one without, whose last number has more digits. So a link whose other end sends checksums refuses lines without one.
 """
 
 from __future__ import annotations
@@ -10,14 +10,13 @@ from controller.base.errors import ParameterError
 from controller.links.line.protocol import Code, LineError, Words
 
 CHECKSUMS = ("optional", "latched", "required")
-"""When a link demands checksums: never, once a line had a valid one, always."""
+"""When a link requires checksums: never, after the first line with a valid one, always."""
 
 
 class ChecksumRule:
-    """The rule of one link, which the stage's file chooses.
+    """The checksum rule of one link.
 
-    ``mode`` : one of :data:`CHECKSUMS`, what holds now; the other end may change it, but not where the stage's file
-    requires checksums.
+    mode : the current one of :data:`CHECKSUMS`. The other end may change it unless the stage file requires checksums.
     """
 
     def __init__(self, mode: str = "optional") -> None:
@@ -26,26 +25,26 @@ class ChecksumRule:
         self._seen = False
 
     def check(self, words: Words) -> None:
-        """Raises LineError for a line without a checksum that must have one.
+        """Raise LineError for a line without a required checksum.
 
-        The error has no tag: the line may be damaged, its tag as well, and whoever sent it sends it again.
+        The error has no tag, because the line and its tag may be damaged.
         """
         if words.checked:
             self._seen = True
-        elif self._demanded and not (_is_change(words) and not self._fixed):
+        elif self._is_required and not (_is_change(words) and not self._fixed):
             raise LineError(Code.CHECKSUM, self._reason())
 
     def change(self, mode: str, *, checked: bool) -> None:
-        """Set the mode as the other end asks; ``checked`` : its line had a checksum.
+        """Set the mode on request of the other end; ``checked`` : whether its line had a checksum.
 
-        Raises ParameterError: the stage's file requires checksums.
+        Raises ParameterError: the stage file requires checksums.
         """
         if self._fixed and mode != self.mode:
             raise ParameterError("the stage's file requires checksums on this link", hint='checksum = "latched"')
         self.mode, self._seen = mode, checked
 
     @property
-    def _demanded(self) -> bool:
+    def _is_required(self) -> bool:
         return self.mode == "required" or (self.mode == "latched" and self._seen)
 
     def _reason(self) -> str:
@@ -56,6 +55,6 @@ class ChecksumRule:
 
 
 def _is_change(words: Words) -> bool:
-    """Whether a line asks for another mode: the way out for a person who cannot compute checksums."""
+    """Whether a line requests another mode, which a person who cannot compute checksums must be able to do."""
     command, *rest = words.words
     return command.upper() == "HELLO" and len(rest) == 1 and rest[0].lower().startswith("checksum=")

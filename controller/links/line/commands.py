@@ -1,4 +1,4 @@
-"""Parses the commands of the omote line protocol; no I/O here.
+"""Parses the commands of the omote line protocol, without any I/O.
 
 :class:`Grammar` knows names and ranges, and makes ``Command("SET", (17,), (0.8,))`` of ``SET jawOpen 0.8``.
 """
@@ -27,21 +27,21 @@ MIN_DURATION_S = 0.05
 MAX_DURATION_S = 3600.0
 MAX_FADE_S = 60.0
 READINGS = ("UNITS", "EMOTION", "VISEMES", "MOOD")
-"""What a face can be read as: action units, the nearest emotion, mouth shapes, valence-arousal-dominance."""
+"""What a face can be read as: action units, the most similar emotion, mouth shapes, valence-arousal-dominance."""
 LISTS = ("COMMANDS", "EXPRESSIONS", "GROUPS", "HEADS", "HOLDERS", "LAYERS", "PARAMETERS", "SHOWS", "VISEMES")
-_SHOWN = 32
+_MAX_QUOTED = 32  # characters of a word that an error quotes
 
 
 @dataclass(frozen=True)
 class Command:
-    """A command whose names and numbers are right.
+    """A command whose names and numbers are valid.
 
     name : its first word, or two for ``GAZE AT``, ``GAZE ROOM``, ``GAZE HEAD`` and ``GAZE OFF``; FRAME becomes SET and
         VERSION becomes HELLO.
-    indices : positions of the parameters it names. values : its numbers, of SET one for each of ``indices``.
-    words : other names in it: of an expression, visemes, a list, a reading, a script or a mark; of HELLO
+    indices : of the parameters that it names. values : its numbers; those of SET belong to ``indices``.
+    words : other names in it: of an expression, visemes, a list, a reading, a script or a mark; for HELLO
         one of :data:`controller.links.line.checksums.CHECKSUMS`.
-    question : what SUB streams: a command GET, MEASURED or READ.
+    question : the query that SUB repeats: a command GET, MEASURED or READ.
     """
 
     name: str
@@ -69,8 +69,8 @@ class Request:
 class Grammar:
     """Parses lines.
 
-    ``find_expression`` gives the canonical name of an expression, or raises ParameterError. ``scripted`` : the lines
-    come from a script, which cannot let servos move that a person has stopped: START is refused.
+    find_expression : returns the canonical name of an expression, or raises ParameterError. scripted : whether the
+    lines come from a script; START is refused then, so that a script cannot undo a person's STOP.
     """
 
     def __init__(
@@ -82,7 +82,7 @@ class Grammar:
         self._all = tuple(range(len(parameters)))
 
     def parse(self, line: bytes) -> Request | None:
-        """The request of a line without its line end; None for an empty line.
+        """Return the request of a line without its line end; None for an empty line.
 
         Raises LineError: the line is refused; it carries code, reason and tag.
         """
@@ -90,7 +90,7 @@ class Grammar:
         return None if words is None else self.request(words)
 
     def request(self, words: Words) -> Request:
-        """The request that the words of a line make. Raises LineError, as :meth:`parse`."""
+        """Return the request that the words of a line make. Raises LineError, like :meth:`parse`."""
         try:
             return Request(self._command(words.words), words.tag, words.checked, words.to)
         except LineError as error:
@@ -105,7 +105,7 @@ class Grammar:
         text = words[0]
         rule = _RULES.get(text.upper())
         if rule is None:
-            raise LineError(Code.COMMAND, f"unknown command {quoted(text)}{did_you_mean(text[:_SHOWN], COMMANDS)}")
+            raise LineError(Code.COMMAND, f"unknown command {quoted(text)}{did_you_mean(text[:_MAX_QUOTED], COMMANDS)}")
         least, most, usage, read = rule
         given = words[1:]
         if len(given) < least or (most is not None and len(given) > most):
@@ -149,7 +149,7 @@ class Grammar:
 
     @cached_property
     def visemes(self) -> Visemes:
-        """Those that VISEME may name, read at the first use."""
+        """The visemes that VISEME may name, read at the first use."""
         return Visemes.load(self._parameters)
 
     def read_sub(self, given: Sequence[str]) -> Command:
@@ -164,11 +164,11 @@ class Grammar:
         return Command("SUB", values=(rate,), question=question)
 
     def names_or_all(self, given: Sequence[str]) -> tuple[int, ...]:
-        """Positions of names; all for ``ALL`` and for none."""
+        """Return the indices of names; of all parameters for ``ALL`` or no names."""
         return self._all if [word.upper() for word in given] in ([], ["ALL"]) else self.names(given)
 
     def names(self, given: Sequence[str]) -> tuple[int, ...]:
-        """Positions of names that must all be known and differ."""
+        """Return the indices of names. Raises LineError: a name is unknown or repeated."""
         try:
             indices = tuple(self._parameters.index(text) for text in given)
         except ParameterError as error:
@@ -179,7 +179,7 @@ class Grammar:
         return indices
 
     def values(self, indices: Sequence[int], given: Sequence[str]) -> tuple[float, ...]:
-        """Values inside the ranges of their parameters."""
+        """Parse values. Raises LineError: one is outside the range of its parameter."""
         p = self._parameters
         return tuple(
             in_range(p.names[i], text, float(p.low[i]), float(p.high[i]))
@@ -188,7 +188,7 @@ class Grammar:
 
 
 def in_range(what: str, text: str, low: float, high: float) -> float:
-    """A number in plain decimal notation, from ``low`` to ``high``. Raises LineError; nothing is clipped."""
+    """Parse a number in plain decimal notation. Raises LineError: it is not from ``low`` to ``high``."""
     value = plain_number(text)
     if value is None:
         raise LineError(Code.NUMBER, f"{what}: {quoted(text)} is not a finite number")
@@ -198,12 +198,12 @@ def in_range(what: str, text: str, low: float, high: float) -> float:
 
 
 def quoted(text: str) -> str:
-    """A word as it was typed, in quotes; the beginning of a long one."""
+    """Return a word in quotes; of a long one, only the beginning."""
     return f"'{_cut(text)}'"
 
 
 def _cut(text: str) -> str:
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+    return text if len(text) <= _MAX_QUOTED else f"{text[:_MAX_QUOTED]}..."
 
 
 def _count(number: int, what: str) -> str:
@@ -263,7 +263,7 @@ def _list(_: Grammar, given: Sequence[str]) -> Command:
 def _help(_: Grammar, given: Sequence[str]) -> Command:
     (what,) = given or ("HELP",)
     if what.upper() not in _RULES:
-        raise LineError(Code.NAME, f"unknown command {quoted(what)}{did_you_mean(what[:_SHOWN], COMMANDS)}")
+        raise LineError(Code.NAME, f"unknown command {quoted(what)}{did_you_mean(what[:_MAX_QUOTED], COMMANDS)}")
     return Command("HELP", words=(what.upper(),) if given else ())
 
 
@@ -279,12 +279,12 @@ def _life(_: Grammar, given: Sequence[str]) -> Command:
 
 
 def _named(name: str) -> Callable[[Grammar, Sequence[str]], Command]:
-    """For commands that take names of parameters or ALL."""
+    """Return the reader of a command that has names of parameters, or ALL."""
     return lambda grammar, given: Command(name, grammar.names_or_all(given))
 
 
 Rule = tuple[int, int | None, str, Callable[[Grammar, Sequence[str]], Command]]
-"""Least and most arguments, how the command is written, and what reads its arguments."""
+"""Smallest and largest number of arguments, the usage of the command, and the reader of its arguments."""
 
 _RULES: dict[str, Rule] = {
     "HELLO": (0, 1, f"HELLO [checksum={'|'.join(CHECKSUMS)}]", _hello),
@@ -325,5 +325,5 @@ COMMANDS = tuple(_RULES)
 
 
 def help_of(name: str | None) -> str:
-    """How a command is written; without a name, the words of all commands."""
+    """Return the usage of a command; ``name`` None: the words of all commands."""
     return _RULES[name][2] if name else f"[command]: {' '.join(COMMANDS)}"

@@ -1,7 +1,7 @@
-"""Simulates a robot host: it sends a script over a pseudo-terminal and checks every answer.
+"""Simulates a robot host, which sends a script over a pseudo-terminal and counts the answers.
 
 ``python -m controller.links.line.host --script tour`` makes the port, prints ``ready PATH``, serves until its standard
-input ends, and prints what it counted as one line of JSON. So it ends with the process that started it.
+input ends, and prints its counts as one line of JSON. So it ends with the process that started it.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ from controller.links.line.protocol import MAX_REPLY, LineDecoder, LineError, Re
 from controller.links.line.script import Script, Wave, load_script
 from controller.vocabulary.vocabulary import Vocabulary
 
-_ANSWER_LIMIT_S = 1.0
+_ANSWER_TIMEOUT_S = 1.0
 _GREETING = "HELLO"
-_HELLO_EVERY_S = 0.1
-_POLL_S = 0.02
-_KEPT_REFUSALS = 20
+_GREETING_INTERVAL_S = 0.1
+_POLL_INTERVAL_S = 0.02
+_MAX_REFUSALS = 20  # refusals that the report shows
 _NO_STEP = (math.inf, "")
 
 
@@ -41,13 +41,13 @@ class RobotHost:
 
     Parameters
     ----------
-    port : the host's end. script : what to send. parameters : for lines that name every parameter.
-    now_s : the time source.
+    port : the host's end. script : the lines to send. parameters : for lines with every parameter.
+    now_s : the time source (s).
 
     Attributes
     ----------
-    sent, accepted, refused, unanswered, damaged, streamed : lines counted.
-    refusals : the first refused lines with their answers. round_trip_ms : from a line to its answer.
+    counts : numbers of lines: sent, accepted, refused, unanswered, damaged, unasked, streamed.
+    refusals : the first refused lines with their answers. round_trip_ms : times from a line to its answer.
     """
 
     def __init__(
@@ -66,10 +66,10 @@ class RobotHost:
         self._greeted = False
 
     def run(self, keep_going: Callable[[], bool]) -> None:
-        """Greet until there is an answer, then play the script, until ``keep_going()`` is false."""
+        """Send greetings until there is an answer, then play the script, while ``keep_going()`` returns True."""
         while keep_going() and not self._greeted:
             self.send(_GREETING)
-            self._listen(self._now_s() + _HELLO_EVERY_S)
+            self._listen(self._now_s() + _GREETING_INTERVAL_S)
         start_s, frame, steps = self._now_s(), 0, self._steps()
         step_s, line = next(steps, _NO_STEP)
         while keep_going():
@@ -79,10 +79,10 @@ class RobotHost:
                 step_s, line = next(steps, _NO_STEP)
             frame = self._send_frame(frame, at_s)
             frame_s = frame / self.script.frames_hz if self.script.frames_hz else math.inf
-            self._listen(start_s + min(at_s + _POLL_S, step_s, frame_s))
+            self._listen(start_s + min(at_s + _POLL_INTERVAL_S, step_s, frame_s))
 
     def _steps(self) -> Iterator[tuple[float, str]]:
-        """Times since the start and lines, without end where the script loops."""
+        """Yield times since the start (s) and lines; endlessly if the script loops."""
         yield from self.script.steps
         if self.script.loop_s and self.script.steps:
             for rounds in itertools.count(1):
@@ -90,7 +90,7 @@ class RobotHost:
                     yield rounds * self.script.loop_s + at_s, line
 
     def send(self, line: str) -> int:
-        """Send a line with a tag and a checksum; returns the tag."""
+        """Send a line with a tag and a checksum, and return the tag."""
         self._tag = self._tag % 999_999_999 + 1
         self._waiting[self._tag] = (self._now_s(), line)
         self.counts["sent"] += 1
@@ -98,7 +98,7 @@ class RobotHost:
         return self._tag
 
     def report(self) -> dict[str, object]:
-        """What was sent, how it was answered and how fast."""
+        """Return the counts, the first refusals and the round-trip times."""
         kinds = ("sent", "accepted", "refused", "unanswered", "damaged", "unasked", "streamed")
         return {
             "script": self.script.name,
@@ -109,7 +109,7 @@ class RobotHost:
         }
 
     def _send_frame(self, frame: int, at_s: float) -> int:
-        """Send every parameter when it is time; frames that were missed are left out."""
+        """Send every parameter if a frame is due, and return the number of the next one; missed frames are skipped."""
         due = int(at_s * self.script.frames_hz) + 1
         if self.script.frames_hz and frame < due:
             self.send("FRAME " + " ".join(map(number, self._wave.at(at_s).tolist())))
@@ -123,7 +123,7 @@ class RobotHost:
                 self._take(line)
             if self._now_s() >= until_s:
                 break
-        self._forget(self._now_s() - _ANSWER_LIMIT_S)
+        self._forget(self._now_s() - _ANSWER_TIMEOUT_S)
 
     def _take(self, line: bytes) -> None:
         try:
@@ -136,9 +136,9 @@ class RobotHost:
         if reply.kind in ("P", "F"):
             self.counts["streamed"] += 1
             return
-        self._answered(reply)
+        self._count_answer(reply)
 
-    def _answered(self, reply: Reply) -> None:
+    def _count_answer(self, reply: Reply) -> None:
         asked = self._waiting.pop(reply.tag or 0, None)
         if asked is None:
             self.counts["unasked"] += 1
@@ -146,13 +146,13 @@ class RobotHost:
         self._greeted = True
         self.round_trip_ms.add((self._now_s() - asked[0]) * 1e3)
         self.counts["accepted" if reply.ok else "refused"] += 1
-        if not reply.ok and len(self.refusals) < _KEPT_REFUSALS:
+        if not reply.ok and len(self.refusals) < _MAX_REFUSALS:
             self.refusals.append(f"{asked[1]} -> ERR {reply.code} {reply.text}")
 
     def _forget(self, before_s: float) -> None:
         for tag in [tag for tag, (sent_s, _) in self._waiting.items() if sent_s < before_s]:
             _, line = self._waiting.pop(tag)
-            self.counts["unanswered"] += line != _GREETING  # of these one answer is enough
+            self.counts["unanswered"] += line != _GREETING  # one answered greeting is enough
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -162,23 +162,23 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--vocabulary", type=Path, action="append", default=[], help="file of further expressions")
     parser.add_argument("--link", type=Path, default=None, help="make this path a link to the port")
     options = parser.parse_args(arguments)
-    for ending in (signal.SIGINT, *TERMINATION_SIGNALS):  # they reach the whole group; the end of stdin ends this
+    for ending in (signal.SIGINT, *TERMINATION_SIGNALS):  # they reach the process group, but only stdin ends this one
         signal.signal(ending, signal.SIG_IGN)
     try:
         parameters = PARAMETERS.with_files(options.vocabulary)
         script = load_script(options.script, parameters, Vocabulary.load(parameters, more=options.vocabulary))
         with HostPort(options.link) as port:
-            _say(f"ready {port.path}")
+            _print_line(f"ready {port.path}")
             host = RobotHost(port, script, parameters)
             host.run(_stdin_open)
-            _say(json.dumps(host.report()))
+            _print_line(json.dumps(host.report()))
     except OMOTE_ERRORS as error:
-        _say("failed " + json.dumps([str(error), error.hint]))
+        _print_line("failed " + json.dumps([str(error), error.hint]))
         return 1
     return 0
 
 
-def _say(line: str) -> None:
+def _print_line(line: str) -> None:
     try:
         sys.stdout.write(line + "\n")
         sys.stdout.flush()

@@ -1,4 +1,4 @@
-"""Serves the robot host's end of a pseudo-terminal, which the controller opens like any serial device."""
+"""Serves the simulated robot host's end of a pseudo-terminal, which the controller opens like any serial device."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ import select
 
 from drivers.sim.serving.ports import Link, PtyPort
 
-_WRITE_LIMIT_S = 0.2
+_WRITE_TIMEOUT_S = 0.2
 
 
 class HostPort(PtyPort):
     """A pseudo-terminal that waits for bytes, and for room to write; parameters and errors as in the base class."""
 
     def open(self, link: Link = None) -> None:
-        """Make the pseudo-terminal; ``path`` is its own name, with a link too."""
+        """Make the pseudo-terminal; ``path`` is its own name even if there is a link to it."""
         super().open(link)
         self.path = self.device
 
     def read(self, timeout_s: float = 0.0) -> bytes:
-        """What has arrived; waits for the first byte, empty after ``timeout_s``."""
+        """Wait for the first byte and return what has arrived; empty after ``timeout_s``."""
         ready, _, _ = select.select(self.descriptors, [], [], max(0.0, timeout_s))
         return super().read() if ready else b""
 
@@ -30,7 +30,7 @@ class HostPort(PtyPort):
             try:
                 view = view[os.write(self.descriptors[0], view) :]
             except OSError:
-                if not select.select([], self.descriptors, [], _WRITE_LIMIT_S)[1]:
+                if not select.select([], self.descriptors, [], _WRITE_TIMEOUT_S)[1]:
                     self.dropped += len(view)
                     return
 

@@ -1,8 +1,8 @@
 """Serves the line protocol on a serial port, in its own thread.
 
 Replies and streamed lines are written without waiting. A peer that does not read loses lines, which are counted, and
-does not delay the face. A port that disappears is opened again when it is back, and a subscription then goes on. Errors
-in the thread are logged and counted and do not end it; only :meth:`LineLink.stop` does.
+does not delay the face. A port that disappears is opened again when it is back, and a subscription then continues.
+Errors in the thread are logged and counted and do not end it; only :meth:`LineLink.stop` does.
 """
 
 from __future__ import annotations
@@ -16,21 +16,21 @@ from controller.links.line.talk import Talk
 from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
 
-_POLL_S = 0.05
-_RETRY_S = 0.5
-_READ_LIMIT = 65_536
+_POLL_INTERVAL_S = 0.05
+_RETRY_INTERVAL_S = 0.5
+_MAX_READ_BYTES = 65_536
 _FAULT_PAUSE_S = 0.05
 
 
 class LineLink:
-    """Takes commands from a serial port and streams parameters back.
+    """Receives commands from a serial port and streams parameters back.
 
     Parameters
     ----------
     port : device path. baud : its rate.
-    sink : where accepted commands go, with the time they arrived.
-    checksum : when lines must have one, of :data:`controller.links.line.checksums.CHECKSUMS`.
-    retry_s : how often a lost port is tried again.
+    sink : receives accepted commands, with the time they arrived.
+    checksum : when lines need a checksum, one of :data:`controller.links.line.checksums.CHECKSUMS`.
+    retry_s : interval between attempts to open a lost port.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class LineLink:
     """
 
     def __init__(
-        self, port: str, baud: int, sink: CommandSink, *, checksum: str = "latched", retry_s: float = _RETRY_S
+        self, port: str, baud: int, sink: CommandSink, *, checksum: str = "latched", retry_s: float = _RETRY_INTERVAL_S
     ) -> None:
         self.port = port
         self.connected = False
@@ -51,14 +51,14 @@ class LineLink:
         self._thread = threading.Thread(target=self._run, name=f"link {port}", daemon=True)
 
     def start(self) -> LineLink:
-        """Open the port and begin to listen. Raises PortError, whose subclass says why the port cannot be opened."""
+        """Open the port and start receiving. Raises PortError: the port cannot be opened; its subclass says why."""
         self._serial.open()
         self.connected = True
         self._thread.start()
         return self
 
     def stop(self) -> None:
-        """Stop listening and give the port back."""
+        """Stop receiving and close the port."""
         self._stopping.set()
         if self._thread.ident is not None:
             self._thread.join()
@@ -66,9 +66,7 @@ class LineLink:
         self.connected = False
 
     def report(self) -> dict[str, object]:
-        """Counts of lines taken, refused (by code) and not answered, of bytes, of lines streamed and dropped, and of
-        reconnects; rate and jitter of arriving lines.
-        """
+        """Return counts of lines, bytes, errors and reconnects, and the rate and jitter of arriving lines."""
         return {
             "port": self.port,
             "connected": self.connected,
@@ -96,7 +94,7 @@ class LineLink:
             except PortError:
                 self._reconnect()
             except Exception as error:  # noqa: BLE001  nothing that arrives may end the link
-                self._session.fault(error, "it goes on with the next line")
+                self._session.fault(error, "the link continues with the next line")
                 self._session.drop()
                 self._stopping.wait(_FAULT_PAUSE_S)
 
@@ -105,10 +103,10 @@ class LineLink:
             self._talk.serve(self._read(), self._serial.put)
 
     def _read(self) -> bytes:
-        """All that has arrived, so that a STOP is found however much came before it."""
-        data = self._serial.read(time.monotonic() + self._talk.wait_s(_POLL_S))
+        """Read everything that has arrived, so that a STOP is found however much came before it."""
+        data = self._serial.read(time.monotonic() + self._talk.wait_s(_POLL_INTERVAL_S))
         more = data
-        while more and len(data) < _READ_LIMIT:
+        while more and len(data) < _MAX_READ_BYTES:
             more = self._serial.read(0.0)
             data += more
         return data

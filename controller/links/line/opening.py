@@ -1,4 +1,4 @@
-"""Opens a link that speaks the line protocol, and starts a simulated robot host where the stage wants one."""
+"""Opens a link with the line protocol, and starts a simulated robot host if the stage has one."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from drivers.base.children import command as module_command
 from drivers.base.children import environment
 
 _HOST = "controller.links.line.host"
-_START_LIMIT_S = 20.0
-_END_LIMIT_S = 3.0
+_START_TIMEOUT_S = 20.0
+_END_TIMEOUT_S = 3.0
 
 
 def open_line(settings: LineSettings, context: LinkContext) -> LineLink | LineServer:
-    """Open the port, or the address, and listen.
+    """Open the serial port, or listen at the address.
 
     Raises LinkError: the simulated host does not start, or the address cannot be used. PortError: the port cannot be
     opened.
@@ -55,11 +55,11 @@ class HostProcess:
 
     Parameters
     ----------
-    script : a path, or a name in ``configs/scripts``. vocabularies : files of further expressions it names.
+    script : a path, or a name in ``configs/scripts``. vocabularies : files of further expressions that it uses.
 
     Attributes
     ----------
-    path : the port it serves. counts : what it counted, once stopped.
+    path : the port that it serves. counts : its report, after :meth:`stop`.
 
     Raises LinkError: it does not start.
     """
@@ -71,7 +71,7 @@ class HostProcess:
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment(_HOST)
         )
-        timer = threading.Timer(_START_LIMIT_S, self._process.kill)
+        timer = threading.Timer(_START_TIMEOUT_S, self._process.kill)
         timer.start()
         line = self._process.stdout.readline() if self._process.stdout is not None else ""
         timer.cancel()
@@ -85,9 +85,9 @@ class HostProcess:
         raise LinkError(message, hint=hint)
 
     def stop(self) -> None:
-        """End it and read its counts; may be called again."""
+        """End the process and read its counts; may be called repeatedly."""
         try:
-            output, _ = self._process.communicate(timeout=_END_LIMIT_S)
+            output, _ = self._process.communicate(timeout=_END_TIMEOUT_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             output, _ = self._process.communicate()

@@ -1,16 +1,16 @@
-"""Keeps what a link has to send until there is room for it, and knows which lines of it are answers."""
+"""Stores the lines that a link has to send until there is room for them, and which of them are answers."""
 
 from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
 
-LIMIT = 65_536
-"""Bytes that wait at most: room for the answers to all lines of a read. A peer that does not read loses whole lines."""
+MAX_BYTES = 65_536
+"""Room for the answers to all lines of one read. A peer that does not read loses whole lines."""
 
 
 class Outbox:
-    """Lines that wait to be sent, in order. Streamed lines never wait: they would be old when they are read."""
+    """Lines that wait to be sent, in order. Streamed lines never wait behind others, because they would be outdated."""
 
     def __init__(self) -> None:
         self._lines: deque[tuple[bytes, bool]] = deque()
@@ -20,15 +20,15 @@ class Outbox:
         return bool(self._lines)
 
     def add(self, line: bytes, *, answer: bool) -> bool:
-        """Take a line with its line end; False when there is no room for it."""
-        if self._size + len(line) > LIMIT or (self._lines and not answer):
+        """Append a line with its line end; return False if there is no room for it."""
+        if self._size + len(line) > MAX_BYTES or (self._lines and not answer):
             return False
         self._lines.append((line, answer))
         self._size += len(line)
         return True
 
     def flush(self, put: Callable[[bytes], int]) -> int:
-        """Send what ``put`` takes without waiting; returns the number of bytes."""
+        """Send what ``put`` accepts without waiting; return the number of bytes."""
         if not self._lines:
             return 0
         sent = left = put(b"".join(line for line, _ in self._lines))
@@ -42,7 +42,7 @@ class Outbox:
         return sent
 
     def clear(self) -> int:
-        """Discard everything; returns how many answers were not sent whole."""
+        """Discard everything; return how many answers were not sent completely."""
         lost = sum(answer for _, answer in self._lines)
         self._lines.clear()
         self._size = 0

@@ -1,4 +1,4 @@
-"""Encodes and decodes lines of the omote line protocol: framing, checksums, tags, replies; no I/O here.
+"""Encodes and decodes lines of the omote line protocol (framing, checksums, tags, replies), without any I/O.
 
 docs/line-protocol.md specifies it; :mod:`controller.links.line.commands` parses the commands.
 """
@@ -25,7 +25,7 @@ MAX_REPLY = 2048
 """Longest line from omote, in bytes, without the line end."""
 
 KNOWN_LINES = 256
-"""Lines whose meaning is kept, so that a repeated one costs less; at most a few kB each."""
+"""Size of the cache of parsed lines, of a few kB each, because robots repeat themselves."""
 
 _TAG = re.compile(r"#(\d{1,9})")
 _REPLY = re.compile(r"(?:#(\d{1,9}) )?(?:(OK|P|F)|ERR ([0-9]+))(?: (.*))?", re.DOTALL)
@@ -38,7 +38,7 @@ _STOP = re.compile(
 
 
 class Code(IntEnum):
-    """Why a line was refused; 1x the line itself, 2x its words, 3x the state of omote."""
+    """Why a line was refused: 1x because of the line itself, 2x its words, 3x the state of omote."""
 
     TOO_LONG = 10
     NOT_ASCII = 11
@@ -56,9 +56,9 @@ class Code(IntEnum):
 
 
 class LineError(LinkError):
-    """A line that is refused.
+    """A refused line.
 
-    code : why, for programs. tag : tag of the line, None without one. checked : the line had a checksum.
+    code : why, for programs. tag : of the line; None if it has none. checked : whether the line had a checksum.
     """
 
     def __init__(self, code: Code, reason: str, *, tag: int | None = None, checked: bool = False) -> None:
@@ -70,9 +70,9 @@ class LineError(LinkError):
 
 @dataclass(frozen=True)
 class Words:
-    """A parsed line: its tag, its words, whether it had a checksum, and whom it is for.
+    """A parsed line: its words, its tag, and whether it had a checksum.
 
-    to : the name of a head or a group, without its ``@``; empty for whom the link talks to.
+    to : the head or group that it is for, without the ``@``; empty for the current target of the link.
     """
 
     words: tuple[str, ...]
@@ -86,7 +86,7 @@ class Reply:
     """A parsed line from omote.
 
     kind : ``"OK"``, ``"ERR"``, or ``"P"``/``"F"`` for streamed parameters.
-    text : what follows. tag : tag of the line it answers. code : of an ERR. checked : it had a checksum.
+    text : the rest. tag : that of the line it answers. code : of an ERR. checked : whether it had a checksum.
     """
 
     kind: str
@@ -97,7 +97,7 @@ class Reply:
 
     @property
     def ok(self) -> bool:
-        """Whether the command was taken."""
+        """Whether the command was accepted."""
         return self.kind == "OK"
 
 
@@ -111,9 +111,9 @@ _CRC = tuple(map(_crc, range(256)))
 
 
 def checksum(data: bytes) -> int:
-    """CRC-8/SMBUS of ``data``: polynomial 0x07, start 0, not reflected. Check value of b"123456789": 0xF4.
+    """Return the CRC-8/SMBUS of ``data``: polynomial 0x07, start 0, not reflected; 0xF4 for b"123456789".
 
-    Unlike the XOR of NMEA it sees every swap of neighbouring ASCII characters and any burst of up to 8 bits.
+    Unlike the XOR of NMEA it detects every swap of adjacent ASCII characters and every error burst of up to 8 bits.
     """
     crc = 0
     for byte in data:
@@ -123,9 +123,9 @@ def checksum(data: bytes) -> int:
 
 @lru_cache(maxsize=KNOWN_LINES)
 def parse_words(line: bytes) -> Words | None:
-    """Parse a line without its line end; None for an empty one. Robots repeat themselves: the last lines are kept.
+    """Parse a line without its line end; return None for an empty one. Recent lines are cached.
 
-    Raises LineError: not printable ASCII, too long, reserved for binary frames, wrong checksum or tag.
+    Raises LineError: not printable ASCII, too long, reserved for binary frames, or a wrong checksum or tag.
     """
     if not line.strip(b" \t"):
         return None
@@ -158,7 +158,7 @@ def _check_bytes(line: bytes) -> None:
 
 
 def is_stop(line: bytes) -> bool:
-    """Whether a line begins with the command STOP, after a tag or noise; whatever else is wrong with it, it stops."""
+    """Whether a line begins with the command STOP, perhaps after a tag or noise, however damaged the rest is."""
     return _STOP.match(line) is not None
 
 
@@ -178,35 +178,35 @@ def _strip_checksum(line: bytes) -> tuple[bytes, bool]:
 
 
 def format_words(words: Iterable[str], *, tag: int | None = None, checked: bool = False) -> bytes:
-    """A line with its line end (LF) from words."""
+    """Return a line of words with its line end (LF)."""
     text = " ".join(words)
     return _finish(text if tag is None else f"#{tag} {text}", checked)
 
 
 def format_ok(text: str, *, tag: int | None = None, checked: bool = False) -> bytes:
-    """The reply to a command that was taken."""
+    """Return the reply to an accepted command."""
     return format_words(["OK", text] if text else ["OK"], tag=tag, checked=checked)
 
 
 def format_error(error: LineError) -> bytes:
-    """The reply to a line that was refused."""
+    """Return the reply to a refused line."""
     reason = _one_line(str(error))
     return format_words(["ERR", str(int(error.code)), reason], tag=error.tag, checked=error.checked)
 
 
 def _one_line(text: str) -> str:
-    """Text of several lines, such as the faults of a file, as one."""
+    """Join the lines of a text, such as the faults of a file, into one."""
     return re.sub(r"\s*\n\s*", "; ", re.sub(r":\s*\n\s*", ": ", text.strip()))
 
 
 def _finish(text: str, checked: bool) -> bytes:
-    """The bytes of a line; one that contains ``*`` always has a checksum, so that its last ``*`` begins that."""
+    """Return the bytes of a line; one with ``*`` always gets a checksum, so that its last ``*`` begins a checksum."""
     data = _NOT_SENT.sub(b"?", text.encode("ascii", "replace"))[: MAX_REPLY - 3]
     return data + (b"*%02X\n" % checksum(data) if checked or b"*" in data else b"\n")
 
 
 def parse_reply(line: bytes) -> Reply | None:
-    """Parse a line from omote; None for an empty one. Raises LineError when it is damaged."""
+    """Parse a line from omote; return None for an empty one. Raises LineError: it is damaged."""
     if not line.strip(b" \t"):
         return None
     body, checked = _strip_checksum(line)
@@ -221,8 +221,8 @@ def parse_reply(line: bytes) -> Reply | None:
 class LineDecoder:
     """Splits a byte stream into lines.
 
-    CR and LF both end a line. A line that grows past ``limit`` is dropped up to its end and reported once,
-    as the bytes kept so far, which are one longer than ``limit``.
+    CR and LF both end a line. A line longer than ``limit`` is cut off to ``limit`` + 1 bytes, by which the parser
+    recognises that it is too long.
     """
 
     def __init__(self, limit: int = MAX_LINE) -> None:
@@ -230,7 +230,7 @@ class LineDecoder:
         self._buffer = bytearray()
 
     def feed(self, data: bytes) -> list[bytes]:
-        """Lines completed by ``data``, without line ends; empty lines are left out."""
+        """Return the lines that ``data`` completes, without line ends; empty lines are left out."""
         pieces = data.replace(b"\r", b"\n").split(b"\n")
         lines = []
         for piece in pieces[:-1]:
@@ -242,7 +242,7 @@ class LineDecoder:
         return lines
 
     def clear(self) -> None:
-        """Discard a line that is not complete, as after the port was lost."""
+        """Discard an incomplete line, for instance after the port was lost."""
         self._buffer.clear()
 
     def _take(self, piece: bytes) -> None:
@@ -251,21 +251,21 @@ class LineDecoder:
 
 
 def format_frame(time_ms: int, values: np.ndarray, *, checked: bool = False) -> bytes:
-    """Every parameter, by position: ``F t v0 v1 ...``. ``values`` : (P,) float64."""
+    """Return a line with every parameter in order: ``F t v0 v1 ...``. values : (P,) float64."""
     return _finish(f"F {time_ms} " + " ".join(map(number, values.tolist())), checked)
 
 
 def format_pairs(time_ms: int, items: Iterable[tuple[str, float]], *, checked: bool = False) -> bytes:
-    """Some values, by name: ``P t name=value ...``."""
+    """Return a line with some values by name: ``P t name=value ...``."""
     return _finish(f"P {time_ms} {pairs(items)}", checked)
 
 
 def pairs(items: Iterable[tuple[str, float]]) -> str:
-    """``name=value name=value ...``."""
+    """Return ``name=value name=value ...``."""
     return " ".join(f"{name}={number(value)}" for name, value in items)
 
 
 def number(value: float) -> str:
-    """A value with at most 4 decimals and no needless zeros."""
+    """Return a value as text with at most 4 decimals and no trailing zeros."""
     text = f"{value:.4f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text

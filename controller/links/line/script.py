@@ -1,4 +1,4 @@
-"""Reads scripts: timed lines of the line protocol, sent by a simulated robot host or played as a show."""
+"""Reads scripts: timed lines of the line protocol that a simulated robot host sends or a show plays."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from surface.base.files import read_toml
 _SUFFIX = ".toml"
 _WORD = re.compile(r"[!-)+-~]{1,100}")
 _NAME = re.compile(r"(?![.])[^/\\\x00-\x1f\x7f]{1,100}")
-"""Of a script that a robot may ask for: no folder, nothing hidden, nothing that a file system refuses."""
+"""Name of a script that a robot may request: without a folder, not hidden, and valid in any file system."""
 
-MOST_STEPS = 50_000
-"""Timed lines in a script."""
+MAX_STEPS = 50_000
+"""Greatest number of timed lines in a script."""
 _Seconds = Annotated[Number, Field(ge=0, le=86_400)]
 
 
@@ -41,20 +41,20 @@ class _File(Settings):
     frames_hz: Annotated[Number, Field(ge=0, le=200)] = 0.0
     marks: dict[str, _Seconds] = {}
     sound: str | None = None
-    steps: Annotated[list[str], Field(max_length=MOST_STEPS)] = []
+    steps: Annotated[list[str], Field(max_length=MAX_STEPS)] = []
     keys: Annotated[list[dict[str, Any]], Field(max_length=1000)] = []
-    """Of the timeline that the steps were made of; see controller.takes.timeline."""
+    """Keys of the timeline from which the steps were made; see controller.takes.timeline."""
 
 
 @dataclass(frozen=True)
 class Script:
-    """What a robot host sends, or a show plays.
+    """A script, which a robot host sends or a show plays.
 
-    steps : (time s, line) in rising time.
+    steps : (time s, line), sorted by time.
     loop_s : after how long it begins again; 0 plays it once.
-    frames_hz : how often every parameter is sent besides, 0 for never.
-    marks : names of moments (s).
-    sound : file with what is heard of it, for a film; a run plays no sound.
+    frames_hz : how often every parameter is sent in addition; 0 for never.
+    marks : times (s) by name.
+    sound : sound file for a film; a run plays no sound.
     """
 
     steps: tuple[tuple[float, str], ...]
@@ -66,7 +66,7 @@ class Script:
 
 
 def _read_steps(file: _File, grammar: Grammar) -> tuple[list[tuple[float, str]], list[str]]:
-    """The steps of a file, and what is wrong with the others."""
+    """Return the valid steps of a file, and the faults of the file."""
     steps: list[tuple[float, str]] = []
     faults = []
     for i, text in enumerate(file.steps):
@@ -76,18 +76,18 @@ def _read_steps(file: _File, grammar: Grammar) -> tuple[list[tuple[float, str]],
             faults.append(f"steps[{i}]: {error} (is {text!r})")
     if file.loop_s and steps and steps[-1][0] > file.loop_s:
         faults.append(f"loop_s: {file.loop_s:g} is before the last step at {steps[-1][0]:g}")
-    if file.sound is not None and not _lies_beside(file.sound):
+    if file.sound is not None and not _is_inside_folder(file.sound):
         faults.append(f"sound: must be a file in the folder of the script or below (is {file.sound!r})")
     return steps, faults
 
 
-def _lies_beside(name: str) -> bool:
-    """Whether a file that a script names is no way to other places of this machine."""
+def _is_inside_folder(name: str) -> bool:
+    """Whether the name of a file in a script stays inside the script's folder."""
     return bool(name) and not Path(name).is_absolute() and ".." not in Path(name).parts and "\0" not in name
 
 
 def read_step(text: str, grammar: Grammar, earliest_s: float = 0.0) -> tuple[float, str]:
-    """Time (s) and line of a step such as ``0.5 EXPR smile``. Raises LineError or ValueError: what is wrong with it."""
+    """Return time (s) and line of a step such as ``0.5 EXPR smile``. Raises LineError or ValueError: it is invalid."""
     time_text, _, line = text.strip().partition(" ")
     at_s = plain_number(time_text)
     if at_s is None:
@@ -102,11 +102,12 @@ def read_step(text: str, grammar: Grammar, earliest_s: float = 0.0) -> tuple[flo
 def load_script(
     name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
 ) -> Script:
-    """The script at a path or of a name in ``configs/scripts``; the shipped expressions without ``vocabulary``.
+    """Read the script at a path or of a name in ``configs/scripts``.
 
-    ``beside`` : the file that names it; its folder is searched first.
+    vocabulary : the named expressions. Default: the shipped ones. beside : the file that names the script, whose folder
+    is searched first.
 
-    Raises ConfigError: it is not there, or wrong; every fault with its key.
+    Raises ConfigError: the script is not there or is invalid; it lists every fault with its key.
     """
     return _load(find_config("scripts", name, beside=beside), parameters, vocabulary)
 
@@ -114,25 +115,25 @@ def load_script(
 def load_named_script(
     name: str, parameters: Parameters, vocabulary: Vocabulary | None = None, *, beside: Path | None = None
 ) -> Script:
-    """The script that a robot asks for by name: one in the folder of ``beside`` or in ``configs/scripts``.
+    """Read a script that a robot requests by name, from the folder of ``beside`` or from ``configs/scripts``.
 
-    A robot gets no other file: ``name`` is no path, and a link out of these folders is not followed. It may ask at any
-    rate, beside commands that must not wait, so a file that has not changed is not read again.
+    A robot gets no other file: ``name`` cannot be a path, and links out of these folders are not followed. Because
+    robots may request scripts at any rate, a file that has not changed is not read again.
 
-    Raises ConfigError: there is none of that name, or it is wrong; every fault with its key.
+    Raises ConfigError: there is no such script, or it is invalid; it lists every fault with its key.
     """
     for folder in _folders(beside) if _NAME.fullmatch(name) else ():
         file = folder / f"{name.removesuffix(_SUFFIX)}{_SUFFIX}"
         state = _state_inside(file)
         if state is not None:
-            return _kept(file, state, parameters, vocabulary)
+            return _load_cached(file, state, parameters, vocabulary)
     known = sorted(path.stem for path in (config_dir() / "scripts").glob(f"*{_SUFFIX}"))
     message = f"no script {quoted(name)} in the folders of the stage and of configs/scripts{did_you_mean(name, known)}"
     raise ConfigError(message, hint=f"there are {', '.join(known)}")
 
 
 def script_names(beside: Path | None = None) -> list[str]:
-    """Names of the scripts that a robot may ask for with one word, in order; see :func:`load_named_script`."""
+    """Return the sorted names of scripts that a robot may request with one word; see :func:`load_named_script`."""
     paths = [path for folder in _folders(beside) for path in folder.glob(f"*{_SUFFIX}")]
     fit = {path.stem for path in paths if _WORD.fullmatch(path.stem) and _has_steps(path)}
     return sorted(fit)
@@ -145,28 +146,28 @@ def _folders(beside: Path | None) -> Iterator[Path]:
 
 
 _State = tuple[int, int, int, int]
-"""Of a file, so that a change is seen: inode, when its content and when anything changed (ns), size (bytes)."""
+"""State of a file, by which a change is detected: inode, mtime (ns), ctime (ns), size (bytes)."""
 
 
 def _state_inside(path: Path) -> _State | None:
-    """The state of a file; None for anything else, such as a folder, a named pipe, or a link out of the folder."""
+    """Return the state of a file; None for anything else, such as a named pipe or a link out of the folder."""
     try:
-        at = path.lstat()
-        if stat.S_ISLNK(at.st_mode) and path.resolve().parent == path.parent.resolve():
-            at = path.stat()
-    except (OSError, ValueError, RuntimeError):  # RuntimeError: links that lead to each other
+        found = path.lstat()
+        if stat.S_ISLNK(found.st_mode) and path.resolve().parent == path.parent.resolve():
+            found = path.stat()
+    except (OSError, ValueError, RuntimeError):  # RuntimeError: a loop of links
         return None
-    return (at.st_ino, at.st_mtime_ns, at.st_ctime_ns, at.st_size) if stat.S_ISREG(at.st_mode) else None
+    return (found.st_ino, found.st_mtime_ns, found.st_ctime_ns, found.st_size) if stat.S_ISREG(found.st_mode) else None
 
 
 def _has_steps(path: Path) -> bool:
     state = _state_inside(path)
-    return state is not None and _had_steps(path, state)
+    return state is not None and _has_steps_cached(path, state)
 
 
 @lru_cache(maxsize=512)
-def _had_steps(path: Path, _state: _State) -> bool:
-    """Whether a file in a given state is a script."""
+def _has_steps_cached(path: Path, _state: _State) -> bool:
+    """Whether a file is a script, cached for a state of the file."""
     try:
         return "steps" in read_toml(path)
     except (OSError, ValueError):
@@ -174,8 +175,8 @@ def _had_steps(path: Path, _state: _State) -> bool:
 
 
 @lru_cache(maxsize=16)
-def _kept(path: Path, _state: _State, parameters: Parameters, vocabulary: Vocabulary | None) -> Script:
-    """The script of a file in a given state."""
+def _load_cached(path: Path, _state: _State, parameters: Parameters, vocabulary: Vocabulary | None) -> Script:
+    """Read a script, cached for a state of its file."""
     return _load(path, parameters, vocabulary)
 
 
@@ -190,7 +191,7 @@ def _load(path: Path, parameters: Parameters, vocabulary: Vocabulary | None) -> 
 
 
 class Wave:
-    """Every parameter in motion, each at its own rate inside its range, for measurements under load."""
+    """Moves every parameter at its own rate inside its range, for measurements under load."""
 
     def __init__(self, parameters: Parameters) -> None:
         index = np.arange(len(parameters))
@@ -200,6 +201,6 @@ class Wave:
         self._swing = np.where(parameters.low < 0, 0.4, 0.25)
 
     def at(self, time_s: float) -> Floats:
-        """(P,) values at a time; none rests between two calls at different times."""
+        """Return the values (P,) at a time; every parameter changes with time."""
         values: Floats = self._middle - self._swing * np.cos(self._rate * time_s + self._phase)
         return values

@@ -1,8 +1,8 @@
-"""Serves the line protocol to several clients over TCP, in a thread of its own.
+"""Serves the line protocol to several clients over TCP, in its own thread.
 
 Each client has its own session, as if it were alone on a serial port. A client that does not read loses lines, which
-are counted; it holds up neither the face nor another client. Where other machines reach the address, a client must send
-``AUTH token`` before anything else. What a web page makes a browser send is turned away.
+are counted; it delays neither the face nor another client. If other machines can reach the address, a client must send
+``AUTH token`` before anything else. HTTP requests, which a web page can make a browser send, are rejected.
 """
 
 from __future__ import annotations
@@ -22,21 +22,21 @@ from controller.links.line.session import LineSession
 from controller.links.line.talk import Talk
 from controller.links.net.address import Address
 from controller.links.net.meter import Meter
-from controller.links.net.receivers import bound
+from controller.links.net.receivers import bind_socket
 
 log = logging.getLogger(__name__)
 
 _WAIT_S = 0.05
-_CHUNK, _TURN_S = 4096, 0.005
-"""Bytes of a client, and time spent on them, before the other clients have their turn."""
-_REST, _LONGEST_REST_S = 3.0, 0.02
-"""How long the server rests after it has worked, in multiples of that time: a flood costs about a quarter of a core."""
-_AUTH_S, _TRIES = 10.0, 3
-"""How long, and how many wrong tokens, until a client without a good one is sent away."""
+_MAX_READ_BYTES, _TURN_S = 4096, 0.005
+"""Bytes of one client that are processed, and time spent on them, before the next client has its turn."""
+_REST_FACTOR, _MAX_REST_S = 3.0, 0.02
+"""Pause after each pass, in multiples of its time, and its limit, so that a flood costs about a quarter of a core."""
+_AUTH_TIMEOUT_S, _MAX_WRONG_TOKENS = 10.0, 3
+"""How long a client may take to send its token, and how many wrong ones it may send."""
 
 
 class Client:
-    """One connected client."""
+    """One connected client. gone : why it must be disconnected; empty while it may stay."""
 
     def __init__(self, call: socket.socket, talk: Talk) -> None:
         self.call, self.talk = call, talk
@@ -45,9 +45,9 @@ class Client:
         self._web = WebRequests()
 
     def read(self) -> bytes:
-        """What has arrived; notes in ``gone`` why the client must go, where it must."""
+        """Return what has arrived; sets ``gone`` if the client has left or is a browser."""
         try:
-            data = self.call.recv(_CHUNK)
+            data = self.call.recv(_MAX_READ_BYTES)
         except BlockingIOError:
             return b""
         except OSError:
@@ -59,7 +59,7 @@ class Client:
         return b"" if self.gone else data
 
     def put(self, data: bytes) -> int:
-        """Send what there is room for."""
+        """Send what there is room for, and return the number of bytes; sets ``gone`` if the client has left."""
         try:
             return self.call.send(data)
         except BlockingIOError:
@@ -69,14 +69,14 @@ class Client:
             return 0
 
     def check(self, now_s: float) -> None:
-        """Note in ``gone`` that it has not given a token in time, or too many wrong ones."""
+        """Set ``gone`` if the client has not sent its token in time, or too many wrong ones."""
         session = self.talk.session
-        if session.locked and (now_s - self.since_s > _AUTH_S or session.wrong_tokens >= _TRIES):
+        if session.locked and (now_s - self.since_s > _AUTH_TIMEOUT_S or session.wrong_tokens >= _MAX_WRONG_TOKENS):
             self.gone = self.gone or "token"
 
 
 class LineServer:
-    """A link that is open; clients come and go.
+    """A TCP server for several clients.
 
     Raises LinkError: the address cannot be used.
     """
@@ -88,7 +88,7 @@ class LineServer:
         self._refused: Counter[int] = Counter()
         self._meter, self._last_fault = Meter(), ""
         self._stopping = threading.Event()
-        self._socket = bound(Address("tcp", *settings.where), socket.SOCK_STREAM)
+        self._socket = bind_socket(Address("tcp", *settings.where), socket.SOCK_STREAM)
         self._socket.listen()
         self.port = bound_at(settings.address, self._socket.getsockname()[1])
         self._selector = selectors.DefaultSelector()
@@ -96,12 +96,12 @@ class LineServer:
         self._thread = threading.Thread(target=self._run, name=f"line {self.port}", daemon=True)
 
     def start(self) -> LineServer:
-        """Begin to listen."""
+        """Start serving."""
         self._thread.start()
         return self
 
     def stop(self) -> None:
-        """Send all clients away and stop listening."""
+        """Disconnect all clients and stop listening."""
         self._stopping.set()
         if self._thread.ident is not None:
             self._thread.join()
@@ -111,7 +111,7 @@ class LineServer:
         self._socket.close()
 
     def report(self) -> dict[str, object]:
-        """Clients now and in all, lines taken, refused (by code) and not answered, bytes, and clients turned away."""
+        """Return counts of current and past clients, of lines and bytes, and of clients that were turned away."""
         clients = list(self._clients)
         counts = sum((_counts(client.talk) for client in clients), self._past.copy())
         refused = sum((client.talk.session.refused for client in clients), self._refused.copy())
@@ -136,30 +136,30 @@ class LineServer:
             if any(key.fileobj is self._socket for key, _ in ready):
                 self._accept()
             self._serve([key.data for key, _ in ready if key.data is not None])
-            self._stopping.wait(min(_REST * (time.monotonic() - begin_s), _LONGEST_REST_S))
+            self._stopping.wait(min(_REST_FACTOR * (time.monotonic() - begin_s), _MAX_REST_S))
 
     def _wait_s(self) -> float:
         return min((client.talk.wait_s(_WAIT_S) for client in self._clients), default=_WAIT_S)
 
     def _serve(self, ready: list[Client]) -> None:
-        """Act on what has arrived, first on that of clients that send a STOP, and stream to all."""
-        heard = {client: client.read() for client in ready if not client.talk.busy}
-        for client in sorted(self._clients, key=lambda each: b"STOP" not in heard.get(each, b"").upper()):
-            data, before = heard.get(client, b""), client.talk.session.accepted
+        """Act on what has arrived, beginning with clients that send a STOP, and stream to all clients."""
+        arrived = {client: client.read() for client in ready if not client.talk.busy}
+        for client in sorted(self._clients, key=lambda each: b"STOP" not in arrived.get(each, b"").upper()):
+            data, before = arrived.get(client, b""), client.talk.session.accepted
             self._talk(client, data)
             taken = client.talk.session.accepted - before
             if taken:
                 self._meter.note(time.monotonic(), skipped=taken - 1)
             client.check(time.monotonic())
         for client in [client for client in self._clients if client.gone]:
-            self._part(client)
+            self._remove(client)
 
     def _talk(self, client: Client, data: bytes) -> None:
         session = client.talk.session
         try:
             client.talk.serve(data, client.put, _TURN_S)
         except Exception as error:  # noqa: BLE001  nothing that arrives may end the link
-            session.fault(error, "it goes on with the next line")
+            session.fault(error, "the link continues with the next line")
             client.talk.lose()
         self._last_fault = session.last_fault or self._last_fault
 
@@ -171,7 +171,7 @@ class LineServer:
             return
         call.setblocking(False)
         if len(self._clients) >= self._settings.clients:
-            self._send_away(call)
+            self._refuse_full(call)
             return
         call.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         call.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
@@ -184,7 +184,7 @@ class LineServer:
         self._served += 1
         self._selector.register(call, selectors.EVENT_READ, client)
 
-    def _send_away(self, call: socket.socket) -> None:
+    def _refuse_full(self, call: socket.socket) -> None:
         self._turned_away["full"] += 1
         with call:
             try:
@@ -192,8 +192,8 @@ class LineServer:
             except OSError as error:
                 log.debug("line %s: %s", self.port, error)
 
-    def _part(self, client: Client) -> None:
-        """Close a client and keep its counts."""
+    def _remove(self, client: Client) -> None:
+        """Disconnect a client and keep its counts."""
         if client.gone != "left":
             self._turned_away[client.gone] += 1
         client.talk.lose()

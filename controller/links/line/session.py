@@ -1,4 +1,4 @@
-"""Runs one conversation in the line protocol: bytes in, replies out, a stream of parameters on request; no I/O here."""
+"""Handles the lines of one far end in the line protocol, without any I/O: bytes in; replies and streamed lines out."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ from controller.vocabulary.reading import Readings
 
 log = logging.getLogger(__name__)
 
-_LOGGED = 50
-"""Kinds of errors that a link logs."""
-_SHOWN = 100
+_MAX_LOGGED = 50
+"""Number of different errors that a link logs."""
+_MAX_SHOWN = 100
 """Characters of an error that its answer shows."""
 
 
@@ -47,18 +47,18 @@ class LineSession:
 
     Parameters
     ----------
-    sink : where accepted commands go.
+    sink : receives accepted commands.
     start_ns : time zero of the stream (monotonic clock, ns).
-    name : who sends the lines, for people: a STOP is reported under this name.
-    checksum : when lines must have one, of :data:`controller.links.line.checksums.CHECKSUMS`.
-    scripted : the lines come from a script; see :class:`controller.links.line.commands.Grammar`.
-    token : what ``AUTH`` must give before anything else is taken; None for nothing.
+    name : of the sender, for people; a STOP is reported under it.
+    checksum : when lines need a checksum, one of :data:`controller.links.line.checksums.CHECKSUMS`.
+    scripted : whether the lines come from a script; see :class:`controller.links.line.commands.Grammar`.
+    token : that ``AUTH`` must give before anything else is accepted; None: no token is needed.
 
     Attributes
     ----------
-    accepted : lines taken. refused : lines refused, by error code. unanswered : lines whose answer could not be sent.
-    faults : how many errors of omote itself there were; last_fault : the last of them.
-    locked : whether the token was not given yet. wrong_tokens : how many others were.
+    accepted : number of lines accepted. refused : number of lines refused, by error code. unanswered : number of lines
+    whose answer could not be sent. faults : number of errors of omote itself; last_fault : the last one.
+    locked : whether a needed token has not been given yet. wrong_tokens : number of wrong tokens.
     """
 
     def __init__(
@@ -93,11 +93,11 @@ class LineSession:
         self.locked, self.wrong_tokens = token is not None, 0
 
     def feed(self, data: bytes, now_ns: int) -> bytes:
-        """Act on bytes that arrived at ``now_ns``; returns the replies, one line for each line that has anything."""
+        """Act on bytes that arrived at ``now_ns`` and return the replies, one for each line that is not empty."""
         return b"".join(self.answers(data, now_ns))
 
     def answers(self, data: bytes, now_ns: int) -> Iterator[bytes]:
-        """As :meth:`feed`, but gives each reply when its line has been acted on. A STOP acts before all other lines."""
+        """Like :meth:`feed`, but yield each reply as soon as its line has been acted on; a STOP acts first."""
         lines = self._decoder.feed(data)
         self._stops_waiting = 0 if self.locked else sum(map(is_stop, lines))
         if self._stops_waiting:
@@ -106,26 +106,26 @@ class LineSession:
             yield self._line(line, now_ns)
 
     def due_ns(self) -> int | None:
-        """When the next streamed line is due; None without a subscription."""
+        """Return when the next streamed line is due; None without a subscription."""
         return None if self._stream is None else self._due_ns
 
     def stream(self, now_ns: int) -> bytes:
-        """The streamed line that is due, with the newest values; empty when none is. Missed ones are left out."""
+        """Return the streamed line that is due, with the newest values; else empty. Missed lines are skipped."""
         request = self._stream
         if request is None or request.command.question is None or now_ns < self._due_ns:
             return b""
         period = round(1e9 / request.command.values[0])
         self._due_ns += period * (1 + (now_ns - self._due_ns) // period)
         try:
-            return self._streamed(request.command.question, (now_ns - self._start_ns) // 1_000_000, request.checked)
+            return self._stream_line(request.command.question, (now_ns - self._start_ns) // 1_000_000, request.checked)
         except Exception as error:  # noqa: BLE001  it ends this stream and nothing else
             self._stream = None
             self.fault(error, "it ends the stream")
             return b""
 
-    def _streamed(self, question: Command, time_ms: int, checked: bool) -> bytes:
+    def _stream_line(self, question: Command, time_ms: int, checked: bool) -> bytes:
         self._sink = self._streamed_sink
-        if not self._look(question.measured):
+        if not self._read_face(question.measured):
             return b""
         if question.name == "READ":
             return format_pairs(time_ms, self._readings.read(question.words[0], self._values), checked=checked)
@@ -133,15 +133,15 @@ class LineSession:
             return format_frame(time_ms, self._values, checked=checked)
         return format_pairs(time_ms, self._named(question.indices), checked=checked)
 
-    def _look(self, measured: bool) -> bool:
-        """Read the face that is shown, or that the servos make; False when that is not known."""
+    def _read_face(self, measured: bool) -> bool:
+        """Read the commanded face, or the one that the servos show; return False if that is not known."""
         if measured:
             return self._sink.measured(self._values)
         self._sink.snapshot(self._values)
         return True
 
     def drop(self) -> None:
-        """Discard a line that is not complete, after the port was lost; a subscription goes on."""
+        """Discard an incomplete line after the port was lost; a subscription continues."""
         self._decoder.clear()
 
     def _line(self, line: bytes, now_ns: int) -> bytes:
@@ -165,7 +165,10 @@ class LineSession:
         return format_ok(text, tag=words.tag, checked=words.checked)
 
     def _words(self, line: bytes) -> Words | None:
-        """The words of a line that has any; a STOP is one however damaged its line is. Raises LineError."""
+        """Return the words of a line; None if it is empty. A STOP counts however damaged its line is.
+
+        Raises LineError: the line is refused.
+        """
         stop = is_stop(line)
         try:
             words = parse_words(line)
@@ -178,14 +181,14 @@ class LineSession:
         return words
 
     def _find(self, name: str) -> CommandSink:
-        """Whom a name means. Raises LineError: nobody."""
+        """Return the head or group of a name. Raises LineError: unknown name."""
         try:
             return self._sink.heads.find(name)
         except ParameterError as error:
             raise LineError(Code.NAME, str(error)) from error
 
     def _check_token(self, words: Words) -> None:
-        """Raises LineError for anything but the token."""
+        """Unlock the session if the words are ``AUTH`` and the token. Raises LineError for anything else."""
         command, *rest = words.words
         if command.upper() == "AUTH" and len(rest) == 1 and same_token(rest[0], self._token or ""):
             self.locked = False
@@ -198,11 +201,11 @@ class LineSession:
             return error
         if isinstance(error, OMOTE_ERRORS):
             return LineError(Code.BUSY, str(error))
-        self.fault(error, "it goes on with the next line")
-        return LineError(Code.FAULT, f"an error in omote, see its log: {self.last_fault[:_SHOWN]}")
+        self.fault(error, "the link continues with the next line")
+        return LineError(Code.FAULT, f"an error in omote, see its log: {self.last_fault[:_MAX_SHOWN]}")
 
     def _do(self, request: Request, now_ns: int) -> str:
-        """Act on a request; returns the text of the reply."""
+        """Act on a request and return the text of the reply."""
         command = request.command
         match command.name:
             case "SUB" | "UNSUB":
@@ -226,15 +229,15 @@ class LineSession:
         return _receipt(command)
 
     def fault(self, error: Exception, consequence: str) -> None:
-        """Count an error of omote itself, and log it once for each kind, at most some kinds."""
+        """Count an error of omote itself; log each different one once, up to 50."""
         self.faults, self.last_fault = self.faults + 1, f"{type(error).__name__}: {error}"
-        if self.last_fault not in self._logged and len(self._logged) < _LOGGED:
+        if self.last_fault not in self._logged and len(self._logged) < _MAX_LOGGED:
             self._logged.add(self.last_fault)
             shown = error if os.environ.get("OMOTE_DEBUG") else None
             log.error("%s: %s; %s", self._name, self.last_fault, consequence, exc_info=shown)
 
     def _act(self, command: Command, now_ns: int) -> bool:
-        """Pass a command that changes the face to the sink; False when it is a question."""
+        """Pass a command that changes the face to the sink; return False if it is a query."""
         sink, values = self._sink, command.values
         match command.name:
             case "SET":
@@ -279,15 +282,15 @@ class LineSession:
         turns.give(None if name.upper() == "OFF" else name, now_ns)
 
     def _start(self) -> None:
-        """Let the servos move again, unless a STOP has arrived behind this line."""
+        """Let the servos move again, unless a STOP has arrived after this line."""
         if self._stops_waiting > 0:
             raise LineError(Code.BUSY, "a STOP follows this line, and stops first; send START after its answer")
         self._sink.stop_latch.start()
 
     def _answer(self, command: Command, now_ns: int) -> str:
-        """Text of the reply to a question."""
+        """Return the text of the reply to a query."""
         name, words = command.name, command.words
-        if name in ("GET", "MEASURED", "READ", "INFO") and not self._look(command.measured):
+        if name in ("GET", "MEASURED", "READ", "INFO") and not self._read_face(command.measured):
             raise LineError(Code.BUSY, "no servo reports its position")
         match name:
             case "GET" | "MEASURED":
@@ -333,7 +336,7 @@ class LineSession:
         return {**self._sink.status(), "show": show, **self._stopped(now_ns), **counts}
 
     def _stopped(self, now_ns: int) -> dict[str, str | float]:
-        """Who stopped the servos, as one word, and how long ago (s)."""
+        """Return who stopped the servos, as one word, and how long ago (s)."""
         stopped = self._sink.stop_latch.stopped
         if stopped is None:
             return {"stopped": "no"}
@@ -355,7 +358,7 @@ class LineSession:
 
 
 def _receipt(command: Command) -> str:
-    """Text of the reply to a command that was carried out."""
+    """Return the text of the reply to a command that was carried out."""
     name, question = command.name, command.question
     if question is not None:
         kind = [] if question.name == "GET" else [question.name]
@@ -373,7 +376,7 @@ def _receipt(command: Command) -> str:
 
 
 def _play(shows: Player | None, what: str, to: str = "0") -> None:
-    """Raises ConfigError or ParameterError: no shows here, no such script, mark or time."""
+    """Start or control a show. Raises ConfigError or ParameterError: no player, or no such script, mark or time."""
     if shows is None:
         raise ParameterError("no shows can be played here", hint="omote run plays them")
     if what not in ("PLAY", "PAUSE", "STOP", "SEEK"):

@@ -1,4 +1,4 @@
-"""Plays scripts as shows, straight into the face, with marks, pause, seek and loop."""
+"""Plays scripts as shows: sends their lines directly to the face, with marks, pause, seek and loop."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from controller.links.line.script import Script
 from controller.links.line.session import LineSession
 
 Note = Callable[[int, str, str], None]
-"""Hears of the time (monotonic clock, ns), ``mark`` or ``line``, and which."""
+"""Called with the time (monotonic clock, ns), ``mark`` or ``line``, and the name of the mark or the line."""
 
 
 class Show:
@@ -24,15 +24,15 @@ class Show:
 
     Parameters
     ----------
-    script : what to play; ``loop_s`` begins it again. sink : the face. note : hears of every mark and line.
+    script : the script to play. sink : the face. note : called for every mark and line.
 
     Attributes
     ----------
-    playing : whether time passes; the face stays as it is otherwise. position_s : where it is.
+    playing : whether time passes; if not, the face stays as it is. position_s : time in the script.
     """
 
     def __init__(self, script: Script, sink: CommandSink, note: Note | None = None) -> None:
-        self.script, self._note = script, note or _nobody
+        self.script, self._note = script, note or _ignore_event
         self.playing = False
         self.position_s = 0.0
         self._sink = sink
@@ -44,13 +44,13 @@ class Show:
 
     @property
     def finished(self) -> bool:
-        """The last step has been played and nothing begins again."""
+        """Whether the last step has been played and the script does not loop."""
         return not self.script.loop_s and self._next >= len(self._times)
 
     def seek(self, to: str | float) -> None:
-        """Go to a mark or a time (s). Earlier lines are not sent: begin such a place with NEUTRAL.
+        """Go to a mark or a time (s). Earlier lines are not sent, so a script should have NEUTRAL there.
 
-        Raises ParameterError as :meth:`place`.
+        Raises ParameterError: see :meth:`place`.
         """
         self.position_s = to_s = self.place(to)
         self._next = bisect.bisect_left(self._times, to_s)
@@ -58,9 +58,9 @@ class Show:
         self._last_ns = None
 
     def place(self, to: str | float) -> float:
-        """Where a mark is (s), or a time.
+        """Return the time (s) of a mark, or ``to`` itself if it is a time.
 
-        Raises ParameterError: no such mark, or not a time from 0 on.
+        Raises ParameterError: there is no such mark, or it is not a time from 0 on.
         """
         if isinstance(to, str):
             if to not in self.script.marks:
@@ -72,7 +72,7 @@ class Show:
         return to
 
     def tick(self, now_ns: int) -> list[str]:
-        """Send the lines that are due at ``now_ns`` (monotonic clock) to the face; returns them."""
+        """Send the lines that are due at ``now_ns`` (monotonic clock) to the face, and return them."""
         if not self.playing:
             self._last_ns = None
             return []
@@ -86,19 +86,19 @@ class Show:
             sent += self._send_due(now_ns)
         return sent
 
-    def give_back(self, now_ns: int) -> None:
-        """Release what the lines of the script hold; the layers below come back over the usual fades."""
+    def release_face(self, now_ns: int) -> None:
+        """Release everything that lines of the script hold, over the usual fades."""
         vocabulary = self._sink.vocabulary
         grammar = Grammar(self._sink.parameters, lambda name: vocabulary[name].name, scripted=True)
         requests = [grammar.parse(line.encode("ascii")) for _, line in self.script.steps]
         commands: dict[str, list[Command]] = {}
-        present = ""
+        target = ""
         for request in filter(None, requests):
-            present = request.command.words[0] if request.command.name == "TO" else present
-            commands.setdefault(request.to or present, []).append(request.command)
+            target = request.command.words[0] if request.command.name == "TO" else target
+            commands.setdefault(request.to or target, []).append(request.command)
         for to, given in commands.items():
             sink = self._sink.heads.find(to) if to else self._sink
-            _give_back(sink, given, now_ns)
+            _release_commands(sink, given, now_ns)
 
     def _send_due(self, now_ns: int) -> list[str]:
         sent = []
@@ -114,7 +114,7 @@ class Show:
         return sent
 
 
-def _give_back(sink: CommandSink, commands: list[Command], now_ns: int) -> None:
+def _release_commands(sink: CommandSink, commands: list[Command], now_ns: int) -> None:
     sink.release(sorted({i for command in commands if command.name == "SET" for i in command.indices}), now_ns)
     if any(command.name == "EXPR" for command in commands):
         sink.expression("neutral", 1.0, None, now_ns)
@@ -122,15 +122,15 @@ def _give_back(sink: CommandSink, commands: list[Command], now_ns: int) -> None:
         sink.gaze_off(now_ns)
 
 
-def _nobody(now_ns: int, event: str, text: str) -> None:
-    """Who hears of marks and lines where nobody does."""
+def _ignore_event(now_ns: int, event: str, text: str) -> None:
+    """Do nothing; the default of ``note``."""
 
 
 class Shows:
-    """The show that plays now; links change it from their threads, the control loop ticks it.
+    """The player of a face: links start and control shows from their threads, and the control loop ticks it.
 
-    find : the script of a name that a link may ask for; raises ConfigError. sink : the face.
-    names : gives the names that ``find`` knows. note : hears of every mark and line of every show.
+    find : returns the script of a name, or raises ConfigError. sink : the face.
+    names : returns the names that ``find`` knows. note : called for every mark and line of every show.
     """
 
     def __init__(
@@ -143,10 +143,10 @@ class Shows:
 
     def start(self, name: str) -> None:
         """Play the script of a name from its beginning. Raises ConfigError."""
-        self.prepared(name)()
+        self.prepare_start(name)()
 
-    def prepared(self, name: str) -> Callable[[], None]:
-        """What :meth:`start` does, once the script has been read. Raises ConfigError."""
+    def prepare_start(self, name: str) -> Callable[[], None]:
+        """Read the script, and return a function that plays it. Raises ConfigError."""
         return partial(self.play, self._find(name))
 
     def play(self, script: Script) -> None:
@@ -157,27 +157,30 @@ class Shows:
             self._show = show
 
     def control(self, what: str, to: str | float = 0.0) -> None:
-        """``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``, to a mark or a time (s).
+        """Apply ``PLAY``, ``PAUSE``, ``STOP`` or ``SEEK``; ``to`` : a mark or a time (s).
 
         Raises ParameterError: there is no show, or no such mark or time.
         """
-        self.prepared_control(what, to)()
+        self.prepare_control(what, to)()
 
-    def prepared_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
-        """What :meth:`control` does, once nothing can refuse it. Raises ParameterError as that."""
+    def prepare_control(self, what: str, to: str | float = 0.0) -> Callable[[], None]:
+        """Check everything that :meth:`control` may refuse, and return a function that applies it.
+
+        Raises ParameterError: see :meth:`control`.
+        """
         show = self._show
         if show is None:
             raise ParameterError("no show plays", hint="begin one: SHOW name")
         return partial(self._control, show, what, show.place(to) if what == "SEEK" else 0.0)
 
     def _control(self, meant: Show, what: str, to_s: float) -> None:
-        """Where another show has begun meanwhile, that one is stopped, paused or played, but not moved to the place."""
+        """Apply an action; if another show has started since the check, that one is controlled, but not moved."""
         with self._lock:
             show = self._show
             if show is None:
                 return
             if what == "SEEK":
-                if show is meant:  # a mark of one show is no place in another
+                if show is meant:  # a mark of one show has no meaning in another
                     show.seek(to_s)
             elif what == "STOP":
                 self._show = None
@@ -192,19 +195,19 @@ class Shows:
 
     @property
     def name(self) -> str | None:
-        """The script's name of the show that was started last; None after its end by STOP or a failure."""
+        """Name of the script that was started last; None before any, and after STOP or a failure."""
         show = self._show
         return None if show is None else show.script.name or "without a name"
 
     def abandon(self, now_ns: int) -> None:
-        """End a show that failed, and give back what it moves."""
+        """End a show that failed, and release what it moves."""
         with self._lock:
             show, self._show = self._show, None
         if show is not None:
-            show.give_back(now_ns)
+            show.release_face(now_ns)
 
     def status(self) -> str:
-        """``off``, or the script's name, where it is (s), and whether it waits: ``tour@12.3``, ``tour@12.3,paused``."""
+        """Return ``off``, or the script's name, its position (s) and whether it is paused: ``tour@12.3,paused``."""
         with self._lock:
             show = self._show
             if show is None or show.finished:

@@ -1,4 +1,4 @@
-"""The line protocol with one far end: answers and streams wait here until there is room for them; no I/O here."""
+"""Joins a line session and an outbox, in which answers and streamed lines wait for room; does no I/O itself."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from controller.links.line.session import LineSession
 from controller.links.net.meter import Meter
 
 Put = Callable[[bytes], int]
-"""Sends as many bytes as there is room for, without waiting, and says how many."""
+"""Sends as many bytes as there is room for, without waiting, and returns how many."""
 
 
 class Talk:
-    """What one far end sends, gets as answers, and asked to be streamed.
+    """The exchange of lines with one far end.
 
     Attributes
     ----------
-    session : its state. meter : how often it sends. counts : bytes in and out, lines streamed and dropped.
-    busy : whether lines that arrived wait to be acted on; bytes may be given only while it is False.
+    session : its state. meter : measures its lines. counts : bytes in and out, lines streamed and dropped.
+    busy : whether received lines wait to be acted on; new bytes may be passed only while it is False.
     """
 
     def __init__(self, session: LineSession) -> None:
@@ -31,16 +31,17 @@ class Talk:
         self._out = Outbox()
 
     def serve(self, data: bytes, put: Put, longest_s: float = math.inf) -> None:
-        """Act on what arrived just now, which may be nothing; send answers, and the streamed line that is due.
+        """Act on received bytes (perhaps none), and send answers and the streamed line that is due.
 
-        ``longest_s`` : lines that are not acted on by then wait for the next call, but a STOP among them acts first.
+        longest_s : lines that have not been acted on after this time wait for the next call; a STOP among them acts
+        first.
         """
         now_ns = time.monotonic_ns()
         if data:
             self.counts["bytes_in"] += len(data)
             self._answers = self.session.answers(data, now_ns)
         if data or self.busy:
-            self._hear(put, now_ns * 1e-9, longest_s)
+            self._act(put, now_ns * 1e-9, longest_s)
         self._flush(put)
         line = self.session.stream(now_ns)
         if line:
@@ -48,19 +49,19 @@ class Talk:
         self._flush(put)
 
     def lose(self) -> None:
-        """The wire is gone: discard what is not complete or not sent; a subscription goes on."""
+        """Discard incomplete and unsent lines after the connection was lost; a subscription continues."""
         self._answers, self.busy = iter(()), False
         self.session.drop()
         self.session.unanswered += self._out.clear()
 
     def wait_s(self, longest_s: float) -> float:
-        """How long to wait for bytes before the next streamed line is due."""
+        """Return how long to wait for bytes until the next streamed line is due, at most ``longest_s``."""
         if self.busy:
             return 0.0
         due_ns = self.session.due_ns()
         return longest_s if due_ns is None else min(longest_s, max(0.0, (due_ns - time.monotonic_ns()) * 1e-9))
 
-    def _hear(self, put: Put, now_s: float, longest_s: float) -> None:
+    def _act(self, put: Put, now_s: float, longest_s: float) -> None:
         before, self.busy = self.session.accepted, False
         for answer in self._answers:
             self._reply(answer, put)

@@ -1,4 +1,4 @@
-"""Links that take and send faces in the formats of other programs, by UDP, TCP, serial ports and standard streams.
+"""Opens links that receive and send faces in other programs' formats over UDP, TCP, serial ports and standard streams.
 
 In: messages. Out: values for a layer, and messages. Imports base to links.kind.
 """

@@ -1,4 +1,4 @@
-"""Addresses of far ends, as a user writes them."""
+"""Parses addresses of far ends as a user writes them."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ LOOPBACK = "127.0.0.1"
 
 @dataclass(frozen=True)
 class Address:
-    """Where messages come from or go to.
+    """The address of a far end.
 
     transport : ``udp``, ``tcp``, ``serial``, ``midi`` or ``lines`` (standard input or output).
-    host, port : of UDP and TCP. device : path of a serial port, or name of a MIDI port.
+    host, port : for UDP and TCP. device : path of a serial port, or name of a MIDI port.
     """
 
     transport: str
@@ -37,7 +37,7 @@ class Address:
 
     @property
     def is_local(self) -> bool:
-        """Whether only programs on this machine reach it."""
+        """Whether only programs on this machine can reach it."""
         if self.transport not in ("udp", "tcp") or self.host == "localhost":
             return True
         try:
@@ -47,21 +47,21 @@ class Address:
 
 
 def has_token(form: Format, address: Address) -> bool:
-    """Whether messages of a format have room for a token at an address: where a stream begins, or in each datagram."""
+    """Whether messages to an address can have a token: TCP streams at their beginning, datagrams if the format does."""
     return address.transport == "tcp" or (address.transport == "udp" and form.takes_token)
 
 
 def is_called(form: Format, address: Address) -> bool:
-    """Whether a program at an address can be called for faces: over TCP, or by UDP where the format can ask."""
+    """Whether one can connect to a program at an address: by TCP, or by UDP if the format has a greeting."""
     return address.transport == "tcp" or (address.transport == "udp" and form.greeting != b"")
 
 
 def parse_address(text: str, form: Format) -> Address:
-    """``HOST:PORT``, ``udp:HOST:PORT``, ``tcp:HOST:PORT``, ``midi:NAME``, a serial port, or ``-``, a standard stream.
+    """Parse ``[udp:|tcp:]HOST:PORT``, ``midi:NAME``, a serial port, or ``-`` for a standard stream.
 
-    form : whose transport and port count where the text names none.
+    form : the format, which gives the default transport and port.
 
-    Raises ValueError: the text is no address, or the format does not travel so.
+    Raises ValueError: the text is not an address, or the format does not have this transport.
     """
     text = text.strip()
     if text == "-":
@@ -81,12 +81,12 @@ def parse_address(text: str, form: Format) -> Address:
 
 
 def _network(form: Format) -> str:
-    """The transport of a host and port that names none."""
+    """Return the default transport of a host and port."""
     return next((each for each in form.transports if each in ("udp", "tcp")), "udp")
 
 
 def _is_host(text: str) -> bool:
-    """Whether a host can be looked up: IDNA takes no empty labels and none of more than 63 characters (RFC 3490)."""
+    """Whether a host can be looked up: IDNA allows labels of 1 to 63 characters (RFC 3490)."""
     try:
         return bool(text.encode("idna"))
     except UnicodeError:

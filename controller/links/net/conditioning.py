@@ -10,20 +10,20 @@ import numpy as np
 from controller.base.errors import ControllerError
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.formats.frame import Frame
-from controller.links.net.neutral import MOST, Neutral, Ranges, load_state, save_state
+from controller.links.net.neutral import MAX_VALUE, Neutral, Ranges, load_state, save_state
 from controller.links.net.one_euro import OneEuro
 from controller.links.net.settings import NetSettings
 
 log = logging.getLogger(__name__)
 
-_LOOKED = 0.02
-"""Amount from which on eyes count as moved."""
+_MIN_MOVEMENT = 0.02
+"""Normalised value above which the eyes count as moved."""
 
 
 class Conditioning:
-    """The chain of one link.
+    """The processing chain of one link.
 
-    path : file in which neutral face and ranges are kept; None for nowhere.
+    path : file in which the neutral face and the ranges are stored; None: they are not stored.
 
     Raises LinkError: the file is damaged.
     """
@@ -45,35 +45,36 @@ class Conditioning:
             load_state(path, parameters, self._neutral, self._ranges)
 
     def apply(self, frame: Frame, now_s: float) -> tuple[Floats, Flags]:
-        """Values (P,) in range, and which of them the layer gets."""
-        values, mask = np.where(frame.mask, self._shares(frame.values), 0.0), frame.mask
+        """Return the values (P,) of a frame for the layer, clipped to their ranges, and their mask (P,)."""
+        values, mask = np.where(frame.mask, self._normalise(frame.values), 0.0), frame.mask
         if self._mirrored is not None:
             swap, sign = self._mirrored
             values, mask = values[swap] * sign, mask[swap]
         if self._settings.calibrate != "off":
-            values = self._calibrated(values, now_s)
-        values = self._one_gaze(values, mask)
+            values = self._calibrate(values, now_s)
+        values = self._choose_gaze(values, mask)
         if self._settings.ranges:
             values = self._ranges.apply(values, now_s)
         if self._filter is not None:
             values = self._filter(values, now_s)
         return np.clip(self._rest + values * self._reach * self._gain, self._low, self._high), mask
 
-    def _shares(self, values: Floats) -> Floats:
-        """Values as shares of the way from rest to the farther end of the range; see the module of the neutral face.
+    def _normalise(self, values: Floats) -> Floats:
+        """Return values as fractions of the way from rest to the farther end of the range, clipped to -2..2.
 
-        One message with a huge number would otherwise stay in the filter for minutes, and in what is kept for ever.
+        Without the limit, one message with a huge number would affect the filter for minutes, and the stored ranges for
+        ever.
         """
-        beyond = MOST * self._reach
+        beyond = MAX_VALUE * self._reach
         return np.clip(values - self._rest, -beyond, beyond) / self._reach
 
     def reset(self) -> None:
-        """The source fell silent: do not smooth across the gap."""
+        """Do not smooth across a gap in which the source was silent."""
         if self._filter is not None:
             self._filter.reset()
 
     def save(self) -> None:
-        """Keep what was learned. Raises ControllerError: the file cannot be written."""
+        """Store the calibration. Raises ControllerError: the file cannot be written."""
         if self._path is not None and (self._neutral.known or self._settings.ranges):
             save_state(self._path, self._parameters, self._neutral, self._ranges)
 
@@ -82,20 +83,20 @@ class Conditioning:
         """Whether the neutral face of the source is known."""
         return self._neutral.known
 
-    def _calibrated(self, values: Floats, now_s: float) -> Floats:
+    def _calibrate(self, values: Floats, now_s: float) -> Floats:
         if not self._neutral.known and self._neutral.learn(values, now_s):
             try:
                 self.save()
-            except ControllerError as error:  # the face goes on; it is learned again at the next start
+            except ControllerError as error:  # the face continues; the calibration is learned again at the next start
                 log.warning("what a link learned is not kept: %s", error)
         return self._neutral.apply(values) if self._neutral.known else values
 
-    def _one_gaze(self, values: Floats, mask: Flags) -> Floats:
-        """Hold at 0 one of the two ways to say where the eyes look, so that they do not add up to twice as much."""
+    def _choose_gaze(self, values: Floats, mask: Flags) -> Floats:
+        """Set the eyeLook shapes or the eye angles to 0, in place, so that the gaze does not count twice."""
         drop = {"looks": self._angles, "angles": self._looks}.get(self._settings.eyes)
         if self._settings.eyes == "auto" and mask[self._angles].any() and mask[self._looks].any():
-            self._looks_moved |= bool((values[self._looks] > _LOOKED).any())
-            self._angles_moved |= bool((np.abs(values[self._angles]) > _LOOKED).any())
+            self._looks_moved |= bool((values[self._looks] > _MIN_MOVEMENT).any())
+            self._angles_moved |= bool((np.abs(values[self._angles]) > _MIN_MOVEMENT).any())
             drop = self._angles if self._looks_moved and self._angles_moved else None
         if drop is not None:
             values[drop] = 0.0
@@ -103,7 +104,7 @@ class Conditioning:
 
 
 def _mirror(parameters: Parameters) -> tuple[np.ndarray, Floats]:
-    """(P,) where each value comes from, and its sign: yaw and roll turn the other way in a mirror."""
+    """Return (P,) the index that each value comes from, and (P,) its sign: a mirror reverses yaw and roll."""
     turned = [-1.0 if name.endswith(("Yaw", "Roll")) else 1.0 for name in parameters.names]
     return parameters.mirror(), np.array(turned)
 

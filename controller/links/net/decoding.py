@@ -1,4 +1,4 @@
-"""Turns what receivers give into frames: a decoder for each sender, and the ends of messages in streams."""
+"""Turns received bytes into frames (faces), with a decoder for each sender and a splitter for each stream."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from controller.formats.format import Format
 from controller.formats.frame import Decoder, Frame, Refusals, Splitter
 from controller.links.net.receivers import Received
 
-MOST_SENDERS = 16
-"""Senders whose state is kept; the one that was silent longest is forgotten."""
+MAX_SENDERS = 16
+"""Number of senders whose state is kept; a further one replaces the one that has been silent longest."""
 
-MOST_WAITING, MOST_WAITING_BYTES = 64, 65_536
-"""Messages of one sender that are read at once; more where they are small."""
+MAX_WAITING, MAX_WAITING_BYTES = 64, 65_536
+"""Of one sender's waiting messages, older ones are skipped only when both the count and the size are exceeded."""
 
 
 @dataclass(frozen=True)
 class Arrived:
-    """A frame, who sent it, and how many older messages of that sender were not read."""
+    """A frame, its sender, and how many older messages of that sender were skipped."""
 
     sender: str
     frame: Frame
@@ -28,12 +28,12 @@ class Arrived:
 class Decoding:
     """Decodes what arrives at one receiver.
 
-    newest : decode only the newest of the messages that waited for each sender; without it, all of them.
-    streams : pieces of streams arrive, not datagrams.
+    streams : whether pieces of streams arrive, not datagrams. newest : whether to skip old messages of a sender that
+    sends more than can be decoded.
 
     Attributes
     ----------
-    refused : what was left out, by reason. messages : how many arrived.
+    refused : number of messages or parts that were left out, by reason. messages : number of messages that arrived.
     """
 
     def __init__(self, form: Format, parameters: Parameters, *, streams: bool, newest: bool = False) -> None:
@@ -44,11 +44,11 @@ class Decoding:
         self._senders: dict[str, tuple[Decoder, Splitter]] = {}
 
     def feed(self, received: Received) -> list[Arrived]:
-        """The frames that some datagrams or pieces of streams complete, in order."""
+        """Return the frames that datagrams or pieces of streams complete; those of each sender are in order."""
         arrived: list[Arrived] = []
         for sender, messages in self._by_sender(received).items():
             decoder, _ = self._senders[sender]
-            skipped = _too_old(messages) if self._newest else 0
+            skipped = _count_stale(messages) if self._newest else 0
             frames = [frame for message in messages[skipped:] for frame in decoder.feed(message)]
             arrived += [Arrived(sender, frame, 0 if n else skipped) for n, frame in enumerate(frames)]
         return arrived
@@ -56,12 +56,12 @@ class Decoding:
     def _by_sender(self, received: Received) -> dict[str, list[bytes]]:
         found: dict[str, list[bytes]] = {}
         for sender, data in received:
-            if not data:  # its stream ended: the next one starts from its beginning
+            if not data:  # the stream has ended: the next one of this sender needs a new decoder
                 self._senders.pop(sender, None)
                 found.pop(sender, None)
                 continue
             if sender in self._senders:
-                self._senders[sender] = self._senders.pop(sender)  # the last of them is the one that sent last
+                self._senders[sender] = self._senders.pop(sender)  # keeps them sorted by their last message
             else:
                 self._add(sender)
             messages = self._messages(sender, data)
@@ -78,18 +78,18 @@ class Decoding:
         return [data]
 
     def _add(self, sender: str) -> None:
-        if len(self._senders) >= MOST_SENDERS:
+        if len(self._senders) >= MAX_SENDERS:
             del self._senders[next(iter(self._senders))]
         decoder = self._form.decoder(self._parameters)
         decoder.refused = self.refused
         self._senders[sender] = decoder, Splitter(self._form.delimiter or b"\n", self._form.most, self.refused)
 
 
-def _too_old(messages: list[bytes]) -> int:
-    """How many messages are left out, so that a flood costs bounded time: what is newest is always read."""
+def _count_stale(messages: list[bytes]) -> int:
+    """Return how many of the oldest messages to skip, so that decoding a flood takes bounded time."""
     size = 0
     for back, message in enumerate(reversed(messages)):
         size += len(message)
-        if back >= MOST_WAITING and size > MOST_WAITING_BYTES:
+        if back >= MAX_WAITING and size > MAX_WAITING_BYTES:
             return len(messages) - back
     return 0

@@ -1,4 +1,4 @@
-"""Takes the faces of one source into a layer; only the newest counts, and nothing queues."""
+"""Receives the faces of one source and shows them on a layer; only the newest counts, and nothing queues."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from controller.links.net.receivers import Gate, Received, Receiver
 from controller.links.net.settings import NetSettings
 from controller.links.net.shown import LayerSink, Shown
 
-PASS_S = 0.004
-"""Shortest time from one look at what has arrived to the next."""
-REST = 3.0
-"""How long a link rests after it has read, in multiples of that time: a flood costs about a quarter of a core."""
+MIN_READ_INTERVAL_S = 0.004
+"""Shortest time from one read to the next."""
+REST_FACTOR = 3.0
+"""How long a link pauses after a read, in multiples of the time it took, so that a flood costs a quarter of a core."""
 _WAIT_S = 0.1
 
 
 class Incoming:
-    """Listens in its own thread until it is stopped.
+    """Receives in its own thread until it is stopped.
 
-    name : of the link, for STOP and the thread. path : file in which a neutral face is kept. gate : the receiver's.
+    name : of the link, for STOP and the thread. path : file in which the calibration is stored. gate : the receiver's,
+    whose rejections are reported.
 
     Attributes
     ----------
-    receiver : what it listens to.
+    receiver : where the faces come from.
 
     Raises LinkError: that file is damaged.
     """
@@ -55,13 +56,13 @@ class Incoming:
         self._thread = threading.Thread(target=self._run, name=f"link {name}", daemon=True)
 
     def start(self) -> None:
-        """Begin to listen."""
+        """Start receiving."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop listening, keep what was learned, and give back what was opened.
+        """Stop receiving, close the receiver, and store learned ranges.
 
-        Raises ControllerError: what was learned cannot be kept.
+        Raises ControllerError: they cannot be stored.
         """
         self._stopping.set()
         if self._thread.ident is not None and self._thread is not threading.current_thread():
@@ -71,7 +72,7 @@ class Incoming:
             self._home.conditioning.save()
 
     def report(self) -> dict[str, object]:
-        """Counts, rate, jitter, loss, age, who sends, and the last error."""
+        """Return counts, rate, jitter, loss, age, the sender, and the last error."""
         now_s = time.monotonic()
         return {
             "accepted": self._meter.frames,
@@ -94,25 +95,28 @@ class Incoming:
             self._ended = self._has_ended(received)
             for shown in (self._home, *self._others.values()):
                 shown.watch(now_s, self._heard_s, ended=self._ended)
-            next_s = now_s + max(PASS_S, (1.0 + REST) * (time.monotonic() - now_s))
+            next_s = now_s + max(MIN_READ_INTERVAL_S, (1.0 + REST_FACTOR) * (time.monotonic() - now_s))
 
     def _has_ended(self, received: Received) -> bool:
-        """Whether the stream of the source that counts has ended, and no other one counts yet."""
-        of_it = [data for sender, data in received if sender == self._from]
-        return not of_it[-1] if of_it else self._ended
+        """Whether the stream of the accepted source has ended and no other source has been accepted since."""
+        pieces = [data for sender, data in received if sender == self._from]
+        return not pieces[-1] if pieces else self._ended
 
     def _newest(self, arrived: list[Arrived], now_s: float) -> dict[str, Arrived]:
-        """The newest frame of the one source that counts, for each face that it names; others are heard only when that
-        one is silent."""
+        """Return the newest frame of the accepted source for each head that it names.
+
+        Another source is accepted only when this one is silent.
+        """
         newest = {}
         for each in arrived:
-            if not self._counts(each, now_s):
+            if not self._accept(each, now_s):
                 continue
             self._meter.note(now_s, each.frame.sequence, each.skipped)
             newest[each.frame.to] = each
         return newest
 
-    def _counts(self, arrived: Arrived, now_s: float) -> bool:
+    def _accept(self, arrived: Arrived, now_s: float) -> bool:
+        """Check the source of a frame, and note an accepted one as the current source."""
         wanted, host = self._settings.source, arrived.sender.rpartition(":")[0]
         if wanted is not None and wanted not in (arrived.sender, host, arrived.frame.subject):
             self._decoding.refused.add("another source than the one to take")
@@ -131,7 +135,7 @@ class Incoming:
             shown.show(frame, now_s)
 
     def _shown_by(self, name: str) -> Shown | None:
-        """What a head or a group shows; None where there is no such head here."""
+        """Return what shows the source on a head or group; None if there is no such head."""
         heads: Directory | None = getattr(self._sink, "heads", None)
         key = name.removeprefix("@").lower()
         if key not in self._others:

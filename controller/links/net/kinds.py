@@ -1,4 +1,4 @@
-"""Makes a kind of link of each format; a package that adds a format makes the kind of its link in the same way."""
+"""Makes a link kind from each format; a package that adds a format makes its link kind in the same way."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from controller.links.net.settings import NetSettings
 
 
 def link_of(form: Format) -> LinkKind:
-    """The kind of link that takes and sends messages of a format."""
+    """Return the link kind that receives and sends messages of a format."""
     settings = type("NetSettings", (NetSettings,), {"form": form, "__module__": __name__})
     return LinkKind(
         api=API,
@@ -21,7 +21,7 @@ def link_of(form: Format) -> LinkKind:
 
 
 def __getattr__(name: str) -> LinkKind:
-    """``LINK_livelink`` and so on: the kind of link of a built-in format."""
+    """Return the link kind of a built-in format for ``LINK_livelink`` and so on."""
     prefix, _, kind = name.partition("LINK_")
     if prefix or kind not in FORMATS.builtin():
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,4 +1,4 @@
-"""Opens a link in one of the formats: what takes faces, what sends them, or both."""
+"""Opens a link in one of the formats, which receives faces, sends them, or both."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ log = logging.getLogger(__name__)
 
 
 class NetLink:
-    """A link that is open."""
+    """An open link."""
 
     def __init__(self, address: str, incoming: Incoming | None, outgoing: Outgoing | None) -> None:
         self._address, self._parts = address, [part for part in (incoming, outgoing) if part is not None]
 
     def report(self) -> dict[str, object]:
-        """What arrived and what was sent."""
+        """Return the counts of both directions."""
         found: dict[str, object] = {"port": self._address}
         for part in self._parts:
             found |= part.report()
@@ -36,9 +36,9 @@ class NetLink:
 
 
 def open_net(settings: NetSettings, context: LinkContext) -> NetLink:
-    """Open both directions, as far as the settings name them.
+    """Open the directions that the settings name.
 
-    Raises LinkError: an address cannot be used, there is no layer of the name, or what was learned cannot be read.
+    Raises LinkError: an address cannot be used, the layer is unknown, or the saved calibration cannot be read.
     PortError: a serial port cannot be opened.
     """
     name = f"{settings.form.kind} {settings.address}"
@@ -69,7 +69,7 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
         address, connect=settings.connect is not None, baud=settings.baud, gate=gate, greeting=greeting
     )
     learns = settings.calibrate != "off" or settings.ranges
-    path = _learned_file(settings, getattr(context.sink, "name", "")) if learns else None
+    path = _calibration_file(settings, getattr(context.sink, "name", "")) if learns else None
     try:
         incoming = Incoming(settings, receiver, context.sink, name, path, gate)
     except BaseException:
@@ -79,11 +79,13 @@ def _open_incoming(settings: NetSettings, context: LinkContext, name: str) -> In
     return incoming
 
 
-def _learned_file(settings: NetSettings, head: str) -> Path:
-    """Where the face of a source is kept: by the source where only one is taken, else by the head, where heads have
-    names, and the layer."""
-    of = settings.source or "-".join(filter(None, (head, settings.layer)))
-    return state_file(f"{settings.form.kind}-{of}")
+def _calibration_file(settings: NetSettings, head: str) -> Path:
+    """Return the file for the calibration of a source.
+
+    It is named after the source if the link accepts only one, else after the head, if it has a name, and the layer.
+    """
+    suffix = settings.source or "-".join(filter(None, (head, settings.layer)))
+    return state_file(f"{settings.form.kind}-{suffix}")
 
 
 def _open_outgoing(

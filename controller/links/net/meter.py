@@ -1,35 +1,36 @@
-"""Measures a source: rate, jitter, loss and age of what it sends, on the clock of this machine."""
+"""Measures the rate, jitter, loss and age of the frames of a source, on the clock of this machine."""
 
 from __future__ import annotations
 
 import math
 
-_SHARE = 0.05  # of a new interval in the averages
-_LONGEST_S = 1.0  # a longer interval is a pause and none of the rate's
-_LARGEST_STEP = 8
-_MOST_LATE, _MOST_MISSING = 100, 3000
-"""Frames by which one may come late, and that may be missing at once; beyond, the source restarted (RFC 3550, A.1)."""
+_NEW_WEIGHT = 0.05  # weight of a new interval in the averages
+_MAX_INTERVAL_S = 1.0  # a longer interval is a pause and does not count for the rate
+_MAX_STEP = 8
+_MAX_LATE, _MAX_MISSING = 100, 3000
+"""Limits of late and of missing frames; beyond them, the source has restarted (RFC 3550, A.1)."""
 
 
-class Numbers:
-    """Counts the frames that are missing between the numbers that a source gives them.
+class SequenceCounter:
+    """Counts the frames that are missing by their sequence numbers.
 
-    As RFC 3550, appendix A.3: those to be expected from the lowest to the highest number, less those that came, so that
-    a frame which overtook another is not lost. Numbers may rise by more than one.
+    As in RFC 3550, appendix A.3, it is the number of frames expected from the lowest to the highest sequence number,
+    minus the number of those that came, so that reordered frames do not count as lost. The number may rise by more than
+    one per frame.
     """
 
     def __init__(self) -> None:
         self._before = self._came = 0
         self._first = self._highest = -1
-        self._rises = [0] * _LARGEST_STEP
+        self._rises = [0] * _MAX_STEP
 
     def note(self, number: int, skipped: int = 0) -> None:
-        """A frame came; ``skipped`` older ones before it were not read."""
+        """Count a frame that came; ``skipped`` : number of older frames before it that were skipped."""
         rise = number - self._highest
-        if self._first < 0 or not -_MOST_LATE <= rise / self._step <= _MOST_MISSING:
+        if self._first < 0 or not -_MAX_LATE <= rise / self._step <= _MAX_MISSING:
             self._begin(number)
         elif rise > 0:
-            if skipped == 0 and rise <= _LARGEST_STEP:
+            if skipped == 0 and rise <= _MAX_STEP:
                 self._rises[rise - 1] += 1
             self._highest = number
         self._first = min(self._first, number)
@@ -37,12 +38,12 @@ class Numbers:
 
     @property
     def lost(self) -> int:
-        """How many are missing."""
+        """Number of missing frames."""
         return self._before + self._missing()
 
     @property
     def _step(self) -> int:
-        """By how much the number usually rises; the smaller of two that are as usual."""
+        """The most frequent rise of the number from frame to frame; of equally frequent ones the smallest."""
         return 1 + self._rises.index(max(self._rises))
 
     def _missing(self) -> int:
@@ -50,7 +51,7 @@ class Numbers:
         return max(0, expected - self._came) if self._came else 0
 
     def _begin(self, number: int) -> None:
-        """The source restarted: at midnight, after the largest number, or as it was started."""
+        """Start again after a jump of the numbers, for instance when the source restarts or its numbers wrap round."""
         self._before += self._missing()
         self._first = self._highest = number
         self._came = 0
@@ -61,38 +62,38 @@ class Meter:
 
     Attributes
     ----------
-    frames : how many came.
+    frames : number of frames that came.
     """
 
     def __init__(self) -> None:
         self.frames = 0
         self._last_s = -math.inf
         self._interval_s = self._deviation_s = 0.0
-        self._numbers = Numbers()
+        self._numbers = SequenceCounter()
 
     def note(self, now_s: float, sequence: int | None = None, skipped: int = 0) -> None:
-        """A frame arrived; ``skipped`` older ones before it were not read."""
+        """Count a frame that arrived; ``skipped`` : number of older frames before it that were skipped."""
         interval_s = (now_s - self._last_s) / (1 + skipped)
         self._last_s = now_s
         self.frames += 1 + skipped
-        if interval_s < _LONGEST_S:
+        if interval_s < _MAX_INTERVAL_S:
             self._average(interval_s)
         if sequence is not None:
             self._numbers.note(sequence, skipped)
 
     @property
     def lost(self) -> int:
-        """How many were missing between their numbers."""
+        """Number of missing frames, by their sequence numbers."""
         return self._numbers.lost
 
     def age_s(self, now_s: float) -> float | None:
-        """How old the last frame is; None before the first."""
+        """Return the age of the last frame (s); None before the first."""
         return None if math.isinf(self._last_s) else max(0.0, now_s - self._last_s)
 
     def report(self, now_s: float) -> dict[str, object]:
-        """Rounded figures for people."""
+        """Return rounded figures for people."""
         age_s = self.age_s(now_s)
-        silent = age_s is None or age_s > _LONGEST_S or self._interval_s <= 0.0
+        silent = age_s is None or age_s > _MAX_INTERVAL_S or self._interval_s <= 0.0
         return {
             "rate_hz": 0.0 if silent else round(1.0 / self._interval_s, 1),
             "jitter_ms": round(1e3 * self._deviation_s, 2),
@@ -101,6 +102,6 @@ class Meter:
         }
 
     def _average(self, interval_s: float) -> None:
-        share = _SHARE if self._interval_s > 0.0 else 1.0
-        self._deviation_s += _SHARE * (abs(interval_s - self._interval_s) * (share < 1.0) - self._deviation_s)
-        self._interval_s += share * (interval_s - self._interval_s)
+        weight = _NEW_WEIGHT if self._interval_s > 0.0 else 1.0
+        self._deviation_s += _NEW_WEIGHT * (abs(interval_s - self._interval_s) * (weight < 1.0) - self._deviation_s)
+        self._interval_s += weight * (interval_s - self._interval_s)

@@ -1,4 +1,4 @@
-"""Sends the present face to another program, at its own rate."""
+"""Sends the current face to another program at a steady rate."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from controller.links.net.steady import SteadyThread
 
 
 class FaceSource(Protocol):
-    """Where the face comes from; see :class:`controller.layers.commands.CommandSink`."""
+    """The source of the face; see :class:`controller.layers.commands.CommandSink`."""
 
     parameters: Parameters
 
     def snapshot(self, out: Floats) -> None:
-        """Copy the present parameters to ``out`` : (P,)."""
+        """Copy the current parameters to ``out`` : (P,)."""
 
     def measured(self, out: Floats) -> bool:
-        """Copy what the servos show to ``out`` : (P,); False when none reports its position."""
+        """Copy the face that the servos show to ``out`` : (P,); return False if no servo reports its position."""
 
 
 class Outgoing:
@@ -39,17 +39,17 @@ class Outgoing:
         )
 
     def start(self) -> None:
-        """Begin to send."""
+        """Start sending."""
         self._start_s = time.monotonic()
         self._thread.start()
 
     def stop(self) -> None:
-        """Stop sending and give back what was opened."""
+        """Stop sending and close the sender."""
         self._thread.stop()
         self._sender.close()
 
     def report(self) -> dict[str, object]:
-        """Messages that were sent, and those that found no room or nobody."""
+        """Return the numbers of messages that were sent and dropped, and the last error."""
         return {"sent": self.sent, "dropped": self.dropped, "send_error": self._sender.error}
 
     def _send(self, time_s: float) -> None:
@@ -61,7 +61,7 @@ class Outgoing:
                 self.dropped += 1
 
     def _frame(self, time_s: float) -> Frame | None:
-        """What is to be sent now; None while only the servos are to be sent and none reports its position."""
+        """Return the frame to send now; None if only the servos' face is wanted and none reports its position."""
         face, servos = self._source.parameters.neutral(), self._source.parameters.neutral()
         self._source.snapshot(face)
         known = self._sends != "face" and self._source.measured(servos)

@@ -1,4 +1,4 @@
-"""Senders: messages to a UDP port, a TCP port, a serial port or standard output; what finds no room is left out."""
+"""Sends messages to a UDP, TCP or serial port or to standard output, and drops those for which there is no room."""
 
 from __future__ import annotations
 
@@ -16,28 +16,29 @@ from controller.links.net.receivers import auth_message
 from drivers.base.errors import PortError
 from drivers.port.serialport import SerialPort
 
-_RETRY_S = 0.5
-_HEARD = 65_536
+_RETRY_INTERVAL_S = 0.5
+_MAX_READ_BYTES = 65_536
 
 
 class Sender(Protocol):
-    """Messages to a far end.
+    """Sends messages to a far end.
 
-    error : what went wrong last, for people; empty while all is well.
+    error : the last error, for people; empty if there is none.
     """
 
     error: str
 
     def send(self, message: bytes) -> bool:
-        """Send one message; False where it was left out, as the far end is not there or has no room."""
+        """Send one message; return False if it was dropped, because the far end is not there or has no room."""
 
     def close(self) -> None:
-        """Give back what was opened."""
+        """Close what was opened."""
 
 
 def open_sender(address: Address, delimiter: bytes, baud: int = 115_200, token: str | None = None) -> Sender:
-    """What takes messages to an address; ``delimiter`` ends each on a stream, ``token`` begins a stream over TCP
-    and each datagram.
+    """Open and return the sender for an address.
+
+    delimiter : ends each message of a stream. token : sent at the beginning of a TCP stream and of each datagram.
 
     Raises PortError: the serial port cannot be opened.
     """
@@ -46,18 +47,18 @@ def open_sender(address: Address, delimiter: bytes, baud: int = 115_200, token: 
     if address.transport == "tcp":
         return TcpSender(address, delimiter, token)
     if address.transport == "midi":
-        from controller.links.net.midi import MidiSender  # few links need it
+        from controller.links.net.midi import MidiSender  # imported lazily: few links need it
 
         return MidiSender(address.device)
     return SerialSender(address.device, delimiter, baud) if address.transport == "serial" else OutputSender(delimiter)
 
 
 class UdpSender:
-    """Datagrams, each of which begins with ``first``."""
+    """Sends datagrams, each of which begins with ``prefix``."""
 
-    def __init__(self, address: Address, first: bytes = b"") -> None:
+    def __init__(self, address: Address, prefix: bytes = b"") -> None:
         self.error = ""
-        self._first = first
+        self._prefix = prefix
         family = socket.AF_INET6 if ":" in address.host else socket.AF_INET
         self._socket = socket.socket(family, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
@@ -65,9 +66,9 @@ class UdpSender:
 
     def send(self, message: bytes) -> bool:
         try:
-            self._socket.sendto(self._first + message, self._to)
+            self._socket.sendto(self._prefix + message, self._to)
         except ConnectionRefusedError:
-            pass  # nobody listened to the one before; somebody may listen now
+            pass  # reported for the previous datagram, to which nobody listened
         except OSError as error:
             self.error = error.strerror or type(error).__name__
             return False
@@ -79,7 +80,7 @@ class UdpSender:
 
 
 class _Stream:
-    """What of a message found no room yet; a new message waits until there is nothing left of the one before."""
+    """Writes messages to a stream without waiting; a new message is dropped while part of the last one is unsent."""
 
     def __init__(self, delimiter: bytes) -> None:
         self.error = ""
@@ -102,12 +103,12 @@ class _Stream:
 
 
 class TcpSender(_Stream):
-    """A stream to a program that is called, and called again where it hangs up."""
+    """Sends a stream to a program that it connects to, again whenever the connection is closed."""
 
     def __init__(self, address: Address, delimiter: bytes, token: str | None = None) -> None:
         super().__init__(delimiter)
         self._address = address
-        self._first = b"" if token is None else auth_message(token) + delimiter
+        self._prefix = b"" if token is None else auth_message(token) + delimiter
         self._socket: socket.socket | None = None
         self._next_s = 0.0
 
@@ -120,23 +121,23 @@ class TcpSender(_Stream):
             return True
         if time.monotonic() < self._next_s:
             return False
-        self._next_s = time.monotonic() + _RETRY_S
+        self._next_s = time.monotonic() + _RETRY_INTERVAL_S
         try:
-            self._socket = socket.create_connection((self._address.host, self._address.port), _RETRY_S)
+            self._socket = socket.create_connection((self._address.host, self._address.port), _RETRY_INTERVAL_S)
         except OSError as error:
             self.error = error.strerror or type(error).__name__
             return False
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.setblocking(False)
         self.error = ""
-        self._rest = self._first
+        self._rest = self._prefix
         self._push()
         return self._socket is not None and not self._rest
 
     def _push(self) -> None:
         try:
             if self._socket is not None:
-                self._hear(self._socket)
+                self._discard_answers(self._socket)
                 self._rest = self._rest[self._socket.send(self._rest) :]
         except BlockingIOError:
             pass
@@ -146,15 +147,15 @@ class TcpSender(_Stream):
             self._socket = None
 
     @staticmethod
-    def _hear(call: socket.socket) -> None:
-        """Read what the far end answers, so that it never waits for that. Raises OSError: it has hung up."""
+    def _discard_answers(connection: socket.socket) -> None:
+        """Read and discard answers, so that they never block the far end. Raises OSError: the connection is closed."""
         with suppress(BlockingIOError):
-            if not call.recv(_HEARD):
+            if not connection.recv(_MAX_READ_BYTES):
                 raise ConnectionResetError(errno.ECONNRESET, "the far end hung up")
 
 
 class SerialSender(_Stream):
-    """A stream to a serial port, which is opened again where it vanishes."""
+    """Sends a stream to a serial port, which is opened again after it has disappeared."""
 
     def __init__(self, device: str, delimiter: bytes, baud: int) -> None:
         super().__init__(delimiter)
@@ -173,7 +174,7 @@ class SerialSender(_Stream):
         try:
             self._port.open()
         except PortError as error:
-            self.error, self._next_s = str(error), time.monotonic() + _RETRY_S
+            self.error, self._next_s = str(error), time.monotonic() + _RETRY_INTERVAL_S
             return False
         self.error = ""
         return True
@@ -182,19 +183,19 @@ class SerialSender(_Stream):
         try:
             self._rest = self._rest[self._port.put(self._rest) :]
         except PortError as error:
-            self.error, self._rest, self._next_s = str(error), b"", time.monotonic() + _RETRY_S
+            self.error, self._rest, self._next_s = str(error), b"", time.monotonic() + _RETRY_INTERVAL_S
             self._port.close()
 
 
 class SerialAnswerer(_Stream):
-    """A stream to a serial port that a receiver holds, and opens again where it vanishes."""
+    """Sends a stream to a serial port that a receiver opens, reopens and closes."""
 
     def __init__(self, port: SerialPort, delimiter: bytes) -> None:
         super().__init__(delimiter)
         self._port = port
 
     def close(self) -> None:
-        pass  # the receiver does
+        pass  # the receiver closes the port
 
     def _ready(self) -> bool:
         return self._port.is_open
@@ -207,7 +208,7 @@ class SerialAnswerer(_Stream):
 
 
 class OutputSender:
-    """Standard output; a reader that does not read loses messages."""
+    """Writes to standard output; messages are dropped while the reader does not read."""
 
     def __init__(self, delimiter: bytes) -> None:
         self.error = ""

@@ -1,4 +1,4 @@
-"""A thread that does the same again and again at a steady rate, until it is stopped."""
+"""Provides a thread that calls a function at a steady rate until it is stopped."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 
 class SteadyThread:
-    """Calls ``step`` with the time (s, monotonic clock) every ``period_s`` seconds; late turns are left out.
+    """Calls ``step`` with the time (s, monotonic clock) every ``period_s`` seconds; calls that are late are skipped.
 
     name : of the thread.
     """
@@ -19,11 +19,11 @@ class SteadyThread:
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
 
     def start(self) -> None:
-        """Begin; the first call comes at once."""
+        """Start the thread, which makes the first call immediately."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Make no further call, and wait for the one that is under way; also before the start."""
+        """Make no further call, and wait for the current one; may also be called before the start."""
         self._stopping.set()
         if self._thread.ident is not None:
             self._thread.join()

@@ -1,4 +1,4 @@
-"""Receives UDP datagrams from a program that sends them once it is asked, and asks again while nothing arrives."""
+"""Receives UDP datagrams from a program that sends them on request, and repeats the request while nothing arrives."""
 
 from __future__ import annotations
 
@@ -9,41 +9,41 @@ from controller.base.errors import LinkError
 from controller.links.net.address import Address
 from controller.links.net.receivers import Received, UdpReceiver
 
-ASK_S = 1.0
+REQUEST_INTERVAL_S = 1.0
 """Time between requests while nothing arrives."""
 
 
 class UdpCaller:
-    """Datagrams of one host, which is asked for them.
+    """Receives the datagrams of one host on request.
 
-    Listens at the same port number as the host's, to which phones send, on the interface that reaches it.
-    greeting : what the host is asked with. error : why nothing arrives, empty while datagrams do.
+    It listens on the interface that reaches the host, at the same port number as the host's, to which phones send.
+    greeting : the request. error : why nothing arrives; empty while datagrams do.
 
-    Raises LinkError: the host is not known or not reached, or the port is taken.
+    Raises LinkError: the host is unknown or cannot be reached, or the port is in use.
     """
 
     def __init__(self, address: Address, greeting: bytes) -> None:
         self._host, own = _hosts(address)
         self._port, self._greeting = address.port, greeting
         self._receiver = UdpReceiver(Address("udp", own, address.port))
-        self._quiet_since_s = -ASK_S
-        self._asked = False  # since the last datagram
+        self._quiet_since_s = -REQUEST_INTERVAL_S
+        self._requested = False  # since the last datagram
         self.error = ""
 
     def receive(self, timeout_s: float) -> Received:
-        if time.monotonic() - self._quiet_since_s >= ASK_S:
-            self._ask()
+        if time.monotonic() - self._quiet_since_s >= REQUEST_INTERVAL_S:
+            self._request()
         found = [each for each in self._receiver.receive(timeout_s) if each[0] == self._host]
         if found:
-            self._quiet_since_s, self._asked, self.error = time.monotonic(), False, self._receiver.error
+            self._quiet_since_s, self._requested, self.error = time.monotonic(), False, self._receiver.error
         return found
 
     def close(self) -> None:
         self._receiver.close()
 
-    def _ask(self) -> None:
-        self.error = self._receiver.error or (f"{self._host} was asked and has not answered" if self._asked else "")
-        self._quiet_since_s, self._asked = time.monotonic(), True
+    def _request(self) -> None:
+        self.error = self._receiver.error or (f"{self._host} has not answered the request" if self._requested else "")
+        self._quiet_since_s, self._requested = time.monotonic(), True
         try:
             self._receiver.send(self._greeting, self._host, self._port)
         except OSError as error:
@@ -51,7 +51,7 @@ class UdpCaller:
 
 
 def _hosts(address: Address) -> tuple[str, str]:
-    """The far end's address in numbers, and the one of this machine that it is reached from."""
+    """Return the numeric address of the far end, and that of this machine's interface that reaches it."""
     try:
         family, _, _, _, there = socket.getaddrinfo(address.host, address.port, type=socket.SOCK_DGRAM)[0]
         with socket.socket(family, socket.SOCK_DGRAM) as probe:

@@ -1,4 +1,4 @@
-"""Opens the link: what the topics of a node of ROS 2 ask of the face, and what it says there."""
+"""Opens a link as a ROS 2 node whose topics set the face, take commands and publish the face."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ from controller.links.ros2.kind import Ros2Settings
 from controller.links.ros2.publishing import Publishing
 from controller.links.ros2.session import RosNode
 
-_LONGEST_LINE = 4096
+_MAX_LINE_BYTES = 4096
 
 
 def open_ros2(settings: Ros2Settings, context: LinkContext) -> Ros2Link:
-    """Join the graph of ROS.
+    """Open the link, which joins the ROS graph.
 
-    Raises LinkError: the router is not there, there is no layer of the name, or a file cannot be read. MissingPackage:
+    Raises LinkError: the router cannot be reached, the layer is unknown, or a file cannot be read. MissingPackage:
     Zenoh or rosbags is not installed.
     """
     layers = context.sink.layer_names()
@@ -43,7 +43,7 @@ def open_ros2(settings: Ros2Settings, context: LinkContext) -> Ros2Link:
 
 
 class Ros2Link:
-    """A node that is in the graph; its topics are described in docs/ros2.md."""
+    """A node in the ROS graph; its topics are described in docs/ros2.md."""
 
     def __init__(self, settings: Ros2Settings, sink: CommandSink, node: RosNode, joints: HeadJoints | None) -> None:
         self._settings, self._sink, self._node, self._joints = settings, sink, node, joints
@@ -61,7 +61,7 @@ class Ros2Link:
         node.subscribe("command", "std_msgs/msg/String", self._take_line)
 
     def start(self) -> None:
-        """Begin to publish."""
+        """Start publishing."""
         self._publishing.start()
 
     def stop(self) -> None:
@@ -69,7 +69,7 @@ class Ros2Link:
         self._publishing.stop()
 
     def report(self) -> dict[str, object]:
-        """Messages taken, refused by reason and published, and whether the router is reached."""
+        """Return counts of messages accepted, refused (by reason) and published, and the state of the connection."""
         connected = self._node.connected
         return {
             "port": self._settings.address,
@@ -82,7 +82,7 @@ class Ros2Link:
         }
 
     def _take_parameters(self, message: Any) -> None:
-        """An array of all parameters in their order; NaN leaves one to the layers below."""
+        """Show an array of all parameters in their order; a NaN leaves its parameter to the layers below."""
         p, given = self._sink.parameters, np.asarray(message.data, float)
         if len(given) != len(p):
             raise LinkError(f"{len(given)} parameters, not {len(p)}")
@@ -92,7 +92,7 @@ class Ros2Link:
         names = [name.removeprefix(self._prefix) for name in message.name]
         values, mask, unknown = named_values(self._sink.parameters, self._joints, names, list(message.position))
         for name in unknown:
-            self._node.refused.add(f"joint_commands: {name[:40]!r} is no joint and no parameter, or no number is given")
+            self._node.refused.add(f"joint_commands: {name[:40]!r} is neither a joint nor a parameter")
         if mask.any():
             self._show(values, mask)
 
@@ -100,7 +100,10 @@ class Ros2Link:
         self._show(self._units.face(message.intensity), self._units.moves)
 
     def _take_expression(self, message: Any) -> None:
-        """By name, or without one by valence and arousal; a confidence above 0 is how strongly it shows."""
+        """Show an expression by its name, or, if that is empty, by valence and arousal.
+
+        A confidence above 0 is its strength; without one the strength is 1.
+        """
         strength = float(message.confidence)
         strength = min(strength, 1.0) if strength > 0.0 else 1.0
         name = message.expression or f"VA:{float(message.valence):.4f},{float(message.arousal):.4f}"
@@ -110,7 +113,7 @@ class Ros2Link:
         self._show_expression(message.data.strip(), 1.0)
 
     def _take_line(self, message: Any) -> None:
-        answer = self._lines.feed(message.data.encode()[:_LONGEST_LINE].rstrip(b"\r\n") + b"\n", time.monotonic_ns())
+        answer = self._lines.feed(message.data.encode()[:_MAX_LINE_BYTES].rstrip(b"\r\n") + b"\n", time.monotonic_ns())
         self._meter.note(time.monotonic(), None)
         for line in answer.decode("utf-8", "replace").splitlines():
             self._answers.publish(data=line)

@@ -1,4 +1,4 @@
-"""Publishes the face, and how its servos and links are, at a steady rate."""
+"""Publishes the face at a steady rate, and the state of its servos and links once a second, on ROS topics."""
 
 from __future__ import annotations
 
@@ -15,8 +15,7 @@ from controller.links.ros2.faces import ActionUnits, HeadJoints, ros_expression
 from controller.links.ros2.session import RosNode, RosPublisher
 from controller.vocabulary.reading import Readings
 
-_SLOW_S = 1.0
-"""Period of diagnostics."""
+_DIAGNOSTICS_PERIOD_S = 1.0
 _FRAME_ID = "base_link"
 _OK, _WARN, _ERROR = 0, 1, 2
 
@@ -24,8 +23,8 @@ _OK, _WARN, _ERROR = 0, 1, 2
 class Publishing:
     """Publishes in its own thread until it is stopped.
 
-    joints : of the head; None where there is none, and then no joints and frames are published. prefix : of the names
-    of frames, as ``maple/``.
+    joints : of the head. None: no joints and frames are published. prefix : put before the names of joints and frames,
+    such as ``maple/``. frames : whether to publish frames on /tf.
     """
 
     def __init__(
@@ -34,38 +33,38 @@ class Publishing:
         self._node, self._sink, self._joints, self._prefix = node, sink, joints, prefix
         self._units, self._readings = ActionUnits(sink.parameters), Readings(sink.parameters, sink.vocabulary)
         self._make = node.types.make
-        kinds = {
+        message_types = {
             "parameters": "std_msgs/msg/Float64MultiArray", "action_units": "hri_msgs/msg/FacialActionUnits",
             "expression": "hri_msgs/msg/Expression", "/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
         }  # fmt: skip
         if joints is not None:
-            kinds["joint_states"] = "sensor_msgs/msg/JointState"
-            kinds |= {"/tf": "tf2_msgs/msg/TFMessage"} if frames else {}
-        self._topics: dict[str, RosPublisher] = {name: node.publisher(name, kind) for name, kind in kinds.items()}
-        self._values, self._slow_s = sink.parameters.neutral(), -np.inf
-        self._thread = SteadyThread("ros2, out", 1.0 / rate_hz, self._turn)
+            message_types["joint_states"] = "sensor_msgs/msg/JointState"
+            message_types |= {"/tf": "tf2_msgs/msg/TFMessage"} if frames else {}
+        self._topics: dict[str, RosPublisher] = {name: node.publisher(name, t) for name, t in message_types.items()}
+        self._values, self._diagnosed_s = sink.parameters.neutral(), -np.inf
+        self._thread = SteadyThread("ros2, out", 1.0 / rate_hz, self._publish_all)
 
     @property
     def sent(self) -> int:
-        """Messages published."""
+        """Number of messages published."""
         return sum(topic.sent for topic in self._topics.values())
 
     def start(self) -> None:
-        """Begin to publish."""
+        """Start publishing."""
         self._thread.start()
 
     def stop(self) -> None:
         """Stop publishing."""
         self._thread.stop()
 
-    def _turn(self, now_s: float) -> None:
+    def _publish_all(self, now_s: float) -> None:
         self._sink.snapshot(self._values)
-        self._publish(self._values)
-        if now_s - self._slow_s >= _SLOW_S:
-            self._slow_s = now_s
-            self._diagnose()
+        self._publish_face(self._values)
+        if now_s - self._diagnosed_s >= _DIAGNOSTICS_PERIOD_S:
+            self._diagnosed_s = now_s
+            self._publish_diagnostics()
 
-    def _publish(self, values: Floats) -> None:
+    def _publish_face(self, values: Floats) -> None:
         header = self._header()
         count = len(values)
         label = self._make("std_msgs/msg/MultiArrayDimension", label="parameters", size=count, stride=count)
@@ -96,24 +95,24 @@ class Publishing:
             self._topics["/tf"].publish(transforms=frames)
 
     def _transform(self, frame: Any, header: Any) -> Any:
-        x, y, z = frame.at_m.tolist()
-        qx, qy, qz, qw = frame.turn.tolist()
-        moved = self._make(
+        x, y, z = frame.position_m.tolist()
+        qx, qy, qz, qw = frame.rotation.tolist()
+        transform = self._make(
             "geometry_msgs/msg/Transform",
             translation=self._make("geometry_msgs/msg/Vector3", x=x, y=y, z=z),
             rotation=self._make("geometry_msgs/msg/Quaternion", x=qx, y=qy, z=qz, w=qw),
         )
         parent = self._make("std_msgs/msg/Header", stamp=header.stamp, frame_id=self._prefix + frame.parent)
-        kind = "geometry_msgs/msg/TransformStamped"
-        return self._make(kind, header=parent, child_frame_id=self._prefix + frame.name, transform=moved)
+        message_type = "geometry_msgs/msg/TransformStamped"
+        return self._make(message_type, header=parent, child_frame_id=self._prefix + frame.name, transform=transform)
 
     def _header(self) -> Any:
         seconds, rest = divmod(time.time_ns(), 1_000_000_000)
         stamp = self._make("builtin_interfaces/msg/Time", sec=seconds, nanosec=rest)
         return self._make("std_msgs/msg/Header", stamp=stamp, frame_id=self._prefix + _FRAME_ID)
 
-    def _diagnose(self) -> None:
-        """One status for the face, and one for each servo and link."""
+    def _publish_diagnostics(self) -> None:
+        """Publish one status for the face, and one for each servo and link."""
         state, found = self._sink.status(), self._sink.overview()
         stopped = self._sink.stop_latch.stopped
         face = self._status("face", _WARN if stopped else _OK, f"stopped by {stopped.who}" if stopped else "", state)
@@ -121,10 +120,11 @@ class Publishing:
         links = [self._status_of("link", each) for each in found.get("links", [])]
         self._topics["/diagnostics"].publish(header=self._header(), status=[face, *servos, *links])
 
-    def _status_of(self, what: str, record: Mapping[str, Any]) -> Any:
+    def _status_of(self, device: str, record: Mapping[str, Any]) -> Any:
+        """Return the status of a device, "servo" or "link", from its entry in the overview."""
         name = record.get("name") or record.get("channel") or record.get("port") or record.get("kind") or ""
         error = str(record.get("error") or "")
-        return self._status(f"{what} {name}", _ERROR if error and what == "servo" else _OK, error, record)
+        return self._status(f"{device} {name}", _ERROR if error and device == "servo" else _OK, error, record)
 
     def _status(self, name: str, level: int, message: str, record: Mapping[str, Any]) -> Any:
         flat = {key: value for key, value in record.items() if isinstance(value, str | int | float | bool)}

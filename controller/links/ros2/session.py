@@ -1,4 +1,4 @@
-"""A node of ROS 2 on a session of Zenoh of its own: publishers and subscriptions that the graph shows."""
+"""Provides a ROS 2 node on its own Zenoh session: publishers and subscriptions that appear in the ROS graph."""
 
 from __future__ import annotations
 
@@ -24,14 +24,14 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 CONNECT_MS = 10_000
-"""So long the router is waited for at the start."""
-LONGEST = 262_144
-"""Bytes of a message that are read at most."""
+"""How long to wait for the router at the start."""
+MAX_MESSAGE_BYTES = 262_144
+"""Longer messages are refused."""
 _HINT = "start the router of ROS: ros2 run rmw_zenoh_cpp rmw_zenohd, or correct connect"
 
 
 class RosPublisher:
-    """Publishes messages of one topic. sent : how many."""
+    """Publishes messages of one topic. sent : number of messages published."""
 
     def __init__(self, session: zenoh.Session, types: MessageTypes, topic: Topic, domain: int) -> None:
         self._types, self._topic, self._gid, self.sent = types, topic, os.urandom(16), 0
@@ -39,80 +39,87 @@ class RosPublisher:
 
     def publish(self, **fields: Any) -> None:
         """Publish a message with these fields."""
-        message = self._types.make(self._topic.kind, **fields)
+        message = self._types.make(self._topic.message_type, **fields)
         self.sent += 1
-        data = self._types.encode(message, self._topic.kind)
+        data = self._types.encode(message, self._topic.message_type)
         self.declared.put(data, attachment=attachment(self.sent, time.time_ns(), self._gid))
 
 
 class RosNode:
-    """The node.
+    """A node of the ROS graph.
 
-    refused : messages that were not taken, by reason.
+    beside : the stage file, to whose folder a settings file is relative; None for the current folder.
 
-    Raises LinkError: the router is not there, or a file of settings cannot be read. MissingPackage: Zenoh or rosbags is
-    not installed.
+    Attributes
+    ----------
+    refused : number of messages that were refused, by reason.
+
+    Raises LinkError: the router cannot be reached, or the settings file cannot be read. MissingPackage: Zenoh or
+    rosbags is not installed.
     """
 
     def __init__(self, settings: Ros2Settings, beside: Path | None) -> None:
         self.types, self.refused = message_types(settings.distribution), Refusals()
-        self._closers, self._domain, self._space = ExitStack(), settings.domain_id, settings.namespace
-        self._session = _open(settings, beside)
+        self._closers, self._domain, self._namespace = ExitStack(), settings.domain_id, settings.namespace
+        self._session = _open_session(settings, beside)
         self._closers.callback(self._session.close)
         self._graph = GraphNode(self._domain, str(self._session.zid()), settings.namespace, settings.node)
-        self._endpoints = 0
-        self._token(self._graph.token())
+        self._endpoint_count = 0
+        self._declare_token(self._graph.token())
 
     @property
     def connected(self) -> bool:
-        """Whether a router is reached now."""
+        """Whether the session is connected to a router now."""
         return bool(list(self._session.info.routers_zid()))
 
     def name(self, topic: str) -> str:
-        """The absolute name of a topic of this node; one with ``/`` before it is absolute already."""
-        return topic if topic.startswith("/") else f"{self._space.rstrip('/')}/{topic}"
+        """Return the absolute name of a topic of this node; a name that begins with ``/`` is absolute already."""
+        return topic if topic.startswith("/") else f"{self._namespace.rstrip('/')}/{topic}"
 
-    def publisher(self, topic: str, kind: str) -> RosPublisher:
-        """What publishes messages of a type on a topic."""
-        wanted = self.types.topic(self.name(topic), kind)
-        made = RosPublisher(self._session, self.types, wanted, self._domain)
-        self._closers.callback(made.declared.undeclare)
-        self._announce(PUBLISHER, wanted)
-        return made
+    def publisher(self, topic: str, message_type: str) -> RosPublisher:
+        """Announce and return a publisher of messages of a type on a topic."""
+        declared = self.types.topic(self.name(topic), message_type)
+        publisher = RosPublisher(self._session, self.types, declared, self._domain)
+        self._closers.callback(publisher.declared.undeclare)
+        self._announce(PUBLISHER, declared)
+        return publisher
 
-    def subscribe(self, topic: str, kind: str, take: Callable[[Any], object]) -> None:
-        """Call ``take`` in a thread of Zenoh with each message of a type on a topic; what it raises is counted."""
-        wanted = self.types.topic(self.name(topic), kind)
+    def subscribe(self, topic: str, message_type: str, take: Callable[[Any], object]) -> None:
+        """Call ``take`` with each message of a type on a topic, in a thread of Zenoh.
 
-        def heard(sample: zenoh.Sample) -> None:
+        A message for which it raises is counted in ``refused``.
+        """
+        declared = self.types.topic(self.name(topic), message_type)
+
+        def receive(sample: zenoh.Sample) -> None:
             try:
                 data = sample.payload.to_bytes()
-                if len(data) > LONGEST:
+                if len(data) > MAX_MESSAGE_BYTES:
                     raise LinkError("message too long")
-                take(self.types.decode(data, kind))
+                take(self.types.decode(data, message_type))
             except OMOTE_ERRORS as error:
                 self.refused.add(f"{topic}: {error}")
             except Exception as error:  # noqa: BLE001  damaged bytes make rosbags raise anything
                 log.debug("ros2 %s: %s: %s", topic, type(error).__name__, error)
                 self.refused.add(f"{topic}: damaged")
 
-        subscriber = self._session.declare_subscriber(wanted.key(self._domain, any_hash=True), heard)
+        subscriber = self._session.declare_subscriber(declared.key(self._domain, any_hash=True), receive)
         self._closers.callback(subscriber.undeclare)
-        self._announce(SUBSCRIPTION, wanted)
+        self._announce(SUBSCRIPTION, declared)
 
     def close(self) -> None:
         """Leave the graph."""
         self._closers.close()
 
-    def _announce(self, kind: str, topic: Topic) -> None:
-        self._endpoints += 1
-        self._token(self._graph.endpoint(self._endpoints, kind, topic))
+    def _announce(self, endpoint_kind: str, topic: Topic) -> None:
+        self._endpoint_count += 1
+        self._declare_token(self._graph.endpoint_token(self._endpoint_count, endpoint_kind, topic))
 
-    def _token(self, key: str) -> None:
+    def _declare_token(self, key: str) -> None:
         self._closers.callback(self._session.liveliness().declare_token(key).undeclare)
 
 
-def _open(settings: Ros2Settings, beside: Path | None) -> zenoh.Session:
+def _open_session(settings: Ros2Settings, beside: Path | None) -> zenoh.Session:
     with importing("a link to ROS 2", "zenoh"):
         import zenoh  # optional: the extra ros2
     zenoh.init_log_from_env_or("error")
@@ -131,7 +138,7 @@ def _open(settings: Ros2Settings, beside: Path | None) -> zenoh.Session:
 
 
 def _read_config(name: str, beside: Path | None) -> zenoh.Config:
-    """Zenoh's own settings from a file, relative to the stage. Raises LinkError."""
+    """Read Zenoh's own settings from a file, relative to the folder of the stage file. Raises LinkError."""
     import zenoh  # optional: the extra ros2
 
     path = (beside.parent if beside is not None else Path()) / name
@@ -140,5 +147,5 @@ def _read_config(name: str, beside: Path | None) -> zenoh.Config:
     try:
         return zenoh.Config.from_file(str(path))
     except zenoh.ZError as error:
-        why = str(error).rpartition(" at /")[0] or str(error)  # a place in Zenoh's own source comes last
+        why = str(error).rpartition(" at /")[0] or str(error)  # cut off the place in Zenoh's own source
         raise LinkError(f"ros2 config {path}: {why.strip()}", hint="correct it, or leave config out") from error

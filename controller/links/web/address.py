@@ -1,4 +1,4 @@
-"""Where a browser finds the panel, for people: an address, and a picture of it that a phone's camera reads."""
+"""Tells people where a browser finds the panel: as an address, and as a QR code for a phone's camera."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ log = logging.getLogger(__name__)
 
 
 def announce(host: str, port: int, token: str | None) -> None:
-    """Say where the panel is; where other machines reach it, also as a QR code on the terminal."""
+    """Log the panel's address; if a token is needed, also show it as a QR code on the terminal."""
     url = address(host, port, token)
     log.warning("web panel: %s", url)
     code = qr_code(url) if token is not None else ""
@@ -20,24 +20,24 @@ def announce(host: str, port: int, token: str | None) -> None:
 
 
 def address(host: str, port: int, token: str | None) -> str:
-    """The panel's URL. The token stands behind a #, which browsers send to nobody."""
+    """Return the panel's URL. The token is in the fragment (after #), which browsers do not send to servers."""
     name = own_address() if host in ("0.0.0.0", "::") else host
     name = f"[{name}]" if ":" in name else name
     return f"http://{name}:{port}/" + (f"#token={token}" if token is not None else "")
 
 
 def own_address() -> str:
-    """The address at which other machines most likely reach this one; nothing is sent to find it."""
+    """Return the address at which other machines most likely reach this one, without sending anything."""
     try:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-            probe.connect(("192.0.2.1", 9))  # an address for documentation (RFC 5737): it only chooses a route
+            probe.connect(("192.0.2.1", 9))  # an address for documentation (RFC 5737), only used to choose a route
             return str(probe.getsockname()[0])
     except OSError:
         return socket.gethostname()
 
 
 def qr_code(text: str) -> str:
-    """A QR code of block characters; empty without the package segno."""
+    """Return a QR code in block characters; empty if the package segno is not installed."""
     try:
         import segno  # optional
     except ImportError:

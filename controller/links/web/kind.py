@@ -1,4 +1,4 @@
-"""Defines the kind of link that serves the web panel."""
+"""Defines the link kind ``web``, which serves the web panel."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PORT = 8080
 
 @dataclass(frozen=True, kw_only=True)
 class WebSettings(WebSocketSettings):
-    """Its options in a stage: those of the WebSocket link, and the face."""
+    """Options of the link in a stage file: those of the WebSocket link, and the face."""
 
     listen: str = option("HOST:PORT at which browsers open the panel.", f"127.0.0.1:{PORT}")
     face: str | None = option("File with the face, as omote export FILE.glb --web writes it.", longest=4096)

@@ -1,4 +1,4 @@
-"""Answers browsers: the panel's own files from a fixed list, and the face; nothing else of the disk is served."""
+"""Answers browsers with the panel's own files, from a fixed list, and with the face; no other file is served."""
 
 from __future__ import annotations
 
@@ -14,10 +14,9 @@ from websockets.http11 import Request, Response
 
 from surface.base import files
 
-STATIC, LARGEST_FILE = Path(__file__).with_name("static"), 4 << 20
-LARGEST_FACE = 64 << 20
-"""Bytes of a face that is served."""
-_LONGEST_TAGS = 2000
+STATIC = Path(__file__).with_name("static")
+MAX_FILE_BYTES, MAX_FACE_BYTES = 4 << 20, 64 << 20
+_MAX_TAGS_LENGTH = 2000
 _SCRIPTS = (
     "panel.js", "robot.js", "face.js", "morph.js", "shaders.js", "pose.js", "controls.js", "pads.js", "servos.js",
     "plot.js", "three.min.js",
@@ -29,8 +28,8 @@ FILES = {
     **{f"/{name}": (name, "text/javascript; charset=utf-8") for name in _SCRIPTS},
     "/three.LICENSE.txt": ("three.LICENSE.txt", "text/plain; charset=utf-8"),
 }
-"""File and type by path."""
-SAFE = {
+"""File name and media type by path."""
+SECURITY_HEADERS = {
     "Content-Security-Policy": (
         "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; "
         "connect-src 'self' blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -46,12 +45,12 @@ SAFE = {
 
 @cache
 def packed(name: str) -> bytes:
-    """A file of ``static``, compressed."""
-    return gzip.compress(files.read_file(STATIC / name, LARGEST_FILE), 6, mtime=0)
+    """Return a file of ``static``, compressed with gzip."""
+    return gzip.compress(files.read_file(STATIC / name, MAX_FILE_BYTES), 6, mtime=0)
 
 
 def page(path: str, known: str | None = None) -> Response:
-    """The answer to a request for one of the panel's own files; not found for everything else.
+    """Return the answer to a request for one of the panel's own files; not found for everything else.
 
     known : the request's If-None-Match; a file that it names is not sent again.
     """
@@ -62,18 +61,18 @@ def page(path: str, known: str | None = None) -> Response:
 
 
 class Face:
-    """The face's file, which may appear after the server has begun; it is read once."""
+    """The file of the face, which may appear after the server has started; it is read once."""
 
     def __init__(self, path: Path | None) -> None:
         self._path, self._packed = path, b""
 
     def answer(self, known: str | None = None) -> Response:
-        """The face; where it is not there yet, when to ask again.
+        """Return the answer to a request for the face; if it is not there yet, the answer says when to try again.
 
         known : the request's If-None-Match; a face that it names is not sent again.
         """
         if not self._packed and self._path is not None and self._path.is_file():
-            raw = files.read_file(self._path, LARGEST_FACE)
+            raw = files.read_file(self._path, MAX_FACE_BYTES)
             self._packed = raw if raw[:2] == b"\x1f\x8b" else gzip.compress(raw, 6, mtime=0)
         if self._packed:
             return _file(self._packed, "model/gltf-binary", known)
@@ -85,13 +84,15 @@ class Face:
 
 
 def text(status: HTTPStatus, words: str) -> Response:
-    """A short answer for people."""
+    """Return a short answer for people."""
     return _answer(status, (words + "\n").encode(), "text/plain; charset=utf-8")
 
 
 def is_local_name(request: Request) -> bool:
-    """Whether a request names this machine by an address or as localhost: a page whose name was made to lead here by
-    somebody else's name server does not."""
+    """Whether a request names this machine by an IP address or as localhost.
+
+    This refuses pages whose host name an attacker's name server resolves to this machine (DNS rebinding).
+    """
     host = (request.headers.get("Host") or "").rpartition("@")[2]
     name = host[1:].partition("]")[0] if host.startswith("[") else host.partition(":")[0]
     try:
@@ -103,12 +104,12 @@ def is_local_name(request: Request) -> bool:
 
 @lru_cache(maxsize=64)
 def entity_tag(body: bytes) -> str:
-    """The strong entity tag of a compressed file, from its content (RFC 9110, 8.8.3)."""
+    """Return the strong entity tag of a compressed file, by its content (RFC 9110, 8.8.3)."""
     return f'"{hashlib.sha256(body).hexdigest()[:32]}"'
 
 
 def _file(body: bytes, kind: str, known: str | None) -> Response:
-    """A compressed file with its entity tag; 304 without a body where the browser has it (RFC 9110, 13.1.2)."""
+    """Return a compressed file with its entity tag, or 304 without a body if the browser has it (RFC 9110, 13.1.2)."""
     tag = entity_tag(body)
     if known is not None and _names(known, tag):
         answer = _answer(HTTPStatus.NOT_MODIFIED, b"", kind)
@@ -120,12 +121,13 @@ def _file(body: bytes, kind: str, known: str | None) -> Response:
 
 
 def _names(known: str, tag: str) -> bool:
-    """Whether a list of entity tags, or ``*``, names this one; weak ones compare as strong ones do."""
-    return any(each.strip().removeprefix("W/") in ("*", tag) for each in known[:_LONGEST_TAGS].split(","))
+    """Whether a list of entity tags, or ``*``, names this one, by the weak comparison."""
+    return any(each.strip().removeprefix("W/") in ("*", tag) for each in known[:_MAX_TAGS_LENGTH].split(","))
 
 
 def _answer(status: HTTPStatus, body: bytes, kind: str, *, zipped: bool = False) -> Response:
-    headers = Headers({"Content-Type": kind, "Content-Length": str(len(body)), "Connection": "close", **SAFE})
+    length = str(len(body))
+    headers = Headers({"Content-Type": kind, "Content-Length": length, "Connection": "close", **SECURITY_HEADERS})
     if zipped:
         headers["Content-Encoding"] = "gzip"
     return Response(status.value, status.phrase, headers, body)

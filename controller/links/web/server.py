@@ -23,14 +23,14 @@ from controller.links.websocket.server import WebSocketLink
 log = logging.getLogger(__name__)
 
 SOCKET = "/ws"
-_DOWNLOADS = 32
-"""Files that may be on their way at once."""
+_MAX_DOWNLOADS = 32
+"""Number of files that may be in flight at the same time."""
 
 
 def open_web(settings: WebSettings, context: LinkContext) -> WebLink:
-    """Serve the panel, and say where.
+    """Serve the panel, and log its address.
 
-    Raises LinkError: the address cannot be used, or the token cannot be kept.
+    Raises LinkError: the address cannot be used, or the token cannot be stored.
     """
     token = settings.token or (make_token()[0] if settings.needs_token else None)
     face = Path(settings.face) if settings.face is not None else None
@@ -44,7 +44,7 @@ def open_web(settings: WebSettings, context: LinkContext) -> WebLink:
 
 
 class WebLink(WebSocketLink):
-    """A panel that is served."""
+    """The server of a web panel."""
 
     download_s = 60.0  # for a whole file, over a slow network
 
@@ -60,7 +60,7 @@ class WebLink(WebSocketLink):
             return text(HTTPStatus.FORBIDDEN, "open the panel by this machine's address, as http://127.0.0.1")
         if path == SOCKET:
             return super()._admit(connection, request)
-        if len(self._downloads) >= _DOWNLOADS:
+        if len(self._downloads) >= _MAX_DOWNLOADS:
             return text(HTTPStatus.SERVICE_UNAVAILABLE, "too many files are on their way; try again")
         self._downloads.add(connection)
         return self._face_for(request) if path == "/face.glb" else page(path, _known(request))
@@ -74,12 +74,12 @@ class WebLink(WebSocketLink):
         return self._face.answer(_known(request))
 
     async def _leave(self) -> None:
-        """Give up what is still on its way."""
+        """Abort downloads that are still in flight."""
         for connection in list(self._downloads):
             connection.transport.abort()
         await asyncio.sleep(0)
 
 
 def _known(request: Request) -> str | None:
-    """The entity tags that a browser has; None for a request without."""
+    """Return the entity tags of files that the browser has; None if the request names none."""
     return ",".join(request.headers.get_all("If-None-Match")) or None

@@ -1,4 +1,4 @@
-"""One client of the WebSocket API: messages in, answers out, the state at a rate on request; no I/O here."""
+"""Handles the messages of one client of the WebSocket API, without any I/O."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from controller.base.parameters import Indices, Parameters
 from controller.base.version import package_version
 from controller.layers.commands import CommandSink
 from controller.links.websocket import messages as m
-from controller.links.websocket.faults import id_of, what_is_wrong
+from controller.links.websocket.faults import explain, id_of
 
 log = logging.getLogger(__name__)
 
@@ -24,16 +24,16 @@ AnyGaze = m.Gaze | m.GazeAt | m.GazeRoom | m.GazeHead | m.GazeOff
 
 
 class Conversation:
-    """What one client asked for.
+    """The state of one client: it turns messages into answers, and gives states and overviews when they are due.
 
     Parameters
     ----------
-    sink : where accepted commands go. who : the client, for people: a stop is reported under this name.
+    sink : receives accepted commands. who : name of the client, for people; a STOP is reported under it.
     start_ns : time zero of the states (monotonic clock, ns).
 
     Attributes
     ----------
-    accepted : requests carried out. refused : requests that were not, by code.
+    accepted : number of requests carried out. refused : number of requests refused, by code.
     """
 
     def __init__(self, sink: CommandSink, who: str, start_ns: int) -> None:
@@ -48,11 +48,11 @@ class Conversation:
         self.refused: Counter[str] = Counter()
 
     def handle(self, text: str | bytes, now_ns: int) -> m.Reply | None:
-        """Carry out one message that arrived at ``now_ns``; returns its answer, None where there is none."""
+        """Carry out a message that arrived at ``now_ns`` and return its answer; None if it gets none."""
         try:
             request = m.REQUESTS.validate_json(text)
         except ValidationError as error:
-            return self._refuse(id_of(text), "message", *what_is_wrong(error))
+            return self._refuse(id_of(text), "message", *explain(error))
         try:
             self._sink = self._home if request.address is None else self._home.heads.find(request.address)
             reply = self._answer(request, now_ns)
@@ -69,18 +69,18 @@ class Conversation:
         return m.Done(id=request.id) if request.id is not None else None
 
     def refuse_rate(self) -> m.Refused:
-        """The answer to messages that come too fast."""
+        """Return the answer to messages that come too fast, and count the refusal."""
         return self._refuse(
             None, "rate", "messages come too fast and some were dropped", "send at most a few hundred a second"
         )
 
     def due_ns(self) -> int | None:
-        """When the next state or overview is due; None where none was asked for."""
+        """Return when the next state or overview is due; None if the client wants none."""
         due = [self._due_ns] if self._subscription is not None else []
         return min([*due, *([self._watch_due_ns] if self._watch_ns else [])], default=None)
 
     def due(self, now_ns: int) -> list[m.Reply]:
-        """What is due: the newest state, and the overview."""
+        """Return the state and the overview that are due."""
         found: list[m.Reply] = []
         state = self.state_due(now_ns)
         if state is not None:
@@ -92,7 +92,7 @@ class Conversation:
         return found
 
     def state_due(self, now_ns: int) -> m.State | m.Frame | None:
-        """The newest state, where one is due. Those that were missed are left out."""
+        """Return the newest state if one is due; missed ones are skipped."""
         wanted = self._subscription
         if wanted is None or now_ns < self._due_ns:
             return None
@@ -111,15 +111,15 @@ class Conversation:
             case m.Hello():
                 return self._welcome(request)
             case m.Get():
-                return self._state(self._positions(request.parameters), now_ns, status=True)
+                return self._state(self._indices(request.parameters), now_ns, status=True)
             case m.List():
                 return m.Names(what=request.what, names=self._names(request.what))
             case m.Subscribe():
-                self._chosen = self._positions(request.parameters)
-                self._one_head()
+                self._chosen = self._indices(request.parameters)
+                self._require_one_head()
                 self._subscription, self._due_ns, self._state_sink = request, now_ns, self._sink
             case m.Watch(rate_hz=rate):
-                self._one_head()
+                self._require_one_head()
                 self._watch_sink = self._sink
                 self._watch_ns, self._watch_due_ns = round(1e9 / rate) if rate > 0.0 else 0, now_ns
             case m.Unsubscribe():
@@ -139,7 +139,7 @@ class Conversation:
         sink = self._sink
         match request:
             case m.Set(parameters=given):
-                sink.set_parameters(*_in_range(sink.parameters, given), now_ns)
+                sink.set_parameters(*_check_values(sink.parameters, given), now_ns)
             case m.Release(parameters=names):
                 chosen = range(len(sink.parameters)) if names is None else sink.parameters.indices(names).tolist()
                 sink.release(list(chosen), now_ns)
@@ -158,8 +158,8 @@ class Conversation:
             case m.Gaze() | m.GazeAt() | m.GazeRoom() | m.GazeHead() | m.GazeOff():
                 self._look(request, now_ns)
 
-    def _one_head(self) -> None:
-        """Raises ParameterError: the request is for several heads."""
+    def _require_one_head(self) -> None:
+        """Raise ParameterError if the request is for several heads, which refuse every query."""
         self._sink.held()
 
     def _look(self, request: AnyGaze, now_ns: int) -> None:
@@ -222,7 +222,7 @@ class Conversation:
         which: Sequence[int] = range(len(names)) if chosen is None else chosen.tolist()
         return {names[i]: round(float(values[i]), 4) for i in which}
 
-    def _positions(self, names: Sequence[str] | None) -> Indices | None:
+    def _indices(self, names: Sequence[str] | None) -> Indices | None:
         return None if names is None else self._sink.parameters.indices(names)
 
     def _names(self, what: str) -> list[str]:
@@ -245,8 +245,8 @@ def _as_numbers(state: m.State) -> m.Frame:
     )
 
 
-def _in_range(parameters: Parameters, given: dict[str, float]) -> tuple[list[int], list[float]]:
-    """Positions and values. Raises ParameterError: an unknown name, two of one parameter, or a value out of range."""
+def _check_values(parameters: Parameters, given: dict[str, float]) -> tuple[list[int], list[float]]:
+    """Return indices and values. Raises ParameterError: an unknown name, a repeated one, or a value out of range."""
     indices = parameters.indices(given).tolist()
     if len(set(indices)) < len(indices):
         raise ParameterError("a parameter is named twice, in two spellings")
@@ -267,7 +267,7 @@ def _parameter(p: Parameters, i: int) -> m.Parameter:
 
 
 def _mood(request: m.Emotion) -> str:
-    """The formula of an emotion, as :class:`controller.vocabulary.vocabulary.Vocabulary` reads it."""
+    """Return the formula of an emotion, as :class:`controller.vocabulary.vocabulary.Vocabulary` reads it."""
     point = [request.valence, request.arousal, *([] if request.dominance is None else [request.dominance])]
     return f"{'VA' if len(point) == 2 else 'VAD'}:{','.join(f'{value:.4f}' for value in point)}"
 
@@ -279,7 +279,10 @@ def _give_turn(sink: CommandSink, name: str | None, now_ns: int) -> None:
 
 
 def _play(sink: CommandSink, request: m.Show) -> None:
-    """Raises ParameterError or ConfigError: no shows here, none of this name, no such mark, or nothing to do."""
+    """Start or control a show.
+
+    Raises ParameterError or ConfigError: there is no player, no such show or mark, or the request is incomplete.
+    """
     if sink.shows is None:
         raise ParameterError("no shows can be played here", hint="omote run plays them")
     if (request.name is None) == (request.action is None):

@@ -1,4 +1,4 @@
-"""Says what is wrong with a message of the WebSocket API, in words for people."""
+"""Explains, for people, what is wrong with a message of the WebSocket API."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ from pydantic import ValidationError
 
 from controller.base.parameters import did_you_mean
 
-_SHOWN = 3
-"""Faults of a message that its answer names."""
-_MOST_ID = 64
+_MAX_FAULTS = 3
+"""Number of a message's faults that its answer names."""
+_MAX_ID_LENGTH = 64
 _SURROGATE = re.compile(r"[\ud800-\udfff]")
-"""Halves of characters, which JSON can escape and UTF-8 cannot write."""
+"""Surrogate code points, which JSON can contain as escapes but UTF-8 cannot encode."""
 _EXAMPLE = '{"type": "set", "parameters": {"jawOpen": 0.5}}'
 
 
-def what_is_wrong(error: ValidationError) -> tuple[str, str]:
-    """What is wrong, in one line, and what to do."""
+def explain(error: ValidationError) -> tuple[str, str]:
+    """Return what is wrong, in one line, and a hint."""
     found = error.errors(include_url=False, include_input=False)
-    shown = "; ".join(map(_fault, found[:_SHOWN]))[:400]
-    more = f"; and {len(found) - _SHOWN} more" if len(found) > _SHOWN else ""
+    shown = "; ".join(map(_fault, found[:_MAX_FAULTS]))[:400]
+    more = f"; and {len(found) - _MAX_FAULTS} more" if len(found) > _MAX_FAULTS else ""
     return shown + more, f"write it as {_EXAMPLE}"
 
 
 def id_of(text: str | bytes) -> int | str | None:
-    """The ``id`` of a message that is wrong otherwise; None where it has none that can be answered with."""
+    """Return the ``id`` of an invalid message; None if it has none that an answer can contain."""
     try:
         found = json.loads(text)
     except (ValueError, RecursionError):
         return None
     given = found.get("id") if isinstance(found, dict) else None
-    text_fits = isinstance(given, str) and len(given) <= _MOST_ID and _SURROGATE.search(given) is None
+    text_fits = isinstance(given, str) and len(given) <= _MAX_ID_LENGTH and _SURROGATE.search(given) is None
     fits = text_fits or (isinstance(given, int) and abs(given) < 1 << 53)
     return given if fits and not isinstance(given, bool) else None
 

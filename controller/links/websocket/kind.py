@@ -1,4 +1,4 @@
-"""Defines the kind of link that serves WebSocket clients."""
+"""Defines the link kind ``websocket``, which serves WebSocket clients."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ PORT = 8765
 
 @dataclass(frozen=True, kw_only=True)
 class WebSocketSettings:
-    """Its options in a stage."""
+    """Options of the link in a stage file."""
 
     listen: str = option("HOST:PORT at which clients connect.", f"127.0.0.1:{PORT}")
-    token: str | None = option("What clients must know, instead of the token that omote makes.", longest=128)
+    token: str | None = option("Token that clients need, instead of the one that omote makes.", longest=128)
     open_to_network: bool = option("Allow others than programs on this machine to connect, with a token.", False)
     origins: list[str] = field(
         default_factory=list,
@@ -25,22 +25,22 @@ class WebSocketSettings:
     clients: int = option("How many clients may be connected.", 16, at_least=1, at_most=256)
 
     def check(self) -> None:
-        """Raises ValueError: no address, or one that others reach without leave, or a token that is easily guessed."""
+        """Raises ValueError: no address, one that others reach without permission, or an easily guessed token."""
         check_reach(self.where[0], self.token, open_to_network=self.open_to_network)
 
     @property
     def where(self) -> tuple[str, int]:
-        """Host and port. Raises ValueError: it is no address."""
+        """Host and port of the link. Raises ValueError: ``listen`` is not an address."""
         return host_and_port(self.listen, PORT)
 
     @property
     def needs_token(self) -> bool:
-        """Whether clients have to know a token."""
+        """Whether clients need a token."""
         return self.token is not None or not is_loopback(self.where[0])
 
     @property
     def address(self) -> str:
-        """Where the link listens."""
+        """The address at which the link listens."""
         return self.listen
 
 

@@ -1,8 +1,8 @@
-"""The messages of the WebSocket API: pydantic models, from which its JSON schema is made.
+"""Defines the messages of the WebSocket API as pydantic models, from which its JSON schema is generated.
 
 A message is a JSON object whose ``type`` says what it is. Angles are in degrees and lengths in millimetres; the axes
 are those of the line protocol (yaw positive to the face's own left, pitch positive up). A message with an ``id`` is
-answered; one without is answered only where it is a question or wrong.
+always answered, one without only if it is a query or is refused.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter
 
 VERSION = 1
-"""Version of the messages: grows where one changes its meaning or goes; new ones may come without."""
+"""Version of the messages, which increases when one changes its meaning or is removed, not when one is added."""
 MAX_RATE_HZ, MIN_RATE_HZ, MAX_WATCH_HZ = 200.0, 0.1, 10.0
-LONGEST = 65_536
-"""Bytes of a message."""
+MAX_MESSAGE_BYTES = 65_536
 
 Name = Annotated[str, Field(min_length=1, max_length=128)]
 Share = Annotated[float, Field(ge=0.0, le=1.0, allow_inf_nan=False)]
@@ -25,25 +24,25 @@ Id = Annotated[int, Field(ge=-(2**53), le=2**53)] | Annotated[str, Field(max_len
 
 
 class Message(BaseModel):
-    """What every request may have. ``id`` : comes back with its answer."""
+    """The fields that every request may have. ``id`` : returned with the answer."""
 
     model_config = ConfigDict(extra="forbid", strict=False, frozen=True)
     id: Id | None = None
 
 
 class Request(Message):
-    """A request for the first head, or for whom ``to`` names: a head, a group of heads, or ``all``."""
+    """A request for the first head, or for those that ``to`` names: a head, a group of heads, or ``all``."""
 
     to: Annotated[str, Field(max_length=64)] | None = None
 
     @property
     def address(self) -> str | None:
-        """Whom it is for; None for the first head."""
+        """The head or group that it is for; None for the first head."""
         return self.to
 
 
 class Hello(Request):
-    """Ask who is there; ``version`` : refused where the server does not speak it. ``name`` : of the client."""
+    """Ask for the server's version and names. ``version`` : refused if not the server's. ``name`` : of the client."""
 
     type: Literal["hello"]
     version: int = VERSION
@@ -58,14 +57,14 @@ class Set(Request):
 
 
 class Release(Request):
-    """Give held parameters back; all without ``parameters``."""
+    """Release held parameters; if ``parameters`` is omitted, all of them."""
 
     type: Literal["release"]
     parameters: Annotated[list[Name], Field(max_length=1000)] | None = None
 
 
 class Expression(Request):
-    """Show a named expression, or a formula such as ``AU1+2+5B``; without a duration until the next one."""
+    """Show a named expression, or a formula such as ``AU1+2+5B``. ``duration_s`` omitted: until the next one."""
 
     type: Literal["expression"]
     name: Name
@@ -74,7 +73,7 @@ class Expression(Request):
 
 
 class Emotion(Request):
-    """Show a mood: a point of valence and arousal, perhaps dominance."""
+    """Show an emotion as a point of valence, arousal and optionally dominance."""
 
     type: Literal["emotion"]
     valence: Signed
@@ -92,14 +91,14 @@ class Gaze(Request):
 
 
 class GazeAt(Request):
-    """Look at a point (x, y, z), mm from the middle between the eyes."""
+    """Look at a point (x, y, z), in mm from the midpoint between the eyes."""
 
     type: Literal["gaze_at"]
     point_mm: tuple[Finite, Finite, Finite]
 
 
 class GazeRoom(Request):
-    """Look at a point (x, y, z) of the room that several heads share, mm, from where the head stands."""
+    """Look at a point (x, y, z), in mm, in the coordinates of the room that several heads share."""
 
     type: Literal["gaze_room"]
     point_mm: tuple[Finite, Finite, Finite]
@@ -113,7 +112,7 @@ class GazeHead(Request):
 
 
 class Turn(Request):
-    """Give a head the turn: it speaks, the others listen and look at it; null gives it to nobody."""
+    """Give a head the turn: it speaks, and the others listen and look at it. Null: nobody has the turn."""
 
     type: Literal["turn"]
     head: Name | None
@@ -141,9 +140,9 @@ class Life(Request):
 
 
 class Show(Message):
-    """Play a script by name; or pause, stop or go on with the one that was started, or seek a mark or a time (s).
+    """Play a script by name; or pause, stop or continue the one that was started, or seek a mark or a time (s).
 
-    ``to`` is where to seek, so ``head`` says whom it is for.
+    Because ``to`` is the place to seek, ``head`` names the head or group that the request is for.
     """
 
     type: Literal["show"]
@@ -154,7 +153,7 @@ class Show(Message):
 
     @property
     def address(self) -> str | None:
-        """Whom it is for; None for the first head."""
+        """The head or group that it is for; None for the first head."""
         return self.head
 
 
@@ -171,21 +170,21 @@ class Start(Request):
 
 
 class Get(Request):
-    """Ask for the state, once."""
+    """Query the state once."""
 
     type: Literal["get"]
     parameters: Annotated[list[Name], Field(max_length=1000)] | None = None
 
 
 class List(Request):
-    """Ask for names."""
+    """Query names."""
 
     type: Literal["list"]
     what: Literal["parameters", "expressions", "layers", "shows", "heads", "groups"]
 
 
 class Subscribe(Request):
-    """Get the state at a rate; a client that reads too slowly gets fewer, never older ones.
+    """Get the state at a rate; a client that reads too slowly gets fewer states, never old ones.
 
     ``form`` : ``names`` for messages ``state``, ``numbers`` for the shorter ``frame``.
     """
@@ -197,7 +196,7 @@ class Subscribe(Request):
 
 
 class Watch(Request):
-    """Get an overview of servos, links and layers at a rate; 0 ends that."""
+    """Get an overview of servos, links and layers at a rate; the rate 0 ends it."""
 
     type: Literal["watch"]
     rate_hz: Annotated[float, Field(ge=0.0, le=MAX_WATCH_HZ)] = 4.0
@@ -225,14 +224,14 @@ REQUESTS: TypeAdapter[AnyRequest] = TypeAdapter(AnyRequest)
 
 
 class Reply(BaseModel):
-    """What every answer may have. ``id`` : of the request, where it had one."""
+    """The fields that every answer may have. ``id`` : that of the request, if it had one."""
 
     model_config = ConfigDict(frozen=True)
     id: Id | None = None
 
 
 class Welcome(Reply):
-    """The answer to ``hello``. ``heads`` : names of the heads of the stage; empty where there is one."""
+    """The answer to ``hello``. ``heads`` : names of the heads; empty if there is one head without a name."""
 
     type: Literal["hello"] = "hello"
     version: int = VERSION
@@ -242,12 +241,12 @@ class Welcome(Reply):
     layers: list[str]
     heads: list[str] = []
     max_rate_hz: float = MAX_RATE_HZ
-    max_bytes: int = LONGEST
+    max_bytes: int = MAX_MESSAGE_BYTES
 
 
 class Parameter(BaseModel):
-    """One parameter: its range, its value at rest, its region of the face, and the angle of the value 1 where it is an
-    angle. ``description`` : what its vocabulary says of it."""
+    """One parameter: its range, its value at rest and its region of the face. ``full_scale_deg`` : the angle of the
+    value 1, for angles. ``description`` : from its vocabulary."""
 
     low: float
     high: float
@@ -258,9 +257,8 @@ class Parameter(BaseModel):
 
 
 class State(Reply):
-    """The face. ``time_s`` : since the server began. ``measured`` : what the servos show; null where none reports it.
-
-    ``status`` : short words and numbers, those of ``STATUS`` of the line protocol.
+    """The face. ``time_s`` : since the server started. ``measured`` : the face that the servos show; null if no servo
+    reports its position. ``status`` : short words and numbers, as ``STATUS`` of the line protocol returns them.
     """
 
     type: Literal["state"] = "state"
@@ -272,7 +270,7 @@ class State(Reply):
 
 
 class Frame(Reply):
-    """The face as numbers, in the order of ``parameters`` of the answer to ``hello``, or of the subscription's."""
+    """The face as numbers, in the order of the subscription's ``parameters``, or else of those in ``hello``."""
 
     type: Literal["frame"] = "frame"
     time_s: float
@@ -283,8 +281,8 @@ class Frame(Reply):
 
 class Overview(Reply):
     """Servos, links and layers. ``held`` : parameters that were set and not released. ``holders`` : by parameter, the
-    layer that holds it. ``show`` : which one plays and where it is. ``servos``, ``links`` : a record each; a value that
-    is not known is null or missing.
+    layer that holds it. ``show`` : the current show and its position. ``servos``, ``links`` : a record for each; an
+    unknown value is null or missing.
     """
 
     type: Literal["overview"] = "overview"
@@ -299,7 +297,7 @@ class Overview(Reply):
 
 
 class Servo(BaseModel):
-    """One servo. Angles in degrees; ``error`` : what is wrong, in words, else empty."""
+    """One servo. Angles are in degrees. ``error`` : what is wrong, in words; empty if nothing is."""
 
     bus: str
     id: int
@@ -332,7 +330,7 @@ class Done(Reply):
 
 
 class Refused(Reply):
-    """A request was not carried out, and why; ``hint`` : what to do next."""
+    """A request was not carried out. ``message`` : why. ``hint`` : what to do next."""
 
     type: Literal["error"] = "error"
     code: Literal["message", "value", "name", "busy", "rate", "fault"]
@@ -345,7 +343,7 @@ REPLIES: TypeAdapter[AnyReply] = TypeAdapter(AnyReply)
 
 
 def schema() -> dict[str, Any]:
-    """The JSON schema of all requests and replies, with the version of the messages."""
+    """Return the JSON schema of all requests and replies, with the version of the messages."""
     requests = REQUESTS.json_schema(ref_template="#/$defs/{model}")
     replies = REPLIES.json_schema(ref_template="#/$defs/{model}", mode="serialization")
     defs = requests.pop("$defs") | replies.pop("$defs")

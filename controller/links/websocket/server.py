@@ -1,7 +1,7 @@
-"""Serves WebSocket clients in a thread of its own.
+"""Serves WebSocket clients in its own thread.
 
-Every client has one task that takes its messages and one that sends to it. A client that does not read loses answers,
-which are counted, and gets fewer states. It delays neither the face nor another client.
+Every client has one task that receives its messages and one that sends to it. A client that does not read loses
+answers, which are counted, and gets fewer states. It delays neither the face nor another client.
 """
 
 from __future__ import annotations
@@ -27,21 +27,21 @@ from controller.links.kind import LinkContext
 from controller.links.net.meter import Meter
 from controller.links.websocket.conversation import Conversation
 from controller.links.websocket.kind import WebSocketSettings
-from controller.links.websocket.messages import LONGEST, Reply
+from controller.links.websocket.messages import MAX_MESSAGE_BYTES, Reply
 
 log = logging.getLogger(__name__)
 
-_WAITING = 256
-"""Answers that may wait for a client."""
-_RATE_HZ, _BURST = 1000.0, 2000.0
-"""Messages a second that are taken of a client in the long run, and the most that are taken at once."""
-_START_S, _STOP_S = 10.0, 3.0
+_MAX_WAITING = 256
+"""Number of answers that may wait for a client."""
+_MAX_RATE_HZ, _MAX_BURST = 1000.0, 2000.0
+"""Messages per second that a client may send in the long run, and messages that it may send at once."""
+_START_TIMEOUT_S, _STOP_TIMEOUT_S = 10.0, 3.0
 
 
 def open_websocket(settings: WebSocketSettings, context: LinkContext) -> WebSocketLink:
     """Listen for clients.
 
-    Raises LinkError: the address cannot be used, or the token cannot be kept.
+    Raises LinkError: the address cannot be used, or the token cannot be stored.
     """
     token = token_for(f"websocket {settings.address}", settings.where[0], settings.token)
     link = WebSocketLink(settings, context.sink, token)
@@ -51,16 +51,16 @@ def open_websocket(settings: WebSocketSettings, context: LinkContext) -> WebSock
 
 
 class WebSocketLink:
-    """A WebSocket server for any number of clients.
+    """A WebSocket server for several clients.
 
-    ``download_s`` : longest time for sending a response to a client that is turned away.
+    download_s : longest time for sending an HTTP response.
     """
 
     download_s = 1.0
 
     def __init__(self, settings: WebSocketSettings, sink: CommandSink, token: str | None) -> None:
         self._settings, self._sink, self._token = settings, sink, token
-        package_version()  # cached here: when a client asks, there may be no file descriptor left to read it
+        package_version()  # cached now, because later there may be no file descriptor left to read it
         self._start_ns = time.monotonic_ns()
         self._clients: set[_Client] = set()
         self._served = 0
@@ -78,14 +78,14 @@ class WebSocketLink:
 
     @property
     def port(self) -> int:
-        """The port it listens on; where the settings say 0, the free one that the system chose."""
+        """The port it listens on; if the settings say 0, the free one that the system has chosen."""
         return self._port
 
     def start(self) -> None:
         """Listen. Raises LinkError: the address cannot be used."""
         self._thread.start()
-        if not self._ready.wait(_START_S):
-            raise LinkError(f"websocket {self._settings.address}: did not start within {_START_S:g} s")
+        if not self._ready.wait(_START_TIMEOUT_S):
+            raise LinkError(f"websocket {self._settings.address}: did not start within {_START_TIMEOUT_S:g} s")
         if self._error is not None:
             reason = getattr(self._error, "strerror", None) or self._error
             raise LinkError(
@@ -97,10 +97,10 @@ class WebSocketLink:
         """Disconnect all clients and stop listening; a second call does nothing."""
         if self._thread.is_alive() and self._stopping is not None:
             self._loop.call_soon_threadsafe(self._stopping.set)
-            self._thread.join(_STOP_S)
+            self._thread.join(_STOP_TIMEOUT_S)
 
     def report(self) -> dict[str, object]:
-        """Clients now and in all, requests taken, refused (by code) and not answered, and clients turned away."""
+        """Return counts of current and past clients, of requests and of clients that were turned away."""
         return {
             "port": bound_at(self._settings.address, self._port or self._settings.where[1]),
             "connected": bool(self._clients),
@@ -132,9 +132,9 @@ class WebSocketLink:
         quiet = logging.getLogger(f"{__name__}.library")
         quiet.setLevel(logging.CRITICAL)
         async with serve(
-            self._talk, host, port, process_request=self._admit, max_size=LONGEST, max_queue=64, compression=None,
-            logger=quiet, open_timeout=max(_START_S, self.download_s), close_timeout=self.download_s,
-            server_header=None,
+            self._talk, host, port, process_request=self._admit, max_size=MAX_MESSAGE_BYTES, max_queue=64,
+            compression=None, logger=quiet, open_timeout=max(_START_TIMEOUT_S, self.download_s),
+            close_timeout=self.download_s, server_header=None,
         ) as server:  # fmt: skip
             self._port = _port_of(server)
             self._ready.set()
@@ -142,10 +142,10 @@ class WebSocketLink:
             await self._leave()
 
     async def _leave(self) -> None:
-        """Called before the server closes; subclasses finish their work here."""
+        """Finish before the server closes; for subclasses."""
 
     def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
-        """None for a client that may connect; for any other the response that says why not."""
+        """Return None for a client that may connect, else the response that says why not."""
         why = self._refusal(request)
         if why is None:
             return None
@@ -182,15 +182,15 @@ class WebSocketLink:
 
 
 class _Client:
-    """One connected client. ``unanswered`` : answers lost because it did not read. ``meter`` : of all clients."""
+    """One connected client. meter : of all clients. unanswered : number of answers lost because it did not read."""
 
     def __init__(self, connection: ServerConnection, sink: CommandSink, start_ns: int, meter: Meter) -> None:
         host, port = connection.remote_address[:2]
         self.conversation = Conversation(sink, f"websocket {host}:{port}", start_ns)
         self.unanswered = 0
         self._connection, self._meter = connection, meter
-        self._waiting: asyncio.Queue[Reply | None] = asyncio.Queue(_WAITING)
-        self._budget, self._counted_s, self._warned_s = _BURST, time.monotonic(), 0.0
+        self._waiting: asyncio.Queue[Reply | None] = asyncio.Queue(_MAX_WAITING)
+        self._budget, self._counted_s, self._warned_s = _MAX_BURST, time.monotonic(), 0.0
 
     async def talk(self) -> None:
         """Serve the client until it disconnects."""
@@ -206,7 +206,7 @@ class _Client:
                 await sending
 
     def _take(self, text: str | bytes) -> None:
-        if not self._may_come() and not _may_stop(text):
+        if not self._is_within_rate() and not _may_stop(text):
             if time.monotonic() > self._warned_s + 1.0:
                 self._warned_s = time.monotonic()
                 self._put(self.conversation.refuse_rate())
@@ -214,10 +214,10 @@ class _Client:
         self._meter.note(time.monotonic())
         self._put(self.conversation.handle(text, time.monotonic_ns()))
 
-    def _may_come(self) -> bool:
-        """Whether a message is within the rate (a token bucket)."""
+    def _is_within_rate(self) -> bool:
+        """Count a message; return whether it is within the rate, by a token bucket."""
         now_s = time.monotonic()
-        self._budget = min(self._budget + (now_s - self._counted_s) * _RATE_HZ, _BURST) - 1.0
+        self._budget = min(self._budget + (now_s - self._counted_s) * _MAX_RATE_HZ, _MAX_BURST) - 1.0
         self._counted_s = now_s
         if self._budget < 0.0:
             self._budget = 0.0
@@ -227,7 +227,7 @@ class _Client:
     def _put(self, reply: Reply | None) -> None:
         """Queue an answer to be sent; None only wakes the sender, which may have a new subscription to serve."""
         if reply is None and not self._waiting.empty():
-            return  # what waits already wakes it, and None would take the place of an answer
+            return  # the waiting answers wake it already, and None would use up the place of an answer
         try:
             self._waiting.put_nowait(reply)
         except asyncio.QueueFull:
@@ -241,7 +241,7 @@ class _Client:
                     await self._connection.send(each.model_dump_json())
 
     async def _next(self) -> Reply | None:
-        """The next answer, or None when a state is due."""
+        """Wait for the next answer; return None when a state is due."""
         due_ns = self.conversation.due_ns()
         wait_s = None if due_ns is None else max(0.0, (due_ns - time.monotonic_ns()) * 1e-9)
         try:
@@ -251,7 +251,7 @@ class _Client:
 
 
 def _may_stop(text: str | bytes) -> bool:
-    """Whether a message may be a STOP, which is taken however many came before it."""
+    """Whether a message may be a STOP, which is accepted at any rate."""
     return len(text) < 200 and ("stop" in text if isinstance(text, str) else b"stop" in text)
 
 

@@ -17,7 +17,7 @@ from controller.base.parameters import PARAMETERS, Floats, Parameters
 from controller.body.messages import HoldAll, PanelRequest
 from controller.panels.session.commands import Commands
 from controller.panels.session.sound import SoundPlayer, sound_length_s
-from controller.takes.edit import cut_out, keep, layered, smooth
+from controller.takes.edit import cut_out, keep, layer_over, smooth
 from controller.takes.livelink import Take
 from controller.takes.plain import write_plain
 from controller.takes.reader import load_take
@@ -153,7 +153,7 @@ class Playback:
         low = keys[number - 1].at_s + 0.01 if number else 0.0
         high = keys[number + 1].at_s - 0.01 if number + 1 < len(keys) else np.inf
         at_s = round(min(max(at_s, low), high), 3)
-        self._commands.arrange(self._commands.now.timeline.moved(number, at_s), ("key", number))
+        self._commands.arrange(self._commands.now.timeline.with_time(number, at_s), ("key", number))
 
     def edit(self, take: Take | None) -> None:
         """Edit a recording; the keys of the timeline for None."""
@@ -179,7 +179,7 @@ class Playback:
         take = self._commands.now.take
         if take is None:
             raise ParameterError("there is no recording to lay another one over", hint="edit the recording first")
-        self._commands.retake(layered(take, above, min(self.position_s, take.duration_s)))
+        self._commands.retake(layer_over(take, above, min(self.position_s, take.duration_s)))
 
     def hear(self, path: Path | None) -> None:
         """Play a sound with the timeline, or none. Raises ControllerError: it is none that can be played."""

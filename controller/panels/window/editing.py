@@ -90,7 +90,7 @@ class MouseEditing:
     def keep_points(self) -> None:
         """Let those control points be the added ones that the shown head has."""
         now, editor = self._commands.now, self.editor
-        moves = editor.fitted(now.moves, now.light)
+        moves = editor.convert_moves(now.moves, now.light)
         self._commands.change(replace(now, light=editor.light, moves=moves))
 
     def find_editor(self) -> PointEditor:
@@ -98,7 +98,7 @@ class MouseEditing:
         return self.editor
 
     def _show_moves(self, moves: Floats | None) -> None:
-        self.editor.set_moves(self.editor.fitted(moves, self._commands.now.light))
+        self.editor.set_moves(self.editor.convert_moves(moves, self._commands.now.light))
 
     def __call__(self, camera: Camera) -> None:
         """Handle this frame's mouse and keys."""

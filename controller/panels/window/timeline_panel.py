@@ -154,7 +154,7 @@ class TimelinePanel:
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         changed, self._ease = imgui.combo("easing", self._ease, list(EASES))
         if changed and playback.selected is not None:
-            self._commands.arrange(self._commands.now.timeline.eased(playback.selected, EASES[self._ease]))
+            self._commands.arrange(self._commands.now.timeline.with_ease(playback.selected, EASES[self._ease]))
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         _, self._mark = imgui.input_text_with_hint("##mark", "name of a mark", self._mark)
         imgui.same_line()

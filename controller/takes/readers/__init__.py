@@ -1,4 +1,4 @@
-"""Defines the kinds of files that are read as takes, one module each.
+"""Defines the kinds of files that are read as takes (recorded faces), one module each.
 
 In: a path. Out: a take, and the layer that it plays into. Imports base to vocabulary, and controller.takes.
 """

@@ -1,4 +1,4 @@
-"""Turns the sound of voices into samples, features and shapes of the mouth.
+"""Turns the sound of a voice into samples, features and mouth shapes.
 
 In: bytes of sound. Out: samples, weights of visemes. Imports base, vocabulary.
 """

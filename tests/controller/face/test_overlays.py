@@ -7,7 +7,7 @@ import pytest
 
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
-from controller.face.overlays import KINDS, MOST, Overlays
+from controller.face.overlays import KINDS, MAX_MARKS, Overlays
 from controller.face.skin_model import Screen
 from controller.panels.overlay.overlay_view import nearest
 from controller.robot.anchors import anchor_places
@@ -32,7 +32,7 @@ def test_every_kind_is_of_the_posed_face_and_bounded(overlays: Overlays) -> None
     for kind in KINDS:
         marks = overlays.marks(kind)
         assert len(marks.points) + len(marks.lines) > 0, kind
-        assert len(marks.points) <= MOST and len(marks.lines) <= 4 * MOST
+        assert len(marks.points) <= MAX_MARKS and len(marks.lines) <= 4 * MAX_MARKS
         assert np.isfinite(marks.points).all() and np.isfinite(marks.lines).all()
     closed = overlays.marks("control points").points
     overlays.pose(values(overlays))

@@ -12,7 +12,7 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.face.point_editing import PointEditor
 from controller.face.sculpting import SculptDrag
-from controller.face.skin_lines import even_line, knots_round, mirrored, uv_under
+from controller.face.skin_lines import even_line, knots_around, mirror_uv, uv_under
 from controller.face.skin_model import Screen, SkinModel, SkinModels
 from controller.panels.session.commands import Commands
 from controller.panels.session.own_groups import place_of, save_corrective, save_own_group
@@ -169,7 +169,7 @@ def test_points_along_a_line_are_even_and_mirrored(editor: PointEditor) -> None:
     places = model.surface.evaluate(line)
     steps = np.linalg.norm(np.diff(places, axis=0), axis=1)
     assert len(line) > 12 and steps.max() < 2.0 and steps.min() > 0.4
-    other = model.surface.evaluate(mirrored(model.surface, line, *model.mesh_rest))
+    other = model.surface.evaluate(mirror_uv(model.surface, line, *model.mesh_rest))
     np.testing.assert_allclose(other, places * [-1.0, 1.0, 1.0], atol=1.5)
     assert not len(even_line(model.surface, picks[:1], 3.0)) and not len(even_line(model.surface, picks * np.nan, 3.0))
 
@@ -270,11 +270,11 @@ def test_moves_of_another_head_are_not_worn(editor: PointEditor, folder: Path) -
     (light,) = found.light
     moves = np.zeros((editor.own + 1, 3))
     moves[[3, -1]] = 1.0
-    assert editor.fitted(moves[:50], (light,)) is None and editor.fitted(None, ()) is None
-    before = editor.fitted(moves, (light,))  # while the head with the point is being loaded
+    assert editor.convert_moves(moves[:50], (light,)) is None and editor.convert_moves(None, ()) is None
+    before = editor.convert_moves(moves, (light,))  # while the head with the point is being loaded
     assert before is not None and before.shape == (editor.own, 3) and before[3, 0] == 1.0
-    assert found.fitted(moves, (light,)) is moves
-    after = found.fitted(moves[:-1], ())
+    assert found.convert_moves(moves, (light,)) is moves
+    after = found.convert_moves(moves[:-1], ())
     assert after is not None and after.shape == moves.shape and not after[-1].any()
 
 
@@ -360,7 +360,7 @@ def test_a_damaged_added_point_is_named(editor: PointEditor, tmp_path: Path, lig
 
 
 def test_points_beside_the_surface_are_a_fault_of_the_stage(editor: PointEditor, tmp_path: Path) -> None:
-    u, v = knots_round(editor.head.part("face").surface, editor._model.skin.uv[0], 5.0)  # type: ignore[union-attr]
+    u, v = knots_around(editor.head.part("face").surface, editor._model.skin.uv[0], 5.0)  # type: ignore[union-attr]
     light = LightPoints("face", u + 50.0, v)
     group = editor.group()
     save_group(tmp_path / "g.json", "g", type(group)("face", group.ids, group.moves, light, np.ones((1, 3))))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller.base.parameters import Floats
-from controller.face.skin_lines import SPACING, even_line, knots_round, mirrored, uv_under
+from controller.face.skin_lines import SPACING, even_line, knots_around, mirror_uv, uv_under
 from surface.dcp import DCPSurface
 
 WIDE, HIGH = 100.0, 80.0
@@ -110,7 +110,7 @@ def test_the_mirrored_place_is_that_on_the_other_side() -> None:
     bent = sheet(0.01)
     mesh_uv = np.stack(np.meshgrid(np.linspace(0, 1, 9), np.linspace(0, 1, 9), indexing="ij"), axis=-1).reshape(-1, 2)
     uv = np.array([[0.13, 0.22], [0.5, 0.7], [0.91, 0.05]])
-    found = mirrored(bent, uv, plane(mesh_uv, 0.01), mesh_uv)
+    found = mirror_uv(bent, uv, plane(mesh_uv, 0.01), mesh_uv)
     np.testing.assert_allclose(found, np.column_stack([1.0 - uv[:, 0], uv[:, 1]]), atol=1e-9)
     np.testing.assert_array_equal(mesh_uv[:9, 0], 0.0)  # the mesh stays
 
@@ -122,11 +122,11 @@ def test_a_place_without_a_mirror_image_has_the_nearest_one_on_the_skin() -> Non
         np.array([[[-50.0, -40.0, 5.0], [-50.0, 40.0, 5.0]], [[10.0, -40.0, 5.0], [10.0, 40.0, 5.0]]]), np.ones((2, 2)),
     )  # fmt: skip
     mesh_uv = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0], [0.5, 0.5], [1.0, 0.5]])
-    found = mirrored(half, np.array([[0.1, 0.5]]), half.evaluate(mesh_uv), mesh_uv)
+    found = mirror_uv(half, np.array([[0.1, 0.5]]), half.evaluate(mesh_uv), mesh_uv)
     np.testing.assert_allclose(half.evaluate(found), [[10.0, 0.0, 5.0]], atol=1e-9)
 
 
 def test_knots_round_a_place_reach_as_far_in_mm_along_both_ways() -> None:
-    (u,), (v,) = knots_round(sheet(), [0.4, 0.3], 8.0)
+    (u,), (v,) = knots_around(sheet(), [0.4, 0.3], 8.0)
     np.testing.assert_allclose(WIDE * (u - 0.4), [-8.0, -4.0, 0.0, 4.0, 8.0], atol=1e-9)
     np.testing.assert_allclose(HIGH * (v - 0.3), [-8.0, -4.0, 0.0, 4.0, 8.0], atol=1e-9)

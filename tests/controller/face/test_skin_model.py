@@ -10,7 +10,7 @@ import pytest
 from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.face import skin_model as module
-from controller.face.skin_model import Screen, SkinModel, SkinModels, turn_of
+from controller.face.skin_model import Screen, SkinModel, SkinModels, head_rotation
 from surface.head import Head
 from surface.head.model.parameters import NAMES, rotation
 from surface.view.scene.camera import Camera
@@ -76,7 +76,7 @@ def test_samples_lie_on_the_skin_with_unit_normals_that_point_outwards(model: Sk
     np.testing.assert_allclose(np.linalg.norm(model.normals, axis=1), 1.0, atol=1e-6)
     front = model.skin.rest[:, 2] > 95.0
     assert front.sum() > 50 and model.normals[front, 2].mean() > 0.5
-    assert len(model.skin.rest) == module._POINTS + module._BETWEEN
+    assert len(model.skin.rest) == module._VERTEX_SAMPLES + module._AREA_SAMPLES
     basis = model.basis @ part.surface.points
     np.testing.assert_allclose(basis, model.skin.rest, atol=0.1)
 
@@ -85,8 +85,8 @@ def test_flat_skin_has_its_share_of_the_samples_by_area(head: Head) -> None:
     """Of places drawn over the area, each tenth of the height has about its share of the area."""
     head.pose(head.values({}))
     part = head.part("face")
-    uv = module._over_area(head)
-    assert uv.shape == (600, 2) and np.array_equal(uv, module._over_area(head))  # the same at every start
+    uv = module._sample_area(head)
+    assert uv.shape == (600, 2) and np.array_equal(uv, module._sample_area(head))  # the same at every start
     a, b, c = (part.vertices[part.mesh.triangles[:, k]].astype(float) for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     height = ((a + b + c) / 3.0)[:, 1]
@@ -139,7 +139,8 @@ def test_the_head_turns_about_its_neck(model: SkinModel, head: Head) -> None:
 def test_turns_are_read_in_the_order_of_a_head() -> None:
     values = np.zeros(len(NAMES))
     values[[NAMES.index(name) for name in TURNED]] = list(TURNED.values())
-    np.testing.assert_allclose(turn_of(values), rotation(*(np.radians([60.0, 40.0, 30.0]) * list(TURNED.values()))))
+    wanted = rotation(*(np.radians([60.0, 40.0, 30.0]) * list(TURNED.values())))
+    np.testing.assert_allclose(head_rotation(values), wanted)
 
 
 def test_places_under_pixels_are_those_that_are_drawn_there(model: SkinModel, head: Head) -> None:

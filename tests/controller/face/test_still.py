@@ -177,5 +177,5 @@ def test_a_crowd_is_drawn_on_one_sheet(tmp_path: Path) -> None:
 
 def test_a_crowd_is_not_posed_by_the_graphics_processor(tmp_path: Path) -> None:
     still = Still.parse([], [], look={"evaluator": "gpu"})
-    with pytest.raises(ParameterError, match="posed by the processor"):
+    with pytest.raises(ParameterError, match="posed by the CPU"):
         draw_crowd(still, 2, tmp_path / "a.png")

@@ -42,7 +42,7 @@ def test_heads_that_look_alike_are_a_crowd_and_each_shows_its_own_face(tmp_path:
         assert wall.names == ("h0", "h1", "h2") and wall.crowded and wall.columns == 3
         first, other, open_jaw = wall.pictures(rows)
         again = wall.pictures(rows[[0, 1, 0]])
-        joined = wall.joined([first, other, open_jaw])
+        joined = wall.join([first, other, open_jaw])
     np.testing.assert_array_equal(again[2], first)  # the same face of the same person
     assert (first != other).mean() > 0.2 and (first != open_jaw).mean() > 0.01
     np.testing.assert_array_equal(joined[:, 64:128], other)

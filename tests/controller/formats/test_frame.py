@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from controller.base.parameters import PARAMETERS as P
-from controller.formats.frame import MOST_REASONS, Held, Refusals, Splitter
+from controller.formats.frame import MAX_REASONS, Held, Refusals, Splitter
 
 
 def test_reasons_are_counted_and_never_more_than_some() -> None:
     refused = Refusals()
     for n in range(1000):
         refused.add(f"reason {n}")
-    assert len(refused) == MOST_REASONS + 1 and refused["other"] == 1000 - MOST_REASONS
+    assert len(refused) == MAX_REASONS + 1 and refused["other"] == 1000 - MAX_REASONS
 
 
 def test_what_is_held_stays_until_it_is_given_again() -> None:

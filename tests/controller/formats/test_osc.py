@@ -8,7 +8,7 @@ import struct
 import pytest
 
 from controller.formats.frame import Refusals
-from controller.formats.osc import MOST_DEPTH, bundle, message, read_packet
+from controller.formats.osc import MAX_BUNDLE_DEPTH, bundle, message, read_packet
 
 SPECIFICATION = [
     (
@@ -93,6 +93,6 @@ def test_what_stands_before_damage_in_a_bundle_is_kept() -> None:
 
 def test_bundles_inside_bundles_have_an_end() -> None:
     data, refused = message("/a"), Refusals()
-    for _ in range(MOST_DEPTH + 1):
+    for _ in range(MAX_BUNDLE_DEPTH + 1):
         data = bundle([data])
     assert read_packet(data, refused) == [] and sum(refused.values()) == 1

@@ -47,7 +47,7 @@ def test_angles_come_back(seed: int) -> None:
 
 @pytest.mark.parametrize("none", [(0.0, 0.0, 0.0, 0.0), (math.nan, 0.0, 0.0, 1.0), (math.inf, 0.0, 0.0, 1.0)])
 def test_what_is_no_rotation_is_refused(none: Quaternion) -> None:
-    with pytest.raises(ValueError, match="a rotation that is none"):
+    with pytest.raises(ValueError, match="a rotation that is zero or not finite"):
         from_unity(none)
 
 

@@ -55,7 +55,7 @@ def test_interfaces_have_the_methods_that_links_use() -> None:
     }  # fmt: skip
     assert methods(HeadSink).keys() == methods(CommandSink).keys()
     assert methods(Player).keys() == {
-        "start", "prepared", "names", "control", "prepared_control", "tick", "abandon", "status",
+        "start", "prepare_start", "names", "control", "prepare_control", "tick", "abandon", "status",
     }  # fmt: skip
 
 
@@ -103,7 +103,7 @@ def test_a_group_passes_on_every_command_and_asks_for_one_head_at_every_question
         for member in members:
             assert member.calls.pop() == (name, given) and not member.calls
     for name, given in QUESTIONS.items():
-        with pytest.raises(ParameterError, match="a question needs one of maple, oak, willow"):
+        with pytest.raises(ParameterError, match="a query needs one of maple, oak, willow"):
             getattr(together, name)(*given)
     together.gaze_head("oak", 7)
     assert [member.calls for member in members] == [[("gaze_head", ("oak", 7))], [], [("gaze_head", ("oak", 7))]]

@@ -13,7 +13,7 @@ from controller.base.parts import Parts
 from controller.layers.idle.settings import IdleSettings
 from controller.layers.mixer import Mixer
 from controller.layers.settings import default_layers
-from controller.layers.sources import Sources, finite
+from controller.layers.sources import Sources, require_finite
 from controller.vocabulary.vocabulary import Vocabulary
 
 SMILE, JAW, YAW = P.index("mouthSmileLeft"), P.index("jawOpen"), P.index("leftEyeYaw")
@@ -82,7 +82,7 @@ def test_blinks_come_back_as_an_expression_that_failed_fades_out(monkeypatch: py
 
 
 def test_values_that_are_no_numbers_are_refused() -> None:
-    assert finite(np.array([0.0, -1.0])).tolist() == [0.0, -1.0]
+    assert require_finite(np.array([0.0, -1.0])).tolist() == [0.0, -1.0]
     for bad in (np.nan, np.inf):
         with pytest.raises(ParameterError, match="finite"):
-            finite(np.array([0.0, bad]))
+            require_finite(np.array([0.0, bad]))

@@ -62,12 +62,12 @@ def test_where_it_would_come_to_rest() -> None:
     out = P.neutral()
     for _ in range(4):
         limiter.step(0.01, P.high, out)
-    rest = limiter.rest(0.01)
+    stopping_position = limiter.stopping_position(0.01)
     path = np.array([limiter.step(0.01, P.low, out).copy() for _ in range(200)])
     turned = path.max(axis=0)
-    assert np.all(turned <= np.minimum(rest, P.high) + 1e-9)
-    moving = rest < 0.9 * P.high
-    assert moving.any() and np.all(turned[moving] > 0.6 * rest[moving])
+    assert np.all(turned <= np.minimum(stopping_position, P.high) + 1e-9)
+    moving = stopping_position < 0.9 * P.high
+    assert moving.any() and np.all(turned[moving] > 0.6 * stopping_position[moving])
 
 
 @pytest.mark.slow
@@ -187,13 +187,13 @@ def test_rest_is_a_step_at_the_present_speed_and_then_the_braking_distance(sign:
     while speed * sign > 0.0:
         place += speed * small
         speed -= sign * accel * small
-    assert limiter.rest(dt)[0] == pytest.approx(place, abs=1e-5)
+    assert limiter.stopping_position(dt)[0] == pytest.approx(place, abs=1e-5)
 
 
 def test_at_rest_it_would_rest_where_it_is() -> None:
     limiter = one(3.0, 20.0)
     limiter.reset(np.array([0.7]))
-    assert limiter.rest(0.01)[0] == 0.7 and limiter.rest(1.0)[0] == 0.7
+    assert limiter.stopping_position(0.01)[0] == 0.7 and limiter.stopping_position(1.0)[0] == 0.7
 
 
 def test_it_comes_to_an_exact_rest_at_its_target() -> None:

@@ -58,7 +58,7 @@ class Line:
         self.sent = np.zeros(len(table.names))
 
     def step(self, *target_deg: float, state: BusState | None = None) -> np.ndarray:
-        allowed = self.guard.apply(np.radians(target_deg), self.sent, self.limiter.rest(DT), state, DT)
+        allowed = self.guard.apply(np.radians(target_deg), self.sent, self.limiter.stopping_position(DT), state, DT)
         return np.degrees(self.limiter.step(DT, allowed, self.sent))
 
     def run(self, seconds: float, *target_deg: float) -> np.ndarray:
@@ -207,7 +207,7 @@ def test_no_hostile_target_gets_past_a_limit_of_the_shipped_head() -> None:
         target[rng.random(24) < 0.05] = rng.choice([np.nan, np.inf, -np.inf, 1e300])
         current = np.where(np.sin(step / 40) > 0, 1.4, rng.choice([0.0, np.nan], 24))
         state = measured(sent + rng.normal(0, 0.2, 24), current, bool(rng.random() < 0.9))
-        limiter.step(DT, guard.apply(target, sent, limiter.rest(DT), state, DT), sent)
+        limiter.step(DT, guard.apply(target, sent, limiter.stopping_position(DT), state, DT), sent)
     speed = np.diff(way, axis=0) / DT
     assert np.all((table.low_rad <= way) & (way <= table.high_rad))
     assert np.all(np.abs(speed) <= table.max_speed_rad_s * (1 + 1e-9))

@@ -10,7 +10,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from controller.base.errors import ParameterError
 from controller.base.parameters import PARAMETERS as P
-from controller.takes.edit import cut_out, keep, layered, smooth
+from controller.takes.edit import cut_out, keep, layer_over, smooth
 from controller.takes.livelink import Take
 from controller.takes.plain import plain_take, write_plain
 
@@ -58,7 +58,7 @@ def test_smoothing_is_a_gaussian_that_keeps_the_ends() -> None:
 
 
 def test_a_layer_moves_its_parameters_while_it_lasts(tmp_path: Path) -> None:
-    both = layered(RAMP, take(BROW, np.array([1.0, 0.5, 1.0])), offset_s=0.35)
+    both = layer_over(RAMP, take(BROW, np.array([1.0, 0.5, 1.0])), offset_s=0.35)
     assert both.mask[[JAW, BROW]].all() and both.mask.sum() == 2
     at = lambda time_s: both.values[np.argmin(np.abs(both.times_s - time_s))]  # noqa: E731
     assert at(0.45)[[JAW, BROW]] == pytest.approx([0.45, 0.5]) and at(0.8)[BROW] == 0.0 and at(0.1)[BROW] == 0.0
@@ -66,4 +66,4 @@ def test_a_layer_moves_its_parameters_while_it_lasts(tmp_path: Path) -> None:
     again = plain_take(tmp_path / "both.csv", P)
     assert again.values[:, [JAW, BROW]] == pytest.approx(both.values[:, [JAW, BROW]], abs=1e-5)
     with pytest.raises(ParameterError):
-        layered(RAMP, RAMP, offset_s=2.0)
+        layer_over(RAMP, RAMP, offset_s=2.0)

@@ -6,7 +6,7 @@ import resource
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
@@ -64,7 +64,7 @@ def test_a_device_without_room_is_told(tmp_path: Path) -> None:
 
 def test_a_disk_that_does_not_keep_up_is_told_and_nobody_waits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     hold, failed = threading.Event(), list[Exception]()
-    monkeypatch.setattr(line_writer, "_MOST_LINES", 10)
+    monkeypatch.setattr(line_writer, "_MAX_PENDING_LINES", 10)
     monkeypatch.setattr(LineWriter, "_write", lambda _: hold.wait(60.0))
     writer = LineWriter(tmp_path / "a", failed.append)
     for _ in range(12):
@@ -72,6 +72,38 @@ def test_a_disk_that_does_not_keep_up_is_told_and_nobody_waits(tmp_path: Path, m
     hold.set()
     writer.close()
     assert len(failed) == 1 and "the disk does not keep up" in str(failed[0])
+
+
+class _ErrorReadAtOnce(LineWriter):
+    """A writer whose ``error`` is read by two failing threads at the same time, unless a lock keeps them apart."""
+
+    barrier: threading.Barrier | None = None
+    stored: OSError | None = None
+
+    @property  # type: ignore[override]
+    def error(self) -> OSError | None:
+        found = self.stored
+        if self.barrier is not None:
+            with suppress(threading.BrokenBarrierError):
+                self.barrier.wait(0.2)
+        return found
+
+    @error.setter
+    def error(self, error: OSError | None) -> None:
+        self.stored = error
+
+
+def test_errors_of_two_threads_are_told_once(tmp_path: Path) -> None:
+    failed: list[Exception] = []
+    writer = _ErrorReadAtOnce(tmp_path / "a", failed.append)
+    writer.close()
+    writer.barrier = threading.Barrier(2)
+    threads = [threading.Thread(target=writer._fail, args=(OSError(number, "no"),)) for number in (1, 2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(failed) == 1
 
 
 def test_a_recording_that_met_a_full_disk_can_be_played_as_far_as_it_goes(tmp_path: Path) -> None:

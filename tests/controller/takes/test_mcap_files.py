@@ -67,7 +67,7 @@ def test_a_text_that_is_not_utf_8_is_told_in_plain_words(tmp_path: Path) -> None
     data = path.read_bytes()
     assert TOPIC.encode() in data
     path.write_bytes(data.replace(TOPIC.encode(), b"\xad" * len(TOPIC)))
-    with pytest.raises(TakeError, match="no whole MCAP file") as caught:
+    with pytest.raises(TakeError, match="not a complete MCAP file") as caught:
         mcap_take(path, P)
     assert "codec" not in str(caught.value)
 
@@ -109,11 +109,11 @@ def test_damaged_files_are_one_message(tmp_path: Path) -> None:
 def test_what_unpacks_to_too_much_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compression: str) -> None:
     many = [("/face", n / 60, {"parameters": {"jawOpen": 0.5}}) for n in range(2000)]
     path = written(tmp_path / "a.mcap", *many, compression=compression)
-    monkeypatch.setattr(mcap_files, "_CHUNK_LIMIT", 40_000)
-    with pytest.raises(TakeError, match=r"no whole MCAP file|a chunk of more than 0\.0"):
+    monkeypatch.setattr(mcap_files, "_MAX_CHUNK_BYTES", 40_000)
+    with pytest.raises(TakeError, match=r"not a complete MCAP file|a chunk of more than 0\.0"):
         mcap_take(path, P)
     monkeypatch.undo()
-    monkeypatch.setattr(mcap_files, "MOST_MESSAGES", 1000)
+    monkeypatch.setattr(mcap_files, "MAX_MESSAGES", 1000)
     with pytest.raises(TakeError, match="more than 1000 messages"):
         mcap_take(path, P)
 

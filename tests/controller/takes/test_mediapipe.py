@@ -40,8 +40,8 @@ def test_shapes_of_the_task_for_browsers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("text", "why"), [
-    ('{"faceLandmarks": []}', "no result has a face"), ('{"faceLandmarks": [[1]]}', "no face of 468"),
-    ('{"faceLandmarks": [', "JSON"), (json.dumps(results("time", -1.0)), "do not rise"),
+    ('{"faceLandmarks": []}', "no result has a face"), ('{"faceLandmarks": [[1]]}', "not a face of 468"),
+    ('{"faceLandmarks": [', "JSON"), (json.dumps(results("time", -1.0)), "are not ascending"),
 ])  # fmt: skip
 def test_what_is_wrong_is_one_message(tmp_path: Path, text: str, why: str) -> None:
     (tmp_path / "a.json").write_text(text)

@@ -75,7 +75,7 @@ def test_an_empty_cell_leaves_a_value_as_it_was(tmp_path: Path) -> None:
         ("time,jawOpn\n0,1\n", "unknown column 'jawOpn', did you mean 'jawOpen'"),
         ("time,x,y\n0,1,2\n", "no column is a parameter"),
         ("jawOpen\n1\n", "no column time"),
-        ("time,jawOpen,JawOpen\n0,1,1\n", "column JawOpen: is there twice"),
+        ("time,jawOpen,JawOpen\n0,1,1\n", "column JawOpen: occurs twice"),
         ("time,jawOpen\n0,1\n0,1\n", "line 3, column time: the time is not later"),
         ("time,jawOpen\n1,1\n0,1\n", "line 3, column time: the time is not later"),
         ("time,jawOpen\n0,\n", "no column is a parameter, or none has a value"),

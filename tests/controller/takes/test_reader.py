@@ -101,7 +101,7 @@ def test_a_reader_is_found_by_the_ending_and_the_first_bytes(tmp_path: Path, nam
 
 @pytest.mark.parametrize(("name", "ending"), [("a.mp4", ".mp4"), ("take", "nothing")])
 def test_a_file_that_nobody_reads_names_what_there_is(name: str, ending: str) -> None:
-    with pytest.raises(TakeError, match=f"{name}: no take: its name ends in {ending}") as caught:
+    with pytest.raises(TakeError, match=f"{name}: not a take: its name ends in {ending}") as caught:
         reader_of(Path(name))
     assert caught.value.hint.startswith("use .") and " or ." in caught.value.hint
     assert all(suffix in caught.value.hint for suffix in suffixes())
@@ -116,7 +116,7 @@ def test_a_reader_of_another_package_reads(install: Callable[..., None]) -> None
 
 @pytest.mark.parametrize(
     ("suffix", "why"),
-    [("track", "begin with a dot"), (".Track", "small letters"), (".wav", "is read by the built-in kind 'wav'")],
+    [("track", "begin with a dot"), (".Track", "lower case"), (".wav", "is read by the built-in kind 'wav'")],
 )
 def test_wrong_suffixes_are_refused(install: Callable[..., None], suffix: str, why: str) -> None:
     install("track", suffix)

@@ -84,7 +84,7 @@ def test_neighbours_share_a_moment_by_their_dominance_the_less_the_firmer_the_so
 @pytest.mark.parametrize(
     ("starts", "end_s", "why"),
     [
-        ((), 1.0, "at least one sound"), ((0.5, 0.4), 1.0, "times that rise"), ((0.5,), 0.4, "times that rise"),
+        ((), 1.0, "at least one sound"), ((0.5, 0.4), 1.0, "ascending times"), ((0.5,), 0.4, "ascending times"),
         ((-0.1,), 1.0, "0 to 3600 s"), ((0.0,), 3600.1, "0 to 3600 s"), ((0.5, 0.5), 0.5, ""), ((0.0,), 3600.0, ""),
     ],
 )  # fmt: skip
@@ -122,7 +122,7 @@ def test_phonemes_a_line(tmp_path: Path) -> None:
     [
         ("a.tsv", "0.0 X\nzero D\n", "line 2: 'zero D' is not a time"),
         ("a.tsv", "0.0 AA\n0.2 QQ\n", "line 2: unknown viseme or phoneme 'QQ'"),
-        ("a.tsv", "0.5 X\n0.2 D\n", "times that rise"),
+        ("a.tsv", "0.5 X\n0.2 D\n", "ascending times"),
         ("a.tsv", "", "at least one sound"),
         ("a.json", "{}", "not the output of rhubarb"),
         ("a.json", "[", "not the output of rhubarb"),

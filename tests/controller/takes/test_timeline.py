@@ -12,7 +12,16 @@ from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.links.line.script import load_script
 from controller.links.line.show import Show
-from controller.takes.timeline import EASES, Key, Timeline, eased, key_of_face, load_timeline, save_show, steps_of
+from controller.takes.timeline import (
+    EASES,
+    Key,
+    Timeline,
+    ease_fraction,
+    key_of_face,
+    load_timeline,
+    save_show,
+    steps_of,
+)
 
 JAW, SMILE = P.index("jawOpen"), P.index("mouthSmileLeft")
 
@@ -33,15 +42,15 @@ def test_the_face_goes_from_key_to_key() -> None:
 
 def test_every_ease_begins_and_ends_where_it_shall() -> None:
     for ease in EASES:
-        assert (eased(0.0, ease), eased(1.0, ease)) == (0.0, 1.0)
-        ways = [eased(share, ease) for share in np.linspace(0, 1, 101)]
+        assert (ease_fraction(0.0, ease), ease_fraction(1.0, ease)) == (0.0, 1.0)
+        ways = [ease_fraction(share, ease) for share in np.linspace(0, 1, 101)]
         assert np.all(np.diff(ways) >= 0.0)
-    assert eased(0.5, "in") < 0.5 < eased(0.5, "out") and eased(0.99, "hold") == 0.0
+    assert ease_fraction(0.5, "in") < 0.5 < ease_fraction(0.5, "out") and ease_fraction(0.99, "hold") == 0.0
 
 
 def test_edits_leave_the_earlier_timeline_as_it_was() -> None:
     first = example()
-    second = first.moved(1, 1.5).eased(1, "hold").with_mark("hello", 0.5)
+    second = first.with_time(1, 1.5).with_ease(1, "hold").with_mark("hello", 0.5)
     assert [key.at_s for key in first.keys] == [0.0, 1.0, 2.0] and not first.marks
     assert [(key.at_s, key.ease) for key in second.keys] == [(0.0, "smooth"), (1.5, "hold"), (2.0, "linear")]
     assert second.with_mark("hello", None).marks == {} and len(second.without_key(0).keys) == 2

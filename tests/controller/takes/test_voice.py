@@ -62,7 +62,7 @@ def test_of_two_visemes_the_likelier_one_shows_by_the_square_of_how_much_likelie
     """Else a mouth between all visemes would look like none."""
     mouth, k = _Mouth(P), 40
     levels = np.random.default_rng(5).uniform(-60.0, -20.0, (k + BEFORE + AHEAD, BANDS))
-    judged, shown = mouth._model.judge(features(levels, -10.0)), mouth.shares(levels, -10.0, np.full(k, -10.0))
+    judged, shown = mouth._model.classify(features(levels, -10.0)), mouth.weights(levels, -10.0, np.full(k, -10.0))
     likelier, stronger = judged[:, 1] / judged[:, 2], shown[:, 1] / shown[:, 2]
     assert np.ptp(likelier) > 0.5
     np.testing.assert_allclose(stronger / stronger[0], (likelier / likelier[0]) ** 2)

@@ -16,7 +16,7 @@ from controller.testing.host import ScriptedHost, open_host
 @pytest.fixture(autouse=True)
 def patience(monkeypatch: pytest.MonkeyPatch) -> None:
     """A busy machine may answer late."""
-    monkeypatch.setattr(host_module, "_ANSWER_LIMIT_S", 30.0)
+    monkeypatch.setattr(host_module, "_ANSWER_TIMEOUT_S", 30.0)
 
 
 def answer(host: ScriptedHost, *texts: str) -> list[str]:

@@ -48,10 +48,10 @@ def test_a_unit_that_is_not_named_stays_and_one_side_moves_alone() -> None:
         ('{"AU99": 1}', "unknown units"),
         ('{"AU1+2": 1}', "unknown units"),
         ('{"": 1}', "unknown units"),
-        ('{"AU1": "5"}', "intensities that are none"),
-        ('{"AU1": -1}', "intensities that are none"),
-        ('{"AU1": NaN}', "intensities that are none"),
-        ('{"AU1": true}', "intensities that are none"),
+        ('{"AU1": "5"}', "invalid intensities"),
+        ('{"AU1": -1}', "invalid intensities"),
+        ('{"AU1": NaN}', "invalid intensities"),
+        ('{"AU1": true}', "invalid intensities"),
     ],
 )
 def test_what_is_wrong_is_refused_with_a_reason(text: str, why: str) -> None:

@@ -60,7 +60,7 @@ def test_what_is_left_out_is_counted() -> None:
     decoder = IFacialMocapDecoder(P)
     decoder.feed(b"jawOpen-7|mouthFunnel0|nonsense-5|tail#1,2,3")
     assert decoder.refused == {
-        "entries without a name and a number": 1, "unknown names": 1, "rotations that are none": 1,
+        "entries without a name and a number": 1, "unknown names": 1, "invalid rotations": 1,
     }  # fmt: skip
 
 

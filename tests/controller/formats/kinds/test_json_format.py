@@ -67,12 +67,12 @@ def test_what_is_not_given_any_more_is_written_as_null() -> None:
         (b'{"type": "stop"}', "no object that sets parameters"),
         (b'{"jawOpn": 1}', "unknown names"),
         (b'{"type": "set", "parameters": {"jawOpn": 1}}', "unknown names"),
-        (b'{"jawOpen": "1"}', "values that are no numbers"),
-        (b'{"jawOpen": true}', "values that are no numbers"),
-        (b'{"jawOpen": NaN}', "values that are no numbers"),
-        (b'{"jawOpen": 1e999}', "values that are no numbers"),
-        (b'{"jawOpen": [0.5]}', "values that are no numbers"),
-        (b'{"jawOpen": 1' + b"0" * 400 + b"}", "values that are no numbers"),
+        (b'{"jawOpen": "1"}', "values that are not numbers"),
+        (b'{"jawOpen": true}', "values that are not numbers"),
+        (b'{"jawOpen": NaN}', "values that are not numbers"),
+        (b'{"jawOpen": 1e999}', "values that are not numbers"),
+        (b'{"jawOpen": [0.5]}', "values that are not numbers"),
+        (b'{"jawOpen": 1' + b"0" * 400 + b"}", "values that are not numbers"),
     ],
 )
 def test_what_is_wrong_is_refused_with_a_reason(text: bytes, why: str) -> None:
@@ -142,4 +142,4 @@ def test_a_result_without_a_face_says_so() -> None:
 def test_what_is_no_face_of_landmarks_is_counted(wrong: object) -> None:
     decoder = JsonDecoder(P)
     assert decoder.feed(json.dumps(wrong).encode()) == []
-    assert decoder.refused == {"landmarks that are no face of 468 or 478 points": 1}
+    assert decoder.refused == {"landmarks that are not a face of 468 or 478 points": 1}

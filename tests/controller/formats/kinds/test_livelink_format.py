@@ -81,7 +81,7 @@ def test_values_above_one_are_kept_and_no_numbers_are_left_out() -> None:
     values[17] = math.nan
     (frame,) = decoder.feed(datagram(values))
     assert frame.values[0] == pytest.approx(1.3) and not frame.mask[17] and np.isfinite(frame.values).all()
-    assert decoder.refused == {"values that are no numbers": 1}
+    assert decoder.refused == {"values that are not numbers": 1}
 
 
 @pytest.mark.parametrize(

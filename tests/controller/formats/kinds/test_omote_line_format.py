@@ -66,9 +66,9 @@ def test_what_hosts_send_and_omote_streams_is_read() -> None:
     [
         (b"SET jawOpn 1", "unknown names"),
         (b"RELEASE jawOpn", "unknown names"),
-        (b"SET jawOpen nan", "values that are no numbers"),
-        (b"SET jawOpen 1e9", "values that are no numbers"),
-        (b"P 1 jawOpen", "values that are no numbers"),
+        (b"SET jawOpen nan", "values that are not numbers"),
+        (b"SET jawOpen 1e9", "values that are not numbers"),
+        (b"P 1 jawOpen", "values that are not numbers"),
         (b"SET jawOpen", "lines that set no parameters"),
         (b"ERR 20 unknown command", "lines that set no parameters"),
         (b"FRAME 1 2", "lines without 59 values"),

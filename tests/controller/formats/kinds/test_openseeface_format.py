@@ -87,7 +87,7 @@ def test_of_several_faces_the_first_one_counts() -> None:
 @pytest.mark.parametrize("data", [b"", b"?", record()[:-1], record() + b"?", record(features={})[:-4], bytes(1700)])
 def test_other_lengths_are_refused(data: bytes) -> None:
     decoder = OpenSeeFaceDecoder(P)
-    assert decoder.feed(data) == [] and decoder.refused == {"a length that is of no record": 1}
+    assert decoder.feed(data) == [] and decoder.refused == {"not a whole number of records": 1}
 
 
 def test_what_is_no_number_is_left_out() -> None:

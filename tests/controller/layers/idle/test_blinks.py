@@ -112,7 +112,7 @@ def test_a_blink_that_goes_on_is_not_begun_again(blink: BlinkSettings) -> None:
     first = blinks.next_s
     blinks.advance(first)
     due = blinks.next_s
-    blinks.hurry(first + 0.1)
+    blinks.request(first + 0.1)
     assert blinks.next_s == due
-    blinks.hurry(blinks.blinks[-1].end_s + 0.31)
+    blinks.request(blinks.blinks[-1].end_s + 0.31)
     assert blinks.next_s < due

@@ -40,15 +40,15 @@ def test_numbers_of_a_behaviour_depend_on_seed_and_name_only() -> None:
 
 def test_steps_add_up_where_they_overlap_and_arrive() -> None:
     alone, late, both = Steps(2), Steps(2), Steps(2)
-    alone.go([1.0, -2.0], 0.0, 1.0)
-    both.go([1.0, -2.0], 0.0, 1.0)
-    late.go([2.0, 0.0], 0.5, 1.0)
-    both.go([3.0, -2.0], 0.5, 1.0)
+    alone.move_to([1.0, -2.0], 0.0, 1.0)
+    both.move_to([1.0, -2.0], 0.0, 1.0)
+    late.move_to([2.0, 0.0], 0.5, 1.0)
+    both.move_to([3.0, -2.0], 0.5, 1.0)
     for t in (-1.0, 0.0, 0.3, 0.7, 1.2, 1.5, 9.0):
         np.testing.assert_allclose(both.at(t), np.add(alone.at(t), late.at(t)), atol=1e-12)
     assert alone.at(0.5) == pytest.approx([0.5, -1.0]) and alone.at(0.1)[0] == pytest.approx(0.00856)  # minimum jerk
     before = both.at(1.2)
-    both.settle(1.2)
+    both.drop_finished(1.2)
     assert both.at(1.2) == pytest.approx(before) and both.at(2.0) == pytest.approx([3.0, -2.0])
     both.reset()
     assert both.at(1.2) == [0.0, 0.0] and both.goal == [0.0, 0.0]

@@ -37,7 +37,7 @@ def test_micro_saccades_are_small_and_one_or_two_a_second(eyes: Eyes, settings: 
     path = []
     for t in times:
         eyes.advance(t)
-        path.append(eyes.unrest(t))
+        path.append(eyes.fixational_offset(t))
     size = np.degrees(np.abs(path))
     assert 0.2 < size.max() <= settings.eyes.micro_deg + settings.eyes.drift_deg
     speed = np.degrees(np.linalg.norm(np.diff(path, axis=0), axis=1)) / 0.01

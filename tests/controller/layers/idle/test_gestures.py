@@ -7,7 +7,7 @@ import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.idle.draws import generator, mean_of
-from controller.layers.idle.gestures import Gestures, Pose, chosen
+from controller.layers.idle.gestures import Gestures, Pose, draw_pose
 from controller.layers.idle.settings import FidgetSettings, GestureSettings, IdleSettings, PoseSettings
 
 
@@ -53,14 +53,14 @@ def test_a_pose_of_one_side_shows_on_either_and_less_on_the_other() -> None:
     left, right, jaw = P.indices(["browOuterUpLeft", "browOuterUpRight", "jawOpen"])
     numbers, drawn = generator(1, "x"), []
     for _ in range(100):
-        values = pose.drawn(numbers)
+        values = pose.draw(numbers)
         assert 0.6 * 0.2 <= values[jaw] <= 0.2 and min(values[left], values[right]) < 0.4 * max(
             values[left], values[right]
         )
         drawn.append(values[left] > values[right])
     assert 30 < sum(drawn) < 70
     both = Pose.of(P, PoseSettings(weights={"browOuterUp": 0.4}))
-    ratios = [values[left] / values[right] for values in (both.drawn(numbers) for _ in range(100))]
+    ratios = [values[left] / values[right] for values in (both.draw(numbers) for _ in range(100))]
     assert 0.84 < min(ratios) < 1.0 < max(ratios) < 1.18
 
 
@@ -69,7 +69,7 @@ def test_single_parameters_can_be_listed_and_no_pose_is_no_movement(settings: Id
     path = path_of(FidgetSettings.model_validate(own), 60.0)
     assert {P.names[i] for i in np.flatnonzero(path.any(axis=0))} == {"jawOpen"} and path.max() <= 0.1
     assert not path_of(FidgetSettings.model_validate({**own, "parameters": []}), 60.0).any()
-    assert chosen([], generator(1, "x")) is None
+    assert draw_pose([], generator(1, "x")) is None
 
 
 def test_gestures_follow_each_other_at_their_interval(settings: IdleSettings) -> None:

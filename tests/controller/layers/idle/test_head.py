@@ -9,7 +9,7 @@ import pytest
 
 from controller.layers.idle.attention import Shift
 from controller.layers.idle.draws import generator
-from controller.layers.idle.head import Nod, Nods, Posture, Sway, Turn, fullness
+from controller.layers.idle.head import Nod, Nods, Posture, Sway, Turn, lung_volume
 from controller.layers.idle.settings import IdleSettings
 
 
@@ -33,7 +33,7 @@ def test_the_head_turns_in_its_own_time(settings: IdleSettings) -> None:
     yaw = np.degrees([turn.at(t)[0] for t in times])
     moving = times[(yaw > 0.0) & (yaw < yaw[-1] - 1e-9)]
     assert moving[-1] - moving[0] == pytest.approx(0.45 + 0.02 * yaw[-1], abs=0.02)
-    turn.settle(2.0)
+    turn.drop_finished(2.0)
     assert math.degrees(turn.at(1.9)[0]) == pytest.approx(yaw[-1])
 
 
@@ -63,7 +63,7 @@ def test_sway_is_three_waves_on_each_axis_and_grows_when_busy(settings: IdleSett
         wanted = np.radians([8.0, 4.0, 2.0]) * np.mean(waves, axis=1)
         np.testing.assert_allclose(sway.at(now_s), wanted, atol=1e-12)
     before = np.array(sway.at(60.0))
-    sway.busy(1.5, 50.0)
+    sway.set_gain(1.5, 50.0)
     np.testing.assert_allclose(sway.at(60.0), 1.5 * before)
     np.testing.assert_allclose(sway.at(50.0), Sway(head, breath, generator(5, "x")).at(50.0))  # not at once
 
@@ -75,7 +75,7 @@ def test_breath_follows_its_four_parts_and_raises_the_head(settings: IdleSetting
     sway = Sway(still, breath, generator(1, "x"))
     full = {0.0: 0.0, 1.0: 0.5, 2.0: 1.0, 2.9: 1.0, 3.0: 1.0, 5.0: 0.5, 7.0: 0.0, 9.9: 0.0, 10.0: 0.0, 11.0: 0.5}
     for now_s, share in full.items():
-        assert fullness(breath, now_s) == pytest.approx(share)
+        assert lung_volume(breath, now_s) == pytest.approx(share)
         assert sway.at(now_s) == pytest.approx((0.0, -math.radians(5.0) * share, 0.0)), now_s
     natural = settings.breath
     length_s = natural.inhale_s + natural.hold_s + natural.exhale_s + natural.pause_s

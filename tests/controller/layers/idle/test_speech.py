@@ -11,17 +11,17 @@ import pytest
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.idle.draws import generator
 from controller.layers.idle.settings import IdleSettings
-from controller.layers.idle.speech import Emphasis, Hearing
+from controller.layers.idle.speech import Emphasis, SpeechDetector
 
 
 def heard(
     settings: IdleSettings, loudness: Callable[[float], float], seconds: float, step_s: float = 0.01
 ) -> dict[str, list[float]]:
     """When utterances began and ended, and syllables were stressed."""
-    hearing = Hearing(settings.speech)
+    hearing = SpeechDetector(settings.speech)
     found: dict[str, list[float]] = {"began": [], "ended": [], "stressed": []}
     for t in np.arange(0.0, seconds, step_s):
-        now = hearing.hear(loudness(float(t)), float(t))
+        now = hearing.update(loudness(float(t)), float(t))
         for what, times in found.items():
             if getattr(now, what):
                 times.append(float(t))
@@ -79,4 +79,4 @@ def test_syllables_are_underlined_in_their_shares(settings: IdleSettings) -> Non
     assert nods.min() >= speech.nod_deg[0] and nods.max() <= speech.nod_deg[1]
     assert np.mean([beat.blink for beat in beats]) == pytest.approx(speech.blink_share, abs=0.02)
     assert np.mean([emphasis.end().blink for _ in range(1000)]) == pytest.approx(speech.end_blink_share, abs=0.05)
-    assert np.mean([emphasis.looks_away() for _ in range(1000)]) == pytest.approx(speech.away_share, abs=0.05)
+    assert np.mean([emphasis.draw_look_away() for _ in range(1000)]) == pytest.approx(speech.away_share, abs=0.05)

@@ -41,10 +41,10 @@ def test_an_address_instead_of_a_port() -> None:
     [
         ({}, "give port"),
         ({"port": "/dev/ttyUSB0", "listen": "127.0.0.1:9404"}, "give port"),
-        ({"listen": "9404"}, "is no address"),
+        ({"listen": "9404"}, "is not an address"),
         ({"listen": "0.0.0.0:9404"}, "open_to_network = true allows it, with a token"),
         ({"listen": "127.0.0.1:9404", "token": "short"}, "at least 12 characters"),
-        ({"listen": "127.0.0.1:9404", "token": "two words of a token"}, "printable ASCII without blanks"),
+        ({"listen": "127.0.0.1:9404", "token": "two words of a token"}, "printable ASCII without spaces"),
         ({"listen": "127.0.0.1:9404", "script": "tour"}, 'script needs port = "simulated"'),
         ({"listen": "127.0.0.1:9404", "clients": 65}, "clients"),
     ],

@@ -215,7 +215,7 @@ def test_a_fault_of_its_own_is_told_once_and_the_link_goes_on(
     assert (answers[0].text, answers[3].text) == ("PONG a", "PONG b")  # the fault costs no other line its answer
     assert link.report()["faults"] == 2
     assert link.report()["last_fault"] == "ZeroDivisionError: life is short"
-    assert caplog.text.count("goes on with the next line") == 1
+    assert caplog.text.count("continues with the next line") == 1
 
 
 def test_faults_that_repeat_leave_the_processor_to_others(

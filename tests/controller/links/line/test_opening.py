@@ -25,8 +25,8 @@ from drivers.base.errors import PortMissing
 @pytest.fixture(autouse=True)
 def patient(monkeypatch: pytest.MonkeyPatch) -> None:
     """Lets a host start and end slowly: on a busy machine it may be scheduled late, or wait for compiled kernels."""
-    monkeypatch.setattr(opening, "_START_LIMIT_S", 120.0)
-    monkeypatch.setattr(opening, "_END_LIMIT_S", 60.0)
+    monkeypatch.setattr(opening, "_START_TIMEOUT_S", 120.0)
+    monkeypatch.setattr(opening, "_END_TIMEOUT_S", 60.0)
 
 
 def eventually(question: Callable[[], object], seconds: float = 60.0) -> None:
@@ -100,7 +100,7 @@ def test_a_host_that_ends_without_a_word_is_named(monkeypatch: pytest.MonkeyPatc
 
 def test_a_host_that_does_not_end_is_killed(monkeypatch: pytest.MonkeyPatch) -> None:
     host = HostProcess("tour")
-    monkeypatch.setattr(opening, "_END_LIMIT_S", 0.0)
+    monkeypatch.setattr(opening, "_END_TIMEOUT_S", 0.0)
     os.kill(host._process.pid, signal.SIGSTOP)  # it cannot end by itself
     host.stop()
     assert host._process.returncode == -signal.SIGKILL and host.counts == {}

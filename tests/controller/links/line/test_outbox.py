@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from controller.links.line.outbox import LIMIT, Outbox
+from controller.links.line.outbox import MAX_BYTES, Outbox
 
 
 def test_lines_leave_in_order_in_pieces_of_any_size() -> None:
@@ -24,7 +24,7 @@ def test_lines_leave_in_order_in_pieces_of_any_size() -> None:
 def test_only_what_has_room_is_taken_and_streamed_lines_never_wait() -> None:
     outbox = Outbox()
     assert outbox.add(b"P 1 a=0\n", answer=False) and not outbox.add(b"P 2 a=0\n", answer=False)
-    assert outbox.add(b"x" * (LIMIT - 8), answer=True) and not outbox.add(b"y", answer=True)
+    assert outbox.add(b"x" * (MAX_BYTES - 8), answer=True) and not outbox.add(b"y", answer=True)
     outbox.flush(lambda data: 9)
     assert outbox.add(b"y" * 9, answer=True) and not outbox.add(b"y", answer=True)
 
@@ -36,4 +36,4 @@ def test_what_is_discarded_counts_the_answers_that_were_not_sent_whole() -> None
         outbox.add(line, answer=True)
     outbox.flush(lambda data: 14)  # the streamed line, the first answer and half of the second
     assert outbox.clear() == 2 and not outbox and outbox.clear() == 0
-    assert outbox.add(b"x" * LIMIT, answer=True)
+    assert outbox.add(b"x" * MAX_BYTES, answer=True)

@@ -175,7 +175,7 @@ def test_who_guesses_tokens_is_sent_away(far: Callable[..., Far]) -> None:
 
 
 def test_who_gives_no_token_is_sent_away(far: Callable[..., Far], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(server, "_AUTH_S", 0.05)
+    monkeypatch.setattr(server, "_AUTH_TIMEOUT_S", 0.05)
     assert far(token=TOKEN).call().is_hung_up()
 
 

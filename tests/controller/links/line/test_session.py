@@ -367,11 +367,11 @@ def test_faults_are_logged_once_a_kind_and_shown_in_part(
 
     monkeypatch.setattr(talk.state, "live", broken)
     assert all(len(talk.say("LIFE 1").text) < 150 for _ in range(6))
-    assert caplog.text.count("it goes on with the next line") == 2 and talk.session.faults == 6
+    assert caplog.text.count("the link continues with the next line") == 2 and talk.session.faults == 6
     kinds = (str(i) for i in itertools.count())
     for _ in range(100):
         talk.say("LIFE 1")
-    assert caplog.text.count("it goes on with the next line") == 50
+    assert caplog.text.count("the link continues with the next line") == 50
 
 
 def test_visemes_form_the_mouth_until_the_next_or_for_a_second(talk: Talk) -> None:

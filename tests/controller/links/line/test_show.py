@@ -130,7 +130,7 @@ def test_what_stops_a_show_also_stops_one_that_has_begun_at_that_moment(what: st
     """A show may start another one while a link asks for it to be stopped; a place in the one is none in the other."""
     shows = Shows(lambda name: Script(((9.0, "PING"),), name=name), CommandState(P))
     shows.start("first")
-    act = shows.prepared_control(what, 5.0)
+    act = shows.prepare_control(what, 5.0)
     shows.start("next")
     act()
     assert shows.status() == status

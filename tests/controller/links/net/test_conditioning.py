@@ -69,11 +69,11 @@ def test_a_still_face_becomes_neutral_and_is_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        (b"", "JSON"), (b"{", "JSON"), (b"[]", "is no calibration of a link"), (b"\xff", "UTF-8"),
+        (b"", "JSON"), (b"{", "JSON"), (b"[]", "is not a calibration of a link"), (b"\xff", "UTF-8"),
         (b'{"format": 2, "neutral": {}, "ranges": {}}', "written by a newer omote"),
         (b'{"neutral": {}, "ranges": {}}', "format: must be a whole number"),
         (b'{"format": 1, "neutral": {"jawOpen": []}, "ranges": {}}', "jawOpen: must be a number from -2 to 2"),
-        (b'{"format": 1, "neutral": 5, "ranges": {}}', "is no calibration of a link"),
+        (b'{"format": 1, "neutral": 5, "ranges": {}}', "is not a calibration of a link"),
     ],
 )  # fmt: skip
 def test_a_damaged_file_is_told_with_what_to_do(tmp_path: Path, text: bytes, why: str) -> None:

@@ -6,7 +6,7 @@ from collections import Counter
 
 from controller.base.parameters import PARAMETERS as P
 from controller.formats.format import FORMATS
-from controller.links.net.decoding import MOST_SENDERS, MOST_WAITING, MOST_WAITING_BYTES, Decoding
+from controller.links.net.decoding import MAX_SENDERS, MAX_WAITING, MAX_WAITING_BYTES, Decoding
 from tests.controller.formats.faces import face
 
 JAW = P.index("jawOpen")
@@ -30,10 +30,10 @@ def test_of_a_flood_only_the_newest_are_read() -> None:
     messages = [("a", message) for n in range(500) for message in form.encoder(P).encode(face(n, n / 60))]
     every = Decoding(form, P, streams=False).feed(messages)
     newest = Decoding(form, P, streams=False, newest=True).feed(messages)
-    assert len(every) == 500 and len(newest) == MOST_WAITING and newest[0].skipped == 500 - MOST_WAITING
+    assert len(every) == 500 and len(newest) == MAX_WAITING and newest[0].skipped == 500 - MAX_WAITING
     assert (newest[-1].frame.values == every[-1].frame.values).all()
     small = [("a", b'{"jawOpen": 0.5}')] * 1000
-    assert sum(len(data) for _, data in small) < MOST_WAITING_BYTES
+    assert sum(len(data) for _, data in small) < MAX_WAITING_BYTES
     assert len(Decoding(FORMATS.get("json"), P, streams=False, newest=True).feed(small)) == 1000
 
 
@@ -41,7 +41,7 @@ def test_senders_without_end_take_bounded_memory() -> None:
     decoding = Decoding(FORMATS.get("json"), P, streams=False)
     for n in range(1000):
         decoding.feed([(f"10.0.0.{n}", b'{"jawOpen": 1}')])
-    assert len(decoding._senders) == MOST_SENDERS
+    assert len(decoding._senders) == MAX_SENDERS
 
 
 def test_strangers_do_not_displace_a_sender_that_goes_on() -> None:

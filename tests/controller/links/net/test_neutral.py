@@ -100,8 +100,8 @@ def test_an_unknown_neutral_face_is_not_kept(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("[]", "no calibration of a link"),
-        ('{"format": 1, "neutral": {}}', "no calibration of a link"),
+        ("[]", "not a calibration of a link"),
+        ('{"format": 1, "neutral": {}}', "not a calibration of a link"),
         ('{"format": 99, "neutral": {}, "ranges": {}}', "newer"),
         ('{"format": 1, "neutral": {"jawOpen": true}, "ranges": {}}', "jawOpen: must be a number"),
         ('{"format": 1, "neutral": {"jawOpen": 2.5}, "ranges": {}}', "jawOpen: must be a number"),

@@ -17,7 +17,7 @@ from controller.links.line.hostport import HostPort
 from controller.links.net import receivers
 from controller.links.net.address import parse_address
 from controller.links.net.opening import open_receiver
-from controller.links.net.receivers import MOST_CONNECTIONS, Gate, InputReceiver, Receiver, notice_loss
+from controller.links.net.receivers import MAX_CONNECTIONS, Gate, InputReceiver, Receiver, enable_keepalive
 from drivers.base.errors import PortMissing
 from tests.controller.links.net.sockets import free_port
 
@@ -119,7 +119,7 @@ def test_only_datagrams_that_begin_with_the_token_count(opened: Open) -> None:
 def test_who_gives_no_token_is_sent_away(opened: Open, monkeypatch: pytest.MonkeyPatch) -> None:
     port = free_port(socket.SOCK_STREAM)
     receiver = opened(f"tcp:127.0.0.1:{port}", gate=Gate("abcdef", b"\n"))
-    monkeypatch.setattr(receivers, "AUTH_S", 0.05)
+    monkeypatch.setattr(receivers, "AUTH_TIMEOUT_S", 0.05)
     with socket.create_connection(("127.0.0.1", port), 10.0) as call:
         end_s = time.monotonic() + 10
         while "without the token" not in receiver.error:
@@ -131,11 +131,11 @@ def test_calls_are_limited(opened: Open) -> None:
     port = free_port(socket.SOCK_STREAM)
     receiver = opened(f"tcp:127.0.0.1:{port}")
     with ExitStack() as calls:
-        for _ in range(MOST_CONNECTIONS + 1):
+        for _ in range(MAX_CONNECTIONS + 1):
             call = calls.enter_context(socket.create_connection(("127.0.0.1", port)))
             receiver.receive(1.0)
         call.settimeout(10)
-        assert call.recv(1) == b"" and receiver.error == f"more than {MOST_CONNECTIONS} connections"
+        assert call.recv(1) == b"" and receiver.error == f"more than {MAX_CONNECTIONS} connections"
 
 
 def test_a_program_that_is_called_is_called_again(opened: Open) -> None:
@@ -160,7 +160,7 @@ def test_a_program_that_is_called_is_called_again(opened: Open) -> None:
 @pytest.mark.skipif(not hasattr(socket, "TCP_KEEPIDLE"), reason="needs Linux's options")
 def test_a_far_end_that_goes_without_a_word_is_asked_after() -> None:
     with socket.socket() as call:
-        notice_loss(call)
+        enable_keepalive(call)
         options = [socket.TCP_KEEPIDLE, socket.TCP_KEEPINTVL, socket.TCP_KEEPCNT]
         idle_s, between_s, count = (call.getsockopt(socket.IPPROTO_TCP, option) for option in options)
         assert call.getsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE) and idle_s + between_s * count <= 10

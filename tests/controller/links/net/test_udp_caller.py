@@ -53,7 +53,7 @@ def test_a_phone_that_is_asked_moves_the_face(kind: str, phone: socket.socket) -
 
 
 def test_a_phone_that_is_silent_is_asked_again(phone: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(udp_caller, "ASK_S", 0.02)
+    monkeypatch.setattr(udp_caller, "REQUEST_INTERVAL_S", 0.02)
     caller = udp_caller.UdpCaller(Address("udp", *phone.getsockname()), b"hello")
     try:
         assert caller.receive(0.001) == [] and caller.error == "", "it had no time to answer"
@@ -72,5 +72,5 @@ def test_a_host_that_is_none_is_told() -> None:
 
 def test_what_has_no_words_to_ask_is_not_called() -> None:
     assert not FORMATS.get("livelink").greeting
-    with pytest.raises(ValueError, match="only TCP is called"):
+    with pytest.raises(ValueError, match="only TCP can be connected to"):
         read_link({"kind": "livelink", "connect": "udp:127.0.0.1:11111"})

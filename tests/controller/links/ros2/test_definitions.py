@@ -53,7 +53,7 @@ def test_action_units_are_arrays_with_an_entry_for_every_number_of_facs() -> Non
 def test_types_have_hashes_from_iron_on() -> None:
     """REP 2016: RIHS01 hashes are part of a topic's key; Humble has none."""
     old, new = (message_types(name).topic("/face", EXPRESSION) for name in ("humble", "jazzy"))
-    assert (old.name, old.kind, old.type_hash) == ("/face", EXPRESSION, NO_HASH)
+    assert (old.name, old.message_type, old.type_hash) == ("/face", EXPRESSION, NO_HASH)
     assert new.type_hash.startswith("RIHS01_") and len(new.type_hash) == len("RIHS01_") + 64
     other = message_types("jazzy").topic("/face", ACTION_UNITS)
     assert other.type_hash != new.type_hash

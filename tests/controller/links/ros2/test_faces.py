@@ -83,7 +83,7 @@ def test_frames_chain_to_where_the_eyes_look(joints: HeadJoints) -> None:
     places = {"base_link": (np.zeros(3), Rotation.identity())}
     for frame in joints.frames(values):
         at, turn = places[frame.parent]
-        places[frame.name] = at + turn.apply(frame.at_m), turn * Rotation.from_quat(frame.turn)
+        places[frame.name] = at + turn.apply(frame.position_m), turn * Rotation.from_quat(frame.rotation)
     pivot, eye = np.array([0.0, 0.0, -0.05]), np.array([0.0, 0.03, 0.03])  # of the neck and the left eye
     head = Rotation.from_euler("ZYX", [30.0, 10.0, -15.0], degrees=True)
     looks = head * Rotation.from_euler("ZY", [21.0, -12.0], degrees=True)

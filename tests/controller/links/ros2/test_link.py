@@ -185,7 +185,7 @@ def test_what_topics_ask_shows(ends: tuple[Near, Far]) -> None:
     tongue = P.index("tongueOut")
     far.say_until("/maple/joint_commands", "sensor_msgs/msg/JointState", joints,
                   lambda: abs(near.values[YAW] - 0.5) < 0.02 and abs(near.values[tongue] - 0.4) < 0.02)  # fmt: skip
-    assert any("'wheel' is no joint" in reason for reason in near.link.report()["refused"])
+    assert any("'wheel' is neither a joint" in reason for reason in near.link.report()["refused"])
     units = {"intensity": [0.0] * UNITS, "confidence": [1.0] * UNITS}
     units["intensity"][12] = 1.0
     smile = P.index("mouthSmileLeft")
@@ -272,9 +272,9 @@ def test_what_cannot_be_used_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("keys", "why"),
     [
-        ({"node": "my node"}, "is no name in ROS"),
-        ({"namespace": "maple"}, "is none in ROS"),
-        ({"connect": "127.0.0.1"}, "is no endpoint"),
+        ({"node": "my node"}, "is not a valid ROS name"),
+        ({"namespace": "maple"}, "is not valid in ROS"),
+        ({"connect": "127.0.0.1"}, "is not an endpoint"),
         ({"domain": 500}, "232"),
         ({"distribution": "foxy"}, "jazzy"),
     ],
@@ -292,7 +292,7 @@ def test_the_domain_of_the_environment_counts(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setenv("ROS_DOMAIN_ID", "42")
     assert Ros2Settings().domain_id == 42 and Ros2Settings(domain=3).domain_id == 3
     monkeypatch.setenv("ROS_DOMAIN_ID", "many")
-    with pytest.raises(ValueError, match="ROS_DOMAIN_ID='many' is no domain"):
+    with pytest.raises(ValueError, match="ROS_DOMAIN_ID='many' is not a domain"):
         Ros2Settings().check()
 
 

@@ -98,7 +98,7 @@ def test_a_face_is_published_in_all_its_forms(joints: HeadJoints) -> None:
     rig = Rig(joints)
     shown = rig.show(jawOpen=0.5, headYaw=0.5, mouthSmileLeft=0.8, mouthSmileRight=0.8, cheekSquintLeft=0.6,
                      cheekSquintRight=0.6)  # fmt: skip
-    rig.publishing._turn(100.0)
+    rig.publishing._publish_all(100.0)
     parameters = rig.last("parameters")
     np.testing.assert_array_equal(parameters.data, shown)
     (dimension,) = parameters.layout.dim
@@ -119,29 +119,29 @@ def test_a_face_is_published_in_all_its_forms(joints: HeadJoints) -> None:
 def test_frames_hang_from_each_other_under_the_prefix(joints: HeadJoints) -> None:
     rig = Rig(joints)
     shown = rig.show(headYaw=0.5, leftEyePitch=-0.5)
-    rig.publishing._turn(100.0)
+    rig.publishing._publish_all(100.0)
     for found, wanted in zip(rig.last("/tf").transforms, joints.frames(shown), strict=True):
         assert found.header.frame_id == f"maple/{wanted.parent}" and found.child_frame_id == f"maple/{wanted.name}"
         assert found.header.stamp.sec == 12
         at, turn = found.transform.translation, found.transform.rotation
-        np.testing.assert_allclose([at.x, at.y, at.z], wanted.at_m)
-        np.testing.assert_allclose([turn.x, turn.y, turn.z, turn.w], wanted.turn)
+        np.testing.assert_allclose([at.x, at.y, at.z], wanted.position_m)
+        np.testing.assert_allclose([turn.x, turn.y, turn.z, turn.w], wanted.rotation)
 
 
 def test_a_message_keeps_its_values_while_the_face_goes_on() -> None:
     rig = Rig(None)
     kept = list[np.ndarray]()
     rig.node.topics["parameters"].publish = lambda layout, data: kept.append(data)  # type: ignore[method-assign]
-    rig.publishing._turn(100.0)
+    rig.publishing._publish_all(100.0)
     rig.show(jawOpen=1.0)
-    rig.publishing._turn(100.1)
+    rig.publishing._publish_all(100.1)
     assert kept[0][P.index("jawOpen")] == 0.0 < kept[1][P.index("jawOpen")]
 
 
 def test_diagnostics_come_once_a_second() -> None:
     rig = Rig(None)
     for now_s in (100.0, 100.1, 100.99, 101.0, 101.5, 102.01):
-        rig.publishing._turn(now_s)
+        rig.publishing._publish_all(now_s)
     assert rig.node.topics["/diagnostics"].sent == 3 and rig.node.topics["parameters"].sent == 6
     assert rig.publishing.sent == 3 + 3 * 6
 
@@ -157,7 +157,7 @@ def test_diagnostics_say_how_the_face_and_every_servo_and_link_are() -> None:
         {"name": "jaw", "position_deg": 3.5, "error": "overload", "history": [1, 2]}, {"channel": "lid", "error": ""},
     ]  # fmt: skip
     rig.state.link_records = lambda: [{"port": "/dev/ttyUSB0", "error": "unplugged"}, {"kind": "vmc"}]
-    rig.publishing._turn(100.0)
+    rig.publishing._publish_all(100.0)
     message = rig.last("/diagnostics")
     assert [(each.name.removeprefix("/maple/omote: "), level_of(each), each.message) for each in message.status] == [
         ("face", 0, "OK"), ("servo jaw", 2, "overload"), ("servo lid", 0, "OK"),
@@ -167,7 +167,7 @@ def test_diagnostics_say_how_the_face_and_every_servo_and_link_are() -> None:
     pairs = {pair.key: pair.value for pair in message.status[1].values}
     assert pairs == {"name": "jaw", "position_deg": "3.5", "error": "overload"}  # lists are left out
     rig.state.stop_latch.stop("somebody", 1)
-    rig.publishing._turn(102.0)
+    rig.publishing._publish_all(102.0)
     stopped = rig.last("/diagnostics").status[0]
     assert stopped.message == "stopped by somebody" and level_of(stopped) == 1
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from controller.links.websocket.faults import id_of, what_is_wrong
+from controller.links.websocket.faults import explain, id_of
 from controller.links.websocket.messages import REQUESTS
 
 SET = {"type": "set", "parameters": {"jawOpen": 0.5}}
@@ -17,7 +17,7 @@ SET = {"type": "set", "parameters": {"jawOpen": 0.5}}
 def fault(text: str | dict[str, Any]) -> str:
     with pytest.raises(ValidationError) as caught:
         REQUESTS.validate_json(text if isinstance(text, str) else json.dumps(text))
-    said, hint = what_is_wrong(caught.value)
+    said, hint = explain(caught.value)
     assert hint == 'write it as {"type": "set", "parameters": {"jawOpen": 0.5}}' and "\n" not in said
     return said
 

@@ -24,9 +24,9 @@ def test_the_address_and_when_a_token_is_needed() -> None:
 @pytest.mark.parametrize(
     ("keys", "part"),
     [
-        ({"listen": "8765"}, "is no address"),
-        ({"listen": "127.0.0.1:99999"}, "is no address"),
-        ({"listen": "127.0.0.1:"}, "is no address"),
+        ({"listen": "8765"}, "is not an address"),
+        ({"listen": "127.0.0.1:99999"}, "is not an address"),
+        ({"listen": "127.0.0.1:"}, "is not an address"),
         ({"listen": "0.0.0.0:8765"}, "open_to_network = true allows it"),
         ({"listen": "robot.local:8765"}, "open_to_network = true allows it"),
         ({"token": "short"}, "at least 12 characters"),

@@ -127,7 +127,7 @@ def test_messages_that_have_no_answer_take_no_place_of_one_that_has(far: tuple[C
     """Many may be read in one go, before anything is sent."""
     state, link, _ = far
     client = server._Client(SimpleNamespace(remote_address=("127.0.0.1", 9)), state, 0, link._meter)  # type: ignore[arg-type]
-    for _ in range(server._WAITING):
+    for _ in range(server._MAX_WAITING):
         client._take('{"type": "neutral"}')
     client._take('{"type": "stop", "id": 1}')
     answers = [client._waiting.get_nowait() for _ in range(client._waiting.qsize())]

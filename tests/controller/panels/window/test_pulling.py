@@ -61,7 +61,7 @@ def pull(hands: Hands, vertex: int, by: tuple[float, float], still: float = 0.02
     for _ in range(400):
         yield from hands.frames(6)
         after = skin(hands)
-        if np.abs(after - before).max() < still and not hands.face._mouse.editor._asked:
+        if np.abs(after - before).max() < still and not hands.face._mouse.editor._pending:
             break
         before = after
     hands.report["left_mm"] = left_mm(hands, vertex, goal)

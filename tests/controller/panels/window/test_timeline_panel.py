@@ -200,7 +200,7 @@ def test_a_show_is_saved_with_its_sound_and_loaded_again(desk: Desk, tmp_path: P
     assert desk.commands.now.timeline == kept
     desk.commands.undo()
     assert desk.commands.now.timeline == Timeline()
-    with pytest.raises(ParameterError, match="lies beside it"):
+    with pytest.raises(ParameterError, match="must be in its folder"):
         save_show(tmp_path / "below" / "show.toml", kept, PARAMETERS)
     panel._name = "nothing"
     with pytest.raises(ParameterError, match="no show or take of this name"):

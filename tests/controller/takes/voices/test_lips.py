@@ -86,7 +86,7 @@ def test_shares_sum_to_one_whatever_is_heard() -> None:
     random = np.random.default_rng(0)
     levels = random.uniform(-150, 30, (100, BANDS))
     found = features(levels, random.uniform(-60, 10, 100 - BEFORE - AHEAD))
-    shares = lip_model().judge(found)
+    shares = lip_model().classify(found)
     assert found.shape == (100 - BEFORE - AHEAD, INPUTS) and found.min() >= 0.0 and found.max() <= 1.2
     np.testing.assert_allclose(shares.sum(axis=1), 1.0)
     assert shares.min() >= 0.0 and set(lip_model().visemes) == set(Visemes.load(P).names)

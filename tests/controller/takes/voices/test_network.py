@@ -13,7 +13,7 @@ import pytest
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
 from controller.takes.voices import network
-from controller.takes.voices.network import Network, network_take, resampled
+from controller.takes.voices.network import Network, network_take, resample
 from controller.tools.motion_file import convert
 from surface.base.errors import MissingPackage
 
@@ -111,11 +111,11 @@ def test_a_model_for_another_rate_gets_that_rate(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("rate", "wanted"), [(44_100, 16_000), (8_000, 16_000), (48_000, 16_000)])
 def test_tones_keep_their_pitch_and_those_too_high_vanish(rate: int, wanted: int) -> None:
-    low = resampled(np.sin(2 * np.pi * 440 * np.arange(rate) / rate), rate, wanted)
+    low = resample(np.sin(2 * np.pi * 440 * np.arange(rate) / rate), rate, wanted)
     assert len(low) == wanted
     np.testing.assert_allclose(low[200:-200], np.sin(2 * np.pi * 440 * np.arange(wanted) / wanted)[200:-200], atol=0.01)
     if rate > wanted:
-        high = resampled(np.sin(2 * np.pi * 11_000 * np.arange(rate) / rate), rate, wanted)
+        high = resample(np.sin(2 * np.pi * 11_000 * np.arange(rate) / rate), rate, wanted)
         assert np.abs(high[200:-200]).max() < 0.02
 
 
@@ -140,7 +140,7 @@ def test_a_network_of_another_sort_is_told(tmp_path: Path, said: dict[str, str],
 
 def test_what_is_no_network_is_told(tmp_path: Path) -> None:
     (tmp_path / "m.onnx").write_bytes(b"nothing of the kind")
-    with pytest.raises(TakeError, match=r"m\.onnx: no network in ONNX"):
+    with pytest.raises(TakeError, match=r"m\.onnx: not an ONNX network"):
         Network(tmp_path / "m.onnx", P)
     with pytest.raises(TakeError, match="cannot be read"):
         Network(tmp_path / "none.onnx", P)
