@@ -78,7 +78,7 @@ class BusSettings(Settings):
         settings = FAMILIES.get(self.family).settings
         check = getattr(settings, "check", None)
         if check is not None:
-            with FAMILIES.blaming(self.family):
+            with FAMILIES.naming_package(self.family):
                 check(to_options(self, settings), self.rate_hz)
         return self
 

@@ -77,5 +77,5 @@ def listed() -> Iterator[Listed]:
             except PluginError as error:
                 yield Listed(sort, kind, str(error), package, False, error.hint)
         for kind, package in registry.shadowed():
-            why = f"{registry.what} {kind!r} of the package {package} is never used: omote has that kind itself"
+            why = f"{registry.noun} {kind!r} of the package {package} is never used: omote has that kind itself"
             yield Listed(sort, kind, why, package, False, f"pip uninstall {package}, or give it another kind")

@@ -108,7 +108,7 @@ class BoardBus(WireBus):
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
         """The configured channels and whether they get pulses; what is connected to them is unknown."""
-        with self._losing():
+        with self._detecting_loss():
             present = self._begin()
         return [
             ServoInfo(servo.id, 0, servo.model, 0, torque=bool(on) if self.tells_torque else None)
