@@ -23,7 +23,7 @@ from controller.robot.terms import curve_corners
 from drivers.base.bus import ServoSpec
 
 if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
+    from controller.robot.anchors import AnchorSolver  # imported lazily: it loads the head
 
 _AT_LIMIT_RAD = 1e-9  # rounding of degrees
 _STEP, _DRAWN, _SEED = 1e-4, 16, 5

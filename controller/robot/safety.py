@@ -24,7 +24,7 @@ from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, Ru
 from drivers.base.bus import BusState
 
 if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
+    from controller.robot.anchors import AnchorSolver  # imported lazily: it loads the head
 
 _NEAR_RAD = 1e-3
 

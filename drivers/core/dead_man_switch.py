@@ -73,7 +73,7 @@ class DeadManSwitch:
         if self._process.stdin is not None and not self._process.stdin.closed:
             self._send("bye")
             _close(self._process.stdin)
-        import subprocess  # start-up: the process itself does without
+        import subprocess  # imported lazily: the child process does not need it
 
         try:
             self._process.wait(timeout=_END_S)
@@ -106,7 +106,7 @@ class DeadManSwitch:
 
 def _start() -> subprocess.Popen[bytes]:
     """Start the process; its standard error is the program's own."""
-    import subprocess  # the process itself does without
+    import subprocess  # imported lazily: the child process does not need it
 
     return subprocess.Popen(
         command(_MODULE, str(os.getpid()), bare=True),
@@ -119,7 +119,7 @@ def _start() -> subprocess.Popen[bytes]:
 
 
 def _not_ready(path: str, why: str) -> Exception:
-    from drivers.base.errors import DriverError  # start-up: the process itself loads it when it is ready
+    from drivers.base.errors import DriverError  # imported lazily: the child process must be ready early
 
     return DriverError(
         f"no process waits to switch the servos on {path} off if this program is killed: {why}",
@@ -195,7 +195,7 @@ def dry_run(path: str, baud: int, frames: Iterable[str]) -> None:
     try:
         far, near = os.openpty()
     except OSError:  # a system without them: loading is all that can be done
-        from drivers.port.serialport import SerialPort  # start-up: see switch_off
+        from drivers.port.serialport import SerialPort  # imported lazily: see switch_off
 
         SerialPort(path, baud)
         return
@@ -209,7 +209,7 @@ def dry_run(path: str, baud: int, frames: Iterable[str]) -> None:
 
 def _load_scheme(scheme: str) -> None:
     """Import what pyserial and the system import only when a network port is opened."""
-    from importlib import import_module  # start-up: few ports are in the network
+    from importlib import import_module  # imported lazily: only for network ports
 
     "localhost".encode("idna")
     if scheme != "socket":
@@ -218,7 +218,7 @@ def _load_scheme(scheme: str) -> None:
 
 def switch_off(path: str, baud: int, frames: Iterable[str], repeats: int = REPEATS) -> bool:
     """Send packets (hexadecimal) on a port several times; False where the port cannot be opened."""
-    # start-up: the parent waits until these are loaded
+    # imported lazily: the parent waits until these are loaded
     from drivers.base.errors import PortBusy, PortError
     from drivers.port.serialport import SerialPort
 

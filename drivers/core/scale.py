@@ -26,7 +26,7 @@ class Scale:
     """
 
     def __init__(self, servos: Sequence[ServoSpec], tables: Sequence[ControlTable]) -> None:
-        from drivers.core.kernels import to_si, to_steps  # start-up: compiled, imported only where servos are driven
+        from drivers.core.kernels import to_si, to_steps  # imported lazily: compiled, for driving only
 
         self._to_steps, self._to_si = to_steps, to_si
         sign = [-1.0 if servo.reverse else 1.0 for servo in servos]

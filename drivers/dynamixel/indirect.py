@@ -1,8 +1,8 @@
 """Indirect addressing of Dynamixel servos: registers that lie apart are mapped side by side and read as one block.
 
-A servo has pointers (the registers Indirect Address); reading the register Indirect Data of a pointer reads the register
-that it points at. The addresses of both depend on model and firmware. X-series servos keep their pointers in RAM and
-lose them in a reboot. P- and Y-series keep them in permanent memory, which is not written.
+A servo has pointers (the registers Indirect Address); reading the register Indirect Data of a pointer reads the
+register that it points at. The addresses of both depend on model and firmware. X-series servos keep their pointers in
+RAM and lose them in a reboot. P- and Y-series keep them in permanent memory, which is not written.
 """
 
 from __future__ import annotations

@@ -14,7 +14,7 @@ from drivers.base.errors import NoReply, ServoRefused
 from drivers.packets.packet1 import Error1, Packet1
 from drivers.protocol1.registers import Registers
 from drivers.servos import startup
-from drivers.servos.registers import TRIES
+from drivers.servos.registers import MAX_TRIES
 from drivers.tables.tables import ControlTable, known_models
 
 EEPROM_TRIES = 10
@@ -91,7 +91,7 @@ class Startup(startup.Startup[Packet1]):
         return reply
 
     def _release(self, servo: int) -> None:
-        self._write_until_kept(servo, "torque", 0, TRIES)
+        self._write_until_kept(servo, "torque", 0, MAX_TRIES)
 
     def _slack(self, turn: int) -> float:
         return OUT_OF_TURN_FRACTION * turn
@@ -167,18 +167,18 @@ class Startup(startup.Startup[Packet1]):
             name, value = next(iter(differing.items()))
             if held:
                 raise self.locked(servo, name, present[name], value)
-            self._write_until_kept(servo, "torque", 0, TRIES)
+            self._write_until_kept(servo, "torque", 0, MAX_TRIES)
         try:
             for name, value in differing.items():
                 if feetech:
-                    self._write_until_kept(servo, "lock", 0, TRIES)
+                    self._write_until_kept(servo, "lock", 0, MAX_TRIES)
                 self._write_until_kept(servo, name, value, EEPROM_TRIES)
                 self.note(servo, name, present[name], value)
         finally:
             if feetech:  # a damaged packet could change the id and limits of an unlocked servo
                 registers.put_unanswered(servo, "lock", 1)
         if feetech and registers.get(servo, "lock") != 1:
-            self._write_until_kept(servo, "lock", 1, TRIES)
+            self._write_until_kept(servo, "lock", 1, MAX_TRIES)
 
     def _wanted(self, servo: int) -> dict[str, int]:
         """Values that permanent registers must have, by short name."""
