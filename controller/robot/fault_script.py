@@ -1,4 +1,4 @@
-"""Reads timelines of faults, which ``omote simulate --script FILE`` plays."""
+"""Reads fault scripts: timelines of faults that ``omote simulate --script FILE`` applies to a simulated bus."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ class FaultScript(Settings):
 
 
 def load_fault_script(path: Path) -> Timeline:
-    """The timeline of a file. Raises ConfigError: it cannot be read, or is wrong; every fault with its place."""
+    """Read the timeline of a file. Raises ConfigError, which lists every error, where it cannot be read or is wrong."""
     file = load(path, FaultScript, lambda file: _steps(file)[1])
     return Timeline(_steps(file)[0], file.loop_s)
 
 
 def _steps(file: FaultScript) -> tuple[list[tuple[float, str]], list[str]]:
-    """The steps of a file, and what is wrong with the others."""
+    """Return the valid steps of a file, and error messages for the others."""
     steps: list[tuple[float, str]] = []
     faults = []
     for i, text in enumerate(file.timeline):
@@ -58,7 +58,7 @@ def _step(text: str, earliest_s: float) -> tuple[float, str]:
 
 
 def _check_command(words: list[str]) -> None:
-    """Raises DriverError or ValueError for what is no command of a timeline."""
+    """Raise DriverError or ValueError unless the words are a command of a timeline."""
     match words:
         case ["fault", _, *_]:
             for spec in words[1:]:
