@@ -11,9 +11,9 @@ from controller.base.config import Number, Settings, load
 from controller.base.plain_numbers import plain_number
 from drivers.base.errors import DriverError
 from drivers.sim.serving.timeline import Timeline
-from drivers.sim.wire.faults import KINDS, LONGEST, parse_fault
+from drivers.sim.wire.faults import KINDS, MAX_VALUE, parse_fault
 
-MOST_STEPS = 10_000
+MAX_STEPS = 10_000
 _Seconds = Annotated[Number, Field(ge=0, le=86_400)]
 
 
@@ -23,7 +23,7 @@ class FaultScript(Settings):
     name: str | None = None
     description: str = ""
     loop_s: _Seconds = 0.0
-    timeline: Annotated[list[str], Field(max_length=MOST_STEPS)]
+    timeline: Annotated[list[str], Field(max_length=MAX_STEPS)]
 
 
 def load_fault_script(path: Path) -> Timeline:
@@ -70,7 +70,7 @@ def _check_command(words: list[str]) -> None:
         case ["clear", kind]:
             raise ValueError(f"there is no fault {kind!r}; there are {', '.join(sorted(KINDS))}")
         case ["place", number, ticks] if number.isdecimal() and ticks.removeprefix("-").isdecimal():
-            if not abs(int(ticks)) <= LONGEST:
-                raise ValueError(f"positions go from {-LONGEST:.0f} to {LONGEST:.0f} steps")
+            if not abs(int(ticks)) <= MAX_VALUE:
+                raise ValueError(f"positions go from {-MAX_VALUE:.0f} to {MAX_VALUE:.0f} steps")
         case _:
             raise ValueError("write fault SPEC, clear KIND or place ID TICKS after the time")

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 READY_S = 15.0
 """Time limit for the process to get ready; it takes a tenth of a second, more on a busy computer."""
-LOOK_S = 0.25
-"""Interval of checking the parent process, for a pipe that other processes hold open."""
-BUSY_S = 0.3
-"""Time in which a dying program closes its port; afterwards the port is in use by another one."""
+CHECK_INTERVAL_S = 0.25
+"""Interval of checking the parent process, in case another process holds the pipe open."""
+PORT_WAIT_S = 0.3
+"""Time in which a dying program closes its port; if the port is still busy then, another program uses it."""
 REPEATS = 5
 PAUSE_S = 0.02
 _END_S = 2.0
@@ -81,7 +81,7 @@ class DeadManSwitch:
             self._kill()
 
     def _why_not_ready(self, ready_s: float) -> str:
-        """Wait for the answer of the process; empty when it is ready."""
+        """Wait for the answer of the process; return why it is not ready, empty when it is."""
         pipe, deadline_s = self._process.stdout, time.monotonic() + ready_s
         answer = None if pipe is None else _read_line(pipe.fileno(), deadline_s)
         if answer is None:
@@ -174,10 +174,10 @@ def watch(source: int, answer: int, parent: int) -> bool:
 
 
 def _parent_died(source: int, parent: int) -> bool:
-    """Wait for the end of a descriptor or of the parent; False where the parent sent ``bye`` first."""
+    """Wait for the end of a descriptor or of the parent; return False where the parent sent ``bye`` first."""
     data = b""
     while True:
-        ready, _, _ = select.select([source], [], [], LOOK_S)
+        ready, _, _ = select.select([source], [], [], CHECK_INTERVAL_S)
         if ready:
             part = os.read(source, 4096)
             data += part
@@ -222,7 +222,7 @@ def switch_off(path: str, baud: int, frames: Iterable[str], repeats: int = REPEA
     from drivers.base.errors import PortBusy, PortError
     from drivers.port.serialport import SerialPort
 
-    port, deadline_s = SerialPort(path, baud), time.monotonic() + BUSY_S
+    port, deadline_s = SerialPort(path, baud), time.monotonic() + PORT_WAIT_S
     while not port.is_open:
         try:
             port.open()
