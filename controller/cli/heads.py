@@ -410,7 +410,7 @@ def export(
         pose = {name: float(value) for name, value in values if value and name in loaded.parameters}
         added = added_exporters()
         kind = next((each.kind for each in added if out.suffix.lower() in each.suffixes), "")
-        with EXPORTERS.blaming(kind):
+        with EXPORTERS.naming_package(kind):
             if robot is None:
                 written = export_head(
                     loaded, out, pose, added, frame, _animation(take, rate_hz, loaded, still.parameters), web

@@ -1,8 +1,8 @@
 """Benchmark of ``omote bench bus --buses N``: several buses at once in one process, as ``omote run`` drives them.
 
-Each bus has a thread and simulated servos in a process of its own, with the time of the bytes on its wire, so each has
-its own limit. Beside the rates it tells the processor time of a cycle, and what the drivers reach where each has a
-process of its own: the difference is what their common interpreter costs.
+Each bus has a thread here and its simulated servos in a separate process that imitates the time of bytes on the wire,
+so that each bus has its own limit. It also reports the processor time of a cycle, and the rates of drivers that each
+have a process: the difference is the cost of sharing one interpreter.
 """
 
 from __future__ import annotations
@@ -36,18 +36,18 @@ from drivers.base.priority import request_realtime, shorten_thread_switches
 from drivers.sim import SimulatedBus
 
 PACED_HZ = 100.0
-PACED_SHARE = 0.99
-TOGETHER_S = 60.0
-"""Longest time in which all buses must be ready to begin together."""
-PROCESS_S = 120.0
-"""How much longer than it measures a process may take, most of it to start."""
+MIN_PACED_FRACTION = 0.99
+MAX_READY_S = 60.0
+"""Longest time until all buses are ready to begin together."""
+MAX_PROCESS_S = 120.0
+"""Time that a process may take beyond its measurement, mostly to start."""
 _OTHER_FAILED = "another bus failed"
 Drive = Callable[[str], AbstractContextManager[Cycle]]
-"""Opens the bus at a path; gives what a cycle of it does."""
+"""Opens the bus at a path; the context gives the function of one cycle."""
 
 
 def bench_many(buses: int, servos: int, baud: int, seconds: float, log: Log) -> list[tuple[str, list[Figure]]]:
-    """Rates of buses that run at once: as fast as each can, beside the same bytes without a driver, and at 100 Hz.
+    """Measure buses that run at once: as fast as each can, the same bytes without a driver, and at 100 Hz.
 
     buses, servos : how many buses, and servos on each. baud : of every bus. seconds : for each measurement.
     """
@@ -62,18 +62,18 @@ def bench_many(buses: int, servos: int, baud: int, seconds: float, log: Log) -> 
             kind = "fast sync read" if fast else "sync read"
             log(f"{buses} buses at once, {kind}, as fast as they can")
             used_s = [wire.processor_s or 0.0 for wire in wires]
-            free = _at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0)
+            free = _measure_at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0)
             used_s = [(wire.processor_s or 0.0) - before for wire, before in zip(wires, used_s, strict=True)]
             log(f"{buses} buses at once, {kind}, the same bytes without a driver")
-            alone = _at_once(paths, partial(bytes_alone, servos=servos, baud=baud, fast=fast), seconds, 0.0)
+            alone = _measure_at_once(paths, partial(bytes_alone, servos=servos, baud=baud, fast=fast), seconds, 0.0)
             log(f"{buses} buses at once, {kind}, each driven from a process of its own")
-            apart = _at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0, processes=True)
+            apart = _measure_at_once(paths, partial(_driver, specs, baud, fast), seconds, 0.0, processes=True)
             figures += _free_figures(kind, limit_hz(servos, baud, fast), MIN_WIRE_FRACTIONS[fast], free, alone)
             simulated = 1e6 * sum(used_s) / sum(loop.rate_hz * seconds + WARM_UP_CYCLES for loop in free)
             figures += _cost_figures(kind, limit_hz(servos, baud, fast), free, alone, apart)
             figures.append(Figure("  simulated servos, processor of a cycle", simulated, "us"))
         log(f"{buses} buses at once, {PACED_HZ:g} Hz")
-        figures += _paced_figures(_at_once(paths, partial(_driver, specs, baud, True), seconds, PACED_HZ))
+        figures += _paced_figures(_measure_at_once(paths, partial(_driver, specs, baud, True), seconds, PACED_HZ))
     return [(f"{buses} buses of {servos} servos at {baud} baud, wire-timed", figures + steal_figures(steal))]
 
 
@@ -86,24 +86,30 @@ def _free_figures(kind: str, limit: float, share: float, free: list[Loop], alone
 
 
 def _cost_figures(kind: str, limit: float, free: list[Loop], alone: list[Loop], apart: list[Loop]) -> Iterator[Figure]:
-    """What the rates cost, and where they are lost."""
+    """Yield the processor time of a cycle, and typical rates with and without drivers and separate processes."""
     driven, bare = (1e6 * sum(loop.processor for loop in loops) / sum(loop.rate_hz for loop in loops)
         for loops in (free, alone))  # fmt: skip
     yield Figure(f"{kind}, processor of a cycle", driven, "us")
     yield Figure("  the same bytes without a driver", bare, "us")
-    typical = [1e3 / limit / _middle([loop.cycle_ms["p50"] for loop in loops]) for loops in (free, apart, alone)]
+    typical = [1e3 / limit / _median([loop.cycle_ms["p50"] for loop in loops]) for loops in (free, apart, alone)]
     names = ("half of all cycles, of the wire limit", "  each driven from a process of its own", "  without a driver")
     yield from (Figure(name, 100 * share, "%") for name, share in zip(names, typical, strict=True))
 
 
-def _middle(values: list[float]) -> float:
+def _median(values: list[float]) -> float:
     return sorted(values)[len(values) // 2]
 
 
 def _paced_figures(paced: list[Loop]) -> Iterator[Figure]:
     for k, loop in enumerate(paced, 1):
         share = loop.rate_hz / PACED_HZ
-        yield Figure(f"bus {k}, at {PACED_HZ:g} Hz", 100 * share, "%", f">= {PACED_SHARE:.0%}", share >= PACED_SHARE)
+        yield Figure(
+            f"bus {k}, at {PACED_HZ:g} Hz",
+            100 * share,
+            "%",
+            f">= {MIN_PACED_FRACTION:.0%}",
+            share >= MIN_PACED_FRACTION,
+        )
         yield Figure(f"  bus {k}, tick late by, 99 of 100", loop.late_ms["p99"], "ms")
 
 
@@ -120,39 +126,40 @@ def _driver(specs: list[ServoSpec], baud: int, fast: bool, path: str) -> Iterato
         yield cycle
 
 
-def _in_a_process(opened: Drive, path: str, seconds: float, rate_hz: float, together: Any, answers: Any) -> None:
-    """A loop of one bus in a process of its own; answers with it, or with what went wrong as text."""
+def _run_process(opened: Drive, path: str, seconds: float, rate_hz: float, together: Any, answers: Any) -> None:
+    """Measure one bus, in a separate process; send the result, or an error as text."""
     shorten_thread_switches()
     request_realtime()
     try:
         with opened(path) as cycle:
-            together.wait(timeout=TOGETHER_S)
+            together.wait(timeout=MAX_READY_S)
             loop = measure_loop(cycle, seconds, rate_hz)
     except threading.BrokenBarrierError:
         answers.send(_OTHER_FAILED)
-    except Exception as error:  # noqa: BLE001  whatever it is, the parent says it
+    except Exception as error:  # noqa: BLE001  the parent reports any error
         together.abort()
-        answers.send(_why(error))
+        answers.send(_describe(error))
     else:
         answers.send(loop)
 
 
-def _apart(paths: list[str], opened: Drive, seconds: float, rate_hz: float) -> list[Loop]:
-    """A loop of every bus, all in processes that begin together; raises as `_at_once`."""
+def _measure_in_processes(paths: list[str], opened: Drive, seconds: float, rate_hz: float) -> list[Loop]:
+    """Measure every bus in its own process, all at once; raises as `_measure_at_once`."""
     context = multiprocessing.get_context("spawn")
     together = context.Barrier(len(paths))
     pipes = [context.Pipe(duplex=False) for _ in paths]
     processes = [
-        context.Process(target=_in_a_process, args=(opened, path, seconds, rate_hz, together, answers), daemon=True)
+        context.Process(target=_run_process, args=(opened, path, seconds, rate_hz, together, answers), daemon=True)
         for path, (_, answers) in zip(paths, pipes, strict=True)
     ]
     try:
         for process, (_, answers) in zip(processes, pipes, strict=True):
             process.start()
             answers.close()  # so that the end of the process is the end of the pipe
-        end_s = time.monotonic() + seconds + PROCESS_S
+        end_s = time.monotonic() + seconds + MAX_PROCESS_S
         found = [
-            _answer(answer, process, together, end_s) for (answer, _), process in zip(pipes, processes, strict=True)
+            _receive_result(answer, process, together, end_s)
+            for (answer, _), process in zip(pipes, processes, strict=True)
         ]
     finally:
         for process in [each for each in processes if each.pid]:
@@ -161,8 +168,8 @@ def _apart(paths: list[str], opened: Drive, seconds: float, rate_hz: float) -> l
     return _all_loops(paths, found)
 
 
-def _answer(answer: Any, process: Any, together: Any, end_s: float) -> Loop | str:
-    """The loop of a process, or why there is none."""
+def _receive_result(answer: Any, process: Any, together: Any, end_s: float) -> Loop | str:
+    """Receive the result of a process, or return as text why there is none."""
     try:
         if answer.poll(max(end_s - time.monotonic(), 0.0)):
             found: Loop | str = answer.recv()
@@ -172,32 +179,34 @@ def _answer(answer: Any, process: Any, together: Any, end_s: float) -> Loop | st
         process.join()
         return f"its process ended with status {process.exitcode} before it had measured anything"
     together.abort()
-    return f"its process did not answer within {PROCESS_S:g} s of the end of its time"
+    return f"its process did not answer within {MAX_PROCESS_S:g} s of the end of its time"
 
 
-def _why(error: Exception) -> str:
-    """What to say of an error."""
+def _describe(error: Exception) -> str:
+    """Describe an error as text."""
     return str(error) if isinstance(error, DriverError) else f"{type(error).__name__}: {error}"
 
 
 def _all_loops(paths: list[str], found: list[Loop | str]) -> list[Loop]:
-    """The loops of all buses; raises ControllerError where one has none."""
+    """Return the results of all buses; raises ControllerError where one is missing."""
     failed = [f"bus {k} on {path}: {each}" for k, (path, each) in enumerate(zip(paths, found, strict=True), 1)
               if isinstance(each, str) and each != _OTHER_FAILED]  # fmt: skip
     loops = [each for each in found if isinstance(each, Loop)]
     if len(loops) < len(paths):
         hint = "close other programs, or measure fewer buses: --buses 2"
-        raise ControllerError("; ".join(failed) or f"buses did not begin within {TOGETHER_S:g} s", hint=hint)
+        raise ControllerError("; ".join(failed) or f"buses did not begin within {MAX_READY_S:g} s", hint=hint)
     return loops
 
 
-def _at_once(paths: list[str], opened: Drive, seconds: float, rate_hz: float, *, processes: bool = False) -> list[Loop]:
-    """A loop of every bus, all in threads that begin together. Raises ControllerError that names those that failed.
+def _measure_at_once(
+    paths: list[str], opened: Drive, seconds: float, rate_hz: float, *, processes: bool = False
+) -> list[Loop]:
+    """Measure every bus in its own thread, all at once. Raises ControllerError, which names buses that failed.
 
-    processes : in processes instead.
+    processes : use processes instead of threads.
     """
     if processes:
-        return _apart(paths, opened, seconds, rate_hz)
+        return _measure_in_processes(paths, opened, seconds, rate_hz)
     found: list[Loop | str] = [_OTHER_FAILED] * len(paths)
     together = threading.Barrier(len(paths))
 
@@ -205,13 +214,13 @@ def _at_once(paths: list[str], opened: Drive, seconds: float, rate_hz: float, *,
         try:
             request_realtime()
             with opened(path) as cycle:
-                together.wait(timeout=TOGETHER_S)
+                together.wait(timeout=MAX_READY_S)
                 found[k] = measure_loop(cycle, seconds, rate_hz)
         except threading.BrokenBarrierError:
-            pass  # found says so already
-        except Exception as error:  # noqa: BLE001  said by the caller
+            pass  # `found` holds _OTHER_FAILED
+        except Exception as error:  # noqa: BLE001  the caller reports any error
             together.abort()
-            found[k] = _why(error)
+            found[k] = _describe(error)
 
     threads = [threading.Thread(target=drive, args=(k, path)) for k, path in enumerate(paths)]
     for thread in threads:

@@ -26,17 +26,17 @@ from drivers.servos.bus import ServoBus
 from drivers.tables.tables import FEETECH, load_table
 
 RATES_HZ = (50.0, 100.0)
-REQUIRED_SHARE = 0.99
-"""Share of the reads in which every servo must answer for a rate to count as reached."""
+REQUIRED_FRACTION = 0.99
+"""Fraction of the reads in which every servo must answer for a rate to count as reached."""
 PINGS = 100
 _REQUEST_2, _REPLY_2, _JOINT_2, _JOINT_EACH_2 = 14, 15, 8, 8
 """Bytes of a request, of one reply, of a joint reply, and of each servo in a joint reply (Protocol 2.0)."""
 
 
 def find_servos(port: str, baud: int, protocols: Sequence[int]) -> list[ServoInfo]:
-    """Servos of known models that answer on a port, in the first protocol in which any do.
+    """Return the servos of known models that answer on a port, in the first protocol in which any do.
 
-    Raises PortError; NoReply: there is none.
+    Raises PortError; NoReply where no servo answers.
     """
     for protocol in protocols:
         found = [item.servo for item in scan_port(port, [(protocol, baud)]) if item.servo]
@@ -56,7 +56,7 @@ def _is_known(info: ServoInfo) -> bool:
 def bench_real_bus(
     port: str, baud: int, seconds: float, log: Log, protocols: Sequence[int] = (2, 1)
 ) -> list[tuple[str, list[Figure]]]:
-    """Titled tables of round trips and read rates of the servos on a port; each rate is measured for ``seconds``.
+    """Measure round trips and read rates of the servos on a port, each rate for ``seconds``; return titled tables.
 
     Raises PortError; NoReply where no servo answers.
     """
@@ -76,7 +76,7 @@ def bench_real_bus(
 
 
 def _read_modes(found: Sequence[ServoInfo]) -> list[tuple[bool, dict[str, Any]]]:
-    """For each way of reading that the servos have, whether it is a fast read, and the bus options that select it.
+    """Return for each way of reading that the servos support: whether it is a fast read, and the bus options for it.
 
     Fast reads need Protocol 2.0 and firmware that has them. With Protocol 1.0 every cycle reads all servos.
     """
@@ -87,7 +87,7 @@ def _read_modes(found: Sequence[ServoInfo]) -> list[tuple[bool, dict[str, Any]]]
 
 
 def _round_trips(bus: Bus) -> list[Figure]:
-    """Time of reading one servo after the other, and how much of it the adapter adds."""
+    """Measure the time of describing one servo after the other, and how much of it the adapter adds."""
     times = Samples()
     for k in range(PINGS):
         began = time.perf_counter()
@@ -102,28 +102,28 @@ def _round_trips(bus: Bus) -> list[Figure]:
         return figures
     message, hint = bus.slow_answers()
     note = f"{message}; try: {hint}" if message else "<= 5 ms"
-    late = Figure("an answer comes after its time on the wire by", 1e3 * bus.reply_delay_s, "ms", note, not message)
-    return [*figures, late]
+    delay = Figure("an answer comes after its time on the wire by", 1e3 * bus.reply_delay_s, "ms", note, not message)
+    return [*figures, delay]
 
 
 def _rates(bus: Bus, baud: int, seconds: float, fast: bool, log: Log) -> list[Figure]:
     name = f"{'fast ' if fast else ''}reads of all"
     log(f"{name}, as fast as possible")
-    free = _measured(bus, seconds, 0.0)
-    figures = [Figure(name, free.rate_hz, "Hz")]
+    unpaced = _measure(bus, seconds, 0.0)
+    figures = [Figure(name, unpaced.rate_hz, "Hz")]
     if limit := read_limit_hz([servo.model for servo in bus.servos], baud, fast):
-        figures.append(Figure("  of the wire limit", 100 * free.rate_hz / limit, "%", f"of {limit:.0f} Hz"))
-    figures.append(Figure("  one read, 99 of 100", free.cycle_ms["p99"], "ms"))
+        figures.append(Figure("  of the wire limit", 100 * unpaced.rate_hz / limit, "%", f"of {limit:.0f} Hz"))
+    figures.append(Figure("  one read, 99 of 100", unpaced.cycle_ms["p99"], "ms"))
     for rate in RATES_HZ:
         log(f"{name}, {rate:g} Hz")
-        paced = _measured(bus, seconds, rate)
+        paced = _measure(bus, seconds, rate)
         share = paced.rate_hz / rate
-        reach = f">= {REQUIRED_SHARE:.0%}"
-        figures.append(Figure(f"  complete at {rate:g} Hz", 100 * share, "%", reach, share >= REQUIRED_SHARE))
+        reach = f">= {REQUIRED_FRACTION:.0%}"
+        figures.append(Figure(f"  complete at {rate:g} Hz", 100 * share, "%", reach, share >= REQUIRED_FRACTION))
     return figures
 
 
-def _measured(bus: Bus, seconds: float, rate_hz: float) -> Loop:
+def _measure(bus: Bus, seconds: float, rate_hz: float) -> Loop:
     return measure_loop(partial(_read, bus.read), seconds, rate_hz)
 
 
@@ -132,7 +132,7 @@ def _read(read: Callable[[], BusState], _: object) -> bool:
 
 
 def read_limit_hz(models: Sequence[str], baud: int, fast: bool) -> float | None:
-    """How often a second the wire allows all positions to be read; None where servos are read one by one."""
+    """Reads of all positions per second that the wire allows; None where servos are read one by one."""
     n, tables = len(models), [load_table(model) for model in models]
     if all(table.protocol == 2 for table in tables):
         size = _REQUEST_2 + n + (_JOINT_2 + _JOINT_EACH_2 * n if fast else _REPLY_2 * n)

@@ -1,4 +1,4 @@
-"""Gives tools the port of a robot's bus, to be opened one after the other; a simulated bus is served meanwhile."""
+"""Gives tools the port of a robot's bus, to be opened several times in turn; a simulated bus is served meanwhile."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from drivers.sim import SimulatedBus
 
 @dataclass(frozen=True)
 class BusPort:
-    """A bus that can be opened again and again.
+    """A bus that can be opened any number of times.
 
-    name : of the bus. family : of its servos. port : path or URL. baud : its rate. options : of the driver.
+    name : of the bus. family : of its servos. port : path or URL. baud : bits/s. options : of the driver.
     """
 
     name: str
@@ -28,11 +28,11 @@ class BusPort:
     options: dict[str, Any]
 
     def bus(self, servos: Sequence[ServoSpec], **changes: Any) -> Bus:
-        """A driver of some of its servos, closed."""
+        """Create a driver for some of its servos; its port is not open yet."""
         return open_bus(self.family, servos, port=self.port, baud=self.baud, **self.options | changes)
 
     def holding(self, servos: Sequence[ServoSpec]) -> list[str]:
-        """Names of servos that say that their torque is on; none of boards, which say nothing."""
+        """Read the names of servos that report that their torque is on; boards of hobby servos report none."""
         if FAMILIES.get(self.family).hobby:
             return []
         with self.bus(servos) as bus:
@@ -42,7 +42,7 @@ class BusPort:
 
 @contextmanager
 def serve_bus(bus: BusSettings, servos: Sequence[ServoSpec]) -> Iterator[BusPort]:
-    """The port of a bus; where its kind is ``"simulated"``, its servos are served as its settings say."""
+    """Give the port of a bus; where its kind is ``"simulated"``, run the simulator that its settings describe."""
     given = bus.options()
     options = {key: value for key, value in given.items() if key not in (*SIMULATION, "port", "baud")}
     if bus.kind != SIMULATED:

@@ -1,9 +1,9 @@
-"""``omote preflight``: moves each servo of a head a little by itself and compares it with the robot file.
+"""``omote preflight``: moves each servo of a head a little, one at a time, and compares it with the robot file.
 
-Before a servo moves, what it says of itself is compared: model, supply, errors, limits, direction, position. A servo
-that does not fit is not moved, and none of a bus with servos whose torque is on: one that moves is alone. It stops at
-the first sign of load, error or trouble with the port, and is switched off; where it does not confirm that, the
-preflight ends.
+Before a servo moves, its model, supply voltage, errors, limits, direction and position are read and compared. A servo
+that differs is not moved. No servo moves on a bus where the torque of another one is on. A movement stops at the first
+sign of load or error, or when the port fails, and the servo is switched off; if it does not confirm that, the preflight
+ends.
 """
 
 from __future__ import annotations
@@ -34,24 +34,24 @@ BY_DEG = 3.0
 """How far a servo is moved to either side."""
 SPEED_DEG_S = 10.0
 LOAD = 0.4
-"""Share of the stall torque (or current) at which a movement stops."""
+"""Fraction of the stall torque (or current) above which a movement stops."""
 LIMIT_SLACK_DEG = 0.5
-"""How much narrower a servo's own limits may be than those of the file; rounding to steps."""
-RANGE = 0.75
-"""Least share of a small way that a servo must go."""
-LAG_S = 0.25
-TRIES = 3
-"""How often a servo is asked before it counts as silent: one answer may be lost."""
-ANSWERS = 8
-"""Servos are asked at least so often to judge their delays."""
+"""How much narrower than the limits of the file a servo's own limits may be, because of rounding to steps."""
+MIN_RANGE = 0.75
+"""Least fraction of a small movement that a servo must make."""
+MAX_LAG_S = 0.25
+MAX_TRIES = 3
+"""Number of pings before a servo counts as silent: one reply may be lost."""
+MIN_REPLIES = 8
+"""Number of replies that are needed to judge the delays of an adapter."""
 
 Ask = Callable[[ChannelSettings, str], bool | None]
-"""Asks a person whether a channel moved as a text says; None: nobody was asked."""
+"""Asks a person whether a channel moved as the text describes; returns None if nobody was asked."""
 
 
 @dataclass(frozen=True)
 class Options:
-    """How a preflight moves. by_deg : to either side. load : share of the stall torque at which it stops."""
+    """How a preflight moves. by_deg : to either side. load : fraction of the stall torque above which it stops."""
 
     by_deg: float = BY_DEG
     load: float = LOAD
@@ -69,7 +69,7 @@ def run_preflight(
     """Check channels, bus by bus and servo by servo, and add what was found to ``preflight``.
 
     Raises PortError where a port cannot be used, StillOn where a servo was not confirmed off, and KeyboardInterrupt,
-    after which the motor that was on is off. What was found until then is in ``preflight``.
+    after which the motor that was on is off. The findings until then are in ``preflight``.
     """
     for settings in robot.buses:
         own = [channel for channel in channels if channel.bus == settings.name]
@@ -86,18 +86,18 @@ def run_preflight(
                 check = _ChannelCheck(port, bus, channel, options, moves=not on)
                 preflight.channels.append(check.findings)
                 check.run(lambda c: towards(c, parameters), ask)
-    _look_for_swaps(preflight)
+    _find_swaps(preflight)
     return preflight
 
 
 def new_preflight(robot: RobotSettings, path: Path) -> Preflight:
-    """A preflight without findings; ``path`` : of the robot file, which is hashed with its calibration."""
+    """Create a preflight without findings; ``path`` : the robot file, which is hashed with its calibration."""
     files = [path] + ([calibration_path(robot.calibration, path)] if robot.calibration is not None else [])
     return Preflight(robot.name, path, tuple(files))
 
 
 def towards(channel: ChannelSettings, parameters: Parameters) -> str:
-    """What a growing angle shows on the face, as ``"jawOpen grows"``; empty where that cannot be said."""
+    """Describe what an increasing angle does to the face, as ``"jawOpen grows"``; empty where that is not known."""
     table = build_table([channel], parameters)
     slopes = np.abs(table.linear[0])
     for best in np.argsort(-slopes, kind="stable")[: np.count_nonzero(slopes)]:
@@ -111,7 +111,7 @@ def towards(channel: ChannelSettings, parameters: Parameters) -> str:
 
 
 class _ChannelCheck:
-    """The check of one channel; fills in its findings."""
+    """Checks one channel and fills in its findings."""
 
     def __init__(
         self, port: BusPort, bus: BusFindings, channel: ChannelSettings, options: Options, *, moves: bool
@@ -123,7 +123,7 @@ class _ChannelCheck:
         )
 
     def run(self, describe: Callable[[ChannelSettings], str], ask: Ask) -> None:
-        """Look at the servo, and move it where nothing speaks against it."""
+        """Read and compare the servo's state, and move the servo if that is safe."""
         if FAMILIES.get(self._port.family).hobby:
             self.findings.skipped = "its board measures nothing; look at it with omote calibrate"
             return
@@ -131,23 +131,23 @@ class _ChannelCheck:
         slow = replace(spec, max_speed_rad_s=min(spec.max_speed_rad_s, math.radians(2.0 * SPEED_DEG_S)))
         try:
             with self._port.bus([slow]) as bus, stop_on_signals(bus.close):
-                if self._look(bus, spec) and not self.findings.faults and self._moves:
+                if self._compare(bus, spec) and not self.findings.faults and self._moves:
                     self._move(bus, describe, ask)
                 elif not self.findings.skipped:
                     self.findings.skipped = "not moved"
         except BusError as error:
-            if self._still_on is not None:  # closing the bus tried again, and failed in its own words
+            if self._still_on is not None:  # closing the bus has tried again and raised another error
                 raise self._still_on from error
             self._fault(f"{error}" + (f" ({error.hint})" if error.hint else ""))
 
     def _fault(self, text: str) -> None:
         self.findings.faults.append(text)
 
-    # ------------------------------------------------------------------ looking
+    # ------------------------------------------------------------------ comparing
 
-    def _look(self, bus: Bus, spec: ServoSpec) -> bool:
-        """Compare what the servo says of itself; whether it is known well enough to be moved."""
-        found = next((info for _ in range(TRIES) for info in bus.discover([spec.id])), None)
+    def _compare(self, bus: Bus, spec: ServoSpec) -> bool:
+        """Compare the servo's state with the file; return whether it is safe to move."""
+        found = next((info for _ in range(MAX_TRIES) for info in bus.discover([spec.id])), None)
         if found is None:
             self._fault("does not answer")
             return False
@@ -161,7 +161,7 @@ class _ChannelCheck:
             return False
         own = bus.own_settings(spec.id)
         self._compare_state(found, own)
-        self._compare_place(bus, own)
+        self._compare_position(bus, own)
         self._compare_answers(bus)
         return True
 
@@ -170,7 +170,7 @@ class _ChannelCheck:
         return found.model_number == wanted.number
 
     def _compare_state(self, found: ServoInfo, own: OwnSettings) -> None:
-        """Supply, temperature, errors and torque."""
+        """Compare supply voltage, temperature, errors and torque."""
         findings = self.findings
         if found.torque:
             self._fault("its torque is on: stop the program that drives it")
@@ -189,13 +189,13 @@ class _ChannelCheck:
             self._fault(f"its supply is {found.voltage_v:.1f} V, it takes {most:.1f} V at most")
 
     def _supply(self, own: OwnSettings) -> tuple[float, float]:
-        """Lowest and highest supply, V: by the file, the maker, and the servo itself."""
+        """Lowest and highest supply voltage, V, that the file, the maker and the servo itself allow."""
         motor = load_table(self._channel.model).motor
         least = self._port.options.get("min_voltage_v") or (0.9 * motor.lowest_v if motor else 0.0)
         return max(float(least), own.least_voltage_v), 1.1 * motor.highest_v if motor else math.inf
 
-    def _compare_place(self, bus: ServoBus, own: OwnSettings) -> None:
-        """Its own direction and limits, and where it stands."""
+    def _compare_position(self, bus: ServoBus, own: OwnSettings) -> None:
+        """Compare its direction, its own limits and its position."""
         findings, (low, high) = self.findings, self._channel.limit_deg
         findings.homing_offset_ticks = own.offset_ticks
         findings.own_limit_deg = math.degrees(own.low_rad), math.degrees(own.high_rad)
@@ -212,10 +212,10 @@ class _ChannelCheck:
             self._fault(f"stands at {findings.position_deg:.1f}, outside limit_deg {low:g} to {high:g}")
 
     def _compare_answers(self, bus: ServoBus) -> None:
-        """The adapter's delay, once for each bus."""
+        """Judge the adapter's delay, once for each bus."""
         if not math.isnan(self._bus.answer_ms):
             return
-        for _ in range(ANSWERS):
+        for _ in range(MIN_REPLIES):
             bus.discover(list(bus.ids))
         if bus.reply_delay_s is not None:
             self._bus.answer_ms = 1e3 * bus.reply_delay_s
@@ -248,14 +248,14 @@ class _ChannelCheck:
             return
         if moved.along < 0.0:
             self._fault("moves against its goals: its position and its motor have opposite directions")
-        elif moved.moved_rad < RANGE * moved.wanted_rad:
+        elif moved.moved_rad < MIN_RANGE * moved.wanted_rad:
             self._fault(f"went {findings.moved_deg:.1f} of {findings.wanted_deg:.1f} degrees")
-        if moved.lag_s > LAG_S:
+        if moved.lag_s > MAX_LAG_S:
             self._fault(f"is {findings.lag_ms:.0f} ms behind its goals")
         self._ask(describe, ask)
 
     def _ask(self, describe: Callable[[ChannelSettings], str], ask: Ask) -> None:
-        """Let a person say whether the right part went the right way, which no servo knows."""
+        """Ask a person whether the right part moved in the right direction, which no servo can measure."""
         shows = describe(self._channel)
         text = f"first as if {shows.replace('grows', 'grew').replace('falls', 'fell')}" if shows else "to and fro"
         said = ask(self._channel, text)
@@ -267,7 +267,7 @@ class _ChannelCheck:
 
 
 def switch_off(bus: Bus) -> None:
-    """Stop a bus, with a second try. Raises StillOn: a servo was not confirmed off."""
+    """Stop a bus, trying twice. Raises StillOn where a servo was not confirmed off."""
     try:
         bus.stop()
     except DriverError:
@@ -279,16 +279,16 @@ def switch_off(bus: Bus) -> None:
 
 
 def _full_current_a(table: ControlTable) -> float:
-    """Current at stall, A; NaN where the maker gives none."""
+    """Stall current, A; NaN where the maker gives none."""
     return table.motor.stall_a if table.motor else math.nan
 
 
-def _look_for_swaps(preflight: Preflight) -> None:
-    """Name pairs whose ids look swapped: each has the other's model, or stands within the other's limits alone."""
+def _find_swaps(preflight: Preflight) -> None:
+    """Add a fault for pairs whose ids look swapped: each has the other's model, or fits only its limits."""
     rows = preflight.channels
     for i, one in enumerate(rows):
         for other in rows[i + 1 :]:
-            if one.bus == other.bus and (_has_model_of(one, other) or _stands_as(one, other)):
+            if one.bus == other.bus and (_has_model_of(one, other) or _is_placed_as(one, other)):
                 for row, named in ((one, other), (other, one)):
                     row.faults.append(f"its id and that of {named.name!r} ({named.id}) look swapped")
 
@@ -300,14 +300,14 @@ def _has_model_of(one: ChannelFindings, other: ChannelFindings) -> bool:
 
 
 def _usual_name(model: str) -> str:
-    """The usual name of a model; empty where it is unknown."""
+    """Canonical name of a model; empty where it is unknown."""
     try:
         return load_table(model).model if model else ""
     except DriverError:
         return ""
 
 
-def _stands_as(one: ChannelFindings, other: ChannelFindings) -> bool:
+def _is_placed_as(one: ChannelFindings, other: ChannelFindings) -> bool:
     """Whether each stands outside its own limits, but within those of the other."""
 
     def inside(position: float, limits: tuple[float, float]) -> bool:

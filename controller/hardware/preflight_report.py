@@ -1,4 +1,4 @@
-"""The report of a preflight: what was measured of each bus and servo beside what its file says, as file and table."""
+"""The report of a preflight, as file and table: measurements of each bus and servo beside the robot file's values."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SUFFIXES = (".toml", ".json")
 
 @dataclass
 class BusFindings:
-    """One bus. answer_ms : how long after their time on the wire answers came; NaN: unknown."""
+    """Findings of one bus. answer_ms : delay of replies beyond their time on the wire; NaN if unknown."""
 
     name: str
     family: str
@@ -41,12 +41,14 @@ class BusFindings:
 
 @dataclass
 class ChannelFindings:
-    """One servo; NaN where nothing was measured.
+    """Findings of one servo; NaN where nothing was measured.
 
-    position_deg : where it stood. own_limit_deg : what its own registers allow. wanted_deg, moved_deg : how far it was
-    sent, and went, to and fro. lag_ms : how long it was behind. peak_current_a : while it moved; peak_load : the same
-    as a share of its stall torque. least_voltage_v : its supply while it moved. seen : what a person said of the
-    direction: ``"right"``, ``"wrong"`` or ``"not asked"``. skipped : why it was not moved.
+    position_deg : position before it moved. own_limit_deg : limits in its own registers.
+    wanted_deg, moved_deg : range of the goals and of the shaft. lag_ms : delay of the shaft behind the goals.
+    peak_current_a, peak_load : greatest current, and fraction of the stall torque, while it moved.
+    least_voltage_v : lowest supply voltage while it moved.
+    seen : a person's judgement of the direction: ``"right"``, ``"wrong"`` or ``"not asked"``.
+    skipped : why it was not moved; empty if it was.
     """
 
     name: str
@@ -74,7 +76,7 @@ class ChannelFindings:
 
 @dataclass
 class Preflight:
-    """All findings of one robot. signed_by : who stands for them; empty: nobody."""
+    """All findings of one robot. signed_by : name of the person who signed them; empty if nobody did."""
 
     robot: str
     path: Path
@@ -86,17 +88,17 @@ class Preflight:
 
     @property
     def faults(self) -> list[str]:
-        """Every fault, with the bus or channel that has it."""
+        """Every fault, as text with the bus or channel that has it."""
         rows: Sequence[BusFindings | ChannelFindings] = (*self.buses, *self.channels)
         return [f"{row.name}: {fault}" for row in rows for fault in row.faults]
 
     @property
     def passed(self) -> bool:
-        """No fault, and no servo was left out."""
+        """Whether there is no fault and no servo was skipped."""
         return not self.faults and not any(row.skipped for row in self.channels)
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain values for TOML and JSON; what is not known is left out."""
+        """Plain values for TOML and JSON, without unknown ones."""
         return {
             "format": FORMAT,
             "kind": "preflight",
@@ -123,7 +125,7 @@ def _versions() -> dict[str, str]:
 
 
 def _known(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that are known, rounded to what was measured."""
+    """Return the known values, rounded to the precision of the measurement."""
     plain: dict[str, Any] = {}
     for key, value in row.items():
         values = value if isinstance(value, tuple) else (value,)
@@ -135,7 +137,7 @@ def _known(row: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def check_report_path(path: Path) -> None:
-    """Raises ControllerError: no report is written into a file that is named so."""
+    """Raise ControllerError unless the file name has a suffix of a report."""
     if path.suffix not in SUFFIXES:
         raise ControllerError(f"{path}: a report is a .toml or a .json file", hint=f"-o {path.stem}.toml")
 
@@ -149,7 +151,7 @@ def write_preflight(preflight: Preflight, path: Path) -> None:
 
 
 def preflight_table(preflight: Preflight) -> Table:
-    """One row a servo."""
+    """Table with one row per servo."""
     table = Table("channel", "id", "model", "supply", "stands at", "moved", "of", "lag", "load", "direction", "")
     for row in preflight.channels:
         load = _with(row.peak_current_a, "{:.2f} A") or _with(100 * row.peak_load, "{:.0f} %")

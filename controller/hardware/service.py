@@ -1,4 +1,4 @@
-"""``omote service``: udev rules and a systemd unit with which a head starts with its computer. Nothing is installed.
+"""``omote service``: writes udev rules and a systemd unit that start a head when its computer boots; installs nothing.
 
 Sources: udev(7), systemd.unit(5), systemd.service(5), systemd.exec(5).
 """
@@ -30,7 +30,7 @@ from drivers.port.ports import list_ports
 
 GROUP = "dialout"
 WATCHDOG_S, STOP_S, START_S = 10, 45, 90
-"""Seconds without a sign of life after which systemd ends the program, and for stopping and starting."""
+"""systemd's time limits in s: without a watchdog message, for stopping, and for starting."""
 _BY_ID = re.compile(r"/dev/serial/by-id/usb-(?P<serial>.+?)-if\d+")
 _SERIAL = re.compile(r"[\w.:+-]+")
 _NAME = re.compile(r"[^a-z0-9]+")
@@ -38,9 +38,9 @@ _NAME = re.compile(r"[^a-z0-9]+")
 
 @dataclass(frozen=True)
 class Adapter:
-    """The adapter of one bus. bus, port : as in the robot file. serial_number : empty where it is not known.
+    """The serial adapter of one bus. bus, port : as in the robot file. serial_number : empty if unknown.
 
-    link : the name that its rule gives it.
+    link : device name that the udev rule gives it.
     """
 
     robot: str
@@ -51,9 +51,9 @@ class Adapter:
 
 
 def write_service(what: str, folder: Path, user: str, name: str = "") -> tuple[list[Path], list[str]]:
-    """Write the files for a stage or a robot; returns them and the commands that install them.
+    """Write the files for a stage or a robot; return their paths and the commands that install them.
 
-    what : a stage or a robot, as for ``omote check``. user : that the service runs as. name : of the service.
+    what : a stage or a robot, as for ``omote check``. user : account that runs the service. name : of the service.
 
     Raises ConfigError: it cannot be read. ControllerError: a name that systemd does not take, or no room to write.
     """
@@ -81,7 +81,7 @@ def write_service(what: str, folder: Path, user: str, name: str = "") -> tuple[l
 
 
 def _stage_and_robots(what: str) -> tuple[Path | None, Sequence[RobotSettings], str]:
-    """The file of a stage, None for a robot alone; its robots, and its name."""
+    """Return the path of a stage (None for a single robot), its robots, and its name."""
     path = _find(what)
     if kind_of(read_toml(path)) is ROBOT:
         robot = load_robot(path, PARAMETERS)
@@ -100,7 +100,7 @@ def _find(what: str) -> Path:
 
 
 def _plain(title: str) -> str:
-    """A name for files and units."""
+    """Convert a title to a name for files and units."""
     plain = _NAME.sub("-", title.lower()).strip("-")
     if not plain:
         raise ControllerError(f"{title!r} gives no name for a service", hint="--name head")
@@ -112,7 +112,7 @@ def _adapter(robot: RobotSettings, bus: BusSettings, short: str) -> Adapter:
 
 
 def _serial_of(port: str) -> str:
-    """The serial number of a port's adapter: as it is plugged in now, or as its name by id has it; else empty."""
+    """Serial number of a port's adapter: of the connected device, or from its name in by-id; empty if unknown."""
     for record in list_ports():
         if port in (record.device, record.by_id) and _SERIAL.fullmatch(record.serial_number):
             return record.serial_number
@@ -124,7 +124,7 @@ def _serial_of(port: str) -> str:
 
 
 def rules_text(title: str, adapters: Sequence[Adapter]) -> str:
-    """Rules that give each adapter a name that stays, a group that may use it and a short latency timer."""
+    """udev rules that give each adapter a permanent name, a group that may use it and a short latency timer."""
     lines = [f"# Adapters of {title}, for omote. Into /etc/udev/rules.d; read by: sudo udevadm control --reload"]
     for adapter in adapters:
         lines += ["", f"# bus {adapter.bus} of {adapter.robot}"]
@@ -205,7 +205,7 @@ WantedBy=multi-user.target
 
 
 def unit_text(title: str, stage: Path, user: str, adapters: Sequence[Adapter]) -> str:
-    """The unit that runs a stage; it waits for the adapters whose rules give them a name."""
+    """systemd unit that runs a stage; it waits for the adapters that have a name by a rule."""
     devices = " ".join(_device_unit(adapter.link) for adapter in adapters if adapter.serial_number)
     after = f"Wants={devices}\nAfter={devices}" if devices else "After=systemd-udevd.service"
     command = " ".join(_quoted(word) for word in (*_omote(), "run", str(stage), "--no-face"))
@@ -216,20 +216,20 @@ def unit_text(title: str, stage: Path, user: str, adapters: Sequence[Adapter]) -
 
 
 def _omote() -> tuple[str, ...]:
-    """The command that started this program, with its whole path."""
+    """Command that started this program, with its absolute path."""
     beside = Path(sys.executable).with_name("omote")
     found = str(beside) if beside.is_file() else shutil.which("omote")
     return (found,) if found else (sys.executable, "-c", "from controller.cli.app import main; main()")
 
 
 def _quoted(word: str) -> str:
-    """A word of a command line as systemd.service(5) reads it."""
+    """Quote a word of a command line for systemd.service(5)."""
     plain = word.replace("\\", "\\\\").replace('"', '\\"').replace("%", "%%").replace("$", "$$")
     return plain if re.fullmatch(r"[\w./:@=+-]+", plain) else f'"{plain}"'
 
 
 def _device_unit(link: str) -> str:
-    """The unit of a device, its name escaped as by systemd-escape(1)."""
+    """Name of the unit of a device, escaped as by systemd-escape(1)."""
     path = f"dev/{link}"
     escaped = "".join(
         c if re.fullmatch(r"[A-Za-z0-9:_.]", c) else "-" if c == "/" else f"\\x{ord(c):02x}" for c in path

@@ -1,4 +1,4 @@
-"""``omote calibrate --find-stops``: the end stops of a robot's servos, checked against the limits of its file."""
+"""``omote calibrate --find-stops``: finds the end stops of servos and compares the robot file's limits."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from drivers.core.registry import FAMILIES
 from drivers.tools.find_stops import TORQUE, Found, StillOn, find_stops, why_not
 
 BEYOND_DEG = 15.0
-"""How far past the limits of the file the search goes."""
-ALIKE_DEG = 1.0
-"""Two approaches of one stop that differ by more do not count."""
+"""How far beyond the limits of the file stops are searched."""
+MAX_SPREAD_DEG = 1.0
+"""Greatest difference between two approaches of one stop."""
 
 
 @dataclass(frozen=True)
 class ChannelStops:
-    """What is known of the stops of one channel, degrees as the robot file counts them.
+    """The stops of one channel, in the degrees of the robot file.
 
     low_deg, high_deg : where the servo stopped; None where it met no stop.
-    faults : what does not fit the file, or why nothing was found; empty where all is well.
+    faults : what does not fit the file, or why nothing was found; empty if there is none.
     """
 
     channel: str
@@ -51,25 +51,26 @@ def find_robot_stops(
     beyond_deg: float = BEYOND_DEG,
     progress: Callable[[str], object] = lambda text: None,
 ) -> list[ChannelStops]:
-    """Find the stops of channels one by one; none where the torque of a servo of its bus is on, and each is off when it
-    is done.
+    """Find the stops of channels one by one; the torque of each servo is switched off after its search.
 
-    torque : share of the full current. beyond_deg : how far past its limits in the file a servo is looked at.
+    A bus on which the torque of any servo is on is left alone.
 
-    Raises PortError, and StillOn where a servo was not confirmed off; what concerns one servo else is in its faults.
+    torque : fraction of the full current. beyond_deg : how far beyond its limits in the file a servo is moved.
+
+    Raises PortError, and StillOn where a servo was not confirmed off; other errors of a servo are in its ``faults``.
     """
     found: list[ChannelStops] = []
     for bus in robot.buses:
-        own = [channel for channel in channels if channel.bus == bus.name]
-        if not own:
+        on_bus = [channel for channel in channels if channel.bus == bus.name]
+        if not on_bus:
             continue
         servos = servo_specs(robot.on_bus(bus.name))
         with serve_bus(bus, servos) as port:
             if on := port.holding(servos):
                 why = f"not looked for: the torque of {', '.join(on)} is on; stop the program that drives them"
-                found += [ChannelStops(channel.name, faults=(why,)) for channel in own]
+                found += [ChannelStops(channel.name, faults=(why,)) for channel in on_bus]
                 continue
-            found += [_channel_stops(port, channel, torque, beyond_deg, progress) for channel in own]
+            found += [_channel_stops(port, channel, torque, beyond_deg, progress) for channel in on_bus]
     return found
 
 
@@ -98,16 +99,16 @@ def _channel_stops(
 
 
 def checked_stops(channel: ChannelSettings, found: Found, beyond_deg: float) -> ChannelStops:
-    """What was found, with what does not fit the channel's limits."""
+    """Return the stops that were found, with faults where they do not fit the channel's limits."""
     ends = [None if angle is None else math.degrees(angle) for angle in (found.low_rad, found.high_rad)]
     low, high = ends
     faults = []
     if low is None or high is None:
         side = "either side" if low is high else "the low side" if low is None else "the high side"
         faults.append(f"no stop on {side}, up to {beyond_deg:g} degrees beyond limit_deg or the end of its turn")
-    if math.degrees(found.spread_rad) > ALIKE_DEG:
+    if math.degrees(found.spread_rad) > MAX_SPREAD_DEG:
         faults.append(f"two approaches of one stop differ by {math.degrees(found.spread_rad):.1f} degrees")
-    if low is not None and high is not None and high - low < ALIKE_DEG:
+    if low is not None and high is not None and high - low < MAX_SPREAD_DEG:
         return ChannelStops(channel.name, None, None, found.peak_current_a, ("it is stuck: it moved to neither side",))
     if low is not None and channel.limit_deg[0] < low:
         faults.append(f"limit_deg begins at {channel.limit_deg[0]:g}, beyond the stop at {low:.1f}")
@@ -117,7 +118,7 @@ def checked_stops(channel: ChannelSettings, found: Found, beyond_deg: float) -> 
 
 
 def stops_table(found: Sequence[ChannelStops], channels: Sequence[ChannelSettings], margin_deg: float) -> Table:
-    """The stops beside the limits of the file, and limits that would keep a margin."""
+    """Table of the stops, the limits of the file, and limits that keep a margin to the stops."""
     limits = {channel.name: channel.limit_deg for channel in channels}
     table = Table("channel", "low stop", "high stop", "limit_deg", "with margin", "current", "")
     for row in found:

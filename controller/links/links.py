@@ -53,7 +53,7 @@ class LinkSettings(Settings):
     def _fits(self) -> LinkSettings:
         check = getattr(self.own, "check", None)
         if check is not None:
-            with LINKS.blaming(self.kind):
+            with LINKS.naming_package(self.kind):
                 check()
         return self
 
@@ -79,7 +79,7 @@ def open_links(choices: Sequence[LinkSettings], context: LinkContext) -> list[Li
     for choice in choices:
         kind = LINKS.get(choice.kind)
         start = LINKS.load(kind, kind.open)
-        with LINKS.blaming(kind.kind):
+        with LINKS.naming_package(kind.kind):
             link: Link = start(choice.own, context)
         found.append(link)
     return found

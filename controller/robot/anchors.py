@@ -1,9 +1,9 @@
 """Anchors: solve how far each servo pulls at its point of the skin, so that the skin moves as in the picture.
 
-The head is sampled once: how far each shape moves a few hundred points of its skin, at four amounts between 0 and 1,
-which keeps the arcs of jaw and lids; a face is then a sum of these moves. A servo moves the skin around its anchor,
-that of neighbouring anchors included. The pulls are a bounded least-squares fit of the skin's motion along each
-servo's direction, at the anchors and at a few points close to them.
+The head is sampled once: by how much each blend shape displaces a few hundred points of its skin, at four amounts from
+0 to 1, which keeps the curved paths of jaw and lids. The displacement of a face is then a sum of these samples. A servo
+moves the skin around its anchor, also at neighbouring anchors. The pulls are a bounded least-squares fit of the skin's
+displacement along each servo's direction, at the anchors and at a few points close to them.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ _LEVELS = 4
 _STRAIGHT_MM = 0.02
 _RIDGE = 1e-3
 _SEED = 7
-_POINTS = 400  # spread over the skin, to report what a head cannot show
-_NEAR = 6  # points around each anchor at most, for solving
+_REPORT_POINTS = 400  # number of points all over the skin, to report what a head cannot show
+_MAX_NEAR_POINTS = 6  # number of points around each anchor, for solving
 _NEAR_MM = 8.0
-_LEAST_LIKE_MM = 0.5
+_MIN_LIKE_MM = 0.5
 
 
 @dataclass(frozen=True)
 class SkinSamples:
-    """Points of one head's skin and how every shape moves them.
+    """Points of one head's skin and their displacement by every blend shape.
 
     part : the part of the head they lie on. uv : (m, 2). rest : (m, 3) mm.
     moves : (m, 3, s, levels) mm that each of ``s`` shapes adds on each quarter of its way from 0 to 1.
@@ -52,7 +52,7 @@ class SkinSamples:
 
     def displacement(self, shapes: Floats) -> Floats:
         """(m, 3) mm for shapes (s,)."""
-        moved: Floats = np.einsum("mcsl,sl->mc", self.moves, level_shares(shapes))
+        moved: Floats = np.einsum("mcsl,sl->mc", self.moves, level_fractions(shapes))
         return moved
 
     def full(self, shape: str) -> Floats:
@@ -61,17 +61,17 @@ class SkinSamples:
         return moved
 
     def subset(self, chosen: slice | NDArray[np.intp]) -> SkinSamples:
-        """Some of the points."""
+        """Return the samples of some of the points."""
         return SkinSamples(self.part, *(each[chosen] for each in (self.uv, self.rest, self.moves, self.jaw)))
 
 
-def level_shares(shapes: Floats) -> Floats:
-    """(s, levels) how much of each quarter of its way a shape has gone."""
+def level_fractions(shapes: Floats) -> Floats:
+    """(s, levels) fraction, 0..1, of each quarter of its range that a shape has passed, for amounts (s,)."""
     return np.clip(_LEVELS * shapes[:, None] - np.arange(_LEVELS), 0.0, 1.0)
 
 
 def sample_skin(head: Head, part: str, uv: Floats) -> SkinSamples:
-    """Sample how a head's shapes move the points ``uv`` : (m, 2) of a part; the head stays at rest.
+    """Sample how a head's shapes displace the points ``uv`` : (m, 2) of a part; the head's pose does not change.
 
     Raises KeyError when there is no such part.
     """
@@ -92,7 +92,7 @@ def _displacement_at_levels(name: str, displacement: Callable[[dict[str, float]]
     """(levels, m, 3) mm that one shape alone moves the points by. mouthClose has an effect on an open jaw only."""
     base = {"mouthClose": "jawOpen"}.get(name)
     if name == "tongueOut":
-        return np.zeros((_LEVELS, *displacement({}).shape))  # it opens the jaw, which counts as jawOpen
+        return np.zeros((_LEVELS, *displacement({}).shape))  # all that it does to the skin is open the jaw, as jawOpen
 
     def at(level: float) -> Floats:
         if base is None:
@@ -106,7 +106,7 @@ def _displacement_at_levels(name: str, displacement: Callable[[dict[str, float]]
 
 
 def shapes_of(values: Floats, order: NDArray[np.intp]) -> Floats:
-    """(s,) shapes of a face ``values`` (p,); ``order`` (h,) maps omote's parameters to the head's."""
+    """(s,) amounts of the shapes for parameters ``values`` (p,); ``order`` : (h,) see :func:`head_order`."""
     return read_pose(values[order]).shapes
 
 
@@ -123,7 +123,10 @@ def skin_points(head: Head, part: str, count: int, seed: int) -> Floats:
 
 
 def servo_field(anchors: Sequence[AnchorSettings], at: SkinSamples, points: SkinSamples) -> Floats:
-    """(3 m, k): how a millimetre of pull at each of k anchors moves m points of the skin; ``at`` : the anchors."""
+    """(3 m, k) mm by which a pull of 1 mm at each of k anchors moves m points of the skin.
+
+    ``at`` : samples of the skin at the anchors. ``points`` : samples at the m points.
+    """
     field = np.zeros((len(points.rest), 3, len(anchors)))
     for j, anchor in enumerate(anchors):
         direction = anchor.unit_direction
@@ -132,21 +135,21 @@ def servo_field(anchors: Sequence[AnchorSettings], at: SkinSamples, points: Skin
             continue
         for side in (1.0, -1.0) if anchor.both else (1.0,):
             mirror = np.array([side, 1.0, 1.0])
-            share = falloff(points, at.rest[j] * mirror, at.jaw[j], anchor.reach_mm)
-            field[:, :, j] += share[:, None] * direction * mirror
+            weight = falloff(points, at.rest[j] * mirror, at.jaw[j], anchor.reach_mm)
+            field[:, :, j] += weight[:, None] * direction * mirror
     return field.reshape(-1, len(anchors))
 
 
 def falloff(points: SkinSamples, centre: Floats, jaw: float, reach_mm: float) -> Floats:
-    """(m,) share of a pull, 1 at the anchor; skin on the other jaw does not move along."""
+    """(m,) fraction of a pull with which each point moves along, 1 at the anchor; 0 on the other jaw."""
     squared = ((points.rest - centre) ** 2).sum(axis=1) / reach_mm**2
-    share: Floats = np.clip(1.0 - squared, 0.0, None) ** 2 * (1.0 - np.abs(points.jaw - jaw)).clip(0.0, 1.0)
-    return share
+    weight: Floats = np.clip(1.0 - squared, 0.0, None) ** 2 * (1.0 - np.abs(points.jaw - jaw)).clip(0.0, 1.0)
+    return weight
 
 
 @dataclass(frozen=True)
 class PullRows:
-    """The equations to fit: the displacement of some points of the skin along some directions, ``r`` of them.
+    """The ``r`` equations to fit, each the displacement of one point of the skin along one anchor's direction.
 
     point, anchor : (r,) indices of the point and of the anchor. direction : (r, 3) unit direction of that anchor.
     """
@@ -169,14 +172,14 @@ class PullRows:
 
     @property
     def weights(self) -> Floats:
-        """(r,) weights that let every anchor count the same."""
+        """(r,) weights of the equations with which every anchor counts the same."""
         return 1.0 / np.sqrt(np.bincount(self.anchor)[self.anchor])
 
 
 class AnchorSolver:
-    """Solves the pulls of all anchored channels of a robot for a face; returns those of ``names``.
+    """Solves the pulls of all anchored channels of a robot for a face; returns the pulls of the channels ``names``.
 
-    names : the channels whose pulls it returns. linear : (k, p) mm per unit of each parameter, roughly.
+    names : the channels whose pulls it returns. linear : (k, p) approximate mm per unit of each parameter.
     skin : m points; the first k are the anchors. field : (3 m, k) see :func:`servo_field`.
     """
 
@@ -198,7 +201,7 @@ class AnchorSolver:
             self.linear[:, parameters.index(name)] = self._solve(np.eye(len(SHAPES))[s])
 
     def for_channels(self, names: Sequence[str]) -> AnchorSolver | None:
-        """A copy that starts from its own last solution and returns only the pulls of ``names``; None without any."""
+        """Return a copy with its own last solution, for the pulls of ``names`` only; None if none is anchored."""
         returned = [i for i, name in enumerate(self.names) if name in names]
         if not returned:
             return None
@@ -217,12 +220,12 @@ class AnchorSolver:
         return self._last[self._returned]
 
     def residual(self, shapes: Floats) -> Floats:
-        """(m, 3) mm that the servos fall short of a face with shapes (s,)."""
+        """(m, 3) mm of displacement that the servos cannot make, for a face with shapes (s,)."""
         return self.skin.displacement(shapes) - (self.field @ self._solve(shapes)).reshape(-1, 3)
 
     def _solve(self, shapes: Floats, start: Floats | None = None) -> Floats:
         """Pulls of all anchors in mm for shapes (s,)."""
-        return self._solver.solve(self._moves @ level_shares(shapes).ravel(), start=start)
+        return self._solver.solve(self._moves @ level_fractions(shapes).ravel(), start=start)
 
 
 def pull_range_mm(channel: ChannelSettings) -> tuple[float, float]:
@@ -235,9 +238,9 @@ def pull_range_mm(channel: ChannelSettings) -> tuple[float, float]:
 def load_anchors(
     robot: RobotSettings, head: Path | Head, parameters: Parameters, *, where: str = ""
 ) -> AnchorSolver | None:
-    """Match a robot's anchors to a head; None for a robot without any.
+    """Match a robot's anchors to a head; None for a robot without anchors.
 
-    ``head`` : its folder, or the head itself, which is left at rest. ``where`` : the robot's file, for messages.
+    ``head`` : its folder, or the head itself, whose pose does not change. ``where`` : the robot's file, for messages.
     Raises ConfigError that lists every anchor that lies on no skin part of the head or does not move with its ``like``,
     SurfaceError when the head cannot be read.
     """
@@ -251,10 +254,10 @@ def load_anchors(
     if faults := list(_part_faults(anchors, head)):
         raise config_error(source, faults)
     part = head.part(next(iter(anchors.values())).part)
-    vertices = part.surface.evaluate(part.mesh.uv)  # the mesh's own positions are rough, the part's may be posed
-    own = np.array([_place(anchor, robot.landmarks, part, vertices) for anchor in anchors.values()])
-    spread = skin_points(head, part.name, _POINTS, _SEED)
-    skin = sample_skin(head, part.name, np.concatenate([own, _close_to(own, part, vertices), spread]))
+    vertices = part.surface.evaluate(part.mesh.uv)  # at rest, more exact than the mesh's positions
+    anchor_uv = np.array([_uv_of(anchor, robot.landmarks, part, vertices) for anchor in anchors.values()])
+    spread = skin_points(head, part.name, _REPORT_POINTS, _SEED)
+    skin = sample_skin(head, part.name, np.concatenate([anchor_uv, _vertices_near(anchor_uv, part, vertices), spread]))
     if faults := list(_motion_faults(anchors, skin)):
         raise config_error(source, faults)
     return AnchorSolver(channels, skin, head_order(head.parameters, parameters), parameters)
@@ -265,20 +268,21 @@ def anchor_places(robot: RobotSettings, head: Head, part: str) -> list[tuple[Flo
     surface = head.part(part)
     vertices = surface.surface.evaluate(surface.mesh.uv)
     return [
-        (_place(channel.anchor, robot.landmarks, surface, vertices), channel.name)
+        (_uv_of(channel.anchor, robot.landmarks, surface, vertices), channel.name)
         for channel in robot.anchored_channels
         if channel.anchor is not None and channel.anchor.part == part
     ]
 
 
-def _close_to(own: Floats, part: HeadPart, vertices: Floats) -> Floats:
-    """(j, 2) the vertices closest to each of the points ``own`` : (k, 2)."""
-    away = [np.linalg.norm(vertices - at, axis=1) for at in part.surface.evaluate(own)]
-    chosen = np.unique(np.concatenate([np.argsort(a)[:_NEAR][np.sort(a)[:_NEAR] < _NEAR_MM] for a in away]))
+def _vertices_near(uv: Floats, part: HeadPart, vertices: Floats) -> Floats:
+    """(j, 2) points (u, v) of the few vertices closest to each of the points ``uv`` : (k, 2)."""
+    distances = [np.linalg.norm(vertices - at, axis=1) for at in part.surface.evaluate(uv)]
+    n = _MAX_NEAR_POINTS
+    chosen = np.unique(np.concatenate([np.argsort(d)[:n][np.sort(d)[:n] < _NEAR_MM] for d in distances]))
     return np.asarray(part.mesh.uv[chosen], dtype=np.float64)
 
 
-def _place(anchor: AnchorSettings, landmarks: Mapping[str, list[float]], part: HeadPart, vertices: Floats) -> Floats:
+def _uv_of(anchor: AnchorSettings, landmarks: Mapping[str, list[float]], part: HeadPart, vertices: Floats) -> Floats:
     """(2,) point (u, v) of an anchor."""
     point = landmarks[anchor.point] if isinstance(anchor.point, str) else anchor.point
     if len(point) == 2:
@@ -288,7 +292,7 @@ def _place(anchor: AnchorSettings, landmarks: Mapping[str, list[float]], part: H
 
 
 def _part_faults(anchors: Mapping[str, AnchorSettings], head: Head) -> Iterator[str]:
-    """Anchors that name a part or a shape that the head does not have, or different parts."""
+    """Yield faults: anchors that name a part or a shape that the head does not have, or different parts."""
     parts = [part.name for part in head.parts if part.follows == "skin"]
     first = next(iter(anchors.values())).part
     for key, anchor in anchors.items():
@@ -301,22 +305,25 @@ def _part_faults(anchors: Mapping[str, AnchorSettings], head: Head) -> Iterator[
 
 
 def _motion_faults(anchors: Mapping[str, AnchorSettings], skin: SkinSamples) -> Iterator[str]:
-    """Anchors that hardly move with their ``like`` along their direction."""
+    """Yield faults: anchors that the parameter in ``like`` hardly moves along their direction."""
     for j, (key, anchor) in enumerate(anchors.items()):
         if anchor.like is not None:
             moved = float(skin.full(anchor.like)[j] @ anchor.unit_direction)
-            if moved < _LEAST_LIKE_MM:
+            if moved < _MIN_LIKE_MM:
                 yield f"{key}.like: {anchor.like} moves the point by {moved:.1f} mm along direction"
 
 
 def residual_rows(
     solver: AnchorSolver, faces: Mapping[str, Floats], parameters: Parameters
 ) -> Iterator[tuple[str, float, float]]:
-    """What a robot cannot show: region, rms mm wanted, rms mm left over, over some faces (p,)."""
+    """Yield for each region of the face how much the robot cannot show: name, rms mm wanted, rms mm not reached.
+
+    faces : parameters (p,) of each face by name.
+    """
     most = np.linalg.norm(solver.skin.moves.sum(axis=3), axis=1).argmax(axis=1)  # the shape that moves a point most
     regions = np.array([parameters.regions[parameters.index(SHAPES[s])] for s in most])
     shapes = [solver.shape_values(face) for face in faces.values()]
     moves = np.array([(solver.skin.displacement(each), solver.residual(each)) for each in shapes])  # (f, 2, m, 3)
     for region in sorted(set(regions)):
-        wanted, left = np.sqrt((moves[:, :, regions == region] ** 2).sum(axis=3).mean(axis=(0, 2)))
-        yield region, float(wanted), float(left)
+        wanted, missing = np.sqrt((moves[:, :, regions == region] ** 2).sum(axis=3).mean(axis=(0, 2)))
+        yield region, float(wanted), float(missing)

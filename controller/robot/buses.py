@@ -42,7 +42,7 @@ class BusSettings(Settings):
 
     @classmethod
     def known_keys(cls) -> list[str]:
-        """Keys that such a table may have, those of all families included."""
+        """Keys that a table of a bus may have, including the options of all families."""
         return [*super().known_keys(), *families_by_option()]
 
     @property
@@ -78,7 +78,7 @@ class BusSettings(Settings):
         settings = FAMILIES.get(self.family).settings
         check = getattr(settings, "check", None)
         if check is not None:
-            with FAMILIES.blaming(self.family):
+            with FAMILIES.naming_package(self.family):
                 check(to_options(self, settings), self.rate_hz)
         return self
 
@@ -90,7 +90,7 @@ def family_in(table: dict[str, Any]) -> str:
 
 
 def read_bus(table: dict[str, Any]) -> BusSettings:
-    """A bus from its table in a robot file, with the options of its family; raises pydantic.ValidationError."""
+    """Read a bus from its table in a robot file, with its family's options; raises pydantic.ValidationError."""
     try:
         family = FAMILIES.get(family_in(table))
     except PluginError:
@@ -99,7 +99,7 @@ def read_bus(table: dict[str, Any]) -> BusSettings:
 
 
 def families_by_option() -> dict[str, list[str]]:
-    """The families that have each option."""
+    """Map each option to the families that have it."""
     found: dict[str, list[str]] = {}
     for family in FAMILIES.all():
         for key in fields_of(family.settings):
@@ -113,7 +113,7 @@ class _Unknown(BusSettings, extra="ignore"):
 
 @cache
 def _model_of(family: Family) -> type[BusSettings]:
-    """The settings of a family's bus, with the family's options and its usual baud rate."""
+    """Create the settings class of a family's bus, with the family's options and default baud rate."""
     own = fields_of(family.settings)
 
     def refuse_others(table: dict[str, Any]) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from controller.base.stop_latch import StopLatch
 from controller.robot.buses import BusSettings
 from controller.robot.channels import servo_specs
 from controller.robot.following import FollowingStatistics
-from controller.robot.letting_go import LettingGo
+from controller.robot.idle_torque import IdleTorqueOff
 from controller.robot.linkages.kind import LinkageSettings
 from controller.robot.safety import GoalFilter
 from controller.robot.settings import ChannelSettings, RuleSettings
@@ -32,30 +32,30 @@ from drivers.base.errors import DriverError, NoReply, PortLost
 from drivers.base.priority import request_realtime
 
 if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
+    from controller.robot.anchors import AnchorSolver  # imported lazily: it loads the head
 
 log = logging.getLogger(__name__)
 
 Newest = Callable[[], tuple[Floats, int]]
 
-_RETRY_NS = 1_000_000_000
-_READS = 10
-_REST_LIMIT_NS = 2_000_000_000
-_AT_REST_RAD = 0.02
+_RETRY_INTERVAL_NS = 1_000_000_000
+_MAX_START_READS = 10
+_MAX_REST_NS = 2_000_000_000
+_MAX_REST_ERROR_RAD = 0.02
 
 
 class BusLoop:
     """Drives the channels of one bus until it is stopped.
 
-    settings : the bus. channels : its channels, one for each servo. parameters : those that the mixes name.
+    settings : the bus. channels : its channels, one for each servo. parameters : all that the channels' mixes may name.
     newest : returns the newest parameter vector (p,) float64 and the time (monotonic ns) at which its command arrived,
         0 for none.
     rules : the robot's safety rules. anchors : solver of the robot's anchored channels, on this bus or another.
-    linkages : those of this bus's channels.
-    limp : switch the motors off and only read the positions of the servos.
-    feed_s : time between calls of :meth:`feed`, after which cycles begin; 0 for a bus that cycles by itself.
-    stop_latch : while it is set, the motors are off, whatever else is asked, and the positions are read. Afterwards the
-        servos start again where they are.
+    linkages : the linkages of this bus's channels.
+    limp : disable torque and only read the positions of the servos.
+    feed_s : time between calls of :meth:`feed`, with which cycles are synchronised; 0 for a bus with its own clock.
+    stop_latch : while it is set, torque is off, whatever else is asked, and only positions are read. Afterwards the
+        servos start again at their present positions.
     """
 
     def __init__(
@@ -87,9 +87,12 @@ class BusLoop:
         self._newest, self._stop_latch = newest, stop_latch or StopLatch()
         self._last_stamp = 0
         self._retry_ns: int | None = None  # when to try again what failed; None while nothing has
-        self._off = False  # the servos are off, or are being switched off, because of the latch
+        self._off = False  # torque is off, or being disabled, because of the latch or a failure
         self._driven = self.bus.driven
-        self._letting_go, self._let_go = LettingGo(settings.let_go_s, settings.let_go_below_a), False
+        self._idle, self._is_idle = (
+            IdleTorqueOff(settings.let_go_s, settings.let_go_below_a),
+            False,
+        )  # torque off while idle
         self._state: BusState | None = None
         self._stopping, self._begun = threading.Event(), threading.Event()
         self._jogs: dict[str, float] = {}
@@ -104,8 +107,8 @@ class BusLoop:
         try:
             self.bus.open()
             stopped = self._stop_latch.stopped is not None
-            follows = self.bus.measures or not self.limp  # starting a board moves servos that nobody knows the place of
-            if not stopped and follows:
+            may_start = self.bus.measures or not self.limp  # starting a board moves servos whose positions are unknown
+            if not stopped and may_start:
                 self.bus.start()
                 self._resume()
             self._off = stopped and not self.limp
@@ -124,16 +127,16 @@ class BusLoop:
         self.clock.feed(step_s, urgent=urgent)
 
     def jog(self, channel: str, angle_rad: float | None) -> None:
-        """Turn a channel's servo to an angle within its limits, whatever the face wants; None gives it back.
+        """Turn a channel's servo to an angle within its limits, whatever the face wants; None ends that.
 
-        The limits of speed and acceleration hold, and rules too. May be called from any thread. Nothing happens where
-        there is no such channel.
+        The limits of speed and acceleration and the safety rules apply. May be called from any thread. An unknown
+        channel is ignored.
         """
         jogs = {name: angle for name, angle in self._jogs.items() if name != channel}
         if angle_rad is not None and channel in self.table.names:
             i = self.table.names.index(channel)
             jogs[channel] = float(np.clip(angle_rad, self.table.low_rad[i], self.table.high_rad[i]))
-        self._jogs = jogs  # at once: the thread of the bus reads it
+        self._jogs = jogs  # replaced as a whole, because the thread of the bus reads it
 
     def end_jogs(self) -> None:
         """Let all servos follow the face again."""
@@ -164,28 +167,28 @@ class BusLoop:
 
     def _resume(self) -> None:
         """Continue from where the servos are, so that the first goals are a ramp from there."""
-        here = self._all_fresh().position_rad
-        self._goals.restart(np.where(np.isfinite(here), here, self._goals.sent))
+        position = self._read_until_fresh().position_rad
+        self._goals.restart(np.where(np.isfinite(position), position, self._goals.sent))
         self._driven = self.bus.driven
 
-    def _all_fresh(self) -> BusState:
-        """Read until every servo that is driven has answered; raises NoReply when some do not.
+    def _read_until_fresh(self) -> BusState:
+        """Read until every servo whose position must be known has just been measured; raises NoReply if some are not.
 
-        Old positions are unsafe to use. After the first start, servos that do not answer are not driven.
+        At the first start these are all servos, later only the driven ones. Old positions are unsafe to use.
         """
-        for _ in range(_READS):
+        for _ in range(_MAX_START_READS):
             state = self._state = self.bus.read()
             missing = ~state.fresh & self.bus.measures & (self._needed() | (self._thread is None))
             if not missing.any():
                 return state
         names = [name for name, absent in zip(self.table.names, missing, strict=True) if absent]
         raise NoReply(
-            f"bus {self.settings.name}: the position of {', '.join(names)} is not known, for no answer came",
-            hint="look at its cable, then start again",
+            f"bus {self.settings.name}: the position of {', '.join(names)} is not known: no answer",
+            hint="check its cable and its power supply, then start again",
         )
 
     def _needed(self) -> Flags:
-        """Servos whose positions must be known."""
+        """Servos whose positions must be known: the driven ones, and none while the bus is limp."""
         return self.bus.driven & (not self.limp)
 
     def _run(self) -> None:
@@ -195,7 +198,7 @@ class BusLoop:
                 self._tick(now)
             if not self.limp:
                 self._come_to_rest()
-        except Exception as error:  # noqa: BLE001  the body raises it and stops the servos
+        except Exception as error:  # noqa: BLE001  the control process (body) raises it and stops the servos
             self.error = error
 
     def _tick(self, now: int) -> None:
@@ -208,11 +211,11 @@ class BusLoop:
             elif self._retry_ns is None or now >= self._retry_ns:
                 self._come_back(now)
         except PortLost as error:
-            log.warning("%s; trying again every %g s", error, _RETRY_NS / 1e9)
+            log.warning("%s; trying again every %g s", error, _RETRY_INTERVAL_NS / 1e9)
             self._retry_ns = 0
 
     def _stay_off(self, now: int) -> None:
-        """Switch the servos off, again every second where some are not confirmed off, and only read their positions."""
+        """Disable torque, again every second where some servos are not confirmed off, and only read positions."""
         if self.bus.running:
             self._off, self._retry_ns = True, 0
             log.warning("bus %s: the servos are off until START", self.settings.name)
@@ -225,7 +228,7 @@ class BusLoop:
         try:
             self.bus.stop()
             if not self.bus.is_open:
-                self.bus.reconnect()  # it only opens the port, for the bus is stopped
+                self.bus.reconnect()  # this only opens the port, because the bus is stopped
         except DriverError as error:
             self._try_later(now, "not off for certain", error)
         else:
@@ -247,7 +250,7 @@ class BusLoop:
         angles, held = self.table.angles(values)
         for name, angle in self._jogs.items():
             angles[self.table.names.index(name)] = angle
-        if self._let_go and not self._take_again(angles):
+        if self._is_idle and not self._wake(angles):
             return
         self.held += held
         wanted = np.where(self._driven, angles, self._goals.sent)
@@ -257,11 +260,11 @@ class BusLoop:
             self.latency_ms.add((time.monotonic_ns() - stamp) / 1e6)
         self._state = self.bus.read()
         self.following.add(angles, self._state)
-        if self._letting_go.may_let_go(self._goals.sent, self._state, self.clock.step_s):
-            self._release(angles, self._state)
+        if self._idle.update(self._goals.sent, self._state, self.clock.step_s):
+            self._disable_idle_torque(angles, self._state)
 
-    def _release(self, wanted: Floats, state: BusState) -> None:
-        """Let the servos go; where that fails, they are started again as after a STOP."""
+    def _disable_idle_torque(self, wanted: Floats, state: BusState) -> None:
+        """Disable the torque of an idle bus; where that fails, the servos are started again as after a STOP."""
         try:
             self.bus.stop()
         except PortLost:
@@ -269,18 +272,21 @@ class BusLoop:
             raise
         except DriverError as error:
             self._off = True
-            self._try_later(time.monotonic_ns(), "not let go", error)
+            self._try_later(time.monotonic_ns(), "idle, but its torque is not off for certain", error)
             return
-        self._let_go = True
-        self._letting_go.begin(wanted, state)
-        log.info("bus %s: still, and let go", self.settings.name)
+        self._is_idle = True
+        self._idle.note_torque_off(wanted, state)
+        log.info("bus %s is idle: torque off", self.settings.name)
 
-    def _take_again(self, wanted: Floats) -> bool:
-        """Switch servos that were let go on again where they are, once a target or a servo moves; whether they are."""
+    def _wake(self, wanted: Floats) -> bool:
+        """Read an idle bus, and enable its torque where the servos are once a target or a servo has moved.
+
+        Return whether the servos are driven again.
+        """
         state = self._state = self.bus.read()
-        if not self._letting_go.must_hold(wanted, state):
+        if not self._idle.check_wake(wanted, state):
             return False
-        self._let_go = False
+        self._is_idle = False
         try:
             self.bus.start(partly=True)
             self._resume()
@@ -288,13 +294,13 @@ class BusLoop:
             self._off = True  # a bus that does not run is only opened again by reconnecting
             raise
         except DriverError as error:
-            self._off = True  # as after a STOP: it is tried again
+            self._off = True  # _come_back tries again, as after a STOP
             self._try_later(time.monotonic_ns(), "not back", error)
             return False
         return True
 
     def _follow_absent(self) -> None:
-        """Let the goals of servos that are not driven, or were not until the last read, begin where they are."""
+        """Set the goals of servos that are not driven, or were not before the last read, to their positions."""
         driven = self.bus.driven
         if driven is not self._driven or not driven.all():
             absent = ~(driven & self._driven)
@@ -305,15 +311,15 @@ class BusLoop:
     def _come_to_rest(self) -> None:
         """Move the servos to the neutral face before torque is switched off, so that no part of the head drops."""
         rest = self.table.neutral_rad
-        end_ns = time.monotonic_ns() + _REST_LIMIT_NS
-        with suppress(DriverError):  # a bus that does not work is stopped as it is
+        end_ns = time.monotonic_ns() + _MAX_REST_NS
+        with suppress(DriverError):  # a bus that fails here is stopped where it is
             for now in Clock(self.settings.rate_hz).run(self._may_move):
                 self._follow_absent()
                 self.bus.write(self._goals.step(rest, self._state))
                 state = self._state = self.bus.read()
                 known = state.fresh | (not self.bus.measures)
                 away = np.where(known, np.abs(state.position_rad - rest), np.where(self.bus.driven, np.inf, 0.0))
-                if now > end_ns or away.max() < _AT_REST_RAD:
+                if now > end_ns or away.max() < _MAX_REST_ERROR_RAD:
                     return
 
     def _may_move(self) -> bool:
@@ -333,15 +339,15 @@ class BusLoop:
             log.warning("bus %s is back", self.settings.name)
             self._off, self._retry_ns, self._last_reason = False, None, ""
 
-    def _try_later(self, now: int, what: str, error: DriverError) -> None:
-        """Try again in a second; log why, once."""
+    def _try_later(self, now: int, condition: str, error: DriverError) -> None:
+        """Schedule the next try for a second later; log a new reason once."""
         if str(error) != self._last_reason:
             self._last_reason = str(error)
-            log.warning("bus %s is %s: %s", self.settings.name, what, error)
-        self._retry_ns = now + _RETRY_NS
+            log.warning("bus %s is %s: %s", self.settings.name, condition, error)
+        self._retry_ns = now + _RETRY_INTERVAL_NS
 
     def condition(self) -> dict[str, object]:
-        """Its name, whether it drives its servos, and why it does not; for people who watch it, from any thread."""
+        """The name of the bus, whether it runs, and its fault as text (empty: none). May be called from any thread."""
         absent = self._last_reason if self._retry_ns is not None else ""
         fault = str(self.error) if self.error is not None else absent
         return {"name": self.settings.name, "running": bool(self.bus.running), "fault": fault}
@@ -356,7 +362,7 @@ class BusLoop:
             "command_to_wire_ms": self.latency_ms.summary(),
             "channels_held_at_limit": self.held,
             "rules": self._goals.guard.report(),
-            "let_go": {"times": self._letting_go.times, "sagged": self._letting_go.sagged},
+            "let_go": {"times": self._idle.torque_off_count, "sagged": self._idle.drift_wake_count},
             "linkages_out_of_reach": self._goals.out_of_reach(),
             "face_difference": self.following.report(),
             "bus": self.bus.report().as_dict(),

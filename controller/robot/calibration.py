@@ -1,7 +1,7 @@
 """Calibration files: the measured neutral and end angles of each servo of one built head.
 
-A robot file says how a kind of head is meant to move; a calibration says how far this one does. It holds the lowest,
-neutral and highest angle captured for each channel, and a robot file that names it is fitted to them.
+A robot file describes how heads of one model move, a calibration file how far one built head does. It holds the lowest,
+neutral and highest angle captured for each channel; the channels of a robot file that names it are fitted to them.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class CalibrationFile(Settings):
     @model_validator(mode="before")
     @classmethod
     def _has_a_known_format(cls, table: dict[str, Any]) -> dict[str, Any]:
-        """Refuse a newer file for its version alone, not for each of its new keys."""
+        """Refuse a newer file with one error about its version instead of errors about its new keys."""
         fault = format_fault(table.get("format", FORMAT), FORMAT)
         if fault is not None:
             raise ValueError(fault)
@@ -58,12 +58,12 @@ class CalibrationFile(Settings):
 
 
 def calibration_path(name: str, robot: Path) -> Path:
-    """The file that a name means for a robot file: a path beside it, or ``<robot>.<name>.calibration.toml``."""
+    """Return the path for a name in a robot file: a path beside it, or ``<robot>.<name>.calibration.toml``."""
     return robot.parent / (name if name.endswith(".toml") else f"{robot.stem}.{name}{SUFFIX}")
 
 
 def calibrated(robot: RobotSettings, path: Path) -> RobotSettings:
-    """The robot with its channels fitted to the calibration in ``path``.
+    """Return the robot with its channels fitted to the calibration in ``path``.
 
     Raises ConfigError when the file cannot be read, is another robot's, or names channels that the robot lacks.
     """
@@ -86,7 +86,7 @@ def calibrated(robot: RobotSettings, path: Path) -> RobotSettings:
 
 
 def fit_to_captured(channel: ChannelSettings, captured: CapturedAngles) -> ChannelSettings:
-    """A channel with its calibrated points moved so that neutral and ends are those captured.
+    """Return a channel with its calibrated points moved so that neutral and ends are at the captured angles.
 
     The angle of the mix at rest becomes ``neutral_deg``, the points on either side are stretched so that the outermost
     ones reach the captured ends, and the limits become the ends. Where no point is at rest, one is added between those
@@ -101,7 +101,7 @@ def fit_to_captured(channel: ChannelSettings, captured: CapturedAngles) -> Chann
 
 
 def _with_rest(channel: ChannelSettings) -> Calibration:
-    """The points of a channel, with one at rest where the others lie on either side of it."""
+    """Return the points of a channel; one is added for the mix at rest where that lies between two others."""
     points = channel.map
     if 0.0 in points.at or not points.at[0] < 0.0 < points.at[-1]:
         return points

@@ -1,4 +1,4 @@
-"""Channels: map the parameter vector to one angle per servo, as flat arrays.
+"""Channels map the parameter vector to one angle per servo; all channels of a bus are computed as flat arrays.
 
 The chain of a channel is mix (or anchor) -> calibrated points -> limits; safety rules (:mod:`controller.robot.safety`)
 and limits of motion (:class:`controller.motion.motion.MotionLimiter`) follow at the clock of the bus.
@@ -23,21 +23,24 @@ from controller.robot.terms import curve_corners
 from drivers.base.bus import ServoSpec
 
 if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
+    from controller.robot.anchors import AnchorSolver  # imported lazily: it loads the head
 
-_AT_LIMIT_RAD = 1e-9  # rounding of degrees
-_STEP, _DRAWN, _SEED = 1e-4, 16, 5
+_LIMIT_TOLERANCE_RAD = 1e-9  # rounding of degrees to radians
+_STEP, _SLOPE_POINTS, _SEED = 1e-4, 16, 5
 
 
 class BoundChannels(Protocol):
-    """Channels whose mixes are computed together, by formulas or a linkage. at : (n,). needs : (k,) parameters."""
+    """Channels whose mixes are computed together, by formulas or a linkage.
+
+    at : (n,) indices of the channels. needs : (k,) indices of the parameters that they depend on.
+    """
 
     @property
     def at(self) -> Indices: ...
     @property
     def needs(self) -> Indices: ...
     def __call__(self, values: Floats) -> Floats:
-        """(n,) their mixes for parameters (p,); NaN where there is none."""
+        """(n,) mixes of the channels for parameters (p,); NaN where one has no value."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +58,9 @@ class PiecewiseLinear:
 
     @classmethod
     def through(cls, corners: Sequence[tuple[Floats, Floats]]) -> PiecewiseLinear:
-        """Functions given by their corners: places and values, (j,) each."""
-        most = max(len(at) for at, _ in corners) - 1
-        knots, widths, slopes = np.zeros((3, len(corners), most))
+        """Create functions from their corners: abscissas and values, (j,) each."""
+        max_pieces = max(len(at) for at, _ in corners) - 1
+        knots, widths, slopes = np.zeros((3, len(corners), max_pieces))
         for i, (at, gives) in enumerate(corners):
             k = len(at) - 1
             knots[i, :k], widths[i, :k], slopes[i, :k] = at[:-1], np.diff(at), np.diff(gives) / np.diff(at)
@@ -72,7 +75,7 @@ class PiecewiseLinear:
 
 @dataclass(frozen=True)
 class Terms:
-    """Terms of mixes that are more than a weight, ``t`` of them, those of one channel together.
+    """The ``t`` terms of mixes that are more than a weight, sorted by channel.
 
     parameter, channel : (t,) input and output of each. curves : t functions.
     first : (j,) where each channel's terms begin; target : (j,) the channels. join : (j,) 0 sum, 1 min, 2 max.
@@ -132,7 +135,7 @@ class ChannelTable:
 
     @cached_property
     def linear(self) -> Floats:
-        """(n, p) what a unit of each parameter adds to each mix; curves, formulas and linkages by their mean slope."""
+        """(n, p) increase of each mix per unit of each parameter; for curves, formulas and linkages the mean slope."""
         out = self.mix if self.terms is None else self.mix + self.terms.linear(self.mix.shape)
         if self.anchors is not None or self.bound:
             out = out.copy()
@@ -143,21 +146,21 @@ class ChannelTable:
         return out
 
     def slopes(self, values: Floats) -> Floats:
-        """(n, p) what a little more of each parameter adds to each mix at (p,); anchors and curves as in ``linear``."""
+        """(n, p) slopes of the mixes at parameters (p,): local for formulas and linkages, else as in ``linear``."""
         out = self.linear.copy()
         for bound in self.bound:
             out[bound.at] = self._slopes(bound, values)
         return out
 
     def _mean_slopes(self, bound: BoundChannels) -> Floats:
-        """(n, p) over points of the whole range, drawn the same each time."""
+        """(n, p) mean of the slopes at fixed pseudo-random points of the whole range."""
         low, high = self._ends
-        points = np.random.default_rng(_SEED).uniform(low, high, (_DRAWN, len(low)))
+        points = np.random.default_rng(_SEED).uniform(low, high, (_SLOPE_POINTS, len(low)))
         mean: Floats = np.mean([self._slopes(bound, point) for point in points], axis=0)
         return mean
 
     def _slopes(self, bound: BoundChannels, values: Floats) -> Floats:
-        """(n, p) central differences; where a value is at its end, or a side has none, towards the other."""
+        """(n, p) central differences, one-sided at the ends of the range; 0 where a mix has no value."""
         low, high = self._ends
         out = np.zeros((len(bound.at), len(values)))
         for p in bound.needs:
@@ -174,7 +177,7 @@ class ChannelTable:
 
     @property
     def reached(self) -> Flags:
-        """(p,) which parameters move any channel."""
+        """(p,) whether each parameter moves any channel."""
         out: Flags = np.abs(self.linear).sum(axis=0) > 0.0
         for bound in self.bound:
             out[bound.needs] = True
@@ -202,11 +205,11 @@ class ChannelTable:
         return np.clip(wanted, self.low_rad, self.high_rad), int(np.count_nonzero(self.beyond(wanted)))
 
     def beyond(self, wanted_rad: Floats) -> Flags:
-        """(n,) whether an angle lies beyond its limits; one that rests at a limit on purpose does not."""
-        return (wanted_rad < self.low_rad - _AT_LIMIT_RAD) | (wanted_rad > self.high_rad + _AT_LIMIT_RAD)
+        """(n,) whether an angle lies beyond its limits, by more than rounding."""
+        return (wanted_rad < self.low_rad - _LIMIT_TOLERANCE_RAD) | (wanted_rad > self.high_rad + _LIMIT_TOLERANCE_RAD)
 
     def limiter(self, period_s: float) -> MotionLimiter:
-        """Keeps the limits of position (rad) and motion on a bus that cycles every ``period_s``."""
+        """Create the limiter of position and motion for a bus with cycles of ``period_s``."""
         return MotionLimiter(
             self.max_speed_rad_s,
             self.max_accel_rad_s2,
@@ -224,7 +227,7 @@ def build_table(
 ) -> ChannelTable:  # fmt: skip
     """Convert the settings of ``n`` channels to arrays; without ``anchors``, anchored channels stay at 0 mm.
 
-    ``linkages`` : those of these channels; without them, a channel that follows one stays at 0.
+    ``linkages`` : of these channels; a channel whose linkage is missing stays at mix 0.
     """
     mix = np.zeros((len(channels), len(parameters.names)))
     for row, channel in zip(mix, channels, strict=True):
@@ -278,9 +281,9 @@ def _terms(channels: Sequence[ChannelSettings], parameters: Parameters) -> Terms
 
 
 def servo_specs(channels: Sequence[ChannelSettings], rest_rad: Floats | None = None) -> list[ServoSpec]:
-    """The driver's specification of each channel's servo.
+    """Return the driver's specification of each channel's servo.
 
-    ``rest_rad`` : (n,) angles of the neutral face, where servos begin that do not measure their position; 0 without.
+    ``rest_rad`` : (n,) angles of the neutral face, at which servos start that do not measure; None means 0.
     """
     rest = np.zeros(len(channels)) if rest_rad is None else rest_rad
     return [
@@ -303,6 +306,6 @@ def servo_specs(channels: Sequence[ChannelSettings], rest_rad: Floats | None = N
 
 
 def _pulses(channel: ChannelSettings) -> tuple[tuple[float, float], ...]:
-    """Measured (rad, us) of a hobby servo; none without."""
+    """Measured (rad, us) points of a hobby servo; empty where the file gives none."""
     pulse = channel.pulse
     return () if pulse is None else tuple(zip(np.radians(pulse.deg).tolist(), pulse.us, strict=True))

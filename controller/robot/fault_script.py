@@ -1,4 +1,4 @@
-"""Reads timelines of faults, which ``omote simulate --script FILE`` plays."""
+"""Reads fault scripts: timelines of faults that ``omote simulate --script FILE`` applies to a simulated bus."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from controller.base.config import Number, Settings, load
 from controller.base.plain_numbers import plain_number
 from drivers.base.errors import DriverError
 from drivers.sim.serving.timeline import Timeline
-from drivers.sim.wire.faults import KINDS, LONGEST, parse_fault
+from drivers.sim.wire.faults import KINDS, MAX_VALUE, parse_fault
 
-MOST_STEPS = 10_000
+MAX_STEPS = 10_000
 _Seconds = Annotated[Number, Field(ge=0, le=86_400)]
 
 
@@ -23,17 +23,17 @@ class FaultScript(Settings):
     name: str | None = None
     description: str = ""
     loop_s: _Seconds = 0.0
-    timeline: Annotated[list[str], Field(max_length=MOST_STEPS)]
+    timeline: Annotated[list[str], Field(max_length=MAX_STEPS)]
 
 
 def load_fault_script(path: Path) -> Timeline:
-    """The timeline of a file. Raises ConfigError: it cannot be read, or is wrong; every fault with its place."""
+    """Read the timeline of a file. Raises ConfigError, which lists every error, where it cannot be read or is wrong."""
     file = load(path, FaultScript, lambda file: _steps(file)[1])
     return Timeline(_steps(file)[0], file.loop_s)
 
 
 def _steps(file: FaultScript) -> tuple[list[tuple[float, str]], list[str]]:
-    """The steps of a file, and what is wrong with the others."""
+    """Return the valid steps of a file, and error messages for the others."""
     steps: list[tuple[float, str]] = []
     faults = []
     for i, text in enumerate(file.timeline):
@@ -58,7 +58,7 @@ def _step(text: str, earliest_s: float) -> tuple[float, str]:
 
 
 def _check_command(words: list[str]) -> None:
-    """Raises DriverError or ValueError for what is no command of a timeline."""
+    """Raise DriverError or ValueError unless the words are a command of a timeline."""
     match words:
         case ["fault", _, *_]:
             for spec in words[1:]:
@@ -70,7 +70,7 @@ def _check_command(words: list[str]) -> None:
         case ["clear", kind]:
             raise ValueError(f"there is no fault {kind!r}; there are {', '.join(sorted(KINDS))}")
         case ["place", number, ticks] if number.isdecimal() and ticks.removeprefix("-").isdecimal():
-            if not abs(int(ticks)) <= LONGEST:
-                raise ValueError(f"positions go from {-LONGEST:.0f} to {LONGEST:.0f} steps")
+            if not abs(int(ticks)) <= MAX_VALUE:
+                raise ValueError(f"positions go from {-MAX_VALUE:.0f} to {MAX_VALUE:.0f} steps")
         case _:
             raise ValueError("write fault SPEC, clear KIND or place ID TICKS after the time")

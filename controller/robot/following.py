@@ -1,4 +1,4 @@
-"""Measured positions of the servos: how far they are from the wanted ones, and the face that they show."""
+"""Compares measured positions of servos with the wanted ones, and finds the face that the servos show."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from controller.layers.commands import CommandState, StatusValue
 from controller.robot.channels import ChannelTable
 from drivers.base.bus import BusState
 
-_HOW: dict[str, Any] = {"ridge": 1e-4, "sparsity": 1e-3, "tolerance": 1e-5}
-_STEPS = 8
-_GOOD = 0.01
+_SOLVER_OPTIONS: dict[str, Any] = {"ridge": 1e-4, "sparsity": 1e-3, "tolerance": 1e-5}
+_MAX_STEPS = 8
+_MAX_ERROR = 0.01  # rms, as a fraction of each channel's range
 
 
 def _rms(squares: Floats, counts: NDArray[np.int64] | int) -> float:
@@ -35,16 +35,16 @@ class FollowingStatistics:
         self._names, self._region_names = table.names, parameters.region_names
         self._regions = np.array([parameters.regions[int(np.argmax(np.abs(row)))] for row in table.linear])
         self._now: Floats | None = None
-        self._squares, self._most = np.zeros((2, len(table.names)))
+        self._squares, self._max_deg = np.zeros((2, len(table.names)))
         self._count = np.zeros(len(table.names), dtype=np.int64)
 
     def add(self, wanted_rad: Floats, state: BusState) -> None:
-        """Add one cycle: wanted angles (n,) rad, and the measured ones; stale positions do not count."""
+        """Add the wanted angles (n,) rad and the measured ones of one cycle; stale positions are ignored."""
         good = state.fresh & np.isfinite(state.position_rad) & np.isfinite(wanted_rad)
-        away = np.where(good, np.degrees(np.abs(state.position_rad - wanted_rad)), 0.0)
-        self._now = np.where(good, away, np.nan)
-        self._squares += away**2
-        np.maximum(self._most, away, out=self._most)
+        error_deg = np.where(good, np.degrees(np.abs(state.position_rad - wanted_rad)), 0.0)
+        self._now = np.where(good, error_deg, np.nan)
+        self._squares += error_deg**2
+        np.maximum(self._max_deg, error_deg, out=self._max_deg)
         self._count += good
 
     def now(self) -> list[tuple[str, float]]:
@@ -66,17 +66,17 @@ class FollowingStatistics:
                 if region in self._regions
             },
             "worst": [
-                {"channel": self._names[i], "rms_deg": float(rms[i]), "max_deg": float(self._most[i])}
+                {"channel": self._names[i], "rms_deg": float(rms[i]), "max_deg": float(self._max_deg[i])}
                 for i in np.argsort(-rms)[:3]
             ],
         }
 
 
 class Mirror:
-    """Finds parameters whose channels give measured angles.
+    """Finds parameters for which the channels have the measured angles.
 
-    A servo head has fewer degrees of freedom than a face, so many faces give the same angles; the one with few and
-    small values is taken. The eyes are read as eye angles, never as eyeLook shapes.
+    A servo head has fewer degrees of freedom than a face, so many faces have the same angles; a face with few and small
+    parameters is chosen. Eyes give the parameters of eye angles, never the eyeLook shapes.
 
     readable : (n,) bool, the channels that can be inverted: those whose map is strictly monotonic.
     """
@@ -93,10 +93,10 @@ class Mirror:
         self._solver = lru_cache(64)(self._make_solver)  # most cycles use the same channels
         self._rest = self._last = parameters.neutral()
         self._span = np.maximum(self._at[:, -1] - self._at[:, 0], 1e-9)
-        self._solver(self.readable.tobytes())  # compiles the solver now, not in a cycle of a bus
+        self._solver(self.readable.tobytes())  # compiles the solver here, so that no cycle of a bus has to wait for it
 
     def read(self, angles_rad: Floats, fresh: Flags | None = None) -> Floats:
-        """Parameters (P,) that show ``angles_rad`` : (n,) best; angles that are not ``fresh`` : (n,) do not count."""
+        """Return the parameters (P,) that fit ``angles_rad`` : (n,) best; angles not ``fresh`` : (n,) are ignored."""
         counted = self.readable & np.isfinite(angles_rad)
         if fresh is not None:
             counted &= fresh
@@ -105,46 +105,48 @@ class Mirror:
             self._last = self._solver(counted.tobytes()).solve(wanted, start=self._last)
             return self._last.copy()
         found = self._approach(self._last, wanted, counted)
-        if self._apart(found, wanted, counted) > _GOOD:  # another branch of a condition or linkage may fit
+        if self._fit_error(found, wanted, counted) > _MAX_ERROR:  # another branch of a condition or linkage may fit
             straight = self._solver(counted.tobytes()).solve(wanted)
             others = [self._approach(start, wanted, counted) for start in (straight, self._rest)]
-            found = min((found, *others), key=lambda each: self._apart(each, wanted, counted))
+            found = min((found, *others), key=lambda each: self._fit_error(each, wanted, counted))
         self._last = found
         return found.copy()
 
     def _approach(self, start: Floats, wanted: Floats, counted: Flags) -> Floats:
-        """Parameters (P,) near ``start`` whose mixes fit best: Gauss and Newton's steps inside the bounds, halved where
-        one overshoots."""
-        at, apart = start, self._apart(start, wanted, counted)
-        for _ in range(_STEPS):
+        """Improve parameters (P,) from ``start`` until their mixes fit, by bounded Gauss-Newton steps.
+
+        A step that does not improve the fit is shortened.
+        """
+        at, error = start, self._fit_error(start, wanted, counted)
+        for _ in range(_MAX_STEPS):
             slopes = self._table.slopes(at)
-            solver = BoundedSolver(slopes, *self._bounds, weights=counted.astype(np.float64), **_HOW)
+            solver = BoundedSolver(slopes, *self._bounds, weights=counted.astype(np.float64), **_SOLVER_OPTIONS)
             goal = solver.solve(np.where(counted, wanted - self._model(at) + slopes @ at, 0.0), start=at)
-            for share in (1.0, 0.5, 0.25, 0.1):
-                there = at + share * (goal - at)
-                if (now := self._apart(there, wanted, counted)) < apart:
+            for fraction in (1.0, 0.5, 0.25, 0.1):
+                candidate = at + fraction * (goal - at)
+                if (new_error := self._fit_error(candidate, wanted, counted)) < error:
                     break
             else:
                 return at
-            at, gain, apart = there, apart - now, now
-            if gain < 1e-3 * _GOOD:
+            at, gain, error = candidate, error - new_error, new_error
+            if gain < 1e-3 * _MAX_ERROR:
                 return at
         return at
 
     def _model(self, values: Floats) -> Floats:
-        """(n,) mixes; those of weights, curves and anchors as straight as in the table's ``linear``."""
+        """(n,) mixes: exact for formulas and linkages, by the table's ``linear`` for weights, curves and anchors."""
         mixed = self._table.linear @ values
         for bound in self._table.bound:
             mixed[bound.at] = bound(values)
         return np.nan_to_num(mixed)
 
-    def _apart(self, values: Floats, wanted: Floats, counted: Flags) -> float:
-        """How far the mixes are from those wanted, in shares of each channel's range (rms)."""
-        away = np.where(counted, (self._model(values) - wanted) / self._span, 0.0)
-        return float(np.sqrt((away**2).sum() / max(int(counted.sum()), 1)))
+    def _fit_error(self, values: Floats, wanted: Floats, counted: Flags) -> float:
+        """Difference of the mixes from the wanted ones, rms over channels, as a fraction of each channel's range."""
+        difference = np.where(counted, (self._model(values) - wanted) / self._span, 0.0)
+        return float(np.sqrt((difference**2).sum() / max(int(counted.sum()), 1)))
 
     def _mixes(self, angles_rad: Floats) -> Floats:
-        """(n,) mix values that give the angles, inside the calibrated points."""
+        """(n,) mixes for which the channels have the angles, inside the calibrated points; 0 where unreadable."""
         mixes = np.zeros(len(angles_rad))
         for i, angle in enumerate(angles_rad):
             if self.readable[i] and np.isfinite(angle):
@@ -153,12 +155,12 @@ class Mirror:
         return mixes
 
     def _make_solver(self, counted: bytes) -> BoundedSolver:
-        """The solver for the angles that count."""
+        """Create the solver for the channels that are counted: their flags as bytes."""
         return BoundedSolver(
             self._table.linear,
             *self._bounds,
             weights=np.frombuffer(counted, bool).astype(np.float64),
-            **_HOW,
+            **_SOLVER_OPTIONS,
         )
 
 
@@ -179,7 +181,7 @@ class MeasuredFace:
     """The face that the measured positions of all servos show, whatever moved them; may be read from any thread.
 
     tables : the channels of each bus. measured : returns the newest measurement of each, None before the first.
-    following : the statistics of each bus.
+    following : the statistics of each bus, for :meth:`differences` and :meth:`status`.
     """
 
     def __init__(
@@ -194,11 +196,14 @@ class MeasuredFace:
         self._following, self._region_names = following, parameters.region_names
         self._rest = parameters.neutral()
         self._lock = threading.Lock()
-        for mirror, _ in self._mirrors:  # the solver is compiled before the clock runs
+        for mirror, _ in self._mirrors:  # compiles the solvers before the first cycle
             mirror.read(np.zeros(len(mirror.readable)))
 
     def read(self, out: Floats, mask: Flags) -> bool:
-        """Write the face to ``out`` : (P,) and which parameters it knows to ``mask`` : (P,); False for none."""
+        """Write the face to ``out`` : (P,), and flags of the parameters that are known to ``mask`` : (P,).
+
+        Return whether any is known.
+        """
         mask.fill(False)
         with self._lock:
             for (mirror, read), touched in zip(self._mirrors, self._touched, strict=True):
@@ -210,7 +215,10 @@ class MeasuredFace:
         return bool(mask.any())
 
     def measured(self, out: Floats) -> bool:
-        """See :class:`controller.layers.commands.CommandSink`; parameters without a servo are neutral."""
+        """Write the face to ``out``; parameters without a servo are neutral. Return whether any is known.
+
+        See :class:`controller.layers.commands.CommandSink`.
+        """
         np.copyto(out, self._rest)
         return self.read(out, np.zeros(len(out), dtype=bool))
 
@@ -221,7 +229,7 @@ class MeasuredFace:
             state.capture(values, mask, now_ns, now_ns)
 
     def differences(self) -> dict[str, float]:
-        """How far the servos of each region are from their wanted angles now (rms, degrees)."""
+        """Difference of the servos from their wanted angles now, by region (rms, degrees)."""
         found: dict[str, list[float]] = {}
         for following in self._following:
             for region, away in following.now():
@@ -233,7 +241,7 @@ class MeasuredFace:
         }
 
     def status(self) -> dict[str, StatusValue]:
-        """How far the servos are from their wanted angles now: all together, and by region (rms, degrees)."""
+        """Difference of the servos from their wanted angles now (rms, degrees): over all, and by region."""
         every = np.array([each for following in self._following for _, each in following.now()])
         if not len(every):
             return {"away_deg": "unknown"}

@@ -1,9 +1,9 @@
-"""Formulas: what a channel follows where weights and curves do not suffice, such as products and conditions.
+"""Formulas compute a channel's mix where weights and curves do not suffice, as with products and conditions.
 
-A formula is one expression of Python, read by :mod:`ast` and refused unless every part of it is in a short list: names
+A formula is one Python expression, parsed by :mod:`ast` and refused unless every part of it is in a short list: names
 of parameters, numbers, arithmetic, comparisons, ``and``, ``or``, ``not``, ``A if C else B`` and the functions of
-:data:`FUNCTIONS`. It has no attributes, no subscripts and no other calls, its length and depth are bounded, and what is
-compiled knows no name but those functions.
+:data:`FUNCTIONS`. It has no attributes, no subscripts and no other calls, its length and depth are bounded, and the
+compiled code can use no name but those functions.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ import numpy as np
 from controller.base.errors import ParameterError
 from controller.base.parameters import Floats, Indices, Parameters
 
-LONGEST, MOST_PARTS, DEEPEST, HIGHEST_POWER = 600, 200, 24, 8
+MAX_LENGTH, MAX_PARTS, MAX_DEPTH, MAX_POWER = 600, 200, 24, 8
 
 Values = list[float]
 Compiled = Callable[[Values], float]
 
 
 def clamp(x: float, low: float, high: float) -> float:
-    """``x`` kept between two ends."""
+    """Clip ``x`` to the range from ``low`` to ``high``."""
     return min(max(x, low), high)
 
 
@@ -37,7 +37,7 @@ def smoothstep(x: float, low: float = 0.0, high: float = 1.0) -> float:
 
 
 def lerp(a: float, b: float, t: float) -> float:
-    """``a`` where ``t`` is 0, ``b`` where it is 1, straight between and beyond."""
+    """Interpolate linearly: ``a`` where ``t`` is 0, ``b`` where it is 1; extrapolates beyond."""
     return a + (b - a) * t
 
 
@@ -52,7 +52,7 @@ FUNCTIONS: dict[str, tuple[Callable[..., float], int, int]] = {
     "smoothstep": (smoothstep, 1, 3),
     "lerp": (lerp, 3, 3),
 }
-"""Functions of formulas, with the fewest and most values each takes; angles of sin and cos are radians."""
+"""Functions of formulas, each with its least and greatest number of arguments; sin and cos take radians."""
 
 _OPERATORS = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Pow, ast.USub, ast.UAdd, ast.Not, ast.And, ast.Or,
               ast.Lt, ast.LtE, ast.Gt, ast.GtE)  # fmt: skip
@@ -62,13 +62,13 @@ _PARTS = (ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp)
 
 @dataclass(frozen=True)
 class Formula:
-    """A formula that was read. text : as it was written. names : of the parameters in it, each once."""
+    """A parsed formula. text : as it was written. names : the parameters in it, each once."""
 
     text: str
     names: tuple[str, ...]
 
     def compiled(self, parameters: Parameters) -> Compiled:
-        """Its value for a list of parameters (p,); NaN where it has none, as for a division by zero.
+        """Compile it to a function of a list of parameter values (p,), NaN where there is no value, as for 1/0.
 
         Raises ParameterError: a name is no parameter.
         """
@@ -81,8 +81,8 @@ def parse_formula(text: str) -> Formula:
     """Read a formula. Raises ValueError that names what is not allowed in it, and where."""
     tree = _parse(text)
     parts = list(_parts(tree.body, 1))
-    if len(parts) > MOST_PARTS:
-        raise ValueError(f"is too long: {len(parts)} parts, {MOST_PARTS} at most")
+    if len(parts) > MAX_PARTS:
+        raise ValueError(f"is too long: {len(parts)} parts, {MAX_PARTS} at most")
     for part in parts:
         _check(part, text)
     called = {id(part.func) for part in parts if isinstance(part, ast.Call)}
@@ -91,8 +91,8 @@ def parse_formula(text: str) -> Formula:
 
 
 def _parse(text: str) -> ast.Expression:
-    if len(text) > LONGEST:
-        raise ValueError(f"is too long: {len(text)} characters, {LONGEST} at most")
+    if len(text) > MAX_LENGTH:
+        raise ValueError(f"is too long: {len(text)} characters, {MAX_LENGTH} at most")
     try:
         return ast.parse(text.strip(), mode="eval")
     except SyntaxError as error:
@@ -102,9 +102,9 @@ def _parse(text: str) -> ast.Expression:
 
 
 def _parts(node: ast.AST, depth: int) -> Iterator[ast.AST]:
-    """Every part of a formula but its operators. Raises ValueError: it is nested too deeply."""
-    if depth > DEEPEST:
-        raise ValueError(f"is nested too deeply: {DEEPEST} levels at most")
+    """Yield every part of a formula but its operators. Raises ValueError where it is nested too deeply."""
+    if depth > MAX_DEPTH:
+        raise ValueError(f"is nested too deeply: {MAX_DEPTH} levels at most")
     yield node
     for child in ast.iter_child_nodes(node):
         if not isinstance(child, ast.operator | ast.unaryop | ast.boolop | ast.cmpop | ast.expr_context):
@@ -116,7 +116,7 @@ def _parts(node: ast.AST, depth: int) -> Iterator[ast.AST]:
 
 
 def _check(part: ast.AST, text: str) -> None:
-    """Raise ValueError for a part that no formula may have."""
+    """Raise ValueError for a part that is not allowed in a formula."""
     shown = ast.get_source_segment(text.strip(), part) or text
     if isinstance(part, ast.Constant):
         value = part.value
@@ -126,8 +126,8 @@ def _check(part: ast.AST, text: str) -> None:
         _check_call(part, shown)
     elif isinstance(part, ast.BinOp) and isinstance(part.op, ast.Pow):
         power = part.right.value if isinstance(part.right, ast.Constant) else None
-        if type(power) is not int or not 1 <= power <= HIGHEST_POWER:
-            raise ValueError(f"{shown}: a power must be a whole number from 1 to {HIGHEST_POWER}")
+        if type(power) is not int or not 1 <= power <= MAX_POWER:
+            raise ValueError(f"{shown}: a power must be a whole number from 1 to {MAX_POWER}")
     elif not isinstance(part, (*_PARTS, ast.Name)):
         raise ValueError(f"{shown!r} is not allowed in a formula; it has numbers, parameters, operators and "
                          f"{', '.join(FUNCTIONS)}")  # fmt: skip
@@ -142,7 +142,7 @@ def _check_call(call: ast.Call, shown: str) -> None:
 
 
 class _Bind(ast.NodeTransformer):
-    """Replaces names by places in a list, and numbers by floats, which have no end of memory."""
+    """Replaces names by items of a list ``v``, and numbers by floats, whose powers cannot exhaust memory."""
 
     def __init__(self, places: dict[str, int]) -> None:
         self._places = places
@@ -161,7 +161,7 @@ class _Bind(ast.NodeTransformer):
 
 
 def _function(tree: ast.Expression) -> ast.Expression:
-    """``lambda v: TREE``."""
+    """Return the tree of ``lambda v: TREE``."""
     arguments = ast.arguments(posonlyargs=[], args=[ast.arg("v")], kwonlyargs=[], kw_defaults=[], defaults=[])
     return ast.Expression(ast.Lambda(arguments, tree.body))
 
@@ -182,7 +182,7 @@ def _without_errors(function: Compiled) -> Compiled:
 
 @dataclass(frozen=True)
 class ChannelFormulas:
-    """Formulas of ``n`` channels. at : (n,) the channels. needs : (k,) parameters that any of them names."""
+    """Formulas of ``n`` channels. at : (n,) their indices. needs : (k,) indices of the parameters that they name."""
 
     at: Indices
     needs: Indices
@@ -190,7 +190,7 @@ class ChannelFormulas:
 
     @classmethod
     def of(cls, formulas: Sequence[tuple[int, Formula]], parameters: Parameters) -> ChannelFormulas:
-        """Formulas by the index of their channel. Raises ParameterError: a name is no parameter."""
+        """Create from pairs of channel index and formula. Raises ParameterError where a name is no parameter."""
         names = dict.fromkeys(name for _, formula in formulas for name in formula.names)
         return cls(
             np.array([at for at, _ in formulas], dtype=np.intp),
@@ -199,13 +199,13 @@ class ChannelFormulas:
         )
 
     def __call__(self, values: Floats) -> Floats:
-        """(n,) values of the formulas for parameters (p,); NaN where one has none."""
+        """(n,) values of the formulas for parameters (p,); NaN where a formula has no value."""
         given = values.tolist()
         return np.array([function(given) for function in self.functions])
 
 
 def formula_faults(text: str, parameters: Parameters) -> list[str]:
-    """What is wrong with a formula that can be read: names that are no parameters, no value for the neutral face."""
+    """List errors of a formula that can be parsed: names that are no parameters, no value for the neutral face."""
     formula, faults = parse_formula(text), []
     for name in formula.names:
         try:

@@ -1,4 +1,4 @@
-"""How far and how fast the servos of a robot turn the joints of a head: limits for a description of the robot."""
+"""Computes joint limits for a robot description: how far and how fast servos turn the joints of a head."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ _STEPS = 401
 
 
 def joint_limits(robot: RobotSettings, parameters: Parameters, joints: list[Joint]) -> dict[str, JointLimit]:
-    """Limits of those joints that servos of the robot turn, by parameter.
+    """Return the limits of the joints that servos of the robot turn, by parameter.
 
-    Each parameter is moved alone through its range; the joint reaches as far as some servo follows it before its own
-    limit, and is as fast as that servo, at the steepest place of its curve.
+    Each parameter is moved alone through its range. The joint's range ends where the servo that follows it furthest
+    meets its own limit; its speed is that servo's speed at the steepest part of its curve.
     """
     found: dict[str, JointLimit] = {}
     for bus in robot.buses:

@@ -38,7 +38,7 @@ def load_robot(path: Path, parameters: Parameters) -> RobotSettings:
 
 
 def robot_parameters(robot: RobotSettings, path: Path, parameters: Parameters) -> Parameters:
-    """``parameters``, followed by those that the vocabularies of the robot file ``path`` add.
+    """Return ``parameters``, followed by the parameters that the vocabularies of the robot file ``path`` add.
 
     Raises ConfigError: a vocabulary cannot be found, or it is wrong.
     """
@@ -59,7 +59,7 @@ def _repeated(robot: RobotSettings) -> list[str]:
 
 
 def _models(robot: RobotSettings) -> list[str]:
-    """Faults: servo models that their bus does not drive, and ``pulse`` of servos that are not hobby servos."""
+    """List faults: servo models that their bus does not drive, and ``pulse`` of servos that are not hobby servos."""
     faults = []
     buses = {bus.name: bus for bus in robot.buses}
     for i, channel in enumerate(robot.channels):
@@ -108,7 +108,7 @@ def _references(robot: RobotSettings, parameters: Parameters) -> list[str]:
 
 
 def _rules(robot: RobotSettings) -> list[str]:
-    """Faults of rules that name unknown channels, or pairs of channels on different buses."""
+    """List faults: rules that name unknown channels, or pairs of channels on different buses."""
     bus = {channel.name: channel.bus for channel in robot.channels}
     faults = [
         f"{key}: no channel called {name!r}{did_you_mean(name, bus)}"

@@ -1,4 +1,4 @@
-"""What safety rules have in common, and the rule of temperature: a warm servo moves less far and less fast."""
+"""Input, output and counter of all safety rules, and the heat rule: a warm servo moves less far and more slowly."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from controller.robot.channels import ChannelTable
 from controller.robot.settings import HeatRule
 from drivers.base.bus import BusState
 
-_SETTLE_S = 2.0  # in which a reading, which comes in whole degrees, takes effect
+_SETTLE_S = 2.0  # time over which a change takes full effect; readings come in whole degrees, that is, in steps
 
 
 @dataclass
@@ -47,7 +47,7 @@ class AllowedRange:
 
 
 class RuleCounter:
-    """How many times each of k rules began to act, and for how many seconds it acted."""
+    """Counts how many times each of k rules began to act, and for how many seconds it acted."""
 
     def __init__(self, labels: list[str]) -> None:
         self.labels = labels
@@ -70,10 +70,9 @@ class RuleCounter:
 
 
 class HeatRules:
-    """Narrows the range about the neutral face, and the speed, from ``above_c`` to ``full_c``.
+    """Narrows the range about the neutral face, and the speed, as temperature rises from ``above_c`` to ``full_c``.
 
-    Only measured temperatures count: a servo that has not said how warm it is moves as always, and one that says it no
-    more keeps the last one.
+    A servo that has not reported a temperature is not limited. If it stops reporting, the last one stays in effect.
     """
 
     def __init__(self, rules: Sequence[HeatRule], table: ChannelTable, neutral: Floats) -> None:
@@ -93,18 +92,18 @@ class HeatRules:
             measured = now.state.temperature_c[self._at]
             wanted = np.clip((measured - self._above) / (self._full - self._above), 0.0, 1.0)
             wanted = np.where(np.isfinite(measured), wanted, self._warmth)
-            most = now.dt / _SETTLE_S
-            self._warmth += np.clip(wanted - self._warmth, -most, most)
-        kept = 1.0 - self._warmth * (1.0 - self._range)
+            max_step = now.dt / _SETTLE_S
+            self._warmth += np.clip(wanted - self._warmth, -max_step, max_step)
+        range_fraction = 1.0 - self._warmth * (1.0 - self._range)
         acting = self._warmth > 0.0
         for sign, end in ((1.0, self._high), (-1.0, self._low)):
-            bound = self._neutral + kept * (end - self._neutral)
+            bound = self._neutral + range_fraction * (end - self._neutral)
             allowed.narrow(self._at, np.full(len(self._at), sign), bound, acting)
         self.counter.count(acting, now.dt)
 
     @property
-    def speed_share(self) -> Floats:
-        """(n,) share of its top speed that each channel of the table may use now."""
+    def speed_fraction(self) -> Floats:
+        """(n,) fraction of its top speed that each channel of the table may use now."""
         self._share[:] = 1.0
         np.minimum.at(self._share, self._at, 1.0 - self._warmth * (1.0 - self._speed))
         return self._share

@@ -2,9 +2,8 @@
 
 The chain is smoothing -> dead band -> slack -> rules -> limiter of motion. Rules only narrow the range [low, high] of
 positions that each servo may be sent; several rules combine by intersection, so their order does not matter. All of
-them act on targets: the :class:`controller.motion.motion.MotionLimiter` behind them keeps speed and acceleration,
-whatever a rule does. After the rules of the Hanson motor stack, without its defects; docs/robots.md lists the
-differences.
+them act on targets: the :class:`controller.motion.motion.MotionLimiter` after them limits speed and acceleration,
+whatever a rule does. The rules follow those of the Hanson motor stack; docs/robots.md lists the differences.
 """
 
 from __future__ import annotations
@@ -24,13 +23,13 @@ from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, Ru
 from drivers.base.bus import BusState
 
 if TYPE_CHECKING:
-    from controller.robot.anchors import AnchorSolver  # start-up: loads the head
+    from controller.robot.anchors import AnchorSolver  # imported lazily: it loads the head
 
-_NEAR_RAD = 1e-3
+_TOLERANCE_RAD = 1e-3
 
 
 class _Thresholds:
-    """Indices, signs and thresholds (k,) of relative positions of channels."""
+    """Thresholds of k channels: index, sign of the side (+1: high), and angle (rad), each (k,)."""
 
     def __init__(self, table: ChannelTable, neutral: Floats, extremes: Sequence[tuple[str, str, float]]) -> None:
         self.at = np.array([table.names.index(name) for name, _, _ in extremes], dtype=np.intp)
@@ -39,19 +38,19 @@ class _Thresholds:
         self.limit = np.where(self.sign > 0, table.high_rad[self.at], table.low_rad[self.at])
         self.bound = self.angle_rad(np.array([extreme for _, _, extreme in extremes]))
 
-    def angle_rad(self, share: Floats) -> Floats:
-        """(k,) rad of relative positions (k,)."""
-        return self.neutral + share * (self.limit - self.neutral)
+    def angle_rad(self, relative: Floats) -> Floats:
+        """(k,) rad of relative positions (k,): 0 is the neutral face, 1 the limit."""
+        return self.neutral + relative * (self.limit - self.neutral)
 
     def past(self, angles: Floats) -> Flags:
         """(..., k) whether the channels' ``angles`` : (..., n) lie beyond their threshold."""
-        return self.sign * (angles[..., self.at] - self.bound) > _NEAR_RAD
+        return self.sign * (angles[..., self.at] - self.bound) > _TOLERANCE_RAD
 
 
 class AntagonistRules:
     """Keeps antagonists from being past their extremes at the same time.
 
-    Decides by where a servo would come to rest, so that neither overshoots while it brakes.
+    It also compares the position at which a servo would come to rest, so that none overshoots while it brakes.
     """
 
     def __init__(self, rules: Sequence[PreventRule], table: ChannelTable, neutral: Floats) -> None:
@@ -72,8 +71,8 @@ class AntagonistRules:
 class TimingRules:
     """Limits how long a servo may stay at an extreme.
 
-    The time past the extreme adds up, and runs back at the same pace on the near side of it: a target that leaves the
-    extreme for a moment does not restart the time.
+    The time past the extreme is added up, and the time inside it is subtracted at the same rate, so that a target that
+    leaves the extreme for a moment does not restart the count.
     """
 
     def __init__(self, rules: Sequence[TimingRule], table: ChannelTable, neutral: Floats) -> None:
@@ -84,7 +83,7 @@ class TimingRules:
         times = np.array([(r.fall_s, r.rest_s, r.recover_s) for r, _ in each]).reshape(-1, 3)
         self._until = np.cumsum(times, axis=1)
         self._fall, self._recover = times[:, 0], times[:, 2]
-        self._spent, self._phase = np.zeros(len(each)), np.full(len(each), -1.0)  # s; phase -1: not acting
+        self._spent, self._phase = np.zeros(len(each)), np.full(len(each), -1.0)  # s; a phase of -1 means not acting
         self._idle = True
         self.counter = RuleCounter([f"timing {name} toward {r.toward}" for r, name in each])
 
@@ -104,7 +103,7 @@ class TimingRules:
         self.counter.count(acting, now.dt)
 
     def _level(self) -> Floats:
-        """(k,) relative limit: 1 falls to the extreme, stays, and rises to 1 again."""
+        """(k,) relative limit: it falls from 1 to the extreme, stays there, and rises to 1 again."""
         fallen = np.clip(self._phase / self._fall, 0.0, 1.0)
         risen = np.clip((self._phase - self._until[:, 1]) / self._recover, 0.0, 1.0)
         level: Floats = 1.0 - (1.0 - self._extreme) * (fallen - risen)
@@ -114,7 +113,7 @@ class TimingRules:
 class LoadRules:
     """Lets a servo that meets resistance give way, from its measured position, against the direction of its push.
 
-    Only fresh, measured currents count; a servo that does not measure its current is never held by this rule.
+    Only currents measured in this cycle count; the rule never limits a servo that does not measure its current.
     """
 
     def __init__(self, rules: Sequence[LoadRule], table: ChannelTable) -> None:
@@ -123,7 +122,7 @@ class LoadRules:
         numbers = np.array([(r.current_a, r.after_s, r.rest_s) for r, _ in each]).reshape(-1, 3)
         self._current, self._after, self._rest = numbers.T
         angles = np.array([(r.most_deg, r.fall_deg_s, r.rise_deg_s) for r, _ in each]).reshape(-1, 3)
-        self._most, self._fall, self._rise = np.radians(angles).T
+        self._max_give, self._fall, self._rise = np.radians(angles).T
         self._low, self._high = table.low_rad[self._at], table.high_rad[self._at]
         self._over, self._calm, self._push, self._from, self._given = np.zeros((5, len(each)))
         self.counter = RuleCounter([f"load {name}" for _, name in each])
@@ -151,7 +150,7 @@ class LoadRules:
     def _give_way(self, over: Flags, known: Flags, dt: float) -> None:
         self._calm = np.where(over, 0.0, self._calm + dt * known)
         falling, rising = over & (self._push != 0.0), self._calm > self._rest
-        self._given = np.where(falling, np.minimum(self._given + self._fall * dt, self._most), self._given)
+        self._given = np.where(falling, np.minimum(self._given + self._fall * dt, self._max_give), self._given)
         self._given = np.where(rising, self._given - self._rise * dt, self._given)
         limit = np.where(self._push > 0, self._high - self._from, self._from - self._low)
         self._push[rising & (-self._given >= limit)] = 0.0
@@ -166,7 +165,7 @@ class DeadBandAndSlack:
 
     def __init__(self, dead_band_rad: Floats, slack_rad: Floats) -> None:
         self._dead, self._half = dead_band_rad, 0.5 * slack_rad
-        self._turn = np.maximum(0.1 * slack_rad, _NEAR_RAD)
+        self._turn = np.maximum(0.1 * slack_rad, _TOLERANCE_RAD)
         self._held, self._peak = np.full(len(slack_rad), np.nan), np.zeros(len(slack_rad))
         self._direction = np.zeros(len(slack_rad))
 
@@ -174,11 +173,11 @@ class DeadBandAndSlack:
         """(n,) rad: the angles to send for ``target`` : (n,) rad."""
         moved = ~(np.abs(target - self._held) <= self._dead)
         self._held[moved] = target[moved]
-        # the direction turns when the target returns from its furthest point
-        came = (self._held - self._peak) * np.where(self._direction == 0.0, 1.0, self._direction)
-        turned = (came < -self._turn) | ((self._direction == 0.0) & (came > self._turn))
-        self._direction = np.where(turned, np.sign(self._held - self._peak), self._direction)
-        self._peak = np.where(turned | (came > 0.0), self._held, self._peak)
+        # the direction reverses when the target has come back from its furthest point by self._turn
+        advance = (self._held - self._peak) * np.where(self._direction == 0.0, 1.0, self._direction)
+        reversed_ = (advance < -self._turn) | ((self._direction == 0.0) & (advance > self._turn))
+        self._direction = np.where(reversed_, np.sign(self._held - self._peak), self._direction)
+        self._peak = np.where(reversed_ | (advance > 0.0), self._held, self._peak)
         return self._held + self._direction * self._half
 
 
@@ -200,7 +199,7 @@ class Guard:
         self._rules = [rule for rule in every if rule.counter.labels]
 
     def apply(self, target: Floats, position: Floats, rest: Floats, state: BusState | None, dt: float) -> Floats:
-        """Angles (n,) rad that the servos may be sent, inside the limits and every rule.
+        """Return the angles (n,) rad that the servos may be sent, inside the limits and every rule.
 
         Parameters
         ----------
@@ -210,7 +209,7 @@ class Guard:
         state : the newest measurement. dt : s.
         """
         low, high = self._table.low_rad, self._table.high_rad
-        finite = np.where(np.isfinite(target), target, position)  # a servo whose target is no number stays
+        finite = np.where(np.isfinite(target), target, position)  # a servo whose target is not finite stays
         wanted = np.clip(self._slack.apply(np.clip(finite, low, high)), low, high)
         allowed = AllowedRange(low.copy(), high.copy())
         now = RuleInput(wanted, position, rest, state, dt)
@@ -219,19 +218,19 @@ class Guard:
         return np.maximum(np.minimum(wanted, allowed.high), np.minimum(allowed.low, allowed.high))
 
     @property
-    def speed_share(self) -> Floats | float:
-        """Share of its top speed that each channel may use now, by its temperature: (n,), or 1 for all."""
-        return 1.0 if self._heat is None else self._heat.speed_share
+    def speed_fraction(self) -> Floats | float:
+        """Fraction of its top speed that each channel may use now, by its temperature: (n,), or 1 for all."""
+        return 1.0 if self._heat is None else self._heat.speed_fraction
 
     def report(self) -> list[dict[str, object]]:
-        """The rules that acted: which, how often, for how long (s)."""
+        """Return a record for each rule that acted: its label, how often, for how long (s)."""
         return [row for rule in self._rules for row in rule.counter.report()]
 
 
 class GoalFilter:
     """Turns the angles wanted of one bus's channels into goals: safety rules first, then limits of motion.
 
-    channels : those of the bus. rules, anchors : of the robot. period_s, linkages : of the bus.
+    channels, period_s, linkages : of the bus. rules, anchors : of the robot.
     """
 
     def __init__(self, channels: Sequence[ChannelSettings], parameters: Parameters, rules: RuleSettings,
@@ -249,7 +248,7 @@ class GoalFilter:
         self.restart(self.table.neutral_rad)
 
     def out_of_reach(self) -> dict[str, int]:
-        """Linkages whose inputs went where they cannot go, and how often."""
+        """Linkages whose inputs became unreachable, by name, and how often."""
         linked = [bound for bound in self.table.bound if isinstance(bound, LinkedChannels)]
         return {each.name: each.times for each in linked if each.times}
 
@@ -264,19 +263,19 @@ class GoalFilter:
         self._slow_start.restart(where)
 
     def restart_some(self, where: Flags, position_rad: Floats) -> None:
-        """As ``restart`` for those of ``where`` : (n,); from the last goal where a position is NaN."""
-        at = np.where(np.isfinite(position_rad), position_rad, self.sent)
-        self._limiter.reset_some(where, at)
-        self.sent[where] = np.clip(at, self.table.low_rad, self.table.high_rad)[where]
+        """Restart the channels ``where`` : (n,) as ``restart`` does; where a position is NaN, from the last goal."""
+        start = np.where(np.isfinite(position_rad), position_rad, self.sent)
+        self._limiter.reset_some(where, start)
+        self.sent[where] = np.clip(start, self.table.low_rad, self.table.high_rad)[where]
         self._begin(where)
 
     def step(self, wanted: Floats, state: BusState | None = None, dt: float | None = None) -> Floats:
-        """One cycle of ``dt`` s, by default the bus's own, towards angles (n,) rad, given the newest measurement.
+        """Compute the goals of one cycle towards angles ``wanted`` (n,) rad, given the newest measurement.
 
-        Returns goals (n,) rad, the same array each time.
+        dt : duration of the cycle, s; by default the bus's own. Returns goals (n,) rad, the same array each time.
         """
         dt = self.period_s if dt is None else dt
         smooth = self._filter.apply(wanted, dt)
         allowed = self.guard.apply(smooth, self.sent, self._limiter.stopping_position(dt), state, dt)
-        self._limiter.set_speed_fraction(np.minimum(self._slow_start.step(dt), self.guard.speed_share))
+        self._limiter.set_speed_fraction(np.minimum(self._slow_start.step(dt), self.guard.speed_fraction))
         return self._limiter.step(dt, allowed, self.sent)

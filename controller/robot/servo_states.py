@@ -1,4 +1,4 @@
-"""What every servo of a bus is asked to do and reports, for people who watch it."""
+"""State of every servo of a bus, its goal and its measurements, for display."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from drivers.base.bus import BusState
 
 
 def servo_states(loop: BusLoop) -> list[dict[str, Any]]:
-    """One record a servo: names, limits and goal (degrees), what it reports (None where unknown), and what is wrong.
+    """Return a record for each servo: names, limits and goal (degrees), measurements (None if unknown), and its error.
 
     May be called from any thread; ``age_s`` is the age of a position.
     """
@@ -42,7 +42,7 @@ def _number(value: float, digits: int) -> float | None:
 
 
 def _fault(state: BusState, i: int) -> str:
-    """What is wrong with a servo, in a few words; empty where nothing is."""
+    """Describe the error of a servo in a few words; empty if it has none."""
     if state.silent[i]:
         return "does not answer"
     if state.hardware_error[i]:

@@ -61,10 +61,10 @@ class PulseSettings(Settings):
 
 
 class AnchorSettings(Settings):
-    """Where on the skin a servo pulls; its ``map`` then gives degrees for millimetres of pull.
+    """Where on the skin a servo pulls; the ``map`` of its channel then converts millimetres of pull to degrees.
 
-    ``point`` is (u, v) of the part, a place [x, y, z] in mm, of which the nearest point of the skin is taken, or the
-    name of one of the robot's landmarks. Skin within ``reach_mm`` moves along, less with distance; with ``like`` it
+    ``point`` is (u, v) of the part, a position [x, y, z] in mm, for which the nearest vertex of the skin is used, or
+    the name of a landmark of the robot. Skin within ``reach_mm`` moves along, less with distance; with ``like`` it
     moves as that parameter moves it (a jaw on its hinge, a lid on its axle). ``both`` also pulls at the mirrored point.
     """
 
@@ -98,7 +98,7 @@ class AnchorSettings(Settings):
 class SmoothSettings(Settings):
     """Smoothing of a channel's target: a moving average over ``average_s``, or a One Euro filter.
 
-    min_cutoff_hz : of a target at rest; lower is smoother. beta : how much it rises with speed (Hz for each degree/s).
+    min_cutoff_hz : cut-off for a target at rest; lower is smoother. beta : its increase with speed, Hz per degree/s.
     """
 
     average_s: Annotated[float, Field(ge=0, le=5, allow_inf_nan=False)] | None = None
@@ -161,12 +161,12 @@ class ChannelSettings(Settings):
 
     @property
     def follows(self) -> bool:
-        """Whether it says itself what it follows; a linkage does for one that does not."""
+        """Whether the channel has its own mix, formula or anchor; else a linkage gives its angle."""
         return bool(self.mix) or self.anchor is not None or self.formula is not None
 
 
 class PreventRule(Settings):
-    """Antagonists: ``channel`` is held at ``extreme`` while ``other`` is, or wants to be, past ``other_extreme``.
+    """Antagonists: ``channel`` is limited to ``extreme`` while ``other`` is, or should go, past ``other_extreme``.
 
     ``other`` has precedence, but waits until ``channel`` has moved back. Positions in rules are relative: 0 is the
     channel's angle for the neutral face, 1 its limit on the side of ``toward``, so a rule stays valid after another
@@ -182,7 +182,7 @@ class PreventRule(Settings):
 
 
 class TimingRule(Settings):
-    """Time at an extreme: after ``hold_s`` past ``extreme`` the limit falls to it, stays there, and returns."""
+    """Time at an extreme: after ``hold_s`` past ``extreme`` the limit falls to it, stays there, and rises again."""
 
     channels: Names
     toward: Side
@@ -212,7 +212,7 @@ class LoadRule(Settings):
 class HeatRule(Settings):
     """Temperature: from ``above_c`` to ``full_c`` the range about the neutral face and the top speed shrink.
 
-    At ``full_c`` they are the shares ``range`` and ``speed`` of what they were.
+    At ``full_c`` they are multiplied by ``range`` and ``speed``.
     """
 
     channels: Names
@@ -249,7 +249,7 @@ class RuleSettings(Settings):
         )
 
     def mentions(self) -> Iterator[tuple[str, str]]:
-        """Key and name of every channel that a rule names."""
+        """Yield the key of the rule and the name of every channel that a rule names."""
         for i, rule in enumerate(self.prevent):
             yield f"rules.prevent[{i}].channel", rule.channel
             yield f"rules.prevent[{i}].other", rule.other
@@ -285,7 +285,7 @@ class RobotSettings(Settings):
     @model_validator(mode="before")
     @classmethod
     def _fill_in_profiles(cls, table: Any) -> Any:
-        """Give channels the values of their profile that they do not set themselves."""
+        """Fill in values of channels from their profile where they do not set them."""
         channels, profiles = table.get("channels"), table.get("profiles", {})
         if not isinstance(channels, list) or not isinstance(profiles, dict):
             return table
@@ -293,7 +293,7 @@ class RobotSettings(Settings):
 
     @model_validator(mode="after")
     def _fill_in_rates(self) -> RobotSettings:
-        """Give buses without a rate the one that is usual for their servos."""
+        """Fill in the rate of buses that give none: the default for their servos."""
         for at, bus in enumerate(self.buses):
             models = [channel.model for channel in self.on_bus(bus.name)]
             if "rate_hz" not in bus.model_fields_set:
@@ -317,7 +317,7 @@ class RobotSettings(Settings):
 
 
 def _with_profile(channel: Any, profiles: dict[str, Any]) -> Any:
-    """A channel with the values of its profile; with those of all profiles where none has that name (a fault)."""
+    """Return a channel with the values of its profile; with the values of all profiles where its name is unknown."""
     if not isinstance(channel, dict) or "profile" not in channel:
         return channel
     own = profiles.get(str(channel["profile"]))

@@ -1,10 +1,10 @@
 """Suggest where a further servo would help a robot most: the point and the direction that reduce the error most.
 
-A servo moves the skin along its direction, by a share that falls off around its point, as for anchors
+A servo moves the skin along its direction, with a weight that falls off around its point, as for anchors
 (:func:`controller.robot.anchors.servo_field`). The residual of a face is the displacement of the skin that the robot's
 servos do not reach. For one face the best pull of a further servo is the least-squares one. Of all directions at a
-point the best is the first eigenvector of the sum of v v^T over the faces, where v is the sum of the residual weighted
-by the shares. Every sampled point of the skin is tried.
+point the best is the eigenvector with the greatest eigenvalue of the sum of v v^T over the faces, where v is the
+weighted sum of the residual. Every sampled point of the skin is tried.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from controller.robot.anchors import AnchorSolver, falloff
 from surface.head.model.parameters import SHAPES
 
 REACH_MM = 15.0
-"""Reach of the servos that are tried; anchors that name no reach have the same."""
-_LEAST_MM = 0.05  # least improvement (rms, within its reach) for a servo to be suggested
+"""Reach of the servos that are tried; it is the default reach of anchors."""
+_MIN_IMPROVEMENT_MM = 0.05  # rms, within its reach, for a servo to be suggested
 
 
 @dataclass(frozen=True)
@@ -46,9 +46,9 @@ class Suggestion:
 def suggest_servos(
     solver: AnchorSolver, faces: Mapping[str, Floats], parameters: Parameters, count: int = 2
 ) -> Iterator[Suggestion]:
-    """Up to ``count`` further servos for faces, each given by its parameters (p,).
+    """Suggest up to ``count`` further servos for faces, each given by its parameters (p,).
 
-    The best comes first; each is found with those before it in place. Servos that would hardly help are left out.
+    The best comes first; each is chosen with the servos before it in place. Servos that would hardly help are left out.
     """
     left = np.array([solver.residual(solver.shape_values(face)) for face in faces.values()])  # (f, m, 3)
     shares = np.array(
@@ -64,14 +64,14 @@ def suggest_servos(
             solver.skin.rest[j], direction, float(np.abs(pulls).max()), regions[j],
             _rms(left[:, near]), _rms(after[:, near]), _rms(left), _rms(after),
         )  # fmt: skip
-        if found.before_mm - found.after_mm < _LEAST_MM:
+        if found.before_mm - found.after_mm < _MIN_IMPROVEMENT_MM:
             return
         yield found
         left = after
 
 
 def _best(shares: Floats, left: Floats) -> tuple[int, Floats]:
-    """Number of the point, and direction (3,), that reduce the residuals ``left (f, m, 3)`` most."""
+    """Index of the point, and direction (3,), that reduce the residuals ``left`` : (f, m, 3) most."""
     weighed = np.einsum("jm,fmc->jfc", shares, left)
     matrices = np.einsum("jfc,jfd->jcd", weighed, weighed)
     values, vectors = np.linalg.eigh(matrices)
@@ -98,7 +98,7 @@ def _regions(solver: AnchorSolver, parameters: Parameters) -> list[str]:
 
 
 def described(found: Suggestion) -> str:
-    """A suggestion in one line, in which point and direction are written as the keys of an anchor."""
+    """Describe a suggestion in one line, with point and direction written as the keys of an anchor."""
     point, direction = ([round(float(x), digits) for x in each] for each, digits in
                         ((found.point, 1), (found.direction, 2)))  # fmt: skip
     return (

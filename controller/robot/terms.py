@@ -24,11 +24,11 @@ from controller.base.parameters import Floats
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Curve = Literal["straight", "smooth"]
 
-_PIECES = 8  # straight pieces between two points of a smooth curve
+_PIECES = 8  # number of straight pieces between two points of a smooth curve
 
 
 def check_points(at: list[float], others: list[float], name: str) -> None:
-    """Raise ValueError unless ``at`` rises and both lists are equally long, two or more."""
+    """Raise ValueError unless ``at`` is strictly ascending and both lists are equally long, two or more."""
     if len(at) != len(others) or len(at) < 2:
         raise ValueError(f"at and {name} need the same number of points, two or more")
     if any(b <= a for a, b in pairwise(at)):
@@ -64,7 +64,7 @@ class TermSettings(Settings):
         return self.within is None and self.at is None
 
     def points(self, low: float, high: float) -> tuple[Floats, Floats]:
-        """Corners (k,) of the term as straight pieces, for a parameter that runs from ``low`` to ``high``."""
+        """Corners (k,) of the term as straight pieces, for a parameter in the range from ``low`` to ``high``."""
         if self.at is not None and self.gives is not None:
             return curve_corners(np.array(self.at), np.array(self.gives), self.curve)
         at = np.array(self.within or (low, high), dtype=np.float64)

@@ -98,7 +98,7 @@ def _recognise(path: Path, readers: list[TakeReader]) -> TakeReader | None:
     for reader in readers:
         if reader.recognises:
             recognises = TAKES.load(reader, reader.recognises)
-            with TAKES.blaming(reader.kind):
+            with TAKES.naming_package(reader.kind):
                 if recognises(start):
                     return reader
     return next((reader for reader in readers if not reader.recognises), None)
@@ -111,7 +111,7 @@ def load_take(path: Path, parameters: Parameters) -> Take:
     """
     reader = reader_of(path)
     read = TAKES.load(reader, reader.read)
-    with TAKES.blaming(reader.kind):
+    with TAKES.naming_package(reader.kind):
         take = read(path, parameters)
     if not isinstance(take, Take):
         raise TakeError(f"{path}: take kind {reader.kind!r} gave no take, but {take!r}", hint="update its package")

@@ -77,5 +77,5 @@ def list_plugins() -> Iterator[ListedPlugin]:
             except PluginError as error:
                 yield ListedPlugin(name, kind, "", package, str(error), error.hint)
         for kind, package in registry.shadowed():
-            fault = f"{registry.what} {kind!r} of the package {package} is never used: omote has that kind itself"
+            fault = f"{registry.noun} {kind!r} of the package {package} is never used: omote has that kind itself"
             yield ListedPlugin(name, kind, "", package, fault, f"pip uninstall {package}, or give it another kind")

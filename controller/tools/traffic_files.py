@@ -14,7 +14,7 @@ from controller.base.files import place_hint
 from drivers.base.errors import DriverError
 from drivers.core import pcapng
 from drivers.core.traffic import Decoder, Decoder1, Decoder2
-from drivers.core.trafficlog import MOST_PIECES, Piece, TrafficRecord, Wire, format_piece, read_log
+from drivers.core.trafficlog import MAX_PIECES, Piece, TrafficRecord, Wire, format_piece, read_log
 from drivers.sim.serving.replay import Replay
 from drivers.sim.wire.simulator import simulator_of
 from drivers.tables.tables import load_table
@@ -37,7 +37,7 @@ class TrafficWriter:
     def __init__(self, path: Path, wire: Wire) -> None:
         self._path, self._is_pcapng = path, path.suffix.lower() == SUFFIX
         self._begun_s, self._begun_ns = time.monotonic(), time.time_ns()
-        self._room, self._pieces = files.DATA_LIMIT if self._is_pcapng else files.TEXT_LIMIT, MOST_PIECES
+        self._room, self._pieces = files.DATA_LIMIT if self._is_pcapng else files.TEXT_LIMIT, MAX_PIECES
         try:
             self._file = path.open("wb", buffering=0)  # unbuffered, since it matters most when the program crashes
             self._write_header(pcapng.file_head(wire) if self._is_pcapng else wire.head().encode())

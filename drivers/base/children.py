@@ -1,6 +1,6 @@
-"""Command line and environment that start a module of this program as a child process with the same module path.
+"""Command line and environment to run a module of this program in a child process.
 
-The child imports modules from where its parent does, in the same order, and not from the current folder.
+The child gets the module search path of its parent, so that it imports the same modules, and not the current folder.
 """
 
 from __future__ import annotations
@@ -12,16 +12,16 @@ from drivers.base.permission import check_ports_allowed
 
 
 def command(module: str, *words: str, bare: bool = False) -> list[str]:
-    """The command line that runs a module, by its dotted name, with arguments; `bare` skips the ``site`` module.
+    """Return the command line that runs a module, by its dotted name, with arguments; `bare` skips the ``site`` module.
 
-    Raises PortError where ports are forbidden, because the child does not know of that.
+    Raises PortError where ports are forbidden, because the child would not be bound by that.
     """
     check_ports_allowed(f"start {module}")
     return [sys.executable or "python3", "-P", *(["-S"] if bare else []), "-m", module, *words]
 
 
 def environment(module: str, *, bare: bool = False) -> dict[str, str]:
-    """The environment of the child; `bare` leaves out every variable of Python's but PYTHONHOME."""
+    """Return the environment of the child; `bare` leaves out all PYTHON* variables but PYTHONHOME."""
     kept = {
         name: value
         for name, value in os.environ.items()
@@ -31,7 +31,7 @@ def environment(module: str, *, bare: bool = False) -> dict[str, str]:
 
 
 def module_path(module: str) -> list[str]:
-    """Folders in which this process finds modules; last the one that holds the package of `module`."""
+    """Folders in which this process searches modules, followed by the one that holds the package of `module`."""
     package = sys.modules.get(module.partition(".")[0])
     folders = [*sys.path, *(os.path.dirname(folder) for folder in getattr(package, "__path__", ()))]
     return list(dict.fromkeys(os.path.abspath(folder) for folder in folders if isinstance(folder, str)))

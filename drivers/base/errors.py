@@ -72,7 +72,7 @@ class ServoFault(BusError):
 
 
 def merge_errors(failed: Mapping[int, BusError]) -> BusError:
-    """One error for several servos, by id: kind, message and hint of the first one, and every servo's id."""
+    """Merge errors, by servo id, into one: class, message and hint of the first error, and the ids of all servos."""
     first, *others = {id(error): error for error in failed.values()}.values()  # one error may concern several
     if not others:
         return first

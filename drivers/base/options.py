@@ -20,7 +20,7 @@ class Option:
 
     help : one sentence for people.
     at_least, at_most : limits of a number, both allowed; above : lower limit of a number, itself not allowed.
-    choices : the only texts allowed. longest : characters of a text at most.
+    choices : the only texts allowed. longest : greatest number of characters of a text.
     """
 
     help: str = ""
@@ -36,7 +36,7 @@ REQUIRED: Any = MISSING
 
 
 def option(help: str, default: Any = None, **limits: Any) -> Any:
-    """A field of a dataclass of options.
+    """Declare a field of a dataclass of options.
 
     help : one sentence for people.
     default : None where the plug-in's own default applies; :data:`REQUIRED` where a value must be given.
@@ -64,7 +64,7 @@ def entries(options: type) -> Iterator[Entry]:
 
 
 def check_options(options: type, reserved: Iterable[str] = ()) -> None:
-    """Raises ValueError for what is no dataclass, and for an option whose type or (`reserved`) name cannot be used."""
+    """Raise ValueError unless ``options`` is a dataclass whose types are usable and whose names are not `reserved`."""
     if not (isinstance(options, type) and is_dataclass(options)):
         raise ValueError(f"its options must be a dataclass, not {options!r}")
     try:
@@ -80,12 +80,12 @@ def check_options(options: type, reserved: Iterable[str] = ()) -> None:
             raise ValueError(f"{options.__name__}.{entry.name}: its type must be {allowed}, not {entry.type}")
 
 
-DIGITS = 9
-"""Digits of a number that count; one with more is too large anyway."""
+MAX_DIGITS = 9
+"""Only so many digits of a number are read; a number with more is too large anyway."""
 
 
 def parse_ids(text: str, most: int = 252) -> list[int]:
-    """``1-3,7`` as [1, 2, 3, 7]; raises DriverError for other text, and for ids given twice or above ``most``."""
+    """Parse ids: ``1-3,7`` gives [1, 2, 3, 7]. Raises DriverError for other text, repeated ids, ids above ``most``."""
     hint = "for example --ids 1-24, or --ids 1,3,7-9"
     outside = DriverError(f"--ids {text}: ids go from 0 to {most}, each once", hint=hint)
     ids: list[int] = []
@@ -93,7 +93,7 @@ def parse_ids(text: str, most: int = 252) -> list[int]:
         match = re.fullmatch(r"([0-9]+)(?:-([0-9]+))?", part.strip())
         if match is None:
             raise DriverError(f"--ids {text}: {part.strip()!r} is no id", hint=hint)
-        first, last = (int(number.lstrip("0")[:DIGITS] or 0) for number in (match[1], match[2] or match[1]))
+        first, last = (int(number.lstrip("0")[:MAX_DIGITS] or 0) for number in (match[1], match[2] or match[1]))
         if first > last:
             raise DriverError(f"--ids {text}: {part.strip()!r} runs backwards", hint=hint)
         if last > most:

@@ -1,4 +1,4 @@
-"""Forbids a process to open ports: what a dry run or a check calls by mistake then fails instead of moving servos."""
+"""Forbids a process to open ports, so that a mistake in a dry run or a check fails instead of moving servos."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _reasons: list[str] = []
 
 @contextmanager
 def ports_forbidden(reason: str) -> Iterator[None]:
-    """Context in which this process opens no port and starts no process that could, in whatever thread.
+    """In this context, no thread of this process can open a port or start a process that could.
 
     `reason` begins the error's message, as in "a dry run".
     """

@@ -29,7 +29,7 @@ def lower_process_priority() -> None:
 
 
 def reduce_timer_slack() -> None:
-    """Let waits of the calling thread end on time; Linux adds 50 us by default, to save power."""
+    """Let waits of the calling thread end on time; by default Linux may delay them by 50 us to save power."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_TIMERSLACK, ctypes.c_ulong(1))
 
@@ -46,7 +46,10 @@ def shorten_thread_switches() -> None:
 
 
 def request_realtime() -> bool:
-    """Ask for real-time scheduling and exact waits of the calling thread; False where it gets short slices instead."""
+    """Request real-time scheduling and exact waits for the calling thread; return whether it was granted.
+
+    Where it is not, short time slices are requested instead.
+    """
     reduce_timer_slack()
     if hasattr(os, "sched_setscheduler") and not os.environ.get(NO_REALTIME):
         try:
@@ -60,7 +63,7 @@ def request_realtime() -> bool:
 
 
 def request_short_time_slice() -> bool:
-    """Ask for short time slices for the calling thread; False where the system has no such request.
+    """Request short time slices for the calling thread; return False where the system has no such request.
 
     Linux 6.12 and later (EEVDF) serves a thread that wakes up before one in the middle of a longer slice, asked for by
     ``sched_setattr``; older ones ignore it.

@@ -1,4 +1,4 @@
-"""Logging of warnings with a rate limit: a new text at once, a repeated one only now and then, with its count.
+"""Logging of warnings with a rate limit: a new text immediately, a repeated one at intervals, with its count.
 
 A loose cable makes a servo fail many times a minute; logging each failure would hide everything else.
 """
@@ -10,11 +10,11 @@ import math
 from collections.abc import Callable
 
 INTERVAL_S = 10.0
-"""A text is not logged again before this time has passed; then with how often it occurred."""
+"""A text is not logged again before this time has passed; then its number of repetitions is added."""
 BURST = 20
 """Repeated texts that may be logged in a row; later ones follow at one a second (a token bucket)."""
-KEPT = 1000
-"""Texts remembered, so that a board that sends a different refusal each time uses no more memory."""
+MAX_TEXTS = 1000
+"""Number of texts remembered, which bounds the memory where a board sends a different text each time."""
 
 
 class RateLimitedLogger:
@@ -30,7 +30,7 @@ class RateLimitedLogger:
         text = text % values if values else text
         now_s = self._clock()
         if text not in self._logged:
-            if len(self._logged) >= KEPT:
+            if len(self._logged) >= MAX_TEXTS:
                 del self._logged[next(iter(self._logged))]
             self._logged[text] = now_s, 0
             self._log.warning("%s", text)
@@ -44,7 +44,7 @@ class RateLimitedLogger:
         self._log.warning("%s%s", text, count)
 
     def _take_token(self, now_s: float) -> bool:
-        """Whether a repeated text may be logged now; counts it."""
+        """Take a token of the bucket; return whether there was one, so that a repeated text may be logged."""
         self._tokens = min(self._tokens + (now_s - self._tokens_s), float(BURST))
         self._tokens_s = now_s
         if self._tokens < 1.0:

@@ -1,9 +1,9 @@
 """Clean-up that runs exactly once on every way out of a program: end, exception, exit, SIGINT, SIGTERM and SIGHUP.
 
-A signal handler may interrupt a transaction half way, so it does not touch the bus itself: it raises, the transaction
-unwinds, and the clean-up runs afterwards while further signals are held back. Python drops exceptions that are raised
-in destructors and callbacks; a hook raises those of signals again. SIGKILL cannot be caught; the servos' own bus
-watchdog covers it.
+A signal handler may interrupt a transaction on the bus, so it does not use the bus: it raises an exception, which
+unwinds the transaction, and the clean-up runs afterwards while further signals are held back. Python drops exceptions
+that are raised in destructors and callbacks; a hook raises those of signals again. SIGKILL cannot be caught; the
+servos' own bus watchdog covers it.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def stop_on_signals(stop: Callable[[], object]) -> Iterator[None]:
     Only the main thread receives signals; in another thread the handlers stay unchanged, and all else still applies.
     SIGHUP stays ignored where it is, as under nohup.
     """
-    first_call = threading.Lock()  # taken by the first call, never released
+    first_call = threading.Lock()  # acquired by the first call and never released
 
     def stop_once() -> None:
         if first_call.acquire(blocking=False):
@@ -118,7 +118,7 @@ def _raise_in(frame: FrameType | None, number: int) -> None:
 
 
 def _install(handler: Callable[[int, FrameType | None], None], signals: Any = SIGNALS) -> dict[int, Any]:
-    """Install a handler; returns those before it. SIGHUP that is ignored stays so."""
+    """Install a handler; return the handlers that it replaces. An ignored SIGHUP stays ignored."""
     if threading.current_thread() is not threading.main_thread():
         return {}
     ignored = getattr(signal, "SIGHUP", None)
@@ -140,9 +140,9 @@ def _hold_back(number: int, frame: FrameType | None) -> None:
 
 
 class Closers(ExitStack):
-    """An exit stack that runs every callback and reports all errors, not only the last one, in :meth:`close`.
+    """An exit stack that runs every callback and raises all their errors, not only the last one, in :meth:`close`.
 
-    As a context manager it logs them only: an error that leaves the context counts more.
+    As a context manager it only logs them, so that they do not replace an error that leaves the context.
     """
 
     def __init__(self) -> None:
@@ -170,7 +170,7 @@ class Closers(ExitStack):
 
 
 def combine_errors(failed: Sequence[Exception]) -> Exception:
-    """A single error unchanged; several as one DriverError with all messages in order, each hint once, all servos."""
+    """Return a single error unchanged, several as one DriverError with all messages, hints (each once) and servos."""
     if len(failed) == 1:
         return failed[0]
     hints = dict.fromkeys(hint for error in failed if (hint := getattr(error, "hint", "")))
@@ -180,7 +180,7 @@ def combine_errors(failed: Sequence[Exception]) -> Exception:
 
 
 def combine_with_context(error: Exception) -> Exception:
-    """The error combined with those that were being handled when it was raised and would be hidden; oldest first.
+    """Combine an error with the errors that were being handled when it was raised, oldest first.
 
     Left out are causes that it was raised from, which its message names already, and errors without a ``hint``.
     """

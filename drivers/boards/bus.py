@@ -23,8 +23,8 @@ from drivers.port.serialport import SerialPort, as_serial_port, reply_margin_s
 log = logging.getLogger(__name__)
 
 STAGGER_S = 0.02
-"""Pause between switching servos on: each draws its full current as it jumps to its first pulse."""
-OFF_TRIES = 6
+"""Pause between switching servos on, because each draws its full current as it jumps to its first pulse."""
+MAX_OFF_TRIES = 6
 
 
 class BoardBus(WireBus):
@@ -35,7 +35,7 @@ class BoardBus(WireBus):
 
     port : device path, or URL; or a :class:`~drivers.sim.serving.virtual.VirtualLink`, with its clock.
     baud : rate of the port.
-    margin_s : longest wait for an answer beyond its time on the wire; None: by the kind of the port.
+    margin_s : longest wait for an answer beyond its time on the wire; None means it depends on the kind of port.
     stagger_s : pause between switching servos on.
     clock : monotonic seconds.
     """
@@ -62,7 +62,7 @@ class BoardBus(WireBus):
         self._position, self._position_s = np.full(n, math.nan), np.full(n, -math.inf)
         self._on = np.zeros(n, dtype=bool)
         self._silent = False
-        self._mute: list[int] = []  # servos without answers, the one polled longest ago first
+        self._mute: list[int] = []  # indices of servos that do not answer; the first was polled longest ago
         self._warn = RateLimitedLogger(log, clock)
 
     @abstractmethod
@@ -75,7 +75,7 @@ class BoardBus(WireBus):
 
     @abstractmethod
     def _poll(self) -> None:
-        """Ask the board once and call :meth:`_note` for what it answers."""
+        """Request positions from the board, and call :meth:`_note` for each that it reports."""
 
     @abstractmethod
     def _off(self, index: int) -> None:
@@ -107,8 +107,8 @@ class BoardBus(WireBus):
         self._port.close()
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
-        """The configured channels and whether they get pulses; what is connected to them is unknown."""
-        with self._losing():
+        """Return the configured channels and whether they get pulses; whether a servo is connected is unknown."""
+        with self._detecting_loss():
             present = self._begin()
         return [
             ServoInfo(servo.id, 0, servo.model, 0, torque=bool(on) if self.tells_torque else None)
@@ -134,13 +134,13 @@ class BoardBus(WireBus):
         return start
 
     def _switch_off(self) -> None:
-        """Switch off every servo by itself, and again until the board confirms it where it can."""
+        """Switch off every servo separately, and again until the board confirms it where it can."""
         left = list(range(len(self.servos)))
         lost: PortLost | None = None
         try:
             for index in left:
                 self._off(index)
-            for _ in range(OFF_TRIES):
+            for _ in range(MAX_OFF_TRIES):
                 left = [index for index in left if not self._try_off(index)]
                 if not left:
                     break
@@ -148,7 +148,7 @@ class BoardBus(WireBus):
             lost = error
         self._on[:] = False
         if left:
-            raise self._not_off(left, lost) from lost
+            raise self._not_off_error(left, lost) from lost
 
     def _try_off(self, index: int) -> bool:
         try:
@@ -157,7 +157,7 @@ class BoardBus(WireBus):
         except BusError:
             return False
 
-    def _not_off(self, left: Sequence[int], lost: PortLost | None) -> DriverError:
+    def _not_off_error(self, left: Sequence[int], lost: PortLost | None) -> DriverError:
         which = ", ".join(f"{self.ids[index]} ({self.servos[index].name})" for index in left)
         message = f"not confirmed off on {self.path}: {which}" + (f" ({lost})" if lost else "")
         return self._error(PortLost if lost else NoReply, message, "switch the servos' power off", left)

@@ -18,7 +18,7 @@ from drivers.base.errors import DriverError
 
 Indices = NDArray[np.intp]
 
-LOWEST_US, HIGHEST_US = 64.0, 4080.0
+MIN_US, MAX_US = 64.0, 4080.0
 """Limits of the pulses that boards can make and servos understand."""
 
 
@@ -51,7 +51,7 @@ def hobby_model(model: str) -> HobbyModel:
 
 
 def check_hobby(model: str) -> None:
-    """Raises DriverError for a model that is no hobby servo."""
+    """Raise DriverError for a model that is no hobby servo."""
     hobby_model(model)
 
 
@@ -72,37 +72,37 @@ class PulseScale:
         self.us_per_rad = np.abs(np.diff(self._us) / np.diff(self._rad)).max(axis=1)
         for i, servo in enumerate(servos):
             low, high = float(self.low_us[i]), float(self.high_us[i])
-            if low < LOWEST_US or high > HIGHEST_US:
+            if low < MIN_US or high > MAX_US:
                 raise DriverError(
                     f"servo {servo.name!r} (id {servo.id}): its limits would be pulses of {low:.0f} to {high:.0f} us, "
-                    f"and none is outside {LOWEST_US:g} to {HIGHEST_US:g}",
+                    f"and none is outside {MIN_US:g} to {MAX_US:g}",
                     hint="narrow limit_deg, or calibrate its pulses",
                 )
 
     def pulses(self, angle_rad: Floats) -> Floats:
-        """(n,) us for angles (n,) rad."""
+        """Convert angles (n,) rad to pulses (n,) us."""
         return _extrapolated(angle_rad, self._rad, self._us)
 
     def steps(self, angle_rad: Floats, per_us: int) -> Indices:
-        """(n,) whole steps of ``1 / per_us`` us for angles (n,) rad, inside the servos' limits."""
+        """Convert angles (n,) rad to whole steps (n,) of ``1 / per_us`` us, inside the servos' limits."""
         steps = np.rint(self.pulses(angle_rad) * per_us)
         low, high = np.ceil(self.low_us * per_us), np.floor(self.high_us * per_us)
         kept: Indices = np.minimum(np.maximum(steps, low), high).astype(np.intp)
         return kept
 
     def check_steps(self, servos: Sequence[ServoSpec], per_us: int) -> None:
-        """Raises DriverError where no whole step of ``1 / per_us`` us lies inside a servo's limits."""
+        """Raise DriverError where no whole step of ``1 / per_us`` us lies inside a servo's limits."""
         low, high = np.ceil(self.low_us * per_us), np.floor(self.high_us * per_us)
         _check_steps(servos, low <= high, self.low_us, self.high_us, f"step of {1 / per_us:g} us")
 
     def radians(self, pulse_us: Floats) -> Floats:
-        """(n,) rad for pulses (n,) us; NaN for 0, which is no pulse."""
+        """Convert pulses (n,) us to angles (n,) rad; NaN for 0, which is no pulse."""
         angles = _extrapolated(self._sign * pulse_us, self._sign[:, None] * self._us, self._rad)
         return np.where(pulse_us > 0.0, angles, math.nan)
 
 
 def _check_steps(servos: Sequence[ServoSpec], fits: Flags, low: Floats, high: Floats, what: str) -> None:
-    """Raises DriverError for the first servo whose limits have no step between them: any goal would pass one."""
+    """Raise DriverError for the first servo without a step between its limits: any goal would be outside."""
     for i in np.flatnonzero(~fits).tolist():
         raise DriverError(
             f"servo {servos[i].name!r} (id {servos[i].id}): "
@@ -148,7 +148,7 @@ def _extrapolated(x: Floats, at: Floats, gives: Floats) -> Floats:
 
 
 class ValueScale:
-    """Conversion between angles of n servos and the values that lines of text have.
+    """Conversion between angles of n servos and the values in lines of text.
 
     fields : value of each servo: ``us``, ``deg``, ``deg10``, ``angle``, ``unit`` (:mod:`drivers.text.template`), or
         ``parameter`` (1 for 90 degrees of the shaft).
@@ -172,14 +172,14 @@ class ValueScale:
         return np.ceil(self._low / self._step - 1e-9), np.floor(self._high / self._step + 1e-9)
 
     def values(self, angle_rad: Floats) -> Floats:
-        """(n,) values for angles (n,) rad, rounded to the last decimal inside the servos' limits."""
+        """Convert angles (n,) rad to values (n,), rounded to the last decimal inside the servos' limits."""
         rounded = np.rint(self._exact(angle_rad) / self._step)
         low, high = self._whole_ends()
         values: Floats = np.minimum(np.maximum(rounded, low), high) * self._step
         return values
 
     def radians(self, values: Floats) -> Floats:
-        """(n,) rad for values (n,)."""
+        """Convert values (n,) to angles (n,) rad."""
         angles: Floats = (values - self._offset) / self._slope
         if self._pulses:
             angles[self._us] = self._pulses.radians(values[self._us])

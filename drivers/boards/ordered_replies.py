@@ -1,8 +1,8 @@
 """Base class of drivers for boards whose answers carry neither a name nor a checksum, only an order.
 
-One answer that is missed, late or one byte too long would shift every later one. So each batch of requests ends with a
-probe whose answer is known; where that is not found at its place, the whole batch is discarded, and nothing is asked
-before the board has answered the probe alone, followed by silence.
+One answer that is missing, late or one byte too long would shift every later one. So each batch of requests ends with a
+probe, a request whose answer is known. Where that is not at its place, the whole batch is discarded, and nothing is
+requested until the board has answered a single probe, followed by silence.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ class OrderedBus(PulseBus):
 
     @abstractmethod
     def _ask_pulses(self, group: Sequence[int], insist: bool = False) -> Floats | None:
-        """Pulses (len(group),) us that the board puts out for some servos, 0 for none; None: no answer."""
+        """Request the pulses (len(group),) us of some servos, 0 for no pulse; return None where no answer comes."""
 
     def _open_link(self) -> None:
         super()._open_link()
@@ -78,7 +78,7 @@ class OrderedBus(PulseBus):
             self._take(group, pulses.tolist())
 
     def _request(self, requests: bytes, count: int, insist: bool = False) -> bytes | None:
-        """The ``count`` bytes that answer requests; None where they do not come, or may be something else.
+        """Send requests; return the ``count`` bytes of their answers, None where they do not come or are doubtful.
 
         ``insist`` probes a silent board now and not only every ``RETRY_S``.
         """
@@ -101,7 +101,7 @@ class OrderedBus(PulseBus):
         self._synchronized, self._next_s = False, 0.0
 
     def _synchronize(self) -> bool:
-        """Probe the board; True where its answer came, followed by silence."""
+        """Probe the board; return whether its answer came, followed by silence."""
         if self._port.clock() < self._next_s:
             return False
         self._port.drain()

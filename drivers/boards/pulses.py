@@ -13,11 +13,11 @@ from drivers.boards.bus import BoardBus
 from drivers.boards.hobby import PulseScale
 
 GROUP = 8
-"""Channels polled in one cycle: boards have small input buffers."""
+"""Number of channels polled in one cycle; boards have small input buffers."""
 
 
 class PulseTrack:
-    """Range of pulses that each of n outputs can have: where it was last seen, and its goals since.
+    """Range of pulses that each of n outputs can have, from its last reported pulse and the goals since.
 
     A board moves its outputs towards their goals and overshoots only by its braking distance, so a pulse outside of the
     range was damaged or belongs to another request.
@@ -39,7 +39,7 @@ class PulseTrack:
         self._low, self._high = np.fmin(self._low, self.goal_us), np.fmax(self._high, self.goal_us)
 
     def believes(self, index: int, pulse_us: float, slack_us: float, stop_us: float = 0.0) -> bool:
-        """Whether an output can have a pulse; a pulse at the goal narrows the range to it.
+        """Whether a reported pulse is possible for an output; a pulse at the goal narrows the range to it.
 
         ``slack_us`` is the board's own rounding, ``stop_us`` its braking distance.
         """
@@ -57,7 +57,7 @@ class PulseBus(BoardBus):
     """A board of hobby servos, whose ``id`` is the channel; options as :class:`~drivers.boards.bus.BoardBus`."""
 
     SLACK_US = 2.0
-    """Deviation of a reported pulse by the board's own rounding."""
+    """Greatest deviation of a reported pulse, by the board's own rounding."""
 
     def __init__(self, servos: Iterable[ServoSpec], **options: Any) -> None:
         super().__init__(servos, **options)
@@ -70,10 +70,10 @@ class PulseBus(BoardBus):
         self._forgot = False  # the board may have been reset
 
     def _doubt(self) -> None:
-        """React to an implausible answer; nothing where answers name their servo."""
+        """Called after an implausible answer; does nothing by default."""
 
     def _turn(self) -> list[int]:
-        """Indices of the servos to ask in this cycle."""
+        """Choose the servos (indices) to poll in this cycle."""
         self._next = (self._next + 1) % len(self._groups)
         return self._groups[self._next]
 

@@ -29,10 +29,10 @@ if TYPE_CHECKING:
 
 READY_S = 15.0
 """Time limit for the process to get ready; it takes a tenth of a second, more on a busy computer."""
-LOOK_S = 0.25
-"""Interval of checking the parent process, for a pipe that other processes hold open."""
-BUSY_S = 0.3
-"""Time in which a dying program closes its port; afterwards the port is in use by another one."""
+CHECK_INTERVAL_S = 0.25
+"""Interval of checking the parent process, in case another process holds the pipe open."""
+PORT_WAIT_S = 0.3
+"""Time in which a dying program closes its port; if the port is still busy then, another program uses it."""
 REPEATS = 5
 PAUSE_S = 0.02
 _END_S = 2.0
@@ -73,7 +73,7 @@ class DeadManSwitch:
         if self._process.stdin is not None and not self._process.stdin.closed:
             self._send("bye")
             _close(self._process.stdin)
-        import subprocess  # start-up: the process itself does without
+        import subprocess  # imported lazily: the child process does not need it
 
         try:
             self._process.wait(timeout=_END_S)
@@ -81,7 +81,7 @@ class DeadManSwitch:
             self._kill()
 
     def _why_not_ready(self, ready_s: float) -> str:
-        """Wait for the answer of the process; empty when it is ready."""
+        """Wait for the answer of the process; return why it is not ready, empty when it is."""
         pipe, deadline_s = self._process.stdout, time.monotonic() + ready_s
         answer = None if pipe is None else _read_line(pipe.fileno(), deadline_s)
         if answer is None:
@@ -106,7 +106,7 @@ class DeadManSwitch:
 
 def _start() -> subprocess.Popen[bytes]:
     """Start the process; its standard error is the program's own."""
-    import subprocess  # the process itself does without
+    import subprocess  # imported lazily: the child process does not need it
 
     return subprocess.Popen(
         command(_MODULE, str(os.getpid()), bare=True),
@@ -119,7 +119,7 @@ def _start() -> subprocess.Popen[bytes]:
 
 
 def _not_ready(path: str, why: str) -> Exception:
-    from drivers.base.errors import DriverError  # start-up: the process itself loads it when it is ready
+    from drivers.base.errors import DriverError  # imported lazily: the child process must be ready early
 
     return DriverError(
         f"no process waits to switch the servos on {path} off if this program is killed: {why}",
@@ -174,10 +174,10 @@ def watch(source: int, answer: int, parent: int) -> bool:
 
 
 def _parent_died(source: int, parent: int) -> bool:
-    """Wait for the end of a descriptor or of the parent; False where the parent sent ``bye`` first."""
+    """Wait for the end of a descriptor or of the parent; return False where the parent sent ``bye`` first."""
     data = b""
     while True:
-        ready, _, _ = select.select([source], [], [], LOOK_S)
+        ready, _, _ = select.select([source], [], [], CHECK_INTERVAL_S)
         if ready:
             part = os.read(source, 4096)
             data += part
@@ -195,7 +195,7 @@ def dry_run(path: str, baud: int, frames: Iterable[str]) -> None:
     try:
         far, near = os.openpty()
     except OSError:  # a system without them: loading is all that can be done
-        from drivers.port.serialport import SerialPort  # start-up: see switch_off
+        from drivers.port.serialport import SerialPort  # imported lazily: see switch_off
 
         SerialPort(path, baud)
         return
@@ -209,7 +209,7 @@ def dry_run(path: str, baud: int, frames: Iterable[str]) -> None:
 
 def _load_scheme(scheme: str) -> None:
     """Import what pyserial and the system import only when a network port is opened."""
-    from importlib import import_module  # start-up: few ports are in the network
+    from importlib import import_module  # imported lazily: only for network ports
 
     "localhost".encode("idna")
     if scheme != "socket":
@@ -218,11 +218,11 @@ def _load_scheme(scheme: str) -> None:
 
 def switch_off(path: str, baud: int, frames: Iterable[str], repeats: int = REPEATS) -> bool:
     """Send packets (hexadecimal) on a port several times; False where the port cannot be opened."""
-    # start-up: the parent waits until these are loaded
+    # imported lazily: the parent waits until these are loaded
     from drivers.base.errors import PortBusy, PortError
     from drivers.port.serialport import SerialPort
 
-    port, deadline_s = SerialPort(path, baud), time.monotonic() + BUSY_S
+    port, deadline_s = SerialPort(path, baud), time.monotonic() + PORT_WAIT_S
     while not port.is_open:
         try:
             port.open()

@@ -3,8 +3,8 @@
 The wire is idle between the last byte of a reply and the first byte of the next goal, so each stage there is one call.
 Importing this module imports numba; do so only where a bus is driven. Every kernel declares its types, so that it is
 compiled on import, before a port is opened: compiled at its first call it would delay a bus under torque beyond the
-servos' watchdog. None lets go of the interpreter's lock: each takes a few microseconds, less than it takes to get the
-lock back where other buses are driven in the same process.
+servos' watchdog. No kernel releases the interpreter's lock: each takes a few microseconds, less than
+it takes to get the lock back where other buses are driven in the same process.
 """
 
 from __future__ import annotations

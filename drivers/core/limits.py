@@ -1,7 +1,8 @@
 """Limits of targets before they are sent: finite, inside the angle limits, and no faster than the servo's top speed.
 
-Speed is limited by a budget of travel for each servo, which grows with time at its top speed up to ``BURST_S`` of it,
-and which every step spends. So the mean speed never exceeds the limit, whatever arrives after a pause or a stall.
+Speed is limited by a travel budget (rad) for each servo: it grows at the servo's top speed, up to the travel of
+``BURST_S`` at that speed, and every step spends from it. So the mean speed never exceeds the limit, whatever arrives
+after a pause or a stall.
 """
 
 from __future__ import annotations
@@ -13,17 +14,17 @@ import numpy as np
 from drivers.base.bus import BusReport, Flags, Floats, ServoSpec
 
 BURST_S = 0.05
-"""Time at top speed that the travel budget holds at most, so that uneven cycles lose no speed."""
+"""Largest travel budget, as time at top speed; above 0, so that uneven cycles do not slow the servos down."""
 
 
 class TargetLimits:
-    """Applies the limits of n servos to their targets, and counts in a report what it changed.
+    """Applies the limits of n servos to their targets, and counts the changed targets in a report.
 
     target : (n,) last targets, inside the angle limits.
     """
 
     def __init__(self, servos: Sequence[ServoSpec], report: BusReport) -> None:
-        from drivers.core.kernels import limit_targets  # compiled: imported only where servos are driven
+        from drivers.core.kernels import limit_targets  # imported lazily: compiled, needed only to drive servos
 
         self._limit = limit_targets
         self._low, self._high, self._speed = np.array(
@@ -41,14 +42,14 @@ class TargetLimits:
     def reset_one(self, index: int, position_rad: float, now_s: float) -> None:
         """Start one servo again from a position; its travel budget grows from now on."""
         self.target[index] = self._last[index] = position_rad
-        before_s = min(max(now_s - self._time_s, 0.0), BURST_S)  # will count as elapsed in the next step
-        self._budget[index] = -before_s * self._speed[index]
+        before_s = min(max(now_s - self._time_s, 0.0), BURST_S)
+        self._budget[index] = -before_s * self._speed[index]  # the next step adds before_s for all servos
 
     def apply(self, wanted_rad: Floats, now_s: float, driven: Flags | None = None) -> Floats:
         """Targets (n,) rad inside the angle limits and no further from the last ones than top speed allows.
 
-        A target that is no finite number keeps the last one. Time that goes backwards counts as none. A servo that is
-        not ``driven`` (n,), None: all are, keeps its last target, wherever that is.
+        A target that is not finite is replaced by the last one. If the clock goes backwards, no time has passed. A
+        servo that is not ``driven`` (n,) keeps its last target, even outside the limits; None means all are driven.
         """
         elapsed_s = min(max(now_s - self._time_s, 0.0), BURST_S)
         self._time_s = now_s

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from drivers.base.errors import DriverError
-from drivers.core.trafficlog import MOST_PIECES, Piece, TrafficRecord, Wire, read_head, read_keys
+from drivers.core.trafficlog import MAX_PIECES, Piece, TrafficRecord, Wire, read_head, read_keys
 
 MAGIC = b"\x0a\x0d\x0d\x0a"
 """First bytes of every file."""
@@ -76,8 +76,8 @@ def read_pcapng(data: bytes) -> TrafficRecord:
                 stamp, piece = _read_packet(block, seconds)
                 first = stamp if first is None else first
                 pieces.append(piece._replace(time_s=max((stamp - first) * seconds, 0.0)))
-                if len(pieces) > MOST_PIECES:
-                    raise DriverError(f"a record has at most {MOST_PIECES} pieces", hint="cut it into parts")
+                if len(pieces) > MAX_PIECES:
+                    raise DriverError(f"a record has at most {MAX_PIECES} pieces", hint="cut it into parts")
     except (struct.error, IndexError) as error:
         raise DriverError(f"it is damaged after {len(pieces)} packets", hint="record it again") from error
     return TrafficRecord(wire, tuple(pieces))

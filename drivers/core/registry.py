@@ -13,14 +13,14 @@ from drivers.base.options import check_options
 from drivers.base.plugins import Registry, folders_with
 from drivers.core.families import API, HIGH_RATE_HZ, RESERVED, USUAL_RATE_HZ, Family
 
-if TYPE_CHECKING:  # start-up: they import numpy, which listing the kinds does not need
+if TYPE_CHECKING:  # imported lazily: numpy is not needed to list the kinds
     from drivers.base.bus import Bus, ServoSpec
     from drivers.core.wirebus import WireBus
 
 SIMULATED = "simulated"
-_BITS_PER_BYTE = 10
-_MOST_OF_WIRE = 0.6
-"""Greatest share of the wire's time for choosing the high rate; the rest is for pauses of adapters and late answers."""
+_BITS_PER_BYTE = 10  # with start and stop bit
+_MAX_WIRE_LOAD = 0.6
+"""Greatest fraction of time that the wire may be busy at the high rate; adapters and late replies need the rest."""
 
 FAMILIES: Registry[Family] = Registry(
     Family,
@@ -35,7 +35,7 @@ FAMILIES: Registry[Family] = Registry(
 
 
 def kinds() -> list[str]:
-    """Every kind of real bus, in order."""
+    """Every kind of real bus, sorted by name."""
     return FAMILIES.kinds()
 
 
@@ -60,12 +60,15 @@ def open_bus(kind: str, servos: Iterable[ServoSpec], *, simulates: str = "dynami
             raise no_simulator_error(simulates)
         simulated = FAMILIES.load(plugin, "drivers.sim.serving.simulated_driver:simulated")
         driver = simulated(driver_of(simulates, servos), simulates)
-    with FAMILIES.blaming(family):
+    with FAMILIES.naming_package(family):
         return driver(servos, **options)
 
 
 def driver_of(kind: str, servos: Sequence[ServoSpec]) -> type[WireBus]:
-    """The driver of a family for some servos; raises DriverError for an unknown kind or model, or a missing package."""
+    """Return the driver class for servos of a family.
+
+    Raises DriverError: unknown kind or model, or a package is not installed.
+    """
     try:
         family = FAMILIES.get(kind)
     except PluginError as error:
@@ -80,15 +83,15 @@ def driver_of(kind: str, servos: Sequence[ServoSpec]) -> type[WireBus]:
 
 
 def check_model(kind: str, model: str, simulates: str = "dynamixel") -> None:
-    """Raises DriverError where a kind of bus does not drive a servo model; the hint lists similar names."""
+    """Raise DriverError where a kind of bus does not drive a servo model; the hint lists similar names."""
     family = FAMILIES.get(simulates if kind == SIMULATED else kind)
     check = FAMILIES.load(family, family.check_model)
-    with FAMILIES.blaming(family.kind):
+    with FAMILIES.naming_package(family.kind):
         check(model)
 
 
 def usual_rate_hz(kind: str, models: Sequence[str], baud: int) -> float:
-    """Cycles per second of a bus of a family, with servos of these models, whose robot file gives no rate.
+    """Default rate (cycles per second) of a bus with servos of these models, for a robot file that gives none.
 
     Raises DriverError for a model that the family does not drive.
     """
@@ -96,9 +99,9 @@ def usual_rate_hz(kind: str, models: Sequence[str], baud: int) -> float:
     if not family.cycle_bytes:
         return USUAL_RATE_HZ
     count = FAMILIES.load(family, family.cycle_bytes)
-    with FAMILIES.blaming(family.kind):
+    with FAMILIES.naming_package(family.kind):
         busy_s = count(models) * _BITS_PER_BYTE / baud
-    return HIGH_RATE_HZ if busy_s * HIGH_RATE_HZ <= _MOST_OF_WIRE else USUAL_RATE_HZ
+    return HIGH_RATE_HZ if busy_s * HIGH_RATE_HZ <= _MAX_WIRE_LOAD else USUAL_RATE_HZ
 
 
 def no_simulator_error(kind: str) -> PluginError:

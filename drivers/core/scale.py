@@ -12,7 +12,7 @@ from drivers.tables.tables import ControlTable
 
 Ticks = NDArray[np.int32]
 
-_EDGE = 1e-6  # steps: rounding must not take a step from a limit that is a whole one
+_EDGE_STEPS = 1e-6  # tolerance, so that rounding does not move a limit that is a whole step
 
 
 class Scale:
@@ -26,7 +26,7 @@ class Scale:
     """
 
     def __init__(self, servos: Sequence[ServoSpec], tables: Sequence[ControlTable]) -> None:
-        from drivers.core.kernels import to_si, to_steps  # start-up: compiled, imported only where servos are driven
+        from drivers.core.kernels import to_si, to_steps  # imported lazily: compiled, for driving only
 
         self._to_steps, self._to_si = to_steps, to_si
         sign = [-1.0 if servo.reverse else 1.0 for servo in servos]
@@ -38,8 +38,8 @@ class Scale:
         ends = [self._steps(np.array([getattr(servo, end) for servo in servos])) for end in ("min_rad", "max_rad")]
         first = np.array([table.first_step for table in tables])
         top = first + np.array([table.ticks_per_turn - 1 for table in tables])
-        low = np.clip(np.ceil(np.minimum(*ends) - _EDGE), first, top)
-        high = np.clip(np.floor(np.maximum(*ends) + _EDGE), low, top)
+        low = np.clip(np.ceil(np.minimum(*ends) - _EDGE_STEPS), first, top)
+        high = np.clip(np.floor(np.maximum(*ends) + _EDGE_STEPS), low, top)
         self._bounds = np.array([low, high, first, top], np.int32)
         self.low, self.high, self.lowest, self.highest = self._bounds
 

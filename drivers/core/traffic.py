@@ -21,8 +21,8 @@ from drivers.tables.tables import ControlTable, Item, load_table
 
 TO, FROM = "->", "<-"
 ARROWS = {True: TO, False: FROM, None: "--"}
-MANY = 8
-"""Most servos of a group that a line names; of the others it gives the number."""
+MAX_NAMED = 8
+"""Greatest number of servos of a group that a line names; for the others it gives their number."""
 
 
 @dataclass
@@ -39,14 +39,14 @@ class ServoTraffic:
 
 
 class Decoder(ABC):
-    """Turns bytes into lines. ``heard`` : what was received from each servo, by id."""
+    """Decodes bytes to lines of text. ``heard`` : what was received from each servo, by id."""
 
     def __init__(self) -> None:
         self.heard: dict[int, ServoTraffic] = {}
 
     @abstractmethod
     def feed(self, sent: bool | None, data: bytes) -> list[str]:
-        """The lines that ``data`` completes. sent : True for bytes of the host, False for answers, None: not known."""
+        """Return the lines that ``data`` completes. sent : True: bytes of the host; False: replies; None: unknown."""
 
 
 class PacketDecoder(Decoder):
@@ -249,4 +249,4 @@ def _name(names: type, code: int) -> str:
 def _limited(texts: Iterable[str]) -> str:
     """The first texts, and how many more there are."""
     listed = list(texts)
-    return ", ".join(listed[:MANY]) + (f" and {len(listed) - MANY} more" if len(listed) > MANY else "")
+    return ", ".join(listed[:MAX_NAMED]) + (f" and {len(listed) - MAX_NAMED} more" if len(listed) > MAX_NAMED else "")

@@ -1,8 +1,8 @@
-"""Records of the traffic on a bus, as lines of text: what was on the wire, and who was there.
+"""Records of the traffic on a bus, as lines of text: the bytes on the wire, and the servos on it.
 
 A log begins with lines ``# KEY = VALUE``, the first of which is ``# omote traffic = 1``. Each other line is the time in
 seconds, ``>`` for bytes of the host, ``<`` for answers or ``-`` where a wire was only listened to, and the bytes in
-hexadecimal. :mod:`drivers.core.pcapng` has the same in the form of network analysers.
+hexadecimal. :mod:`drivers.core.pcapng` stores the same for network analysers.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from typing import NamedTuple
 from drivers.base.errors import DriverError
 
 FORMAT = "1"
-MOST_PIECES = 5_000_000
-"""Pieces of traffic in a record."""
+MAX_PIECES = 5_000_000
+"""Greatest number of pieces of traffic in a record."""
 _SIGNS: dict[bool | None, str] = {True: ">", False: "<", None: "-"}
 _SENT = {sign: sent for sent, sign in _SIGNS.items()}
 _HEAD = re.compile(r"# *([\w ]{1,40}?) *= *(.{0,100000})")
@@ -25,7 +25,7 @@ _SERVO = re.compile(r"(\d{1,3}):([\w.-]{1,60})")
 
 
 class Piece(NamedTuple):
-    """Bytes that passed together: seconds since the beginning, sent by the host (None: not known), bytes."""
+    """Bytes that passed together. time_s : since the beginning. sent : by the host; None if not known."""
 
     time_s: float
     sent: bool | None
@@ -34,7 +34,7 @@ class Piece(NamedTuple):
 
 @dataclass(frozen=True)
 class Wire:
-    """What is on a wire: the family, its bit rate, models by id where they are known, and the model of all others."""
+    """Description of a wire. servos : known models by id. model : of all other servos; empty if not known."""
 
     family: str = "dynamixel"
     baud: int = 1_000_000
@@ -63,7 +63,7 @@ def format_piece(piece: Piece) -> str:
 
 
 def read_log(text: str) -> TrafficRecord:
-    """A log as it was written. Raises DriverError with the number of the line that is wrong."""
+    """Parse a log. Raises DriverError, which names the first wrong line."""
     lines = text.splitlines()
     head = dict(_keys(lines))
     if "omote traffic" not in head:
@@ -73,8 +73,8 @@ def read_log(text: str) -> TrafficRecord:
     for number, line in enumerate(lines, 1):
         if line.strip() and not line.startswith("#"):
             pieces.append(_read_piece(number, line, pieces[-1].time_s if pieces else 0.0))
-        if len(pieces) > MOST_PIECES:
-            raise DriverError(f"line {number}: a record has at most {MOST_PIECES} pieces", hint="cut it into parts")
+        if len(pieces) > MAX_PIECES:
+            raise DriverError(f"line {number}: a record has at most {MAX_PIECES} pieces", hint="cut it into parts")
     return TrafficRecord(wire, tuple(pieces))
 
 
@@ -90,7 +90,7 @@ def _keys(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
 
 
 def read_head(head: dict[str, str]) -> Wire:
-    """What the keys at the beginning of a log say. Raises DriverError: a newer format, or a value that is wrong."""
+    """Parse the keys at the beginning of a log. Raises DriverError for a newer format or a wrong value."""
     if head.get("omote traffic", FORMAT) != FORMAT:
         raise DriverError("it was written by a newer omote", hint="pip install --upgrade omote")
     baud = head.get("baud", "1000000")
@@ -105,7 +105,7 @@ def read_head(head: dict[str, str]) -> Wire:
 
 
 def read_keys(text: str) -> dict[str, str]:
-    """The keys in the first lines of a text."""
+    """Parse the keys in the first lines of a text."""
     return dict(_keys(text.splitlines()))
 
 

@@ -1,6 +1,6 @@
 """Base class of all drivers on one port: loss of the port and reconnecting, absent servos, target limits, a safe stop.
 
-A family implements hooks that open its port and start, drive, read and switch off its servos.
+A family of servos implements the hooks: methods that open its port and start, drive, read and switch off its servos.
 """
 
 from __future__ import annotations
@@ -25,19 +25,23 @@ log = logging.getLogger(__name__)
 
 E = TypeVar("E", bound=DriverError)
 
-JOIN_S = 1.0
-"""Time between two attempts to start servos that were left out, one of them at a time."""
-JOIN_REST = 10.0
-"""A servo whose attempt failed rests for so many times as long as that took, and as many times longer as servos rest:
-all servos wait for each attempt, but for a tenth of the time at most once each has been tried."""
-LONGEST_TRY_S = 15.0
-"""An attempt counts as no longer than this: a process that was stopped in the middle of one must not wait for hours."""
+JOIN_INTERVAL_S = 1.0
+"""Least time between two attempts to start a servo that was left out; each attempt starts one servo."""
+RETRY_DELAY_FACTOR = 10.0
+"""A servo whose attempt failed is tried again after this factor times the duration of the attempt times the number of
+servos that wait for a retry. All servos of the bus wait during an attempt, so attempts then take a tenth of the time at
+most."""
+MAX_ATTEMPT_S = 15.0
+"""An attempt counts as no longer than this, so that a process that was suspended during one does not wait for hours."""
 FAR_RAD = 0.4
-"""How far from its last goal a servo may stand that comes back and is simply driven on."""
+"""A servo that answers again no further than this from its last goal is driven on without a new start."""
 
 
 class WireBus(Bus):
-    """A bus on one port; see :class:`~drivers.base.bus.Bus`. Its hooks are abstract methods; `clock` is monotonic."""
+    """A bus on one port; see :class:`~drivers.base.bus.Bus`.
+
+    clock : monotonic time, s. Families override the hooks: the abstract methods, and those whose docstring says "Hook".
+    """
 
     def __init__(self, servos: Iterable[ServoSpec], *, clock: Callable[[], float] = time.monotonic) -> None:
         super().__init__(servos)
@@ -46,10 +50,10 @@ class WireBus(Bus):
         self._limits = TargetLimits(self.servos, self._report)
         self._presence = Presence(len(self.servos))
         self._reasons: dict[int, BusError] = {}  # why servos were left out, by index
-        self._join_s, self._tried = 0.0, -1
-        self._rests_s: dict[int, float] = {}  # until when servos rest whose attempts failed, by index
+        self._next_join_s, self._last_attempt = 0.0, -1  # time of the next attempt; index of the servo tried last
+        self._retry_after_s: dict[int, float] = {}  # time before which a servo is not tried again, by index
         self._running = False
-        self._unconfirmed = False  # servos may be on although the bus was stopped
+        self._unconfirmed = False  # torque may be on although the bus is not running
         self._lost = False
 
     @property
@@ -71,39 +75,40 @@ class WireBus(Bus):
 
     @abstractmethod
     def _bring_up(self) -> Floats:
-        """Check every servo, switch it on at its present position, and return these (n,) rad; see :meth:`Bus.start`.
+        """Check every servo and enable its torque at its present position; return the positions (n,) rad.
 
-        Where it raises, what it had switched on was switched off, or ``_unconfirmed`` is set.
+        See :meth:`Bus.start`. Where it raises, it has disabled the torque that it enabled, or set ``_unconfirmed``.
         """
 
     def _bring_back(self) -> Floats:
-        """As :meth:`_bring_up`, but NaN for servos that cannot be started, with ``_leave_out`` called for each.
+        """Hook: start again servos that were started before in this run; return their positions (n,) rad.
 
-        For servos that ran already in this run. By default as many as a start needs: all of them.
+        The position is NaN for a servo that cannot be started, for which ``_leave_out`` is called. By default it is
+        :meth:`_bring_up`, which needs all servos.
         """
         return self._bring_up()
 
     def _join(self, index: int) -> float:
-        """Start a servo that was left out, where it is (rad); raises BusError where that is not safe."""
+        """Hook: start a servo that was left out, return its position, rad; raises BusError where that is not safe."""
         raise BusError("this bus leaves no servo out")
 
     @abstractmethod
     def _send(self, angle_rad: Floats) -> Floats:
-        """Send goals (n,) rad that passed the limits; returns them rounded to the servos' steps, (n,) rad.
+        """Send goals (n,) rad that passed the limits; return them rounded to the servos' steps, (n,) rad.
 
-        Nothing may be sent to servos that are not in :attr:`driven`.
+        Nothing may be sent to servos that are not :attr:`driven`.
         """
 
     @abstractmethod
     def _ask(self) -> BusState:
-        """Read one cycle's measurements."""
+        """Request the measurements of one cycle and return the state of the servos."""
 
     @abstractmethod
     def _switch_off(self) -> None:
-        """Switch every reachable servo off, each by itself; raises NoReply for those not confirmed."""
+        """Disable the torque of every reachable servo separately; raises NoReply for servos not confirmed off."""
 
     def _settle(self, now_s: float) -> None:
-        """Maintain the servos before a cycle, as after tripped watchdogs; does nothing by default."""
+        """Hook: called before goals are sent and before a read, for maintenance such as clearing watchdogs."""
 
     @property
     def running(self) -> bool:
@@ -119,14 +124,14 @@ class WireBus(Bus):
 
     @property
     def _reads_a_turn(self) -> int:
-        """Reads within which every servo is asked for its position."""
+        """Hook: number of reads within which the position of every servo is requested."""
         return 1
 
     def open(self) -> None:
         try:
             self._open_link()
         except BaseException:
-            self._close_link()  # it may be open already
+            self._close_link()  # it may have been opened before the error
             raise
         self._lost = False
 
@@ -134,7 +139,7 @@ class WireBus(Bus):
         """Open the port again and, if the bus was running, start from the servos' present positions.
 
         Servos that cannot be started are left out and join later, see :meth:`Bus.start`. When all of them fail, the bus
-        stays lost and sends no goals; call again later.
+        sends no goals and its port counts as lost; call again later.
         """
         self._close_link()
         self.open()
@@ -151,8 +156,11 @@ class WireBus(Bus):
         self._close_link()
 
     @contextmanager
-    def _losing(self) -> Iterator[None]:
-        """Context that closes the port and counts the loss when it disappears."""
+    def _detecting_loss(self) -> Iterator[None]:
+        """Use the port in this context: where it disappears, the loss is counted and the port is closed.
+
+        Raises PortLost then, and where the port is lost or closed already.
+        """
         self._raise_if_lost()
         try:
             yield
@@ -171,7 +179,7 @@ class WireBus(Bus):
             raise BusError(f"the bus on {self.path} is not started", hint="call start()", port=self.path)
 
     def _error(self, kind: type[E], message: str, hint: str = "", indices: Iterable[int] | None = None) -> E:
-        """An error of this port that concerns some servos, by default all."""
+        """Return an error that names this port and the servos at ``indices``, by default all."""
         ids = self.ids if indices is None else tuple(self.ids[index] for index in indices)
         return kind(message, hint=hint, port=self.path, servo_ids=ids)
 
@@ -187,25 +195,25 @@ class WireBus(Bus):
 
     def _start(self, partly: bool = False) -> None:
         ran_before = self._running
-        with self._losing():
+        with self._detecting_loss():
             self._begin_driving(self._bring_back() if partly else self._bring_up())
             if not self._presence.driven.any():
                 # the next reconnect() starts them again, and stop() switches off what may still be on
                 self._running, self._unconfirmed = ran_before, True
                 raise merge_errors({self.ids[index]: why for index, why in self._reasons.items()})
 
-    def _begin_driving(self, here_rad: Floats) -> None:
-        """Drive servos from where they are, (n,) rad; NaN for one that is left out."""
-        started = np.isfinite(here_rad)
+    def _begin_driving(self, position_rad: Floats) -> None:
+        """Drive servos from their positions (n,) rad; a servo whose position is NaN is left out."""
+        started = np.isfinite(position_rad)
         self._reasons = {index: why for index, why in self._reasons.items() if not started[index]}
-        self._limits.reset(np.where(started, here_rad, 0.0), self._clock())
+        self._limits.reset(np.where(started, position_rad, 0.0), self._clock())
         self._presence.reset(started)
-        self._rests_s.clear()
-        self._join_s = self._clock() + JOIN_S
+        self._retry_after_s.clear()
+        self._next_join_s = self._clock() + JOIN_INTERVAL_S
         self._running, self._unconfirmed = True, False
 
     def _back_out(self) -> None:
-        """Switch off what a failed start may have switched on; :meth:`stop` tries again where that is not confirmed."""
+        """Disable torque after a failed start may have enabled it; where that fails, :meth:`stop` tries again."""
         self._unconfirmed = True
         self._switch_off()
         self._unconfirmed = False
@@ -214,13 +222,13 @@ class WireBus(Bus):
         if not self._running and not self._unconfirmed:
             return
         self._running, self._unconfirmed = False, True
-        if self._lost:  # the adapter may be back
+        if self._lost:  # the adapter may have been plugged in again
             try:
                 self.reconnect()
             except DriverError as error:
-                message = f"servos not confirmed off, for their port is gone: {error}"
+                message = f"servos not confirmed off, because their port is gone: {error}"
                 raise self._error(PortLost, message, "switch the servos' power off") from error
-        with self._losing():
+        with self._detecting_loss():
             self._switch_off()
         self._unconfirmed = False
 
@@ -230,7 +238,7 @@ class WireBus(Bus):
         if wanted.shape != (len(self.servos),):
             raise ValueError(f"angle_rad: shape {wanted.shape}, expected {(len(self.servos),)}")
         self._raise_if_stopped()
-        self._raise_if_lost()  # not _losing(): the wire waits for every line between a reply and the next goals
+        self._raise_if_lost()  # a context manager here would delay the goals of every cycle
         try:
             now = self._clock()
             self._settle(now)
@@ -257,68 +265,69 @@ class WireBus(Bus):
     def _follow(self, state: BusState) -> None:
         """Drive only servos whose positions are known, each from where it is; see :mod:`drivers.core.presence`."""
         for index in self._presence.note(state, self._reads_a_turn):
-            self._come_back(index, float(state.position_rad[index]))
-        if self._presence.some_left_out and self._clock() >= self._join_s:
-            self._let_join(np.flatnonzero(self._presence.left_out & ~state.silent).tolist())
+            self._resume_driving(index, float(state.position_rad[index]))
+        if self._presence.some_left_out and self._clock() >= self._next_join_s:
+            self._try_to_start_one(np.flatnonzero(self._presence.left_out & ~state.silent).tolist())
 
-    def _come_back(self, index: int, angle_rad: float) -> None:
-        """Go on driving a servo that was away, from its position.
+    def _resume_driving(self, index: int, angle_rad: float) -> None:
+        """Drive a servo that answers again, from its position; start it anew where that is far from its last goal.
 
-        One that kept its torque stands near its last goal. One that reads far from there has lost its torque and its
-        settings, or two servos answer at once and what is read is wrong: it is started as if it were new, which reads
-        all of it again.
+        A servo that kept its torque stands near its last goal. If it reads a position far from there, it has lost its
+        torque and its settings, or two servos answer at once and the position is wrong. A new start reads and sets all
+        its registers again.
         """
         goal_rad = float(self._limits.target[index])
         if abs(angle_rad - goal_rad) <= FAR_RAD:
             self._begin_at(index, angle_rad)
             return
         message = f"it came back at {angle_rad:.2f} rad, far from its last goal of {goal_rad:.2f} rad"
-        hint = "it is started again; look for a second servo of its id, and at its supply"
+        hint = "it is started again; check its supply, and whether a second servo has its id"
         self._give_up(index, self._error(BusError, message, hint, [index]))
 
     def _give_up(self, index: int, why: BusError) -> None:
-        """Send a servo no more goals until it has been started again."""
+        """Leave a servo out: send it no more goals until it has been started again."""
         self._presence.leave_out(index)
         self._leave_out(index, why)
 
     def _begin_at(self, index: int, angle_rad: float) -> None:
-        """Let the goals of one servo begin at a position."""
+        """Set the last goal of one servo to its position, from which the next goals begin."""
         self._limits.reset_one(index, angle_rad, self._clock())
 
-    def _let_join(self, waiting: Sequence[int]) -> None:
-        """Try to start one of the servos that were left out and answer, each in its turn."""
+    def _try_to_start_one(self, waiting: Sequence[int]) -> None:
+        """Try to start the next of the ``waiting`` servos (indices): they were left out and answer."""
         begun_s = self._clock()
-        self._join_s = begun_s + JOIN_S
-        ready = [index for index in waiting if begun_s >= self._rests_s.get(index, begun_s)]
+        self._next_join_s = begun_s + JOIN_INTERVAL_S
+        ready = [index for index in waiting if begun_s >= self._retry_after_s.get(index, begun_s)]
         if not ready:
             return
-        index = min(ready, key=lambda each: (each <= self._tried, each))
-        self._tried = index
+        index = min(ready, key=lambda each: (each <= self._last_attempt, each))
+        self._last_attempt = index
         try:
-            here = self._join(index)
+            position_rad = self._join(index)
         except BusError as error:
             self._leave_out(index, error)
-            self._let_rest(index, begun_s)
+            self._delay_retry(index, begun_s)
             return
-        self._drive_again(index, here)
+        self._drive_again(index, position_rad)
 
-    def _let_rest(self, index: int, begun_s: float) -> None:
-        """Try others first, after as long a pause as the attempt that failed took."""
+    def _delay_retry(self, index: int, begun_s: float) -> None:
+        """Delay the next attempt after one that began at ``begun_s`` failed, and longer the next one of this servo."""
         now_s = self._clock()
-        took_s = min(now_s - begun_s, LONGEST_TRY_S)
-        self._join_s = max(self._join_s, now_s + took_s)
-        self._rests_s[index] = now_s + JOIN_REST * took_s * len(self._rests_s.keys() | {index})
+        took_s = min(now_s - begun_s, MAX_ATTEMPT_S)
+        self._next_join_s = max(self._next_join_s, now_s + took_s)
+        waiting = len(self._retry_after_s.keys() | {index})
+        self._retry_after_s[index] = now_s + RETRY_DELAY_FACTOR * took_s * waiting
 
     def _drive_again(self, index: int, angle_rad: float) -> None:
-        """Drive a servo that was started by itself, from where it is."""
-        self._rests_s.pop(index, None)
+        """Drive a servo that was started while the bus ran, from its position."""
+        self._retry_after_s.pop(index, None)
         self._begin_at(index, angle_rad)
         self._presence.join(index)
         if self._reasons.pop(index, None) is not None:
             log.warning("servo %s is driven again", self._label(index))
 
     def _leave_out(self, index: int, why: BusError) -> None:
-        """Keep, and log where it is new, why a servo cannot be started with the others."""
+        """Store why a servo cannot be started with the others, and log a new reason."""
         before = self._reasons.get(index)
         self._reasons[index] = why
         if before is None or str(before) != str(why):

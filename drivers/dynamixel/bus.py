@@ -1,8 +1,8 @@
-"""Bus of Dynamixel servos with Protocol 2.0: one sync write and one sync read a cycle.
+"""Bus of Dynamixel servos with Protocol 2.0: one sync write and one sync read per cycle.
 
-A servo that misses a deadline is left out of the group until it has answered a ping (once a second at most while it is
-silent), so the others go on. Every goal is limited in angle and speed. A tripped watchdog is cleared with the goal
-where the servo is. A motor that switched off by itself is reported and stays off.
+A servo that misses a deadline is left out of the group reads until it has answered a ping (sent once a second at most
+while it is silent), so the others go on. Every goal is limited in angle and speed. A tripped bus watchdog is cleared
+after the goal was set to the servo's position. A motor that switched its torque off is reported and stays off.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from drivers.base.bus import BusState, Floats, ServoInfo, ServoSpec
 from drivers.base.errors import BusError, PortLost
 from drivers.base.rate_limited_log import RateLimitedLogger
-from drivers.dynamixel.indirect import set_up
+from drivers.dynamixel.indirect import set_up_pointers
 from drivers.dynamixel.registers import Registers
 from drivers.dynamixel.sdk import PING_DATA, Packets
 from drivers.dynamixel.startup import Policy, Startup
@@ -30,8 +30,8 @@ from drivers.tables.tables import load_table
 
 log = logging.getLogger(__name__)
 
-MAP_TRIES = 5
-"""How often the pointers of one servo are set again between two starts."""
+MAX_POINTER_RESTORES = 5
+"""How often the indirect addresses of one servo are set again between two starts."""
 
 
 class DynamixelBus(ServoBus):
@@ -40,10 +40,11 @@ class DynamixelBus(ServoBus):
     servos, port, baud, margin_s, clock : see :class:`~drivers.protocol1.bus.Protocol1Bus`.
     feedback : ``"full"`` reads velocity and current with every position, and by indirect addressing temperature,
         hardware error, torque and watchdog too; ``"position"`` reads only the position.
-    fast : use fast reads where every servo's firmware has them.
+    fast : use fast sync and bulk reads where the firmware of every servo has them.
     indirect : use indirect addressing where the model has it.
-    slow_group : servos read at once for values that are not in the feedback (supply, and torque, error and watchdog
-        where they are not), so that each is read every half second; 0 reads only servos that raise an alert.
+    slow_group : number of servos of which one request reads values that are not in the feedback (supply voltage, and
+        torque, error and watchdog without indirect addressing). Each value is read every half second. 0 reads these
+        values only of servos that raise an alert.
     policy : fields of :class:`~drivers.dynamixel.startup.Policy`, such as ``watchdog_ms``.
 
     Raises DriverError for an unknown model or an option that does not fit.
@@ -72,19 +73,19 @@ class DynamixelBus(ServoBus):
         self.policy = Policy(**policy)  # type: ignore[arg-type]
         self._port = Port(port, baud, margin_s)
         self._registers = Registers(Packets(), self._port, self.servos)
-        self._tables([load_table(servo.model) for servo in self.servos])
+        self._set_tables([load_table(servo.model) for servo in self.servos])
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, fast, slow_group)
-        self._may_map = indirect and feedback == "full"
-        self._group({})
-        self._remapped: Counter[int] = Counter()
-        self._heard_s = 0.0
+        self._use_indirect = indirect and feedback == "full"
+        self._group_reads({})
+        self._pointer_restores: Counter[int] = Counter()
+        self._last_cycle_s = 0.0
         self._warn = RateLimitedLogger(log, clock)
 
-    # ------------------------------------------------------------------ looking, starting, stopping
+    # ------------------------------------------------------------------ discovering, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
-        """Servos that answer; ``ids`` None asks all ids at once, which takes about a second."""
-        with self._losing():
+        """Return the servos that answer; ``ids`` None pings all ids with one broadcast, which takes about a second."""
+        with self._detecting_loss():
             if ids is None:
                 found = self._registers.packets.ping_all(self._port)
             else:
@@ -92,74 +93,79 @@ class DynamixelBus(ServoBus):
             return [self._info(i, params[0] | params[1] << 8, params[2]) for i, params in sorted(found.items())]
 
     def _ping(self, servo: int) -> bytes:
-        """The data of a servo's answer to a ping; empty where it does not answer, or only with an error."""
+        """Ping a servo and return the data of its reply; empty where it does not answer, or only with an error."""
         reply = self._registers.packets.hello(self._port, servo).replies.get(servo)
         if reply is None and servo not in self.ids:
             self._port.suspects.discard(servo)  # no such servo
         return b"" if reply is None else reply.params
 
     def _startup(self, policy: Policy | None = None) -> Startup:
-        return Startup(self._registers, policy or self.policy, self._may_map)
+        return Startup(self._registers, policy or self.policy, self._use_indirect)
 
-    def _group(self, mapped: Mapping[int, Block]) -> None:
-        self._mapped = dict(mapped)
-        self._telemetry.rebuild(mapped)
+    def _group_reads(self, indirect: Mapping[int, Block]) -> None:
+        self._indirect_blocks = dict(indirect)
+        self._telemetry.rebuild(indirect)
 
-    def _started(self, started: Started) -> Floats:
-        here = super()._started(started)
-        self._remapped.clear()
-        self._heard_s = self._clock()
-        return here
+    def _finish_start(self, started: Started) -> Floats:
+        angle_rad = super()._finish_start(started)
+        self._pointer_restores.clear()
+        self._last_cycle_s = self._clock()
+        return angle_rad
 
-    def _use(self, started: Started) -> None:
-        self._use_map(self._mapped | started.mapped)
+    def _store_started(self, started: Started) -> None:
+        self._set_indirect_blocks(self._indirect_blocks | started.mapped)
         self._telemetry.tripped.difference_update(started.ticks)
-        super()._use(started)
+        super()._store_started(started)
 
     # ------------------------------------------------------------------ every cycle
 
     def _send(self, angle_rad: Floats) -> Floats:
-        """One sync write of all goals, inside the servos' own limits too."""
+        """Send all goals with one sync write per group of servos, clipped to the servos' own limits as well."""
         sent = self.scale.goals(angle_rad, self._goals)
         self._telemetry.send_goals(self._goals, self.driven)
         return sent
 
     def _settle(self, now: float) -> None:
-        """Read all watchdogs when the caller paused for so long that they may have tripped."""
-        pause, self._heard_s = now - self._heard_s, now
+        """Read all bus watchdogs, and clear tripped ones, if the last cycle is long enough ago for them to trip."""
+        pause, self._last_cycle_s = now - self._last_cycle_s, now
         limit = self.policy.watchdog_ms / 1000.0
         if self._running and limit and pause > limit:
-            self._telemetry.ask_watchdogs(self._clock)
+            self._telemetry.read_watchdogs(self._clock)
             self._clear_watchdogs()
 
     def _ask(self) -> BusState:
-        """One sync read of all servos and one slow value of some."""
+        """Read the feedback of all servos, and one slow value of some; restore lost indirect addresses first."""
         if self._telemetry.unmapped:
             unmapped, self._telemetry.unmapped = sorted(self._telemetry.unmapped), set()
             for servo in unmapped:
-                self._map_again(servo)
+                self._restore_pointers(servo)
         state = self._telemetry.cycle(self._clock, self._running, self.scale)
         if self._running and self._telemetry.tripped:
             self._clear_watchdogs()
         return state
 
-    def _use_map(self, mapped: dict[int, Block]) -> None:
-        """Group the servos again where other registers are mapped now."""
-        if mapped != self._mapped:
-            self._group(mapped)
+    def _set_indirect_blocks(self, blocks: dict[int, Block]) -> None:
+        """Group the servos anew if ``blocks``, read through indirect addresses, by servo id, differ from before."""
+        if blocks != self._indirect_blocks:
+            self._group_reads(blocks)
 
-    def _map_again(self, servo: int) -> None:
-        """Set the pointers of a servo that lost them; one that does not keep them is read without from now on."""
-        self._remapped[servo] += 1
-        mapped = set_up(self._registers, [servo]) if self._remapped[servo] <= MAP_TRIES else {}
-        if not mapped:
-            self._use_map({i: block for i, block in self._mapped.items() if i != servo})
+    def _restore_pointers(self, servo: int) -> None:
+        """Set the indirect addresses of a servo that lost them, as after a reboot.
+
+        A servo that does not keep them is read without indirect addressing until the next start.
+        """
+        self._pointer_restores[servo] += 1
+        may_restore = self._pointer_restores[servo] <= MAX_POINTER_RESTORES
+        blocks = set_up_pointers(self._registers, [servo]) if may_restore else {}
+        if not blocks:
+            self._set_indirect_blocks({i: block for i, block in self._indirect_blocks.items() if i != servo})
 
     def _clear_watchdogs(self) -> None:
-        """Clear tripped watchdogs with the goal where the servo is, so that nothing jumps.
+        """Clear tripped watchdogs and set each goal to the servo's position, so that no servo jumps.
 
-        Until all of that is confirmed the servo is sent no goals. It ignored those since the watchdog tripped, so they
-        may be far from it, and it would obey the next one as soon as the first write of these has reached it.
+        Three writes do that: clear the watchdog, set the goal, arm the watchdog. Until all three are confirmed, the bus
+        sends the servo no goals: it would obey them as soon as the first write has arrived, and they may be far from
+        its position, because it has ignored all goals since the watchdog tripped.
         """
         left_out = {self.ids[index] for index in np.flatnonzero(self._presence.left_out)}
         for servo in sorted(self._telemetry.tripped - left_out):
@@ -173,7 +179,7 @@ class DynamixelBus(ServoBus):
             except PortLost:
                 raise
             except BusError as error:
-                label = self._registers.label(servo)  # it is not forgotten: its register may read 0 now
+                label = self._registers.label(servo)  # it stays in `tripped`, even if its register reads 0 already
                 self._warn("watchdog of servo %s is not cleared yet", label)
                 log.debug("%s", error)
                 continue
@@ -182,7 +188,7 @@ class DynamixelBus(ServoBus):
             self._presence.join(index)
 
     def _goal_at_present(self, servo: int) -> int:
-        """The goal that keeps a servo that holds where it is, inside its own limits: it refuses any other."""
+        """Read and return the goal, in steps, that keeps a servo with torque at its position, inside its own limits."""
         startup, index = self._startup(), self.ids.index(servo)
         startup.started.limits[servo] = int(self.scale.lowest[index]), int(self.scale.highest[index])
         return startup.goals_at_present([servo], held=[servo])[servo]

@@ -42,7 +42,7 @@ class CompiledRead:
         axes: Floats,
         slow_values: Callable[[], Sequence[NDArray[Any]]],
     ) -> None:
-        from drivers.core.kernels import take_replies  # start-up: loads numba
+        from drivers.core.kernels import take_replies  # imported lazily: loads numba
 
         self._take_replies, self.read = take_replies, read
         self._octets, self._known, self.axes, self._slow_values = octets, known, axes, slow_values
@@ -83,7 +83,7 @@ def _fields(request: ReadRequest, joint: bool) -> NDArray[np.int64]:
 
     Data begin behind the error byte, and in a joint reply behind the id.
     """
-    from drivers.core.kernels import FIELDS, SIGN_MAGNITUDE, TWOS_COMPLEMENT, UNSIGNED  # start-up: loads numba
+    from drivers.core.kernels import FIELDS, SIGN_MAGNITUDE, TWOS_COMPLEMENT, UNSIGNED  # imported lazily: numba
 
     block, fields = request.block, np.zeros((len(FIELDS), 3), np.int64)
     for row, name in enumerate(FIELDS):

@@ -23,15 +23,15 @@ class DynamixelSettings(ServoSettings):
 
 def driver_for(servos: Sequence[ServoSpec]) -> type[WireBus]:
     """The driver for the servos' protocols; only what they need is loaded. Raises DriverError: unknown model."""
-    from drivers.tables.tables import load_table  # start-up: families are listed without their drivers
+    from drivers.tables.tables import load_table  # imported lazily: families are listed without their drivers
 
     protocols = {load_table(servo.model).protocol for servo in servos}
     if 1 not in protocols:
-        from drivers.dynamixel.bus import DynamixelBus  # start-up: as above
+        from drivers.dynamixel.bus import DynamixelBus  # imported lazily, as above
 
         return DynamixelBus
-    from drivers.dynamixel.legacy import LegacyBus  # start-up: as above
-    from drivers.dynamixel.mixed import MixedBus  # start-up: as above
+    from drivers.dynamixel.legacy import LegacyBus  # imported lazily, as above
+    from drivers.dynamixel.mixed import MixedBus  # imported lazily, as above
 
     return LegacyBus if protocols == {1} else MixedBus
 

@@ -41,7 +41,7 @@ class GoalFrame:
     """
 
     def __init__(self, ids: Sequence[int], address: int, size: int, places: NDArray[np.int64]) -> None:
-        from drivers.core.kernels import put_goals  # start-up: loads numba
+        from drivers.core.kernels import put_goals  # imported lazily: loads numba
 
         self._put_goals = put_goals
         self._size, self._places = size, places
@@ -78,7 +78,7 @@ class GroupRead:
     """
 
     def __init__(self, runs: Sequence[Run], fast: bool = False) -> None:
-        from drivers.core.kernels import check_joint, check_replies  # start-up: loads numba
+        from drivers.core.kernels import check_joint, check_replies  # imported lazily: loads numba
 
         self._check = check_joint if fast else check_replies
         self.runs, self.fast = tuple(runs), fast

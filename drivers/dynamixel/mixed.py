@@ -24,9 +24,9 @@ from drivers.packets.packet import MAX_ID
 from drivers.tables.tables import load_table
 
 ONLY_LEGACY = {"singles", "torque_limit"}
-"""Options of Protocol 1.0 alone."""
+"""Options that only the driver of Protocol 1.0 has."""
 ONLY_NEW = {"baud", "margin_s", "fast", "indirect"}
-"""Options of Protocol 2.0 alone, and of the port."""
+"""Options that only the driver of Protocol 2.0 has, and those of the port, which that driver opens."""
 
 
 class MixedBus(WireBus):
@@ -68,7 +68,7 @@ class MixedBus(WireBus):
         self._new._use_path(path)
 
     def _open_link(self) -> None:
-        for half in self._halves:  # it is one port; each half resets its state
+        for half in self._halves:  # both share one port, and each half resets its state
             half.open()
 
     def _close_link(self) -> None:
@@ -78,11 +78,11 @@ class MixedBus(WireBus):
         for half in self._halves:
             half._release()
 
-    # ------------------------------------------------------------------ looking, starting, stopping
+    # ------------------------------------------------------------------ discovering, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
         """Servos that answer: each id is pinged in the protocol it is configured for, then in the other."""
-        with self._losing():
+        with self._detecting_loss():
             found: dict[int, ServoInfo] = {}
             if ids is None:
                 found = {info.id: info for info in self._new.discover()}
@@ -101,36 +101,36 @@ class MixedBus(WireBus):
                 half._start()
             except BaseException:
                 self._unconfirmed = True
-                self._let_go_of_halves()
+                self._undo_half_starts()
                 self._unconfirmed = any(half._unconfirmed for half in self._halves)
                 raise
             here[index] = half._limits.target
         return here
 
     def _bring_back(self) -> Floats:
-        """Both halves, each with the servos that can be started."""
+        """Start both halves again, each with the servos that can be started."""
         here = np.full(len(self.ids), np.nan)
         for half, index in zip(self._halves, self._index, strict=True):
-            with half._losing():
+            with half._detecting_loss():
                 half._begin_driving(half._bring_back())
             here[index] = np.where(half.driven, half._limits.target, np.nan)
             self._reasons |= {int(index[at]): why for at, why in half._reasons.items()}
         return here
 
     def _join(self, index: int) -> float:
-        """Where a servo is that its half has started again."""
+        """Return the position of a servo if its half has started it again, rad; else raise why it is left out."""
         for half, places in zip(self._halves, self._index, strict=True):
             if index in places:
                 at = half.ids.index(self.ids[index])
                 if half.driven[at]:
                     return float(half._limits.target[at])
-        raise self._reasons[index].with_traceback(None)  # else it keeps a frame of every attempt
+        raise self._reasons[index].with_traceback(None)  # a kept traceback would grow with every attempt
 
     def recover(self, ids: Sequence[int] | None = None) -> None:
-        """Bring servos back that switched off or were rebooted; see the drivers of both protocols."""
+        """Start servos again that switched off or were rebooted; see :meth:`drivers.servos.bus.ServoBus.recover`."""
         self._raise_if_stopped()
         failed: dict[int, BusError] = {}
-        with self._losing():
+        with self._detecting_loss():
             for half in self._halves:
                 chosen = [servo for servo in half.ids if ids is None or servo in ids]
                 failed |= half._recover(chosen)
@@ -146,26 +146,28 @@ class MixedBus(WireBus):
         failed = self._stop_halves()
         if not failed:
             return
-        left = tuple(servo for error in failed for servo in error.servo_ids)
+        unconfirmed = tuple(servo for error in failed for servo in error.servo_ids)
         kind = PortLost if any(isinstance(error, PortLost) for error in failed) else NoReply
-        raise kind("; ".join(map(str, failed)), hint=failed[0].hint, port=self.path, servo_ids=left) from failed[0]
+        raise kind("; ".join(map(str, failed)), hint=failed[0].hint, port=self.path, servo_ids=unconfirmed) from failed[
+            0
+        ]
 
-    def _let_go_of_halves(self) -> None:
-        """Switch off what the start of both halves switched on, where the second one failed."""
+    def _undo_half_starts(self) -> None:
+        """Disable the torque that the start of the first half enabled, where the start of the second half failed."""
         for half in self._halves:
             if half._running:
                 with suppress(DriverError):  # the first error is reported; stop() tries again
-                    half._let_go()
+                    half._undo_start()
 
     def _stop_halves(self) -> list[DriverError]:
-        """Switch off the servos of both halves that may be on, also where the first fails; returns the errors."""
+        """Disable torque on both halves where it may be on, also if the first half fails; return the errors."""
         failed = []
         for half in self._halves:
             if not half._running and not half._unconfirmed:
                 continue
             half._running, half._unconfirmed = False, True
             try:
-                with half._losing():
+                with half._detecting_loss():
                     half._switch_off()
                 half._unconfirmed = False
             except DriverError as error:
@@ -178,7 +180,7 @@ class MixedBus(WireBus):
         sent = np.empty(len(self.ids))
         for half, index in zip(self._halves, self._index, strict=True):
             sent[index] = half.write(np.where(self.driven[index], angle_rad[index], np.nan))
-            self._hold_back_with(half, index)
+            self._copy_held_back(half, index)
         return sent
 
     @property
@@ -188,18 +190,21 @@ class MixedBus(WireBus):
     def _ask(self) -> BusState:
         states = [half.read() for half in self._halves]
         for half, index in zip(self._halves, self._index, strict=True):
-            self._hold_back_with(half, index)
+            self._copy_held_back(half, index)
         return BusState(states[-1].time_s, *(self._joined(states, field.name) for field in fields(BusState)[1:]))
 
-    def _hold_back_with(self, half: DynamixelBus | LegacyBus, index: NDArray[np.intp]) -> None:
-        """Hold back here, too, whom a half holds back, and let them begin where they are when it drives them again."""
-        theirs, own = half._presence.held_back, self._presence.held_back
-        for at in np.flatnonzero(theirs != own[index]):
-            if theirs[at]:
-                self._presence.hold_back(int(index[at]))
+    def _copy_held_back(self, half: DynamixelBus | LegacyBus, index: NDArray[np.intp]) -> None:
+        """Hold back the servos that a half holds back; drive them again from their positions when the half does.
+
+        index : (k,) index in this bus of each of the half's servos.
+        """
+        in_half, in_both = half._presence.held_back, self._presence.held_back
+        for i in np.flatnonzero(in_half != in_both[index]):
+            if in_half[i]:
+                self._presence.hold_back(int(index[i]))
             else:
-                self._begin_at(int(index[at]), float(half._limits.target[at]))
-                self._presence.join(int(index[at]))
+                self._begin_at(int(index[i]), float(half._limits.target[i]))
+                self._presence.join(int(index[i]))
 
     def _joined(self, states: Sequence[BusState], name: str) -> NDArray[Any]:
         parts = [getattr(state, name) for state in states]
@@ -209,7 +214,7 @@ class MixedBus(WireBus):
         return frozen(whole, whole.dtype)
 
     def report(self) -> BusReport:
-        """Counters of both halves together."""
+        """Sum the counters of both halves."""
         report = super().report()
         errors = Counter(report.errors)
         for half in self._halves:
@@ -221,6 +226,6 @@ class MixedBus(WireBus):
             report.speed_limited += part.speed_limited
             report.eeprom_writes += part.eeprom_writes
             report.silent = tuple(sorted((*report.silent, *part.silent)))
-            report.stray = part.stray  # both count it in the port
+            report.stray = part.stray  # counted by the port, which both share
         report.errors = dict(errors)
         return report

@@ -40,7 +40,7 @@ from drivers.dynamixel.frames import STATUS_SIZE, GroupRead, Run
 from drivers.packets import packet
 from drivers.packets.packet import Instruction, StatusPacket, StatusReader, encode_instruction
 from drivers.servos import exchange
-from drivers.servos.exchange import Exchange, R, settled
+from drivers.servos.exchange import Exchange, R, finish_exchange
 from drivers.servos.port import Port
 
 PING_DATA = 3
@@ -183,7 +183,7 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
             port.is_using = False
         return found
 
-    def _read_asked(self, port: Any, ids: tuple[int, ...], address: int, size: int, manner: str) -> Got:
+    def _read_ready(self, port: Any, ids: tuple[int, ...], address: int, size: int, manner: str) -> Got:
         return self.read_prepared(port, group_read((Run(ids, address, size),), manner == "fast"))
 
     def read_prepared(self, port: Port, group: GroupRead, compiled: CompiledRead | None = None) -> Got:
@@ -197,20 +197,20 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
             port.expect(group.size)
             if compiled is not None:
                 compiled.prepare()
-            data = self._fill(port, group.size)
+            data = self._receive(port, group.size)
             taken = compiled is not None and compiled.take(data, port.clock())
             replies = {} if taken else group.decode(data)
             if replies is not None:
                 port.suspects.difference_update(group.wanted)
                 return Exchange(replies, (), False)
             if not group.fast:
-                return self._sort(port, group.wanted, data)
+                return self._find_replies(port, group.wanted, data)
             got = self._decode_joint(port, group, data)
         finally:
             port.is_using = False
         return self._read_behind(port, group, got)
 
-    def _fill(self, port: Any, size: int) -> bytes:
+    def _receive(self, port: Any, size: int) -> bytes:
         """Received bytes, at least ``size`` of them unless the deadline passes.
 
         It sleeps for the time that they take on the wire: one wake-up, not one for every few bytes.
@@ -231,7 +231,7 @@ class Packets(SdkExchanges[StatusPacket], protocol2_packet_handler.Protocol2Pack
             raw += data
             if data:
                 replies = packet.decode_fast(bytes(raw), devices)
-        return settled(port, group.wanted, {reply.id: reply for reply in replies}, len(raw) >= group.size)
+        return finish_exchange(port, group.wanted, {reply.id: reply for reply in replies}, len(raw) >= group.size)
 
     def _read_behind(self, port: Port, group: GroupRead, got: Got) -> Got:
         """Read servos after the first silent one again, one reply each: it cut them off from the joint reply (S14).

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from drivers.base.bus import ServoSpec
 from drivers.base.errors import BusError, CorruptReply, NoReply, ServoFault, ServoRefused
-from drivers.dynamixel.indirect import set_up
+from drivers.dynamixel.indirect import set_up_pointers
 from drivers.dynamixel.registers import Registers
 from drivers.packets.packet import Instruction, StatusPacket
 from drivers.servos import startup
@@ -25,29 +25,32 @@ OUT_OF_TURN_TICKS = 64
 MAX_OFFSET = 1024
 BOOT_S = 1.0
 ERROR_CLEAR = b"\x02ERCL"
-"""Parameters of Clear that end an error (e-Manual, Y-series, Error Clear Packet)."""
+"""Parameters of the instruction Clear that clear an error (e-Manual, Y-series, Error Clear Packet)."""
 TURNING_ON, RUNNING, TURNING_OFF = 4, 5, 6
-"""Values of Controller State: the motor is being switched on, takes goals, is being switched off."""
+"""Values of the register Controller State: the motor is being switched on, takes goals, is being switched off."""
 NOT_OFF = (TURNING_ON, RUNNING, TURNING_OFF)
-STATE_S = 3.0
-"""Longest time to switch a motor on or off that has a brake, or stops first."""
+MAX_STATE_S = 3.0
+"""Longest time to wait for a motor that opens or closes its brake, or stops before it is off."""
 EEPROM_TRIES = 10
 
 
 @dataclass(frozen=True)
 class Policy(startup.Policy):
-    """What start-up may do. A servo that receives nothing for `watchdog_ms` stops by itself; 0 switches that off."""
+    """What start-up may do.
+
+    watchdog_ms : bus watchdog, after which a servo that receives nothing stops; 0 switches the watchdog off.
+    """
 
     watchdog_ms: int = 200
 
     @property
     def watchdog_steps(self) -> int:
-        """The register's value, rounded up, at most 127."""
+        """Value of the register Bus Watchdog, in steps of 20 ms, rounded up, at most 127."""
         return min(math.ceil(self.watchdog_ms / 1000.0 / WATCHDOG_STEP_S), 127)
 
 
 class Startup(startup.Startup[StatusPacket]):
-    """Start-up and stop sequence; `indirect` maps registers side by side where the models have indirect addressing."""
+    """Start-up and stop sequence; `indirect` sets indirect addresses where the models have them."""
 
     out_of_turn_hint = (
         "turn it back by hand; if that does not help, clear its homing offset, and switch its power off and on, which "
@@ -67,84 +70,92 @@ class Startup(startup.Startup[StatusPacket]):
         return reply.params[0] | reply.params[1] << 8, reply.params[2]
 
     def _release(self, servo: int) -> None:
-        """Switch one servo off; while it stops and closes its brake it refuses goals and torque, so wait for that."""
+        """Disable the torque of one servo, and wait until it has stopped and closed its brake."""
         self.registers.put(servo, "torque", 0)
-        if self._with_state([servo], NOT_OFF.__contains__):
-            message = f"servo {self.registers.label(servo)} is not off {STATE_S:g} s after its torque was switched off"
+        if self._await_state([servo], NOT_OFF.__contains__):
+            message = (
+                f"servo {self.registers.label(servo)} is not off {MAX_STATE_S:g} s after its torque was switched off"
+            )
             raise self.registers.error(ServoFault, message, "look at its Controller State and Brake Delay", servo)
 
     def _slack(self, turn: int) -> float:
         return OUT_OF_TURN_TICKS
 
     def _first_steps(self, ids: Sequence[int]) -> Mapping[int, int]:
-        """Switched on, a servo counts within the turn that begins at its homing offset, however far it was turned.
+        """First step of the turn of each servo: its homing offset.
 
-        A limp servo that was turned to -30 is at 4066 then, and a goal at 0 would spin it. Source: e-Manual, Present
-        Position (132). Offsets beyond `MAX_OFFSET` do not act in position mode.
+        With torque, a servo counts within the turn that begins there, however far it was turned before. So a servo that
+        was turned to -30 without torque is at 4066 with it, and a goal at 0 would make it turn nearly once around.
+        Source: e-Manual, Present Position (132). Offsets beyond `MAX_OFFSET` have no effect in position mode.
         """
-        bare = [servo for servo in ids if not self.registers.tables[servo].error_codes]  # Y-series keep their turns
-        offsets = self.registers.get_all(bare, "offset")
+        resetting = [
+            servo for servo in ids if not self.registers.tables[servo].error_codes
+        ]  # Y-series keep their turns
+        offsets = self.registers.get_all(resetting, "offset")
         return {servo: offset for servo, offset in offsets.items() if abs(offset) <= MAX_OFFSET}
 
     def torque_on(self, ids: Sequence[int], held: Sequence[int]) -> None:
-        """Switch torque on; servos with a brake take goals only once it is open.
+        """Enable torque, and wait for servos with a brake, which take goals only once it is open.
 
         Raises ServoFault: one does not run, or a motor did not come on.
         """
         super().torque_on(ids, held)
-        waiting = self._with_state(ids, lambda state: state != RUNNING)
+        waiting = self._await_state(ids, lambda state: state != RUNNING)
         if waiting:
             which = ", ".join(map(self.registers.label, waiting))
             hint = "look at its Controller State, Brake Delay and Goal Update Delay"
-            message = f"servos do not run {STATE_S:g} s after torque: {which}"
+            message = f"servos do not run {MAX_STATE_S:g} s after torque: {which}"
             raise self.registers.error(ServoFault, message, hint, *waiting)
         self.started.ticks |= self.registers.get_all(self.registers.having(ids, "state"), "position")
 
-    def _confirmed_off(self, servo: int) -> bool:
-        """Off, and no longer stopping or closing its brake: while it does that it refuses what is written."""
+    def _confirm_off(self, servo: int) -> bool:
+        """Disable torque; return whether the servo is off, has stopped and has closed its brake."""
         registers = self.registers
         if not registers.having([servo], "state"):
-            return super()._confirmed_off(servo)
+            return super()._confirm_off(servo)
         try:
-            self._with_state([servo], lambda state: state in (TURNING_ON, TURNING_OFF))
+            self._await_state([servo], lambda state: state in (TURNING_ON, TURNING_OFF))
             if registers.get(servo, "torque", tries=1):
                 registers.put(servo, "torque", 0, tries=1)
-            settled = not self._with_state([servo], NOT_OFF.__contains__)
-            return settled and registers.get(servo, "torque", tries=1) == 0
+            stopped = not self._await_state([servo], NOT_OFF.__contains__)
+            return stopped and registers.get(servo, "torque", tries=1) == 0
         except BusError:
             return False
 
-    def _with_state(self, ids: Sequence[int], waits: Callable[[int], bool]) -> list[int]:
-        """Servos whose Controller State is still wrong after `STATE_S`; those without such a register never wait."""
+    def _await_state(self, ids: Sequence[int], is_wrong: Callable[[int], bool]) -> list[int]:
+        """Wait at most `MAX_STATE_S` until no Controller State is wrong; return the servos where it still is.
+
+        Servos without that register are ignored.
+        """
         registers = self.registers
-        left, end_s = registers.having(ids, "state"), registers.port.clock() + STATE_S
-        while left := [servo for servo, state in registers.get_all(left, "state").items() if waits(state)]:
+        waiting, end_s = registers.having(ids, "state"), registers.port.clock() + MAX_STATE_S
+        while waiting := [servo for servo, state in registers.get_all(waiting, "state").items() if is_wrong(state)]:
             if registers.port.clock() >= end_s:
                 break
             registers.port.sleep(0.02)
-        return left
+        return waiting
 
     def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
         latched = self.registers.get_all(ids, "hardware")
         return {servo: f"hardware error 0x{latched.get(servo, 0):02X}" for servo in ids}
 
     def bring_up(self, servos: Sequence[ServoSpec]) -> startup.Started:
-        """Make identified servos answer writes, then start them where they are."""
-        self._with_state([servo.id for servo in servos], lambda state: state in (TURNING_ON, TURNING_OFF))
+        """Make identified servos answer writes, then start them at their present positions."""
+        self._await_state([servo.id for servo in servos], lambda state: state in (TURNING_ON, TURNING_OFF))
         self.registers.put_all(dict.fromkeys([servo.id for servo in servos], 2), "status_level")
         return super().bring_up(servos)
 
     def _clear_faults(self, ids: Sequence[int]) -> list[int]:
-        """End errors where that is allowed; returns servos that were rebooted."""
+        """Clear errors where that is allowed; return servos that were rebooted."""
         coded = [servo for servo in ids if self.registers.tables[servo].error_codes]
         self._clear_codes(coded)
         return self._reboot_faulted([servo for servo in ids if servo not in coded])
 
     def _clear_codes(self, ids: Sequence[int]) -> None:
-        """Y-series: end errors by the instruction Clear, where that is allowed; none is rebooted.
+        """Clear errors of Y-series servos with the instruction Clear, where that is allowed; none is rebooted.
 
-        A tripped watchdog is cleared with its register later, and with a warning of its battery a servo goes on. An
-        error of the supply needs no leave: the motor is off already, and the supply was found good.
+        A tripped watchdog is cleared later through its register. A battery warning is only logged. An error of the
+        supply voltage may always be cleared: the motor is off already, and the supply was found good.
         """
         registers = self.registers
         bad: dict[int, int] = {}
@@ -169,10 +180,10 @@ class Startup(startup.Startup[StatusPacket]):
             raise self.fault("latched", still)
 
     def _reboot_faulted(self, ids: Sequence[int]) -> list[int]:
-        """Reboot servos with a latched error where that is allowed.
+        """Reboot servos with a latched error where that is allowed; return them.
 
-        Input voltage alone is ignored where it does not switch the motor off; else the servo is rebooted in any case:
-        its motor is off already, and the supply was found good.
+        An input-voltage error alone is ignored where it does not switch the motor off. Where it does, the servo is
+        always rebooted: its motor is off already, and the supply was found good.
         """
         registers = self.registers
         latched = registers.get_all(ids, "hardware")
@@ -197,7 +208,7 @@ class Startup(startup.Startup[StatusPacket]):
         return list(bad)
 
     def _await_boot(self, servo: int) -> StatusPacket:
-        """The answer of a servo that was rebooted; raises as :meth:`Registers.hello` where none comes in time."""
+        """Greet a rebooted servo until it answers; raises as :meth:`Registers.hello` where it does not in time."""
         port = self.registers.port
         end_s = port.clock() + BOOT_S
         while True:
@@ -208,9 +219,9 @@ class Startup(startup.Startup[StatusPacket]):
                     raise
 
     def _write_settings(self, servo: int, held: bool) -> None:
-        """Operating mode, drive mode, startup configuration and return delay: read, and written only where they differ.
+        """Read operating mode, drive mode, startup configuration and return delay, and write those that differ.
 
-        ``held`` : its torque is on, so nothing may be written; raises ServoRefused where something differs.
+        ``held`` : its torque is on, so nothing may be written; raises ServoRefused where a value differs.
         """
         registers, table = self.registers, self.registers.tables[servo]
         self._check_gear(servo)
@@ -232,7 +243,7 @@ class Startup(startup.Startup[StatusPacket]):
             self._write_eeprom(servo, name, present[name], value)
 
     def _check_gear(self, servo: int) -> None:
-        """Y-series: an electronic gear that is not the model's own makes another angle of every step."""
+        """Raise ServoRefused for a Y-series servo whose electronic gear is not the default, which scales its steps."""
         registers = self.registers
         for name in ("gear_numerator", "gear_denominator"):
             item = registers.item(servo, name)
@@ -251,17 +262,17 @@ class Startup(startup.Startup[StatusPacket]):
         self.note(servo, name, old, new)
 
     def _prepare(self, servos: Sequence[ServoSpec]) -> None:
-        """Indirect addresses, limits of speed and acceleration, and the bus watchdog: cleared, then armed."""
+        """Write indirect addresses and the limits of speed and acceleration; clear the bus watchdog, then arm it."""
         ids = [servo.id for servo in servos]
         if self._indirect:
-            self.started.mapped = set_up(self.registers, ids)
+            self.started.mapped = set_up_pointers(self.registers, ids)
         for name, limit in (("speed_limit", "max_speed_rad_s"), ("accel_limit", "max_accel_rad_s2")):
             values = {}
             for servo in servos:
                 item = self.registers.item(servo.id, name)
                 if item is not None:  # 0 would mean no limit
                     steps = math.ceil(getattr(servo, limit) / item.scale)
-                    values[servo.id] = min(max(steps, 1), _most(self.registers.tables[servo.id], item))
+                    values[servo.id] = min(max(steps, 1), _max_profile_value(self.registers.tables[servo.id], item))
             self.registers.set_all(values, name)
         watched = self.registers.having(ids, "watchdog")
         self.registers.put_all(dict.fromkeys(watched, 0), "watchdog")
@@ -273,7 +284,7 @@ class Startup(startup.Startup[StatusPacket]):
             self.registers.set_all(dict.fromkeys(self.registers.having(ids, "watchdog"), 0), "watchdog")
 
 
-def _most(table: ControlTable, item: Item) -> int:
+def _max_profile_value(table: ControlTable, item: Item) -> int:
     """The largest value of a profile register; P-series bound it by the register that holds the limit."""
     if item.upper is not None:
         return table[item.upper].initial

@@ -77,7 +77,7 @@ class MaestroBus(OrderedBus):
 
     def _open_link(self) -> None:
         super()._open_link()
-        self._port.write(bytes((m.POLOLU,)))  # by this byte a board on a serial line detects the rate
+        self._port.write(bytes((m.POLOLU,)))  # a board on a serial line detects the baud rate from this byte
 
     def _begin(self) -> Floats:
         self._ask_pulses([], insist=True)  # clears errors from before
@@ -88,7 +88,7 @@ class MaestroBus(OrderedBus):
     def _bring_up(self) -> Floats:
         start = super()._bring_up()
         try:
-            present = self._checked(start)
+            present = self._send_and_check(start)
         except BaseException:
             self._back_out()
             raise
@@ -100,14 +100,14 @@ class MaestroBus(OrderedBus):
             )
         return np.where(np.isnan(present), start, present)
 
-    def _checked(self, start: Floats) -> Floats:
-        """Send all goals as in every cycle; returns what the board puts out then, (n,) rad, NaN for no pulses.
+    def _send_and_check(self, start: Floats) -> Floats:
+        """Send all goals as in every cycle; return what the board puts out then, (n,) rad, NaN for no pulses.
 
         Raises ServoRefused: the board reports errors, as one that does not know the command. NoReply.
         """
         self._errors = 0
         self._go(start)
-        answered = self._ask_pulses([], insist=True) is not None  # the board forgets its errors as it reports them
+        answered = self._ask_pulses([], insist=True) is not None  # reading the errors clears them in the board
         present = self._begin()
         if self._errors:
             raise self._error(
@@ -149,7 +149,7 @@ class MaestroBus(OrderedBus):
         return self._scale.radians(goals)
 
     def _targets(self, steps: np.ndarray, known: np.ndarray) -> Iterator[bytes]:
-        """Commands for the targets; a Mini Maestro takes consecutive channels in one."""
+        """Encode commands for the targets; a Mini Maestro takes consecutive channels in one command."""
         goals = {self.ids[i]: int(steps[i]) for i in np.flatnonzero(known)}
         if self._board == MICRO:
             yield from (self._code.word(m.SET_TARGET, channel, goal) for channel, goal in goals.items())
@@ -170,7 +170,7 @@ class MaestroBus(OrderedBus):
             self._warn(f"the Maestro on {self.path} reports: {name}; it stopped all pulses")
 
     def _ask_pulses(self, group: Sequence[int], insist: bool = False) -> Floats | None:
-        """As in the base class; also reads the board's errors, which clears them there, and adds them to those seen."""
+        """As in the base class; also reads the board's errors, which clears them in the board, and stores them."""
         requests = b"".join(self._code.command(m.GET_POSITION, self.ids[index]) for index in group)
         data = self._request(requests + self._code.command(m.GET_ERRORS), 2 * len(group) + 2, insist)
         if data is None:

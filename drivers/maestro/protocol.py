@@ -14,7 +14,7 @@ GO_HOME, STOP_SCRIPT, RESTART_SCRIPT, RESTART_WITH_PARAMETER, SCRIPT_STATUS = 0x
 POLOLU, MINI_SSC = 0xAA, 0xFF
 
 QUARTER = 4
-"""Steps of a target in a microsecond."""
+"""Number of steps of a target per microsecond."""
 SPEED_US_S = 25.0
 """One step of speed: 0.25 us per 10 ms, in us/s."""
 ACCELERATION_US_S2 = 312.5
@@ -37,7 +37,7 @@ class MaestroError(IntFlag):
 
 
 def error_names(bits: int) -> list[str]:
-    """The errors by name, as ``["crc", "buffer full"]``."""
+    """Names of errors, as ``["crc", "buffer full"]``."""
     return [str(error.name).lower().replace("_", " ") for error in MaestroError if bits & error]
 
 
@@ -52,7 +52,7 @@ def crc7(data: bytes) -> int:
 
 
 class Encoder:
-    """Commands as bytes.
+    """Encodes commands as bytes.
 
     device : device number for the Pololu protocol; None: compact protocol, to any board.
     crc : end every command with its CRC-7.
@@ -72,6 +72,6 @@ class Encoder:
         return self.command(code, channel, value & 0x7F, value >> 7)
 
     def targets(self, first: int, values: Sequence[int]) -> bytes:
-        """Set Multiple Targets: consecutive channels, from ``first`` on."""
+        """Encode Set Multiple Targets for consecutive channels, from ``first`` on."""
         data = [part for value in values for part in (value & 0x7F, value >> 7)]
         return self.command(SET_MULTIPLE, len(values), first, *data)

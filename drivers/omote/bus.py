@@ -22,17 +22,17 @@ from drivers.omote.protocol import Answer
 
 MODELS = {"parameter": ("parameter", 4), "degrees": ("deg", 2)}
 """Value and decimals of models besides hobby servos, which are sent as pulses (us)."""
-UNDER_WAY = 2
-"""Lines that may be unanswered: small boards have small input buffers."""
-HELLO_S, HELLO_AGAIN_S = 5.0, 0.5
-"""Time in which a head must answer (a board resets when its port is opened), and interval of the requests."""
-LOST_S = 0.5
+MAX_UNANSWERED = 2
+"""Number of lines that may be unanswered, because small boards have small input buffers."""
+HELLO_TIMEOUT_S, HELLO_INTERVAL_S = 5.0, 0.5
+"""Time in which a head must answer (a board resets when its port is opened), and interval between requests."""
+ANSWER_TIMEOUT_S = 0.5
 """Time after which an unanswered line counts as lost."""
-TRIES = 3
+MAX_TRIES = 3
 
 
 def check_lineout(model: str) -> None:
-    """Raises DriverError for a model that is neither a parameter, degrees, nor a hobby servo."""
+    """Raise DriverError unless a model is ``parameter``, ``degrees`` or a hobby servo."""
     try:
         if model not in MODELS:
             check_hobby(model)
@@ -78,7 +78,7 @@ class LineOutBus(BoardBus):
         self._reset()
 
     def _reset(self) -> None:
-        """Start with a head whose state is unknown."""
+        """Forget what is known of the head."""
         self._waiting: dict[int, tuple[float, dict[int, float]]] = {}  # tag: (when it was sent, angle by index)
         self._answers: dict[int, Answer] = {}
         self._input = b""
@@ -103,7 +103,7 @@ class LineOutBus(BoardBus):
         for group in self._groups(self._names):
             answer = self._insist(["GET", *group])
             if answer.code == protocol.UNKNOWN_COMMAND:
-                break  # a simple head: it starts at rest
+                break  # a simple head does not report values; its servos start at rest
             if not answer.ok:
                 raise self._refusal(group, answer)
             for name, word in zip(group, answer.text.split()[1:], strict=False):
@@ -112,10 +112,10 @@ class LineOutBus(BoardBus):
         return self._scale.radians(values)
 
     def _greet(self) -> Answer:
-        end = self._port.clock() + HELLO_S
+        end = self._port.clock() + HELLO_TIMEOUT_S
         while True:
             self._port.write(b"\n")  # ends an incomplete line that the head may have received
-            answer = self._exchange(["HELLO"], HELLO_AGAIN_S)
+            answer = self._exchange(["HELLO"], HELLO_INTERVAL_S)
             if answer is not None and answer.ok:
                 return answer
             if self._port.clock() >= end:
@@ -126,7 +126,7 @@ class LineOutBus(BoardBus):
                 )
 
     def _refusal(self, group: Sequence[str], answer: Answer) -> BusError:
-        """The error for names that a head refuses; requests each separately to find the wrong one."""
+        """Return the error for names that a head refuses; requests each name separately to find the wrong one."""
         for name in group:
             single = self._insist(["GET", name])
             if not single.ok:
@@ -140,7 +140,7 @@ class LineOutBus(BoardBus):
         """Does nothing: :meth:`_switch_off` releases all names in a few lines."""
 
     def _switch_off(self) -> None:
-        """Release every name: the head goes on with other sources, or switches its servos off."""
+        """Release every name, after which the head follows its other sources, or switches its servos off."""
         left: list[int] = []
         lost = None
         try:
@@ -151,12 +151,12 @@ class LineOutBus(BoardBus):
         self._on[:] = False
         self._sent[:] = math.nan
         if left:
-            raise self._not_off(left, None) from lost
+            raise self._not_off_error(left, None) from lost
 
     def _release_names(self, group: Sequence[str]) -> list[str]:
-        """Release some names, one by one where they are refused together; returns those not released."""
-        for _ in range(TRIES):
-            answer = self._exchange(["RELEASE", *group], LOST_S)
+        """Release some names, one by one where they are refused together; return the names not released."""
+        for _ in range(MAX_TRIES):
+            answer = self._exchange(["RELEASE", *group], ANSWER_TIMEOUT_S)
             if answer is None:
                 continue
             if answer.ok:
@@ -173,7 +173,7 @@ class LineOutBus(BoardBus):
         now = self._clock()
         refresh = now - self._all_sent_s >= self._heartbeat_s
         due = known & ((values != self._sent) | refresh)
-        if len(self._waiting) >= UNDER_WAY:
+        if len(self._waiting) >= MAX_UNANSWERED:
             if due.any():
                 self._report.count("held_back")
             return sent
@@ -190,12 +190,12 @@ class LineOutBus(BoardBus):
         """Process the answers that have arrived, without waiting."""
         self._listen()
         now = self._clock()
-        for tag in [tag for tag, (when, _) in self._waiting.items() if now - when > LOST_S]:
+        for tag in [tag for tag, (when, _) in self._waiting.items() if now - when > ANSWER_TIMEOUT_S]:
             del self._waiting[tag]
             self._report.count("no_reply")
             self._sent[:] = math.nan  # send all values again
         if self._running:
-            self._note_answer(now - self._answer_s <= self._heartbeat_s + 2 * LOST_S)
+            self._note_answer(now - self._answer_s <= self._heartbeat_s + 2 * ANSWER_TIMEOUT_S)
 
     def _groups(self, words: Iterable[str]) -> list[list[str]]:
         return protocol.split_to_fit(words, self._max_line - len(f"#{protocol.MAX_TAG} RELEASE*00"))
@@ -217,14 +217,14 @@ class LineOutBus(BoardBus):
         return self._answers.pop(tag, None)
 
     def _insist(self, words: Sequence[str]) -> Answer:
-        for _ in range(TRIES):
-            answer = self._exchange(words, LOST_S)
+        for _ in range(MAX_TRIES):
+            answer = self._exchange(words, ANSWER_TIMEOUT_S)
             if answer is not None:
                 return answer
         raise self._error(NoReply, f"the head on {self.path} does not answer {words[0]}")
 
     def _listen(self, deadline_s: float = 0.0) -> None:
-        """Process the input; waits for some where a deadline is given."""
+        """Process the input; with a deadline, wait for input until then."""
         *lines, self._input = (self._input + self._port.read(deadline_s)).split(b"\n")
         self._input = self._input[-4 * protocol.MAX_LINE :]
         for line in lines:
@@ -239,7 +239,7 @@ class LineOutBus(BoardBus):
         if waiting is None:
             self._report.stray += answer.tag is not None
             if not answer.ok and answer.tag is None:
-                self._refused(answer, {})
+                self._note_refusal(answer, {})
             return
         self._answer_s = self._clock()
         angles = waiting[1]
@@ -249,9 +249,9 @@ class LineOutBus(BoardBus):
             for index, angle in angles.items():
                 self._note(index, angle)
         else:
-            self._refused(answer, angles)
+            self._note_refusal(answer, angles)
 
-    def _refused(self, answer: Answer, angles: dict[int, float]) -> None:
+    def _note_refusal(self, answer: Answer, angles: dict[int, float]) -> None:
         """Count a refused line, which changed nothing at the head; its values are sent again."""
         self._report.count("refused")
         self._sent[list(angles) or slice(None)] = math.nan

@@ -18,7 +18,7 @@ _CHECKED = re.compile(rb"(.*)\*([0-9A-Fa-f]{2})[ \t]*\Z", re.DOTALL)
 
 
 def checksum(data: bytes) -> int:
-    """CRC-8/SMBUS: polynomial 0x07, start 0, not reflected. Check value of b"123456789": 0xF4."""
+    """Compute CRC-8/SMBUS: polynomial 0x07, start 0, not reflected. Check value of b"123456789": 0xF4."""
     crc = 0
     for byte in data:
         crc ^= byte
@@ -33,13 +33,13 @@ def is_word(name: str) -> bool:
 
 
 def number(value: float) -> str:
-    """A value with at most 4 decimals, without trailing zeros."""
+    """Format a value with at most 4 decimals, without trailing zeros."""
     text = f"{value:.4f}".rstrip("0").rstrip(".")
     return "0" if text in ("-0", "") else text
 
 
 def line(words: Iterable[str], tag: int, checked: bool) -> bytes:
-    """A line with its end."""
+    """Encode a line with tag, optional checksum and line end."""
     data = f"#{tag} {' '.join(words)}".encode("ascii")
     return data + (b"*%02X\n" % checksum(data) if checked else b"\n")
 
@@ -73,7 +73,7 @@ def read_answer(data: bytes) -> Answer | None:
 
 
 def split_to_fit(words: Iterable[str], room: int) -> list[list[str]]:
-    """Words in groups that fit into ``room`` bytes with a blank before each; a longer word is a group by itself."""
+    """Group words so that each group fits into ``room`` bytes with a blank before each word; a longer word is alone."""
     groups: list[list[str]] = []
     used = room + 1
     for word in words:

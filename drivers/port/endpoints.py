@@ -41,23 +41,23 @@ _HUNG_UP = "it hung up"
 
 
 class Endpoint(ABC):
-    """One open far end that is read and written without blocking; ``device`` is the pyserial object or socket."""
+    """One open device or connection, read and written without blocking; ``device`` : the pyserial object or socket."""
 
     def __init__(self, device: Any) -> None:
         self.device = device
 
     @abstractmethod
     def take(self) -> bytes:
-        """The bytes that have arrived; raises BlockingIOError when there are none, OSError when it has disappeared."""
+        """Return the bytes that have arrived; raises BlockingIOError if there are none, OSError if it is gone."""
 
     @abstractmethod
     def put(self, data: memoryview) -> int:
-        """Write as many bytes as there is room for; raises BlockingIOError when there is none."""
+        """Write as many bytes as there is room for; return their number. Raises BlockingIOError if there is no room."""
 
     def wait(self, timeout_s: float, writing: bool) -> bool:
-        """Wait until bytes have arrived, or until there is room to write some, at most for a time; False: for neither.
+        """Wait until bytes have arrived or, where ``writing``, until there is room to write some.
 
-        True where that is not known, so that the caller tries.
+        Return False after the time limit, and True where it is not known, so that the caller tries.
         """
         ends = [self.device]
         reading, room, _ = select.select([] if writing else ends, ends if writing else [], [], timeout_s)
@@ -156,7 +156,7 @@ class UrlEnd(Endpoint):
 
 
 class MemoryPorts:
-    """The ports ``memory://NAME`` of this process, each with what takes the connections of its clients."""
+    """The ports ``memory://NAME`` of this process, each with the function that accepts its clients."""
 
     def __init__(self) -> None:
         self._servers: dict[str, Callable[[socket.socket], None]] = {}
@@ -171,7 +171,7 @@ class MemoryPorts:
         self._servers.pop(name, None)
 
     def connect(self, name: str) -> socket.socket:
-        """A client's socket; raises OSError where nothing serves the name."""
+        """Return a client's socket; raises OSError where nothing serves the name."""
         accept = self._servers.get(name)
         if accept is None:
             raise FileNotFoundError(errno.ENOENT, f"nothing in this process serves memory://{name}")
@@ -184,7 +184,7 @@ MEMORY_PORTS = MemoryPorts()
 
 
 def address_of(url: str) -> tuple[str, int]:
-    """Host and port of ``socket://host:port`` or another scheme; raises ValueError for another form."""
+    """Parse host and port of ``socket://host:port``, or of another scheme; raises ValueError for another form."""
     parts = urlsplit(url)
     if not parts.hostname or parts.port is None:
         raise ValueError(f"{url!r} is not {parts.scheme or 'socket'}://HOST:PORT")

@@ -1,7 +1,7 @@
-"""The latency timer of USB serial adapters: found in sysfs and by late answers, and the commands that mend it.
+"""The latency timer of USB serial adapters: found in sysfs or by late replies, and the commands that fix it.
 
-An FTDI chip holds short answers back until its timer ends, 16 ms as it leaves the factory (FTDI AN232B-04), so that a
-bus that asks once a cycle stays below 60 Hz, however fast its wire is.
+An FTDI chip holds short replies back until its timer ends, by default after 16 ms (FTDI AN232B-04). So a bus with one
+request per cycle stays below 60 Hz, however fast its wire is.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from statistics import quantiles
 SLOW_LATENCY_S = 0.0015
 """A timer above this slows a bus down."""
 LATE_S = 0.005
-"""Answers that come so long after their time on the wire wait for something: host and servo need 1 ms together."""
-KEPT, LEAST = 64, 8
-"""Answers whose delays are kept, and how many are needed to judge."""
+"""Replies with a longer delay beyond their time on the wire are held back: host and servo need 1 ms together."""
+MAX_DELAYS, MIN_DELAYS = 64, 8
+"""Number of delays that are kept, and that are needed to judge."""
 
 
 class ReplyDelays:
     """How long the newest answers of single servos took beyond their time on the wire, seconds."""
 
     def __init__(self) -> None:
-        self._delays: deque[float] = deque(maxlen=KEPT)
+        self._delays: deque[float] = deque(maxlen=MAX_DELAYS)
 
     def add(self, delay_s: float) -> None:
         """Keep one."""
@@ -35,11 +35,11 @@ class ReplyDelays:
     @property
     def usual_s(self) -> float | None:
         """The lower quartile, for a timer delays every answer and a busy host some; None before there are enough."""
-        return quantiles(self._delays, n=4)[0] if len(self._delays) >= LEAST else None
+        return quantiles(self._delays, n=4)[0] if len(self._delays) >= MIN_DELAYS else None
 
 
 def latency_remedies(device: str, serial_number: str = "") -> tuple[str, ...]:
-    """Commands that set the timer of a device to 1 ms: for now, the same with setserial, and a udev rule for always."""
+    """Commands that set the timer of a device to 1 ms: for now, the same with setserial, and a permanent udev rule."""
     name = Path(device).resolve().name
     return (
         f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer",
@@ -56,7 +56,7 @@ def latency_rule(serial_number: str = "") -> str:
 
 
 def slow_answers(path: str, timer_s: float | None, delay_s: float | None) -> tuple[str, str]:
-    """What slows a port down and the command that mends it, each empty where nothing does.
+    """Describe what slows a port down, and the command that fixes it; both empty where nothing does.
 
     timer_s : the adapter's latency timer, None where there is none. delay_s : measured, see `ReplyDelays`.
     """

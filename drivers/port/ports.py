@@ -24,8 +24,8 @@ class PortRecord:
     serial_number, description : as the device reports, may be empty.
     usable : this user may read and write it.
     latency_s : the adapter's latency timer in seconds; None where there is none.
-    hint : the command that fixes what is wrong; empty when nothing is.
-    lasting_hint : the one that keeps it fixed, where that is another; else empty.
+    hint : the command that fixes a problem; empty if there is none.
+    lasting_hint : the command that fixes it permanently, if that is another one; else empty.
     """
 
     device: str

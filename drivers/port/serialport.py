@@ -21,10 +21,10 @@ from drivers.port.endpoints import UNPLUGGED, Endpoint, open_endpoint
 _MISSING = {errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR, errno.EIO, errno.ECONNREFUSED, errno.EHOSTUNREACH}
 _DENIED = {errno.EACCES, errno.EPERM}
 _BUSY = {errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK}
-_WRITE_LIMIT_S = 0.5
+_MAX_WRITE_S = 0.5
 
 HOST_MARGIN_S = 0.010
-"""Time a busy host may need to notice a reply, beyond the wire and the adapter."""
+"""Time that a busy host may need to notice a reply, beyond the delays of wire and adapter."""
 UNKNOWN_LATENCY_S = 0.002
 PSEUDO_MARGIN_S = 0.05
 """The same for a pseudo-terminal or a socket, whose far end is a program that competes for the processor."""
@@ -34,7 +34,7 @@ _tap: ContextVar[Callable[[bool, bytes], None] | None] = ContextVar("tap", defau
 
 @contextmanager
 def tapped(tap: Callable[[bool, bytes], None]) -> Iterator[None]:
-    """Context in which new ports call ``tap(sent, data)`` for all bytes that they send and receive."""
+    """Ports created in this context call ``tap(sent, data)`` for all bytes that they send and receive."""
     token = _tap.set(tap)
     try:
         yield
@@ -54,7 +54,7 @@ class SerialPort:
     Attributes
     ----------
     tap : called with (sent, bytes) for everything that passes, or None.
-    clock, sleep : the clock of this port's deadlines, and how to wait on it.
+    clock, sleep : the clock of this port's deadlines, and the function that waits on it; seconds.
     """
 
     clock: Callable[[], float] = staticmethod(time.monotonic)
@@ -111,18 +111,18 @@ class SerialPort:
         view = memoryview(data)
         while view:
             try:
-                view = view[self._use("put", view) :]
+                view = view[self._call_endpoint("put", view) :]
                 continue
             except BlockingIOError:
-                deadline = deadline or time.monotonic() + _WRITE_LIMIT_S
+                deadline = deadline or time.monotonic() + _MAX_WRITE_S
             if time.monotonic() > deadline:
                 raise self._lost("it takes no bytes")
             self._wait(deadline, writing=True)
 
     def put(self, data: bytes) -> int:
-        """Write what there is room for now, without waiting; returns the number of bytes. Raises PortLost."""
+        """Write as many bytes as there is room for, without waiting; return their number. Raises PortLost."""
         try:
-            sent: int = self._use("put", memoryview(data))
+            sent: int = self._call_endpoint("put", memoryview(data))
         except BlockingIOError:
             return 0
         if self.tap is not None:
@@ -130,22 +130,22 @@ class SerialPort:
         return sent
 
     def read(self, deadline_s: float) -> bytes:
-        """The bytes that have arrived, empty for none; waits for the first one until a deadline. Raises PortLost.
+        """Return the bytes that have arrived, empty for none; wait for the first until a deadline. Raises PortLost.
 
-        A deadline of ``time.monotonic()`` in the past takes what is there already, so that bytes that came while this
-        process was stalled still count.
+        With a deadline in the past it returns bytes that are there already, so that bytes that came while this process
+        was stalled are not lost.
         """
         return self.read_now() if self._wait(deadline_s) else b""
 
     def read_now(self) -> bytes:
-        """The bytes that have arrived, empty for none, without asking first whether there are any. Raises PortLost."""
+        """Return the bytes that have arrived, empty for none, without a poll before the read. Raises PortLost."""
         try:
             return self._take()
         except BlockingIOError:
             return b""
 
     def drain(self, quiet_s: float = 0.0, limit_s: float = 0.2) -> int:
-        """Discard input until nothing came for ``quiet_s``, at most for ``limit_s``; returns the bytes discarded."""
+        """Discard input until nothing came for ``quiet_s``, at most for ``limit_s``; returns these bytes."""
         count, end = 0, time.monotonic() + limit_s
         while True:
             try:
@@ -158,16 +158,16 @@ class SerialPort:
                 return count
 
     def _take(self) -> bytes:
-        data: bytes = self._use("take")
+        data: bytes = self._call_endpoint("take")
         if self.tap is not None:
             self.tap(False, data)
         return data
 
     def _wait(self, deadline_s: float, writing: bool = False) -> bool:
-        return bool(self._use("wait", max(0.0, deadline_s - time.monotonic()), writing))
+        return bool(self._call_endpoint("wait", max(0.0, deadline_s - time.monotonic()), writing))
 
-    def _use(self, method: str, *arguments: Any) -> Any:
-        """Call a method of the open endpoint; its BlockingIOError passes, every other error becomes PortLost."""
+    def _call_endpoint(self, method: str, *arguments: Any) -> Any:
+        """Call a method of the open endpoint; BlockingIOError passes, every other error becomes PortLost."""
         end = self._end
         try:
             if end is None:
@@ -206,7 +206,7 @@ class SerialPort:
 
 
 def as_serial_port(port: str | os.PathLike[str] | SerialPort, baud: int) -> SerialPort:
-    """A port for a path or URL; a port is returned unchanged."""
+    """Create a port for a path or URL; a port is returned unchanged."""
     return SerialPort(port, baud) if isinstance(port, str | os.PathLike) else port
 
 

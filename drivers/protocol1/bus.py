@@ -81,15 +81,15 @@ class Protocol1Bus(ServoBus):
         self._switch: DeadManSwitch | None = None
         self._unkept, self._checked_s = False, 0.0
         self._registers = Registers(self.PACKETS(), self._port, self.servos)
-        self._tables([load_table(servo.model) for servo in self.servos])
+        self._set_tables([load_table(servo.model) for servo in self.servos])
         self._telemetry = Telemetry(self._registers, self.ids, self._report, feedback, singles, slow_group)
-        self._group({})
+        self._group_reads({})
 
     # ------------------------------------------------------------------ looking, starting, stopping
 
     def discover(self, ids: Sequence[int] | None = None) -> list[ServoInfo]:
         """Servos that answer; ``ids`` None asks every id by itself, which takes a while (nothing better is safe)."""
-        with self._losing():
+        with self._detecting_loss():
             found = []
             for servo in range(MAX_ID + 1) if ids is None else ids:
                 reply = self._registers.packets.hello(self._port, servo).replies.get(servo)
@@ -106,7 +106,7 @@ class Protocol1Bus(ServoBus):
     def _startup(self, policy: Policy | None = None) -> Startup:
         return Startup(self._registers, policy or self.policy)
 
-    def _group(self, mapped: Mapping[int, Block]) -> None:
+    def _group_reads(self, indirect: Mapping[int, Block]) -> None:
         self._telemetry.rebuild({servo.id: startup.speed_steps(servo, self._registers) for servo in self.servos})
 
     def _identified(self) -> None:

@@ -46,7 +46,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
         got = self.exchange(port, frame, {servo: 0}).replies.get(servo)
         return got is not None and got.code != Instruction1.PING
 
-    def _read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[Packet1]:
+    def _read_ready(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[Packet1]:
         if manner:
             return self.exchange(port, _group_frame(ids, address, size, manner), dict.fromkeys(ids, size))
         replies: dict[int, Packet1] = {}
@@ -57,7 +57,7 @@ class Exchanges(exchange.Exchanges[Packet1]):
             corrupt |= got.corrupt
         return Exchange(replies, tuple(servo for servo in ids if servo not in replies), corrupt)
 
-    def _rows_at_most(self, width: int) -> int:
+    def _max_rows(self, width: int) -> int:
         return (self.longest - 8) // width
 
 

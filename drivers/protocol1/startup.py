@@ -14,21 +14,24 @@ from drivers.base.errors import NoReply, ServoRefused
 from drivers.packets.packet1 import Error1, Packet1
 from drivers.protocol1.registers import Registers
 from drivers.servos import startup
-from drivers.servos.registers import TRIES
+from drivers.servos.registers import MAX_TRIES
 from drivers.tables.tables import ControlTable, known_models
 
 EEPROM_TRIES = 10
 MULTI_TURN = 0x10
-"""Feetech's Phase: present positions leave the turn."""
-OUT_OF_TURN = 1 / 64
-"""Share of a turn that a position may lie outside of it."""
+"""Bit of Feetech's register Phase: positions count over several turns."""
+OUT_OF_TURN_FRACTION = 1 / 64
+"""How far a position may lie outside its turn, as a fraction of the turn."""
 RELAPSE_S = 0.25
-"""Time in which a servo that had shut down shuts down again if the cause persists."""
+"""Time within which a servo that had shut down shuts down again if the cause persists."""
 
 
 @dataclass(frozen=True)
 class Policy(startup.Policy):
-    """What start-up may do. `torque_limit` is the share of the stall torque, above 0 to 1; None leaves it as it is."""
+    """What start-up may do.
+
+    torque_limit : fraction of the stall torque, above 0, at most 1; None leaves the register as it is.
+    """
 
     torque_limit: float | None = None
 
@@ -39,10 +42,10 @@ class Policy(startup.Policy):
 
 
 def identity(reply: Packet1, tables: Iterable[ControlTable]) -> tuple[int, int]:
-    """(model number, firmware) of a servo from its first registers, as the first of the tables that knows it reads it.
+    """Decode (model number, firmware) of a servo from ``reply``, which holds its first registers.
 
-    Families keep them at different addresses and in different byte orders; where no table gives the number of a
-    known model, the first table's reading counts.
+    Families keep them at different addresses and in different byte orders. The first of ``tables`` that decodes the
+    number of a known model decides, or the first table if none does.
     """
     readings = []
     for table in tables:
@@ -52,7 +55,7 @@ def identity(reply: Packet1, tables: Iterable[ControlTable]) -> tuple[int, int]:
 
 
 def speed_steps(servo: ServoSpec, registers: Registers) -> int:
-    """A servo's top speed in steps of its speed register; never 0, which would mean no limit."""
+    """Convert a servo's top speed to steps of its speed register; never 0, which would mean no limit."""
     table, item = registers.tables[servo.id], registers.item(servo.id, "speed")
     scale, top = (item.scale, 1023 if item.name == "Moving Speed" else table.top_speed) if item else (1.0, 1)
     return min(max(math.ceil(servo.max_speed_rad_s / scale), 1), top)
@@ -74,7 +77,7 @@ class Startup(startup.Startup[Packet1]):
         return identity(reply, [expected])
 
     def _greet(self, servo: int) -> Packet1:
-        """A servo's first registers; one that answers only pings is set to answer everything."""
+        """Read a servo's first registers; a servo that answers only pings is set to answer everything first."""
         registers = self.registers
         try:
             return registers.hello(servo)
@@ -88,27 +91,27 @@ class Startup(startup.Startup[Packet1]):
         return reply
 
     def _release(self, servo: int) -> None:
-        self._write_surely(servo, "torque", 0, TRIES)
+        self._write_until_kept(servo, "torque", 0, MAX_TRIES)
 
     def _slack(self, turn: int) -> float:
-        return OUT_OF_TURN * turn
+        return OUT_OF_TURN_FRACTION * turn
 
     def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
         return {servo: f"error flags 0x{self.registers.flags.get(servo, 0):02X}" for servo in ids}
 
     def _least_voltage(self, ids: Sequence[int]) -> Mapping[int, int]:
-        """Least voltage that servos need by id, 0.1 V; not read where the policy has it."""
+        """Read the least supply voltage that servos need, in 0.1 V, by id; empty where the policy gives it."""
         return super()._least_voltage(ids) if self.policy.min_voltage_v is None else {}
 
     def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
-        """Check hardware errors; `torque_on` starts servos that shut down again, where the policy allows it."""
+        """Raise ServoFault for hardware errors that the policy does not let `torque_on` clear; reboots nothing."""
         self._faulted = self._faults(ids)
         if self._faulted and not self.policy.reboot_faulted:
             raise self.fault("report", self._faulted)
         return ()
 
     def torque_on(self, ids: Sequence[int], held: Sequence[int]) -> None:
-        """Switch torque on, and see whether servos that had shut down stay on."""
+        """Enable torque, and check whether servos that had shut down stay on."""
         super().torque_on(ids, held)
         if self._faulted:
             self.registers.port.sleep(RELAPSE_S)  # a cause that persists shuts it down again
@@ -117,7 +120,7 @@ class Startup(startup.Startup[Packet1]):
             raise self.fault("report", faulted)
 
     def _faults(self, ids: Sequence[int]) -> dict[int, int]:
-        """Hardware errors in the last replies; input voltage alone is ignored where it switches nothing off."""
+        """Hardware error bits of the last replies, by id; an input-voltage error that leaves torque on is ignored."""
         registers, bad = self.registers, {}
         for servo in ids:
             bits = registers.causes(servo, registers.flags.get(servo, 0))
@@ -126,7 +129,7 @@ class Startup(startup.Startup[Packet1]):
         return bad
 
     def _prepare(self, servos: Sequence[ServoSpec]) -> None:
-        """Write limits of speed, acceleration and torque."""
+        """Write the limits of speed, acceleration and torque."""
         registers, ids = self.registers, [servo.id for servo in servos]
         registers.set_all({servo.id: speed_steps(servo, registers) for servo in servos}, "speed")
         registers.set_all(dict.fromkeys(registers.having(ids, "time"), 0), "time")
@@ -140,19 +143,19 @@ class Startup(startup.Startup[Packet1]):
         registers.set_all(self._torque_limits(ids), "torque_limit")
 
     def _torque_limits(self, ids: Sequence[int]) -> dict[int, int]:
-        """Torque limits by id; a servo that shut down has 0 and gets all of its torque again."""
-        registers, share = self.registers, self.policy.torque_limit
+        """Torque limits to write, by id; a servo that shut down has the limit 0 and gets its full torque again."""
+        registers, fraction = self.registers, self.policy.torque_limit
         limits = registers.get_all(registers.having(ids, "torque_limit"), "torque_limit")
         for servo, value in limits.items():
             item = registers.item(servo, "torque_limit")
             full = (item.maximum if item else None) or 0
-            limits[servo] = (value or full) if share is None else max(round(share * full), 1)
+            limits[servo] = (value or full) if fraction is None else max(round(fraction * full), 1)
         return limits
 
     # ------------------------------------------------------------------ permanent registers
 
     def _write_settings(self, servo: int, held: bool) -> None:
-        """Permanent registers this driver depends on: read, and written only where they differ, with torque off."""
+        """Read the permanent registers that this driver depends on, and write those that differ, with torque off."""
         registers = self.registers
         wanted = self._wanted(servo)
         if not held:  # a delayed reply only costs time, so a servo that holds is left alone
@@ -164,38 +167,38 @@ class Startup(startup.Startup[Packet1]):
             name, value = next(iter(differing.items()))
             if held:
                 raise self.locked(servo, name, present[name], value)
-            self._write_surely(servo, "torque", 0, TRIES)
+            self._write_until_kept(servo, "torque", 0, MAX_TRIES)
         try:
             for name, value in differing.items():
                 if feetech:
-                    self._write_surely(servo, "lock", 0, TRIES)
-                self._write_surely(servo, name, value, EEPROM_TRIES)
+                    self._write_until_kept(servo, "lock", 0, MAX_TRIES)
+                self._write_until_kept(servo, name, value, EEPROM_TRIES)
                 self.note(servo, name, present[name], value)
         finally:
-            if feetech:  # unlocked, its id and limits could be changed by a bad packet
+            if feetech:  # a damaged packet could change the id and limits of an unlocked servo
                 registers.put_unanswered(servo, "lock", 1)
         if feetech and registers.get(servo, "lock") != 1:
-            self._write_surely(servo, "lock", 1, TRIES)
+            self._write_until_kept(servo, "lock", 1, MAX_TRIES)
 
     def _wanted(self, servo: int) -> dict[str, int]:
-        """Values of permanent registers by short name."""
+        """Values that permanent registers must have, by short name."""
         registers, table = self.registers, self.registers.tables[servo]
         last = table.ticks_per_turn - 1
         feetech = "Response Level" in table
         wanted = {"status_level": 1 if feetech else 2}
         low, high = registers.get(servo, "min_ticks"), registers.get(servo, "max_ticks")
         if low == high == 0:
-            wanted["max_ticks"] = last  # it would turn without end
+            wanted["max_ticks"] = last  # both limits 0 mean wheel mode, which turns without end
         elif low == high == last:
-            wanted["min_ticks"] = 0  # MX: several turns
+            wanted["min_ticks"] = 0  # both limits at the end mean multi-turn mode of MX servos
         if registers.item(servo, "mode"):
             wanted["mode"] = 0
         if feetech and registers.get(servo, "phase") & MULTI_TURN and table.group_read:
             wanted["phase"] = registers.get(servo, "phase") & ~MULTI_TURN
         return wanted
 
-    def _write_surely(self, servo: int, name: str, value: int, tries: int) -> None:
-        """Write until it reads back, without depending on replies to writes, which a servo may not send.
+    def _write_until_kept(self, servo: int, name: str, value: int, tries: int) -> None:
+        """Write a register until it reads back, without relying on replies to writes, which a servo may not send.
 
         Raises ServoRefused where it keeps another value.
         """

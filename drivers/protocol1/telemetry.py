@@ -1,4 +1,4 @@
-"""Telemetry of servos with Protocol 1.0 framing: read in groups, or a few in turn where they cannot be."""
+"""Telemetry of servos with Protocol 1.0 framing: read in groups, or a few per cycle where group reads do not exist."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FULL = ("position", "velocity", "load", "voltage", "temperature", "hardware", "m
 def layout_of(table: ControlTable, feedback: str = "full") -> Layout:
     """Layout of a control table; `feedback` ``"full"`` reads all measurements, ``"position"`` position and speed.
 
-    The goal's block has time and speed too, where they lie beside it.
+    The block of the goal contains time and speed too, where the model has these registers.
     """
     feetech = item_of(table, "hardware") is not None  # Dynamixel reports errors in the error byte
     full: tuple[str, ...] = FULL if feetech else FULL[:5]
@@ -35,7 +35,7 @@ def layout_of(table: ControlTable, feedback: str = "full") -> Layout:
 
 
 class GoalRows:
-    """Rows of the sync write that sends goals to a group, each with the speed (k,) to approach it, in steps."""
+    """Rows of the sync write that sends goals to a group; speeds : (k,) speed of each servo, in steps."""
 
     def __init__(self, group: Group, speeds: Sequence[int]) -> None:
         self.block, self._index = group.layout.goal, group.index
@@ -45,7 +45,7 @@ class GoalRows:
         self._rows["speed"] = speeds
 
     def encode(self, ticks: Ticks, driven: Flags) -> bytes:
-        """Rows of the servos that are driven; ``(n,)`` both, of the whole bus."""
+        """Rows of the driven servos of the group; ``ticks`` and ``driven`` are those of the whole bus, (n,) each."""
         self._rows["goal"] = ticks[self._index]
         chosen = driven[self._index]
         return (self._rows if chosen.all() else self._rows[chosen]).tobytes()
@@ -54,8 +54,8 @@ class GoalRows:
 class Telemetry(telemetry.Telemetry):
     """Reads the servos of a bus and stores what they measured, as :class:`~drivers.protocol1.bus.Protocol1Bus` says.
 
-    load : (n,) share of the stall torque, positive where it pushes towards greater angles; NaN before the first.
-    moving : (n,) the servo reported that it moves.
+    load : (n,) fraction of the stall torque, positive where it pushes to more steps; NaN before the first reading.
+    moving : (n,) whether the servo reported that it moves.
     """
 
     _registers: Registers
@@ -69,21 +69,21 @@ class Telemetry(telemetry.Telemetry):
         self.moving = np.zeros(len(self.ids), bool)
 
     def rebuild(self, speeds: Mapping[int, int]) -> None:
-        """Group the servos by their control tables, and forget their positions; `speeds` of goals in steps by id."""
+        """Group the servos by their control tables, and forget their positions; `speeds` : steps, by servo id."""
         self._regroup([layout_of(self._registers.tables[servo], self._feedback) for servo in self.ids])
         self._goals = [GoalRows(group, [speeds[servo] for servo in group.ids]) for group in self._groups]
         self._next_single = dict.fromkeys(self._groups, 0)
 
     @property
     def turn(self) -> int:
-        """Cycles in which the position of every servo is read once."""
+        """Number of cycles in which the position of every servo is read once."""
         singles = [len(group.ids) for group in self._groups if not group.layout.manner]
         return -(-max(singles, default=1) // self._singles)
 
     def send_goals(self, ticks: Ticks, driven: Flags) -> None:
-        """One sync write per group to the servos that are driven, ``(n,)`` steps, and flags.
+        """Send goals, ``(n,)`` steps, to the servos that are ``driven`` (n,): one sync write per group.
 
-        None to servos whose torque is off: it could switch them on.
+        Servos whose torque is off are sent none: a goal could switch their torque on.
         """
         for goals in self._goals:
             if rows := goals.encode(ticks, self._torque & driven):
@@ -91,11 +91,11 @@ class Telemetry(telemetry.Telemetry):
 
     def _read_feedback(self, clock: Callable[[], float], running: bool, scale: Scale) -> BusState | None:
         requests = [ReadRequest(group, group.layout.feedback, self._chosen(group)) for group in self._groups]
-        self._ask(requests, clock, running)
+        self._read_requests(requests, clock, running)
         return None
 
     def _chosen(self, group: Group) -> tuple[int, ...]:
-        """Servos that are read this cycle: all of a group that answers together, else the next few that answer."""
+        """Choose the servos to read in this cycle: the whole group where it is read together, else the next few."""
         if group.layout.manner:
             return group.ids
         first = self._next_single[group]
@@ -105,7 +105,7 @@ class Telemetry(telemetry.Telemetry):
             self._next_single[group] = (group.ids.index(chosen[-1]) + 1) % len(group.ids)
         return chosen
 
-    def _ask(self, requests: list[ReadRequest], clock: Callable[[], float], running: bool) -> None:
+    def _read_requests(self, requests: list[ReadRequest], clock: Callable[[], float], running: bool) -> None:
         for request in requests:
             if request.ids:
                 block, manner = request.block, request.group.layout.manner
@@ -118,7 +118,7 @@ class Telemetry(telemetry.Telemetry):
             self.moving[request.group.index[request.group.slots(request.ids)]] = values["moving"] != 0
 
     def _note_errors(self, ids: Sequence[int], where: NDArray[np.intp], errors: Octets) -> None:
-        """Those error flags that are about a servo's state raise an alert."""
+        """Store error flags that concern a servo's state as hardware errors; they raise an alert."""
         causes = [self._registers.causes(servo, flags) for servo, flags in zip(ids, errors.tolist(), strict=True)]
         self._hardware[where] = causes
         super()._note_errors(ids, where, np.where(causes, ALERT, 0).astype(np.uint8))

@@ -10,7 +10,7 @@ from drivers.packets.framing import FrameReader
 from drivers.packets.packet import BROADCAST_ID, Instruction
 from drivers.servos.port import Port
 
-_LATE_CHUNKS = 16
+_MAX_LATE_READS = 16
 
 
 class Reply(Protocol):
@@ -33,7 +33,7 @@ class Exchange(NamedTuple, Generic[R]):
     """The replies to one request.
 
     replies : by servo id; only those with the right sender, length and checksum.
-    missing : ids that were addressed and are not in ``replies``.
+    missing : ids of servos that should have answered and are not in ``replies``.
     corrupt : True when damaged bytes arrived too, so that a missing reply may have been one of them.
     joint_lost : True when no servo answered a fast read, also where the plain read after it was answered.
     """
@@ -64,24 +64,24 @@ class Exchanges(ABC, Generic[R]):
 
     @abstractmethod
     def encode(self, servo: int, code: int, params: bytes = b"") -> bytes:
-        """The packet of an instruction."""
+        """Encode the packet of an instruction."""
 
     @abstractmethod
     def hello(self, port: Port, servo: int) -> Exchange[R]:
-        """Send the greeting, a request whose reply has a unique length. The servo may be in ``port.suspects``."""
+        """Send the greeting, a request whose reply has a unique length, also to a servo in ``port.suspects``."""
 
     @abstractmethod
-    def _read_asked(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[R]:
-        """Read the same registers of servos that owe no reply; parameters as for :meth:`read_group`."""
+    def _read_ready(self, port: Port, ids: tuple[int, ...], address: int, size: int, manner: str) -> Exchange[R]:
+        """Read the same registers of servos that are not in ``port.suspects``; parameters as for :meth:`read_group`."""
 
     # ------------------------------------------------------------------ one servo
 
     def number(self, value: int) -> bytes:
-        """An address or a length, as packets carry it."""
+        """Encode an address or a length as packets carry it."""
         return value.to_bytes(self.number_size, "little")
 
     def send(self, port: Port, frame: bytes) -> None:
-        """Clear the input and send one packet; the port stays in use until the reply was taken."""
+        """Discard the input and send one packet; the caller ends the use of the port after the reply."""
         port.is_using = True
         try:
             port.clearPort()
@@ -99,7 +99,7 @@ class Exchanges(ABC, Generic[R]):
             port.is_using = False
 
     def ask(self, port: Port, servo: int, code: int, params: bytes, length: int) -> Exchange[R]:
-        """One instruction to one servo and its reply of ``length`` data bytes.
+        """Send one instruction to one servo and receive its reply of ``length`` data bytes.
 
         A servo that missed a deadline must first answer a greeting: its replies come in order, so a late one has
         arrived by then. A reply with as many bytes as the one to a greeting cannot be distinguished from a late one.
@@ -109,7 +109,7 @@ class Exchanges(ABC, Generic[R]):
         return self.exchange(port, self.encode(servo, code, params), {servo: length})
 
     def read(self, port: Port, servo: int, address: int, size: int) -> Exchange[R]:
-        """``size`` bytes of registers of one servo."""
+        """Read ``size`` bytes of registers of one servo."""
         return self.ask(port, servo, Instruction.READ, self.number(address) + self.number(size), size)
 
     def write(self, port: Port, servo: int, address: int, data: bytes) -> Exchange[R]:
@@ -117,7 +117,7 @@ class Exchanges(ABC, Generic[R]):
         return self.ask(port, servo, Instruction.WRITE, self.number(address) + data, 0)
 
     def revive(self, port: Port, servo: int) -> bool:
-        """Greet a servo that missed a deadline; True when it answers again."""
+        """Greet a servo that missed a deadline; return whether it answers again."""
         return not self.hello(port, servo).missing
 
     # ------------------------------------------------------------------ many servos
@@ -132,7 +132,7 @@ class Exchanges(ABC, Generic[R]):
         asked = tuple(servo for servo in ids if servo not in left_out)
         if not asked:
             return Exchange({}, left_out, False)
-        got = self._read_asked(port, asked, address, size, manner)
+        got = self._read_ready(port, asked, address, size, manner)
         return got._replace(missing=got.missing + left_out)
 
     def write_group(self, port: Port, address: int, size: int, rows: bytes) -> None:
@@ -148,12 +148,12 @@ class Exchanges(ABC, Generic[R]):
         width = size + 1
         if not rows or len(rows) % width:
             raise ValueError(f"rows: {len(rows)} bytes are not whole rows of 1 + {size}")
-        head, step = self.number(address) + self.number(size), self._rows_at_most(width) * width
+        head, step = self.number(address) + self.number(size), self._max_rows(width) * width
         parts = (rows[at : at + step] for at in range(0, len(rows), step))
         return [self.encode(BROADCAST_ID, Instruction.SYNC_WRITE, head + part) for part in parts]
 
-    def _rows_at_most(self, width: int) -> int:
-        """Rows of so many bytes that one sync write carries; by default as many as there can be servos."""
+    def _max_rows(self, width: int) -> int:
+        """Greatest number of rows of ``width`` bytes in one sync write; by default one for every possible servo."""
         return BROADCAST_ID
 
     # ------------------------------------------------------------------ on the wire
@@ -161,42 +161,44 @@ class Exchanges(ABC, Generic[R]):
     def exchange(self, port: Port, frame: bytes, wanted: Mapping[int, int]) -> Exchange[R]:
         """Send a packet and collect the replies; `wanted`: data bytes expected by servo id, in the replies' order."""
         size = len(wanted) * self.status_size + sum(wanted.values())
-        port.suspects.update(wanted)  # until they have answered, so also when this is interrupted
+        port.suspects.update(wanted)  # removed by replies, so they stay when this is interrupted
         self.send(port, frame)
         try:
             port.expect(size)
-            data = self._fill(port, size)
+            data = self._receive(port, size)
             if len(wanted) == 1 and len(data) == size:
                 port.note_delay(size)
-            return self._sort(port, wanted, data)
+            return self._find_replies(port, wanted, data)
         finally:
             port.is_using = False
 
-    def _fill(self, port: Port, size: int) -> bytes:
-        """Received bytes, at least ``size`` of them unless the deadline passes."""
+    def _receive(self, port: Port, size: int) -> bytes:
+        """Receive bytes, at least ``size`` of them unless the deadline passes."""
         data = more = port.link.read(port.deadline_s)
         while more and len(data) < size:
             more = port.link.read(port.deadline_s)
             data += more
         return data
 
-    def _sort(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[R]:
-        """The replies in ``data`` and in what still arrives, whatever lies between them."""
-        reader, box, late = self.reader(), _Sorter[R](wanted, self.refusals), 0
-        box.take(reader.feed(data))
-        while len(box.replies) < len(wanted) and late < _LATE_CHUNKS:
+    def _find_replies(self, port: Port, wanted: Mapping[int, int], data: bytes) -> Exchange[R]:
+        """Find the replies in ``data`` and, where some are missing, in what still arrives."""
+        reader, sorter, late = self.reader(), _Sorter[R](wanted, self.refusals), 0
+        sorter.take(reader.feed(data))
+        while len(sorter.replies) < len(wanted) and late < _MAX_LATE_READS:
             data = port.link.read(port.deadline_s)
             if not data:
-                box.take(reader.flush())
+                sorter.take(reader.flush())
                 break
             late += port.clock() > port.deadline_s
-            box.take(reader.feed(data))
-        port.stray += box.stray
-        return settled(port, wanted, box.unique(), bool(reader.broken_frames or reader.noise_bytes or box.twice))
+            sorter.take(reader.feed(data))
+        port.stray += sorter.stray
+        return finish_exchange(
+            port, wanted, sorter.unique(), bool(reader.broken_frames or reader.noise_bytes or sorter.twice)
+        )
 
 
 class _Sorter(Generic[R]):
-    """Sorts replies into requested ones and strays; two under one id are both discarded.
+    """Separates requested replies from strays; two replies with one id are both discarded.
 
     `wanted` holds the data bytes expected by servo id, `refusals` the error bits with which a reply may lack them.
     """
@@ -208,23 +210,23 @@ class _Sorter(Generic[R]):
         self.stray = 0
 
     def take(self, arrived: Sequence[R]) -> None:
-        """Sort some more."""
+        """Sort replies that arrived."""
         for reply in arrived:
             length = self._wanted.get(reply.id)
             refused = reply.error & self._refusals and not reply.params
             if length is None or (len(reply.params) != length and not refused):
                 self.stray += 1
             elif self.replies.setdefault(reply.id, reply) is not reply:
-                self.stray += 1 if reply.id in self.twice else 2  # the one that was kept first is a stray, too
+                self.stray += 1 if reply.id in self.twice else 2  # the first one is discarded as well
                 self.twice.add(reply.id)
 
     def unique(self) -> dict[int, R]:
-        """Replies that came once."""
+        """Return the replies whose id came once."""
         return {servo: reply for servo, reply in self.replies.items() if servo not in self.twice}
 
 
-def settled(port: Port, wanted: Mapping[int, int], replies: dict[int, R], corrupt: bool) -> Exchange[R]:
-    """The exchange of these replies; servos without one stay suspects."""
+def finish_exchange(port: Port, wanted: Mapping[int, int], replies: dict[int, R], corrupt: bool) -> Exchange[R]:
+    """Return the result of an exchange; servos that replied are no longer suspects, the others stay so."""
     missing = tuple(servo for servo in wanted if servo not in replies)
     port.suspects.difference_update(replies)
     return Exchange(replies, missing, corrupt and bool(missing))

@@ -48,13 +48,13 @@ NAMES = {
     "gear_numerator": ("Electronic GearRatio Numerator",),
     "gear_denominator": ("Electronic GearRatio Denominator",),
 }
-"""Short name -> the makers' names of a register, which differ by family."""
+"""The makers' names of a register, which differ by family, by short name."""
 SCALED = {"velocity": "rad/s", "current": "A", "load": "1", "voltage": "V", "temperature": "C"}
-"""Short names of registers that are converted, and the units they are converted to."""
+"""Registers that are converted from steps, by short name, and the units they are converted to."""
 
 
 def item_of(table: ControlTable, name: str) -> Item | None:
-    """Register of a table by its short name; None where the model has none."""
+    """Return the register of a table by its short name; None where the model does not have it."""
     return next((table[vendor] for vendor in NAMES[name] if vendor in table), None)
 
 
@@ -81,7 +81,7 @@ class Block:
 
     @cached_property
     def dtype(self) -> np.dtype[np.void]:
-        """The block's bytes as a record."""
+        """numpy type of the block's bytes, with a field for each register."""
         return np.dtype(
             {
                 "names": list(self.items),
@@ -92,13 +92,13 @@ class Block:
         )
 
     def decode(self, data: NDArray[np.uint8]) -> dict[str, NDArray[np.int64]]:
-        """Signed values of k servos by short name, ``(k,)`` each, from their replies ``(k, size)`` uint8."""
+        """Decode replies ``(k, size)`` uint8 of k servos to signed values by short name, ``(k,)`` each."""
         raw = np.ascontiguousarray(data).view(self.dtype)[:, 0]
         return {name: _signed(raw[name].astype(np.int64), item.sign_bit) for name, item in self.items.items()}
 
 
 def _signed(raw: NDArray[np.int64], sign_bit: int | None) -> NDArray[np.int64]:
-    """Signed values of numbers whose sign is one bit and whose other bits are the magnitude."""
+    """Convert numbers of which one bit is the sign and the lower bits are the magnitude; None: no such bit."""
     if sign_bit is None:
         return raw
     magnitude = raw & ((1 << sign_bit) - 1)
@@ -106,12 +106,12 @@ def _signed(raw: NDArray[np.int64], sign_bit: int | None) -> NDArray[np.int64]:
 
 
 def format_of(item: Item) -> str:
-    """numpy's type code of a register's bytes; a sign in a separate bit is not decoded by it."""
+    """Return numpy's type code of a register; it does not decode a sign in a separate bit."""
     return f"{'>' if item.big_endian else '<'}{'i' if item.signed else 'u'}{item.size}"
 
 
 def block_of(table: ControlTable, *names: str) -> Block:
-    """The registers of these short names that a model has; empty where it has none."""
+    """Return a block of the registers with these short names that the model has."""
     return Block({name: item for name in names if (item := item_of(table, name)) is not None})
 
 
@@ -120,8 +120,8 @@ class Layout:
     """Blocks of one control table that a bus reads and writes; servos whose layouts have equal keys share reads.
 
     goal : registers written every cycle.
-    feedback : block read every cycle (or in turn, where servos are read one by one).
-    slow : blocks read in turn: what is not in ``feedback``.
+    feedback : block read every cycle, or in turn where servos are read one by one.
+    slow : blocks that are read in turn, with the registers that are not in ``feedback``.
     manner : how a group is read, see ``Exchanges.read_group``; empty: one servo after the other.
     indirect : ``feedback`` is read through indirect addresses, which a servo loses when it reboots.
     """
@@ -144,7 +144,7 @@ class Group:
     Parameters
     ----------
     ids : k servo ids.
-    index : (k,) their places in the bus's arrays.
+    index : (k,) their indices in the arrays of the bus.
     tables, layout : k control tables, and the layout that they share.
 
     Attributes
@@ -158,7 +158,7 @@ class Group:
         self._slot = {servo: slot for slot, servo in enumerate(self.ids)}
 
     def slots(self, ids: Sequence[int]) -> slice | list[int]:
-        """Rows of ids within the group; a slice for the whole group, which is faster."""
+        """Positions of ids within the group; a slice for the whole group, which is faster."""
         return slice(None) if tuple(ids) == self.ids else [self._slot[servo] for servo in ids]
 
 
@@ -175,12 +175,12 @@ class ReadRequest(NamedTuple):
     ids: tuple[int, ...]
 
     def without(self, left_out: Collection[int]) -> ReadRequest:
-        """The same request to fewer servos."""
+        """Return the same request without some servos."""
         return self._replace(ids=tuple(servo for servo in self.ids if servo not in left_out))
 
 
 def slow_requests(groups: Sequence[Group], size: int) -> list[ReadRequest]:
-    """Requests for all slow blocks of all groups, for `size` servos each; none where `size` is 0.
+    """Return requests that read all slow blocks of all groups once, each from `size` servos; none where `size` is 0.
 
     Servos that are read one by one get a request each.
     """

@@ -1,6 +1,6 @@
 """Serial port for request-reply transactions: dynamixel-sdk's port handler with its known faults overridden.
 
-It is exclusive and blocking, keeps monotonic reply deadlines that fit the wire, and knows the servos that owe a reply.
+It is exclusive and blocking, keeps reply deadlines on a monotonic clock, and knows the servos whose replies are late.
 See drivers/dynamixel/sdk.py for the list of faults that the numbers S3 to S12 refer to.
 """
 
@@ -16,20 +16,20 @@ from drivers.port.latency import ReplyDelays
 from drivers.port.serialport import SerialPort, as_serial_port, reply_margin_s
 
 BITS_PER_BYTE = 10
-LEAST_SLEEP_S = 0.0005
+MIN_SLEEP_S = 0.0005
 """A shorter sleep costs more than it saves."""
-WAKE_EARLY_S = 0.0006
-"""How long before the last byte is due a sleep ends."""
-POLL_S = 0.00002
-"""Length of the sleeps from then on: a processor that is not switched off keeps its caches, and processing the reply
-takes a third of the time."""
-POLL_LATE_S = 0.0005
-"""How long after the last byte was due polling goes on."""
-POLL_WORTH_S = 0.00004
-"""Polling begins where nine of ten waits end later than this."""
-SLEEPS = 32
-"""So many replies after one that came piece by piece are slept for, then one is looked at again. One of so many that
-are polled for without a sleep is slept for: else nothing would be learned of how late the system wakes threads."""
+POLL_BEFORE_S = 0.0006
+"""Polling begins this long before the last byte of a reply is due; until then the thread sleeps."""
+POLL_INTERVAL_S = 0.00002
+"""Longest wait of one poll. A processor that does not sleep keeps its caches, and then processes the reply in a third
+of the time."""
+POLL_AFTER_S = 0.0005
+"""Polling ends this long after the last byte was due."""
+MIN_WAKE_DELAY_S = 0.00004
+"""Replies are polled for if nine of ten waits end later than this."""
+SLEEP_PERIOD = 32
+"""After a reply that came in pieces, the thread sleeps until the last byte is due for so many replies. One in so many
+replies that are polled for without a sleep is slept for, to keep measuring how late the system wakes threads."""
 
 
 class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
@@ -45,11 +45,11 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
 
     Attributes
     ----------
-    clock, sleep : monotonic seconds, and the function that waits.
+    clock, sleep : functions that return monotonic seconds, and wait for seconds.
     port_name : device path.
     suspects : ids that missed a deadline and may still reply late; see :class:`~drivers.servos.exchange.Exchanges`.
-    stray : replies thrown away.
-    delays : how late the newest replies of single servos were.
+    stray : number of replies that were discarded.
+    delays : delays of the newest replies of single servos, beyond their time on the wire.
     """
 
     def __init__(self, path: str | SerialPort, baud: int = 1_000_000, margin_s: float | None = None) -> None:
@@ -63,7 +63,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         self.delays = ReplyDelays()
         self.deadline_s = self._free_s = 0.0
         self._sleeps = self._polled = 0
-        self._wakes = WakeDelay(0.1, 2 * POLL_WORTH_S)
+        self._wakes = WakeDelay(0.1, 2 * MIN_WAKE_DELAY_S)
         self._held = bytearray()
         self._margin_s = margin_s
         self._tune()
@@ -76,7 +76,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
     # ------------------------------------------------------------------ opening and closing
 
     def setPortName(self, port_name: str) -> None:
-        """Another device path for the next opening."""
+        """Set the device path for the next opening."""
         self.port_name = self.link.path = port_name
 
     def openPort(self) -> bool:
@@ -84,7 +84,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         return self.setupPort(self.baudrate)
 
     def setupPort(self, cflag_baud: int) -> bool:
-        """As ``openPort``, at a rate."""
+        """Open as ``openPort``, at a baud rate."""
         self.link.baud = self.baudrate = cflag_baud
         self.link.open()
         self.suspects.clear()
@@ -97,7 +97,7 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         return True
 
     def setBaudRate(self, baudrate: int) -> bool:
-        """Any rate, not only those of the SDK's list (4.5 Mbaud is real)."""
+        """Open again at any baud rate, also one that is not in the SDK's list, such as 4.5 Mbaud."""
         return self.setupPort(baudrate)
 
     def closePort(self) -> None:
@@ -108,17 +108,17 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
     # ------------------------------------------------------------------ bytes
 
     def clearPort(self) -> None:
-        """Throw away all input (S3)."""
+        """Discard all input (S3)."""
         self._held.clear()
         self.link.drain()
 
     def getBytesAvailable(self) -> int:
-        """Bytes that can be read without waiting."""
+        """Number of bytes that can be read without waiting."""
         self._held += self.link.read(0.0)
         return len(self._held)
 
     def readPort(self, length: int) -> bytes:
-        """At most ``length`` bytes, waiting for the first until the packet timeout (S12)."""
+        """Read at most ``length`` bytes, waiting for the first until the packet timeout (S12)."""
         if not self._held:
             self._held += self.link.read(self.deadline_s)
         data = bytes(self._held[:length])
@@ -126,19 +126,19 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         return data
 
     def writePort(self, packet: bytes) -> int:
-        """Send; returns the count sent."""
+        """Send bytes; return their number."""
         self.transmit(bytes(packet))
         return len(packet)
 
     def transmit(self, packet: bytes) -> None:
-        """Hand bytes to the system, and note when the last of them will have left."""
+        """Pass bytes to the system, and compute when the last of them will have left."""
         self._free_s = max(self.clock(), self._free_s) + len(packet) * self._byte_s
         self.link.write(packet)
 
     def first(self) -> bytes:
-        """The first bytes of an expected reply, empty when none came until the deadline.
+        """Return the first bytes of an expected reply, empty when none came until the deadline.
 
-        Where replies come piece by piece, it sleeps while the wire carries them all: one wake-up for a reply.
+        Where replies come in pieces, it sleeps until the whole reply is due, so that the thread wakes once per reply.
         """
         if not self._sleeps:
             return self.link.read(self.deadline_s)
@@ -146,59 +146,59 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
         return self._await(self.deadline_s - self.margin_s)
 
     def more(self) -> bytes:
-        """The next bytes of a reply that came in part, empty when none came until the deadline."""
-        self._sleeps = SLEEPS
+        """Return the next bytes of a reply that came in part, empty when none came until the deadline."""
+        self._sleeps = SLEEP_PERIOD
         return self._await(self.deadline_s - self.margin_s)
 
     def _await(self, due_s: float) -> bytes:
-        """Sleep until bytes are due, and take them; poll for them at the end where the system wakes threads late."""
+        """Sleep until bytes are due, and read them; poll for them at the end where the system wakes threads late."""
         now = self.clock()
-        polls = self._polls(due_s - now)
-        wake_s = due_s - WAKE_EARLY_S if polls else due_s
-        if wake_s - now > LEAST_SLEEP_S:
+        polls = self._decide_poll(due_s - now)
+        wake_s = due_s - POLL_BEFORE_S if polls else due_s
+        if wake_s - now > MIN_SLEEP_S:
             self.sleep(wake_s - now)
             self._wakes.note(self.clock() - wake_s)
             if not polls and (data := self.link.read_now()):
                 return data
         return self._poll(due_s) if polls else self.link.read(self.deadline_s)
 
-    def _polls(self, pause_s: float) -> bool:
-        """Whether to poll at the end of a pause."""
-        if self._wakes.late_s <= POLL_WORTH_S:
+    def _decide_poll(self, pause_s: float) -> bool:
+        """Decide whether to poll at the end of a pause; counts the pauses without a sleep."""
+        if self._wakes.late_s <= MIN_WAKE_DELAY_S:
             return False
-        if not LEAST_SLEEP_S < pause_s <= LEAST_SLEEP_S + WAKE_EARLY_S:
+        if not MIN_SLEEP_S < pause_s <= MIN_SLEEP_S + POLL_BEFORE_S:
             return True
-        self._polled = (self._polled + 1) % SLEEPS
+        self._polled = (self._polled + 1) % SLEEP_PERIOD
         return self._polled > 0
 
     def _poll(self, due_s: float) -> bytes:
-        end_s = min(due_s + POLL_LATE_S, self.deadline_s)
+        end_s = min(due_s + POLL_AFTER_S, self.deadline_s)
         while (now := self.clock()) < end_s:
-            if data := self.link.read(min(now + POLL_S, end_s)):
+            if data := self.link.read(min(now + POLL_INTERVAL_S, end_s)):
                 return data
         return self.link.read(self.deadline_s)
 
     # ------------------------------------------------------------------ deadlines
 
     def expect(self, size: int) -> None:
-        """Deadline for ``size`` bytes of reply to what was sent: time on the wire, both ways, plus the margin."""
+        """Set the deadline for a reply of ``size`` bytes: time of request and reply on the wire, plus the margin."""
         self.deadline_s = max(self.clock(), self._free_s) + size * self._byte_s + self.margin_s
 
     def note_delay(self, size: int) -> None:
-        """Note how long after its time on the wire a reply of ``size`` bytes was there, which was just received."""
+        """Store the delay, beyond its time on the wire, of a reply of ``size`` bytes that was just received."""
         self.delays.add(self.clock() - self._free_s - size * self._byte_s)
 
     def setPacketTimeout(self, packet_length: int) -> None:
-        """Deadline for a reply of ``packet_length`` bytes: wire time plus margin (S7)."""
+        """Set the deadline for a reply of ``packet_length`` bytes: time on the wire plus margin (S7)."""
         self.setPacketTimeoutMillis(self.tx_time_per_byte * packet_length + self.margin_s * 1000.0)
 
     def setPacketTimeoutMillis(self, msec: float) -> None:
-        """Deadline so many milliseconds from now."""
+        """Set the deadline to so many milliseconds from now."""
         super().setPacketTimeoutMillis(msec)
         self.deadline_s = self.clock() + msec / 1000.0
 
     def isPacketTimeout(self) -> bool:
-        """True after the deadline."""
+        """Whether the deadline has passed."""
         return self.clock() > self.deadline_s
 
     def getCurrentTime(self) -> float:
@@ -209,9 +209,9 @@ class Port(port_handler.PortHandler):  # type: ignore[misc]  # without types
 
     @property
     def is_using(self) -> bool:
-        """True in the middle of a transaction. Setting it begins or ends one.
+        """Whether a transaction is in progress. Setting it begins or ends one.
 
-        Raises DriverError: another thread is in the middle of a transaction (S9).
+        Raises DriverError where another thread has a transaction in progress (S9).
         """
         return self._busy.locked()
 

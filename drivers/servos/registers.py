@@ -14,7 +14,7 @@ from drivers.servos.layout import NAMES, item_of
 from drivers.servos.port import Port
 from drivers.tables.tables import ControlTable, Item, model_name
 
-TRIES = 4
+MAX_TRIES = 4
 T = TypeVar("T")
 E = TypeVar("E", bound=DriverError)
 
@@ -38,10 +38,10 @@ class Registers(ABC, Generic[R]):
 
     @abstractmethod
     def refusal(self, reply: R) -> str:
-        """Why a servo refused an instruction; empty where it did not."""
+        """Return why a servo refused an instruction; empty where it did not."""
 
     def span(self, table: ControlTable, item: Item) -> tuple[int, int, str]:
-        """(address, size, manner) of the read that contains a register, see ``Exchanges.read_group``."""
+        """Return (address, size, manner) of the read that contains a register, see ``Exchanges.read_group``."""
         return item.address, item.size, "sync"
 
     def title(self, item: Item, name: str) -> str:
@@ -54,23 +54,23 @@ class Registers(ABC, Generic[R]):
 
     @abstractmethod
     def hardware_error(self, servo: int) -> int:
-        """Hardware error bits of a servo that was just read from."""
+        """Return the hardware error bits of a servo from which a register was just read."""
 
     def note(self, servo: int, reply: R) -> None:
-        """Keep what a reply holds beside its data."""
+        """Store what a reply tells beside its data, such as error flags; does nothing by default."""
 
-    # ------------------------------------------------------------------ what a servo has
+    # ------------------------------------------------------------------ registers of a model
 
     def label(self, servo: int) -> str:
         """The name of a servo in messages: ``"jaw" (id 3)``."""
         return f'"{self.names[servo]}" (id {servo})' if servo in self.names else f"id {servo}"
 
     def item(self, servo: int, name: str) -> Item | None:
-        """Register of a servo; None where its model has none."""
+        """Return the register of a servo; None where its model does not have it."""
         return item_of(self.tables[servo], name)
 
     def having(self, ids: Iterable[int], name: str) -> list[int]:
-        """Those of the ids whose model has a register."""
+        """Return the ids of servos whose model has a register."""
         return [servo for servo in ids if self.item(servo, name) is not None]
 
     def register_name(self, servo: int, name: str) -> str:
@@ -79,31 +79,33 @@ class Registers(ABC, Generic[R]):
 
     # ------------------------------------------------------------------ one servo
 
-    def hello(self, servo: int, tries: int = TRIES) -> R:
-        """A servo's reply to a greeting; raises NoReply or CorruptReply."""
+    def hello(self, servo: int, tries: int = MAX_TRIES) -> R:
+        """Greet a servo and return its reply; raises NoReply or CorruptReply."""
         return self._with_retries(servo, self.greeting, partial(self.packets.hello, self.port, servo), tries)
 
-    def get(self, servo: int, name: str, tries: int = TRIES) -> int:
-        """One register; raises NoReply, CorruptReply or ServoRefused."""
+    def get(self, servo: int, name: str, tries: int = MAX_TRIES) -> int:
+        """Read one register; raises NoReply, CorruptReply or ServoRefused."""
         item = self._known(servo, name)
         at, size, _ = self.span(self.tables[servo], item)
         ask = partial(self.packets.read, self.port, servo, at, size)
         reply = self._with_retries(servo, f"reading {self.title(item, name)}", ask, tries)
         return item.decode(reply.params[item.address - at :])
 
-    def put(self, servo: int, name: str, value: int, tries: int = TRIES) -> None:
+    def put(self, servo: int, name: str, value: int, tries: int = MAX_TRIES) -> None:
         """Write one register and wait for the servo's status; raises as :meth:`get` does."""
         item = self._known(servo, name)
         ask = partial(self.packets.write, self.port, servo, item.address, item.encode(value))
         self._with_retries(servo, f"writing {self.title(item, name)} = {value}", ask, tries)
 
     def put_unanswered(self, servo: int, name: str, value: int) -> None:
-        """Write one register by a sync write of one, which is never answered: an unread reply would collide with the
-        next request."""
+        """Write one register with a sync write to one servo.
+
+        No servo answers a sync write; a reply that nobody reads would collide with the next request.
+        """
         self.put_all({servo: value}, name)
 
     def info(self, servo: int, number: int, firmware: int, find_table: Callable[[], ControlTable]) -> ServoInfo:
-        """Description of a servo; without measurements where its model is unknown or it stops answering.
+        """Read the description of a servo; without measurements where its model is unknown or it stops answering.
 
         `find_table` returns its control table or raises DriverError. Raises PortLost.
         """
@@ -121,11 +123,11 @@ class Registers(ABC, Generic[R]):
     # ------------------------------------------------------------------ many servos
 
     def get_all(self, ids: Sequence[int], name: str) -> dict[int, int]:
-        """One register of many servos: in groups where they can, then each missing one by itself.
+        """Read one register of many servos: by group reads where possible, then separately where a reply is missing.
 
-        Returns a dict by id; ids whose model lacks the register are left out.
+        Returns values by id; servos whose model lacks the register are left out.
 
-        Raises NoReply, CorruptReply: some did not answer; ``servo_ids`` are all of them.
+        Raises NoReply or CorruptReply where servos did not answer; ``servo_ids`` are all of these.
         """
         values: dict[int, int] = {}
         for (at, size, manner), group in self._spans(ids, name).items():
@@ -144,7 +146,7 @@ class Registers(ABC, Generic[R]):
             self.packets.send_only(self.port, frame)
 
     def frames(self, values: Mapping[int, int], name: str) -> list[bytes]:
-        """The sync writes of :meth:`put_all`."""
+        """Return the sync write packets of :meth:`put_all`."""
         groups: dict[tuple[int, int], bytes] = {}
         for servo in self.having(values, name):
             item = self._known(servo, name)
@@ -153,7 +155,7 @@ class Registers(ABC, Generic[R]):
         return [frame for key, rows in groups.items() for frame in self.packets.group_frames(*key, rows)]
 
     def set_all(self, values: Mapping[int, int], name: str) -> None:
-        """Write one register of many servos and make sure that each has it; raises as :meth:`get` does."""
+        """Write one register of many servos, read it back, and write again where it differs; raises as :meth:`get`."""
         self.put_all(values, name)
         has = self.get_all(list(values), name)
         self.each(
@@ -162,9 +164,9 @@ class Registers(ABC, Generic[R]):
         )
 
     def each(self, ids: Iterable[int], do: Callable[[int], T]) -> dict[int, T]:
-        """Do something with every servo, each by itself, and raise one error about all that failed.
+        """Call ``do`` for every servo, also after a failure; return the results by id.
 
-        Raises BusError: of the kind of the first failure, naming every id that failed.
+        Raises BusError after that if any failed: of the class of the first failure, naming every id that failed.
         """
         done: dict[int, T] = {}
         failed: dict[int, BusError] = {}
@@ -177,10 +179,10 @@ class Registers(ABC, Generic[R]):
             raise merge_errors(failed)
         return done
 
-    # ------------------------------------------------------------------ every answer checked
+    # ------------------------------------------------------------------ checking replies
 
     def error(self, kind: type[E], message: str, hint: str, *ids: int) -> E:
-        """An error about servos on this port."""
+        """Return an error that names this port and servos."""
         return kind(message, hint=hint, port=self.port.port_name, servo_ids=ids)
 
     def _spans(self, ids: Iterable[int], name: str) -> dict[tuple[int, int, str], list[int]]:

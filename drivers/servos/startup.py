@@ -1,8 +1,9 @@
 """Start-up of servos without movement, and switching them off so that no reachable one keeps its torque.
 
-Nothing is written before every servo has answered and is the configured model. Torque is switched on last, with each
-goal at the position just read, and is read back. To stop, one packet switches all servos off; then each is switched
-off and read back by itself, again later where it does not answer, so that a dead servo does not keep others on.
+Nothing is written before every servo has answered and is the configured model. Torque is enabled last, with each goal
+at the position just read, and is read back. To stop, one packet disables the torque of all servos; then that is
+repeated and read back for each servo separately, again later where one does not answer, so that a dead servo keeps no
+other on.
 """
 
 from __future__ import annotations
@@ -32,19 +33,19 @@ from drivers.tables.tables import ControlTable, load_table, model_name
 
 log = logging.getLogger(__name__)
 
-OFF_RETRIES = 5
+MAX_OFF_RETRIES = 5
 
 
 @dataclass(frozen=True)
 class Policy:
     """What start-up may do, in every family.
 
-    takeover : servos whose torque is on already are kept holding (``"adopt"``), switched off first (``"release"``:
-        what they carry may fall), or make start-up fail (``"refuse"``).
+    takeover : servos whose torque is on already keep it (``"adopt"``), are switched off first (``"release"``: what they
+        carry may fall), or make start-up fail (``"refuse"``).
     reboot_faulted : reboot servos that had shut down for a hardware error; they have no torque meanwhile.
-    min_voltage_v : wait until every servo has at least this supply; None takes each servo's own limit.
-    voltage_wait_s : how long to wait for it.
-    partly : where some servos do not come on, the others keep their torque.
+    min_voltage_v : wait until every servo has at least this supply voltage; None takes each servo's own limit.
+    voltage_wait_s : longest wait for the supply voltage.
+    partly : if some servos fail to start, the others keep their torque.
     """
 
     takeover: str = "adopt"
@@ -60,13 +61,13 @@ class Policy:
 
 @dataclass
 class Started:
-    """What start-up found and did.
+    """Result of a start-up; all dictionaries are by servo id.
 
-    ticks : present position by id, read after torque came on.
-    limits : lowest and highest step by id that the servo's own registers allow.
-    mapped : block that is read through pointers, by id.
-    held : servos that held with torque before, and were not rebooted.
-    eeprom : one line for every permanent register written.
+    ticks : position after torque came on.
+    limits : lowest and highest step that the servo's own registers allow.
+    mapped : block that is read through indirect addresses.
+    held : ids of servos whose torque was on before and that were not rebooted.
+    eeprom : one line of text for every permanent register written.
     """
 
     ticks: dict[int, int] = field(default_factory=dict)
@@ -79,10 +80,10 @@ class Started:
 class Startup(ABC, Generic[R]):
     """The steps of start-up and stop; a protocol implements the hooks.
 
-    started : what was found and done.
-    left_on : servos that a failed start has switched on and that are not confirmed off.
-    out_of_turn_hint, not_on_hint, not_off_hint : what a user can do where a position is not within one turn, or a
-        motor does not switch on, or off.
+    started : the result.
+    left_on : servos whose torque a failed start has enabled and that are not confirmed off.
+    out_of_turn_hint, not_on_hint, not_off_hint : what a user can do where a position is not within one turn, a motor
+        does not switch on, or does not switch off.
     """
 
     out_of_turn_hint: ClassVar[str]
@@ -98,30 +99,30 @@ class Startup(ABC, Generic[R]):
 
     @abstractmethod
     def _identity(self, reply: R, expected: ControlTable) -> tuple[int, int]:
-        """Model number and firmware in a servo's reply to the greeting."""
+        """Return model number and firmware from a servo's reply to the greeting."""
 
     def _greet(self, servo: int) -> R:
-        """A servo's reply to the greeting."""
+        """Greet a servo and return its reply."""
         return self.registers.hello(servo)
 
     @abstractmethod
     def _release(self, servo: int) -> None:
-        """Switch one servo off and verify it."""
+        """Disable the torque of one servo and verify it."""
 
     def _least_voltage(self, ids: Sequence[int]) -> Mapping[int, int]:
-        """Least voltage that servos need by id, 0.1 V."""
+        """Read the least supply voltage that servos need, in 0.1 V, by id."""
         return self.registers.get_all(ids, "min_voltage")
 
     @abstractmethod
     def _clear_faults(self, ids: Sequence[int]) -> Sequence[int]:
-        """Look at hardware errors; returns servos that were rebooted.
+        """Check hardware errors and clear those that may be cleared; return servos that were rebooted.
 
         Raises ServoFault where a servo has an error and the policy does not allow to reboot it.
         """
 
     @abstractmethod
     def _write_settings(self, servo: int, held: bool) -> None:
-        """Permanent registers this driver depends on: read, and written only where they differ, with torque off."""
+        """Read the permanent registers that this driver depends on, and write those that differ, with torque off."""
 
     @abstractmethod
     def _prepare(self, servos: Sequence[ServoSpec]) -> None:
@@ -129,20 +130,20 @@ class Startup(ABC, Generic[R]):
 
     @abstractmethod
     def _slack(self, turn: int) -> float:
-        """Steps that the position of a servo that holds may lie outside of a turn of so many."""
+        """How many steps the position of a servo with torque may lie outside its turn of ``turn`` steps."""
 
     def _first_steps(self, ids: Sequence[int]) -> Mapping[int, int]:
-        """First step of the turn in which servos that are off count once they are on, by id; 0 where it is missing."""
+        """First step, by id, of the turn in which a servo counts after its torque is enabled; 0 for missing ids."""
         return {}
 
     @abstractmethod
     def _why_off(self, ids: Sequence[int]) -> Mapping[int, str]:
-        """Why motors did not switch on, by id."""
+        """Read why motors did not switch on, as text by id."""
 
     def _disarm(self, ids: Sequence[int]) -> None:
-        """Switch off what watches servos whose motors are off."""
+        """Switch off the bus watchdogs of servos; does nothing by default."""
 
-    # ------------------------------------------------------------------ up
+    # ------------------------------------------------------------------ starting
 
     def identify(self, servos: Sequence[ServoSpec]) -> None:
         """Greet every servo, compare its model and load its control table.
@@ -165,11 +166,11 @@ class Startup(ABC, Generic[R]):
             raise merge_errors(wrong)
 
     def bring_up(self, servos: Sequence[ServoSpec]) -> Started:
-        """Start identified servos where they are.
+        """Start identified servos at their present positions; return the result.
 
-        Raises BusError where that is not safe. Torque was switched off again where this start had switched it on, with
-        the policy ``partly`` only of the servos that the error names. Servos that held before go on holding, without a
-        watchdog, or with the policy ``partly`` with it.
+        Raises BusError where that is not safe. Then torque that this start had enabled is disabled again; with the
+        policy ``partly`` only of the servos that the error names. Servos whose torque was on before keep it; their
+        watchdog is switched off, unless the policy is ``partly``.
         """
         ids = [servo.id for servo in servos]
         held = self.take_over(ids)
@@ -183,41 +184,44 @@ class Startup(ABC, Generic[R]):
         self.started.held = held
         try:
             self._prepare(servos)
-            self._torque_on_or_back_out(ids, held)
+            self._enable_torque(ids, held)
         except BaseException:
             if not self.policy.partly:
                 self._leave_holding(held)
             raise
         return self.started
 
-    def _torque_on_or_back_out(self, ids: Sequence[int], held: Sequence[int]) -> None:
-        """Switch torque on; after an error switch off again what was not on before."""
+    def _enable_torque(self, ids: Sequence[int], held: Sequence[int]) -> None:
+        """Enable torque; after an error disable it again on servos where it was off before."""
         self.left_on = [servo for servo in ids if servo not in held]
         try:
             self.torque_on(ids, held)
         except BaseException as error:
-            self._back_out(self.left_on, error)
+            self._disable_after_error(self.left_on, error)
             self.left_on = []
             raise
         self.left_on = []
 
     def _leave_holding(self, held: Sequence[int]) -> None:
-        """Leave servos on that held before a start that failed: nobody feeds their watchdogs now."""
+        """After a failed start, switch off the watchdogs of servos that keep their torque: no goals will be sent."""
         if held:
-            with suppress(DriverError):  # the first error says more
+            with suppress(DriverError):  # the error of the start is raised instead
                 self._disarm(held)
 
-    def _back_out(self, ids: Sequence[int], error: BaseException) -> None:
-        """Switch off what was switched on before an error."""
+    def _disable_after_error(self, ids: Sequence[int], error: BaseException) -> None:
+        """Disable torque that was enabled before an error; with the policy ``partly`` only where the error names it."""
         if not self.policy.partly or not isinstance(error, BusError):
             self.switch_off(ids)
             return
         named = error.servo_ids or ids
-        with suppress(NoReply):  # the first error names them too
+        with suppress(NoReply):  # the error that is raised names them too
             self.switch_off([servo for servo in ids if servo in named])
 
     def take_over(self, ids: Sequence[int]) -> list[int]:
-        """Servos whose torque is on and stays on. Raises ServoRefused: some hold, and that is not allowed."""
+        """Treat servos whose torque is on as the policy says; return the ids of those that keep it.
+
+        Raises ServoRefused where torque is on and the policy refuses that.
+        """
         held = [servo for servo, torque in self.registers.get_all(ids, "torque").items() if torque]
         if not held or self.policy.takeover == "adopt":
             return held
@@ -229,7 +233,7 @@ class Startup(ABC, Generic[R]):
         raise self.registers.error(ServoRefused, message, hint, *held)
 
     def wait_for_voltage(self, ids: Sequence[int]) -> None:
-        """Wait for the supply: switching torque on while it ramps up latches input-voltage errors.
+        """Wait for the supply voltage: enabling torque while it still rises latches input-voltage errors.
 
         Raises ServoFault where it stays too low.
         """
@@ -255,36 +259,36 @@ class Startup(ABC, Generic[R]):
         raise self.registers.error(ServoFault, message, "check the power supply and its cable", *sorted(low))
 
     def _tenths(self, servo: int, value: int) -> float:
-        """A supply that was read, in 0.1 V."""
+        """Convert a supply voltage that was read to 0.1 V."""
         item = self.registers.item(servo, "voltage")
         return value if item is None else 10.0 * item.scale * value
 
-    def fault(self, what: str, bad: Mapping[int, int]) -> BusError:
-        """The error of servos with a hardware error; their bits by id."""
+    def fault(self, verb: str, bad: Mapping[int, int]) -> BusError:
+        """Return an error about servos that ``verb`` a hardware error; bad : their error bits or code by id."""
         label = self.registers.label
         which = ", ".join(f"{label(servo)} {self._error_text(servo, bits)}" for servo, bits in bad.items())
         hint = "support the head, then start with reboot_faulted=true, or switch the power off and on"
-        return self.registers.error(ServoFault, f"servos {what} a hardware error: {which}", hint, *sorted(bad))
+        return self.registers.error(ServoFault, f"servos {verb} a hardware error: {which}", hint, *sorted(bad))
 
     def _error_text(self, servo: int, bits: int) -> str:
         return f"code {bits}" if self.registers.tables[servo].error_codes else f"0x{bits:02X}"
 
     def locked(self, servo: int, name: str, old: int, new: int) -> BusError:
-        """The error of a permanent register that must change while the servo holds."""
-        what = f"{self.registers.register_name(servo, name)} must change from {old} to {new}"
-        message = f"servo {self.registers.label(servo)} holds with torque, and {what}"
+        """Return the error for a permanent register that must change while the torque of its servo is on."""
+        change = f"{self.registers.register_name(servo, name)} must change from {old} to {new}"
+        message = f"servo {self.registers.label(servo)} holds with torque, and {change}"
         return self.registers.error(
             ServoRefused, message, 'support the head, then start with takeover="release"', servo
         )
 
     def note(self, servo: int, name: str, old: int, new: int) -> None:
-        """Log that a permanent register was written."""
+        """Log, and add to the result, that a permanent register was written."""
         line = f"servo {self.registers.label(servo)}: {self.registers.register_name(servo, name)} {old} -> {new}"
         self.started.eeprom.append(line)
         log.info("permanent setting written: %s", line)
 
     def torque_on(self, ids: Sequence[int], held: Sequence[int]) -> None:
-        """Write goals at the present positions, right before torque; then switch torque on and read it back.
+        """Write goals at the present positions; right after that enable torque, and read it back.
 
         ``held`` are the servos whose torque is on already. Raises ServoFault: a motor did not come on, or a position is
         not within one turn.
@@ -324,41 +328,42 @@ class Startup(ABC, Generic[R]):
         message = f"servo {self.registers.label(servo)} reads position {value}, outside one turn of {turn} steps"
         return self.registers.error(ServoFault, message, self.out_of_turn_hint, servo)
 
-    # ------------------------------------------------------------------ down
+    # ------------------------------------------------------------------ stopping
 
-    def let_go(self, ids: Sequence[int], held: Sequence[int]) -> None:
-        """Switch servos off as :meth:`switch_off`, and leave others on, without their watchdogs."""
+    def switch_off_started(self, ids: Sequence[int], held: Sequence[int]) -> None:
+        """Switch servos off as :meth:`switch_off`, and leave the ``held`` ones on, without their watchdogs."""
         try:
             self.switch_off(ids)
         finally:
             self._leave_holding(held)
 
     def switch_off(self, ids: Sequence[int]) -> None:
-        """Switch torque off for every servo that can be reached, each by itself.
+        """Disable the torque of every servo that can be reached, each servo separately.
 
-        Raises PortLost, NoReply: after everything was tried; ``servo_ids`` are those not confirmed off.
+        Raises PortLost or NoReply after everything was tried; ``servo_ids`` are the servos not confirmed off.
         """
         registers = self.registers
         known = [servo for servo in ids if servo in registers.tables]
-        open_ids, lost = list(known), None
+        unconfirmed, lost = list(known), None
         try:
             registers.put_all(dict.fromkeys(known, 0), "torque")
-            for _ in range(1 + OFF_RETRIES):
-                open_ids = [servo for servo in open_ids if not self._confirmed_off(servo)]
-                if not open_ids:
+            for _ in range(1 + MAX_OFF_RETRIES):
+                unconfirmed = [servo for servo in unconfirmed if not self._confirm_off(servo)]
+                if not unconfirmed:
                     break
-            self._disarm([servo for servo in known if servo not in open_ids])
+            self._disarm([servo for servo in known if servo not in unconfirmed])
         except PortLost as error:
             lost = error
-        if not open_ids:
+        if not unconfirmed:
             return
-        which = ", ".join(map(registers.label, open_ids)) + (f" ({lost})" if lost else "")
+        which = ", ".join(map(registers.label, unconfirmed)) + (f" ({lost})" if lost else "")
         message = f"not confirmed off on {registers.port.port_name}: {which}"
         raise self.registers.error(
-            NoReply if lost is None else PortLost, message, self.not_off_hint, *open_ids
+            NoReply if lost is None else PortLost, message, self.not_off_hint, *unconfirmed
         ) from lost
 
-    def _confirmed_off(self, servo: int) -> bool:
+    def _confirm_off(self, servo: int) -> bool:
+        """Disable the torque of a servo once more; return whether it reads as off."""
         try:
             self.registers.put_unanswered(servo, "torque", 0)
             return self.registers.get(servo, "torque", tries=1) == 0

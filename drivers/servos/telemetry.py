@@ -77,7 +77,7 @@ class Telemetry(ABC):
         """Read the feedback of the servos whose turn it is; returns the state where it is known already."""
 
     @abstractmethod
-    def _ask(self, requests: list[ReadRequest], clock: Callable[[], float], running: bool) -> None:
+    def _read_requests(self, requests: list[ReadRequest], clock: Callable[[], float], running: bool) -> None:
         """Read blocks from servos and hand the replies to `_accept`."""
 
     # ------------------------------------------------------------------ every cycle
@@ -114,7 +114,7 @@ class Telemetry(ABC):
         state = self._read_feedback(clock, running, scale)
         request = self._urgent.popleft() if self._urgent else self._next_turn(clock())
         if request is not None:
-            self._ask([request], clock, running)
+            self._read_requests([request], clock, running)
         elif state is not None:
             return state
         return self.state(scale, clock())

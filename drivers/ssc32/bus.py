@@ -1,7 +1,7 @@
 """Driver of hobby servos on a Lynxmotion SSC-32: one line moves all channels, each cycle polls the pulses of some.
 
-Source: SSC-32U guide, pages 24-33. An answer is one byte of tens of microseconds, so each batch of requests ends with
-VER, whose answer is known.
+Source: SSC-32U guide, pages 24-33. An answer is a single byte, the pulse in steps of 10 us, so each batch of requests
+ends with VER, whose answer is known.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ from drivers.sim.serving.virtual import VirtualLink
 from drivers.sim.servos.chain import Chain
 from drivers.testing import boardchecks, servochecks
 from drivers.testing.load import busiest
-from drivers.testing.records import MOST, BoardRecord, Output, Record, ServoRecord, Write, outputs
+from drivers.testing.records import MAX_ENTRIES, BoardRecord, Output, Record, ServoRecord, Write, outputs
 from drivers.testing.serving import Serving, stepped
 from drivers.testing.servochecks import Limits, fail
 from drivers.testing.steppedserial import SteppedSerial
@@ -137,7 +137,9 @@ class Bench(ABC, Generic[AnyRecord]):
             self._serving.line.catch_up(self._serving.clock())
             self._record.notice(self._serving.clock())
         if self._record.left_out:
-            raise AssertionError(f"the record is full ({MOST} entries): call forget() between parts of a long test")
+            raise AssertionError(
+                f"the record is full ({MAX_ENTRIES} entries): call forget() between parts of a long test"
+            )
         return self._record
 
     def _summary(self) -> str:

@@ -17,8 +17,8 @@ from drivers.sim.servos.motion import Trajectory
 from drivers.sim.servos.plant import Plant
 from drivers.sim.servos.registers import Change
 
-MOST = 1_000_000
-"""Writes, pieces of motion and pieces of traffic that a record keeps, of each."""
+MAX_ENTRIES = 1_000_000
+"""Number of writes, of pieces of motion and of pieces of traffic that a record keeps, each."""
 
 
 class Write(NamedTuple):
@@ -62,7 +62,7 @@ class Traffic(NamedTuple):
 class Record:
     """What happened on a line since ``start_s``, a time of its clock.
 
-    writes, traffic : in order. left_out : whether there was more than :data:`MOST` of something.
+    writes, traffic : in order. left_out : whether there were more than :data:`MAX_ENTRIES` entries of a sort.
     """
 
     def __init__(self, start_s: float) -> None:
@@ -73,7 +73,7 @@ class Record:
 
     def keep(self, entries: list[Any], entry: Any) -> None:
         """Add an entry where there is room."""
-        if len(entries) < MOST:
+        if len(entries) < MAX_ENTRIES:
             entries.append(entry)
         else:
             self.left_out = True

@@ -1,6 +1,7 @@
 """Driver of hobby servos on a board that reads lines of text, whose format is given by templates.
 
-A line has the servos whose goals changed and one more in turn, so that a board that was reset gets all of them again.
+A line contains the servos whose goals changed and, in turn, one other servo, so that a board that was reset gets all
+goals again.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ from drivers.boards.pulses import GROUP, PulseBus
 from drivers.text.template import NAMES, TEXTS, VALUES, AnswerPattern, check_texts, decimals
 
 TIME_MS = (1, 1000)
-"""Limits of the time that a line gives the board for its moves."""
-FINE = 6
-"""Decimals of values that are only read, which are not rounded."""
-MISSES = 2
-"""Missing answers in a row after which a servo is silent."""
+"""Limits of the duration of a line's moves, ms."""
+READ_DECIMALS = 6
+"""Decimals of values that are only read: enough for no rounding."""
+MAX_MISSES = 2
+"""Number of missing answers in a row after which a servo is silent."""
 RETRY_S = 1.0
 """Interval of requests for silent servos."""
 
@@ -60,7 +61,7 @@ class TextBus(PulseBus):
         self._main = next(iter(self._scales))
         answered = [field for field in VALUES if self._answer and field in self._answer.fields]
         self._answered = (*answered, "us")[0]
-        self._read_scale = ValueScale(self.servos, [self._answered] * n, [FINE] * n)
+        self._read_scale = ValueScale(self.servos, [self._answered] * n, [READ_DECIMALS] * n)
         self._sent = np.full(n, math.nan)
         self._refresh = 0
         self._sent_s = self._retry_s = -math.inf
@@ -121,7 +122,7 @@ class TextBus(PulseBus):
             here = self._limits.target if self._running else self._position
             self._position = np.where(np.isnan(self._sent), here, self._scales[self._main].radians(self._sent))
             return
-        group = self._asked_now()
+        group = self._choose_polled()
         if not group:
             return
         self._port.drain()
@@ -135,8 +136,8 @@ class TextBus(PulseBus):
             self._missed[index] = 0
             self._take([index], [pulse])
 
-    def _asked_now(self) -> list[int]:
-        """Indices of the servos to poll in this cycle; silent servos in separate cycles, every ``RETRY_S``."""
+    def _choose_polled(self) -> list[int]:
+        """Choose the servos (indices) to poll in this cycle; silent servos get separate cycles, every ``RETRY_S``."""
         now = self._clock()
         if self._mute and now >= self._retry_s:
             self._retry_s = now + RETRY_S
@@ -145,13 +146,13 @@ class TextBus(PulseBus):
         return [index for index in self._turn() if index not in self._mute]
 
     def _miss(self, index: int) -> bool:
-        """Count a missing answer; True where the servo is silent from now on."""
+        """Count a missing answer; return whether the servo counts as silent now."""
         self._report.count("no_reply", self.ids[index])
         self._missed[index] += 1
-        if self._missed[index] >= MISSES:
+        if self._missed[index] >= MAX_MISSES:
             self._mute.append(index)
             self._retry_s = self._clock() + RETRY_S
-        return bool(self._missed[index] == MISSES)
+        return bool(self._missed[index] == MAX_MISSES)
 
     def _answers(self, pattern: AnswerPattern, group: list[int]) -> dict[int, float]:
         """Pulses (us) by index from the answers that arrive in time; other lines are counted as stray."""
@@ -173,7 +174,7 @@ class TextBus(PulseBus):
         return found
 
     def _pulse(self, index: int, values: Mapping[str, float | str]) -> float:
-        """The pulse (us) of an answer."""
+        """Return the pulse (us) in an answer."""
         value = float(values[self._answered])
         if self._answered == "us":
             return value

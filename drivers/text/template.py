@@ -78,7 +78,7 @@ def _piece(
 
 
 def _fits(field: str, spec: str) -> bool:
-    """Whether a placeholder can have a format: decimals need an f."""
+    """Whether a format is valid for a placeholder; decimals need an f."""
     match = _FORMAT.match(spec)
     if field == "name" or match is None:
         return not spec
@@ -86,7 +86,7 @@ def _fits(field: str, spec: str) -> bool:
 
 
 def decimals(spec: str) -> int:
-    """Decimals of a number in a format; 6 for ``f`` alone."""
+    """Number of decimals of a format; 6 for ``f`` alone."""
     match = _FORMAT.match(spec)
     return int(match[1] or (6 if match[2] == "f" else 0)) if match else 0
 
@@ -102,7 +102,7 @@ class Template:
         self.fields = frozenset(piece.field for piece in self.pieces if piece.field)
 
     def fill(self, values: Mapping[str, float | str]) -> str:
-        """The text with values in place of placeholders."""
+        """Return the text with values in place of the placeholders."""
         return "".join(
             piece.text + (_formatted(piece.spec, values[piece.field]) if piece.field else "") for piece in self.pieces
         )
@@ -115,7 +115,7 @@ def _formatted(spec: str, value: float | str) -> str:
 
 
 def pattern_of(pieces: Iterable[Piece]) -> re.Pattern[str]:
-    """Regular expression that matches a filled template, with a group for each placeholder."""
+    """Build a regular expression that matches a filled template, with a group for each placeholder."""
     groups = {"": "", "name": r"(\S+?)"}
     return re.compile("".join(re.escape(piece.text) + groups.get(piece.field, _NUMBER) for piece in pieces))
 

@@ -33,25 +33,25 @@ from drivers.tables.tables import ControlTable, load_table, model_name
 from drivers.tools.scan_protocol1 import identity
 
 CURRENT_POSITION = 5
-"""Operating Mode: position control whose current Goal Current limits."""
+"""Value of Operating Mode: position control with the current limited by Goal Current."""
 TORQUE = 0.15
-"""Share of the full current or torque that the search uses."""
+"""Default fraction of the full current or torque that the search uses."""
 FAST_RAD_S, SLOW_RAD_S = math.radians(20.0), math.radians(8.0)
 """Speed of the first and of the second approach."""
-LEAD_RAD = math.radians(8.0)
-"""How far the goal may be ahead of the shaft."""
-PUSH_RAD = math.radians(2.0)
-"""How far ahead it must be for a shaft that stands still to be at a stop."""
+MAX_LEAD_RAD = math.radians(8.0)
+"""Greatest distance of the goal ahead of the shaft."""
+MIN_PUSH_RAD = math.radians(2.0)
+"""Least distance of the goal ahead of a shaft that stands still for it to be at a stop."""
 BACK_RAD = math.radians(4.0)
-"""How far the shaft moves back between two approaches."""
-STILL_S, STILL_RAD = 0.25, math.radians(0.2)
+"""Distance that the shaft moves back between two approaches."""
+STILL_S, MAX_STILL_RAD = 0.25, math.radians(0.2)
 """A shaft that moves by no more than this angle in this time stands still."""
-PUSHING = 0.5
-"""Share of the current limit from which the motor counts as pushing."""
+MIN_PUSH_FRACTION = 0.5
+"""Fraction of the current limit from which the motor counts as pushing."""
 IDLE_S, IDLE_STEPS = 1.5, 10
 """A shaft that stands still without pushing, for longer than this and for more steps, does not follow its goal."""
 PERIOD_S, WATCHDOG_STEPS = 0.02, 25
-NEAR_RAD = math.radians(1.0)
+MAX_END_ERROR_RAD = math.radians(1.0)
 
 
 class StillOn(ServoFault):
@@ -62,7 +62,7 @@ class StillOn(ServoFault):
 class Found:
     """The result of a search; angles in rad, measured as the servo's specification says.
 
-    low_rad, high_rad : where it stopped; None: there was no stop within the reach of the search.
+    low_rad, high_rad : angles where it stopped; None: there was no stop in the range of the search.
     spread_rad : greatest difference between two approaches of one stop.
     peak_current_a : the greatest current that was measured, A.
     offset_ticks : the servo's homing offset, which all angles include; 0 where the model has none.
@@ -76,7 +76,7 @@ class Found:
 
 
 def why_not(model: str) -> str:
-    """Why the stops of a model cannot be found; empty where they can. Raises DriverError: unknown model."""
+    """Return why the stops of a model cannot be found; empty if they can. Raises DriverError for an unknown model."""
     table = load_table(model)
     if item_of(table, "current") is None:
         return f"{table.model} measures no current, so it cannot feel a stop"
@@ -103,9 +103,9 @@ def find_stops(
     """Find both stops of a servo whose motor is off, and switch it off again.
 
     port, baud : where it is connected. servo : its model, zero and direction; its limits are not used.
-    reach_rad : lowest and highest angle that the search goes to.
-    torque : share of the full current that it uses, above 0 and at most 0.5.
-    progress : called with what is being done. margin_s : longest wait for a reply beyond its time on the wire.
+    reach_rad : lowest and highest angle of the search.
+    torque : fraction of the full current that it uses, above 0 and at most 0.5.
+    progress : called with a text for every step. margin_s : longest wait for a reply beyond its time on the wire.
 
     Raises ServoRefused: the model cannot, or the motor is on. ServoFault: a hardware error, or it does not follow.
     StillOn: it could not be confirmed off.
@@ -142,15 +142,15 @@ class _Search:
         self._peak = 0
         self._before: list[tuple[str, int]] = []
         table = load_table(servo.model)
-        registers.tables[self._id] = self._table = self._identified(table)
+        registers.tables[self._id] = self._table = self._identify(table)
         self._scale = Scale((servo,), (self._table,))
         self._by_current = _has_current_mode(self._table)
         self._shift = self._allowed = 0
 
     # ------------------------------------------------------------------ before and after
 
-    def _identified(self, expected: ControlTable) -> ControlTable:
-        """The servo's own table; raises NoReply, or WrongModel where it is another model."""
+    def _identify(self, expected: ControlTable) -> ControlTable:
+        """Identify the servo and return its control table; raises NoReply, or WrongModel for another model."""
         registers = self._registers
         reply = registers.hello(self._id)
         if isinstance(registers, Registers1):
@@ -171,10 +171,10 @@ class _Search:
         self._check_health()
         offset = registers.get(self._id, "offset") if item_of(self._table, "offset") else 0
         with ExitStack() as stack:
-            stack.enter_context(self._watched())
-            stack.enter_context(stop_on_signals(self._put_back))
+            stack.enter_context(self._dead_man_switch())
+            stack.enter_context(stop_on_signals(self._restore))
             self._limit(offset)
-            ends = [self._bounded(angle) for angle in (low_rad, high_rad)]
+            ends = [self._clipped_steps(angle) for angle in (low_rad, high_rad)]
             start = self._position()
             registers.put(self._id, "goal", start)
             registers.put(self._id, "torque", 1)
@@ -185,8 +185,8 @@ class _Search:
         return self._result(found, offset)
 
     @contextmanager
-    def _watched(self) -> Iterator[None]:
-        """For a servo without a bus watchdog, run a process that switches it off when this program is killed."""
+    def _dead_man_switch(self) -> Iterator[None]:
+        """In this context, a process switches off a servo without bus watchdog if this program is killed."""
         link = self._port.link
         device = isinstance(link, SerialPort) and not link.path.startswith("memory://") and os.name == "posix"
         if not device or item_of(self._table, "watchdog") is not None:
@@ -200,12 +200,12 @@ class _Search:
             switch.dismiss()
 
     def _limit(self, offset: int) -> None:
-        """Limit current and speed; `_put_back` restores every register that this changes."""
+        """Limit current and speed; `_restore` undoes every change of a register."""
         if self._by_current:
             mode = self._registers.get(self._id, "drive_mode")
             self._change("drive_mode", mode & ~(REVERSE | TIME_PROFILE | TORQUE_BY_GOAL))
             self._change("mode", CURRENT_POSITION)
-            self._shift = offset if abs(offset) > MAX_OFFSET else 0  # acts in this mode, not in position mode
+            self._shift = offset if abs(offset) > MAX_OFFSET else 0  # has an effect in this mode, not in position mode
             full = self._registers.get(self._id, "current_limit")
             self._allowed = max(round(self._torque * full), 1)
             self._change("goal_current", self._allowed)
@@ -229,8 +229,8 @@ class _Search:
             self._before.append((name, present))
             self._registers.put(self._id, name, value)
 
-    def _put_back(self) -> None:
-        """Switch the motor off, confirm it, and restore the changed registers, the last one first."""
+    def _restore(self) -> None:
+        """Disable torque, confirm it, and restore the changed registers in reverse order."""
         registers = self._registers
         for _ in range(6):
             with suppress(BusError):
@@ -249,7 +249,7 @@ class _Search:
     # ------------------------------------------------------------------ the search
 
     def _side(self, side: int, end: int, start: int) -> list[int] | None:
-        """The two steps where the shaft stopped on one side (-1 or 1); None: it reached ``end`` without a stop."""
+        """Return the two positions (steps) where the shaft stopped on one side (-1 or 1); None: it reached ``end``."""
         name = "lowest" if (side < 0) != self._servo.reverse else "highest"
         self._progress(f"{self._servo.name}: looking for the {name} stop")
         first = self._approach(side, end, FAST_RAD_S)
@@ -262,38 +262,41 @@ class _Search:
         return None if second is None else [first, second]
 
     def _approach(self, side: int, end: int, speed_rad_s: float) -> int | None:
-        """Move towards ``end`` until the shaft stands still while the motor pushes; the step there, None at ``end``."""
+        """Move towards ``end`` until the shaft stands still while the motor pushes.
+
+        Return the position there, in steps; None where ``end`` was reached first.
+        """
         tick = self._table.rad_per_tick
         goal, seen, idle = float(self._position()), deque[tuple[float, int]](), list[float]()
         while True:
             position, push = self._step(round(goal))
-            if side * (end - position) <= NEAR_RAD / tick and side * (end - goal) <= 0.0:
+            if side * (end - position) <= MAX_END_ERROR_RAD / tick and side * (end - goal) <= 0.0:
                 return None
             now = self._port.clock()
             seen.append((now, position))
-            while len(seen) > 2 and now - seen[1][0] > STILL_S:  # two at least, also where a step takes longer
+            while len(seen) > 2 and now - seen[1][0] > STILL_S:  # keep two at least, also where a step takes longer
                 seen.popleft()
             lead, still = side * (goal - position), self._is_still(seen, now)
-            if still and lead >= PUSH_RAD / tick and push >= PUSHING * self._allowed:
+            if still and lead >= MIN_PUSH_RAD / tick and push >= MIN_PUSH_FRACTION * self._allowed:
                 return position
-            # On a busy machine the goal is slow to get as far ahead as it may; until it is, the servo need not push.
-            is_far = lead >= 0.99 * min(LEAD_RAD / tick, side * (end - position))
+            # On a busy machine the goal gets ahead of the shaft slowly; until it is far ahead, the servo need not push.
+            is_far = lead >= 0.99 * min(MAX_LEAD_RAD / tick, side * (end - position))
             idle = [*idle, now] if still and is_far else []
             if len(idle) > IDLE_STEPS and now - idle[0] > IDLE_S:
-                if not self._rearmed():
+                if not self._rearm():
                     raise self._stuck()
                 idle.clear()
-            ahead = min(side * (goal - position) + speed_rad_s * PERIOD_S / tick, LEAD_RAD / tick)
+            ahead = min(side * (goal - position) + speed_rad_s * PERIOD_S / tick, MAX_LEAD_RAD / tick)
             goal = side * min(side * (position + side * ahead), side * end)
 
     def _is_still(self, seen: deque[tuple[float, int]], now: float) -> bool:
         """Whether the shaft has stood still for the last STILL_S; ``seen`` has (time in s, position in steps)."""
         ticks = [position for _, position in seen]
         long_enough = now - seen[0][0] > 0.7 * STILL_S
-        return long_enough and (max(ticks) - min(ticks)) * self._table.rad_per_tick <= STILL_RAD
+        return long_enough and (max(ticks) - min(ticks)) * self._table.rad_per_tick <= MAX_STILL_RAD
 
-    def _rearmed(self) -> bool:
-        """Whether the bus watchdog had tripped, since the computer was busy for half a second: goals count again."""
+    def _rearm(self) -> bool:
+        """Arm the bus watchdog again if it had tripped, as when the computer was busy; return whether it had."""
         if item_of(self._table, "watchdog") is None or self._registers.get(self._id, "watchdog") not in TRIPPED_VALUES:
             return False
         self._arm()
@@ -310,16 +313,16 @@ class _Search:
         return self._registers.error(ServoFault, message, hint, self._id)
 
     def _go(self, target: int) -> None:
-        """Move to a position (steps); give up two seconds after the time that this should take."""
+        """Move to a position (steps); stop waiting two seconds after the time that this should take."""
         tick = self._table.rad_per_tick
         goal = float(self._position())
         end_s = self._port.clock() + abs(target - goal) * tick / FAST_RAD_S + 2.0
         while self._port.clock() < end_s:
             goal += max(min(target - goal, FAST_RAD_S * PERIOD_S / tick), -FAST_RAD_S * PERIOD_S / tick)
             position, _ = self._step(round(goal))
-            if abs(position - target) * tick < NEAR_RAD:
+            if abs(position - target) * tick < MAX_END_ERROR_RAD:
                 return
-        self._rearmed()
+        self._rearm()
 
     def _step(self, goal: int) -> tuple[int, int]:
         """Send a goal, wait for one period, and read position and current (or load), both in steps."""
@@ -348,8 +351,8 @@ class _Search:
     def _position(self) -> int:
         return self._registers.get(self._id, "position")
 
-    def _bounded(self, angle_rad: float) -> int:
-        """Steps of an angle, within one turn and, where the mode obeys them, the servo's own limits."""
+    def _clipped_steps(self, angle_rad: float) -> int:
+        """Convert an angle to steps, clipped to one turn and, where the mode obeys them, to the servo's own limits."""
         table, steps = self._table, self._scale.tick(0, angle_rad)
         steps = min(max(steps, table.first_step), table.first_step + table.ticks_per_turn - 1)
         if self._by_current:

@@ -1,7 +1,7 @@
 """Scan for servos with Protocol 1.0 framing: Dynamixel AX and MX, Feetech STS and SCS. Nothing is written to them.
 
-There is no broadcast ping that all of them answer, so each id is pinged, as fast as the wire allows, and replies are
-distinguished by the id they carry.
+There is no broadcast ping that all of them answer, so each id is pinged, as fast as the wire allows; a reply carries
+the id of its servo.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from drivers.servos.port import Port
 from drivers.tables.tables import known_models, load_table
 
 PING_BYTES = 12
-"""Bytes of a ping on the wire, request and reply together."""
+"""Number of bytes of a ping on the wire, request and reply together."""
 RETURN_DELAY_S = 0.0006
-"""Longest time a servo takes before it answers, as they leave the factory (500 us) and a little more."""
+"""Longest time before a servo with factory settings answers (500 us), and a little more."""
 SLACK_S = 0.001
 WAIT_S = 0.03
-"""How long the last reply is waited for, beyond the adapter's latency timer, because the host may be busy."""
-TRIES = 3
+"""Time to wait for the last reply, beyond the adapter's latency timer, because the host may be busy."""
+MAX_TRIES = 3
 HEAD_BYTES = 6
 FEETECH_ID, DYNAMIXEL_ID = 5, 3
-"""Addresses of the id in servos of either maker; that of the model number is 3 and 0."""
+"""Addresses of the id in servos of either maker; the model number is at 3 (Feetech) and 0 (Dynamixel)."""
 
 
 class Heard(NamedTuple):
-    """Result of one round of pings: the ids that answered, and whether other bytes arrived, too."""
+    """Result of one round of pings: the ids that answered, and whether other bytes arrived as well."""
 
     ids: tuple[int, ...]
     noise: bool
@@ -56,24 +56,24 @@ def ping_all(link: SerialPort, progress: Callable[[int], None] = lambda servo: N
 
 
 def registers_on(port: str | SerialPort, baud: int) -> Registers:
-    """Registers of unknown servos on a port, with time for the replies of a busy host."""
+    """Create access to registers of unknown servos on a port, with a longer time limit for busy hosts."""
     path = port if isinstance(port, str) else port.path
     return Registers(Exchanges(), Port(port, baud, WAIT_S + (latency_s(path) or 0.0)), ())
 
 
 def describe(link: SerialPort, servo: int) -> ServoInfo | None:
-    """Model and settings of a servo; None where it does not answer. Of an unknown model only the number is given."""
+    """Read model and settings of a servo; None where it does not answer. For an unknown model only its number."""
     registers = registers_on(link, link.baud)
     found = identity(registers, servo)
     return None if found is None else registers.info(servo, *found, lambda: load_table(*found))
 
 
 def identity(registers: Registers, servo: int) -> tuple[int, int] | None:
-    """Model number and firmware of a servo; None where it does not answer.
+    """Read model number and firmware of a servo; None where it does not answer.
 
     Dynamixel and Feetech keep them at different addresses, so the id beside them decides.
     """
-    for _ in range(TRIES):
+    for _ in range(MAX_TRIES):
         reply = registers.packets.read(registers.port, servo, 0, HEAD_BYTES).replies.get(servo)
         if reply is None or not reply.params:
             continue

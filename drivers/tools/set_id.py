@@ -22,11 +22,11 @@ from drivers.tables.tables import FEETECH, load_table
 from drivers.tools.scan_protocol1 import identity, registers_on
 
 SETTLE_S = 1.0
-"""How long a servo may not answer while it writes its permanent memory."""
-TRIES = 3
-"""How often a servo is asked who it is before its id counts as free."""
+"""Time for which a servo may not answer while it writes its permanent memory."""
+MAX_TRIES = 3
+"""Number of tries to identify a servo before its id counts as free."""
 REPLY_S = 0.02
-"""Time for the reply to a write, which is not read: it may come from the new id."""
+"""Time for the reply to a write; it is not read, because it may carry the new id."""
 
 
 @contextmanager
@@ -40,7 +40,7 @@ def _registers(port: str, baud: int, protocol: int) -> Iterator[Registers[Any]]:
 
 
 def _find(registers: Registers[Any], servo: int) -> ServoInfo | None:
-    """What a servo is, with its torque; None where no servo answers. Raises CorruptReply where two answer at once."""
+    """Identify a servo and read its torque; None where no servo answers. Raises CorruptReply where two answer."""
     found: tuple[int, int] | None
     if isinstance(registers, Registers1):
         found = identity(registers, servo)
@@ -57,9 +57,9 @@ def _find(registers: Registers[Any], servo: int) -> ServoInfo | None:
     return ServoInfo(servo, table.number, table.model, found[1], torque=registers.get(servo, "torque") == 1)
 
 
-def _find_surely(registers: Registers[Any], servo: int) -> ServoInfo | None:
-    """What a servo is; None where it does not answer several times: one reply may be lost or late."""
-    return next((found for _ in range(TRIES) if (found := _find(registers, servo)) is not None), None)
+def _find_with_retries(registers: Registers[Any], servo: int) -> ServoInfo | None:
+    """Identify a servo; None where it does not answer several times, since one reply may be lost or late."""
+    return next((found for _ in range(MAX_TRIES) if (found := _find(registers, servo)) is not None), None)
 
 
 def _write(registers: Registers[Any], servo: int, name: str, value: int) -> None:
@@ -84,10 +84,10 @@ def set_id(port: str, baud: int, protocol: int | None, old: int, new: int, *, re
         if not 0 <= servo <= MAX_ID:
             raise ValueError(f"{name}: an id is 0 to {MAX_ID}, got {servo}")
     with _registers(port, baud, protocol or _protocol_of(port, baud, old)) as registers:
-        info = _find_surely(registers, old)
+        info = _find_with_retries(registers, old)
         if info is None:
             raise _nobody(port, baud, old)
-        taken = _find_surely(registers, new) if new != old else None
+        taken = _find_with_retries(registers, new) if new != old else None
         if taken is not None:
             raise _error(f"the id {new} on {port} is taken by another {taken.model}", "choose a free id", port, new)
         if info.torque:
@@ -109,7 +109,7 @@ def set_id(port: str, baud: int, protocol: int | None, old: int, new: int, *, re
 
 @contextmanager
 def _unlocked(registers: Registers[Any], old: int, new: int, model: str) -> Iterator[None]:
-    """Context in which a servo's permanent memory is open; it is closed again under either id on every way out."""
+    """In this context a servo's permanent memory is unlocked; it is locked again under either id in the end."""
     table = registers.tables[old]
     if table.lock != "Lock":
         yield
@@ -118,7 +118,7 @@ def _unlocked(registers: Registers[Any], old: int, new: int, model: str) -> Iter
         _write(registers, old, "Lock", 0)
         yield
     finally:
-        if model.startswith(FEETECH):  # an AX opens only without power
+        if model.startswith(FEETECH):  # an AX unlocks only when its power is switched off
             registers.tables.setdefault(new, table)
             for servo in dict.fromkeys((old, new)):
                 if registers.tables[servo].model == table.model:
@@ -126,11 +126,11 @@ def _unlocked(registers: Registers[Any], old: int, new: int, model: str) -> Iter
 
 
 def _protocol_of(port: str, baud: int, servo: int) -> int:
-    """The protocol in which a servo answers. Raises NoReply where it does in none, ServoRefused where in both."""
+    """Return the protocol in which a servo answers. Raises NoReply if in none, ServoRefused if in both."""
     found = []
     for protocol in (2, 1):
         with _registers(port, baud, protocol) as registers:
-            found += [protocol] if _find_surely(registers, servo) is not None else []
+            found += [protocol] if _find_with_retries(registers, servo) is not None else []
     if len(found) > 1:
         message = f"a servo of Protocol 2.0 and one of Protocol 1.0 have the id {servo} on {port}"
         raise _error(message, "add --protocol 2 or --protocol 1", port, servo)
@@ -145,7 +145,7 @@ def _nobody(port: str, baud: int, servo: int) -> NoReply:
 
 
 def _await(registers: Registers[Any], servo: int) -> ServoInfo | None:
-    """The servo as soon as it answers again."""
+    """Wait until a servo answers again, and return its description."""
     found, end_s = None, time.monotonic() + SETTLE_S
     while found is None and time.monotonic() < end_s:
         found = _find(registers, servo)

@@ -21,7 +21,7 @@ import numpy as np
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.links.websocket.conversation import Conversation
-from controller.links.websocket.messages import LONGEST
+from controller.links.websocket.messages import MAX_VALUE
 from tests.fuzz.messages import LONGEST_S, Findings, damage
 
 GOOD: tuple[dict[str, Any], ...] = (
@@ -47,12 +47,12 @@ def damaged(draw: random.Random) -> Iterator[bytes]:
     texts = [json.dumps(each).encode() for each in GOOD]
     while True:
         if draw.random() < 0.5:
-            yield json.dumps(_other_values(draw.choice(GOOD), draw)).encode()[:LONGEST]
+            yield json.dumps(_other_values(draw.choice(GOOD), draw)).encode()[:MAX_VALUE]
             continue
         message = bytearray(draw.choice(texts))
         for _ in range(draw.choice((1, 1, 2, 5))):
             damage(message, draw.choice(texts), draw)
-        yield bytes(message[:LONGEST])
+        yield bytes(message[:MAX_VALUE])
 
 
 def _other_values(request: dict[str, Any], draw: random.Random) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Linkages: servos that move one thing together, so that no angle of one belongs to one parameter.
+"""Linkages: servos that move one part together, so that the angle of each depends on several parameters.
 
 In: values of a linkage's inputs, degrees and millimetres. Out: angles of its servos. A kind is a module
 ``kinds/KIND_linkage.py`` that nothing else names. Imports controller.robot.terms and base.

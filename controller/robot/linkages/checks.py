@@ -17,7 +17,7 @@ from drivers.base.errors import PluginError
 
 
 def with_files(robot: RobotSettings, path: Path) -> RobotSettings:
-    """A robot whose linkages name files by their whole paths; relative ones lie beside the robot's ``path``."""
+    """Return the robot with absolute paths in its linkages; relative ones are relative to the robot file ``path``."""
     if not any(hasattr(linkage, "file") for linkage in robot.linkages):
         return robot
     linkages = [
@@ -30,7 +30,7 @@ def with_files(robot: RobotSettings, path: Path) -> RobotSettings:
 
 
 def linkage_faults(robot: RobotSettings, parameters: Parameters) -> list[str]:
-    """Channels without anything to follow or with two things, linkages of channels that there are not, wrong inputs."""
+    """List faults: channels that follow nothing or two things, linkages of unknown channels, wrong inputs."""
     channels = {channel.name: channel for channel in robot.channels}
     linked = [name for linkage in robot.linkages for name in linkage.channels]
     faults = [
@@ -79,7 +79,7 @@ def _making_faults(where: str, linkage: LinkageSettings, parameters: Parameters)
     try:
         LINKAGES.get(linkage.kind)
     except PluginError:
-        return []  # its kind is a fault of its own
+        return []  # an unknown kind is reported elsewhere
     try:
         made = LinkedChannels.of(linkage, linkage.channels, parameters)
     except (ConfigError, ValueError) as error:

@@ -21,7 +21,7 @@ from drivers.base.errors import PluginError
 from drivers.base.plugins import Registry, modules_in
 
 API = 1
-"""Version of what a kind of linkage must keep: this module."""
+"""Version of the interface that a kind of linkage implements: this module."""
 _SUFFIX = "_linkage"
 
 
@@ -48,7 +48,7 @@ class LinkageSettings(Settings):
 
     @classmethod
     def known_keys(cls) -> list[str]:
-        """Keys of such a table, those of all kinds included."""
+        """Keys that a table of a linkage may have, including those of all kinds."""
         own = {key for kind in LINKAGES.all() for key in kind.settings.model_fields}
         return [*super().known_keys(), *sorted(own)]
 
@@ -59,12 +59,12 @@ class LinkageSettings(Settings):
 
 
 class Linkage(Protocol):
-    """What turns inputs into angles."""
+    """Converts inputs to angles of servos."""
 
     def angles(self, inputs: Floats) -> tuple[Floats, bool]:
-        """(n,) degrees of the servos for inputs (k,), and whether the inputs lie where it cannot go.
+        """(n,) degrees of the servos for inputs (k,), and whether the inputs are unreachable.
 
-        There, the angles are those of a place within reach on the way to them; they are always finite.
+        Then the angles belong to reachable inputs on the way to them. Angles are always finite.
         """
 
 
@@ -73,8 +73,8 @@ class LinkageKind:
     """One kind of linkage.
 
     api : version of the registry it is made for. kind : its name in robot files. title : its name for people.
-    settings : what a robot file says of it. make : the linkage of such settings; raises ConfigError or ValueError.
-    install : what ``pip install`` takes where a package is missing.
+    settings : class of its settings in a robot file. make : creates the linkage from them; raises ConfigError or
+        ValueError. install : argument of ``pip install`` for a package that it needs.
     """
 
     api: int
@@ -99,7 +99,7 @@ class _Unknown(LinkageSettings, extra="ignore"):
 
 
 def read_linkage(table: dict[str, Any]) -> LinkageSettings:
-    """A linkage from its table in a robot file. Raises pydantic.ValidationError: every fault with its key."""
+    """Read a linkage from its table in a robot file. Raises pydantic.ValidationError, with all faults by key."""
     try:
         settings = LINKAGES.get(str(table.get("kind"))).settings
     except PluginError:

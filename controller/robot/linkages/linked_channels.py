@@ -22,7 +22,7 @@ class LinkedChannels:
 
     name : of the linkage. at : (n,) indices of its channels on the bus. needs : (k,) indices of the parameters that its
     inputs follow.
-    outside : whether the linkage cannot reach the last inputs. times : how often inputs became unreachable.
+    outside : whether the last inputs were unreachable. times : how often inputs became unreachable.
     """
 
     name: str
@@ -35,7 +35,10 @@ class LinkedChannels:
 
     @classmethod
     def of(cls, settings: LinkageSettings, names: Sequence[str], parameters: Parameters) -> LinkedChannels:
-        """A linkage over the channels ``names``. Raises ParameterError, ConfigError, ValueError."""
+        """Create from the settings of a linkage; ``names`` are the channels of the bus.
+
+        Raises ParameterError, ConfigError, ValueError.
+        """
         made = LINKAGES.get(settings.kind).make(settings)
         inputs = tuple(_input(each, parameters) for each in settings.inputs.values())
         named = [_named(each) for each in settings.inputs.values()]
@@ -56,7 +59,7 @@ class LinkedChannels:
 
 
 def input_names(settings: LinkageSettings) -> list[tuple[str, str]]:
-    """For every parameter that the inputs of a linkage follow: the key in the robot file, and the parameter's name."""
+    """Yield the key in the robot file and the name of every parameter that the inputs of a linkage follow."""
     return [(f"inputs.{key}", name) for key, each in settings.inputs.items() for name in _named(each)]
 
 
@@ -65,7 +68,7 @@ def _named(given: str | dict[str, TermSettings]) -> tuple[str, ...]:
 
 
 def _input(given: str | dict[str, TermSettings], parameters: Parameters) -> Compiled:
-    """The function that computes an input from a list of parameter values."""
+    """Return the function that computes an input from a list of parameter values."""
     if isinstance(given, str):
         formula: Formula = parse_formula(given)
         return formula.compiled(parameters)

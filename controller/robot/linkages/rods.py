@@ -1,6 +1,6 @@
 """Rods between the horns of servos and a plate on a joint: kinematics of necks and of Stewart platforms.
 
-A plate turns, and perhaps moves, about a joint; each servo's horn holds one end of a rod of fixed length, the plate the
+A plate turns about a joint, and may also shift; each servo's horn holds one end of a rod of fixed length, the plate the
 other. The angle of a horn that fits a pose of the plate follows from the law of cosines: with d from the axle to the
 rod's end on the plate, h the horn at angle 0 and g = axis x h,
 
@@ -23,8 +23,8 @@ POSE = ("x", "y", "z", "yaw", "pitch", "roll")
 """Inputs of a plate: mm and degrees."""
 
 _HALVINGS = 24
-_WORST = 200.0  # condition number of the motion at rest beyond which a pose is not determined
-_MM_PER_DEG = 1.0  # how a mm is weighed against a degree in it
+_MAX_CONDITION = 200.0  # condition number of the motion at rest beyond which a pose is not determined
+_MM_PER_DEG = 1.0  # mm that weigh as much as a degree in the condition number
 
 
 def turn(yaw_deg: float, pitch_deg: float, roll_deg: float) -> Floats:
@@ -71,9 +71,9 @@ class Rods:
         return made
 
     def angles(self, inputs: Floats) -> tuple[Floats, bool]:
-        """(n,) degrees for inputs (k,) in mm and degrees, and whether they lie beyond what the rods reach.
+        """(n,) degrees for inputs (k,) in mm and degrees, and whether the inputs are unreachable.
 
-        Beyond it, the plate stays on the straight way from rest to there, as far as all rods reach.
+        Then the angles belong to the furthest reachable pose on the straight way from rest to the inputs.
         """
         found = self._solve(inputs)
         if found is not None:
@@ -87,7 +87,7 @@ class Rods:
         return best, True
 
     def _solve(self, inputs: Floats) -> Floats | None:
-        """Degrees for a pose; None where a rod does not reach, or only just, where a horn turns over."""
+        """Degrees for a pose; None where a rod does not reach it, or so narrowly that a horn could turn over."""
         pose = np.zeros(6)
         pose[list(self.inputs)] = inputs
         away = self.plate @ turn(*pose[3:]).T + pose[:3] - self.axle
@@ -101,12 +101,12 @@ class Rods:
         return wrapped
 
     def _check(self) -> None:
-        """Raise ValueError where small motions of the servos leave the plate's pose open."""
+        """Raise ValueError where the servos' angles do not determine the plate's pose near rest."""
         rest = self._solve(np.zeros(len(self.inputs)))
         if rest is None or np.abs(rest).max() > 1e-3:
             raise ValueError("the rods do not fit the plate at rest: a horn and its rod lie in one line")
         steps = 0.1 * np.eye(len(self.inputs))
         ends = [(self._solve(step), self._solve(-step)) for step in steps]
         slopes = [(a - b) / 0.2 for a, b in ends if a is not None and b is not None]
-        if len(slopes) < len(steps) or np.linalg.cond(np.array(slopes)) > _WORST:
+        if len(slopes) < len(steps) or np.linalg.cond(np.array(slopes)) > _MAX_CONDITION:
             raise ValueError("these rods do not determine the plate: move one where it turns the plate another way")

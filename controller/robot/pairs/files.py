@@ -16,16 +16,16 @@ from controller.base.errors import ConfigError
 from controller.base.files import replacing
 from controller.base.parameters import Floats, Parameters
 from controller.base.plain_numbers import plain_number
-from controller.robot.pairs.fit import LEAST_PAIRS, FittedServo, FittedTerm, fit_servo
+from controller.robot.pairs.fit import MIN_PAIRS, FittedServo, FittedTerm, fit_servo
 from controller.robot.robot import load_robot, robot_parameters
 from controller.robot.settings import ChannelSettings, RobotSettings
 from surface.base.files import read_file, read_text, reading
 
 PREFIX = "servos:"
-"""What the name of a column of angles begins with; the channel's name follows."""
-_MOST_BYTES, _MOST_ROWS = 1 << 26, 100_000
-_MOST_DEG = 36_000.0
-_BEYOND = 0.05  # share of its range by which a parameter may lie beyond it; such values count as the end of the range
+"""Prefix of the names of columns with angles; the channel's name follows."""
+_MAX_BYTES, _MAX_ROWS = 1 << 26, 100_000
+_MAX_DEG = 36_000.0
+_MAX_BEYOND = 0.05  # fraction of its range by which a parameter may exceed it; such values are clipped
 
 
 @dataclass(frozen=True)
@@ -46,20 +46,20 @@ class FittedChannel:
 
 
 def read_pairs(path: Path, robot: RobotSettings, parameters: Parameters) -> Pairs:
-    """Pairs of a CSV file: columns of parameters by name, and ``servos:NAME`` with the angles (deg) of channels.
+    """Read pairs from a CSV file: columns of parameters by name, and ``servos:NAME`` with angles (deg) of channels.
 
-    A column ``time`` is left out. Raises ConfigError: it cannot be read, a column is unknown, a number is missing or
-    beyond what its column may hold.
+    A column ``time`` is ignored. Raises ConfigError where the file cannot be read, a column is unknown, or a number is
+    missing or outside the range of its column.
     """
     with reading(path, ConfigError):
-        lines = [line for line in read_text(path, _MOST_BYTES).splitlines() if line.strip()]
+        lines = [line for line in read_text(path, _MAX_BYTES).splitlines() if line.strip()]
     head = [cell.strip() for cell in lines[0].split(",")] if lines else []
     known = {channel.name for channel in robot.channels}
     if faults := list(_column_faults(head, known, parameters)):
         raise _wrong(path, faults)
     pairs = max(len(lines) - 1, 0)
-    if not LEAST_PAIRS <= pairs <= _MOST_ROWS:
-        raise _wrong(path, [f"has {pairs} pairs; it takes {LEAST_PAIRS} to {_MOST_ROWS}"])
+    if not MIN_PAIRS <= pairs <= _MAX_ROWS:
+        raise _wrong(path, [f"has {pairs} pairs; it takes {MIN_PAIRS} to {_MAX_ROWS}"])
     table = np.array([_numbers(path, number, line, len(head)) for number, line in enumerate(lines[1:], 2)])
     if faults := list(_number_faults(head, table, parameters)):
         raise _wrong(path, faults)
@@ -100,21 +100,21 @@ def _numbers(path: Path, number: int, line: str, count: int) -> list[float]:
 
 
 def _number_faults(head: list[str], table: Floats, parameters: Parameters) -> Iterator[str]:
-    """Of each column with numbers that no face or servo has, the first one."""
+    """List, for each column with numbers outside the range of its parameter or servo, the first such number."""
     for column, name in enumerate(head):
-        low, high, unit = -_MOST_DEG, _MOST_DEG, "degrees"
+        low, high, unit = -_MAX_DEG, _MAX_DEG, "degrees"
         if (at := parameters.find(name)) is not None:
             low, high, unit = float(parameters.low[at]), float(parameters.high[at]), "its range"
         elif not name.startswith(PREFIX):
             continue
-        spare = _BEYOND * (high - low)
+        spare = _MAX_BEYOND * (high - low)
         beyond = np.flatnonzero((table[:, column] < low - spare) | (table[:, column] > high + spare))
         if len(beyond):
             yield f"row {beyond[0] + 2}: {name} is {table[beyond[0], column]:g}, beyond {low:g} to {high:g}, {unit}"
 
 
 def fit_channels(robot: RobotSettings, pairs: Pairs) -> list[FittedChannel]:
-    """The fit of every channel that was recorded, in the robot's order."""
+    """Fit every channel that was recorded, in the robot's order."""
     linked = {name for linkage in robot.linkages for name in linkage.channels}
     found = []
     for channel in robot.channels:
@@ -144,7 +144,7 @@ def write_robot(path: Path, target: Path, fitted: list[FittedChannel], parameter
         load_robot(temporary, parameters)
         if kept is not None:
             with replacing(kept) as copy:
-                copy.write_bytes(read_file(target, _MOST_BYTES))
+                copy.write_bytes(read_file(target, _MAX_BYTES))
     return kept
 
 
@@ -160,7 +160,7 @@ def _keep(target: Path) -> Path:
 
 
 def _keys(each: FittedChannel, parameters: Parameters) -> dict[str, Any]:
-    """The keys of a channel that follow from its fit: terms in degrees, and a map that adds the angle at rest."""
+    """Return the keys of a channel for its fit: terms in degrees, and a map that adds the angle at rest."""
     low, high = each.channel.limit_deg
     rest = each.fit.rest_deg
     mix = {parameters.names[term.parameter]: _term(term) for term in each.fit.terms}
@@ -169,7 +169,7 @@ def _keys(each: FittedChannel, parameters: Parameters) -> dict[str, Any]:
 
 
 def _term(term: FittedTerm) -> float | dict[str, list[float]]:
-    """A weight where the term is straight through 0, else its curve."""
+    """Return a weight if the term is a straight line through 0, else its curve."""
     if len(term.at) == 2:
         return round(float((term.gives[1] - term.gives[0]) / (term.at[1] - term.at[0])), 4)
     return {"at": np.round(term.at, 5).tolist(), "gives": np.round(term.gives, 4).tolist()}

@@ -1,9 +1,10 @@
 """Learns mixes from pairs: recorded values of parameters, and the position of a servo that belongs to each.
 
-A servo's angle is fitted as a constant and a term for each of few parameters, a weight or a monotone curve of straight
-pieces. Least squares with bounds on every slope and a penalty on their sum (Tibshirani's lasso, 1996) leave out what is
-not needed; how strong the penalty is, and whether curves are worth it, is decided by what is predicted of blocks of the
-recording that were left out. Blocks, because neighbours in time are nearly the same face.
+A servo's angle is fitted as a constant and a term for each of a few parameters: a weight, or a monotone curve of
+straight pieces. Least squares with bounds on every slope and a penalty on their sum (Tibshirani's lasso, 1996) leave
+out parameters that are not needed. The strength of the penalty, and the choice between weights and curves, follow from
+the error on blocks of the recording that were left out of the fit (cross-validation). These are blocks because faces
+that are close in time are nearly equal.
 """
 
 from __future__ import annotations
@@ -17,21 +18,21 @@ from controller.base.parameters import Flags, Floats, Indices
 from controller.base.solve import BoundedSolver
 
 FOLDS = 5
-LEAST_PAIRS = 4 * FOLDS
-_STILL_DEG = 0.05  # a servo that moves less says nothing
-_STILL = 1e-3  # the same for a parameter
+MIN_PAIRS = 4 * FOLDS
+_MIN_SPAN_DEG = 0.05  # a servo that moves less is not fitted
+_MIN_SPAN = 1e-3  # a parameter that moves less is ignored
 _PENALTIES = (1e-4, 1e-3, 1e-2)
 _PIECES = 4
-_WORTH = 0.9  # share of the error of weights below which curves are worth it
-_LEAST_EXPLAINED = 0.5  # of the variance left out, below which the pairs do not determine a servo
-_STEEPEST = 20.0  # spans of the servo for the span of a parameter
-_LEAST_TERM = 0.005  # spans of the servo that a term moves it by
+_CURVE_GAIN = 0.9  # curves are used if their error is below this fraction of the error of weights
+_MIN_EXPLAINED = 0.5  # fraction of the left-out variance below which the pairs do not determine a servo
+_MAX_SLOPE = 20.0  # spans of the servo per span of a parameter
+_MIN_TERM = 0.005  # spans of the servo by which a term must move it
 _ALIKE = 0.9995
 
 
 @dataclass(frozen=True)
 class FittedTerm:
-    """What one parameter adds, degrees: at (k,) rising values of it, gives (k,) ; two points for a weight."""
+    """Degrees that a parameter adds. at : (k,) its values, ascending. gives : (k,) degrees; two points for a weight."""
 
     parameter: int
     at: Floats
@@ -67,27 +68,29 @@ def fit_servo(values: Floats, deg: Floats, candidates: Sequence[int] | None = No
     Parameters
     ----------
     values : (m, p) faces, in the order they were recorded. deg : (m,) angles of the servo.
-    candidates : parameters it may follow; those that move in the pairs without.
+    candidates : parameters that it may follow; None: all that move in the pairs.
 
-    Raises ValueError: fewer pairs than :data:`LEAST_PAIRS`, or a number that is not finite.
+    Raises ValueError: fewer pairs than :data:`MIN_PAIRS`, or a number that is not finite.
     """
-    if len(values) < LEAST_PAIRS or not (np.isfinite(values).all() and np.isfinite(deg).all()):
-        raise ValueError(f"needs {LEAST_PAIRS} pairs or more, all of finite numbers; there are {len(values)}")
+    if len(values) < MIN_PAIRS or not (np.isfinite(values).all() and np.isfinite(deg).all()):
+        raise ValueError(f"needs {MIN_PAIRS} pairs or more, all of finite numbers; there are {len(values)}")
     span = float(np.ptp(deg))
-    moving = [p for p in (range(values.shape[1]) if candidates is None else candidates) if values[:, p].std() > _STILL]
-    if span < _STILL_DEG or not moving:
-        why = "it does not move in the pairs" if span < _STILL_DEG else "no parameter moves in the pairs"
+    moving = [
+        p for p in (range(values.shape[1]) if candidates is None else candidates) if values[:, p].std() > _MIN_SPAN
+    ]
+    if span < _MIN_SPAN_DEG or not moving:
+        why = "it does not move in the pairs" if span < _MIN_SPAN_DEG else "no parameter moves in the pairs"
         return FittedServo(float(np.median(deg)), (), 0.0, 0.0, span, why)
     basis = {pieces: _Basis.over(values[:, moving], pieces) for pieces in (1, _PIECES)}
     errors = {(pieces, x): _left_out(basis[pieces], deg, x) for pieces in basis for x in _PENALTIES}
     best = {pieces: min(_PENALTIES, key=lambda x, k=pieces: errors[k, x]) for pieces in basis}  # type: ignore[misc]
-    pieces = _PIECES if errors[_PIECES, best[_PIECES]] < _WORTH * errors[1, best[1]] else 1
+    pieces = _PIECES if errors[_PIECES, best[_PIECES]] < _CURVE_GAIN * errors[1, best[1]] else 1
     return _fitted(basis[pieces], deg, np.array(moving), values, best[pieces], errors[pieces, best[pieces]])
 
 
 @dataclass(frozen=True)
 class _Basis:
-    """Pieces of ``j`` parameters: knots (j, k + 1), design (m, j k) of how much of each piece a face has gone."""
+    """Pieces of ``j`` parameters. knots : (j, k + 1). design : (m, j k) part of each piece that a face has passed."""
 
     knots: Floats
     design: Floats
@@ -101,12 +104,12 @@ class _Basis:
 
     @property
     def pieces(self) -> int:
-        """Of each parameter."""
+        """Number of pieces of each parameter."""
         return int(self.knots.shape[1]) - 1
 
 
 def _left_out(basis: _Basis, deg: Floats, penalty: float) -> float:
-    """Error (rms, degrees) over blocks that were left out."""
+    """Error (rms, degrees) on blocks that were left out of the fit."""
     block = np.arange(len(deg)) * FOLDS // len(deg)
     away = np.zeros(len(deg))
     for fold in range(FOLDS):
@@ -123,7 +126,7 @@ def _slopes(basis: _Basis, inside: Flags, deg: Floats, penalty: float) -> tuple[
     span = max(float(np.ptp(wanted)), 1e-9)
     matrix, goal = (design - middle) / scale, (wanted - wanted.mean()) / span
     rising = _direction(matrix, goal, basis.pieces)
-    low, high = np.where(rising, 0.0, -_STEEPEST), np.where(rising, _STEEPEST, 0.0)
+    low, high = np.where(rising, 0.0, -_MAX_SLOPE), np.where(rising, _MAX_SLOPE, 0.0)
     solver = BoundedSolver(matrix, low, high, ridge=1e-6 * len(goal), sparsity=penalty * len(goal))
     slopes = solver.solve(goal) * span / scale
     return slopes, float(wanted.mean() - middle @ slopes)
@@ -132,7 +135,7 @@ def _slopes(basis: _Basis, inside: Flags, deg: Floats, penalty: float) -> tuple[
 def _direction(matrix: Floats, goal: Floats, pieces: int) -> Flags:
     """(j k,) bool, whether each parameter's curve rises: by the weights alone, which see the others, too."""
     whole = matrix.reshape(len(matrix), -1, pieces).sum(axis=2)
-    solver = BoundedSolver(whole, np.full(whole.shape[1], -_STEEPEST), np.full(whole.shape[1], _STEEPEST),
+    solver = BoundedSolver(whole, np.full(whole.shape[1], -_MAX_SLOPE), np.full(whole.shape[1], _MAX_SLOPE),
                            ridge=1e-6 * len(goal), sparsity=1e-3 * len(goal))  # fmt: skip
     weights = solver.solve(goal)
     alone = whole.T @ goal
@@ -146,9 +149,7 @@ def _fitted(
     span = float(np.ptp(deg))
     everything = np.ones(len(deg), dtype=bool)
     slopes, rest = _slopes(basis, everything, deg, penalty)
-    kept = [
-        j for j, slope in enumerate(slopes.reshape(len(moving), -1)) if _moves(basis, j, slope) > _LEAST_TERM * span
-    ]
+    kept = [j for j, slope in enumerate(slopes.reshape(len(moving), -1)) if _moves(basis, j, slope) > _MIN_TERM * span]
     terms, by_piece = [], slopes.reshape(len(moving), -1)
     for j in kept:
         gives = np.concatenate([[0.0], np.cumsum(by_piece[j] * np.diff(basis.knots[j]))])
@@ -159,9 +160,7 @@ def _fitted(
     away = found.angles(values) - deg
     rest, rms = rest - float(away.mean()), float(away.std())
     explained = 1.0 - (left_out / max(float(deg.std()), 1e-9)) ** 2
-    why = (
-        "" if explained >= _LEAST_EXPLAINED else f"what was left out is only predicted to {left_out:.2f} degrees (rms)"
-    )
+    why = "" if explained >= _MIN_EXPLAINED else f"what was left out is only predicted to {left_out:.2f} degrees (rms)"
     return FittedServo(rest, tuple(terms), rms, left_out, span, why, _alike(values, moving, kept))
 
 
@@ -170,6 +169,6 @@ def _moves(basis: _Basis, j: int, slopes: Floats) -> float:
 
 
 def _alike(values: Floats, moving: Indices, kept: Sequence[int]) -> tuple[tuple[int, int], ...]:
-    """Used parameters beside others that moved exactly with them, so that the pairs do not say which one it is."""
+    """Pairs of a used parameter and another that always moved with it, so that the servo may follow either."""
     near = np.abs(np.corrcoef(values[:, moving].T)).reshape(len(moving), len(moving)) > _ALIKE
     return tuple((int(moving[i]), int(moving[j])) for i in kept for j in np.flatnonzero(near[i]) if j != i)

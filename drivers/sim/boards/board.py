@@ -33,11 +33,11 @@ class Board(Line):
 
     @abstractmethod
     def answer(self, packet: Any, now_s: float) -> list[tuple[int, bytes]]:
-        """Do a packet; returns what is answered, each with the channel it is about (0: none)."""
+        """Carry out a packet; return the replies, each with the channel that it concerns (0: none)."""
 
     @abstractmethod
     def reset(self, now_s: float) -> None:
-        """The state after power-on."""
+        """Set the state after power-on."""
 
     def carry_out(self, packet: Any, now_s: float) -> list[Reply]:
         """Execute a packet, unless the supply is too low; returns the replies that arrive."""
@@ -94,7 +94,7 @@ class RcChannel:
             self._trajectory = plan_timed(now_s, now, target, distance / speed)
 
     def go_in(self, target: float, now_s: float, seconds: float) -> None:
-        """Move to a target so that it is there after `seconds` (0 = at once)."""
+        """Move to a target so that it arrives after `seconds` (0 = immediately)."""
         now = self._trajectory.at(now_s)
         jump = not self.target or not target or seconds <= 0.0
         self.target = target

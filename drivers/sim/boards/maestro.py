@@ -150,7 +150,7 @@ class Maestro(Board):
         return packet.size
 
     def answer(self, packet: Command, now_s: float) -> list[tuple[int, bytes]]:
-        """Do a command. An error sends every channel home and is kept until it is read."""
+        """Carry out a command. An error sends every channel home and is kept until it is read."""
         error = packet.error
         if self._count == 6 and packet.code in _MINI_ONLY:
             error = MaestroError.PROTOCOL
@@ -240,7 +240,7 @@ def _alone(options: MaestroOptions, setting: Setting) -> Maestro:
 
 
 def _far_end(servos: Servos, options: Mapping[str, Any], setting: Setting) -> Maestro:
-    """The smallest board that has the highest channel."""
+    """Create the smallest board that has the highest channel."""
     others = dict(options)
     sizes = SIZES if others.pop("board", "mini") == "micro" else SIZES[1:]
     highest = max(channel for channel, _ in servos)

@@ -15,7 +15,7 @@ def make_port(link: Link) -> ServedPort:
     if text.startswith("memory://"):
         return MemoryPort(text)
     if text.startswith("rfc2217://"):
-        from drivers.sim.serving.rfc2217port import Rfc2217Port  # start-up: few use it
+        from drivers.sim.serving.rfc2217port import Rfc2217Port  # imported lazily: rarely used
 
         return Rfc2217Port(text)
     return PtyPort(link)

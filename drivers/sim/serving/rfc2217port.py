@@ -16,12 +16,12 @@ from serial.rfc2217 import PortManager
 
 from drivers.sim.serving.ports import TcpPort
 
-MOST_UNSENT = 1 << 16
-"""Bytes kept for a client that does not read; what comes then is lost."""
-MOST_OPTION = 1024
-"""Bytes of a telnet option; the longest of RFC 2217 has five."""
+MAX_UNSENT = 1 << 16
+"""Number of bytes kept for a client that does not read; further bytes are lost."""
+MAX_OPTION = 1024
+"""Greatest length of a telnet option, bytes; the longest of RFC 2217 has five."""
 _WRONG = (ValueError, TypeError, LookupError, AttributeError, struct.error)
-"""What pyserial's manager raises for a client that does not keep to the protocol."""
+"""Errors that pyserial's manager raises for a client that violates the protocol."""
 
 
 @dataclass
@@ -81,7 +81,7 @@ class Rfc2217Port(TcpPort):
         data = super()._receive()
         try:
             plain = b"".join(self._manager.filter(data)) if data else b""
-            too_long = data and len(self._manager.suboption or b"") > MOST_OPTION
+            too_long = data and len(self._manager.suboption or b"") > MAX_OPTION
         except _WRONG:
             plain, too_long = b"", True
         if too_long:
@@ -99,4 +99,4 @@ class Rfc2217Port(TcpPort):
         self._unsent += data
         with suppress(OSError):
             self._unsent = self._unsent[self._target.send(self._unsent) :]
-        return len(self._unsent) < MOST_UNSENT
+        return len(self._unsent) < MAX_UNSENT

@@ -22,10 +22,10 @@ from drivers.sim.servos.simulators import ids_and_models
 from drivers.sim.wire.faults import parse_fault
 from drivers.sim.wire.line import Line
 
-START_S = 20.0
-"""A child process that is not ready after this time is given up."""
+MAX_START_S = 20.0
+"""A child process that is not ready after this time is killed."""
 ERROR = "error "
-"""How the answer to a command begins that was not carried out."""
+"""Prefix of the answer to a command that failed."""
 _CHILD = "drivers.sim.serving.child"
 
 
@@ -270,7 +270,7 @@ class SimulatedBus:
             elif self._stop is not None:
                 self._done.clear()
                 self._stop.sendall(line)
-                answer = self._answer if self._done.wait(START_S) else ""
+                answer = self._answer if self._done.wait(MAX_START_S) else ""
             else:
                 return ""
         if not answer:
@@ -284,8 +284,8 @@ def _serve(server: PortServer, reading: socket.socket) -> None:
 
 
 def _next_line(child: subprocess.Popen[bytes]) -> str:
-    """What the child says next, without its end; empty where it ends, and it is killed where it takes too long."""
-    timer = threading.Timer(START_S, child.kill)
+    """Read the child's next line; empty where the child has ended. A child that takes too long is killed."""
+    timer = threading.Timer(MAX_START_S, child.kill)
     timer.start()
     try:
         return (child.stdout.readline() if child.stdout else b"").decode().strip()

@@ -28,7 +28,7 @@ class VirtualClock:
         self.now_s = now_s
 
     def __call__(self) -> float:
-        """The time, as ``time.monotonic`` gives it."""
+        """Return the time, as ``time.monotonic`` does."""
         return self.now_s
 
     def sleep(self, span_s: float) -> None:
@@ -66,7 +66,7 @@ class VirtualLink:
         return self._open
 
     def open(self) -> None:
-        """Take it; raises PortMissing while it is unplugged."""
+        """Open it; raises PortMissing while it is unplugged."""
         self._queue.advance(self.clock())
         if self._gone:
             raise PortMissing("no port virtual: it is unplugged", port=self.path)
@@ -75,7 +75,7 @@ class VirtualLink:
         self._queue.replies.clear()
 
     def close(self) -> None:
-        """Give it back."""
+        """Close it."""
         self._open = False
 
     @property
@@ -84,11 +84,11 @@ class VirtualLink:
         return self._queue.due_s
 
     def advance(self) -> None:
-        """Let the far end do what is due."""
+        """Let the far end do everything that is due now."""
         self._queue.advance(self.clock())
 
     def set_baud(self, baud: int) -> None:
-        """The host changes its bit rate."""
+        """Change the bit rate of the host."""
         self.baud = baud
         self._line.set_line_baud(baud)
 
@@ -119,11 +119,11 @@ class VirtualLink:
                 return data
 
     def read_now(self) -> bytes:
-        """What has arrived."""
+        """Return bytes that have arrived."""
         return self.read(self.clock())
 
     def drain(self, quiet_s: float = 0.0, limit_s: float = 0.2) -> int:
-        """Throw away what has arrived; returns how many bytes that was."""
+        """Discard bytes that have arrived; return their number."""
         self.sleep(quiet_s)
         self._check()
         return len(self._arrived())

@@ -66,7 +66,7 @@ class SimulatedServo(ServoState):
             self.drive.sense_quickly(now_s)
 
     def write(self, address: int, data: bytes, now_s: float) -> int:
-        """Error byte of a write; nothing is changed unless all of it is allowed."""
+        """Carry out a write and return the error byte; nothing is changed unless all of it is allowed."""
         changes = self.registers.parse(address, data)
         if isinstance(changes, ErrorNumber):
             self.on_refusal(address, data, changes, now_s)
@@ -88,7 +88,7 @@ class SimulatedServo(ServoState):
         )
 
     def reg_write(self, address: int, data: bytes) -> int:
-        """Error byte; keeps an allowed write for `action`."""
+        """Store an allowed write for `action`; return the error byte."""
         changes = self.registers.parse(address, data)
         if isinstance(changes, ErrorNumber):
             self.on_refusal(address, data, changes, self.last_instruction.at_s)
@@ -98,7 +98,7 @@ class SimulatedServo(ServoState):
         return self.alert
 
     def action(self, now_s: float) -> int:
-        """Error byte; runs the registered write, Instruction (2) where there is none."""
+        """Carry out the registered write; return the error byte, Instruction (2) where there is none."""
         if not self.registers.get("Registered Instruction"):
             return self.alert | ErrorNumber.INSTRUCTION
         changes, self._pending = self._pending, []
@@ -107,7 +107,7 @@ class SimulatedServo(ServoState):
         return self.alert
 
     def factory_reset(self, option: int, now_s: float) -> int:
-        """Error byte. 0xFF resets all, 1 keeps the id, 2 keeps id and baud rate."""
+        """Reset registers and return the error byte: 0xFF resets all, 1 keeps the id, 2 keeps id and baud rate."""
         kept = {0xFF: (), 0x01: ("ID",), 0x02: ("ID", "Baud Rate")}.get(option)
         if kept is None:
             return self.alert | ErrorNumber.DATA_RANGE
@@ -144,7 +144,7 @@ class SimulatedServo(ServoState):
 
     # ------------------------------------------------------------ effects of writes
     def _effects_by_name(self) -> dict[str, Callable[[int, float], None]]:
-        """What writing a register does beyond changing it."""
+        """Effects of writing a register beyond changing it, by register name."""
         effects: dict[str, Callable[[int, float], None]] = {
             "Torque Enable": self._write_torque,
             "Bus Watchdog": self._write_watchdog,
@@ -177,7 +177,7 @@ class SimulatedServo(ServoState):
             effect(value, now_s)
 
     def _store_permanent(self, item: Item, now_s: float) -> None:
-        """Wear, the time it takes and what a permanent register changes."""
+        """Count the write of a permanent register, begin its busy time, and apply what the register changes."""
         self.drive.configure()
         if self.keeps_writes:
             self.eeprom_writes[item.name] += 1

@@ -12,11 +12,11 @@ from drivers.sim.servos.registers import Registers
 from drivers.tables.tables import ControlTable
 
 OVERLOAD_AFTER_S = 1.0
-"""How long a jammed motor gives its full torque before it counts as overloaded."""
+"""Time that a jammed motor gives its full torque before it counts as overloaded."""
 
 
 class Sensing(Enum):
-    """What has to be sensed before registers are read."""
+    """Which sensors must be updated before registers are read."""
 
     NOTHING = 0
     QUICK = 1
@@ -24,12 +24,12 @@ class Sensing(Enum):
 
 
 def speed_unit(table: ControlTable) -> float:
-    """One step of a model's speed register, ticks/s."""
+    """Return one step of a model's speed register, ticks/s."""
     return (table.get("Present Speed") or table["Present Velocity"]).scale / table.rad_per_tick
 
 
 class Drive(ABC):
-    """Turns goal registers into a trajectory and what the shaft does into registers, for one servo on from ``now_s``.
+    """Converts goal registers to a trajectory, and motion of the shaft to registers, for one servo from ``now_s`` on.
 
     goals : names of the registers that move the motor in the present mode.
     offset : Present Position less the shaft's, ticks; `side` and `mirror` reverse the direction.
@@ -65,14 +65,14 @@ class Drive(ABC):
         self.sense(now_s)
 
     def sensing(self, addresses: Collection[int]) -> Sensing:
-        """What has to be sensed before the bytes at these addresses are read."""
+        """Return which sensors must be updated before the bytes at these addresses are read."""
         sensed = {at for at in addresses if self.first_sensed <= at < self.last_sensed}
         if not sensed:
             return Sensing.NOTHING
         return Sensing.QUICK if sensed <= self.quick else Sensing.ALL
 
     def torque_limit(self) -> float:
-        """Most that the motor may give by its registers, as a share of its stall torque."""
+        """Greatest torque that the registers allow, as a fraction of the stall torque."""
         item = self.registers.table.get("Torque Limit")
         return self.registers.get("Torque Limit") / (item.maximum or 1000) if item else 1.0
 
@@ -85,7 +85,7 @@ class Drive(ABC):
         return self.mirror + self.side * float(register - self.offset)
 
     def stop(self, now_s: float) -> None:
-        """Stop at once (bus watchdog: profile acceleration and velocity count as 0)."""
+        """Stop immediately (bus watchdog: profile acceleration and velocity count as 0)."""
         self.plant.trajectory = hold(now_s, self.plant.motion(now_s).position)
 
     def coast(self, now_s: float) -> None:
@@ -93,7 +93,7 @@ class Drive(ABC):
         self.plant.trajectory = plan_stop(now_s, self.plant.motion(now_s), 0.5 * self.plant.top_acceleration)
 
     def observe(self, now_s: float) -> tuple[Motion, Motion, float]:
-        """(motion of the shaft, motion commanded to the motor, load)."""
+        """Return (motion of the shaft, motion commanded to the motor, load)."""
         plant = self.plant
         commanded = plant.trajectory.at(now_s)
         motion = plant.follow(now_s, commanded)
@@ -106,7 +106,7 @@ class Drive(ABC):
         return motion, commanded, load
 
     def give(self) -> float:
-        """How far the position control lets the shaft give way to a torque, ticks for the motor's stall torque."""
+        """Compliance of the position control: ticks by which the shaft yields to the motor's stall torque."""
         return 0.0
 
     def hardware_errors(self, now_s: float, load: float) -> int:

@@ -9,7 +9,7 @@ from drivers.sim.servos.registers import Registers
 from drivers.tables.tables import to_magnitude
 
 MULTI_TURN = 0x10
-"""Feetech's Phase (18): present positions leave the turn."""
+"""Bit of Feetech's register Phase (18): positions count over several turns."""
 SPEED_STEPS = 1.0
 """Feetech: steps/s of one unit of Goal and Present Velocity (STS memory table, address 46: steps/s)."""
 LIMIT_STEPS = 50
@@ -38,10 +38,10 @@ class WordDrive(Drive):
         self.configure()
 
     def configure(self) -> None:
-        """Every setting is read when it is used."""
+        """Does nothing: every setting is read when it is used."""
 
     def plan(self, now_s: float) -> None:
-        """To Goal Position at Moving Speed (0 = the motor's top speed); in wheel mode at that share of full power."""
+        """Plan the motion to Goal Position at Moving Speed (0: top speed), or in wheel mode without end."""
         registers, plant = self.registers, self.plant
         now, moving = plant.motion(now_s), registers.get("Moving Speed")
         magnitude = moving & (1 << DIRECTION_BIT) - 1
@@ -130,18 +130,18 @@ class FeetechDrive(WordDrive):
         plant.trajectory = plan_move(now_s, now, goal, min(speed or top, top), self._acceleration())
 
     def _top_speed(self) -> float:
-        """The motor's, or Maximum Velocity Limit where that is slower; 0 there is no limit."""
+        """Top speed of the motor, or Maximum Velocity Limit where that is lower; there 0 means no limit."""
         limit = self.registers.get("Maximum Velocity Limit") * LIMIT_STEPS
         return min(limit or self.plant.top_speed, self.plant.top_speed)
 
     def _acceleration(self) -> float:
-        """STS: Acceleration, where it is not 0, and at most Maximum Acceleration, where that is not 0."""
+        """Acceleration of STS servos: the registers Acceleration and Maximum Acceleration, where they are not 0."""
         top, registers = self.plant.top_acceleration, self.registers
         names = [name for name in ("Acceleration", "Maximum Acceleration") if name in registers.table]
         return min((ACCELERATION_STEPS * registers.get(name) or top for name in names), default=top)
 
     def _position(self, motion: Motion) -> int:
-        """With multi-turn feedback (STS) it leaves the turn."""
+        """Present Position, which with multi-turn feedback (STS) counts over several turns."""
         registers = self.registers
         if "Homing Offset" in registers.table and registers.get("Phase") & MULTI_TURN:
             return self.to_register(motion.position)

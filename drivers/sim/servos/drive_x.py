@@ -19,7 +19,7 @@ MAX_POSITION_OFFSET = 1024
 """Homing Offset beyond this is ignored in position mode (e-Manual, Homing Offset)."""
 
 POSITION_P = 128
-"""Steps of Position P Gain for a whole step of PWM per step of error (e-Manual, Position PID Gain)."""
+"""Value of Position P Gain that gives one step of PWM per step of error (e-Manual, Position PID Gain)."""
 FOLLOWING_TICKS = 10
 """Distance between commanded and real position from which on it is a following error."""
 
@@ -112,7 +112,7 @@ class XDrive(Drive):
         return self.full_pwm * POSITION_P / max(registers.get("Position P Gain"), 1)
 
     def _reach(self, current: int) -> float:
-        """How far from its rest a current can stretch the skin, ticks."""
+        """Distance from rest, ticks, to which a current can stretch the skin."""
         spring = self.plant.skin.spring
         return abs(current) / self.full_current / spring if spring > 0.0 else math.inf
 
@@ -127,7 +127,7 @@ class XDrive(Drive):
             self._plan_speed(now_s, mode)
 
     def _plan_position(self, now_s: float, mode: int) -> None:
-        """To Goal Position, or as far as the current can stretch the skin."""
+        """Plan the motion to Goal Position, or as far as the current can stretch the skin."""
         plant = self.plant
         acceleration, speed, register = self._profile()
         reach = self.reach
@@ -154,7 +154,7 @@ class XDrive(Drive):
         return profile
 
     def _plan_current(self, now_s: float) -> None:
-        """The shaft goes where the skin's spring balances the current; without a spring it turns."""
+        """Plan the motion to where the skin's spring balances the current; without a spring the shaft keeps turning."""
         share = self.side * self.registers.get("Goal Current") / self.full_current
         now, plant, top = self.plant.motion(now_s), self.plant, self.top_speed
         if plant.skin.spring > 0.0:
@@ -182,7 +182,7 @@ class XDrive(Drive):
         return load
 
     def sense_quickly(self, now_s: float) -> None:
-        """Only current, velocity, position and temperature."""
+        """Write current, velocity, position and temperature."""
         motion, _, load = self.observe(now_s)
         side = self.side
         _MOTION.pack_into(
@@ -223,7 +223,7 @@ class XDrive(Drive):
 
 
 def _current_at_stall(table: ControlTable) -> int:
-    """What Present Current shows at stall, in its steps; Current Limit where the maker gives no current at stall."""
+    """Value of Present Current at stall; Current Limit where the maker gives no stall current."""
     if table.motor is None:
         return table["Current Limit"].initial
     return round(table.motor.stall_a / table["Present Current"].scale)

@@ -14,7 +14,7 @@ _SENSED = struct.Struct("<BHhhii4xiiHBB")
 """Moving Status, Realtime Tick, Present PWM, Current, Velocity and Position; Position and Velocity Trajectory; Present
 Input Voltage, Inverter and Motor Temperature."""
 _STEPS = 524_288 / 4096
-"""Of a turn for one of an X-series servo."""
+"""Number of steps of a Y-series servo per step of an X-series servo."""
 
 
 class YDrive(XDrive):

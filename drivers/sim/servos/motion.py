@@ -68,7 +68,7 @@ class Trajectory:
 
     @property
     def heading(self) -> int:
-        """Way in which it goes in the end: 1 to higher positions, -1 to lower ones, 0 where it stands still."""
+        """Final direction: 1 to higher positions, -1 to lower ones, 0 where it stands still."""
         return _sign(self._end_velocity) or _sign(self.end - self.turn[1])
 
     @property
@@ -109,7 +109,7 @@ def _sign(value: float) -> int:
 
 
 def hold(now_s: float, position: float) -> Trajectory:
-    """Stand still."""
+    """Plan to stand still at a position."""
     return Trajectory(now_s, Motion(position), [], position)
 
 
@@ -140,7 +140,7 @@ def plan_move(
 
 
 def plan_timed(now_s: float, start: Motion, goal: float, total_s: float, ramp_s: float = 0.0) -> Trajectory:
-    """Move to rest at `goal` in exactly `total_s`, with ramps of `ramp_s` (at most half of it).
+    """Plan a move to rest at `goal` in exactly `total_s`, with ramps of `ramp_s` (at most half of it).
 
     The cruising speed v follows from D = (v0 + v)/2 ramp + v (total - 2 ramp) + v/2 ramp.
     """
@@ -154,14 +154,14 @@ def plan_timed(now_s: float, start: Motion, goal: float, total_s: float, ramp_s:
 
 
 def plan_speed(now_s: float, start: Motion, goal_velocity: float, acceleration: float) -> Trajectory:
-    """Ramp to a velocity and keep it."""
+    """Plan a ramp to a velocity that is then kept."""
     change = goal_velocity - start.velocity
     pieces = [(abs(change) / acceleration, math.copysign(acceleration, change))]
     return Trajectory(now_s, start, pieces, None, Profile.RECTANGULAR)
 
 
 def plan_stop(now_s: float, start: Motion, acceleration: float) -> Trajectory:
-    """Slow down to rest, wherever that is."""
+    """Plan to slow down to rest, at whatever position that ends."""
     time = abs(start.velocity) / acceleration
     pieces = [(time, -math.copysign(acceleration, start.velocity))]
     return Trajectory(now_s, start, pieces, start.position + 0.5 * start.velocity * time)

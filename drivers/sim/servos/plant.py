@@ -10,12 +10,12 @@ from drivers.sim.servos.motion import Motion, Trajectory, hold
 
 @dataclass(frozen=True, slots=True)
 class Skin:
-    """Load on the shaft, as shares of the motor's stall torque.
+    """Load on the shaft, as fractions of the motor's stall torque.
 
-    spring : share per tick away from `rest`: silicone skin pulls back.
+    spring : fraction per tick of distance from `rest`, since silicone skin pulls back.
     rest : position of the skin at rest, ticks; None = where the servo starts.
-    inertia : share per tick/s².
-    friction : share while it turns.
+    inertia : fraction per tick/s².
+    friction : fraction while it turns.
 
     The defaults are for servos of 4096 steps a turn, see `for_turn`.
     """
@@ -27,13 +27,13 @@ class Skin:
 
     @classmethod
     def for_turn(cls, ticks: int) -> Skin:
-        """The usual skin on a servo of so many steps a turn: the same share at the same angle."""
+        """The default skin for a servo with so many steps per turn: the same load at the same angle."""
         fine = 4096 / ticks
         return cls(spring=cls().spring * fine, inertia=cls().inertia * fine)
 
 
 SETTLED = 5.0
-"""Time constants after which nothing is left of a lag."""
+"""Number of time constants after which a lag counts as zero."""
 NO_STOPS = (-math.inf, math.inf)
 """A shaft that may turn without end."""
 
@@ -122,7 +122,7 @@ class Plant:
         self._flank = way
 
     def _in_play(self, now_s: float, motion: Motion) -> Motion:
-        """The shaft while the motor runs through the play, and while the control then catches up."""
+        """Motion of the shaft while the motor runs through the play, and while the control then catches up."""
         turn_s, position = self._turned
         if now_s < turn_s:
             return motion
@@ -183,7 +183,7 @@ class Plant:
         self._heated_s = max(now_s, self._heated_s)
 
     def jam(self, now_s: float, stuck: bool) -> None:
-        """Hold the shaft where it is, or release it (it then goes on from there)."""
+        """Hold the shaft at its position, or release it, after which it goes on from there."""
         if stuck and self.jammed_at is None:
             self.jammed_at = self.motion(now_s).position
             self.jammed_since = now_s
@@ -192,12 +192,12 @@ class Plant:
             self.jammed_at = self.jammed_since = None
 
     def set_stops(self, now_s: float, stops: tuple[float, float]) -> None:
-        """Put mechanical stops beside the shaft, or take them away (`NO_STOPS`); it stays between them."""
+        """Set mechanical stops of the shaft, or remove them (`NO_STOPS`); the shaft stays between them."""
         self.stops, self.pressed_since = stops, None
         self.trajectory = hold(now_s, self.motion(now_s).position)
 
     def place(self, now_s: float, position: float) -> None:
-        """Put the shaft somewhere between its stops, as by hand with torque off."""
+        """Move the shaft to a position between its stops, as by hand with torque off."""
         position = min(max(position, self.stops[0]), self.stops[1])
         self.trajectory = hold(now_s, position)
         if self.jammed_at is not None:
@@ -205,7 +205,7 @@ class Plant:
 
 
 def _time_for(distance: float, acceleration: float, top_speed: float) -> float:
-    """Time from rest through a distance, s: at an acceleration, and at most at a speed."""
+    """Time, s, from rest through a distance with an acceleration and a top speed."""
     ramp = 0.5 * top_speed * top_speed / acceleration
     if distance <= ramp:
         return math.sqrt(2.0 * distance / acceleration)

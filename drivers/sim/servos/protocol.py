@@ -1,4 +1,4 @@
-"""Base class of a protocol of simulated servos: who receives a packet, who answers, and the shared instructions."""
+"""Base class of the protocols of simulated servos: which servos receive and answer a packet, and instructions."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ class Protocol(ABC):
 
     @cached_property
     def handlers(self) -> dict[int, Callable[[Any, float], list[Reply]]]:
-        """What carries out an instruction, by its number; the numbers are the same in both protocols."""
+        """Functions that carry out instructions, by number; the numbers are the same in both protocols."""
         return {
             Instruction.PING: self._ping,
             Instruction.READ: self._read,
@@ -178,7 +178,7 @@ class Protocol(ABC):
         return int.from_bytes(params[at : at + self.WORD], "little")
 
     def _ping(self, packet: Any, now_s: float) -> list[Reply]:
-        """Always answered, whatever the Status Return Level. Broadcast: by all servos, in order of id."""
+        """Answer a ping, whatever the Status Return Level; a broadcast is answered by all servos, in order of id."""
         ids = sorted(self.by_id) if packet.id == BROADCAST_ID else [packet.id]
         replies = []
         for device_id in ids:
@@ -186,7 +186,7 @@ class Protocol(ABC):
         return replies
 
     def _read(self, packet: Any, now_s: float) -> list[Reply]:
-        """Not answered by a secondary id."""
+        """Answer a read; a secondary id does not answer."""
         params, word = packet.params, self.WORD
         if len(params) != 2 * word:
             return self._refuse(packet, ErrorNumber.DATA_LENGTH, now_s, self.MALFORMED_READ_LEVEL)

@@ -18,16 +18,16 @@ from drivers.sim.servos.drive_x import CURRENT, CURRENT_POSITION, EXTENDED, PWM,
 from drivers.sim.servos.drive_y import YDrive
 from drivers.sim.servos.plant import NO_STOPS, Plant, Skin
 from drivers.sim.servos.registers import Change, Registers
-from drivers.sim.wire.faults import LONGEST
+from drivers.sim.wire.faults import MAX_VALUE
 from drivers.tables.models import check_driven
 from drivers.tables.tables import load_table
 
 TRIPPED = 0xFF
-"""Bus Watchdog (98) after it has expired."""
+"""Value of Bus Watchdog (98) after it has tripped."""
 WATCHDOG_STEP_S = 0.02
 HEALTH_PERIOD_S = 0.1
 BROWN_OUT_V = 2.5
-"""Supply below which a servo's processor stops: it receives nothing, and restarts when the supply is back."""
+"""Supply voltage below which a servo's processor stops; it restarts when the supply is back."""
 INVERTER_OFF, TURNING_ON, RUNNING, TURNING_OFF, HARDWARE_FAULT = 2, 4, 5, 6, 8
 """Controller State of Y-series servos."""
 BOOT_S = 0.25
@@ -41,7 +41,7 @@ def same_rate(first: int, second: int) -> bool:
 
 @dataclass(slots=True)
 class LastInstruction:
-    """When the last instruction went over the wire; shared by the servos of a bus."""
+    """Time of the last instruction on the wire; shared by the servos of a bus."""
 
     at_s: float
 
@@ -193,8 +193,8 @@ class ServoState:
 
         Raises ValueError: the motor is on and holds the shaft, or the position is further away than servos count.
         """
-        if not abs(position) <= LONGEST:
-            raise ValueError(f"servo {self.id}: positions go from {-LONGEST:.0f} to {LONGEST:.0f} steps")
+        if not abs(position) <= MAX_VALUE:
+            raise ValueError(f"servo {self.id}: positions go from {-MAX_VALUE:.0f} to {MAX_VALUE:.0f} steps")
         if self.plant.powered:
             raise ValueError(f"servo {self.id} holds its shaft: switch its torque off before moving it by hand")
         self.plant.place(now_s, self.drive.to_shaft(round(position)))
@@ -275,7 +275,7 @@ class ServoState:
         return self.watchdog_ignored or (small and self.registers.get("Operating Mode") == CURRENT)
 
     def change_fault(self, kind: str, value: Any, begins: bool, now_s: float) -> None:
-        """A fault of this servo begins or ends; kinds as in ``drivers.sim.wire.faults``."""
+        """Begin or end a fault of this servo; kinds as in ``drivers.sim.wire.faults``."""
         plant = self.plant
         if kind == "alert":
             self.forced_alert = begins
@@ -300,7 +300,7 @@ class ServoState:
             self.check_health(now_s)
 
     def _supply(self, volts: float, now_s: float) -> None:
-        """Another supply: too little for the processor, enough of it again, or more or less than before."""
+        """Change the supply voltage; the processor stops below `BROWN_OUT_V` and restarts above it."""
         was_off, is_off = self.deaf_until == math.inf, volts < BROWN_OUT_V
         self.plant.supply_v = volts
         if is_off and not was_off:
@@ -386,7 +386,7 @@ class ServoState:
             self._permanent[first:end] = self.registers.memory[first:end]
 
     def _reset_goals(self, now_s: float) -> None:
-        """Goal Position where the shaft is; current and PWM at their limits, or 0 in the mode that they control."""
+        """Set Goal Position to the shaft's position, and current and PWM to their limits, or 0 in their own mode."""
         registers = self.registers
         registers.put("Goal Position", self.drive.to_register(self.plant.motion(now_s).position))
         if "Goal PWM" not in self.table or self.table.error_codes:

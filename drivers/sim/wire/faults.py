@@ -28,8 +28,8 @@ from typing import Any, NamedTuple
 from drivers.base.errors import DriverError
 from drivers.packets.packet import MAX_ID
 
-LONGEST = 1e9
-"""Largest time (s), count and number of steps that a fault may have."""
+MAX_VALUE = 1e9
+"""Greatest time (s), count, rate and number of steps in a fault."""
 
 
 class Kind(NamedTuple):
@@ -70,12 +70,12 @@ def _within(read: Read, low: float, high: float) -> Read:
     return checked
 
 
-_duration = _within(_seconds, 0.0, LONGEST)
+_duration = _within(_seconds, 0.0, MAX_VALUE)
 
 
 def _span(text: str) -> tuple[float, float]:
     low, high = (float(end) for end in text.split(".."))
-    if not -LONGEST < low < high < LONGEST:
+    if not -MAX_VALUE < low < high < MAX_VALUE:
         raise ValueError("LOW..HIGH, the lower end first")
     return low, high
 
@@ -106,7 +106,7 @@ KINDS: dict[str, Kind] = {
     "stall": Kind("servo"),  # shaft stuck where it is
     "watchdog-ignored": Kind("servo"),  # keeps turning when its bus watchdog trips
     "dup": Kind("servo"),  # a second servo has the same id; their replies collide
-    "baud": Kind("servo", _within(_integer, 1, LONGEST)),  # listens at so many bits per second
+    "baud": Kind("servo", _within(_integer, 1, MAX_VALUE)),  # listens at so many bits per second
     "eeprom-busy": Kind("servo", _duration, 0.02),  # receives nothing for this time after each permanent write
     "echo": Kind("bus"),  # the adapter echoes every byte it was sent
     "chain-stop": Kind("bus"),  # no servo after a silent one answers
@@ -138,7 +138,7 @@ class Fault:
 _OPTIONS: dict[str, tuple[str, Callable[[str], Any]]] = {
     "every": ("every", int),
     "p": ("chance", float),
-    "count": ("count", _within(int, 0, LONGEST)),
+    "count": ("count", _within(int, 0, MAX_VALUE)),
     "at": ("at_s", _seconds),
     "for": ("for_s", _duration),
     "as": ("alias", str),
@@ -213,7 +213,7 @@ def _with_option(fault: Fault, part: str) -> Fault:
     attribute, read = _OPTIONS[key]
     changes: dict[str, Any] = {attribute: _convert(fault.spec, read, text, key)}
     fault = replace(fault, **changes)
-    if fault.every < 1 or not 0.0 <= fault.chance <= 1.0 or not 0.0 <= fault.at_s <= LONGEST:
+    if fault.every < 1 or not 0.0 <= fault.chance <= 1.0 or not 0.0 <= fault.at_s <= MAX_VALUE:
         raise _bad(fault.spec, f"{part!r} is out of range")
     return fault
 

@@ -279,7 +279,9 @@ def test_export_poses_what_is_set_and_asks_exporters_of_others(tmp_path, monkeyp
         ),
     )
     blamed = []
-    monkeypatch.setattr("controller.tools.plugins.EXPORTERS.blaming", lambda kind: blamed.append(kind) or nullcontext())
+    monkeypatch.setattr(
+        "controller.tools.plugins.EXPORTERS.naming_package", lambda kind: blamed.append(kind) or nullcontext()
+    )
     head = ["--head", str(sheet[1])]
     said = CliRunner().invoke(make_app(), ["export", "a.ODD", *head, "--set", "jawOpen=0.5", "--set", "headYaw=0"])
     assert said.exit_code == 0, said.exception

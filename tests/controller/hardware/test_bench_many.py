@@ -64,13 +64,15 @@ def falling(path: str) -> Iterator[object]:
 )
 def test_a_bus_that_fails_is_named_with_the_reason(paths: list[str], processes: bool, said: str) -> None:
     with pytest.raises(ControllerError) as caught:
-        module._at_once(paths, falling, 0.1, 0.0, processes=processes)
+        module._measure_at_once(paths, falling, 0.1, 0.0, processes=processes)
     assert str(caught.value).startswith(said) and "good" not in str(caught.value)
     assert "--buses" in caught.value.hint
 
 
 def test_loops_of_processes_come_in_the_order_of_the_buses() -> None:
-    assert all(loop.rate_hz > 0.0 for loop in module._at_once(["one", "two"], falling, 0.1, 0.0, processes=True))
+    assert all(
+        loop.rate_hz > 0.0 for loop in module._measure_at_once(["one", "two"], falling, 0.1, 0.0, processes=True)
+    )
 
 
 @pytest.mark.parametrize(

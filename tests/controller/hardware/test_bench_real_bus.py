@@ -43,10 +43,10 @@ def test_a_bus_is_measured_and_nothing_is_written(model: str, protocol: int) -> 
 def test_a_slow_adapter_is_found_by_its_answers() -> None:
     with SimulatedBus([1, 2], wire=True, latency_s=0.016) as bus:
         found = measured(bus.path)
-    late = found["an answer comes after its time on the wire by"]
-    assert late.value > 14.0
-    assert late.kept is False
-    assert "setserial" in late.reach
+    delay = found["an answer comes after its time on the wire by"]
+    assert delay.value > 14.0
+    assert delay.kept is False
+    assert "setserial" in delay.reach
     assert found["reads of all"].value < 62.0
 
 

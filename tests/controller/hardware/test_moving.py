@@ -14,21 +14,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controller.hardware.moving import LEAD_RAD, PERIOD_S, STALE_S, NotMoved, Sampler, move_a_little
+from controller.hardware.moving import MAX_LEAD_RAD, PERIOD_S, STALE_S, NotMoved, Sampler, move_a_little
 from drivers.base.bus import BusState
 
 DEG = math.radians(1.0)
 
 
 class FormulaBus:
-    """One servo that follows its goals ``late`` samples later, by ``gain`` times their way.
+    """One servo that follows its goals ``delay`` samples later, by ``gain`` times their way.
 
     change : called with each state before it is given out.
     """
 
-    def __init__(self, late: int = 0, gain: float = 1.0, change: Any = None) -> None:
-        self.goals = [0.0] * (late + 1)
-        self.late, self.gain, self.change, self.reads = late, gain, change, 0
+    def __init__(self, delay: int = 0, gain: float = 1.0, change: Any = None) -> None:
+        self.goals = [0.0] * (delay + 1)
+        self.delay, self.gain, self.change, self.reads = delay, gain, change, 0
         self.sent: list[float] = []
 
     def write(self, goals: list[float]) -> np.ndarray:
@@ -40,7 +40,7 @@ class FormulaBus:
     def read(self) -> BusState:
         self.reads += 1
         one = np.ones(1)
-        position = self.gain * self.goals[-1 - self.late]
+        position = self.gain * self.goals[-1 - self.delay]
         state = BusState(
             time_s=0.0, position_rad=position * one, velocity_rad_s=0 * one, current_a=0.1 * one, voltage_v=11.0 * one,
             temperature_c=30 * one, hardware_error=np.zeros(1, int), error=np.zeros(1, int), torque=np.ones(1, bool),
@@ -63,13 +63,13 @@ def moved(bus: FormulaBus, load: float = 0.5, low: float = -1.0, high: float = 1
     return move_a_little(sampler(bus, load), 5 * DEG, 30 * DEG, low, high)
 
 
-@pytest.mark.parametrize("late", [0, 1, 3])
-def test_what_a_shaft_did_is_measured(late: int) -> None:
-    found = moved(FormulaBus(late))
+@pytest.mark.parametrize("delay", [0, 1, 3])
+def test_what_a_shaft_did_is_measured(delay: int) -> None:
+    found = moved(FormulaBus(delay))
     assert found.wanted_rad == pytest.approx(10 * DEG)
     assert found.moved_rad == pytest.approx(10 * DEG, abs=0.6 * DEG)
     assert found.along > 0.0
-    assert late * PERIOD_S <= found.lag_s <= (late + 1) * PERIOD_S  # it reads a period after it sends
+    assert delay * PERIOD_S <= found.lag_s <= (delay + 1) * PERIOD_S  # it reads a period after it sends
     assert (found.peak_current_a, found.peak_load, found.least_voltage_v) == pytest.approx((0.1, 0.1, 11.0))
 
 
@@ -85,12 +85,12 @@ def test_a_delay_is_measured_however_long_reading_takes(delay_s: float, reading_
         sent.append((now.s, float(goal[0])))
         return goal
 
-    def late(reads: int, state: BusState) -> BusState:
+    def delay(reads: int, state: BusState) -> BusState:
         now.s += reading_s
         position = next((goal for at_s, goal in reversed(sent) if at_s <= now.s - delay_s), 0.0)
         return replace(state, position_rad=np.array([position]))
 
-    bus.change, bus.write = late, write  # type: ignore[method-assign]
+    bus.change, bus.write = delay, write  # type: ignore[method-assign]
 
     def sleep(span_s: float) -> None:
         now.s += span_s
@@ -158,5 +158,5 @@ def test_a_movement_ends_at_the_first_sign_of_trouble(changes: dict[str, Any], w
 def test_nearly_too_much_goes_on() -> None:
     changes = {"current_a": 0.5, "age_s": STALE_S}
     assert moved(FormulaBus(change=lambda reads, state: peak(reads, state, 1, **changes))).peak_load == 0.5
-    slow = FormulaBus(change=lambda reads, state: replace(state, position_rad=state.position_rad - 0.99 * LEAD_RAD))
+    slow = FormulaBus(change=lambda reads, state: replace(state, position_rad=state.position_rad - 0.99 * MAX_LEAD_RAD))
     assert moved(slow).moved_rad == pytest.approx(10 * DEG)

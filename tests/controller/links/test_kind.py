@@ -44,7 +44,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     yield add
     for name in [name for name in sys.modules if name.startswith("plugin_")]:
         del sys.modules[name]
-    LINKS.forget()
+    LINKS.clear()
 
 
 def test_built_in_kinds_are_folders_and_formats() -> None:

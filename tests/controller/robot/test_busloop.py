@@ -164,7 +164,7 @@ def test_nothing_is_sent_while_a_pose_is_not_known(servos: SimulatedBus, monkeyp
     monkeypatch.setattr(loop.bus, "start", start)
     monkeypatch.setattr(loop.bus, "close", close)
     monkeypatch.setattr(loop.bus, "write", sent.append)
-    monkeypatch.setattr(module, "_READS", 3)
+    monkeypatch.setattr(module, "_MAX_START_READS", 3)
     with pytest.raises(NoReply, match="the position of jaw is not known") as caught:
         loop.start()
     assert "yaw" not in str(caught.value) and caught.value.hint
@@ -192,7 +192,7 @@ def test_a_single_missed_answer_is_asked_for_again(servos: SimulatedBus, monkeyp
 def test_a_lost_port_comes_back_and_motion_goes_on_from_the_measured_pose(
     servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(module, "_RETRY_NS", 50_000_000)
+    monkeypatch.setattr(module, "_RETRY_INTERVAL_NS", 50_000_000)
     face = Face()
     with running(servos, face) as loop, caplog.at_level(logging.WARNING):
         loop.begin()
@@ -219,7 +219,7 @@ def test_no_goal_is_sent_to_a_servo_that_does_not_say_where_it_is_after_a_reconn
     servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The port is back and takes goals, and all servos came up, but one does not answer: it alone stays where it is."""
-    monkeypatch.setattr(module, "_RETRY_NS", 20_000_000)
+    monkeypatch.setattr(module, "_RETRY_INTERVAL_NS", 20_000_000)
     face = Face()
     with running(servos, face, SHORT) as loop:
         loop.begin()
@@ -268,7 +268,7 @@ def test_servos_are_led_to_rest_until_each_of_them_says_that_it_is_there(
     assert resting(servos, True, [far, silent, near, there]) == 4
     assert resting(servos, True, [(True, -3.0), (True, 1.1), there]) == 2
     assert resting(servos, False, [silent, there]) == 1  # where nothing is measured, the goal counts
-    monkeypatch.setattr(module, "_REST_LIMIT_NS", -(10**9))
+    monkeypatch.setattr(module, "_MAX_REST_NS", -(10**9))
     assert resting(servos, True, [far, far]) == 1  # not longer than the limit
 
 
@@ -317,7 +317,7 @@ def test_an_error_of_the_loop_is_kept_and_the_servos_are_switched_off(servos: Si
 
 def stopping(servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch) -> tuple[Face, StopLatch]:
     """A face with the jaw open, and a latch; failed attempts are repeated soon."""
-    monkeypatch.setattr(module, "_RETRY_NS", 50_000_000)
+    monkeypatch.setattr(module, "_RETRY_INTERVAL_NS", 50_000_000)
     face = Face()
     face.values[JAW] = 1.0
     return face, StopLatch()
@@ -452,8 +452,8 @@ def test_stop_ends_the_way_to_rest(servos: SimulatedBus, monkeypatch: pytest.Mon
 def test_with_a_silent_servo_the_others_are_driven_after_a_replug_and_it_joins_with_a_ramp(
     servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "_RETRY_NS", 50_000_000)
-    monkeypatch.setattr("drivers.core.wirebus.JOIN_S", 0.05)
+    monkeypatch.setattr(module, "_RETRY_INTERVAL_NS", 50_000_000)
+    monkeypatch.setattr("drivers.core.wirebus.JOIN_INTERVAL_S", 0.05)
     monkeypatch.setattr("drivers.servos.telemetry.PROBE_S", 0.2)
     face = Face()
     with running(servos, face, SHORT) as loop:
@@ -489,14 +489,14 @@ def test_still_servos_are_let_go_and_come_back_from_where_they_are(servos: Simul
     face = Face()
     with running(servos, face, {"let_go_s": 0.3, "let_go_below_a": 5.0}) as loop:
         loop.begin()
-        until(lambda: loop._let_go)
+        until(lambda: loop._is_idle)
         until(lambda: not servos.servo(1).torque and not servos.servo(2).torque)
         servos.servo(1).place(2048 + round(2 * TICKS))  # by hand, less than what counts as moved
         ticked(loop, 10)
-        assert loop._let_go
+        assert loop._is_idle
         goals: list[float] = []
         face.values[JAW] = 0.5
-        until(lambda: not loop._let_go)
+        until(lambda: not loop._is_idle)
         goals.append(degrees(servos, 1))
         assert goals[0] == pytest.approx(2.0, abs=3.0)  # from where it was, not from 15 degrees
         until(lambda: abs(degrees(servos, 1) - 15.0) < 0.2)
@@ -510,7 +510,7 @@ def test_a_failure_while_servos_are_let_go_or_taken_again_is_overcome(
     servos: SimulatedBus, monkeypatch: pytest.MonkeyPatch, call: str, error: DriverError
 ) -> None:
     """A servo that misses its confirmation, and an adapter that resets as torque goes off or comes on."""
-    monkeypatch.setattr(module, "_RETRY_NS", 50_000_000)
+    monkeypatch.setattr(module, "_RETRY_INTERVAL_NS", 50_000_000)
     face = Face()
     with running(servos, face, {"let_go_s": 0.2, "let_go_below_a": 5.0}) as loop:
         once, real = iter([error]), getattr(loop.bus, call)
@@ -528,7 +528,7 @@ def test_a_failure_while_servos_are_let_go_or_taken_again_is_overcome(
         monkeypatch.setattr(loop.bus, call, fails_once)
         loop.begin()
         begun.set()
-        until(lambda: loop._let_go or loop._off)
+        until(lambda: loop._is_idle or loop._off)
         face.values[JAW] = 1.0
         until(lambda: abs(degrees(servos, 1) - 30.0) < 0.2)
         assert loop.error is None and servos.servo(1).torque and servos.servo(2).torque
@@ -539,10 +539,10 @@ def test_a_servo_that_sags_is_taken_again_and_then_held(servos: SimulatedBus) ->
     with running(servos, face, {"let_go_s": 0.2, "let_go_below_a": 5.0}) as loop:
         loop.begin()
         for count in (1, 2):
-            until(lambda: loop._let_go)
+            until(lambda: loop._is_idle)
             servos.servo(2).place(2048 + round(10 * TICKS))
-            until(lambda n=count: loop._letting_go.sagged == n)  # type: ignore[misc]
+            until(lambda n=count: loop._idle.drift_wake_count == n)  # type: ignore[misc]
             until(lambda: abs(degrees(servos, 2)) < 0.2)
         ticked(loop, 40)
-        assert not loop._let_go and servos.servo(2).torque
+        assert not loop._is_idle and servos.servo(2).torque
         assert loop.report()["let_go"] == {"times": 2, "sagged": 2}

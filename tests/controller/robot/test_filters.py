@@ -10,7 +10,7 @@ import pytest
 from controller.base.parameters import PARAMETERS as P
 from controller.links.net.one_euro import OneEuro
 from controller.robot.filters import TargetFilter
-from controller.robot.letting_go import LettingGo
+from controller.robot.idle_torque import IdleTorqueOff
 from controller.robot.safety import GoalFilter
 from controller.robot.settings import ChannelSettings, HeatRule, RuleSettings, SmoothSettings
 from drivers.base.bus import BusState
@@ -144,8 +144,8 @@ def test_a_filter_is_one_thing(keys: dict[str, float]) -> None:
     (state(30.0, np.nan), False), (state(30.0, 0.01, 0.2), False), (None, False),
 ])  # fmt: skip
 def test_only_what_is_still_and_unloaded_for_certain_is_let_go(measured: BusState | None, let_go: bool) -> None:
-    letting = LettingGo(1.0, 0.05)
-    found = [letting.may_let_go(np.zeros(1), measured, 0.1) for _ in range(15)]
+    idle = IdleTorqueOff(1.0, 0.05)
+    found = [idle.update(np.zeros(1), measured, 0.1) for _ in range(15)]
     assert any(found) == let_go
     assert not any(found[:9])
-    assert not any(LettingGo(0.0, 0.05).may_let_go(np.zeros(1), measured, 0.1) for _ in range(15))
+    assert not any(IdleTorqueOff(0.0, 0.05).update(np.zeros(1), measured, 0.1) for _ in range(15))

@@ -60,7 +60,7 @@ def test_a_warm_servo_moves_less_far_about_the_neutral_face_and_less_fast(celsiu
     else:
         assert (allowed.low[0], allowed.high[0]) == (-9.0, 9.0)
     assert allowed.high[1:].tolist() == [9, 9] and allowed.low[1:].tolist() == [-9, -9]
-    assert rules.speed_share.tolist() == pytest.approx([1.0 - 0.8 * warmth, 1.0, 1.0])
+    assert rules.speed_fraction.tolist() == pytest.approx([1.0 - 0.8 * warmth, 1.0, 1.0])
     assert [row["rule"] for row in rules.counter.report()] == (["heat jaw"] if warmth else [])
 
 
@@ -69,7 +69,7 @@ def test_a_reading_takes_effect_over_two_seconds_both_ways() -> None:
     shares = []
     for celsius in [70.0] * 5 + [20.0] * 5:
         cycle(rules, [celsius, 0.0, 0.0], 0.5)
-        shares.append(rules.speed_share[0])
+        shares.append(rules.speed_fraction[0])
     assert shares == pytest.approx([0.8, 0.6, 0.4, 0.2, 0.2, 0.4, 0.6, 0.8, 1.0, 1.0])
     assert rules.counter.report() == [{"rule": "heat jaw", "times": 1, "seconds": 4.0}]
 
@@ -81,7 +81,7 @@ def test_what_is_not_measured_changes_nothing() -> None:
     cycle(rules, [60.0, 20.0, 70.0])
     for celsius in (None, [np.nan] * 3):  # it keeps the last one
         cycle(rules, celsius)
-        assert rules.speed_share.tolist() == pytest.approx([0.6, 1.0, 0.2])
+        assert rules.speed_fraction.tolist() == pytest.approx([0.6, 1.0, 0.2])
 
 
 def test_of_two_rules_the_slower_counts() -> None:
@@ -91,4 +91,4 @@ def test_of_two_rules_the_slower_counts() -> None:
     ]
     both = HeatRules(each, table, np.zeros(3))
     cycle(both, [60.0, 0, 0])
-    assert both.speed_share[0] == pytest.approx(0.1)
+    assert both.speed_fraction[0] == pytest.approx(0.1)

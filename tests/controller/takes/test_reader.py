@@ -55,7 +55,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Callabl
     yield add
     for name in [name for name in sys.modules if name.startswith("plugin_")]:
         del sys.modules[name]
-    TAKES.forget()
+    TAKES.clear()
 
 
 def test_the_built_in_readers() -> None:
@@ -150,7 +150,7 @@ def test_what_is_no_take_is_refused_and_errors_name_the_package(install: Callabl
         load_take(Path("a.three"), P)
     assert caught.value.hint
     install("zero", ".zero", read="broken")
-    TAKES.forget()
+    TAKES.clear()
     with pytest.raises(PluginError, match="zero"):
         load_take(Path("a.zero"), P)
 

@@ -58,7 +58,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Install
     for name in [name for name in sys.modules if name.startswith("plugin_")]:
         del sys.modules[name]
     for registry in REGISTRIES.values():
-        registry.forget()
+        registry.clear()
 
 
 def test_a_take_that_is_none_is_told(install: Install, tmp_path: Path) -> None:

@@ -130,10 +130,13 @@ def test_a_damaged_list_of_entry_points_takes_nothing_from_others(install: Insta
 
 def test_an_error_of_another_package_names_it_and_ours_goes_through(install: Install) -> None:
     registry = install(good=GOOD)
-    with pytest.raises(PluginError, match=r"of the package somebody 0\.3 failed: KeyError"), registry.blaming("good"):
+    with (
+        pytest.raises(PluginError, match=r"of the package somebody 0\.3 failed: KeyError"),
+        registry.naming_package("good"),
+    ):
         raise KeyError("x")
     for kind, error in (("own", KeyError("x")), ("good", ValueError("x")), ("good", PluginError("x"))):
-        with pytest.raises(type(error)) as caught, registry.blaming(kind):
+        with pytest.raises(type(error)) as caught, registry.naming_package(kind):
             raise error
         assert caught.value is error
 
@@ -167,7 +170,7 @@ def test_a_plug_in_that_is_installed_later_is_found_after_a_new_look(install: In
     registry = install(late="THING = None")
     with pytest.raises(PluginError):
         registry.get("late")
-    registry.forget()
+    registry.clear()
     assert registry.kinds() == ["late", "own"]
 
 

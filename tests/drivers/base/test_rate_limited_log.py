@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.base.bus import ServoSpec
-from drivers.base.rate_limited_log import BURST, KEPT, RateLimitedLogger
+from drivers.base.rate_limited_log import BURST, MAX_TEXTS, RateLimitedLogger
 from drivers.sim.serving.virtual import VirtualBus, VirtualClock
 
 IDS = range(1, 13)
@@ -55,9 +55,9 @@ def test_what_was_said_before_comes_at_a_bounded_rate_whoever_it_is_about(
 
 
 def test_texts_are_not_kept_for_ever(say: RateLimitedLogger) -> None:
-    for number in range(3 * KEPT):
+    for number in range(3 * MAX_TEXTS):
         say("refused line %d", number)
-    assert len(say._logged) == KEPT
+    assert len(say._logged) == MAX_TEXTS
 
 
 @pytest.mark.slow

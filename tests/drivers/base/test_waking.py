@@ -4,7 +4,7 @@ import random
 
 import pytest
 
-from drivers.base.waking import LONGEST_S, WakeDelay
+from drivers.base.waking import MAX_DELAY_S, WakeDelay
 
 
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.8])
@@ -21,7 +21,7 @@ def test_it_stays_between_none_and_the_longest() -> None:
     delay = WakeDelay(0.5, 50e-6)
     for _ in range(1000):
         delay.note(1.0)
-    assert delay.late_s == LONGEST_S
+    assert delay.late_s == MAX_DELAY_S
     for _ in range(1000):
         delay.note(-1.0)
     assert delay.late_s == 0.0

@@ -16,7 +16,7 @@ import pytest
 
 from drivers.base.bus import Floats, ServoSpec
 from drivers.base.errors import NoReply, PortLost
-from drivers.boards.bus import OFF_TRIES, BoardBus
+from drivers.boards.bus import MAX_OFF_TRIES, BoardBus
 from drivers.port.serialport import PSEUDO_MARGIN_S
 from drivers.sim.serving.virtual import VirtualClock
 
@@ -148,7 +148,7 @@ def test_a_servo_that_is_not_confirmed_is_tried_several_times_and_named(far: int
         assert caught.value.servo_ids == (8,)
         assert caught.value.hint == "switch the servos' power off"
         lines = received(bus, far)
-        assert (lines.count("3:off"), lines.count("8:off")) == (2, 1 + OFF_TRIES)
+        assert (lines.count("3:off"), lines.count("8:off")) == (2, 1 + MAX_OFF_TRIES)
         bus.confirmed = {0, 1}
 
 

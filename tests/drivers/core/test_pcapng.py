@@ -90,6 +90,6 @@ def test_a_cut_file_is_told() -> None:
 
 
 def test_the_number_of_packets_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pcapng, "MOST_PIECES", 2)
+    monkeypatch.setattr(pcapng, "MAX_PIECES", 2)
     with pytest.raises(DriverError, match="at most 2 pieces"):
         read_pcapng(FILE)

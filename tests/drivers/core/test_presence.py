@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from drivers.base.bus import BusState, make_state
-from drivers.core.presence import AGREE_RAD, AWAY_S, AWAY_TURNS, Presence
+from drivers.core.presence import AWAY_ROUNDS, AWAY_S, MAX_DISAGREEMENT_RAD, Presence
 
 
 def state(fresh: list[int], silent: tuple[int, ...] = (0, 0, 0), age_s: float = 10.0, at_rad: float = 0.0) -> BusState:
@@ -31,17 +31,17 @@ def test_a_silent_servo_is_away_at_once_and_back_with_its_second_position() -> N
 def test_positions_that_do_not_agree_bring_no_servo_back() -> None:
     presence = Presence(3)
     presence.note(state([1, 0, 1], (0, 1, 0)), 1)
-    for at_rad in (0.0, 2 * AGREE_RAD, 0.0):
+    for at_rad in (0.0, 2 * MAX_DISAGREEMENT_RAD, 0.0):
         assert presence.note(state([1, 1, 1], at_rad=at_rad), 1) == []
     presence.note(state([1, 0, 1], (0, 1, 0)), 1)
     assert presence.note(state([1, 1, 1]), 1) == [], "the positions of before it went do not count"
-    assert presence.note(state([1, 1, 1], at_rad=0.9 * AGREE_RAD), 1) == [1]
+    assert presence.note(state([1, 1, 1], at_rad=0.9 * MAX_DISAGREEMENT_RAD), 1) == [1]
 
 
 def test_a_servo_is_away_that_was_asked_often_enough_for_long_enough() -> None:
     for turn in (1, 4):
         presence = Presence(3)
-        for _ in range(AWAY_TURNS * turn):
+        for _ in range(AWAY_ROUNDS * turn):
             presence.note(state([1, 1, 0]), turn)
             assert presence.driven.all(), "a turn is not over"
         presence.note(state([1, 1, 0], age_s=AWAY_S), turn)

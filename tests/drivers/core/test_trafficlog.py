@@ -55,6 +55,6 @@ def test_a_wrong_log_is_told(text: str, message: str) -> None:
 
 
 def test_the_number_of_pieces_is_limited(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trafficlog, "MOST_PIECES", 2)
+    monkeypatch.setattr(trafficlog, "MAX_PIECES", 2)
     with pytest.raises(DriverError, match="at most 2 pieces"):
         read_log("# omote traffic = 1\n" + "0.1 > ff\n" * 3)

@@ -10,7 +10,7 @@ import pytest
 
 from drivers.base.bus import Bus, BusState, ServoSpec
 from drivers.base.errors import BusError, DriverError, NoReply, PortLost, PortMissing, ServoRefused
-from drivers.core.wirebus import JOIN_REST, LONGEST_TRY_S
+from drivers.core.wirebus import MAX_ATTEMPT_S, RETRY_DELAY_FACTOR
 from drivers.sim.serving.virtual import VirtualBus
 
 SERVOS = tuple(ServoSpec(i, f"s{i}", "rc-180", -0.5, 0.5, 2.0, 50.0) for i in (1, 4))
@@ -168,7 +168,9 @@ def test_servos_behind_a_port_that_does_not_come_back_are_not_confirmed_off(boar
     board.fault("unplug")
     with pytest.raises(PortLost):
         bus.read()
-    with pytest.raises(PortLost, match="servos not confirmed off, for their port is gone: no port virtual") as caught:
+    with pytest.raises(
+        PortLost, match="servos not confirmed off, because their port is gone: no port virtual"
+    ) as caught:
         bus.stop()
     assert (caught.value.hint, caught.value.servo_ids) == ("switch the servos' power off", (1, 4))
     assert not bus.running
@@ -352,7 +354,7 @@ def test_a_process_that_was_stopped_in_an_attempt_tries_again_within_minutes(mon
     with wire.bus(watchdog_ms=0) as bus:
         bus.start()
         attempts = stuck(wire, bus, monkeypatch, 0, takes_s=6 * 3600.0)
-        for _ in range(round(2.0 * JOIN_REST * LONGEST_TRY_S)):
+        for _ in range(round(2.0 * RETRY_DELAY_FACTOR * MAX_ATTEMPT_S)):
             bus.read()
             wire.clock.sleep(1.0)
         assert len(attempts) >= 2 and bus.driven[1]

@@ -100,7 +100,7 @@ def test_a_servo_that_refuses_pointers_is_read_plainly(
     monkeypatch.setattr(type(refuser), "_store", deaf)
     with caplog.at_level(logging.WARNING), open_bus("dynamixel", SERVOS, port=wire.path, **CALM) as bus:
         bus.start()
-        assert 'no indirect addressing for "brow" (id 2): read plainly' in caplog.text
+        assert 'no indirect addressing for "brow" (id 2): slow values are read in turn' in caplog.text
         state = settle(bus, [0.2, 0.2, 0.2])
         assert state.fresh.all()
         assert read_until(bus, lambda s: bool(np.isfinite(s.temperature_c).all())).torque.all()

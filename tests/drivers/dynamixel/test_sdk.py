@@ -445,10 +445,10 @@ class Pieces:
 
 def test_of_a_reply_in_pieces_more_is_awaited_until_it_is_whole_or_none_comes() -> None:
     port = Pieces(b"abc", b"de", b"fghij")
-    assert Packets()._fill(port, 10) == b"abcdefghij"
+    assert Packets()._receive(port, 10) == b"abcdefghij"
     assert port.asked == 2
     cut = Pieces(b"abc", b"")
-    assert (Packets()._fill(cut, 10), cut.asked) == (b"abc", 1)
+    assert (Packets()._receive(cut, 10), cut.asked) == (b"abc", 1)
 
 
 def test_broadcast_ping_finds_everybody(wire: Wire, ours: tuple) -> None:

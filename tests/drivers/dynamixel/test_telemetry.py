@@ -250,7 +250,7 @@ def test_servos_that_ignore_fast_reads_are_read_plainly(wire: VirtualBus) -> Non
 
 
 def test_fast_reads_come_back_after_a_fault_has_passed(wire: VirtualBus, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(telemetry, "FAST_AGAIN_S", 0.2)
+    monkeypatch.setattr(telemetry, "FAST_RETRY_S", 0.2)
     table = wire.chain.servos[0].table
     with wire.bus(fast=True, **CALM) as bus:
         bus.start()

@@ -286,7 +286,7 @@ def test_a_start_needs_to_know_whether_the_board_has_errors(number: int, monkeyp
     rig = VirtualBus([SERVO, replace(SERVO, id=4, name="brow")], "maestro", driver=QUICK, baud=115_200,
                      options={"board": "micro"})  # fmt: skip
     with rig.bus() as bus:
-        checked, request = bus._checked, bus._request
+        checked, request = bus._send_and_check, bus._request
 
         def check(start: object) -> object:
             seen = iter(range(9))
@@ -301,7 +301,7 @@ def test_a_start_needs_to_know_whether_the_board_has_errors(number: int, monkeyp
             finally:
                 monkeypatch.setattr(bus, "_request", request)
 
-        monkeypatch.setattr(bus, "_checked", check)
+        monkeypatch.setattr(bus, "_send_and_check", check)
         with pytest.raises((NoReply, ServoRefused), match=r"whether it has errors|reports protocol"):
             bus.start()
     assert [row["pulse_us"] for row in rig.line.describe(rig.clock())] == [0] * 6

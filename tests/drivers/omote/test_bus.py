@@ -20,7 +20,7 @@ from controller.links.line.session import LineSession
 from drivers import open_bus
 from drivers.base.bus import Bus, ServoSpec
 from drivers.base.errors import DriverError, NoReply, WrongModel
-from drivers.omote.bus import LOST_S
+from drivers.omote.bus import ANSWER_TIMEOUT_S
 from drivers.sim import SimulatedBus
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.boards.test_boards import NAMED, QUICK, BoardContract, cycle, far_end, outputs, rig
@@ -133,8 +133,8 @@ def test_a_line_that_is_refused_is_counted_and_the_rest_goes_on() -> None:
 
 
 def test_silence_at_the_far_end_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("drivers.omote.bus.HELLO_S", 0.3)
-    monkeypatch.setattr("drivers.omote.bus.HELLO_AGAIN_S", 0.1)
+    monkeypatch.setattr("drivers.omote.bus.HELLO_TIMEOUT_S", 0.3)
+    monkeypatch.setattr("drivers.omote.bus.HELLO_INTERVAL_S", 0.1)
     master, slave = os.openpty()
     bus = head(os.ttyname(slave), {"jawOpen": (0.0, 1.0)})
     with bus, pytest.raises(NoReply, match="no head answers") as caught:
@@ -264,10 +264,10 @@ def test_a_line_that_is_lost_is_told_once_and_only_after_its_time() -> None:
         cycle(bus, [0.1, 0.1, 0.1], 10)
         board.fault("mute:*")
         bus.write([0.2, 0.1, 0.1])
-        board.clock.sleep(0.9 * LOST_S)
+        board.clock.sleep(0.9 * ANSWER_TIMEOUT_S)
         bus.read()
         assert bus.report().errors == {}
-        board.clock.sleep(0.2 * LOST_S)
+        board.clock.sleep(0.2 * ANSWER_TIMEOUT_S)
         for _ in range(3):
             bus.read()
         assert bus.report().errors == {"no_reply": 1}

@@ -7,7 +7,7 @@ import logging
 import pytest
 
 from drivers.base.bus import ServoSpec
-from drivers.port.latency import LEAST, ReplyDelays, latency_remedies, latency_rule, slow_answers
+from drivers.port.latency import MIN_DELAYS, ReplyDelays, latency_remedies, latency_rule, slow_answers
 from drivers.servos.bus import ServoBus
 from drivers.sim.serving.virtual import VirtualBus
 
@@ -16,7 +16,7 @@ SERVOS = [ServoSpec(i, f"servo {i}", "xl330-m288", -1.0, 1.0, 4.0, 40.0) for i i
 
 def test_a_judgement_needs_enough_answers_and_ignores_late_ones_of_a_busy_host() -> None:
     delays = ReplyDelays()
-    for _ in range(LEAST - 1):
+    for _ in range(MIN_DELAYS - 1):
         delays.add(0.001)
     assert delays.usual_s is None
     for _ in range(3):

@@ -18,7 +18,7 @@ import serial
 from drivers.base.errors import DriverError, PortLost
 from drivers.dynamixel.sdk import Packets
 from drivers.packets.packet import Instruction, InstructionPacket, encode_status
-from drivers.servos.port import POLL_LATE_S, POLL_S, SLEEPS, WAKE_EARLY_S, Port
+from drivers.servos.port import POLL_AFTER_S, POLL_BEFORE_S, POLL_INTERVAL_S, SLEEP_PERIOD, Port
 from drivers.sim.serving.virtual import VirtualBus
 from tests.drivers.contract import SERVOS
 from tests.drivers.wire import Wire
@@ -200,14 +200,14 @@ def test_a_reply_in_pieces_is_slept_through_and_polled_for_at_first(
 ) -> None:
     waits = Waits(sleeper, monkeypatch, last_s=0.005)
     assert sleeper.more() == b"x"
-    assert waits.naps == [pytest.approx(0.005 - WAKE_EARLY_S)]
-    assert max(waits.asked) <= waits.last_s + POLL_S, "so the processor is awake when it comes"
+    assert waits.naps == [pytest.approx(0.005 - POLL_BEFORE_S)]
+    assert max(waits.asked) <= waits.last_s + POLL_INTERVAL_S, "so the processor is awake when it comes"
     waits.now, waits.last_s = 0.0048, math.inf
     waits.asked.clear()
     assert sleeper.more() == b""
     assert len(waits.naps) == 1, "a sleep as short as this is none"
     assert waits.now == sleeper.deadline_s
-    assert len(waits.asked) <= (0.0002 + POLL_LATE_S) / POLL_S + 3, "then it is awaited in one go"
+    assert len(waits.asked) <= (0.0002 + POLL_AFTER_S) / POLL_INTERVAL_S + 3, "then it is awaited in one go"
 
 
 @pytest.mark.parametrize(("late_s", "polls"), [(5e-6, False), (80e-6, True)])
@@ -218,7 +218,7 @@ def test_polling_goes_on_only_where_the_system_wakes_the_thread_late(
     for _ in range(50):
         waits.now = 0.0
         assert sleeper.more() == b"x"
-    assert waits.naps[-1] == pytest.approx(0.005 - WAKE_EARLY_S if polls else 0.005)
+    assert waits.naps[-1] == pytest.approx(0.005 - POLL_BEFORE_S if polls else 0.005)
 
 
 @pytest.mark.parametrize(("late_s", "polls"), [(5e-6, False), (80e-6, True)])
@@ -226,7 +226,7 @@ def test_it_is_learned_also_from_replies_too_short_to_sleep_before_polling(
     sleeper: Port, monkeypatch: pytest.MonkeyPatch, late_s: float, polls: bool
 ) -> None:
     """Else a processor that was busy once would be polled on for ever."""
-    waits, calls = Waits(sleeper, monkeypatch, 0.005, late_s), 40 * SLEEPS
+    waits, calls = Waits(sleeper, monkeypatch, 0.005, late_s), 40 * SLEEP_PERIOD
     for _ in range(calls):
         waits.now = 0.0042
         assert sleeper.more() == b"x"
@@ -242,10 +242,10 @@ def test_the_replies_after_one_in_pieces_are_slept_for_from_their_beginning(
     assert not waits.naps, "nothing is known yet: replies of a port without a wire come at once"
     sleeper.more()
     waits.naps.clear()
-    for _ in range(SLEEPS + 1):
+    for _ in range(SLEEP_PERIOD + 1):
         waits.now = 0.0
         assert sleeper.first() == b"x"
-    assert len(waits.naps) == SLEEPS, "then one is looked at again"
+    assert len(waits.naps) == SLEEP_PERIOD, "then one is looked at again"
 
 
 @pytest.mark.parametrize("baud", [123_456, 250_000, 4_500_000])

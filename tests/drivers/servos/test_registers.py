@@ -10,7 +10,7 @@ import pytest
 
 from drivers.base.bus import Bus
 from drivers.base.errors import CorruptReply, NoReply, PortLost, ServoRefused
-from drivers.servos.registers import TRIES, Registers
+from drivers.servos.registers import MAX_TRIES, Registers
 from drivers.sim.serving.virtual import VirtualBus
 from drivers.tables.tables import load_table
 from tests.drivers.contract import SERVOS
@@ -65,7 +65,7 @@ def test_a_register_that_a_model_lacks_is_left_out_or_refused(registers: Registe
 
 
 def test_a_register_is_asked_for_a_few_times_and_no_more(wire: VirtualBus, registers: Registers[Any]) -> None:
-    wire.fault(f"drop:2:count={TRIES - 1}")
+    wire.fault(f"drop:2:count={MAX_TRIES - 1}")
     assert registers.get(2, "voltage") > 0
     wire.clear()
     wire.fault("drop:2")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.base.errors import BusError, NoReply, PortLost, ServoFault, ServoRefused, WrongModel
-from drivers.servos.startup import OFF_RETRIES, Policy
+from drivers.servos.startup import MAX_OFF_RETRIES, Policy
 from drivers.sim.serving.virtual import VirtualBus
 from drivers.tables.tables import ControlTable, load_table
 from tests.drivers.contract import SERVOS
@@ -245,7 +245,7 @@ def test_a_start_that_fails_and_cannot_switch_off_again_is_switched_off_later(
 def test_stop_tries_again_where_replies_are_lost(wire: VirtualBus) -> None:
     with wire.bus() as bus:
         bus.start()
-        wire.fault(f"drop:2:count={OFF_RETRIES - 1}")
+        wire.fault(f"drop:2:count={MAX_OFF_RETRIES - 1}")
         bus.stop()
         assert torques(wire) == [False] * 3
 

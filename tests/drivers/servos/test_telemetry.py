@@ -73,7 +73,7 @@ def still(wire: VirtualBus) -> Iterator[Bus]:
 
 def regroup(bus: Bus) -> None:
     """What the bus does when servos leave or join a group of reads."""
-    bus._group(getattr(bus, "_mapped", {}))
+    bus._group_reads(getattr(bus, "_indirect_blocks", {}))
 
 
 def test_a_regrouped_servo_has_no_position_until_it_is_read_again(wire: VirtualBus, still: Bus) -> None:

@@ -102,7 +102,7 @@ def test_forget_begins_anew(bus: ServoBus) -> None:
 
 
 def test_a_full_record_fails_every_assertion(bus: ServoBus, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(records, "MOST", 3)
+    monkeypatch.setattr(records, "MAX_ENTRIES", 3)
     for _ in range(4):
         write(bus, 1, SPEED, 50)
     for check in (bus.no_jump, bus.torque_off_at_exit, bus.never_beyond_limits, lambda: bus.bus_load_below(1.0)):

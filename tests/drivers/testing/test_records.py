@@ -13,8 +13,8 @@ from tests.drivers.testing.lines import START_S, Line
 
 
 def test_entries_beyond_the_most_are_left_out_and_that_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert records.MOST == 1_000_000
-    monkeypatch.setattr(records, "MOST", 2)
+    assert records.MAX_ENTRIES == 1_000_000
+    monkeypatch.setattr(records, "MAX_ENTRIES", 2)
     record = Record(5.0)
     for k in range(2):
         record.passed(k == 0, 10 + k, 7.0 + k)

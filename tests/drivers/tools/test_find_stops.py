@@ -209,7 +209,7 @@ def soft(monkeypatch: pytest.MonkeyPatch, bus: VirtualBus, pushing_at_deg: float
     drive = bus.chain.servo(3).drive
     full = drive.registers.get("Current Limit") / drive.full_current if isinstance(drive, XDrive) else 1.0
     steps = pushing_at_deg * 4096 / 360
-    monkeypatch.setattr(Plant, "STIFFNESS", full * module.PUSHING * module.TORQUE / steps)
+    monkeypatch.setattr(Plant, "STIFFNESS", full * module.MIN_PUSH_FRACTION * module.TORQUE / steps)
 
 
 @pytest.mark.parametrize(("step_s", "late"), [(0.3, 0), (0.5, 9)])

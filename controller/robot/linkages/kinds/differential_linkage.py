@@ -1,6 +1,6 @@
-"""Two servos beside each other that push a plate on a joint by rods: alike they tip it, against each other tilt it.
+"""Two servos side by side that push a plate on a joint by rods: equal angles pitch it, opposite angles roll it.
 
-The usual neck of small heads, and eyes with two rods. See :mod:`controller.robot.linkages.rods`.
+It is the usual neck of small heads, and drives eyes with two rods. See :mod:`controller.robot.linkages.rods`.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class DifferentialSettings(RodSettings):
 
 
 def make_rods(settings: RodSettings) -> Linkage:
-    """The rods of settings. Raises ValueError: they determine no pose."""
+    """Create the rods of settings. Raises ValueError where they do not determine the pose of the plate."""
     arrays = (
         np.array(each, dtype=np.float64) for each in (settings.plate, settings.axle, settings.horn, settings.axis)
     )

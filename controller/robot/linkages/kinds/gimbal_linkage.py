@@ -1,7 +1,7 @@
-"""A gimbal: one servo turns a ring, and a servo on the ring turns what is inside, as an eye.
+"""A gimbal: one servo turns a ring, and a servo on the ring turns the part inside, such as an eye.
 
-omote's angles turn by yaw first and then by pitch, so a gimbal whose outer ring is pitch needs others for the same
-direction of gaze: yaw' = asin(sin yaw cos pitch), pitch' = atan2(sin pitch, cos pitch cos yaw); roll is left out.
+omote's angles turn by yaw first and then by pitch. A gimbal whose outer ring is pitch needs other angles for the same
+direction of gaze: yaw' = asin(sin yaw cos pitch), pitch' = atan2(sin pitch, cos pitch cos yaw); roll is ignored.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from pydantic import Field, model_validator
 from controller.base.parameters import Floats
 from controller.robot.linkages.kind import API, LinkageKind, LinkageSettings
 
-_MOST_DEG = 80.0
+_MAX_DEG = 80.0
 
 
 class GimbalSettings(LinkageSettings):
@@ -33,19 +33,19 @@ class GimbalSettings(LinkageSettings):
 
 @dataclass(frozen=True)
 class Gimbal:
-    """yaw_first : whether the inputs are yaw, pitch, and not pitch, yaw. pitch_outside : the order of the rings."""
+    """yaw_first : whether the inputs are yaw, pitch; else pitch, yaw. pitch_outside : pitch turns the outer ring."""
 
     yaw_first: bool
     pitch_outside: bool
 
     def angles(self, inputs: Floats) -> tuple[Floats, bool]:
-        """(2,) degrees of the servos of yaw and of pitch; beyond 80 degrees, where the rings fall into one, clamped."""
+        """(2,) degrees of the servos of yaw and of pitch; clipped at 80 degrees, before the rings align."""
         wanted = inputs if self.yaw_first else inputs[::-1]
-        kept = np.clip(wanted, -_MOST_DEG, _MOST_DEG)
-        beyond = bool((kept != wanted).any())
+        clipped = np.clip(wanted, -_MAX_DEG, _MAX_DEG)
+        beyond = bool((clipped != wanted).any())
         if not self.pitch_outside:
-            return kept, beyond
-        yaw, pitch = np.radians(kept)
+            return clipped, beyond
+        yaw, pitch = np.radians(clipped)
         inner, outer = np.arcsin(np.sin(yaw) * np.cos(pitch)), np.arctan2(np.sin(pitch), np.cos(pitch) * np.cos(yaw))
         return np.degrees(np.array([inner, outer])), beyond
 

@@ -1,7 +1,7 @@
 """A measured table: angles of the servos at a grid of values of one to three inputs, interpolated between them.
 
-A CSV file beside the robot's: a column for each input and for each channel, named as they are, a row for each point of
-the grid, in any order. The points of the grid may lie at any distances; each combination must be there once.
+The table is a CSV file beside the robot's, with a column for each input and each channel, with their names, and a row
+for each point of the grid, in any order. The grid may be irregular; each combination of its values must occur once.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from controller.base.plain_numbers import plain_number
 from controller.robot.linkages.kind import API, Input, LinkageKind, LinkageSettings
 from surface.base.files import read_text, reading
 
-_MOST_BYTES, _MOST_ROWS = 1 << 22, 20_000
+_MAX_BYTES, _MAX_ROWS = 1 << 22, 20_000
 
 
 class TableSettings(LinkageSettings):
@@ -35,13 +35,13 @@ class TableSettings(LinkageSettings):
 
 @dataclass(frozen=True)
 class GridTable:
-    """Multilinear interpolation. axes : k rising arrays (g,). values : (g1, ..., gk, n) degrees at the grid."""
+    """Multilinear interpolation. axes : k ascending arrays (g,). values : (g1, ..., gk, n) degrees at the grid."""
 
     axes: tuple[Floats, ...]
     values: Floats
 
     def angles(self, inputs: Floats) -> tuple[Floats, bool]:
-        """(n,) degrees for inputs (k,); beyond the grid, those of its edge."""
+        """(n,) degrees for inputs (k,), which are clipped to the grid; and whether they were outside."""
         low, high = np.array([[axis[0], axis[-1]] for axis in self.axes]).T
         kept = np.clip(inputs, low, high)
         cells = [min(int(np.searchsorted(a, x, "right")), len(a) - 1) for a, x in zip(self.axes, kept, strict=True)]
@@ -64,7 +64,9 @@ def _make(settings: TableSettings) -> GridTable:
     for row in rows:
         if found.setdefault(tuple(row[:k]), row) is not row:
             raise config_error(path, [f"{_place(names[:k], row)} stands there twice"])
-    if missing := math.prod(map(len, axes)) - len(found):  # before room is made for a grid that few rows may span
+    if missing := math.prod(map(len, axes)) - len(
+        found
+    ):  # before memory is allocated for a grid that few rows may span
         point = next(place for place in product(*axes) if place not in found)
         more = f", and {missing - 1} more" if missing > 1 else ""
         raise config_error(path, [f"there is no row for {_place(names, point)}{more}: every combination needs one"])
@@ -79,13 +81,13 @@ def _place(names: list[str], values: Iterable[float]) -> str:
 def _rows(path: Path, names: list[str]) -> Floats:
     """(r, names) the numbers of a file. Raises ConfigError: it cannot be read, or a column or number is missing."""
     with reading(path, ConfigError):
-        lines = list(enumerate(read_text(path, _MOST_BYTES).splitlines(), 1))
+        lines = list(enumerate(read_text(path, _MAX_BYTES).splitlines(), 1))
     lines = [(number, line) for number, line in lines if line.strip() and line[0] != "#"]
     head = [cell.strip() for cell in lines[0][1].split(",")] if lines else []
     if lacking := [name for name in names if name not in head]:
         raise config_error(path, [f"there is no column {name!r}" for name in lacking])
-    if len(lines) > _MOST_ROWS:
-        raise config_error(path, [f"has {len(lines)} rows; {_MOST_ROWS} at most"])
+    if len(lines) > _MAX_ROWS:
+        raise config_error(path, [f"has {len(lines)} rows; {_MAX_ROWS} at most"])
     columns = [head.index(name) for name in names]
     rows = []
     for number, line in lines[1:]:

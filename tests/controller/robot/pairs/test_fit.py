@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller.robot.pairs import fit as module
-from controller.robot.pairs.fit import FOLDS, LEAST_PAIRS, FittedServo, FittedTerm, _Basis, fit_servo
+from controller.robot.pairs.fit import FOLDS, MIN_PAIRS, FittedServo, FittedTerm, _Basis, fit_servo
 
 
 def faces(count: int = 240, parameters: int = 4, low: float = 0.0) -> np.ndarray:
@@ -99,8 +99,8 @@ def test_noise_is_not_taken_for_a_face() -> None:
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
 def test_too_few_pairs_and_numbers_that_are_none_are_refused(bad: float) -> None:
-    values, deg = faces(LEAST_PAIRS), np.linspace(0, 10, LEAST_PAIRS)
-    assert LEAST_PAIRS == 20
+    values, deg = faces(MIN_PAIRS), np.linspace(0, 10, MIN_PAIRS)
+    assert MIN_PAIRS == 20
     fit_servo(values, deg)
     with pytest.raises(ValueError, match="needs 20 pairs or more, all of finite numbers; there are 19"):
         fit_servo(values[1:], deg[1:])
