@@ -55,12 +55,12 @@ class Borders:
     network: Network
 
     def at(self, vertices: list[Floats32]) -> Floats:
-        """(e, 2, 3) ends of the edges, mm, for the posed vertices (v, 3) of every part."""
+        """Return (e, 2, 3): ends of the edges, mm, for the posed vertices (v, 3) of every part."""
         return _ends_at(self.part, self.ends, vertices)
 
 
 def _ends_at(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
-    """(e, 2, 3) as :meth:`Borders.at` gives them."""
+    """Return (e, 2, 3): as :meth:`Borders.at` gives them."""
     out = np.empty((len(part), 2, 3))
     for k in np.unique(part):
         out[part == k] = vertices[k][ends[part == k]]
@@ -68,7 +68,7 @@ def _ends_at(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
 
 
 def find_borders(subject: Subject) -> Borders:
-    """All border edges, and which of them are sewn at rest."""
+    """Return all border edges, and which of them are sewn at rest."""
     numbers = [k for k, p in enumerate(subject.parts) if p.material in SHEETS and p.follows == "skin"]
     starts = np.cumsum([0, *(len(v) for v in subject.rest)])
     pairs = [(k, border_edges(_welded(subject, k).astype(np.int32))) for k in numbers]
@@ -86,7 +86,7 @@ def find_borders(subject: Subject) -> Borders:
 
 
 def _welded(subject: Subject, number: int) -> Ints:
-    """(t, 3) triangles of a part, where vertices in one place are one; triangles without area are dropped."""
+    """Return (t, 3): triangles of a part, where vertices in one place are one; triangles without area are dropped."""
     at, triangles = subject.rest[number], subject.parts[number].triangles
     _, first, same = np.unique(np.round(at / (1e-3 * subject.scale)), axis=0, return_index=True, return_inverse=True)
     corner = first[same.ravel()][triangles]
@@ -96,7 +96,7 @@ def _welded(subject: Subject, number: int) -> Ints:
 
 
 def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Borders) -> Iterator[Finding]:
-    """Holes at rest, and seams that open in a pose.
+    """Find holes at rest, and seams that open in a pose.
 
     A very wide hole is where the skin of a mesh ends, as under hair. It is a warning, and so are the holes in smaller
     parts of such a head, such as the roots of its ears.
@@ -117,7 +117,7 @@ def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Border
 
 
 def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, places: Places) -> Iterator[Finding]:
-    """The seam that opens furthest, with the pose in which it does."""
+    """Find the seam that opens furthest, with the pose in which it does."""
     worst, where, pose = 0.0, np.zeros(3), ""
     reach, along = 4.0 * APART_MM * subject.scale, ALONG_MM * subject.scale
     rest = borders.at(subject.rest).mean(axis=1)
@@ -139,7 +139,7 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
 
 
 def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
-    """Edges of every chain that is sewn to nothing, without the outer border of each sheet."""
+    """Return edges of every chain that is sewn to nothing, without the outer border of each sheet."""
     free, at = np.flatnonzero(~borders.sewn), borders.at(subject.rest)
     chains = _chains(_joined(borders, at, free, SEWN_MM * subject.scale))
     sheet = _sheets(subject, borders)
@@ -154,21 +154,23 @@ def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
 
 
 def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
-    """(k, 2) ends of the edges ``rows (k,)``; ends nearer than ``reach`` mm to each other, as at a seam, are one."""
+    """Return (k, 2): ends of the edges ``rows (k,)``; ends nearer than ``reach`` mm to each other, as at a seam, are
+    one."""
     ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
     known = np.unique(ends, return_inverse=True)[1].reshape(-1)
     return joined_nearer(points, known, reach).reshape(-1, 2)
 
 
 def _chains(ids: Ints) -> list[Ints]:
-    """Rows of edges (e, 2) of each connected component."""
+    """Return rows of edges (e, 2) of each connected component."""
     label = _components(ids, int(ids.max(initial=-1)) + 1)
     own = label[ids[:, 0]] if len(ids) else np.zeros(0, np.int64)
     return [np.flatnonzero(own == k) for k in np.unique(own)]
 
 
 def _sheets(subject: Subject, borders: Borders) -> Ints:
-    """(v,) number of the sheet that each vertex belongs to; triangles and seams connect the vertices of a sheet."""
+    """Return (v,): number of the sheet that each vertex belongs to; triangles and seams connect the vertices of a
+    sheet."""
     starts = np.cumsum([0, *(len(v) for v in subject.rest)])
     links = [_welded(subject, k)[:, [0, 1, 1, 2]].reshape(-1, 2) + starts[k] for k in np.unique(borders.part)]
     sewn = np.flatnonzero(borders.sewn)
@@ -177,7 +179,7 @@ def _sheets(subject: Subject, borders: Borders) -> Ints:
 
 
 def _components(links: Ints, count: int) -> Ints:
-    """(count,) for each node the least number in its connected component; ``links (k, 2)`` connect nodes."""
+    """Return (count,): for each node the least number in its connected component; ``links (k, 2)`` connect nodes."""
     label = np.arange(count)
     while len(links):
         least = np.minimum(label[links[:, 0]], label[links[:, 1]])
@@ -193,8 +195,8 @@ def _components(links: Ints, count: int) -> Ints:
 
 
 def _form(ends: Floats) -> tuple[Floats, float]:
-    """Middle (3,) and width of a loop, mm. The width is four times the area divided by the length: the diameter of a
-    circle, and twice the height of a slit."""
+    """Return the middle (3,) and width of a loop, mm. The width is four times the area divided by the length: the
+    diameter of a circle, and twice the height of a slit."""
     middle = ends.reshape(-1, 3).mean(axis=0)
     area = 0.5 * np.linalg.norm(np.cross(ends[:, 0] - middle, ends[:, 1] - middle).sum(axis=0))
     return middle, float(4.0 * area / max(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum(), 1e-9))
@@ -227,7 +229,7 @@ def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
 
 
 def _in_openings(subject: Subject, mouth: Mouth | None, at: Floats) -> Bools:
-    """(m,) which of the places (m, 3) belong to the rim of the mouth, or of an eye that has an eyeball."""
+    """Return (m,): which of the places (m, 3) belong to the rim of the mouth, or of an eye that has an eyeball."""
     out = np.zeros(len(at), bool)
     if subject.eyes is not None:
         for side in (n for n in (0, 1) if subject.eye(n) is not None):

@@ -38,7 +38,7 @@ def check_head(head: Head) -> list[Finding]:
 
 
 def not_finite(subject: Subject) -> Iterator[Finding]:
-    """Poses that throw vertices out of space."""
+    """Find poses that throw vertices out of space."""
     for name in ("", *subject.head.parameters):
         vertices = subject.at_one(name) if name else subject.rest
         bad = [p.name for p, v in zip(subject.parts, vertices, strict=True) if not np.isfinite(v).all()]
@@ -49,7 +49,7 @@ def not_finite(subject: Subject) -> Iterator[Finding]:
 
 
 def unsealed_lips(subject: Subject, mouth: Mouth | None) -> Iterator[Finding]:
-    """Lips that gape at rest, or where mouthClose should close them over an open jaw."""
+    """Find lips that gape at rest, or where mouthClose should close them over an open jaw."""
     if mouth is None:
         return
     at_rest, x = lips_gap(subject, mouth, subject.rest)

@@ -20,8 +20,8 @@ OBLIQUE = 1.5  # a vertex lies no deeper than it is away from the crossing along
 
 @inlined
 def _passes(p: Any, d0: Any, d1: Any, d2: Any, a: Any, b: Any, c: Any) -> Any:
-    """Where the segment from p by d passes through the triangle a, b, c: 0..1 out of its back, -1..0 into its front, 2
-    where it does not."""
+    """Return where the segment from p by d passes through the triangle a, b, c: 0..1 out of its back, -1..0 into its
+    front, 2 where it does not."""
     e0, e1, e2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     f0, f1, f2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     h0, h1, h2 = d1 * f2 - d2 * f1, d2 * f0 - d0 * f2, d0 * f1 - d1 * f0
@@ -99,7 +99,8 @@ def _outside(j: Any, corners: Any, least: Any, most: Any) -> Any:
 
 @merged
 def _next_leaf(stack: Any, top: Any, low: Any, high: Any, leaves: Any, least: Any, most: Any) -> Any:
-    """First triangle of the next leaf whose box meets another one, or -1; and how many nodes are on the stack.
+    """Return the first triangle of the next leaf whose box meets another one, or -1; and how many nodes are on the
+    stack.
 
     ``stack`` holds the nodes of the tree that are still to be searched.
     """
@@ -238,7 +239,7 @@ class Crossings:
         self._start = np.searchsorted(edges[:, 0], np.arange(self._count + 1))
 
     def pairs(self, vertices: Floats, *, least: float = -1.0) -> Ints:
-        """(k, 2) rows of ``tree.triangles`` that cross with the mesh's vertices (n, 3) where they are now.
+        """Return (k, 2): rows of ``tree.triangles`` that cross with the mesh's vertices (n, 3) where they are now.
 
         least : mm; only pairs of which one of those asked for has moved further than that from rest.
         """
@@ -254,8 +255,9 @@ class Crossings:
         return out[:used]
 
     def depths(self, pairs: Ints, passing: int, passed: int, reach: float, least: float) -> tuple[Ints, Floats]:
-        """Vertices (k,) of triangles asked for, of a kind ``passing``, that lie behind triangles of a kind ``passed``,
-        of pairs as :meth:`pairs` found them last, and how deep, mm: more than ``least``, no deeper than ``reach``."""
+        """Return vertices (k,) of triangles asked for, of a kind ``passing``, that lie behind triangles of a kind
+        ``passed``, of pairs as :meth:`pairs` found them last, and how deep, mm: more than ``least``, no deeper than
+        ``reach``."""
         both = np.concatenate([pairs, pairs[:, ::-1]])
         both = both[(self.kind[both[:, 0]] == passing) & (self.kind[both[:, 1]] == passed)]
         if not len(both):
@@ -282,7 +284,7 @@ class Crossings:
         return out
 
     def _normals(self, at: Floats) -> Floats:
-        """(n, 3) unit normals at vertices."""
+        """Return (n, 3): unit normals at vertices."""
         corner = self.tree.corners
         cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         own = self._ids.ravel()
@@ -291,8 +293,8 @@ class Crossings:
         return unit
 
     def _seeds(self, pairs: Ints, way: Floats) -> tuple[Floats, Floats, Floats, Ints]:
-        """The ends of edges behind what they pass: ways (n, 3), the triangle's longest edge (n,), the distance (n,),
-        which is 0 there, and a queue (n,) of them."""
+        """Return the ends of edges behind what they pass: ways (n, 3), the triangle's longest edge (n,), the distance
+        (n,), which is 0 there, and a queue (n,) of them."""
         ways, length, far = np.zeros((self._count, 3)), np.zeros(self._count), np.full(self._count, np.inf)
         hit = way.any(axis=2)
         ids, corner = self._ids[pairs[:, 0]], self.tree.corners[pairs[:, 0]]
@@ -305,7 +307,7 @@ class Crossings:
         return ways, length, far, queue
 
     def _cut(self, pairs: Ints, cut: Bools) -> Bools:
-        """(edges,) which of the mesh's edges, both ways, pass through something."""
+        """Return (edges,): which of the mesh's edges, both ways, pass through something."""
         ends = self._ids[pairs[:, 0]]
         a, b = ends[cut], np.roll(ends, -1, axis=1)[cut]
         out = np.zeros(len(self._keys), bool)

@@ -10,7 +10,7 @@ STEP = 0.15  # of a pixel, mm, times the head's scale
 
 
 def eye_opening(subject: Subject, side: int, vertices: list[Floats32]) -> float:
-    """Largest height of the left (0) or right (1) eyeball that shows, mm; 0 without an eyeball."""
+    """Return the largest height of the left (0) or right (1) eyeball that shows, mm; 0 without an eyeball."""
     number = subject.eye(side)
     if number is None:
         return 0.0

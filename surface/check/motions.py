@@ -12,7 +12,7 @@ from surface.check.lids import eye_opening
 from surface.check.subject import Subject
 from surface.head.model.parameters import SHAPES
 
-LEAST_MM = 0.1  # a parameter that moves nothing further than this has no effect
+MIN_MOVE_MM = 0.1  # a parameter that moves nothing further than this has no effect
 ASIDE = 0.06  # of the distance between the eyes: how far off the middle a side begins
 SHUT_MM = 0.5  # what may show of an eye in a blink
 OPEN_MM = 1.0  # what shows of an eye that is open
@@ -20,10 +20,10 @@ ACROSS = ("jaw", "mouth")  # their Left and Right are where they go; of all othe
 
 
 def empty_shapes(subject: Subject) -> Iterator[Finding]:
-    """Parameters that the head has a group or a joint for, and that move nothing of their own."""
+    """Find parameters that the head has a group or a joint for, and that move nothing of their own."""
     for name in subject.claimed:
         most = max(float(np.abs(m).max(initial=0.0)) for m in subject.moves(name))
-        if most < LEAST_MM * subject.scale or _is_idle(subject, name):
+        if most < MIN_MOVE_MM * subject.scale or _is_idle(subject, name):
             text = f"{name} = 1 moves nothing, though the head has something of that name"
             yield Finding("empty shape", text, f"export the mesh with this shape, then {AGAIN}")
 
@@ -33,11 +33,11 @@ def _is_idle(subject: Subject, name: str) -> bool:
     groups = [g for p in subject.head.data.parts for g in p.groups if g.name == name]
     joint = name == "jawOpen" and subject.head.data.jaw.angle_rad > 0
     most = max((float(np.abs(g.moves).max(initial=0.0)) for g in groups), default=np.inf)
-    return most < LEAST_MM * subject.scale and not joint
+    return most < MIN_MOVE_MM * subject.scale and not joint
 
 
 def swapped_sides(subject: Subject) -> Iterator[Finding]:
-    """Parameters of one side that move the other. Left is the subject's, at greater x."""
+    """Find parameters of one side that move the other. Left is the subject's, at greater x."""
     middle, apart = _middle(subject)
     wrong = []
     for name in subject.claimed:
@@ -55,7 +55,7 @@ def swapped_sides(subject: Subject) -> Iterator[Finding]:
 
 
 def blind_lids(subject: Subject) -> Iterator[Finding]:
-    """Eyes that a blink does not close."""
+    """Find eyes that a blink does not close."""
     names = ("eyeBlinkLeft", "eyeBlinkRight")
     any_blink = any(n in subject.claimed for n in names)
     for side, name in enumerate(names):
@@ -74,7 +74,7 @@ def blind_lids(subject: Subject) -> Iterator[Finding]:
 
 
 def _side(name: str) -> int:
-    """1 for a parameter of the left side, -1 of the right, 0 of neither."""
+    """Return 1 for a parameter of the left side, -1 of the right, 0 of neither."""
     left = name.endswith("Left") or name.startswith("leftEye")
     right = name.endswith("Right") or name.startswith("rightEye")
     return int(left) - int(right)
@@ -85,7 +85,7 @@ def _goes_across(name: str) -> bool:
 
 
 def _middle(subject: Subject) -> tuple[float, float]:
-    """x of the middle of the face, and the distance between the eyes, mm."""
+    """Return x of the middle of the face, and the distance between the eyes, mm."""
     if subject.eyes is not None:
         return float(subject.eyes[:, 0].mean()), max(float(np.ptp(subject.eyes[:, 0])), 1e-6)
     xs = np.concatenate([subject.rest[k][:, 0] for k in subject.skin] or [np.zeros(2)])
@@ -93,7 +93,7 @@ def _middle(subject: Subject) -> tuple[float, float]:
 
 
 def _where(subject: Subject, name: str, middle: float) -> float:
-    """How far from the middle the vertices lie that a parameter moves, mm, meant by how far they move."""
+    """Return how far from the middle the vertices lie that a parameter moves, mm, meant by how far they move."""
     moves = [np.linalg.norm(m, axis=1) for m in subject.moves(name)]
     total = sum(float(m.sum()) for m in moves)
     along = sum(float(m @ v[:, 0]) for m, v in zip(moves, subject.rest, strict=True))

@@ -17,7 +17,7 @@ from surface.check.subject import Subject
 STEP = 0.5  # mm of a pixel where the lips are looked for, times the head's scale
 FINE = 0.15  # of a pixel where their gap is measured
 TORN = 0.3  # of the largest motion: a step of that height from one pixel to the next is the line of the lips
-LEAST_MM = 3.0  # that the chin must go down
+MIN_DROP_MM = 3.0  # that the chin must go down
 DEEP_MM, LIPS_MM = 9.0, 15.0  # skin so far behind the lips, and no higher or lower, is the inside of the mouth
 PARTED_MM = 12.0  # of lips at rest: a higher opening is none between lips
 INNER = 0.5  # of the width of the mouth, in which its gap is measured
@@ -44,12 +44,12 @@ class Mouth:
 
 
 def find_mouth(subject: Subject) -> Mouth | None:
-    """The line of the lips; None where no jaw opens."""
+    """Return the line of the lips; None where no jaw opens."""
     if "jawOpen" not in subject.claimed or not len(subject.skin):
         return None
     moves = [m[:, 1].astype(np.float64) for m in subject.moves("jawOpen")]
     drop = -min(float(moves[k].min()) for k in subject.skin)
-    if drop < LEAST_MM * subject.scale:
+    if drop < MIN_DROP_MM * subject.scale:
         return None
     picture = _front(subject)
     down, below = _over_gaps(_values(subject, picture, moves), round(PARTED_MM / STEP))
@@ -65,7 +65,7 @@ def find_mouth(subject: Subject) -> Mouth | None:
 
 
 def _front(subject: Subject) -> Picture:
-    """The skin at rest from the front."""
+    """Return the skin at rest from the front."""
     at = np.concatenate([subject.rest[k] for k in subject.skin])
     view = View((at[:, 0].min(), at[:, 0].max()), (at[:, 1].min(), at[:, 1].max()), STEP * subject.scale)
     shapes = subject.shapes(subject.rest)
@@ -73,7 +73,8 @@ def _front(subject: Subject) -> Picture:
 
 
 def _values(subject: Subject, picture: Picture, of: list[Floats]) -> Floats:
-    """(h, w) values at the vertices (m,) of every part, meant over the triangle at each pixel; NaN where none is."""
+    """Return (h, w): values at the vertices (m,) of every part, meant over the triangle at each pixel; NaN where none
+    is."""
     out = np.full(picture.depth.shape, np.nan)
     for k in np.unique(picture.parts[picture.parts != NOTHING]):
         here = picture.parts == k
@@ -82,7 +83,7 @@ def _values(subject: Subject, picture: Picture, of: list[Floats]) -> Floats:
 
 
 def _over_gaps(values: Floats, most: int) -> tuple[Floats, Ints]:
-    """Values (h, w) with what is above a gap of at most ``most`` rows in it, too, and how high the gap below is.
+    """Return values (h, w) with what is above a gap of at most ``most`` rows in it, too, and how high the gap below is.
 
     Lips that are parted at rest show nothing between them; the line of the lips runs along the lower one's edge.
     """
@@ -97,7 +98,7 @@ def _over_gaps(values: Floats, most: int) -> tuple[Floats, Ints]:
 
 
 def _longest_run(hits: Bools, most_gap: int = 2) -> Ints:
-    """Indices of the longest run of hits, with gaps of a few filled."""
+    """Return indices of the longest run of hits, with gaps of a few filled."""
     at = np.flatnonzero(hits)
     if not len(at):
         return at
@@ -107,7 +108,8 @@ def _longest_run(hits: Bools, most_gap: int = 2) -> Ints:
 
 
 def lips_gap(subject: Subject, mouth: Mouth, vertices: list[Floats32]) -> tuple[float, float]:
-    """Largest height of the opening between the lips, mm, and the x where it is, in the middle half of the mouth."""
+    """Return the largest height of the opening between the lips, mm, and the x where it is, in the middle half of the
+    mouth."""
     scale, half = subject.scale, 0.5 * INNER * mouth.width
     centre = mouth.middle
     view = View(
@@ -124,7 +126,7 @@ def lips_gap(subject: Subject, mouth: Mouth, vertices: list[Floats32]) -> tuple[
 
 
 def _inside(rest: Floats32, mouth: Mouth, scale: float) -> Floats:
-    """(m,) 1 for vertices (m, 3) that at rest lie behind the lips, as the inside of the mouth does; else 0."""
+    """Return (m,): 1 for vertices (m, 3) that at rest lie behind the lips, as the inside of the mouth does; else 0."""
     away = rest.astype(np.float64) - mouth.middle
     beside = np.abs(away[:, 0]) < 0.5 * mouth.width
     behind = away[:, 2] < -DEEP_MM * scale

@@ -21,12 +21,12 @@ CLOSE = 0.6  # of the radius: how far the middle of an eyeball may lie from the 
 VIEWS = (0.0, 38.0, -38.0, 90.0, -90.0, 180.0)  # degrees, from which a head is looked at
 POSES: tuple[dict[str, float], ...] = ({}, {"jawOpen": 1.0})
 INSIDE_OUT = 0.6  # of what shows of a part: its back
-LEAST_PIXELS = 60
+MIN_PIXELS = 60
 SOLID = ("teeth", "gums", "tongue", "eye")  # materials of parts that are seen from outside only
 
 
 def wrong_unit(subject: Subject) -> Iterator[Finding]:
-    """A head that is far too big or too small to be one in millimetres."""
+    """Find a head that is far too big or too small to be one in millimetres."""
     if subject.eyes is not None:
         size, (low, high), what = float(np.linalg.norm(subject.eyes[0] - subject.eyes[1])), EYES_RANGE_MM, "eyes are"
     else:
@@ -39,7 +39,7 @@ def wrong_unit(subject: Subject) -> Iterator[Finding]:
 
 
 def off_camera(subject: Subject, mouth: Mouth | None) -> Iterator[Finding]:
-    """A face that the front camera does not see, or sees from behind."""
+    """Find a face that the front camera does not see, or sees from behind."""
     marks = _marks(subject, mouth)
     clip = np.column_stack([marks, np.ones(len(marks))]) @ np.asarray(Camera.front().matrix(1.0), float).T
     behind = bool((clip[:, 3] <= 0).any())
@@ -53,7 +53,7 @@ def off_camera(subject: Subject, mouth: Mouth | None) -> Iterator[Finding]:
 
 
 def missing_eyes(subject: Subject) -> Iterator[Finding]:
-    """Eyeballs that are not there, not where they turn, or that nobody sees."""
+    """Find eyeballs that are not there, not where they turn, or that nobody sees."""
     present = [subject.eye(side) is not None for side in (0, 1)]
     if not any(present) and subject.eyes is None:
         text = "the head has no eyes: gaze will not show"
@@ -72,7 +72,7 @@ def missing_eyes(subject: Subject) -> Iterator[Finding]:
 
 
 def inside_out(subject: Subject) -> Iterator[Finding]:
-    """Parts that show their back: by the way their triangles run, or by their normals."""
+    """Find parts that show their back: by the way their triangles run, or by their normals."""
     seen = np.zeros(len(subject.parts))
     backs = np.zeros((2, len(subject.parts)))
     for values in POSES:
@@ -85,17 +85,18 @@ def inside_out(subject: Subject) -> Iterator[Finding]:
                 backs[:, k] += by_way, by_normal
     subject.posed_now({})
     for k, part in enumerate(subject.parts):
-        if seen[k] < LEAST_PIXELS and part.material in SOLID:
+        if seen[k] < MIN_PIXELS and part.material in SOLID:
             seen[k], *backs[:, k] = _alone(subject, k)
     for part, count, (by_way, by_normal) in zip(subject.parts, seen, backs.T, strict=True):
-        if count >= LEAST_PIXELS and max(by_way, by_normal) > INSIDE_OUT * count:
+        if count >= MIN_PIXELS and max(by_way, by_normal) > INSIDE_OUT * count:
             what = "triangles run" if by_way > INSIDE_OUT * count else "normals point"
             text = f"part {part.name!r}: its {what} inwards, {100 * max(by_way, by_normal) / count:.0f} % of what shows"
             yield Finding("inside-out part", text, f"make all faces of the mesh look outwards, then {AGAIN}")
 
 
 def _alone(subject: Subject, number: int) -> tuple[int, int, int]:
-    """As :func:`_sides_shown`, of one part that nothing else hides: only what is no lining shows its outside then."""
+    """Do the same as :func:`_sides_shown`, of one part that nothing else hides: only what is no lining shows its
+    outside then."""
     picture = _picture(subject, [v if k == number else v[:0] for k, v in enumerate(subject.rest)], 0.0)
     normals = [p.normals for p in subject.parts]
     return _sides_shown(subject, picture, subject.rest, normals).get(number, (0, 0, 0))
@@ -141,7 +142,7 @@ def _faces_forward(subject: Subject) -> bool:
 
 
 def _marks(subject: Subject, mouth: Mouth | None) -> Floats:
-    """(k, 3) places of the face: eyes and mouth, or the middle of the skin's front."""
+    """Return (k, 3): places of the face: eyes and mouth, or the middle of the skin's front."""
     marks = [] if subject.eyes is None else list(subject.eyes)
     marks += [] if mouth is None else [mouth.middle]
     if marks:

@@ -114,8 +114,8 @@ class DeformationBatch:
 
 
 def slices(sizes: NDArray[np.int64], most: int) -> Ints:
-    """Where to cut a row of things of these ``sizes (c,)`` so that no slice exceeds ``most``, but for single things:
-    ``(k + 1,)`` from 0 to c."""
+    """Return where to cut a row of things of these ``sizes (c,)`` so that no slice exceeds ``most``, but for single
+    things: ``(k + 1,)`` from 0 to c."""
     cuts, total = [0], 0
     for c, size in enumerate(sizes.tolist()):
         if total + size > most and cuts[-1] < c:
@@ -126,7 +126,9 @@ def slices(sizes: NDArray[np.int64], most: int) -> Ints:
 
 
 def _repeated(array: NDArray[Any], count: int) -> NDArray[Any]:
-    """(count, ...) copies of an array, with room behind the last: kernels read four numbers of a row of three."""
+    """Return (count, ...): copies of an array, with room behind the last: kernels read four numbers of a row of
+    three.
+    """
     room = np.zeros(count * array.size + LANES, array.dtype)
     room[: count * array.size] = np.tile(array.ravel(), count)
     return room[: count * array.size].reshape(count, *array.shape)

@@ -37,7 +37,7 @@ Table = TypeVar("Table", bound=ControlPoints)
 LIMIT = 256  # differences a cell takes before it is computed again
 BIAS = 6.0  # cost of one row's difference, in rows computed again (measured)
 GAP = 256  # unchanged vertices between two changed ranges that are uploaded rather than left out
-MOST_MOVED = 0.75  # from this part of the points on, everything is computed again
+RECOMPUTE_FRACTION = 0.75  # from this part of the points on, everything is computed again
 PARTS = 4  # into which a thread's share of the cells is cut
 SMALL = 500_000  # weights below which one thread is as fast as two
 
@@ -80,7 +80,7 @@ class Deformation(Generic[Table]):
         self._work = self.lists.rows * np.diff(self.lists.tile_start) * LANES  # weights by cell, however they are kept
         self.storage = compress(self.basis, self.lists, self.mesh)
         self._sign, self._threads = np.float32(-1 if mesh.flip else 1), threads
-        self._most = int(MOST_MOVED * len(surface.arrays()[4]))
+        self._most = int(RECOMPUTE_FRACTION * len(surface.arrays()[4]))
         self._pool: ThreadPoolExecutor | None = None  # started when first used
         self._make = partial(type(surface).from_padded, closed_u=surface.closed[0], closed_v=surface.closed[1])
         self._arrays = work_arrays(self.mesh, surface.arrays()[4], int(self.lists.tile_start[-1]), normals)
@@ -140,18 +140,18 @@ class Deformation(Generic[Table]):
         self._place(self._all, _rows(xyz, "xyz"), False)
 
     def own_arrays(self) -> dict[str, np.ndarray]:
-        """What differs between deformations of one mesh that share weights and knots, by the names of
+        """Return what differs between deformations of one mesh that share weights and knots, by the names of
         :data:`.binding.NAMES`."""
         return {
             name: self._arrays[name] for name in ("points", "origin", "vertices", "normals", "differences", "extent")
         }
 
     def addressed(self) -> dict[str, np.ndarray]:
-        """All arrays that kernels take, by the names of :data:`.binding.NAMES`."""
+        """Return all arrays that kernels take, by the names of :data:`.binding.NAMES`."""
         return vars(self.lists) | self._arrays | self.storage.arrays
 
     def work(self) -> tuple[np.ndarray, np.float32, list[np.ndarray]]:
-        """What kernels take besides: all cells, the sign of normals, scratch space of a thread."""
+        """Return what kernels take besides: all cells, the sign of normals, scratch space of a thread."""
         return self._cells, self._sign, [np.zeros_like(room) for room in self._rooms()]
 
     @property
@@ -318,7 +318,7 @@ class Deformation(Generic[Table]):
         apply.compute_cells(self._addresses, cells, 0, len(cells), self._sign, *self._rooms())
 
     def _rooms(self) -> list[np.ndarray]:
-        """Scratch space of the kernels."""
+        """Return scratch space of the kernels."""
         return [self._arrays[name] for name in ("local", "scratch", "starts")]
 
     def _compute_in_parts(self) -> None:
@@ -343,7 +343,7 @@ class Deformation(Generic[Table]):
 
 
 def _rows(rows: ArrayLike, name: str) -> Floats:
-    """Float64 numbers in order, not copied where they are that already."""
+    """Return float64 numbers in order, not copied where they are that already."""
     if type(rows) is np.ndarray and rows.dtype == np.float64 and rows.flags.c_contiguous:
         return rows
     fast = isinstance(rows, np.ndarray) and rows.dtype.kind == "f"
@@ -351,7 +351,7 @@ def _rows(rows: ArrayLike, name: str) -> Floats:
 
 
 def _gathered(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
-    """Each id once."""
+    """Return each id once."""
     if not relative:
         unique, last = np.unique(which[::-1], return_index=True)
         return unique, np.ascontiguousarray(rows[::-1][last])
@@ -362,7 +362,7 @@ def _gathered(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
 
 
 def _view(flat: np.ndarray) -> np.ndarray:
-    """(m, 3) read-only view."""
+    """Return (m, 3): read-only view."""
     view = flat.reshape(-1, 3)
     view.flags.writeable = False
     return view

@@ -49,7 +49,7 @@ def change_knots(
 
 
 def _first_uncovered(lists: Lists, mesh: Mesh, i: int, knots: list[Floats]) -> int:
-    """The first vertex that only point i covers and that the new knots do not reach, or -1."""
+    """Return the first vertex that only point i covers and that the new knots do not reach, or -1."""
     found = np.zeros(len(mesh.uv), dtype=np.int64)
     count = _only_covering(*lists.entries_of(i), lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found)
     for vertex in found[:count]:
@@ -81,7 +81,7 @@ def _replace_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[F
 
 
 def _with_row(table: Floats, i: int, row: Floats) -> Floats:
-    """Knots with row i replaced; wider where the row needs it."""
+    """Return knots with row i replaced; wider where the row needs it."""
     if len(row) > table.shape[1]:
         table = np.hstack([table, np.repeat(table[:, -1:], len(row) - table.shape[1], axis=1)])
     table[i] = row[-1]
@@ -90,7 +90,7 @@ def _with_row(table: Floats, i: int, row: Floats) -> Floats:
 
 
 def _cells_in(mesh: Mesh, knots: list[Floats]) -> Ints:
-    """Cells whose vertices lie within the rectangle of the knots."""
+    """Return cells whose vertices lie within the rectangle of the knots."""
     boxes, bins = mesh.cell_boxes
     box = np.array([knots[0][0], knots[0][-1], knots[1][0], knots[1][-1]])
     out, along = np.zeros(len(boxes), dtype=np.int32), [np.ascontiguousarray(boxes[:, k : k + 2]) for k in (0, 2)]
@@ -99,7 +99,7 @@ def _cells_in(mesh: Mesh, knots: list[Floats]) -> Ints:
 
 
 def _blocks(lists: Lists, c: int) -> list[np.ndarray]:
-    """Views of a cell's weights (tiles, room, 8) and derivative weights (tiles, room, 16), if there are any."""
+    """Return views of a cell's weights (tiles, room, 8) and derivative weights (tiles, room, 16), if there are any."""
     room, at = lists.room[c], lists.at[c]
     tiles = lists.tile_start[c + 1] - lists.tile_start[c]
     end = at + tiles * room * LANES
@@ -108,7 +108,7 @@ def _blocks(lists: Lists, c: int) -> list[np.ndarray]:
 
 
 def _entry(lists: Lists, i: int, c: int) -> int:
-    """The index of point i's entry for cell c."""
+    """Return the index of point i's entry for cell c."""
     start = lists.point_start[i]
     return int(start + np.argmax(lists.point_cell[start : start + lists.point_count[i]] == c))
 
@@ -182,7 +182,7 @@ def _compact(lists: Lists) -> None:
 
 @kernel
 def _only_covering(cells, places, cell_start, rows, room, at, value, out):
-    """Vertices at which a point with rows ``places`` in ``cells`` is the only one; returns their number."""
+    """Write vertices at which a point with rows ``places`` in ``cells`` is the only one; returns their number."""
     count = 0
     for q in range(cells.shape[0]):
         c = cells[q]

@@ -26,7 +26,7 @@ from .lists import LANES, Basis, Lists, cells_by_point
 PLAIN = -1  # in ``rows_at``: the cell has plain weights
 COST = 1.0, 1.5  # without and with normals: factors that need more operations than so many times plain weights are
 # slower (measured on sheets and heads; they read less memory)
-MOST = 1 << 30  # numbers that are stored as factors; further cells keep plain weights
+MAX_NUMBERS = 1 << 30  # numbers that are stored as factors; further cells keep plain weights
 MIX = 0x9E3779B1  # multiplier of the hash (Knuth, The Art of Computer Programming 6.4)
 
 
@@ -60,7 +60,7 @@ class Factors:
 
 
 def no_factors(cells: int) -> Factors:
-    """Plain weights for that many cells."""
+    """Return plain weights for that many cells."""
     single = np.zeros(0, np.int32)
     return Factors(np.full(cells, PLAIN), np.zeros(cells, np.int64), single, single, np.zeros(0, np.float32), single)
 
@@ -95,12 +95,12 @@ def factorize(
 
 
 def _slots(entries: int) -> Ints:
-    """An empty hash table, at most half of which so many entries fill."""
+    """Return an empty hash table, at most half of which so many entries fill."""
     return np.zeros(1 << (2 * entries).bit_length(), np.int64)
 
 
 def products(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
-    """(tiles, rows, 8) b w of a cell with factors, and (tiles, rows, 16) b_u w and b_v w if it has slopes."""
+    """Return (tiles, rows, 8): b w of a cell with factors, and (tiles, rows, 16) b_u w and b_v w if it has slopes."""
     rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
     head, first = factors.picks_at[c], factors.rows_at[c]
     wide, picks = factors.picks[head : head + HEAD], factors.picks[head + HEAD : head + HEAD + STEP * tiles]
@@ -122,8 +122,8 @@ def products(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
 
 @kernel
 def _ordered(uv, side, axis, values, rank, order):
-    """Distinct coordinates of a cell's vertices, rising, into ``values (k, 2)``, and each vertex's place among them
-    into ``rank``; returns how many there are."""
+    """Write distinct coordinates of a cell's vertices, rising, into ``values (k, 2)``, and each vertex's place among
+    them into ``rank``; returns how many there are."""
     count = distinct(uv, side, axis, values, rank)
     before = values[:count].copy()
     for k in range(count):
@@ -157,7 +157,7 @@ def _put_windows(rank, size, wide, axis, tiles, picks):
 
 @kernel
 def _stored(row, size, table, used, slots):
-    """The place of ``row[:size]`` in ``table``, where it is added at ``used`` if it is new; both int32."""
+    """Return the place of ``row[:size]`` in ``table``, where it is added at ``used`` if it is new; both int32."""
     total, last = np.uint32(size), slots.shape[0] - 1
     for k in range(size):
         total = np.uint32((total ^ np.uint32(row[k])) * np.uint32(MIX))
@@ -205,7 +205,7 @@ def _sort_rows(keys, ids):
 
 @kernel
 def _operations(rows, entries, groups, tiles, wide_u, slopes):
-    """How many operations on eight numbers a cell takes with plain weights and with factors."""
+    """Return how many operations on eight numbers a cell takes with plain weights and with factors."""
     if slopes:
         return 9 * entries, 6 * rows * (wide_u // 8) + 17 * groups * tiles
     return 3 * entries, 3 * rows * (wide_u // 8) + 7 * groups * tiles
@@ -228,7 +228,7 @@ def _factor_cells(
         many_u = _ordered(cell_uv, sides, 0, values_u, rank_u, order)
         many_v = _ordered(cell_uv, sides, 1, values_v, rank_v, order)
         wide_u, wide_v = (many_u + 7) // 8 * 8, (many_v + 7) // 8 * 8
-        if used[1] + each * (wide_u + wide_v) * rows[c] > min(MOST, len(factors)):
+        if used[1] + each * (wide_u + wide_v) * rows[c] > min(MAX_NUMBERS, len(factors)):
             continue
         if not (
             _put_windows(rank_u, size, wide_u, 0, tiles, own) and _put_windows(rank_v, size, wide_v, 1, tiles, own)

@@ -16,11 +16,11 @@ from surface.base.jit import kernel
 from surface.mesh.mesh import Mesh
 
 PER_POINT = 45.0  # cost of a point in a cell's list, in weights (measured; that of the mesh's cells is 10)
-MOST = 256  # vertices of a joined cell
+MAX_VERTICES = 256  # vertices of a joined cell
 
 
-def merged(mesh: Mesh, per_point: float = PER_POINT, most: int = MOST) -> Mesh:
-    """The mesh with cells joined where one list costs less than two; vertices keep their order."""
+def merged(mesh: Mesh, per_point: float = PER_POINT, most: int = MAX_VERTICES) -> Mesh:
+    """Return the mesh with cells joined where one list costs less than two; vertices keep their order."""
     cells, points = len(mesh.cell_start) - 1, int(mesh.list_ids.max(initial=-1)) + 1
     begins = np.zeros(cells, np.bool_)
     kept = np.zeros(len(mesh.list_ids), np.bool_)
@@ -31,8 +31,8 @@ def merged(mesh: Mesh, per_point: float = PER_POINT, most: int = MOST) -> Mesh:
 
 
 def _joined(mesh: Mesh, begins: Bools, kept: Bools) -> Mesh:
-    """The mesh whose cells are those that ``begins (c,)`` says, each with the cells after it; ``kept (k,)`` says which
-    of the listed points are the first of their kind in a new cell."""
+    """Return the mesh whose cells are those that ``begins (c,)`` says, each with the cells after it; ``kept (k,)`` says
+    which of the listed points are the first of their kind in a new cell."""
     at = np.flatnonzero(begins)
     start = np.append(mesh.cell_start[at], mesh.cell_start[-1])
     total = np.concatenate([[0], np.cumsum(kept)])

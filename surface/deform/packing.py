@@ -22,7 +22,7 @@ from .lists import LANES, Lists
 PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lanes follow the mesh's order
 CHOICE = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
 WORTH = 0.97  # of the rows without reordering: with more than these left, vertices stay in order
-MOST = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
+MAX_ROWS = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
 
 
 @dataclass
@@ -70,7 +70,16 @@ def order_vertices(lists: Lists) -> Order:
     cells, tiles = len(lists.rows), int(lists.tile_start[-1])
     found = Order(np.zeros(LANES * tiles, np.uint16), np.zeros(cells, np.bool_), np.zeros(cells, np.int64))
     _order_cells(
-        lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, CHOICE, WORTH, MOST, *found
+        lists.cell_start,
+        lists.tile_start,
+        lists.rows,
+        lists.at,
+        lists.value,
+        lists.slope,
+        CHOICE,
+        WORTH,
+        MAX_ROWS,
+        *found,
     )
     return found
 
@@ -79,7 +88,7 @@ def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
     """Pack those of the ``wanted (c,)`` cells that have rows of zeros."""
     tiles = np.diff(lists.tile_start)
     blocks = lists.rows * tiles
-    chosen = wanted & (order.entries < blocks) & (lists.rows < MOST) & (np.diff(lists.cell_start) <= MOST)
+    chosen = wanted & (order.entries < blocks) & (lists.rows < MAX_ROWS) & (np.diff(lists.cell_start) <= MAX_ROWS)
     entries, moved = int(order.entries[chosen].sum()), chosen & order.moved
     made = Packed(
         packed_at=_starts(tiles + 1, chosen), tile_entry=np.zeros(int((tiles + 1)[chosen].sum()), np.int64),
@@ -95,14 +104,14 @@ def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
 
 
 def _starts(sizes: Ints, chosen: Bools) -> Ints:
-    """(c,) where each of the ``chosen`` cells starts if they follow each other; PLAIN for the others."""
+    """Return (c,): where each of the ``chosen`` cells starts if they follow each other; PLAIN for the others."""
     held = np.where(chosen, sizes, 0)
     return np.where(chosen, np.cumsum(held) - held, PLAIN)
 
 
 def unpacked(lists: Lists, made: Packed, c: int) -> list[Floats32]:
-    """(tiles, rows, 8) b w of a packed cell, and (tiles, rows, 16) b_u w and b_v w if it has slopes, in the mesh's
-    order."""
+    """Return (tiles, rows, 8): b w of a packed cell, and (tiles, rows, 16) b_u w and b_v w if it has slopes, in the
+    mesh's order."""
     rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
     size = int(lists.cell_start[c + 1] - lists.cell_start[c])
     first, at = int(made.packed_at[c]), int(made.order_at[c])
@@ -125,7 +134,8 @@ def unpacked(lists: Lists, made: Packed, c: int) -> list[Floats32]:
 
 @kernel
 def _marks(size, rows, at, value, slope, masks):
-    """Bit k of ``masks[s]`` : does point k of a cell with a block at ``at`` reach its vertex s? Returns how many do."""
+    """Return bit k of ``masks[s]`` : does point k of a cell with a block at ``at`` reach its vertex s? Returns how many
+    do."""
     count = 0
     for s in range(size):
         masks[s] = 0
@@ -144,7 +154,7 @@ def _marks(size, rows, at, value, slope, masks):
 
 @kernel
 def _bits(word):
-    """How many bits of a number are set (Warren, Hacker's Delight 5-1)."""
+    """Return how many bits of a number are set (Warren, Hacker's Delight 5-1)."""
     word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
     word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
     word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
@@ -153,7 +163,7 @@ def _bits(word):
 
 @kernel
 def _entries(size, masks, order, union):
-    """How many rows of tiles of eight vertices in the given order are not all zero."""
+    """Return how many rows of tiles of eight vertices in the given order are not all zero."""
     count = 0
     for first in range(0, size, 8):
         union[:] = 0
@@ -166,8 +176,8 @@ def _entries(size, masks, order, union):
 
 @kernel
 def _next_vertex(masks, union, left, choice):
-    """Which of the first ``choice`` of the vertices ``left`` adds fewest points to the ``union`` of a tile, and shares
-    most with it."""
+    """Return which of the first ``choice`` of the vertices ``left`` adds fewest points to the ``union`` of a tile, and
+    shares most with it."""
     best, found = 1 << 60, 0
     for q in range(min(choice, len(left))):
         more, common = 0, 0

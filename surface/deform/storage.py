@@ -36,7 +36,7 @@ class Storage(NamedTuple):
         return vars(self.factors) | vars(self.packed)
 
     def blocks(self, cells: Ints) -> Bools:
-        """Which of ``cells (k,)`` have blocks, (k,) bool."""
+        """Return which of ``cells (k,)`` have blocks, (k,) bool."""
         held: Bools = (self.factors.rows_at[cells] < 0) & (self.packed.packed_at[cells] < 0)
         return held
 
@@ -63,7 +63,7 @@ def _take_out(lists: Lists, kept: Bools) -> None:
 
 
 def remember(lists: Lists, storage: Storage) -> Callable[[], None]:
-    """What takes back the next calls of :func:`expand`, if nothing else was changed meanwhile."""
+    """Return what takes back the next calls of :func:`expand`, if nothing else was changed meanwhile."""
     value, slope, used = lists.value, lists.slope, lists.used
     places = [lists.at, lists.room, storage.factors.rows_at, storage.packed.packed_at, storage.packed.order_at]
     before = [array.copy() for array in places]

@@ -32,7 +32,7 @@ def __getattr__(name: str) -> Any:
 
 
 def exporters(extra: Iterable[Exporter] = ()) -> tuple[Exporter, ...]:
-    """The exporters of this folder, by module, and ``extra`` ones after them.
+    """Return the exporters of this folder, by module, and ``extra`` ones after them.
 
     Raises ExportError: an exporter was made for another omote, or two want the same suffix.
     """
@@ -51,7 +51,7 @@ def exporters(extra: Iterable[Exporter] = ()) -> tuple[Exporter, ...]:
 
 @cache
 def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
-    """Exporters of this folder, and what is missing for those that cannot be imported."""
+    """Return exporters of this folder, and what is missing for those that cannot be imported."""
     found, missing = [], []
     for module in pkgutil.iter_modules(__path__):
         try:
@@ -102,7 +102,7 @@ def export_head(
 
 
 def _writer(exporter: Exporter, frame: str, animation: Animation | None, web: bool) -> Write:
-    """What writes in a frame, an animation, or for the web."""
+    """Return what writes in a frame, an animation, or for the web."""
     if web:
         if exporter.write_web is None or frame != "head" or animation is not None:
             raise ExportError(

@@ -49,7 +49,7 @@ class Mesh:
                 value.flags.writeable = False
 
     def points_of(self, cell: int) -> np.ndarray:
-        """(k,) int32: control points that reach a cell."""
+        """Return (k,) int32: control points that reach a cell."""
         return self.list_ids[self.list_start[cell] : self.list_start[cell + 1]]
 
     @cached_property
@@ -64,7 +64,7 @@ class Mesh:
 
 
 def border_edges(triangles: NDArray[np.int32]) -> Ints:
-    """(k, 2) edges that only one triangle has, in the direction of that triangle."""
+    """Return (k, 2): edges that only one triangle has, in the direction of that triangle."""
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     key, back = edges[:, 0] << 32 | edges[:, 1], edges[:, 1] << 32 | edges[:, 0]
     return edges[~np.isin(key, back)]

@@ -48,14 +48,17 @@ class Patch:
     shares: Floats
 
     def deviation(self, sampled: Sampled, points: Floats) -> float:
-        """Greatest distance of the patch from the limit surface at the samples; grips lie at points (g, 3)."""
+        """Return the greatest distance of the patch from the limit surface at the samples; grips lie at points (g,
+        3).
+        """
         basis = _basis(np.linspace(0.0, 1.0, COUNT))
         at = np.einsum("ia,jb,abg->ijg", basis, basis, self.shares) @ points
         return float(np.linalg.norm(at - sampled.limit @ points, axis=-1).max())
 
 
 def limit_samples(mesh: Complex, face: int, along: Along) -> Sampled:
-    """Samples of one face; ``along`` gives shares at places along a link, where the face that it borders is regular."""
+    """Return samples of one face; ``along`` gives shares at places along a link, where the face that it borders is
+    regular."""
     layout = Layout(mesh, face, 0)
     rect = layout.rects[face]
     size = rect[1] - rect[0], rect[3] - rect[2]
@@ -70,7 +73,7 @@ def limit_samples(mesh: Complex, face: int, along: Along) -> Sampled:
 
 
 def _rows(side: list[dict[int, float]] | None, column: dict[int, int]) -> Floats | None:
-    """(COUNT, g) shares along a side."""
+    """Return (COUNT, g): shares along a side."""
     if side is None:
         return None
     out = np.zeros((len(side), len(column)))
@@ -81,7 +84,8 @@ def _rows(side: list[dict[int, float]] | None, column: dict[int, int]) -> Floats
 
 
 def _sides(mesh: Complex, face: int, along: Along) -> list[list[dict[int, float]] | None]:
-    """Shares along the four sides, each in the order of the face's links; None beside another star face or nothing.
+    """Return shares along the four sides, each in the order of the face's links; None beside another star face or
+    nothing.
 
     Sides of several links, at T-junctions, are taken link by link.
     """
@@ -112,7 +116,7 @@ def _side(mesh: Complex, way: list[int], along: Along) -> list[dict[int, float]]
 
 
 def _around(mesh: Complex, face: int) -> tuple[list[list[int]], dict[int, int]]:
-    """Vertices around each face near one, that one first; and the own grip of each of these vertices."""
+    """Return vertices around each face near one, that one first; and the own grip of each of these vertices."""
     links = mesh.file.links
     by_vertex: dict[int, set[int]] = {}
     for number, loop in mesh.loops.items():
@@ -127,7 +131,7 @@ def _around(mesh: Complex, face: int) -> tuple[list[list[int]], dict[int, int]]:
 
 
 def _limit(loops: list[list[int]], grips: dict[int, int], corners: dict[int, Floats], width: int) -> Floats:
-    """(COUNT, COUNT, width) shares of grips at the first face's lattice, on the limit surface."""
+    """Return (COUNT, COUNT, width): shares of grips at the first face's lattice, on the limit surface."""
     order = {v: k for k, v in enumerate(dict.fromkeys(v for loop in loops for v in loop))}
     shares, places = np.zeros((len(order), width)), np.full((len(order), 2), np.nan)
     for vertex, k in order.items():
@@ -147,8 +151,8 @@ def _limit(loops: list[list[int]], grips: dict[int, int], corners: dict[int, Flo
 
 
 def _filled(lattice: Floats) -> Floats:
-    """A lattice in which places without samples, as at T-junctions, are interpolated along their row and column; where
-    neither has samples on both sides, the nearest sample counts."""
+    """Return a lattice in which places without samples, as at T-junctions, are interpolated along their row and column;
+    where neither has samples on both sides, the nearest sample counts."""
     known = np.isfinite(lattice[..., 0])
     if known.all():
         return lattice
@@ -173,7 +177,7 @@ def _filled(lattice: Floats) -> Floats:
 
 
 def _neighbours(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
-    """Faces by their edges."""
+    """Return faces by their edges."""
     edges: dict[tuple[int, int], list[int]] = {}
     for k, face in enumerate(faces):
         for a, b in zip(face, face[1:] + face[:1], strict=True):
@@ -182,7 +186,8 @@ def _neighbours(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
 
 
 def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list[list[int]], Floats, Floats]:
-    """One step of Catmull and Clark's subdivision on rows (n, w); places are means, which is right on one face only."""
+    """Return one step of Catmull and Clark's subdivision on rows (n, w); places are means, which is right on one face
+    only."""
     edges, n = _neighbours(faces), len(x)
     centres = np.array([x[face].mean(axis=0) for face in faces])
     number = {edge: n + k for k, edge in enumerate(edges)}
@@ -205,7 +210,7 @@ def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list
 def _smoothed(
     faces: list[list[int]], edges: dict[tuple[int, int], list[int]], centres: Floats, x: Floats
 ) -> Floats:  # fmt: skip
-    """New places of the old vertices."""
+    """Return new places of the old vertices."""
     valence, free = np.zeros(len(x)), np.zeros(len(x))
     around, middle, border = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
     for (a, b), own in edges.items():
@@ -227,7 +232,7 @@ def _smoothed(
 
 
 def _on_limit(faces: list[list[int]], x: Floats) -> Floats:
-    """Vertices of quads moved to the limit surface (Halstead, Kass and DeRose 1993)."""
+    """Return vertices of quads moved to the limit surface (Halstead, Kass and DeRose 1993)."""
     edges = _neighbours(faces)
     valence, free = np.zeros(len(x)), np.zeros(len(x))
     beside, across, border = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
@@ -251,7 +256,7 @@ def _on_limit(faces: list[list[int]], x: Floats) -> Floats:
 
 
 def _corrected(limit: Floats, sides: list[Floats | None]) -> Floats:
-    """The lattice moved by a Coons patch so that its sides are the exact ones where these are known.
+    """Return the lattice moved by a Coons patch so that its sides are the exact ones where these are known.
 
     sides : (COUNT, g) from (0, 0) on: v = 0 along u, u = 1 along v, v = 1 back along u, u = 0 back along v.
     """
@@ -272,28 +277,28 @@ def _corrected(limit: Floats, sides: list[Floats | None]) -> Floats:
 
 
 def _corner(after: Floats | None, before: Floats | None) -> Floats:
-    """What is missing at a corner between two sides; nothing where neither is known."""
+    """Return what is missing at a corner between two sides; nothing where neither is known."""
     known = [row for row in (None if after is None else after[0], None if before is None else before[-1])
              if row is not None]  # fmt: skip
     return np.mean(known, axis=0) if known else np.zeros(1)
 
 
 def _basis(t: Floats) -> Floats:
-    """(m, SPANS + 3) cubic B-splines over 0 to 1 with clamped ends."""
+    """Return (m, SPANS + 3): cubic B-splines over 0 to 1 with clamped ends."""
     knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, SPANS + 1), [1.0] * 3])
     inside = np.minimum(t, 1.0 - 1e-15)
     return np.stack([blending(knots[i : i + 5], inside) for i in range(SPANS + 3)], axis=1)
 
 
 def fit_patch(sampled: Sampled) -> Patch:
-    """The bicubic patch nearest to the samples whose corners and sides depend on those of the samples only."""
+    """Return the bicubic patch nearest to the samples whose corners and sides depend on those of the samples only."""
     fit = _fitting()
     shares: Floats = np.einsum("ai,bj,ijg->abg", fit, fit, sampled.wanted)
     return Patch(shares)
 
 
 def _fitting() -> Floats:
-    """(SPANS + 3, COUNT): control points of the cubic spline nearest to samples, through the first and last."""
+    """Return (SPANS + 3, COUNT): control points of the cubic spline nearest to samples, through the first and last."""
     basis = _basis(np.linspace(0.0, 1.0, COUNT))
     inner = np.linalg.pinv(basis[1:-1, 1:-1])
     ends = np.zeros((2, COUNT))

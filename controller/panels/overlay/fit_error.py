@@ -102,6 +102,6 @@ class FitErrorView:
 
 
 def _encoded(imgui: Any, linear: Any) -> int:
-    """A linear RGB (3,) as ImGui draws it, as bright as it is on the lit face."""
+    """Return a linear RGB (3,) as ImGui draws it, as bright as it is on the lit face."""
     red, green, blue = (np.asarray(linear, np.float64) ** (1 / 2.2)).tolist()
     return packed(imgui, (red, green, blue, 1.0))

@@ -103,7 +103,7 @@ class OverlayView:
         return np.append(values, 0.0)[self._order]
 
     def _measured(self) -> Floats | None:
-        """(h,) what the servos show; what they do not know is as wanted."""
+        """Return (h,): what the servos show; what they do not know is as wanted."""
         if "measured" not in self.on or self._state is None:
             return None
         shown = self._newest().copy()
@@ -139,7 +139,7 @@ class OverlayView:
 
 
 def nearest(points: Floats, pixel: tuple[float, float], screen: Screen) -> Floats:
-    """(3,) the point of (m, 3) that is nearest to a pixel; of several, the one in front."""
+    """Return (3,): the point of (m, 3) that is nearest to a pixel; of several, the one in front."""
     shown = screen.project(points)
     away = np.hypot(shown[:, 0] - pixel[0], shown[:, 1] - pixel[1])
     close = np.flatnonzero(away <= away.min() + 4.0)

@@ -86,12 +86,12 @@ class StopButton:
 
 
 def _least(imgui: Any) -> float:
-    """Width that shows the label whole."""
+    """Return the width that shows the label whole."""
     return float(imgui.calc_text_size(LABEL).x + imgui.get_font_size())
 
 
 def _corner(imgui: Any) -> Box:
-    """The lower right corner of the window."""
+    """Return the lower right corner of the window."""
     size, line = imgui.get_io().display_size, imgui.get_font_size()
     right, bottom = size.x - line, size.y - line
     return Box(right - _CORNER_LINES * line, bottom - _LINES * line, right, bottom)

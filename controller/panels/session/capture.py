@@ -19,7 +19,7 @@ from surface.view.docks import PictureArea
 from surface.view.pictures.clip import write_clip
 from surface.view.pictures.sheet import write_png
 
-LONGEST_S = 600.0
+MAX_S = 600.0
 _CLIP_HEIGHT = 480
 
 
@@ -124,7 +124,7 @@ class Capture:
         if self._rows is None:
             return
         self._rows.append(np.append(self.seconds, self._newest()))
-        if self.seconds > LONGEST_S:
+        if self.seconds > MAX_S:
             self.toggle()
 
     def _write_picture(self, picture: np.ndarray) -> None:
@@ -138,7 +138,7 @@ class Capture:
             self.message = str(error)
 
     def _free(self, stem: str, suffix: str) -> Path:
-        """The first name with a number that no file has."""
+        """Return the first name with a number that no file has."""
         number = 1
         while (path := self._folder / f"{stem}{number}{suffix}").exists() or path in self._promised:
             number += 1

@@ -211,7 +211,7 @@ class Commands:
 
 
 def _differences(before: Settings, after: Settings) -> Iterator[PanelRequest]:
-    """Requests that change ``before`` to ``after``."""
+    """Return requests that change ``before`` to ``after``."""
     for index in before.held.keys() - after.held.keys():
         yield Hold(index, None)
     for index, value in after.held.items():

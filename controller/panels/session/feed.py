@@ -40,7 +40,7 @@ class History:
         self._next, self._count = (self._next + 1) % _ROWS, min(self._count + 1, _ROWS)
 
     def series(self) -> tuple[Floats, Floats]:
-        """(n,) times (s), and (k, n) values of the columns, oldest first."""
+        """Return (n,): times (s), and (k, n) values of the columns, oldest first."""
         order = (np.arange(_ROWS - self._count, _ROWS) + self._next) % _ROWS
         return self._times[order], self._rows[:, order]
 
@@ -82,7 +82,7 @@ class Feed:
             self._problems.add(note)
 
     def history(self, servo: Mapping[str, Any]) -> History:
-        """What a servo was asked and reported: the columns of :attr:`COLUMNS`."""
+        """Return what a servo was asked and reported: the columns of :attr:`COLUMNS`."""
         return self.histories.setdefault(servo_key(servo), History(self.COLUMNS))
 
     @property
@@ -92,5 +92,5 @@ class Feed:
 
 
 def servo_key(servo: Mapping[str, Any]) -> str:
-    """A name that no other servo of the stage has."""
+    """Return a name that no other servo of the stage has."""
     return f"{servo['bus']}/{servo['id']} {servo['name']}"

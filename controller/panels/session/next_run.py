@@ -30,7 +30,7 @@ class NextRun:
 
 
 def carried_to(run: NextRun, parameters: Parameters) -> History | None:
-    """What was set and can be taken back, for ``parameters``: those that they lack are left out."""
+    """Return what was set and can be taken back, for ``parameters``: those that they lack are left out."""
     history, at = run.carried, [parameters.find(name) for name in run.names]
     if history is None:
         return None

@@ -24,7 +24,7 @@ from controller.takes.reader import load_take
 from controller.takes.timeline import Ease, key_of_face, load_timeline, save_show
 from controller.vocabulary.vocabulary import Vocabulary
 
-_LEAST_S = 1.0
+_MIN_LENGTH_S = 1.0
 """A timeline that is shorter is drawn as long as this."""
 JITTER_S = 0.05
 
@@ -75,7 +75,7 @@ class Playback:
     @property
     def shown_s(self) -> float:
         """Length of the scale that is drawn."""
-        return max(self.length_s * 1.1, _LEAST_S)
+        return max(self.length_s * 1.1, _MIN_LENGTH_S)
 
     def __call__(self) -> None:
         """Let the line go on while it plays; it stops at the end."""

@@ -28,14 +28,14 @@ _BLOCK = 1 << 16  # frames
 
 
 def find_player() -> tuple[str, ...] | None:
-    """The command that plays a WAV file whose path follows; None where there is none."""
+    """Return the command that plays a WAV file whose path follows; None where there is none."""
     if sys.platform == "win32":
         return (sys.executable, "-c", _WINDOWS)
     return next((command for command in PLAYERS if shutil.which(command[0])), None)
 
 
 def sound_length_s(path: Path) -> float:
-    """How long the samples of a WAV file are. Raises ControllerError: it cannot be read, or is none."""
+    """Return how long the samples of a WAV file are. Raises ControllerError: it cannot be read, or is none."""
     with _opened(path) as sound:
         return sum(len(block) // sound.format.frame for block in _blocks(sound)) / sound.format.rate_hz
 
@@ -93,14 +93,14 @@ def _opened(path: Path) -> Iterator[Sound]:
 
 
 def _blocks(sound: Sound) -> Iterator[bytes]:
-    """The remaining part of a sound."""
+    """Return the remaining part of a sound."""
     while block := sound.read(_BLOCK):
         yield block
 
 
 def _from(path: Path, from_s: float) -> Path | None:
-    """A WAV file of what comes after a moment, as 16 bit PCM: not every player can begin in the middle, or reads every
-    kind of WAV. None where nothing comes."""
+    """Return a WAV file of what comes after a moment, as 16 bit PCM: not every player can begin in the middle, or reads
+    every kind of WAV. None where nothing comes."""
     with _opened(path) as sound:
         form = sound.format
         skip = round(max(from_s, 0.0) * form.rate_hz)
@@ -118,7 +118,7 @@ def _from(path: Path, from_s: float) -> Path | None:
 
 
 def _written(form: SoundFormat, parts: Sequence[NDArray[np.int16]]) -> Path:
-    """A WAV file of samples, 16 bit PCM, that somebody else removes. Raises OSError, and leaves no file then."""
+    """Return a WAV file of samples, 16 bit PCM, that somebody else removes. Raises OSError, and leaves no file then."""
     with tempfile.NamedTemporaryFile(prefix="omote-", suffix=".wav", delete=False) as file:
         path = Path(file.name)
         try:

@@ -116,7 +116,7 @@ def is_person(table: Mapping[str, Any]) -> bool:
 
 
 def free_folder(beside: Path, stem: str) -> Path:
-    """The first name with a number that nothing has."""
+    """Return the first name with a number that nothing has."""
     number = 1
     while (path := beside / f"{stem}-head{number}").exists():
         number += 1

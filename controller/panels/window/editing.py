@@ -94,7 +94,7 @@ class MouseEditing:
         self._commands.change(replace(now, light=editor.light, moves=moves))
 
     def find_editor(self) -> PointEditor:
-        """What drags the points of the head that is shown now."""
+        """Return what drags the points of the head that is shown now."""
         return self.editor
 
     def _show_moves(self, moves: Floats | None) -> None:
@@ -229,7 +229,7 @@ class MouseEditing:
             self._commands.move(moves)
 
     def _face_wanted(self) -> Floats:
-        """(P,) the face with what is held by hand, which it may still be on its way to."""
+        """Return (P,): the face with what is held by hand, which it may still be on its way to."""
         values = self._newest().copy()
         for index, value in self._commands.now.held.items():
             values[index] = value

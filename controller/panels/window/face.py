@@ -218,5 +218,5 @@ class WindowFace:
             self._fit_error()
 
     def report(self) -> dict[str, object]:
-        """Frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""
+        """Return frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""
         return {**self._log.report(self._settings, "window"), **qualities(self._choice)}

@@ -81,7 +81,7 @@ class Keys:
 
 
 def _help_size(imgui: Any) -> tuple[float, float]:
-    """Width and height of the help in text of the usual size."""
+    """Return the width and height of the help in text of the usual size."""
     style = imgui.get_style()
     columns = (HELP.keys(), HELP.values())
     wide = sum(max(imgui.calc_text_size(words).x for words in column) + 2 * style.cell_padding.x for column in columns)

@@ -103,7 +103,7 @@ class Looks:
         return self._stage(self._shown).load_head(self.shown_light)
 
     def _stage(self, look: Look) -> Stage:
-        """The stage with a look. Raises ConfigError: no such person, or one that does not fit the head."""
+        """Return the stage with a look. Raises ConfigError: no such person, or one that does not fit the head."""
         stage = self.stage
         if look.head is not None:
             settings = stage.settings.model_copy(update={"identity": {}})
@@ -115,7 +115,7 @@ class Looks:
 
 
 def person_names() -> list[str]:
-    """Names of the shipped persons."""
+    """Return names of the shipped persons."""
     return sorted(path.stem for path in (config_dir() / "persons").glob("*.toml"))
 
 
@@ -148,7 +148,7 @@ class LookControls:
 
 
 def _choose(imgui: Any, label: str, names: Sequence[str], chosen: str) -> str:
-    """One of ``names`` from a list that opens; what was chosen by a file keeps its own line."""
+    """Return one of ``names`` from a list that opens; what was chosen by a file keeps its own line."""
     listed = list(names) if chosen in names else [chosen, *names]
     imgui.set_next_item_width(imgui.get_font_size() * 9)
     changed, at = imgui.combo(label, listed.index(chosen), listed)

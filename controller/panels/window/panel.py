@@ -112,7 +112,7 @@ class Panel:
         self.heads: HeadChoice | None = None
 
     def docks(self) -> list[Dock]:
-        """The parts, as tabs beside the picture."""
+        """Return the parts, as tabs beside the picture."""
         parts: dict[str, Callable[[], None]] = {
             "Faces": self.expressions,
             "Sliders": self.sliders,
@@ -193,7 +193,7 @@ class Panel:
         imgui.end()
 
     def _below_top(self, part: Callable[[], None]) -> Callable[[], None]:
-        """A part below what every tab has on top."""
+        """Return a part below what every tab has on top."""
 
         def draw() -> None:
             from imgui_bundle import imgui  # optional

@@ -99,7 +99,7 @@ class Saving:
         imgui.end_combo()
 
     def suggested(self, kind: Kind) -> str:
-        """A name that nothing has yet."""
+        """Return a name that nothing has yet."""
         words = self._words
         known = {fold(name) for name in (*words.vocabulary.names, *words.parameters.names)}
         names = (f"{STEMS[kind]}_{i}" for i in count(1))
@@ -152,7 +152,7 @@ class Saving:
         return self._open_again(name, {})
 
     def _anchor(self, name: str) -> str:
-        """An anchor is known as an expression, too: the face that the pull made."""
+        """Return an anchor is known as an expression, too: the face that the pull made."""
         place, pull = self._editor().last_pull(self._newest())
         check_name(name, self._words.vocabulary)
         path = self._words.own.parent / f"{name}-anchor.toml"
@@ -174,6 +174,6 @@ class Saving:
 
 
 def shown(path: Path) -> Path:
-    """A path as a user names it: from the present folder where it is in there."""
+    """Return a path as a user names it: from the present folder where it is in there."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path

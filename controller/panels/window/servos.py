@@ -134,7 +134,7 @@ class ServoBars:
 
 
 def share(servo: Mapping[str, Any], angle_deg: float | None) -> float | None:
-    """Where an angle is between a servo's limits, 0..1; None where it is not known."""
+    """Return where an angle is between a servo's limits, 0..1; None where it is not known."""
     low, high = float(servo["low_deg"]), float(servo["high_deg"])
     if angle_deg is None or high <= low:
         return None
@@ -142,7 +142,7 @@ def share(servo: Mapping[str, Any], angle_deg: float | None) -> float | None:
 
 
 def tooltip(servo: Mapping[str, Any]) -> str:
-    """All that is known of a servo, in lines."""
+    """Return all that is known of a servo, in lines."""
     lines = [
         f"{servo['name']}: {servo['model']}, id {servo['id']} on {servo['bus']}",
         f"limits {servo['low_deg']:g} to {servo['high_deg']:g} deg, wanted {servo['wanted_deg']:g} deg",

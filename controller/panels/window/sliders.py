@@ -43,7 +43,7 @@ class Sliders:
             self._region(imgui, region)
 
     def rows(self, region: str) -> list[tuple[int, ...]]:
-        """Indices that each slider of a region moves: two where sides are linked."""
+        """Return indices that each slider of a region moves: two where sides are linked."""
         members = [
             i
             for i in map(int, self._parameters.region(region))
@@ -114,7 +114,7 @@ class Sliders:
             imgui.set_tooltip("servos show " + " and ".join(f"{x:.2f}" for x in known))
 
     def _away(self, region: str) -> str:
-        """How far the servos of a region are from their wanted angles, for its title."""
+        """Return how far the servos of a region are from their wanted angles, for its title."""
         away = None if self._state is None else self._state.away_deg(region)
         return "" if away is None else f"   servos {away:.1f} deg away"
 

@@ -218,11 +218,11 @@ class TimelinePanel:
 
 
 def label_left(tick: float, width: float, right: float) -> float:
-    """Where the label of a tick begins: right of it, or left of it where it would go on beyond ``right``."""
+    """Return where the label of a tick begins: right of it, or left of it where it would go on beyond ``right``."""
     return tick + _LABEL if tick + _LABEL + width <= right else tick - _LABEL - width
 
 
 def tick_s(least_s: float) -> float:
-    """The least of 1, 2, 5, 10 and so on, and their tenths, that is ``least_s`` or more."""
+    """Return the least of 1, 2, 5, 10 and so on, and their tenths, that is ``least_s`` or more."""
     power = 10.0 ** math.floor(math.log10(max(least_s, 1e-3)))
     return next((power * factor for factor in (1.0, 2.0, 5.0) if power * factor >= least_s), power * 10.0)

@@ -100,7 +100,7 @@ class Neck:
     whole: float = -78.0
 
     def share(self, points: Floats) -> Floats:
-        """(n,) share of the head's rotation that each point at rest (n, 3) follows, 0..1."""
+        """Return (n,): share of the head's rotation that each point at rest (n, 3) follows, 0..1."""
         return smoothstep(points[:, 1] + self.slope * points[:, 2], self.still, self.whole)
 
 

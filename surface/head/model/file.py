@@ -60,16 +60,16 @@ class _Section:
         return _error(self.path, self.where + key, why)
 
     def read(self, **wanted: type | tuple[int, ...]) -> dict[str, Any]:
-        """Values by key, each of a type, or numbers of a shape: () a float, (k,) a tuple, else an array."""
+        """Return values by key, each of a type, or numbers of a shape: () a float, (k,) a tuple, else an array."""
         return {key: self._numbers(key, w) if isinstance(w, tuple) else self._value(key, w)
                 for key, w in wanted.items()}  # fmt: skip
 
     def section(self, key: str) -> _Section:
-        """The table under a key."""
+        """Return the table under a key."""
         return _Section(self.path, self._value(key, dict), f"{self.where}{key}.")
 
     def sections(self, key: str) -> list[_Section]:
-        """The tables of a list of them."""
+        """Return the tables of a list of them."""
         tables = self._value(key, list)
         for i, table in enumerate(tables):
             if not isinstance(table, dict):
@@ -99,7 +99,7 @@ class _Arrays:
     stored: dict[str, Array]
 
     def read(self, key: str, shape: tuple[int, ...]) -> Array:
-        """The array of a key in the type that omote computes with, whatever it was stored in."""
+        """Return the array of a key in the type that omote computes with, whatever it was stored in."""
         if key not in self.stored:
             raise _error(self.path, key, "missing")
         found = _checked(self.path, key, self.stored[key], shape)
@@ -111,7 +111,7 @@ class _Arrays:
         return array
 
     def split(self, key: str, a: Array, ends: Array) -> list[Array]:
-        """Runs of rows that end at ``ends``, an array kept under ``key``."""
+        """Return runs of rows that end at ``ends``, an array kept under ``key``."""
         if len(ends) and (ends[-1] != len(a) or (np.diff(ends) < 0).any() or ends[0] < 0):
             raise _error(self.path, key, f"does not match an array of {len(a)} rows")
         return np.split(a, ends[:-1]) if len(ends) else []
@@ -192,7 +192,7 @@ def _part(section: _Section, arrays: _Arrays) -> PartData:
 
 
 def _extent(section: _Section) -> dict[str, Any]:
-    """Which directions of a part are closed, its rectangle and its side; what is not there is left out."""
+    """Return which directions of a part are closed, its rectangle and its side; what is not there is left out."""
     shapes: dict[str, tuple[int, ...]] = {"closed_u": (2,), "closed_v": (2,), "rect": (4,)}
     found = section.read(**{key: shape for key, shape in shapes.items() if key in section.table})
     for key, ends in found.items():
@@ -205,7 +205,7 @@ def _extent(section: _Section) -> dict[str, Any]:
 
 
 def _cuts(arrays: _Arrays, key: str) -> tuple[Slit, ...]:
-    """Cuts of a part's mesh: rows of axis (0 along u, 1 along v), at, start, end."""
+    """Return cuts of a part's mesh: rows of axis (0 along u, 1 along v), at, start, end."""
     if key not in arrays.stored:
         return ()
     rows = arrays.read(key, (ANY, 4))
@@ -346,14 +346,14 @@ def _table(head: HeadData) -> dict[str, Any]:
 
 
 def _contact_table(contact: Contact) -> dict[str, Any]:
-    """A contact without its places and what is as usual; its seal, if it has one."""
+    """Return a contact without its places and what is as usual; its seal, if it has one."""
     usual = ("places", "seal", "cling") if contact.cling else ("places", "seal")
     table = {k: v for k, v in vars(contact).items() if k not in usual}
     return table | ({"seal": vars(contact.seal)} if contact.seal else {})
 
 
 def _extent_table(part: PartData) -> dict[str, Any]:
-    """What :func:`_extent` reads, without what is as usual."""
+    """Return what :func:`_extent` reads, without what is as usual."""
     ends = {key: getattr(part, key) for key in ("closed_u", "closed_v", "rect")}
     table: dict[str, Any] = {key: [float(x) for x in row] for key, row in ends.items() if row is not None}
     return table | ({"flip": True} if part.flip else {})

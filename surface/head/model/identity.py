@@ -38,7 +38,7 @@ class Identity:
 
 
 def fingerprint(head: HeadData) -> int:
-    """CRC-32 over the knots of all control points of a head."""
+    """Return CRC-32 over the knots of all control points of a head."""
     out = 0
     for part in head.parts:
         for knots in (part.knots_u, part.knots_v):
@@ -47,7 +47,7 @@ def fingerprint(head: HeadData) -> int:
 
 
 def load_identities(head: str | Path) -> dict[str, Identity]:
-    """The identities of a head, given by its folder or its head.toml, by name; empty where it has none.
+    """Return the identities of a head, given by its folder or its head.toml, by name; empty where it has none.
 
     Raises HeadFileError: the file is damaged or of a newer version.
     """
@@ -71,7 +71,7 @@ def _identities(file: Sidecar) -> dict[str, Identity]:
 
 
 def _moves(z: Mapping[str, Array], ids_prefix: str, moves_prefix: str) -> dict[str, tuple[Array, Floats32]]:
-    """Control points and their displacements, by what follows the prefixes of their keys."""
+    """Return control points and their displacements, by what follows the prefixes of their keys."""
     out = {}
     for key in z:
         if key.startswith(ids_prefix):
@@ -107,7 +107,7 @@ def save_identities(head: str | Path, identities: list[Identity]) -> Path:
 
 
 def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mapping[str, float], where: str) -> HeadData:
-    """The head with identities mixed in, each by 0 to 1.
+    """Return the head with identities mixed in, each by 0 to 1.
 
     Raises HeadFileError: no identity of that name, an amount out of range, or one that was made for another fit.
     """
@@ -147,7 +147,7 @@ def _check_fit(head: HeadData, identity: Identity, where: str) -> None:
 
 
 def _changed(part: PartData, change: Group, amount: float) -> PartData:
-    """The part with a multiple of ``change`` added to its group of the same name."""
+    """Return the part with a multiple of ``change`` added to its group of the same name."""
     total = np.zeros((len(part.points), 3), np.float32)
     total[change.ids] += np.float32(amount) * change.moves
     for g in part.groups:

@@ -26,7 +26,7 @@ WEIGHT = 1e-4
 EDGES = 0.5  # longest edge of triangles where such points reach, in spans of their knots
 REACH = 1.7  # spans from its middle within which a point is followed
 ROUNDS = 6  # of splitting edges, each halves them
-LEAST_MM = 0.25  # no edge is split that is shorter than twice this
+MIN_EDGE_MM = 0.25  # no edge is split that is shorter than twice this
 Coarser = Callable[[str, Mesh], Mapping[str, Ints]]
 _SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
@@ -51,12 +51,12 @@ class LightPoints:
         return np.column_stack([self.knots_u[:, 2], self.knots_v[:, 2]])
 
     def take(self, which: Ints) -> LightPoints:
-        """Some of them."""
+        """Return some of them."""
         return LightPoints(self.part, self.knots_u[which], self.knots_v[which])
 
 
 def join_light(points: Sequence[LightPoints]) -> dict[str, LightPoints]:
-    """All light points by part, in their order."""
+    """Return all light points by part, in their order."""
     names = dict.fromkeys(each.part for each in points)
     return {
         name: LightPoints(
@@ -71,7 +71,8 @@ def join_light(points: Sequence[LightPoints]) -> dict[str, LightPoints]:
 def with_light(
     data: HeadData, points: Sequence[LightPoints], coarser: Coarser = lambda name, mesh: {}
 ) -> tuple[HeadData, dict[str, Refined]]:  # fmt: skip
-    """The head with light control points behind those of each part, and the meshes of these parts, made finer there.
+    """Return the head with light control points behind those of each part, and the meshes of these parts, made finer
+    there.
 
     coarser : fewer triangles (t, 3) over the mesh of a part, by level; they are made finer, too.
 
@@ -113,7 +114,9 @@ def check_light(part: PartData, own: LightPoints) -> None:
 
 
 def with_points(part: PartData, own: LightPoints) -> PartData:
-    """The part with the points behind its own: on the surface, and following every group and the jaw as it does."""
+    """Return the part with the points behind its own: on the surface, and following every group and the jaw as it
+    does.
+    """
     surface = make_surface(part)
     share, n, k = surface.basis_matrix(own.centres).tocsr(), surface.n, len(own)
     width = part.knots_u.shape[1]
@@ -135,7 +138,7 @@ def _padded(knots: Floats, width: int) -> Floats:
 
 
 def _carried(group: Group, share: Array, n: int) -> Group:
-    """A group that moves new points as the surface at their middles."""
+    """Return a group that moves new points as the surface at their middles."""
     field = np.zeros((n, 3))
     field[group.ids] = group.moves
     extra = share @ field
@@ -163,7 +166,7 @@ class Refined:
         self._spans = np.column_stack([np.diff(k, axis=1).mean(axis=1) for k in (own.knots_u, own.knots_v)])
         _, along_u, along_v = self._surface.derivatives(own.centres)
         millimetres = np.column_stack([np.linalg.norm(along_u, axis=1), np.linalg.norm(along_v, axis=1)])
-        self._longest = np.maximum(EDGES * (self._spans * millimetres).min(axis=1), 2 * LEAST_MM)
+        self._longest = np.maximum(EDGES * (self._spans * millimetres).min(axis=1), 2 * MIN_EDGE_MM)
         self._uv, self._places = mesh.uv, mesh.vertices
         self.triangles = self._refine(np.asarray(mesh.triangles, np.int64))
         inner = {level: (each < self._count).all(axis=1) for level, each in coarser.items()}
@@ -180,8 +183,8 @@ class Refined:
         return np.array(self._middles.ends, np.int64).reshape(-1, 2)
 
     def _refine(self, triangles: Ints) -> Ints:
-        """Triangles (t', 3) with shorter edges where light points reach, of (t, 3) over the mesh's own vertices. Both
-        triangles of an edge that they reach are near; the others, which are most, are not looked at."""
+        """Return triangles (t', 3) with shorter edges where light points reach, of (t, 3) over the mesh's own vertices.
+        Both triangles of an edge that they reach are near; the others, which are most, are not looked at."""
         near = self._near(self._uv[triangles])
         others, triangles = triangles[~near], triangles[near]
         for _ in range(ROUNDS if len(triangles) else 0):
@@ -193,7 +196,7 @@ class Refined:
         return np.concatenate([others, triangles])
 
     def _near(self, places: Floats) -> np.ndarray:
-        """(t,) which of polygons (t, k, 2) lie, by their boxes, where all light points together reach."""
+        """Return (t,): which of polygons (t, k, 2) lie, by their boxes, where all light points together reach."""
         reach, centres = REACH * self._spans, self._own.centres
         low, high = (centres - reach).min(axis=0), (centres + reach).max(axis=0)
         near: np.ndarray = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
@@ -208,7 +211,7 @@ class Refined:
             self._places = np.concatenate([self._places, self._surface.evaluate(uv)])
 
     def _is_long(self, edges: Ints) -> np.ndarray:
-        """(e,) which edges reach a light point and are longer than there is use for."""
+        """Return (e,): which edges reach a light point and are longer than there is use for."""
         length = np.linalg.norm(self._places[edges[:, 0]] - self._places[edges[:, 1]], axis=1)
         ends = self._uv[edges]
         reach, centres = REACH * self._spans, self._own.centres
@@ -223,7 +226,9 @@ class Refined:
         return out
 
     def packed(self, grown: PartData) -> dict[str, Array]:
-        """The finer mesh of the part with the points, as arrays to keep: new vertices are in cells of their own."""
+        """Return the finer mesh of the part with the points, as arrays to keep: new vertices are in cells of their
+        own.
+        """
         mesh, surface = self.mesh, make_surface(grown)
         lists = self._with_own(surface.n - len(self._own))
         starts = [mesh.cell_start]
@@ -252,7 +257,8 @@ class Refined:
         return lists
 
     def carry(self, values: Array) -> Array:
-        """Rows (m, ...) by vertex, behind the mesh's own those that seams added, with rows for new vertices between."""
+        """Return rows (m, ...) by vertex, behind the mesh's own those that seams added, with rows for new vertices
+        between."""
         own = [np.asarray(values[: self._count], np.float64)]
         rows = np.concatenate([own[0], np.zeros((len(self.ends), *values.shape[1:]))])
         for i, (a, b) in enumerate(self.ends.tolist(), self._count):

@@ -70,7 +70,7 @@ class Look:
 
 
 def skin_tone(melanin: float, blood: float = 0.0) -> Floats:
-    """(3,) linear albedo of skin.
+    """Return (3,): linear albedo of skin.
 
     Melanin and blood absorb: each adds to the density, the negative logarithm of the albedo (Tsumura, Ojima, Sato et
     al., "Image-based skin color and texture analysis/synthesis by extracting hemoglobin and melanin information in the
@@ -82,7 +82,7 @@ def skin_tone(melanin: float, blood: float = 0.0) -> Floats:
 
 
 def skin_albedo(painted: Floats, melanin: float, blood: float, redness: Floats) -> Floats:
-    """(m, 3) albedo of painted skin (m, 3) for another melanin.
+    """Return (m, 3): albedo of painted skin (m, 3) for another melanin.
 
     What the paint adds to the base tone, in density, stays: by ``redness (m, 1)``, and less in darker skin, whose
     melanin covers the blood.
@@ -93,7 +93,7 @@ def skin_albedo(painted: Floats, melanin: float, blood: float, redness: Floats) 
 
 
 def with_age(head: HeadData, age: float) -> HeadData:
-    """The head with its wrinkles at rest, each by its share of ``age``, 0..1."""
+    """Return the head with its wrinkles at rest, each by its share of ``age``, 0..1."""
     shares = {
         group.name: age * share
         for part in head.parts

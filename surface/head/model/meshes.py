@@ -22,7 +22,7 @@ LOOP_SHARE = 0.4  # how near a border follows its loop, in chord errors
 
 
 def make_surface(data: PartData) -> DCPSurface:
-    """The part's DCP surface."""
+    """Return the part's DCP surface."""
     return DCPSurface.from_padded(
         data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1],
         closed_u=data.closed_u, closed_v=data.closed_v,
@@ -30,7 +30,7 @@ def make_surface(data: PartData) -> DCPSurface:
 
 
 def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) -> Mesh:
-    """Triangles for a part by its budget, with vertices where the head's seams begin and end."""
+    """Return triangles for a part by its budget, with vertices where the head's seams begin and end."""
     most, chord, depth = data.budget
     with np.errstate(divide="ignore", invalid="ignore"):  # triangles without area while borders are cut
         return surface.tessellate(
@@ -45,14 +45,14 @@ def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) 
 
 
 def _ends(seams: Sequence[Seam], part: str) -> Floats:
-    """(k, 2) ends of a part's seams, where three borders or more meet; closed seams have none."""
+    """Return (k, 2): ends of a part's seams, where three borders or more meet; closed seams have none."""
     lines = [uv for s in seams for name, uv in ((s.part_a, s.uv_a), (s.part_b, s.uv_b)) if name == part]
     ends = [line[k] for line in lines for k in (0, -1) if not np.array_equal(line[0], line[-1])]
     return np.unique(np.array(ends, float).reshape(-1, 2), axis=0)
 
 
 def domain_of(data: PartData) -> Domain:
-    """The part's rectangle, or the one around its loops, trimmed by them.
+    """Return the part's rectangle, or the one around its loops, trimmed by them.
 
     ``ValueError`` for a part with neither.
     """
@@ -66,7 +66,7 @@ def domain_of(data: PartData) -> Domain:
 
 
 def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
-    """The mesh as arrays to store, without positions and normals, which the surface gives."""
+    """Return the mesh as arrays to store, without positions and normals, which the surface gives."""
     return {
         "mesh_uv": mesh.uv,
         "mesh_triangles": mesh.triangles.astype(np.int32),
@@ -81,7 +81,7 @@ def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
 def unpack(
     arrays: dict[str, Array], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool, flip: bool = False
 ) -> Mesh | None:
-    """The stored mesh, or None if it is absent, made with another budget or flip, or does not fit the surface.
+    """Return the stored mesh, or None if it is absent, made with another budget or flip, or does not fit the surface.
 
     ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex is put in the middle
     of its cell's control points.

@@ -71,13 +71,13 @@ class Pose:
 
 
 def head_angles(values: Floats) -> Floats:
-    """(3,) yaw, pitch and roll of the head, rad, in parameter values (59,) in the order of NAMES."""
+    """Return (3,): yaw, pitch and roll of the head, rad, in parameter values (59,) in the order of NAMES."""
     angles: Floats = np.clip(values[len(SHAPES) : len(SHAPES) + 3], -1.0, 1.0) * HEAD_RAD
     return angles
 
 
 def read_pose(values: Floats) -> Pose:
-    """Parameter values (59,) in the order of NAMES, clipped, as a pose.
+    """Return parameter values (59,) in the order of NAMES, clipped, as a pose.
 
     mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
     opens the jaw as far as it needs, ahead of the tongue, and keeps the lips off it. Blink and look down do not add up:
@@ -113,7 +113,8 @@ def read_pose(values: Floats) -> Pose:
 
 
 def lid_down(look: float, blink: float) -> float:
-    """What a look down, 0..1, adds to a blink, 0..1, as a look down: how much further than the blink it takes the lid.
+    """Return what a look down, 0..1, adds to a blink, 0..1, as a look down: how much further than the blink it takes
+    the lid.
 
     The lid, in blinks, is at the greater of ``blink`` and LID_SHARE times ``look``, smooth where they are equal
     (a polynomial minimum; Quilez, "Smooth minimum", 2013); the width of that is none for an open and for a closed eye.
@@ -126,20 +127,20 @@ def lid_down(look: float, blink: float) -> float:
 
 
 def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float, float]:
-    """Yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes (down, in, out, up) together."""
+    """Return the yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes (down, in, out, up) together."""
     down, inward, outward, up = look
     yaw, pitch = yaw + (outward - inward) * (1 - 2 * side), pitch + down - up
     return min(max(yaw, -1.0), 1.0), min(max(pitch, -1.0), 1.0)
 
 
 def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
-    """Hermite step 3 t^2 - 2 t^3 of ``x``, 0 at ``low`` and 1 at ``high``, constant beyond them."""
+    """Return hermite step 3 t^2 - 2 t^3 of ``x``, 0 at ``low`` and 1 at ``high``, constant beyond them."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
 def rotation(yaw: float, pitch: float, roll: float = 0.0) -> Floats:
-    """(3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
+    """Return (3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
     cy, cp, cr, sy, sp, sr = cos(yaw), cos(pitch), cos(roll), sin(yaw), sin(pitch), sin(roll)
     return np.array(
         [
@@ -151,7 +152,7 @@ def rotation(yaw: float, pitch: float, roll: float = 0.0) -> Floats:
 
 
 def rotation_vector(matrix: Floats) -> Floats:
-    """(3,) axis times angle of a rotation by less than 180 degrees."""
+    """Return (3,): axis times angle of a rotation by less than 180 degrees."""
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     axis = (h - f, c - g, d - b)
     sine = 0.5 * hypot(*axis)

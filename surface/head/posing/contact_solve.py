@@ -107,8 +107,8 @@ def put_back(points, near, own, eye, local):
 
 @kernel
 def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work):
-    """One pass of :func:`part_sides` over the placed samples; returns the largest error that it found. Samples are
-    placed again after it."""
+    """Write one pass of :func:`part_sides` over the placed samples; returns the largest error that it found. Samples
+    are placed again after it."""
     own, radius, local = sampling[4], limits[3], work[0]
     _, profiles, overlap, _, _, _ = opening
     error, around = 0.0, radius > 0.0
@@ -145,9 +145,9 @@ def close_sides(seal, passes, tolerance, rows, apart, opening, push, sampling, w
 def part_sides(
     points, eye, axis, seal, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work
 ):  # fmt: skip
-    """Correct control points (n, 3) at an opening, of which ``seal``, 0..1, is closed first, until the remainder is
-    below ``tolerance``, mm, ``passes`` times at most; lids are moved onto the eyeball first, which opens them. Returns
-    how many passes there were, 0 where the last answer still holds.
+    """Return correct control points (n, 3) at an opening, of which ``seal``, 0..1, is closed first, until the remainder
+    is below ``tolerance``, mm, ``passes`` times at most; lids are moved onto the eyeball first, which opens them.
+    Returns how many passes there were, 0 where the last answer still holds.
 
     press, soft : as in :func:`.contact_kernels.find_overlap`; rows : samples of a column.
     apart : (2 c, k) how far the moved points go up where the sides of a column part by 1.

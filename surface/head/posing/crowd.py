@@ -134,7 +134,7 @@ class _Member:
 
 
 def _make_part(part: HeadPart, count: int) -> CrowdPart:
-    """A part of ``count`` heads, as it is now."""
+    """Return a part of ``count`` heads, as it is now."""
     vertices, normals = (np.tile(array, (count, 1, 1)) for array in (part.vertices, part.normals))
     batch = DeformationBatch(part.deformation, count) if isinstance(part, SkinPart) else None
     return CrowdPart(part, vertices, normals, batch)

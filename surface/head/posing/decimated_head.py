@@ -47,7 +47,8 @@ class DecimatedPart:
         return self.kept[: int(np.searchsorted(self.kept, len(self.part.mesh.uv)))]
 
     def rows(self, ids: NDArray[np.integer]) -> Ints:
-        """Rows among the decimated head's vertices of the part's vertices ``ids (k,)``; all of them must be kept."""
+        """Return rows among the decimated head's vertices of the part's vertices ``ids (k,)``; all of them must be
+        kept."""
         return self.first + np.searchsorted(self.kept, ids)
 
 
@@ -138,7 +139,7 @@ class JoinedRig(SkinRig):
 
 
 def _joined(parts: Sequence[PartData]) -> PartData:
-    """Points, groups, jaw and lids of several parts as those of one."""
+    """Return points, groups, jaw and lids of several parts as those of one."""
     groups: dict[str, list[tuple[int, Group]]] = {}
     first = 0
     for part in parts:
@@ -229,7 +230,7 @@ class _Seams:
 
 
 def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
-    """Which vertices are drawn or wanted, by part, with those that seams put them between."""
+    """Return which vertices are drawn or wanted, by part, with those that seams put them between."""
     kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
     for stitch in reversed(head.stitches):  # a later seam may take what an earlier one moves
         drawn = np.isin(stitch.ids, kept[stitch.second.name])

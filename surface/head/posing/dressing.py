@@ -50,7 +50,7 @@ def _colour(part: HeadPart, worn: WornPart, look: Worn) -> None:
 
 
 def _directions(part: HeadPart) -> Floats32:
-    """(m, 3) unit vectors along the strands at rest: those of v."""
+    """Return (m, 3): unit vectors along the strands at rest: those of v."""
     _, _, along = part.surface.derivatives(part.mesh.uv, side=part.mesh.side)
     length = np.linalg.norm(along, axis=1, keepdims=True)
     return np.asarray(along / np.maximum(length, 1e-9), np.float32)
@@ -89,7 +89,7 @@ def _seen(triangles: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArray[n
 
 
 def sampled(garment: Garment, kind: str, part: HeadPart) -> Floats32 | None:
-    """(m, 1) a garment's picture over a part at its vertices, linear between pixels; None where it has none."""
+    """Return (m, 1): a garment's picture over a part at its vertices, linear between pixels; None where it has none."""
     picture = garment.fields.get(f"{kind}/{part.name}")
     if picture is None:
         return None

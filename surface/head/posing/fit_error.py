@@ -24,7 +24,7 @@ UNKNOWN = np.iinfo(np.uint16).max
 
 
 def read_fit_error(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Floats32]:
-    """Distances (m,) mm by part, NaN where none was measured; empty where the head has no such file.
+    """Return distances (m,) mm by part, NaN where none was measured; empty where the head has no such file.
 
     head : the head's folder or its head.toml. parts : what they are for; those of another tessellation are left out.
 
@@ -34,7 +34,7 @@ def read_fit_error(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, 
 
 
 def _unpacked(stored: np.ndarray) -> Floats32:
-    """(m,) mm. Raises ValueError: an array that is not as it is written."""
+    """Return (m,): mm. Raises ValueError: an array that is not as it is written."""
     if stored.ndim != 1 or stored.dtype != np.uint16:
         raise ValueError(f"holds an array of shape {stored.shape} and type {stored.dtype}, expected (any,) uint16")
     return np.where(stored == UNKNOWN, np.nan, STEP_MM * stored).astype(np.float32)

@@ -72,7 +72,7 @@ def mix_rows(amounts: Floats, rows: Floats32, rest: Floats, least: Floats, out: 
 
 @inlined
 def mapped(rows, at, linear, x0, y0, z0):  # type: ignore[no-untyped-def]
-    """``linear @ p`` plus a shift (x0, y0, z0) of the eight vectors p from ``rows[at]`` on."""
+    """Return ``linear @ p`` plus a shift (x0, y0, z0) of the eight vectors p from ``rows[at]`` on."""
     x, y, z = load_x(rows, at), load_y(rows, at), load_z(rows, at)
     return (
         fma(x, linear[0, 0], fma(y, linear[0, 1], fma(z, linear[0, 2], splat(x0)))),

@@ -55,7 +55,7 @@ def _colour_skin(part: HeadPart, look: Look) -> None:
 
 
 def _lips(part: HeadPart) -> Floats:
-    """(m, 1) share of each vertex that is lip: as painted, or what paint makes glossy."""
+    """Return (m, 1): share of each vertex that is lip: as painted, or what paint makes glossy."""
     painted = part.attributes.get("lips")
     if painted is not None:
         return np.asarray(painted[:, :1], np.float64)
@@ -66,7 +66,7 @@ def _lips(part: HeadPart) -> Floats:
 
 
 def _sunlit(part: HeadPart, eyes: Floats) -> Floats32:
-    """(m, 1) how many freckles grow where: on nose and cheeks most, on the forehead some."""
+    """Return (m, 1): how many freckles grow where: on nose and cheeks most, on the forehead some."""
     middle, apart = eyes.mean(axis=0), float(np.linalg.norm(eyes[0] - eyes[1]))
     x, y, z = ((np.asarray(part.vertices, np.float64) - middle) / apart).T
     front = smoothstep(z, -0.55, 0.1)

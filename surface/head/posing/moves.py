@@ -48,8 +48,8 @@ class Moves:
         add_moves(amounts, self._start, self._tile, self._rows, self._order, self._sums, points)
 
     def add_all(self, amounts: Floats, points: Floats) -> Floats:
-        """(h, n, 3) ``points (n, 3)`` with displacements by each of ``amounts (h, g)``: one product of matrices, which
-        reads the displacements once for all."""
+        """Return (h, n, 3): ``points (n, 3)`` with displacements by each of ``amounts (h, g)``: one product of
+        matrices, which reads the displacements once for all."""
         if self._dense is None:
             self._dense = self._table().astype(np.float64)
         moved: Floats = (amounts @ self._dense).reshape(len(amounts), self._n, 3)
@@ -57,11 +57,11 @@ class Moves:
         return moved
 
     def at(self, ids: Ints) -> Floats32:
-        """(g, k, 3) displacements of the points ``ids (k,)``."""
+        """Return (g, k, 3): displacements of the points ``ids (k,)``."""
         return self._table().reshape(len(self.used), self._n, 3)[:, ids]
 
     def _tiles_of(self, group: Group) -> tuple[np.ndarray, Floats32]:
-        """Which tiles a group moves, rising, and by how much their points, (k, LANES, 3)."""
+        """Return which tiles a group moves, rising, and by how much their points, (k, LANES, 3)."""
         rows = np.zeros((self._tiles * LANES, 3), np.float32)
         place = np.empty(self._n, np.int64)
         place[self._order] = np.arange(self._n)
@@ -70,7 +70,7 @@ class Moves:
         return tiles.astype(np.int32), rows.reshape(-1, LANES, 3)[tiles]
 
     def _table(self) -> Floats32:
-        """(g, 3 n) displacements of all points."""
+        """Return (g, 3 n): displacements of all points."""
         tiles = np.zeros((len(self.used), self._tiles, 3 * LANES), np.float32)
         group = np.repeat(np.arange(len(self.used)), np.diff(self._start))
         tiles[group, self._tile] = self._rows.reshape(-1, 3 * LANES)
@@ -80,7 +80,7 @@ class Moves:
 
 
 def gray_order(moved: Bools) -> Ints:
-    """(n,) an order of points in which neighbours are moved by nearly the same groups, from ``moved (g, n)``.
+    """Return (n,): an order of points in which neighbours are moved by nearly the same groups, from ``moved (g, n)``.
 
     It is that of the reflected Gray code of a point's column. Groups that move about half of the points come first:
     they cut the others into the fewest pieces.

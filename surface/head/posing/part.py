@@ -47,7 +47,7 @@ class Turn:
             turn_head(source.vertices, source.normals, share, self.vector, self.pivot, start, stop, vertices, normals)
 
     def after(self, linear: Floats, shift: Floats) -> tuple[Floats32, Floats32]:
-        """Linear part (3, 3) and shift (3,) of an affine motion followed by the whole rotation."""
+        """Return linear part (3, 3) and shift (3,) of an affine motion followed by the whole rotation."""
         turned = self.matrix @ (shift - self.pivot) + self.pivot
         return (self.matrix @ linear).astype(np.float32), turned.astype(np.float32)
 
@@ -92,8 +92,8 @@ class HeadPart:
         raise NotImplementedError
 
     def place_points(self, pose: Pose, moved: Floats | None = None) -> Floats:
-        """What :class:`surface.head.posing.influence.Influence` sums over, (k, 3), before the head turns; vertices and
-        normals are left as they are. ``moved`` : as :meth:`.rig.SkinRig.apply` takes it."""
+        """Return what :class:`surface.head.posing.influence.Influence` sums over, (k, 3), before the head turns;
+        vertices and normals are left as they are. ``moved`` : as :meth:`.rig.SkinRig.apply` takes it."""
         raise NotImplementedError
 
     @property

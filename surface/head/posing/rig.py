@@ -67,7 +67,7 @@ class SkinRig:
         self.version = self.invalidations = 0
 
     def move_all(self, poses: Sequence[Pose]) -> Floats:
-        """(h, n, 3) control points as groups alone move them in each of the poses: what :meth:`apply` takes."""
+        """Return (h, n, 3): control points as groups alone move them in each of the poses: what :meth:`apply` takes."""
         amounts = np.array([self._drivers.amounts(pose.shapes)[self._moves.used] for pose in poses])
         moved = self._moves.add_all(amounts.reshape(len(poses), -1), self.rest)
         for pose, points in zip(poses, moved, strict=True):
@@ -75,9 +75,9 @@ class SkinRig:
         return moved
 
     def apply(self, pose: Pose, moved: Floats | None = None) -> Floats:
-        """Positions (n, 3) of all control points before the head turns, overwritten by the next call; corrections at
-        the part's own contacts are put into ``pose.pushes``. ``moved (n, 3)`` : where groups alone move them, if that
-        is known."""
+        """Write positions (n, 3) of all control points before the head turns, overwritten by the next call; corrections
+        at the part's own contacts are put into ``pose.pushes``. ``moved (n, 3)`` : where groups alone move them, if
+        that is known."""
         np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
         key = self._pose_key(pose)
         if key != self._last_key:
@@ -172,12 +172,12 @@ class Lids:
 
 
 def optical_axis(gaze: Floats) -> Floats:
-    """(3,) unit vector along which an eye looks, from yaw and pitch (2,), rad."""
+    """Return (3,): unit vector along which an eye looks, from yaw and pitch (2,), rad."""
     return np.ascontiguousarray(rotation(*gaze)[:, 2])
 
 
 def _axis_of(pose: Pose, eye: int) -> Floats:
-    """The optical axis of an eye in a pose, computed once."""
+    """Return the optical axis of an eye in a pose, computed once."""
     key = ("axis", eye)
     if key not in pose.found:
         pose.found[key] = optical_axis(pose.gaze[eye])
@@ -186,7 +186,7 @@ def _axis_of(pose: Pose, eye: int) -> Floats:
 
 
 def _path_of(pose: Pose, jaw: Jaw) -> tuple[Floats, Floats]:
-    """The jaw's path in a pose, computed once."""
+    """Return the jaw's path in a pose, computed once."""
     key = ("path", id(jaw))
     if key not in pose.found:
         pose.found[key] = jaw_path(jaw, pose.jaw)
@@ -214,7 +214,7 @@ def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballCleara
 
 
 def _undo_share(part: PartData) -> Floats:
-    """(n,) share of the jaw's motion that mouthClose takes back at each point, 0..1."""
+    """Return (n,): share of the jaw's motion that mouthClose takes back at each point, 0..1."""
     close = np.zeros_like(part.points)
     for g in part.groups:
         if g.name == "mouthClose":
@@ -223,7 +223,7 @@ def _undo_share(part: PartData) -> Floats:
 
 
 def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
-    """Rotation (3, 3) and shift (3,) of the lower jaw, opened by ``amount``: p -> turn @ p + shift.
+    """Return the rotation (3, 3) and shift (3,) of the lower jaw, opened by ``amount``: p -> turn @ p + shift.
 
     A rotation about the hinge plus a glide of the hinge, both growing with the amount.
     """
@@ -242,7 +242,7 @@ def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
 
 
 def _key_of(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
-    """What :func:`motion_key` returns."""
+    """Write what :func:`motion_key` returns."""
     if follows == "jaw":
         return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))
     if follows in ("left_eye", "right_eye"):
@@ -252,7 +252,7 @@ def _key_of(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
 
 
 def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
-    """Linear part (3, 3) and shift (3,) of a part that is fixed to skull, jaw or an eye, before the head turns.
+    """Return linear part (3, 3) and shift (3,) of a part that is fixed to skull, jaw or an eye, before the head turns.
 
     Control points of a rational surface may be moved by any affine map: the surface follows exactly.
     """
@@ -264,7 +264,7 @@ def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floa
 
 
 def _motion_of(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
-    """What :func:`rigid_motion` returns."""
+    """Write what :func:`rigid_motion` returns."""
     linear, shift = np.eye(3), np.zeros(3)
     if follows == "jaw":
         linear, shift = _path_of(pose, head.jaw)

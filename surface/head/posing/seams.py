@@ -76,7 +76,7 @@ class SeamStitch:
 
 
 def _along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:
-    """Border vertices of a part on a polyline, and how far along it they lie, in its points; in order."""
+    """Return border vertices of a part on a polyline, and how far along it they lie, in its points; in order."""
     ids = np.unique(part.borders)
     distance, at = np.empty(len(ids)), np.empty(len(ids))
     nearest_on_line(part.mesh.uv[ids], np.ascontiguousarray(line, np.float64), False, distance, at)
@@ -86,7 +86,8 @@ def _along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:
 
 
 def _around(ids: Ints, at: Floats, line: Floats) -> tuple[Ints, Floats]:
-    """Vertices along a polyline; on a closed one the last comes before the first, too, and the first after the last."""
+    """Return vertices along a polyline; on a closed one the last comes before the first, too, and the first after the
+    last."""
     if not len(ids) or not np.array_equal(line[0], line[-1]):
         return ids, at
     length = len(line) - 1.0

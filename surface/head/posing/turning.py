@@ -17,7 +17,9 @@ ONE, TWO = np.float32(1.0), np.float32(2.0)
 
 @inlined
 def sine_and_rest(share, half):  # type: ignore[no-untyped-def]
-    """Sine of twice ``share * half``, and one less its cosine, of eight shares; ``half`` is at most pi / 2."""
+    """Return the sine of twice ``share * half``, and one less its cosine, of eight shares; ``half`` is at most pi /
+    2.
+    """
     x = mul(share, splat(half))
     q = mul(x, x)
     s = add(mul(q, splat(SINE[0])), splat(SINE[1]))
@@ -37,7 +39,9 @@ def sine_and_rest(share, half):  # type: ignore[no-untyped-def]
 
 @inlined
 def turned(x, y, z, a, b, c, sine, rest):  # type: ignore[no-untyped-def]
-    """Eight vectors turned about the unit axis (a, b, c): Rodrigues' formula, with ``rest`` one less the cosine."""
+    """Return eight vectors turned about the unit axis (a, b, c): Rodrigues' formula, with ``rest`` one less the
+    cosine.
+    """
     along = mul(rest, fma(x, a, fma(y, b, mul(z, splat(c)))))
     return (
         add(sub(x, mul(rest, x)), add(mul(sine, fma(z, b, mul(y, splat(-c)))), mul(along, splat(a)))),

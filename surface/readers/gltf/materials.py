@@ -23,7 +23,7 @@ _Rows = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 def read_materials(file: Gltf) -> list[Material]:
-    """All materials of a file."""
+    """Return all materials of a file."""
     images = _Images(file)
     return [_material(file, images, k, _table(table)) for k, table in enumerate(file.items("materials"))]
 
@@ -35,7 +35,7 @@ class _Images:
         self._file, self._found, self._size = file, dict[tuple[str, Any], bytes](), 0
 
     def bytes_of(self, source: Any) -> bytes:
-        """The bytes of an image. Raises FitError."""
+        """Return the bytes of an image. Raises FitError."""
         image, where = self._file.item("images", source, "texture"), f"images[{source}]"
         place = "bufferView" if "bufferView" in image else "uri"
         value = image.get(place)
@@ -78,7 +78,7 @@ def _number(value: Any, default: float) -> float:
 
 
 def _four(value: Any) -> tuple[float, float, float, float]:
-    """A colour; 1 for each part of it that is missing."""
+    """Return a colour; 1 for each part of it that is missing."""
     every = value if isinstance(value, list) else []
     r, g, b, a = (_number(every[k] if k < len(every) else None, 1.0) for k in range(4))
     return r, g, b, a
@@ -93,7 +93,9 @@ def _colour_and_texture(table: dict[str, Any]) -> tuple[tuple[float, float, floa
 
 
 def _vrm_colour_and_texture(file: Gltf, index: int) -> tuple[tuple[float, float, float, float], dict[str, Any]]:
-    """The same of a material of VRM 0, which says it in the terms of its own shader; white where there is none."""
+    """Return the same of a material of VRM 0, which says it in the terms of its own shader; white where there is
+    none.
+    """
     every = _extension(file.document, "VRM").get("materialProperties")
     own = _table(every[index]) if isinstance(every, list) and index < len(every) else {}
     texture = _table(own.get("textureProperties")).get("_MainTex")
@@ -103,12 +105,13 @@ def _vrm_colour_and_texture(file: Gltf, index: int) -> tuple[tuple[float, float,
 
 
 def _linear(srgb: float) -> float:
-    """Linear intensity of a part of an sRGB colour (IEC 61966-2-1)."""
+    """Return linear intensity of a part of an sRGB colour (IEC 61966-2-1)."""
     return float(srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def _picture(file: Gltf, images: _Images, texture: dict[str, Any]) -> tuple[bytes | None, str]:
-    """The encoded texture and its kind. One over the second texture coordinates, which are not read, is left out."""
+    """Return the encoded texture and its kind. One over the second texture coordinates, which are not read, is left
+    out."""
     moved = _extension(texture, "KHR_texture_transform")
     if not texture or moved.get("texCoord", texture.get("texCoord", 0)) != 0:
         return None, ""
@@ -124,7 +127,7 @@ def _picture(file: Gltf, images: _Images, texture: dict[str, Any]) -> tuple[byte
 
 
 def _image(images: _Images, source: Any) -> tuple[bytes | None, str]:
-    """The bytes of a picture and its kind; None for a format that cannot be read."""
+    """Return the bytes of a picture and its kind; None for a format that cannot be read."""
     data = images.bytes_of(source)
     mime = kind_of_picture(data)
     return (data, mime) if mime else (None, "")

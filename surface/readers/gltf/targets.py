@@ -42,7 +42,7 @@ class TargetNames:
 
 
 def _numbered(names: list[str]) -> list[str]:
-    """The names, with a number behind each that occurred before."""
+    """Return the names, with a number behind each that occurred before."""
     seen, numbers, out = set[str](), dict[str, int](), list[str]()
     for name in names:
         unique, number = name, numbers.get(name, 2)
@@ -59,7 +59,7 @@ def _named(table: dict[str, Any]) -> list[str]:
 
 
 def _unnamed(meshes: list[Any]) -> int:
-    """How many meshes have targets without names: two of them must not be taken for one another."""
+    """Return how many meshes have targets without names: two of them must not be taken for one another."""
     out = 0
     for mesh in meshes:
         primitives = [_table(p) for p in _list(_table(mesh).get("primitives"))]
@@ -69,7 +69,7 @@ def _unnamed(meshes: list[Any]) -> int:
 
 
 def read_expressions(file: Gltf, names: TargetNames) -> tuple[Expression, ...]:
-    """Every expression of a VRM file that moves something; presets go by the names of the specification."""
+    """Return every expression of a VRM file that moves something; presets go by the names of the specification."""
     return tuple(e for e in (*_of_vrm_0(file, names), *_of_vrm_1(file, names)) if e.binds)
 
 
@@ -98,7 +98,7 @@ def _of_vrm_1(file: Gltf, names: TargetNames) -> Iterator[Expression]:
 
 
 def _shapes(names: TargetNames, binds: list[tuple[Any, Any, float]]) -> tuple[tuple[str, float], ...]:
-    """Names of shapes and weights of (mesh, target, weight); a shape that several meshes share counts once."""
+    """Return names of shapes and weights of (mesh, target, weight); a shape that several meshes share counts once."""
     out: dict[str, float] = {}
     for mesh, index, weight in binds:
         if isinstance(mesh, int) and isinstance(index, int) and 0 <= mesh < len(names):

@@ -46,7 +46,7 @@ def test_a_height_is_the_least_along_the_mean_way_from_the_ring(
     points[-1] = [900.0, 0.0, 0.0]  # nothing is round it
     values[:9] *= 9.0
     if not listed:
-        monkeypatch.setattr(spikes, "MOST_LISTED", 0)
+        monkeypatch.setattr(spikes, "MAX_LISTED", 0)
     out = spikes.Rings(points, count, 6.0).heights(values)
     assert len(out) == count and {1, 2} <= set(around(points, 0))
     for i in range(count):
@@ -63,7 +63,7 @@ def test_rings_as_lists_and_searched_for_give_the_very_same_heights(monkeypatch:
     rng = np.random.default_rng(5)
     points, values = rng.uniform(-20.0, 20.0, (600, 3)), rng.normal(size=(600, 3))
     listed = spikes.Rings(points, 500, 6.0)
-    monkeypatch.setattr(spikes, "MOST_LISTED", 10)
+    monkeypatch.setattr(spikes, "MAX_LISTED", 10)
     searched = spikes.Rings(points, 500, 6.0)
     for enough in (0.0, 1.0):
         np.testing.assert_array_equal(searched.heights(values, enough), listed.heights(values, enough))

@@ -6,7 +6,7 @@ import numpy as np
 import shapes
 
 from surface import DCPSurface
-from surface.deform.merging import MOST, PER_POINT, merged
+from surface.deform.merging import MAX_VERTICES, PER_POINT, merged
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
 
@@ -25,7 +25,7 @@ def test_lists_of_joined_cells_are_those_of_their_parts() -> None:
     for c, (first, last) in enumerate(zip(joined.cell_start, joined.cell_start[1:], strict=False)):
         parts = np.unique(mesh.cell[first:last])
         assert joined.points_of(c).tolist() == np.unique(np.concatenate([mesh.points_of(k) for k in parts])).tolist()
-        assert len(parts) == 1 or last - first <= MOST
+        assert len(parts) == 1 or last - first <= MAX_VERTICES
 
 
 def test_cells_are_joined_only_where_one_list_costs_less() -> None:

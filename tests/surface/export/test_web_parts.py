@@ -12,7 +12,7 @@ from small_head import all_points, part, small_head
 from surface.export import web_parts as module
 from surface.export.shapes import ExportPart
 from surface.export.textures import EYE_RIM, materials
-from surface.export.web_parts import LEAST_MM, LEAST_NORMAL, web_parts
+from surface.export.web_parts import MIN_MOVE_MM, MIN_NORMAL, web_parts
 from surface.head import Head
 
 
@@ -33,10 +33,10 @@ def own_part(count: int, uv: Any = None, **attributes: Any) -> Any:
 def test_only_vertices_of_triangles_are_kept_and_only_shapes_that_move_them() -> None:
     moves = np.zeros((5, 3), np.float32)
     one, two, three, turn = moves.copy(), moves.copy(), moves.copy(), moves.copy()
-    one[3] = [0, -2 * LEAST_MM, 0]
-    one[4] = two[2] = [LEAST_MM, 0, 0]  # a vertex that is left out, and one that moves just enough
-    three[1] = [0.9 * LEAST_MM, 0, 0]
-    turn[1] = [0, 0, -LEAST_NORMAL]
+    one[3] = [0, -2 * MIN_MOVE_MM, 0]
+    one[4] = two[2] = [MIN_MOVE_MM, 0, 0]  # a vertex that is left out, and one that moves just enough
+    three[1] = [0.9 * MIN_MOVE_MM, 0, 0]
+    turn[1] = [0, 0, -MIN_NORMAL]
     whole = export_part(
         np.arange(15).reshape(5, 3), colours=np.arange(15, dtype=np.float32).reshape(5, 3),
         displacements={"one": one, "two": two, "three": three},
@@ -66,7 +66,7 @@ def test_half_shapes_are_what_lies_between_arc_and_chord() -> None:
     head.pose(head.values({}))
     rest = head.part("b").vertices
     whole, half = tooth.part.displacements["jawOpen"], tooth.part.displacements["jawOpenHalf"]
-    np.testing.assert_allclose(rest + 0.5 * whole + half, at_half, atol=LEAST_MM)
+    np.testing.assert_allclose(rest + 0.5 * whole + half, at_half, atol=MIN_MOVE_MM)
     assert 0.1 < np.abs(half).max() < 0.1 * np.abs(whole).max()
 
 

@@ -424,4 +424,4 @@ def test_what_was_found_for_the_same_surface_is_used_again_and_for_another_found
     assert len(solved) == 3 and solved[-1] != solved[0]
     for overlap in np.linspace(1.0, 2.0, 20):
         EyeballClearance(lips(overlap), low_places(), np.zeros(3), 0.0)
-    assert len(contact_module._FOUND) == contact_module._MOST_FOUND
+    assert len(contact_module._FOUND) == contact_module._MAX_CACHED
