@@ -47,7 +47,7 @@ class FitErrorView:
             self._colours.clear()
         return plain_theme(theme) if self._painted else theme
 
-    def draw_choice(self) -> None:
+    def draw_checkboxes(self) -> None:
         """The part of the panel that switches it, and what it says of the head."""
         from imgui_bundle import imgui  # optional
 

@@ -81,7 +81,7 @@ class Drops:
 
     def _appear(self, **change: Any) -> None:
         look: Look = self._commands.now.look or self._looks.first
-        self._commands.appear(replace(look, **change))
+        self._commands.set_look(replace(look, **change))
 
     def _take_toml(self, path: Path) -> None:
         with reading(path, ConfigError):

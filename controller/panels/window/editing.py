@@ -119,7 +119,7 @@ class MouseEditing:
         """Make the face look at what is under a pixel, half-way between its eyes and the camera."""
         towards = np.asarray(camera.eye, np.float64)
         point = screen.place(pixel, self._eyes + 0.5 * (towards - self._eyes)) - self._eyes
-        self._commands.look((float(point[0]), float(point[1]), float(point[2])), "gaze")
+        self._commands.set_gaze((float(point[0]), float(point[1]), float(point[2])), "gaze")
 
     def _use(self, imgui: Any, io: Any, pixel: tuple[float, float], screen: Screen, outside: bool) -> None:
         """Use the tool where Ctrl and the mouse are pressed, and continue an action that has begun."""
@@ -226,7 +226,7 @@ class MouseEditing:
         self.editor.release()
         moves = self.editor.moves
         if moves is not before and (before is not None or moves.any()):
-            self._commands.move(moves)
+            self._commands.set_moves(moves)
 
     def _face_wanted(self) -> Floats:
         """Return (P,): the face with what is held by hand, which it may still be on its way to."""

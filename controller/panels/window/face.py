@@ -110,7 +110,7 @@ class WindowFace:
         self._ended = False
         self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
         if carried is not None and (history := carried_to(carried, parameters)) is not None:
-            self._panel.commands.carry_on(history)
+            self._panel.commands.restore(history)
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
@@ -168,9 +168,9 @@ class WindowFace:
     def _draw_overlay_choice(self) -> None:
         """What can be drawn over the picture, and what can be painted on the face."""
         if self._overlays is not None:
-            self._overlays.draw_choice()
+            self._overlays.draw_checkboxes()
         if self._fit_error is not None:
-            self._fit_error.draw_choice()
+            self._fit_error.draw_checkboxes()
 
     def _take_over(self, head: Head) -> None:
         """Pose, drag and look at another head from now on."""
@@ -181,7 +181,7 @@ class WindowFace:
             looks = self._looks
             self._mouse.change(head, looks.shown_light if looks else (), same=looks is not None and looks.only_light)
         if self._overlays is not None:
-            self._overlays.forget()
+            self._overlays.reload()
 
     def _mirror(self, state: PanelState, on: bool) -> None:
         """Let the face show what the servos show, where they are known to, or what is wanted."""

@@ -63,7 +63,7 @@ class HeadChoice:
         self._values.listen(now.mailbox)
         if self._state is not None:
             self._state.turn_to(now.state)
-        commands.turn_to(before.name, now.name, now.stage.settings.liveliness)
+        commands.switch_head(before.name, now.name, now.stage.settings.liveliness)
         self.show(now.stage)
 
     def draw(self, commands: Commands) -> None:

@@ -144,7 +144,7 @@ class LookControls:
 
     def choose(self, look: Look) -> None:
         """Change to a look."""
-        self._commands.appear(look)
+        self._commands.set_look(look)
 
 
 def _choose(imgui: Any, label: str, names: Sequence[str], chosen: str) -> str:

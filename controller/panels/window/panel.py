@@ -171,7 +171,7 @@ class Panel:
 
     def _neutral(self) -> None:
         """Give everything back, servos that were turned by hand too."""
-        self.commands.neutral()
+        self.commands.return_to_neutral()
         if self.feed is not None:
             self.calibrating.forget()
 

@@ -152,13 +152,13 @@ class TimelinePanel:
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         changed, self._ease = imgui.combo("easing", self._ease, list(EASES))
         if changed and playback.selected is not None:
-            self._commands.arrange(self._commands.now.timeline.eased(playback.selected, EASES[self._ease]))
+            self._commands.set_timeline(self._commands.now.timeline.eased(playback.selected, EASES[self._ease]))
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         _, self._mark = imgui.input_text_with_hint("##mark", "name of a mark", self._mark)
         imgui.same_line()
         if imgui.button("mark"):
             at_s = None if self._mark in self._commands.now.timeline.marks else playback.position_s
-            self._try(lambda: self._commands.arrange(self._commands.now.timeline.with_mark(self._mark, at_s)))
+            self._try(lambda: self._commands.set_timeline(self._commands.now.timeline.with_mark(self._mark, at_s)))
 
     def _take_buttons(self, imgui: Any) -> None:
         flow = Flow(imgui)

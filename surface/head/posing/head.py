@@ -22,9 +22,9 @@ from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
 from surface.head.model.sway import Sway
 from surface.head.model.wardrobe import read_garment, with_garments
+from surface.head.posing.appearance import apply_look
 from surface.head.posing.dressing import dress
 from surface.head.posing.finer import apply_baked, coarser_of
-from surface.head.posing.looks import apply_look
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
 from surface.head.posing.seams import SeamStitch
