@@ -28,7 +28,7 @@ def number(keys: Ints) -> tuple[Ints, Ints]:
     of ``keys``."""
     flat = np.ascontiguousarray(keys).reshape(-1)
     first, back = np.zeros(len(flat), dtype=np.int64), np.zeros(len(flat), dtype=np.int64)
-    count = _number(flat, first, back)
+    count = _number_keys(flat, first, back)
     return first[:count].copy(), back.reshape(keys.shape)
 
 
@@ -41,7 +41,7 @@ def find(keys: Ints, wanted: Ints) -> Ints:
 
 
 @kernel
-def _place(key, keys, first, table):
+def _find_slot(key, keys, first, table):
     """Return the key's place in the hash table, whose size is a power of two: taken by it, or free (-1)."""
     block = (np.uint64(key >> 3) * HASH_FACTOR) >> np.uint64(20)
     place = np.int64((block << np.uint64(3) | np.uint64(key & 7)) & np.uint64(table.shape[0] - 1))
@@ -51,11 +51,11 @@ def _place(key, keys, first, table):
 
 
 @kernel
-def _number(keys, first, back):
+def _number_keys(keys, first, back):
     """Number different keys in order of appearance; returns how many there are."""
     table, count = np.full(FIRST_SIZE, -1, dtype=np.int32), 0
     for k in range(keys.shape[0]):
-        place = _place(keys[k], keys, first, table)
+        place = _find_slot(keys[k], keys, first, table)
         if table[place] < 0:
             table[place], first[count] = count, k
             count += 1
@@ -63,7 +63,7 @@ def _number(keys, first, back):
             if 2 * count > table.shape[0]:
                 table = np.full(4 * table.shape[0], -1, dtype=np.int32)
                 for n in range(count):
-                    table[_place(keys[first[n]], keys, first, table)] = n
+                    table[_find_slot(keys[first[n]], keys, first, table)] = n
         else:
             back[k] = table[place]
     return count

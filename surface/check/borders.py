@@ -18,7 +18,7 @@ from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import Mouth
 from surface.check.network import Network
 from surface.check.places import Places
-from surface.check.raster import View, turned
+from surface.check.raster import View, view_rotation
 from surface.check.subject import Subject, pose_of
 from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import border_edges
@@ -56,10 +56,10 @@ class Borders:
 
     def at(self, vertices: list[Floats32]) -> Floats:
         """Return (e, 2, 3): ends of the edges, mm, for the posed vertices (v, 3) of every part."""
-        return _ends_at(self.part, self.ends, vertices)
+        return _edge_ends(self.part, self.ends, vertices)
 
 
-def _ends_at(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
+def _edge_ends(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
     """Return (e, 2, 3): as :meth:`Borders.at` gives them."""
     out = np.empty((len(part), 2, 3))
     for k in np.unique(part):
@@ -71,7 +71,7 @@ def find_borders(subject: Subject) -> Borders:
     """Return all border edges, and which of them are sewn at rest."""
     numbers = [k for k, p in enumerate(subject.parts) if p.material in SHEETS and p.follows == "skin"]
     starts = np.cumsum([0, *(len(v) for v in subject.rest)])
-    pairs = [(k, border_edges(_welded(subject, k).astype(np.int32))) for k in numbers]
+    pairs = [(k, border_edges(_weld(subject, k).astype(np.int32))) for k in numbers]
     part = np.concatenate([np.full(len(e), k) for k, e in pairs] or [np.zeros(0, int)]).astype(np.int64)
     ends = np.concatenate([e for _, e in pairs] or [np.zeros((0, 2), int)]).astype(np.int64)
     ids = ends + starts[part][:, None]
@@ -85,7 +85,7 @@ def find_borders(subject: Subject) -> Borders:
     return Borders(part, ends, ids, mate >= 0, mate, network)
 
 
-def _welded(subject: Subject, number: int) -> Ints:
+def _weld(subject: Subject, number: int) -> Ints:
     """Return (t, 3): triangles of a part, where vertices in one place are one; triangles without area are dropped."""
     at, triangles = subject.rest[number], subject.parts[number].triangles
     _, first, same = np.unique(np.round(at / (1e-3 * subject.scale)), axis=0, return_index=True, return_inverse=True)
@@ -103,8 +103,8 @@ def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Border
     """
     at = borders.at(subject.rest)
     found = []
-    for loop in _loops(subject, borders):
-        (middle, width), part = _form(at[loop]), subject.parts[borders.part[loop[0]]]
+    for loop in _find_loops(subject, borders):
+        (middle, width), part = _measure_loop(at[loop]), subject.parts[borders.part[loop[0]]]
         wide = width >= WIDE_MM * subject.scale and not _in_openings(subject, mouth, middle[None])[0]
         if wide and is_seen(subject, part, at[loop]):
             length = float(np.linalg.norm(at[loop, 1] - at[loop, 0], axis=1).sum())
@@ -138,11 +138,11 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
         yield Finding("hole", text, AGAIN)
 
 
-def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
+def _find_loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
     """Return edges of every chain that is sewn to nothing, without the outer border of each sheet."""
     free, at = np.flatnonzero(~borders.sewn), borders.at(subject.rest)
-    chains = _chains(_joined(borders, at, free, SEWN_MM * subject.scale))
-    sheet = _sheets(subject, borders)
+    chains = _find_chains(_join_ends(borders, at, free, SEWN_MM * subject.scale))
+    sheet = _find_sheets(subject, borders)
     lengths = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
     rows = [free[c] for c in chains]
     outer: dict[int, tuple[float, int]] = {}
@@ -153,7 +153,7 @@ def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
     yield from (row for k, row in enumerate(rows) if k not in longest)
 
 
-def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
+def _join_ends(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
     """Return (k, 2): ends of the edges ``rows (k,)``; ends nearer than ``reach`` mm to each other, as at a seam, are
     one."""
     ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
@@ -161,18 +161,18 @@ def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
     return joined_nearer(points, known, reach).reshape(-1, 2)
 
 
-def _chains(ids: Ints) -> list[Ints]:
+def _find_chains(ids: Ints) -> list[Ints]:
     """Return rows of edges (e, 2) of each connected component."""
     label = _components(ids, int(ids.max(initial=-1)) + 1)
     own = label[ids[:, 0]] if len(ids) else np.zeros(0, np.int64)
     return [np.flatnonzero(own == k) for k in np.unique(own)]
 
 
-def _sheets(subject: Subject, borders: Borders) -> Ints:
+def _find_sheets(subject: Subject, borders: Borders) -> Ints:
     """Return (v,): number of the sheet that each vertex belongs to; triangles and seams connect the vertices of a
     sheet."""
     starts = np.cumsum([0, *(len(v) for v in subject.rest)])
-    links = [_welded(subject, k)[:, [0, 1, 1, 2]].reshape(-1, 2) + starts[k] for k in np.unique(borders.part)]
+    links = [_weld(subject, k)[:, [0, 1, 1, 2]].reshape(-1, 2) + starts[k] for k in np.unique(borders.part)]
     sewn = np.flatnonzero(borders.sewn)
     links.append(np.column_stack([borders.ids[sewn, 0], borders.ids[borders.mate[sewn], 0]]))
     return _components(np.concatenate(links), int(starts[-1]))
@@ -194,7 +194,7 @@ def _components(links: Ints, count: int) -> Ints:
     return label
 
 
-def _form(ends: Floats) -> tuple[Floats, float]:
+def _measure_loop(ends: Floats) -> tuple[Floats, float]:
     """Return the middle (3,) and width of a loop, mm. The width is four times the area divided by the length: the
     diameter of a circle, and twice the height of a slit."""
     middle = ends.reshape(-1, 3).mean(axis=0)
@@ -216,7 +216,7 @@ def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
     out = -np.cross(ends[:, 0] - middle, ends[:, 1] - middle)  # triangles have a hole on their right
     area = 0.5 * float(np.linalg.norm(out, axis=1).sum())
     for yaw, pitch in VIEWS:
-        turn = turned(yaw, pitch)
+        turn = view_rotation(yaw, pitch)
         faces = float(turn[2] @ out.sum(axis=0)) > FACING * 2.0 * area
         if abs(yaw) > 90 and not (faces and part.material == "skin"):
             continue

@@ -40,7 +40,7 @@ def _passes(p: Any, d0: Any, d1: Any, d2: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 @inlined
-def _one_side(x: Any, y: Any) -> Any:
+def _is_on_one_side(x: Any, y: Any) -> Any:
     """Do all corners of a triangle x (3, 3) lie on one side of the plane of y (3, 3)?"""
     e0, e1, e2 = y[1, 0] - y[0, 0], y[1, 1] - y[0, 1], y[1, 2] - y[0, 2]
     f0, f1, f2 = y[2, 0] - y[0, 0], y[2, 1] - y[0, 1], y[2, 2] - y[0, 2]
@@ -53,9 +53,9 @@ def _one_side(x: Any, y: Any) -> Any:
 
 
 @kernel
-def _cross(x: Any, y: Any) -> Any:
+def _do_cross(x: Any, y: Any) -> Any:
     """Do two triangles (3, 3) pass through each other?"""
-    if _one_side(x, y) or _one_side(y, x):
+    if _is_on_one_side(x, y) or _is_on_one_side(y, x):
         return False
     for k in range(3):
         m = (k + 1) % 3
@@ -67,7 +67,7 @@ def _cross(x: Any, y: Any) -> Any:
 
 
 @inlined
-def _apart(node: Any, low: Any, high: Any, least: Any, most: Any) -> Any:
+def _is_apart(node: Any, low: Any, high: Any, least: Any, most: Any) -> Any:
     """Has the box of a node nothing in common with another one?"""
     return (
         low[node, 0] > most[0] or high[node, 0] < least[0] or low[node, 1] > most[1] or high[node, 1] < least[1]
@@ -76,19 +76,19 @@ def _apart(node: Any, low: Any, high: Any, least: Any, most: Any) -> Any:
 
 
 @inlined
-def _has(ids: Any, j: Any, v: Any) -> Any:
+def _has_vertex(ids: Any, j: Any, v: Any) -> Any:
     """Is a vertex a corner of triangle j?"""
     return ids[j, 0] == v or ids[j, 1] == v or ids[j, 2] == v
 
 
 @inlined
-def _neighbours(ids: Any, i: Any, j: Any) -> Any:
+def _are_neighbours(ids: Any, i: Any, j: Any) -> Any:
     """Have two triangles a corner in common?"""
-    return _has(ids, j, ids[i, 0]) or _has(ids, j, ids[i, 1]) or _has(ids, j, ids[i, 2])
+    return _has_vertex(ids, j, ids[i, 0]) or _has_vertex(ids, j, ids[i, 1]) or _has_vertex(ids, j, ids[i, 2])
 
 
 @inlined
-def _outside(j: Any, corners: Any, least: Any, most: Any) -> Any:
+def _is_outside(j: Any, corners: Any, least: Any, most: Any) -> Any:
     """Has the box of a triangle nothing in common with another one?"""
     out = False
     for k in range(3):
@@ -107,7 +107,7 @@ def _next_leaf(stack: Any, top: Any, low: Any, high: Any, leaves: Any, least: An
     while top > 0:
         top -= 1
         node = stack[top]
-        if _apart(node, low, high, least, most):
+        if _is_apart(node, low, high, least, most):
             continue
         if node >= leaves:
             return (node - leaves) * LEAF, top
@@ -134,9 +134,14 @@ def _search(
             if first < 0:
                 break
             for j in range(first, min(len(corners), first + LEAF)):
-                if j == i or (moved[j] and j < i) or not meets[kind[i], kind[j]] or _outside(j, corners, least, most):
+                if (
+                    j == i
+                    or (moved[j] and j < i)
+                    or not meets[kind[i], kind[j]]
+                    or _is_outside(j, corners, least, most)
+                ):
                     continue
-                if not _neighbours(ids, i, j) and _cross(corners[i], corners[j]):
+                if not _are_neighbours(ids, i, j) and _do_cross(corners[i], corners[j]):
                     if used < len(out):
                         out[used, 0], out[used, 1] = i, j
                     used += 1
@@ -180,7 +185,7 @@ def _first_back(
             if first < 0:
                 break
             for j in range(first, min(len(corners), first + LEAF)):
-                if not passed[kind[j]] or _outside(j, corners, least, most) or _has(ids, j, own[i]):
+                if not passed[kind[j]] or _is_outside(j, corners, least, most) or _has_vertex(ids, j, own[i]):
                     continue
                 t = _passes(p, d0, d1, d2, corners[j, 0], corners[j, 1], corners[j, 2])
                 if abs(t) < best:

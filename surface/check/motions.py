@@ -41,8 +41,8 @@ def swapped_sides(subject: Subject) -> Iterator[Finding]:
     middle, apart = _middle(subject)
     wrong = []
     for name in subject.claimed:
-        offset = _direction(subject, name) if _goes_across(name) else _where(subject, name, middle) / apart
-        if offset * _side(name) < -ASIDE:
+        offset = _direction(subject, name) if _goes_across(name) else _mean_offset(subject, name, middle) / apart
+        if offset * _side_of(name) < -ASIDE:
             wrong.append(name)
     if wrong:
         more = f" and {len(wrong) - 4} more" if len(wrong) > 5 else ""
@@ -73,7 +73,7 @@ def blind_lids(subject: Subject) -> Iterator[Finding]:
             yield Finding("blind lid", text, f"make the shape close the lids, then {AGAIN}")
 
 
-def _side(name: str) -> int:
+def _side_of(name: str) -> int:
     """Return 1 for a parameter of the left side, -1 of the right, 0 of neither."""
     left = name.endswith("Left") or name.startswith("leftEye")
     right = name.endswith("Right") or name.startswith("rightEye")
@@ -92,7 +92,7 @@ def _middle(subject: Subject) -> tuple[float, float]:
     return float(0.5 * (xs.min() + xs.max())), max(0.35 * float(np.ptp(xs)), 1e-6)
 
 
-def _where(subject: Subject, name: str, middle: float) -> float:
+def _mean_offset(subject: Subject, name: str, middle: float) -> float:
     """Return how far from the middle the vertices lie that a parameter moves, mm, meant by how far they move."""
     moves = [np.linalg.norm(m, axis=1) for m in subject.moves(name)]
     total = sum(float(m.sum()) for m in moves)

@@ -51,8 +51,8 @@ def find_mouth(subject: Subject) -> Mouth | None:
     drop = -min(float(moves[k].min()) for k in subject.skin)
     if drop < MIN_DROP_MM * subject.scale:
         return None
-    picture = _front(subject)
-    down, below = _over_gaps(_values(subject, picture, moves), round(PARTED_MM / STEP))
+    picture = _draw_front(subject)
+    down, below = _fill_gaps(_values(subject, picture, moves), round(PARTED_MM / STEP))
     step = np.where(np.isfinite(down[1:]) & np.isfinite(down[:-1]), down[1:] - down[:-1], 0.0)
     torn: Bools = step > TORN * np.nanmax(-down)
     columns = _longest_run(np.asarray(torn.any(axis=0)))
@@ -64,7 +64,7 @@ def find_mouth(subject: Subject) -> Mouth | None:
     return Mouth(x, y, picture.depth[rows, columns], float(np.nanmax(-down)))
 
 
-def _front(subject: Subject) -> Picture:
+def _draw_front(subject: Subject) -> Picture:
     """Return the skin at rest from the front."""
     at = np.concatenate([subject.rest[k] for k in subject.skin])
     view = View((at[:, 0].min(), at[:, 0].max()), (at[:, 1].min(), at[:, 1].max()), STEP * subject.scale)
@@ -82,7 +82,7 @@ def _values(subject: Subject, picture: Picture, of: list[Floats]) -> Floats:
     return out
 
 
-def _over_gaps(values: Floats, most: int) -> tuple[Floats, Ints]:
+def _fill_gaps(values: Floats, most: int) -> tuple[Floats, Ints]:
     """Return values (h, w) with what is above a gap of at most ``most`` rows in it, too, and how high the gap below is.
 
     Lips that are parted at rest show nothing between them; the line of the lips runs along the lower one's edge.
@@ -118,14 +118,14 @@ def lips_gap(subject: Subject, mouth: Mouth, vertices: list[Floats32]) -> tuple[
         FINE * scale,
     )
     picture = view.draw(subject.shapes(vertices))
-    inside = _values(subject, picture, [_inside(v, mouth, scale) for v in subject.rest])
+    inside = _values(subject, picture, [_mark_inside(v, mouth, scale) for v in subject.rest])
     solid = np.isin(picture.parts, subject.skin) & (inside < 0.5)
     height = enclosed(~solid, solid).sum(axis=0) * view.step
     column = int(height.argmax())
     return float(height[column]), picture.at(0, column)[0]
 
 
-def _inside(rest: Floats32, mouth: Mouth, scale: float) -> Floats:
+def _mark_inside(rest: Floats32, mouth: Mouth, scale: float) -> Floats:
     """Return (m,): 1 for vertices (m, 3) that at rest lie behind the lips, as the inside of the mouth does; else 0."""
     away = rest.astype(np.float64) - mouth.middle
     beside = np.abs(away[:, 0]) < 0.5 * mouth.width

@@ -17,7 +17,7 @@ from surface.check.crossings import Crossings
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
-from surface.check.raster import NOTHING, View, turned
+from surface.check.raster import NOTHING, View, view_rotation
 from surface.check.subject import Subject
 from surface.head import Head
 from surface.head.model.data import HeadData
@@ -97,22 +97,22 @@ class _Body:
         same = np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
         meets = np.zeros((len(LIMITS_MM),) * 2, bool)
         meets[0] = meets[:, 0] = True
-        seen = self._seen(triangles) & (kind == 0)
+        seen = self._are_visible(triangles) & (kind == 0)
         self._crossings = Crossings(self._rest, triangles, same, kind, meets, seen)
         self._area = self._areas(triangles[seen], same)
 
     def _at(self, vertices: list[Floats32]) -> Floats:
         return np.concatenate([vertices[k] for k in self.numbers]).astype(np.float64)
 
-    def _seen(self, triangles: Ints) -> Bools:
+    def _are_visible(self, triangles: Ints) -> Bools:
         """Return (t,): which triangles can be seen from outside at rest, or have a corner of such a one."""
         seen = np.zeros(len(triangles), bool)
         for yaw, pitch in VIEWS:
-            at = self._rest @ turned(yaw, pitch).T
+            at = self._rest @ view_rotation(yaw, pitch).T
             (x0, y0, _), (x1, y1, _) = at.min(axis=0), at.max(axis=0)
             step = max(STEP_MM * self._subject.scale, (x1 - x0) / MAX_PIXELS, (y1 - y0) / MAX_PIXELS)
             shape = self._rest.astype(np.float32), triangles.astype(np.int32)
-            picture = View((x0, x1), (y0, y1), step, turned(yaw, pitch)).draw([shape])
+            picture = View((x0, x1), (y0, y1), step, view_rotation(yaw, pitch)).draw([shape])
             seen[picture.rows[picture.parts != NOTHING]] = True
         corners = np.zeros(len(self._rest), bool)
         corners[triangles[seen]] = True

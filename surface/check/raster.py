@@ -76,7 +76,7 @@ class Picture:
         return self.view.x[0] + column * self.view.step, self.view.y[0] + row * self.view.step
 
 
-def turned(yaw_deg: float, pitch_deg: float = 0.0) -> Floats:
+def view_rotation(yaw_deg: float, pitch_deg: float = 0.0) -> Floats:
     """Return (3, 3): for a viewer at ``yaw_deg`` to the subject's left and ``pitch_deg`` above."""
     yaw, pitch = np.radians(yaw_deg), np.radians(pitch_deg)
     about_y = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])

@@ -47,7 +47,7 @@ def ring_heights(points: Any, own: Any, first: Any, last: Any, order: Any, ring:
     """
     for i in range(len(out)):
         near = first[own[i]], last[own[i]], order
-        x, y, z = _way_from_ring(points, i, *near, ring, values, enough)
+        x, y, z = _sum_from_ring(points, i, *near, ring, values, enough)
         length = np.sqrt(x * x + y * y + z * z)
         out[i] = 0.0
         if length >= 1e-9:
@@ -55,7 +55,7 @@ def ring_heights(points: Any, own: Any, first: Any, last: Any, order: Any, ring:
 
 
 @nonallocating
-def _way_from_ring(
+def _sum_from_ring(
     points: Any, i: int, first: Any, last: Any, order: Any, ring: Any, values: Any, enough: float
 ) -> Any:
     """Sum of the ways to value i from those on its ring; none at all where one of them is nearer than ``enough``."""
@@ -148,7 +148,9 @@ def find_samples(subject: Subject, spacing: float) -> Samples:
     for k, part in enumerate(subject.parts):
         if part.material == "skin" and part.follows == "skin":
             used = np.unique(part.triangles)
-            corners, share = _filled(subject.rest[k].astype(np.float64), part.triangles.astype(np.int64), spacing)
+            corners, share = _sample_triangles(
+                subject.rest[k].astype(np.float64), part.triangles.astype(np.int64), spacing
+            )
             whole = np.tile([1.0, 0.0, 0.0], (len(used), 1))
             found.append((np.full(len(used), k), np.repeat(used[:, None], 3, axis=1), whole))
             more.append((np.full(len(corners), k), corners, share))
@@ -157,7 +159,7 @@ def find_samples(subject: Subject, spacing: float) -> Samples:
     return Samples(number.astype(np.int64), corners.astype(np.int64), share, sum(len(x[0]) for x in found))
 
 
-def _filled(at: Floats, triangles: Ints, spacing: float) -> tuple[Ints, Floats]:
+def _sample_triangles(at: Floats, triangles: Ints, spacing: float) -> tuple[Ints, Floats]:
     """Return corners (m, 3) and weights (m, 3) of places inside triangles that have edges longer than ``spacing``
     mm.
     """
@@ -201,7 +203,7 @@ class Rings:
         return out
 
 
-def without_rims(points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
+def drop_rims(points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
     """Return ``height (k,)`` of the first k of points (m, 3), 0 where it is below ``least``, and where a point of a
     free border, ``rims (r, 3)``, is nearer than ``off`` mm: corners of a border always stick out."""
     rows = np.flatnonzero(height > least)
@@ -229,11 +231,11 @@ def _spikes(
         return [None, None]
     at, off = samples.at(subject.rest), OFF_RIM * radius
     rings = Rings(at, samples.vertices, radius)
-    height = without_rims(at, rims, rings.heights(at), PAIRED * steep * radius, off)
-    height[_allowed(subject, at[: samples.vertices], height, places)] = 0.0
+    height = drop_rims(at, rims, rings.heights(at), PAIRED * steep * radius, off)
+    height[_may_stick_out(subject, at[: samples.vertices], height, places)] = 0.0
     worst, best, name, where = int(height.argmax()), 0.0, "", 0
     for pose in (n for n in subject.claimed if n in SHAPES):
-        moved = _moved(
+        moved = _heights_in_pose(
             subject, places, samples.at(subject.moves(pose)), rings, at, rims, radius, max(best, MOVED * radius)
         )
         if moved.max() > best:
@@ -249,7 +251,7 @@ def _spikes(
     ]
 
 
-def _moved(
+def _heights_in_pose(
     subject: Subject, places: Places, moves: Floats, rings: Rings, at: Floats, rims: Floats, radius: float,
     enough: float,
 ) -> Floats:  # fmt: skip
@@ -257,10 +259,10 @@ def _moved(
 
     They are 0 below ``enough``, and where the other side of the face moves alike.
     """
-    moved = without_rims(at, rims, rings.heights(moves, enough), enough, OFF_RIM * radius)
+    moved = drop_rims(at, rims, rings.heights(moves, enough), enough, OFF_RIM * radius)
     low = moved < MIRRORED * radius
     if (moved[low] > 0.0).any():
-        height = without_rims(at, rims, rings.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
+        height = drop_rims(at, rims, rings.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
         moved[low & _has_mirror_image(subject, at[: len(height)], height, places)] = 0.0
     return moved
 
@@ -304,7 +306,7 @@ def mirror_images(points: Any, mirrored: Any, first: Any, last: Any, order: Any,
     return out
 
 
-def _allowed(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
+def _may_stick_out(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
     """Return (m,): which samples may stick out: those of the nose, and those that have a mirror image."""
     middle, apart = places.centre[0], places.apart
     out: Bools = np.abs(at[:, 0] - middle) < NOSE * apart

@@ -10,7 +10,7 @@ from surface.base.arrays import Bools, Floats, Floats32
 from surface.check.findings import AGAIN, Finding
 from surface.check.lids import eye_opening
 from surface.check.mouth import Mouth
-from surface.check.raster import NOTHING, Picture, View, turned
+from surface.check.raster import NOTHING, Picture, View, view_rotation
 from surface.check.subject import HAIR, SIDES, Subject
 from surface.view.scene.camera import Camera
 
@@ -40,7 +40,7 @@ def wrong_unit(subject: Subject) -> Iterator[Finding]:
 
 def off_camera(subject: Subject, mouth: Mouth | None) -> Iterator[Finding]:
     """Find a face that the front camera does not see, or sees from behind."""
-    marks = _marks(subject, mouth)
+    marks = _face_landmarks(subject, mouth)
     clip = np.column_stack([marks, np.ones(len(marks))]) @ np.asarray(Camera.front().matrix(1.0), float).T
     behind = bool((clip[:, 3] <= 0).any())
     at = clip[:, :2] / np.maximum(np.abs(clip[:, 3:]), 1e-9)
@@ -86,7 +86,7 @@ def inside_out(subject: Subject) -> Iterator[Finding]:
     subject.posed_now({})
     for k, part in enumerate(subject.parts):
         if seen[k] < MIN_PIXELS and part.material in SOLID:
-            seen[k], *backs[:, k] = _alone(subject, k)
+            seen[k], *backs[:, k] = _sides_shown_alone(subject, k)
     for part, count, (by_way, by_normal) in zip(subject.parts, seen, backs.T, strict=True):
         if count >= MIN_PIXELS and max(by_way, by_normal) > INSIDE_OUT * count:
             what = "triangles run" if by_way > INSIDE_OUT * count else "normals point"
@@ -94,7 +94,7 @@ def inside_out(subject: Subject) -> Iterator[Finding]:
             yield Finding("inside-out part", text, f"make all faces of the mesh look outwards, then {AGAIN}")
 
 
-def _alone(subject: Subject, number: int) -> tuple[int, int, int]:
+def _sides_shown_alone(subject: Subject, number: int) -> tuple[int, int, int]:
     """Do the same as :func:`_sides_shown`, of one part that nothing else hides: only what is no lining shows its
     outside then."""
     picture = _picture(subject, [v if k == number else v[:0] for k, v in enumerate(subject.rest)], 0.0)
@@ -119,7 +119,7 @@ def _sides_shown(
 
 
 def _picture(subject: Subject, vertices: list[Floats32], yaw: float) -> Picture:
-    turn, step = turned(yaw), 1.2 * subject.scale
+    turn, step = view_rotation(yaw), 1.2 * subject.scale
     at = np.concatenate(vertices) @ turn.T
     low, high = at.min(axis=0), at.max(axis=0)
     most = 600 * step  # a head of any size makes a picture of a size that can be drawn
@@ -141,7 +141,7 @@ def _faces_forward(subject: Subject) -> bool:
     return float(moves @ z / moves.sum()) >= float(z.min() + 0.35 * np.ptp(z))
 
 
-def _marks(subject: Subject, mouth: Mouth | None) -> Floats:
+def _face_landmarks(subject: Subject, mouth: Mouth | None) -> Floats:
     """Return (k, 3): places of the face: eyes and mouth, or the middle of the skin's front."""
     marks = [] if subject.eyes is None else list(subject.eyes)
     marks += [] if mouth is None else [mouth.middle]

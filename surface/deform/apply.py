@@ -32,7 +32,7 @@ from surface.spline.lanes import (
 )
 
 from .binding import arrays_of
-from .groupsums import HEAD, STEP, join_all, join_values, sum_groups, wide
+from .groupsums import HEAD, STEP, factor_counts, join_all, join_values, sum_groups
 from .packedsums import AHEAD, sum_all_packed, sum_packed, write_lanes
 
 AHEAD_OUT = 384  # coordinates of vertices that are fetched before they are written: 16 tiles
@@ -133,7 +133,7 @@ def store_numerators(
 ):  # fmt: skip
     """Store the numerators of one cell, whose points are in ``local``, for later differences."""
     base, at, groups = first_tile * (72 if slopes else 24), head + HEAD, 0
-    wide_u, wide_v = wide(row, head, picks)
+    wide_u, wide_v = factor_counts(row, head, picks)
     if row >= 0:
         groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, slopes, local, starts, scratch)
     for tile in range(first_tile, end_tile):
@@ -273,7 +273,7 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
         gather(points, ids, ids_at[c], rows, origin, c, local)
         px, py, pz = splat(np.float32(origin[c, 0])), splat(np.float32(origin[c, 1])), splat(np.float32(origin[c, 2]))
         place, step, row, pick_at, tile = at[c], room[c] * 8, rows_at[c], picks_at[c] + HEAD, tile_start[c]
-        wide_u, wide_v = wide(row, picks_at[c], picks)
+        wide_u, wide_v = factor_counts(row, picks_at[c], picks)
         groups = 0
         if row >= 0:
             groups = sum_groups(

@@ -26,9 +26,9 @@ from surface.spline.controlpoints import ControlPoints
 
 from . import apply, edits
 from .binding import address_table
-from .denominators import denominators, farthest, unusable
+from .denominators import denominators, farthest, first_unusable
 from .lists import LANES, Basis, build_lists
-from .merging import merged
+from .merging import merge_cells
 from .storage import compress
 from .updates import REFUSED, measure, move_points
 from .working import middles, work_arrays
@@ -75,7 +75,7 @@ class Deformation(Generic[Table]):
             raise ValueError(f"mesh: was made from another surface: this one has {surface.n} points")
         if mesh.structure and mesh.structure != surface.structure:
             raise ValueError("mesh: was made from another surface, with other knots: tessellate this one")
-        self.mesh, self.basis = merged(mesh), Basis.of(surface)
+        self.mesh, self.basis = merge_cells(mesh), Basis.of(surface)
         self.lists = build_lists(surface, self.mesh, normals, progress)
         self._work = self.lists.rows * np.diff(self.lists.tile_start) * LANES  # weights by cell, however they are kept
         self.storage = compress(self.basis, self.lists, self.mesh)
@@ -152,7 +152,7 @@ class Deformation(Generic[Table]):
 
     def work(self) -> tuple[np.ndarray, np.float32, list[np.ndarray]]:
         """Return what kernels take besides: all cells, the sign of normals, scratch space of a thread."""
-        return self._cells, self._sign, [np.zeros_like(room) for room in self._rooms()]
+        return self._cells, self._sign, [np.zeros_like(room) for room in self._scratch()]
 
     @property
     def weights_of_cells(self) -> Ints:
@@ -243,7 +243,7 @@ class Deformation(Generic[Table]):
         if target.shape != (len(which), 3):
             raise ValueError(f"{name}: shape {target.shape}, expected {(len(which), 3)}")
         if len(which) > n:  # ids that are given several times: the last position counts, moves add up
-            which, target = _gathered(check_ids(which, n), target, relative)
+            which, target = _sum_by_id(check_ids(which, n), target, relative)
         if copies > 1:
             which, target = self.basis.copies(check_ids(which, n)), np.tile(target, (copies, 1))
         found = move_points(self._addresses, which, target, relative, self._most, LIMIT, BIAS, GAP, self._sign)
@@ -295,7 +295,7 @@ class Deformation(Generic[Table]):
         are so far away that these cannot hold their sums."""
         arrays = self._arrays
         order = self.storage.packed.order_at, self.storage.packed.order
-        bad = unusable(cells, self.lists.cell_start, self.lists.tile_start, arrays["inv_w"], arrays["dw"], *order)
+        bad = first_unusable(cells, self.lists.cell_start, self.lists.tile_start, arrays["inv_w"], arrays["dw"], *order)
         if bad >= 0:
             u, v = self.mesh.uv[bad]
             raise ValueError(
@@ -315,9 +315,9 @@ class Deformation(Generic[Table]):
         self._count = apply.join_ranges(cells, len(cells), self.lists.cell_start, GAP, self._ranges)
 
     def _compute(self, cells: np.ndarray) -> None:
-        apply.compute_cells(self._addresses, cells, 0, len(cells), self._sign, *self._rooms())
+        apply.compute_cells(self._addresses, cells, 0, len(cells), self._sign, *self._scratch())
 
-    def _rooms(self) -> list[np.ndarray]:
+    def _scratch(self) -> list[np.ndarray]:
         """Return scratch space of the kernels."""
         return [self._arrays[name] for name in ("local", "scratch", "starts")]
 
@@ -331,7 +331,7 @@ class Deformation(Generic[Table]):
         turns = count()  # next(turns) is one step: no two threads take the same part
 
         def work() -> None:
-            rooms = [np.zeros_like(room) for room in self._rooms()]
+            rooms = [np.zeros_like(room) for room in self._scratch()]
             while (part := next(turns)) < parts:
                 begin, end = cuts[part], cuts[part + 1]
                 apply.compute_cells(self._addresses, self._cells, begin, end, self._sign, *rooms)
@@ -350,7 +350,7 @@ def _rows(rows: ArrayLike, name: str) -> Floats:
     return np.ascontiguousarray(rows, dtype=np.float64) if fast else numbers(rows, name)
 
 
-def _gathered(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
+def _sum_by_id(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
     """Return each id once."""
     if not relative:
         unique, last = np.unique(which[::-1], return_index=True)

@@ -9,7 +9,7 @@ from surface.base.arrays import Floats
 from surface.base.jit import inlined, kernel
 
 from .binding import arrays_of
-from .groupsums import HEAD, STEP, wide
+from .groupsums import HEAD, STEP, factor_counts
 
 MIN_SUM = 1e-36  # of the weights at a vertex: float32 has fewer digits for smaller numbers
 MAX_SUM = 3e37  # of weights times distances: ten times that is still a float32, see :func:`farthest`
@@ -69,7 +69,7 @@ def denominators(table, cells):
     slopes = dw.shape[0] > 0
     for q in range(cells.shape[0]):
         c = cells[q]
-        wide_u, wide_v = wide(rows_at[c], picks_at[c], picks)
+        wide_u, wide_v = factor_counts(rows_at[c], picks_at[c], picks)
         heavy[c] = 0.0
         if rows_at[c] >= 0:
             heavy[c] = _heaviest_group(rows[c], rows_at[c], wide_u, factor_u, factor_v, factors, slopes)
@@ -95,7 +95,7 @@ def denominators(table, cells):
 
 
 @kernel
-def unusable(cells, cell_start, tile_start, inv_w, dw, order_at, order):
+def first_unusable(cells, cell_start, tile_start, inv_w, dw, order_at, order):
     """Return the first vertex of ``cells`` whose weights add up to less than ``MIN_SUM`` or to more than float32 has,
     or whose derivative weights do; -1 if there is none."""
     for q in range(cells.shape[0]):

@@ -12,7 +12,7 @@ from surface.spline.basis import blending
 from surface.spline.kernels import points_in
 
 from .lists import LANES, Basis, Lists, cells_by_point, grow, write_rows
-from .storage import Storage, expand, remember
+from .storage import Storage, expand, make_restore
 
 
 def change_weights(
@@ -38,7 +38,7 @@ def change_knots(
     ``ValueError`` where a vertex would be covered by no point; nothing is changed then.
     """
     copies = [(b * basis.n + i, [knots[k] + shift[k] for k in range(2)]) for b, shift in enumerate(basis.shifts)]
-    restore = remember(lists, storage)
+    restore = make_restore(lists, storage)
     for copy, shifted in copies:
         expand(lists, storage, np.union1d(lists.entries_of(copy)[0], _cells_in(mesh, shifted)))
         vertex = _first_uncovered(lists, mesh, copy, shifted)
@@ -51,7 +51,9 @@ def change_knots(
 def _first_uncovered(lists: Lists, mesh: Mesh, i: int, knots: list[Floats]) -> int:
     """Return the first vertex that only point i covers and that the new knots do not reach, or -1."""
     found = np.zeros(len(mesh.uv), dtype=np.int64)
-    count = _only_covering(*lists.entries_of(i), lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found)
+    count = _list_only_covered(
+        *lists.entries_of(i), lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found
+    )
     for vertex in found[:count]:
         value = 1.0
         for k in range(2):
@@ -65,7 +67,7 @@ def _first_uncovered(lists: Lists, mesh: Mesh, i: int, knots: list[Floats]) -> i
 def _replace_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]) -> Ints:
     """Write point i's knots and update its rows and lists; returns the cells that changed."""
     for k in range(2):
-        basis.knots[k] = _with_row(basis.knots[k], i, knots[k])
+        basis.knots[k] = _replace_row(basis.knots[k], i, knots[k])
         basis.degrees[k][i] = degrees[k]
     old, old_rows = lists.entries_of(i)
     cells = np.union1d(old, _cells_in(mesh, knots))
@@ -80,7 +82,7 @@ def _replace_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[F
     return cells[held | nonzero]
 
 
-def _with_row(table: Floats, i: int, row: Floats) -> Floats:
+def _replace_row(table: Floats, i: int, row: Floats) -> Floats:
     """Return knots with row i replaced; wider where the row needs it."""
     if len(row) > table.shape[1]:
         table = np.hstack([table, np.repeat(table[:, -1:], len(row) - table.shape[1], axis=1)])
@@ -181,7 +183,7 @@ def _compact(lists: Lists) -> None:
 
 
 @kernel
-def _only_covering(cells, places, cell_start, rows, room, at, value, out):
+def _list_only_covered(cells, places, cell_start, rows, room, at, value, out):
     """Write vertices at which a point with rows ``places`` in ``cells`` is the only one; returns their number."""
     count = 0
     for q in range(cells.shape[0]):

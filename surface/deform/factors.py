@@ -17,7 +17,7 @@ import numpy as np
 from surface.base.arrays import Floats32, Ints
 from surface.base.jit import kernel
 from surface.mesh.mesh import Mesh
-from surface.spline.kernels import along, distinct
+from surface.spline.kernels import blend_along, distinct
 from surface.spline.lanes import PICKS_FAST
 
 from .groupsums import HEAD, STEP
@@ -85,7 +85,7 @@ def factorize(
     *used, room = _factor_cells(
         *basis.knots, *basis.degrees, basis.weights, mesh.uv, mesh.side, lists.cell_start, lists.tile_start, lists.rows,
         lists.ids_at, lists.ids, entries, slopes, cost[slopes], int(tiles.max()), made.rows_at, made.picks_at, factor_u,
-        factor_v, factors, picks, _slots(2 * listed), _slots(cells),
+        factor_v, factors, picks, _make_slots(2 * listed), _make_slots(cells),
     )  # fmt: skip
     by_point = cells_by_point(lists.ids, lists.rows, len(lists.point_start))
     lists.point_start, lists.point_count, lists.point_cell, lists.point_row = by_point
@@ -94,12 +94,12 @@ def factorize(
     return Factors(made.rows_at, made.picks_at, u, v, others[0], others[1], slopes, made.sums + room)
 
 
-def _slots(entries: int) -> Ints:
+def _make_slots(entries: int) -> Ints:
     """Return an empty hash table, at most half of which so many entries fill."""
     return np.zeros(1 << (2 * entries).bit_length(), np.int64)
 
 
-def products(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
+def expand_factors(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
     """Return (tiles, rows, 8): b w of a cell with factors, and (tiles, rows, 16) b_u w and b_v w if it has slopes."""
     rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
     head, first = factors.picks_at[c], factors.rows_at[c]
@@ -121,7 +121,7 @@ def products(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
 
 
 @kernel
-def _ordered(uv, side, axis, values, rank, order):
+def _sort_distinct(uv, side, axis, values, rank, order):
     """Write distinct coordinates of a cell's vertices, rising, into ``values (k, 2)``, and each vertex's place among
     them into ``rank``; returns how many there are."""
     count = distinct(uv, side, axis, values, rank)
@@ -156,7 +156,7 @@ def _put_windows(rank, size, wide, axis, tiles, picks):
 
 
 @kernel
-def _stored(row, size, table, used, slots):
+def _intern_row(row, size, table, used, slots):
     """Return the place of ``row[:size]`` in ``table``, where it is added at ``used`` if it is new; both int32."""
     total, last = np.uint32(size), slots.shape[0] - 1
     for k in range(size):
@@ -180,7 +180,7 @@ def _stored(row, size, table, used, slots):
 @kernel
 def _factor_row(knots, i, p, values, many, wide, weight, slopes, work, numbers, row):
     """One point's factors, times its weight, in ``row``; zeros where there are fewer than ``wide``."""
-    along(knots, i, p, values, many, True, work, numbers)
+    blend_along(knots, i, p, values, many, True, work, numbers)
     row[:] = 0.0
     for k in range(many):
         row[k] = numbers[k, 0] * weight
@@ -204,7 +204,7 @@ def _sort_rows(keys, ids):
 
 
 @kernel
-def _operations(rows, entries, groups, tiles, wide_u, slopes):
+def _count_operations(rows, entries, groups, tiles, wide_u, slopes):
     """Return how many operations on eight numbers a cell takes with plain weights and with factors."""
     if slopes:
         return 9 * entries, 6 * rows * (wide_u // 8) + 17 * groups * tiles
@@ -225,8 +225,8 @@ def _factor_cells(
     for c in range(rows.shape[0]):
         first, last, tiles, at = cell_start[c], cell_start[c + 1], tile_start[c + 1] - tile_start[c], used[0]
         cell_uv, sides, size = uv[first:last], side[first:last], last - first
-        many_u = _ordered(cell_uv, sides, 0, values_u, rank_u, order)
-        many_v = _ordered(cell_uv, sides, 1, values_v, rank_v, order)
+        many_u = _sort_distinct(cell_uv, sides, 0, values_u, rank_u, order)
+        many_v = _sort_distinct(cell_uv, sides, 1, values_v, rank_v, order)
         wide_u, wide_v = (many_u + 7) // 8 * 8, (many_v + 7) // 8 * 8
         if used[1] + each * (wide_u + wide_v) * rows[c] > min(MAX_NUMBERS, len(factors)):
             continue
@@ -237,19 +237,19 @@ def _factor_cells(
         for k in range(rows[c]):
             i = ids[ids_at[c] + k]
             _factor_row(knots_v, i, pv[i], values_v, many_v, wide_v, 1.0, slopes, work, numbers, row)
-            factor_v[at + k] = _stored(bits, each * wide_v, table, used[1], slots)
+            factor_v[at + k] = _intern_row(bits, each * wide_v, table, used[1], slots)
             used[1] = max(used[1], factor_v[at + k] + each * wide_v)
         points = ids[ids_at[c] : ids_at[c] + rows[c]].copy()
         groups = _sort_rows(factor_v[at : at + rows[c]], points)
-        plain, factored = _operations(rows[c], entries[c], groups, tiles, wide_u, slopes)
+        plain, factored = _count_operations(rows[c], entries[c], groups, tiles, wide_u, slopes)
         if factored > cost * plain:
             continue
         for k in range(rows[c]):
             i = ids[ids_at[c] + k] = points[k]
             _factor_row(knots_u, i, pu[i], values_u, many_u, wide_u, weights[i], slopes, work, numbers, row)
-            factor_u[at + k] = _stored(bits, each * wide_u, table, used[1], slots)
+            factor_u[at + k] = _intern_row(bits, each * wide_u, table, used[1], slots)
             used[1] = max(used[1], factor_u[at + k] + each * wide_u)
-        picks_at[c] = _stored(own, HEAD + STEP * tiles, picks, used[2], pick_slots)
+        picks_at[c] = _intern_row(own, HEAD + STEP * tiles, picks, used[2], pick_slots)
         used[2] = max(used[2], picks_at[c] + HEAD + STEP * tiles)
         rows_at[c] = at
         used[0] += rows[c]

@@ -88,7 +88,7 @@ def join_all(groups, wide_u, wide_v, tile, factors, picks, starts, sums):
 
 
 @inlined
-def wide(row, head, picks):
+def factor_counts(row, head, picks):
     """Return how many factors the rows of a cell have in u and in v; 0 where it has plain weights."""
     u, v = 0, 0
     if row >= 0:

@@ -114,11 +114,11 @@ def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Pro
     used, ids = int(at[-1]), ids[: int(ids_at[-1])].copy()
     cell_start = mesh.cell_start.copy()  # not the read-only one: kernels are compiled for one kind of array only
     tile_start, by_point = np.concatenate([[0], np.cumsum(tiles)]), cells_by_point(ids, rows, len(arrays[4]))
-    blocks = _shortened(value, used), _shortened(slope, 2 * used)
+    blocks = _shorten(value, used), _shorten(slope, 2 * used)
     return Lists(cell_start, tile_start, rows, rows.copy(), at[:-1].copy(), ids_at[:-1].copy(), ids, *blocks, *by_point)
 
 
-def _shortened(table: np.ndarray, used: int) -> np.ndarray:
+def _shorten(table: np.ndarray, used: int) -> np.ndarray:
     """Return the first ``used`` numbers of a table, whose memory is given back if there are more."""
     return table if used >= len(table) else table[:used].copy()
 

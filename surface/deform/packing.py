@@ -91,11 +91,11 @@ def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
     chosen = wanted & (order.entries < blocks) & (lists.rows < MAX_ROWS) & (np.diff(lists.cell_start) <= MAX_ROWS)
     entries, moved = int(order.entries[chosen].sum()), chosen & order.moved
     made = Packed(
-        packed_at=_starts(tiles + 1, chosen), tile_entry=np.zeros(int((tiles + 1)[chosen].sum()), np.int64),
+        packed_at=_cell_starts(tiles + 1, chosen), tile_entry=np.zeros(int((tiles + 1)[chosen].sum()), np.int64),
         entry_row=np.zeros(entries, np.uint16), packed=np.zeros(LANES * entries, np.float32),
         packed_slope=np.zeros(2 * LANES * entries if len(lists.slope) else 0, np.float32),
-        places_at=_starts(blocks, chosen), places=np.zeros(int(blocks[chosen].sum()), np.uint16),
-        order_at=_starts(LANES * tiles, moved), order=order.order[np.repeat(moved, LANES * tiles)],
+        places_at=_cell_starts(blocks, chosen), places=np.zeros(int(blocks[chosen].sum()), np.uint16),
+        order_at=_cell_starts(LANES * tiles, moved), order=order.order[np.repeat(moved, LANES * tiles)],
     )  # fmt: skip
     _pack_cells(
         lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, *vars(made).values()
@@ -103,13 +103,13 @@ def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
     return made
 
 
-def _starts(sizes: Ints, chosen: Bools) -> Ints:
+def _cell_starts(sizes: Ints, chosen: Bools) -> Ints:
     """Return (c,): where each of the ``chosen`` cells starts if they follow each other; PLAIN for the others."""
     held = np.where(chosen, sizes, 0)
     return np.where(chosen, np.cumsum(held) - held, PLAIN)
 
 
-def unpacked(lists: Lists, made: Packed, c: int) -> list[Floats32]:
+def unpack_cell(lists: Lists, made: Packed, c: int) -> list[Floats32]:
     """Return (tiles, rows, 8): b w of a packed cell, and (tiles, rows, 16) b_u w and b_v w if it has slopes, in the
     mesh's order."""
     rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
@@ -133,7 +133,7 @@ def unpacked(lists: Lists, made: Packed, c: int) -> list[Floats32]:
 
 
 @kernel
-def _marks(size, rows, at, value, slope, masks):
+def _mark_points(size, rows, at, value, slope, masks):
     """Return bit k of ``masks[s]`` : does point k of a cell with a block at ``at`` reach its vertex s? Returns how many
     do."""
     count = 0
@@ -153,7 +153,7 @@ def _marks(size, rows, at, value, slope, masks):
 
 
 @kernel
-def _bits(word):
+def _count_bits(word):
     """Return how many bits of a number are set (Warren, Hacker's Delight 5-1)."""
     word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
     word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
@@ -162,7 +162,7 @@ def _bits(word):
 
 
 @kernel
-def _entries(size, masks, order, union):
+def _count_entries(size, masks, order, union):
     """Return how many rows of tiles of eight vertices in the given order are not all zero."""
     count = 0
     for first in range(0, size, 8):
@@ -170,7 +170,7 @@ def _entries(size, masks, order, union):
         for j in range(first, min(first + 8, size)):
             union |= masks[order[j]]
         for word in union:
-            count += _bits(word)
+            count += _count_bits(word)
     return count
 
 
@@ -183,8 +183,8 @@ def _next_vertex(masks, union, left, choice):
         more, common = 0, 0
         for k in range(len(union)):
             word = masks[left[q], k]
-            more += _bits(word & ~union[k])
-            common += _bits(word & union[k])
+            more += _count_bits(word & ~union[k])
+            common += _count_bits(word & union[k])
         if (more << 20) - common < best:
             best, found = (more << 20) - common, q
     return found
@@ -219,12 +219,12 @@ def _order_cells(cell_start, tile_start, rows, at, value, slope, choice, worth, 
     for c in range(rows.shape[0]):
         size, wide = cell_start[c + 1] - cell_start[c], (rows[c] + 63) >> 6
         masks, union = all_masks[:, :wide], np.zeros(wide, np.uint64)
-        reached = _marks(size, rows[c], at[c], value, slope, masks)
-        entries[c] = _entries(size, masks, same, union)
+        reached = _mark_points(size, rows[c], at[c], value, slope, masks)
+        entries[c] = _count_entries(size, masks, same, union)
         chosen = same
         if size <= most and reached < rows[c] * size:
             _arrange(size, masks, choice, union, left, other)
-            count = _entries(size, masks, other, union)
+            count = _count_entries(size, masks, other, union)
             if count <= worth * entries[c]:
                 entries[c], moved[c], chosen = count, True, other
         for s in range(size):

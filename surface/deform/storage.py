@@ -14,9 +14,9 @@ import numpy as np
 from surface.base.arrays import Bools, Ints
 from surface.mesh.mesh import Mesh
 
-from .factors import Factors, factorize, products
+from .factors import Factors, expand_factors, factorize
 from .lists import LANES, Basis, Lists, grow
-from .packing import PLAIN, Packed, order_vertices, pack, unpacked
+from .packing import PLAIN, Packed, order_vertices, pack, unpack_cell
 
 
 class Storage(NamedTuple):
@@ -62,7 +62,7 @@ def _take_out(lists: Lists, kept: Bools) -> None:
     lists.used = len(lists.value)
 
 
-def remember(lists: Lists, storage: Storage) -> Callable[[], None]:
+def make_restore(lists: Lists, storage: Storage) -> Callable[[], None]:
     """Return what takes back the next calls of :func:`expand`, if nothing else was changed meanwhile."""
     value, slope, used = lists.value, lists.slope, lists.used
     places = [lists.at, lists.room, storage.factors.rows_at, storage.packed.packed_at, storage.packed.order_at]
@@ -80,7 +80,7 @@ def expand(lists: Lists, storage: Storage, cells: Ints) -> None:
     """Give ``cells (k,)`` blocks, at the end of the arrays of ``lists``, before they are changed."""
     factors, packed = storage
     for c in cells[~storage.blocks(cells)]:
-        blocks = products(factors, lists, c) if factors.rows_at[c] >= 0 else unpacked(lists, packed, c)
+        blocks = expand_factors(factors, lists, c) if factors.rows_at[c] >= 0 else unpack_cell(lists, packed, c)
         end = lists.used + blocks[0].size
         lists.value = grow(lists.value, end)
         lists.value[lists.used : end] = blocks[0].ravel()

@@ -20,7 +20,7 @@ from surface.spline.lanes import load
 
 from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
 from .binding import arrays_of
-from .groupsums import HEAD, STEP, product, slope_products, wide
+from .groupsums import HEAD, STEP, factor_counts, product, slope_products
 from .packedsums import add_packed_row, add_products
 
 NOT_STORED = -1  # in ``differences``: the cell's numerators are not stored
@@ -41,7 +41,7 @@ def add_row(
     Its plain weights start at ``place``, or it is the ``row`` in the factors, unless that is -1.
     """
     size, at = 72 if slopes else 24, head + HEAD
-    wide_u, wide_v = wide(row, head, picks)
+    wide_u, wide_v = factor_counts(row, head, picks)
     for tile in range(first_tile, end_tile):
         base = tile * size
         if row >= 0:

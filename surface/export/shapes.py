@@ -98,13 +98,13 @@ def _add_shape(head: Head, name: str, base: Mapping[str, float], parts: list[Exp
     before = [(part.vertices.copy(), unit(part.normals)) for part in head.parts]
     head.pose(head.values({**base, name: 1.0}))
     for out, part, (vertices, normals) in zip(parts, head.parts, before, strict=True):
-        moved = _without_noise(part.vertices - vertices, MIN_MOVE_MM)
+        moved = _zero_noise(part.vertices - vertices, MIN_MOVE_MM)
         if moved.any():
             out.displacements[name] = moved
-            out.normal_changes[name] = _without_noise(unit(part.normals) - normals, MIN_NORMAL)
+            out.normal_changes[name] = _zero_noise(unit(part.normals) - normals, MIN_NORMAL)
 
 
-def _without_noise(rows: Floats32, least: float) -> Floats32:
+def _zero_noise(rows: Floats32, least: float) -> Floats32:
     """Return rows, zero where all components are smaller than ``least``."""
     return np.where(np.abs(rows).max(axis=1, keepdims=True) < least, np.float32(0), rows)
 

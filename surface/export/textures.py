@@ -45,14 +45,14 @@ def png_bytes(picture: Picture) -> bytes:
     return out
 
 
-def encoded(linear: Floats) -> Picture:
+def encode_srgb(linear: Floats) -> Picture:
     """Return linear colours 0..1 as sRGB bytes (IEC 61966-2-1)."""
     c = np.clip(linear, 0.0, 1.0)
     curve = np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
     return np.rint(255.0 * curve).astype(np.uint8)
 
 
-def decoded(srgb: Floats) -> Floats:
+def decode_srgb(srgb: Floats) -> Floats:
     """Return sRGB colours 0..1 as linear ones."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
@@ -64,8 +64,8 @@ def eye_column(part: ExportPart) -> Picture:
     for k, stop in enumerate(stops):
         wanted = part.painted.get(stop.get("of", ""))
         if wanted is not None:
-            share = decoded(colours[k]) * np.asarray(wanted, float) / np.array(plain[stop["of"]])
-            colours[k] = encoded(share) / 255.0
+            share = decode_srgb(colours[k]) * np.asarray(wanted, float) / np.array(plain[stop["of"]])
+            colours[k] = encode_srgb(share) / 255.0
     v = 1.0 - (np.arange(256) + 0.5) / 256
     column = np.stack([np.interp(v, [stop["v"] for stop in stops], colours[:, k]) for k in range(3)], axis=1)
     return np.repeat(np.rint(255 * column).astype(np.uint8)[:, None], 4, axis=1)
@@ -103,7 +103,7 @@ def eye_picture(part: ExportPart, size: int = 256) -> Picture:
     tint *= ((1.0 - 0.8 * smoothstep(t, 0.72, 1.0)) * smoothstep(t, -0.06, 0.12))[..., None]
     white = sclera * (1.0 - smoothstep(r, 0.60, 1.0)[..., None] * (1.0 - np.array([0.92, 0.70, 0.62])))
     share = smoothstep(q, 0.90, 1.06)[..., None]
-    return encoded(tint * (1.0 - share) + white * share)
+    return encode_srgb(tint * (1.0 - share) + white * share)
 
 
 def _fibres(angle: Floats, t: Floats) -> Floats:
@@ -142,7 +142,7 @@ def strand_picture(size: int = 128) -> Picture:
     fine, coarse, light = (_tiling_noise(random, size, falloff) for falloff in (0.5, 1.0, 0.5))
     height = np.clip(0.5 + 0.21 * coarse + 0.13 * fine, 0.05, 2.0)
     picture = np.zeros((size, size, 4), np.uint8)
-    picture[..., :3] = encoded(np.clip(0.62 + 0.14 * light + 0.10 * coarse, 0.1, 1.0))[..., None]
+    picture[..., :3] = encode_srgb(np.clip(0.62 + 0.14 * light + 0.10 * coarse, 0.1, 1.0))[..., None]
     picture[..., 3] = np.rint(255 * np.clip(STRAND_CUTOFF / height, 0.0, 1.0)).astype(np.uint8)
     return picture
 

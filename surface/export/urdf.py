@@ -96,12 +96,12 @@ def _pieces(head: Head, pose: Mapping[str, float]) -> list[Piece]:
         carrier = _carriers(head, own, part.vertices, wide)
         of_triangle = np.sort(carrier[part.triangles], axis=1)[:, 1]  # as two of its corners or the middle one
         for number in np.unique(of_triangle).tolist():
-            found += _coloured(links[number], part, part.triangles[of_triangle == number])
+            found += _split_by_colour(links[number], part, part.triangles[of_triangle == number])
     head.pose(head.values({}))
     return found
 
 
-def _coloured(link: str, part: ExportPart, triangles: Ints) -> list[Piece]:
+def _split_by_colour(link: str, part: ExportPart, triangles: Ints) -> list[Piece]:
     """Return a piece of each colour: one, but for an eyeball."""
     if part.material != "eye":
         colour = np.asarray(materials().get(part.material, materials()["skin"])["colour"], float)
@@ -133,13 +133,13 @@ def _carriers(head: Head, part: HeadPart, rest: Floats32, opened: Floats32) -> I
         return np.full(len(rest), 3 + list(_EYES).index(part.follows))
     if part.follows in ("jaw", "skull"):
         return np.full(len(rest), 2 if part.follows == "jaw" else 1)
-    whole = _swing(head, rest)
+    whole = _jaw_swing(head, rest)
     share = (np.asarray(opened - rest, float) * whole).sum(axis=1) / np.maximum((whole * whole).sum(axis=1), 1e-9)
     still = head.data.neck.share(rest.astype(float)) < _MIN_FRACTION
     return np.where(still, 0, np.where(share > _MIN_FRACTION, 2, 1))
 
 
-def _swing(head: Head, points: Floats32) -> Floats:
+def _jaw_swing(head: Head, points: Floats32) -> Floats:
     """Return (m, 3): how far the whole motion of the jaw moves points that are fixed to it, mm."""
     jaw = head.data.jaw
     sine, cosine = np.sin(jaw.angle_rad), np.cos(jaw.angle_rad)

@@ -52,8 +52,8 @@ def web_parts(head: Head, level: str = "full") -> list[WebPart]:
     found = []
     for part, own in zip(exported, head.parts, strict=True):
         triangles = own.decimated.get(level)
-        kept, small = _reduced(part, part.triangles if triangles is None else triangles)
-        found.append(_coloured(small, own, kept, front))
+        kept, small = _reduce(part, part.triangles if triangles is None else triangles)
+        found.append(_add_material_data(small, own, kept, front))
     return found
 
 
@@ -68,7 +68,7 @@ def _add_half(head: Head, name: str, parts: list[ExportPart]) -> None:
     head.pose(head.values({}))
 
 
-def _reduced(part: ExportPart, triangles: NDArray[np.integer]) -> tuple[Ints, ExportPart]:
+def _reduce(part: ExportPart, triangles: NDArray[np.integer]) -> tuple[Ints, ExportPart]:
     """Return the vertices (k,) that triangles (t, 3) use, rising, and the part of these, without shapes that hardly
     move."""
     kept = np.unique(triangles)
@@ -86,7 +86,7 @@ def _reduced(part: ExportPart, triangles: NDArray[np.integer]) -> tuple[Ints, Ex
     )  # fmt: skip
 
 
-def _coloured(part: ExportPart, own: HeadPart, kept: Ints, front: float) -> WebPart:
+def _add_material_data(part: ExportPart, own: HeadPart, kept: Ints, front: float) -> WebPart:
     """Return the part with what its material needs; ``front`` : the front of the teeth, mm."""
     a = _Attributes(own, kept)
     table = materials().get(part.material, materials()["skin"])

@@ -36,7 +36,7 @@ def picture_beside(folder: Path, name: str) -> tuple[bytes | None, str]:
     return (data, mime) if mime else (None, "")
 
 
-def _beside(folder: Path, name: str) -> Path | None:
+def _path_beside(folder: Path, name: str) -> Path | None:
     """Return the path of a file in the folder or below it; None for any other."""
     relative = Path(name.replace("\\", "/"))
     inside = name and "\0" not in name and not relative.is_absolute() and ".." not in relative.parts
@@ -44,7 +44,7 @@ def _beside(folder: Path, name: str) -> Path | None:
 
 
 def _data(folder: Path, name: str) -> bytes | None:
-    path = _beside(folder, name)
+    path = _path_beside(folder, name)
     try:
         return read_bytes(path) if path is not None and path.is_file() else None
     except (FitError, OSError, ValueError):

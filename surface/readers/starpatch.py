@@ -69,7 +69,7 @@ def limit_samples(mesh: Complex, face: int, along: Along) -> Sampled:
     order = list(dict.fromkeys([*grips.values(), *extra]))
     column = {grip: k for k, grip in enumerate(order)}
     limit = _limit(loops, {v: column[g] for v, g in grips.items()}, corners, len(order))
-    return Sampled(order, size, limit, _corrected(limit, [_rows(side, column) for side in sides]))
+    return Sampled(order, size, limit, _correct_sides(limit, [_rows(side, column) for side in sides]))
 
 
 def _rows(side: list[dict[int, float]] | None, column: dict[int, int]) -> Floats | None:
@@ -140,17 +140,17 @@ def _limit(loops: list[list[int]], grips: dict[int, int], corners: dict[int, Flo
             places[k] = corners[vertex]
     faces = [[order[v] for v in loop] for loop in loops]
     for _ in range(LEVELS):
-        faces, shares, places = _subdivided(faces, shares, places)
-    shares = _on_limit(faces, shares)
+        faces, shares, places = _subdivide(faces, shares, places)
+    shares = _project_to_limit(faces, shares)
     out = np.full((COUNT, COUNT, width), np.nan)
     for k in np.flatnonzero(np.isfinite(places[:, 0])).tolist():
         i, j = np.rint(places[k] * (COUNT - 1)).astype(int)
         if np.abs(places[k] * (COUNT - 1) - (i, j)).max() < 1e-6:
             out[i, j] = shares[k]
-    return _filled(out)
+    return _fill(out)
 
 
-def _filled(lattice: Floats) -> Floats:
+def _fill(lattice: Floats) -> Floats:
     """Return a lattice in which places without samples, as at T-junctions, are interpolated along their row and column;
     where neither has samples on both sides, the nearest sample counts."""
     known = np.isfinite(lattice[..., 0])
@@ -185,7 +185,7 @@ def _neighbours(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
     return edges
 
 
-def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list[list[int]], Floats, Floats]:
+def _subdivide(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list[list[int]], Floats, Floats]:
     """Return one step of Catmull and Clark's subdivision on rows (n, w); places are means, which is right on one face
     only."""
     edges, n = _neighbours(faces), len(x)
@@ -195,7 +195,7 @@ def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list
         [0.5 * (x[a] + x[b]) if len(own) == 1 else 0.25 * (x[a] + x[b]) + 0.5 * centres[own].mean(axis=0)
          for (a, b), own in edges.items()]
     )  # fmt: skip
-    corners = _smoothed(faces, edges, centres, x)
+    corners = _smooth(faces, edges, centres, x)
     first = n + len(edges)
     quads = []
     for k, face in enumerate(faces):
@@ -207,7 +207,7 @@ def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list
     return quads, np.concatenate([corners, middles, centres]), np.concatenate([places, between, inside])
 
 
-def _smoothed(
+def _smooth(
     faces: list[list[int]], edges: dict[tuple[int, int], list[int]], centres: Floats, x: Floats
 ) -> Floats:  # fmt: skip
     """Return new places of the old vertices."""
@@ -231,7 +231,7 @@ def _smoothed(
     return smoothed
 
 
-def _on_limit(faces: list[list[int]], x: Floats) -> Floats:
+def _project_to_limit(faces: list[list[int]], x: Floats) -> Floats:
     """Return vertices of quads moved to the limit surface (Halstead, Kass and DeRose 1993)."""
     edges = _neighbours(faces)
     valence, free = np.zeros(len(x)), np.zeros(len(x))
@@ -255,7 +255,7 @@ def _on_limit(faces: list[list[int]], x: Floats) -> Floats:
     return moved
 
 
-def _corrected(limit: Floats, sides: list[Floats | None]) -> Floats:
+def _correct_sides(limit: Floats, sides: list[Floats | None]) -> Floats:
     """Return the lattice moved by a Coons patch so that its sides are the exact ones where these are known.
 
     sides : (COUNT, g) from (0, 0) on: v = 0 along u, u = 1 along v, v = 1 back along u, u = 0 back along v.
@@ -292,12 +292,12 @@ def _basis(t: Floats) -> Floats:
 
 def fit_patch(sampled: Sampled) -> Patch:
     """Return the bicubic patch nearest to the samples whose corners and sides depend on those of the samples only."""
-    fit = _fitting()
+    fit = _fitting_matrix()
     shares: Floats = np.einsum("ai,bj,ijg->abg", fit, fit, sampled.wanted)
     return Patch(shares)
 
 
-def _fitting() -> Floats:
+def _fitting_matrix() -> Floats:
     """Return (SPANS + 3, COUNT): control points of the cubic spline nearest to samples, through the first and last."""
     basis = _basis(np.linspace(0.0, 1.0, COUNT))
     inner = np.linalg.pinv(basis[1:-1, 1:-1])

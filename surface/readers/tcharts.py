@@ -100,7 +100,7 @@ def read_complex(file: TsmFile, name: str) -> NamedSurface:
     layouts = {face: Layout(mesh, face) for face in mesh.loops if not mesh.is_star(face)}
     charts = _charts(mesh, layouts)
     points = {grip: np.array(row[:3]) for grip, (_, row) in file.grips.items()}
-    return _assembled(mesh, charts, points, name)
+    return _assemble(mesh, charts, points, name)
 
 
 def _charts(mesh: Complex, layouts: dict[int, Layout]) -> list[Chart]:
@@ -208,7 +208,7 @@ class _Exact:
         return out
 
 
-def _assembled(mesh: Complex, charts: list[Chart], points: dict[int, Floats], name: str) -> NamedSurface:
+def _assemble(mesh: Complex, charts: list[Chart], points: dict[int, Floats], name: str) -> NamedSurface:
     """Return all charts and patches in one plane."""
     sheet = _Sheet(mesh)
     exact = _Exact(mesh, charts, points)
@@ -218,7 +218,7 @@ def _assembled(mesh: Complex, charts: list[Chart], points: dict[int, Floats], na
     for face in (f for f in mesh.loops if mesh.is_star(f)):
         sampled = limit_samples(mesh, face, exact.along)
         deviation = max(deviation, sheet.add_patch(face, sampled, points))
-    return sheet.finished(points, name, deviation)
+    return sheet.finish(points, name, deviation)
 
 
 class _Sheet:
@@ -279,7 +279,7 @@ class _Sheet:
         self._count += 1
         return patch.deviation(sampled, np.array([points[g] for g in sampled.grips]))
 
-    def finished(self, points: dict[int, Floats], name: str, deviation: float) -> NamedSurface:
+    def finish(self, points: dict[int, Floats], name: str, deviation: float) -> NamedSurface:
         """Return the surface."""
         ties = Ties.of(self._ties, points)
         surface = DCPSurface(ties.apply(ties.points), self._weights, *self._knots)

@@ -287,8 +287,8 @@ class Ray:
         high = self._ends[k] if k < len(self._ends) else np.inf
         if (low, high) not in self._rows:
             first, last = bisect_right(self._all, low + self._near), bisect_left(self._all, high - self._near)
-            inner = _merged(self._all[first:last], self._near)
-            row = _extended(inner, x, low, high)
+            inner = _merge_values(self._all[first:last], self._near)
+            row = _extend(inner, x, low, high)
             found = [low] * 4 * bool(np.isfinite(low)) + row + [high] * 4 * bool(np.isfinite(high))
             if not inner:
                 return found, low, high  # these depend on x
@@ -309,12 +309,12 @@ def overlap(a: Rect, b: Rect, near: float) -> bool:
     return a[0] < b[1] - near and b[0] < a[1] - near and a[2] < b[3] - near and b[2] < a[3] - near
 
 
-def _merged(row: list[float], near: float) -> list[float]:
+def _merge_values(row: list[float], near: float) -> list[float]:
     """Return distinct values of a rising row."""
     return row[:1] + [b for a, b in pairwise(row) if b - a > near]
 
 
-def _extended(inner: list[float], x: float, low: float, high: float) -> list[float]:
+def _extend(inner: list[float], x: float, low: float, high: float) -> list[float]:
     """Return knots with three more where the layout ends without an outline: equal intervals beyond what is known."""
     if np.isfinite(low) and np.isfinite(high):
         return inner

@@ -76,7 +76,7 @@ def loop_over(surface: DCPSurface, rect: Rect, edges: list[TrimEdge], size: floa
     free = _seams(parts, rect, _closes(surface, rect, size))
     if len(free) > MAX_SEAMS:
         raise ValueError(f"runs along seams {len(free)} times, more than the {MAX_SEAMS} that are read")
-    loop = _chained(parts, free, rect, _joined(edges))
+    loop = _chain(parts, free, rect, _follow_directly(edges))
     extent = np.array([rect[1] - rect[0], rect[3] - rect[2]])
     if any((np.abs(np.diff(part, axis=0)) > extent / 2).any() for part in parts):
         raise ValueError("crosses the seam of its face, which is not read")
@@ -145,14 +145,14 @@ def _settle(x: Floats, near: Bools, low: float, high: float) -> None:
             x[k] = low if left else high
 
 
-def _joined(edges: list[TrimEdge]) -> Bools:
+def _follow_directly(edges: list[TrimEdge]) -> Bools:
     """Return (c,): of each edge in space, whether the next one follows without a pole between."""
     curves = [k for k, edge in enumerate(edges) if not edge.is_pole]
     following = [*curves[1:], curves[0] + len(edges)]
     return np.array([b == a + 1 for a, b in zip(curves, following, strict=True)])
 
 
-def _chained(parts: list[Floats], free: list[tuple[int, int]], rect: Rect, joined: Bools) -> Floats:
+def _chain(parts: list[Floats], free: list[tuple[int, int]], rect: Rect, joined: Bools) -> Floats:
     """Return the corners of the loop with each edge along a seam at the end that leaves the smallest gaps; among equals
     the one that runs anticlockwise. ``parts`` are changed."""
     extent = np.array([rect[1] - rect[0], rect[3] - rect[2]])
@@ -169,7 +169,7 @@ def _chained(parts: list[Floats], free: list[tuple[int, int]], rect: Rect, joine
     if best[0] > OPEN:
         raise ValueError("does not close over (u, v)")
     _put(parts, free, best[2], rect)
-    return _without_repeats(np.concatenate(parts))
+    return _drop_repeats(np.concatenate(parts))
 
 
 def _put(parts: list[Floats], free: list[tuple[int, int]], sides: tuple[int, ...], rect: Rect) -> None:
@@ -183,7 +183,7 @@ def _area(loop: Floats) -> float:
     return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
-def _without_repeats(loop: Floats) -> Floats:
+def _drop_repeats(loop: Floats) -> Floats:
     """Return the closed polyline without points that repeat the one before."""
     step = np.abs(loop - np.roll(loop, 1, axis=0)).max(axis=1)
     kept: Floats = loop[step > 1e-12 * np.abs(loop).max()]

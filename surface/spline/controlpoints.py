@@ -131,12 +131,12 @@ class ControlPoints:
     @property
     def knots_u(self) -> Sequence[Floats]:
         """n arrays of degree + 2 knots, read-only."""
-        return _without_padding(self.padded[0], self.degrees[0])
+        return _strip_padding(self.padded[0], self.degrees[0])
 
     @property
     def knots_v(self) -> Sequence[Floats]:
         """n arrays of degree + 2 knots, read-only."""
-        return _without_padding(self.padded[1], self.degrees[1])
+        return _strip_padding(self.padded[1], self.degrees[1])
 
     @property
     def degrees(self) -> tuple[Ints, Ints]:
@@ -215,5 +215,5 @@ class ControlPoints:
         return samples, sides, out
 
 
-def _without_padding(knots: Floats, degrees: Ints) -> list[Floats]:
+def _strip_padding(knots: Floats, degrees: Ints) -> list[Floats]:
     return [row[: p + 2] for row, p in zip(knots, degrees, strict=True)]

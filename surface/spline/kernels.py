@@ -128,7 +128,7 @@ def distinct(uv, side, axis, values, index):
 
 
 @kernel
-def along(knots, i, p, values, count, slopes, work, out):
+def blend_along(knots, i, p, values, count, slopes, work, out):
     """Write one blending function (and its slope) at distinct coordinates into ``out (k, 2)``; any nonzero?"""
     found = False
     for k in range(count):
@@ -188,9 +188,9 @@ def sum_run(knots_u, knots_v, pu, pv, points, weights, ids, uv, side, slopes, wo
     acc[:m] = 0.0
     for q in range(ids.shape[0]):
         i = ids[q]
-        if not along(knots_u, i, pu[i], values_u, many_u, slopes, work, along_u):
+        if not blend_along(knots_u, i, pu[i], values_u, many_u, slopes, work, along_u):
             continue
-        if not along(knots_v, i, pv[i], values_v, many_v, slopes, work, along_v):
+        if not blend_along(knots_v, i, pv[i], values_v, many_v, slopes, work, along_v):
             continue
         for s in range(m):
             a0, a1 = along_u[index_u[s], 0], along_u[index_u[s], 1]

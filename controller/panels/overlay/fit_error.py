@@ -34,14 +34,14 @@ class FitErrorView:
         self.on = False
         self._area, self._redraw = area, redraw
         self._colours, self._painted = FitColours(), False
-        self._see(head)
+        self._read_error(head)
 
-    def _see(self, head: Head) -> None:
+    def _read_error(self, head: Head) -> None:
         self._figures, self._gaps = figures_of(head), unmeasured(head)
 
     def dress(self, head: Head, theme: Theme) -> Theme:
         """Paint a head that is drawn from now on, or take the paint off; returns the theme that shows it so."""
-        self._see(head)
+        self._read_error(head)
         self._painted = self.on and self._colours.paint(head)
         if not self._painted:
             self._colours.clear()

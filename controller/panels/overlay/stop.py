@@ -57,7 +57,7 @@ class StopButton:
         low, high, draw = imgui.get_item_rect_min(), imgui.get_item_rect_max(), imgui.get_window_draw_list()
         seen = draw.get_clip_rect_min(), draw.get_clip_rect_max()
         box = Box(low.x, low.y, high.x, high.y)
-        if box.within(Box(seen[0].x, seen[0].y, seen[1].x, seen[1].y)) and box.right - box.left >= _least(imgui):
+        if box.within(Box(seen[0].x, seen[0].y, seen[1].x, seen[1].y)) and box.right - box.left >= _min_width(imgui):
             self._slot = box
 
     def __call__(self, imgui: Any) -> None:
@@ -85,7 +85,7 @@ class StopButton:
         draw.add_text(imgui.ImVec2(*at), packed(imgui, (1.0, 1.0, 1.0, 1.0)), LABEL)
 
 
-def _least(imgui: Any) -> float:
+def _min_width(imgui: Any) -> float:
     """Return the width that shows the label whole."""
     return float(imgui.calc_text_size(LABEL).x + imgui.get_font_size())
 

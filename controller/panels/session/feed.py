@@ -69,13 +69,13 @@ class Feed:
         now_s, newest = self._clock(), self._newest()
         if newest is not None and newest is not self.details:
             self.details, self._waits = newest, False
-            self._keep(now_s)
+            self._record(now_s)
         since = now_s - self._asked_s
         if since >= (_PATIENCE_S if self._waits else PERIOD_S):
             self._asked_s, self._waits = now_s, True
             self._send(AskDetails())
 
-    def _keep(self, now_s: float) -> None:
+    def _record(self, now_s: float) -> None:
         for servo in self.details.servos:
             self.history(servo).add(now_s, servo)
         for note in self.details.notes:

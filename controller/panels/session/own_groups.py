@@ -74,8 +74,8 @@ def save_corrective(
 def place_of(head: Head, group: GroupMoves) -> Place:
     """Return the region and profile of the shape that moves the same control points the most; the mouth's where none
     does."""
-    part, group = next(part for part in head.data.parts if part.name == group.part), _on_own_points(head, group)
-    moved = {each.name: _shared(each.ids, each.moves, group) for each in part.groups if each.name in SHAPES}
+    part, group = next(part for part in head.data.parts if part.name == group.part), _drop_added_points(head, group)
+    moved = {each.name: _overlap(each.ids, each.moves, group) for each in part.groups if each.name in SHAPES}
     if not any(moved.values()):
         return Place("mouth", "mouth")
     shapes: Mapping[str, Any] = read_toml(config_dir() / "vocabularies" / "arkit.toml")["parameters"]
@@ -83,7 +83,7 @@ def place_of(head: Head, group: GroupMoves) -> Place:
     return Place(shape["region"], shape["profile"])
 
 
-def _on_own_points(head: Head, group: GroupMoves) -> GroupMoves:
+def _drop_added_points(head: Head, group: GroupMoves) -> GroupMoves:
     """Return a group with those of the head's own control points that count most where it adds some."""
     if group.light is None:
         return group
@@ -93,7 +93,7 @@ def _on_own_points(head: Head, group: GroupMoves) -> GroupMoves:
     return GroupMoves(group.part, np.concatenate([group.ids, ids]), np.concatenate([group.moves, moves]))
 
 
-def _shared(ids: np.ndarray, moves: np.ndarray, group: GroupMoves) -> float:
+def _overlap(ids: np.ndarray, moves: np.ndarray, group: GroupMoves) -> float:
     """Return how far a shape moves the control points of a group, each weighted with how far the group moves it."""
     far = np.zeros(max(ids.max(initial=-1), group.ids.max(initial=-1)) + 1)
     np.add.at(far, ids, np.linalg.norm(np.asarray(moves, float), axis=1))

@@ -134,7 +134,7 @@ class Saving:
         weights = save_expression(words.own, name, face, words.vocabulary, words.parameters, words.earlier, kind)
         words.vocabulary.add(Expression(name, weights, kind=kind))
         self._send(Learn(name, tuple(map(float, weights)), kind))
-        return f"wrote {name} to {shown(words.own)}"
+        return f"wrote {name} to {shorten_path(words.own)}"
 
     def _group(self, name: str) -> str:
         words, editor = self._words, self._editor()
@@ -157,7 +157,7 @@ class Saving:
         check_name(name, self._words.vocabulary)
         path = self._words.own.parent / f"{name}-anchor.toml"
         save_anchor(path, name, place, pull, self._words.parameters)
-        return f"{self._expression(name, 'user')}; its servo is in {shown(path)}"
+        return f"{self._expression(name, 'user')}; its servo is in {shorten_path(path)}"
 
     def _editor(self) -> PointEditor:
         if self.editor is None:
@@ -170,10 +170,10 @@ class Saving:
         if self.reopen is not None:
             now = replace(history.now, moves=None, light=())
             self.reopen(History(now, (*history.past, history.now), ()), held)
-        return f"wrote {name} to {shown(self._words.own)}"
+        return f"wrote {name} to {shorten_path(self._words.own)}"
 
 
-def shown(path: Path) -> Path:
+def shorten_path(path: Path) -> Path:
     """Return a path as a user names it: from the present folder where it is in there."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path

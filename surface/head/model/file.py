@@ -40,7 +40,7 @@ def _error(path: Path, key: str, why: str) -> HeadFileError:
     return HeadFileError(f"{path}: {key}: {why}", hint=HINT)
 
 
-def _checked(path: Path, key: str, a: Array, shape: tuple[int, ...]) -> Array:
+def _check(path: Path, key: str, a: Array, shape: tuple[int, ...]) -> Array:
     if a.ndim != len(shape) or any(w not in (ANY, g) for g, w in zip(a.shape, shape, strict=True)):
         raise _error(path, key, f"has shape {a.shape}, expected {shape}".replace("-1", "any"))
     if a.dtype.kind not in "fiu" or not np.isfinite(a).all():
@@ -87,7 +87,7 @@ class _Section:
             a = np.asarray(self._value(key, (list, int, float)), float)
         except (TypeError, ValueError) as e:
             raise self.error(key, "holds something that is not a number") from e
-        _checked(self.path, self.where + key, a, shape)
+        _check(self.path, self.where + key, a, shape)
         return a if a.ndim > 1 else tuple(a.tolist()) if a.ndim else float(a)
 
 
@@ -102,7 +102,7 @@ class _Arrays:
         """Return the array of a key in the type that omote computes with, whatever it was stored in."""
         if key not in self.stored:
             raise _error(self.path, key, "missing")
-        found = _checked(self.path, key, self.stored[key], shape)
+        found = _check(self.path, key, self.stored[key], shape)
         with np.errstate(invalid="ignore", over="ignore"):
             array = np.ascontiguousarray(found, TYPES.get(key.rsplit("/", 1)[-1], np.float64))
         lost = not np.isfinite(array).all() or (array.dtype.kind == "i" and (array != found).any())

@@ -132,7 +132,7 @@ def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mappi
             parts[part] = replace(parts[part], points=points)
         for part, changes in identity.changes.items():
             for group in changes:
-                parts[part] = _changed(parts[part], group, amount)
+                parts[part] = _add_change(parts[part], group, amount)
     moved = replace(head.jaw, centre=tuple(jaw.tolist()))
     return replace(head, eyes=eyes, jaw=moved, parts=[parts[p.name] for p in head.parts])
 
@@ -146,7 +146,7 @@ def _check_fit(head: HeadData, identity: Identity, where: str) -> None:
                             hint="make it again: omote fit MESH -o FOLDER --keep --identities FILE")  # fmt: skip
 
 
-def _changed(part: PartData, change: Group, amount: float) -> PartData:
+def _add_change(part: PartData, change: Group, amount: float) -> PartData:
     """Return the part with a multiple of ``change`` added to its group of the same name."""
     total = np.zeros((len(part.points), 3), np.float32)
     total[change.ids] += np.float32(amount) * change.moves

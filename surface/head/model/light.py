@@ -91,7 +91,7 @@ def with_light(
         mesh = mesh or tessellate(part, surface, data.seams)
         refined[name] = Refined(mesh, own, part, coarser(name, mesh))
         grown = with_points(part, own)
-        parts[name] = replace(grown, mesh=refined[name].packed(grown))
+        parts[name] = replace(grown, mesh=refined[name].pack_finer(grown))
     return replace(data, parts=list(parts.values())), refined
 
 
@@ -124,20 +124,20 @@ def with_points(part: PartData, own: LightPoints) -> PartData:
         part,
         points=np.concatenate([part.points, share @ part.points]),
         weights=np.concatenate([part.weights, np.full(k, WEIGHT)]),
-        knots_u=np.concatenate([part.knots_u, _padded(own.knots_u, width)]),
-        knots_v=np.concatenate([part.knots_v, _padded(own.knots_v, part.knots_v.shape[1])]),
+        knots_u=np.concatenate([part.knots_u, _pad(own.knots_u, width)]),
+        knots_v=np.concatenate([part.knots_v, _pad(own.knots_v, part.knots_v.shape[1])]),
         degrees=np.concatenate([part.degrees, np.full((k, 2), 3)]),
-        groups=[_carried(group, share, n) for group in part.groups],
+        groups=[_carry_group(group, share, n) for group in part.groups],
         jaw=np.concatenate([part.jaw, share @ part.jaw]),
         lids=np.concatenate([part.lids, np.zeros(k)]),  # who is far from the face keeps no distance from the eyeball
     )
 
 
-def _padded(knots: Floats, width: int) -> Floats:
+def _pad(knots: Floats, width: int) -> Floats:
     return np.hstack([knots, np.repeat(knots[:, -1:], width - knots.shape[1], axis=1)])
 
 
-def _carried(group: Group, share: Array, n: int) -> Group:
+def _carry_group(group: Group, share: Array, n: int) -> Group:
     """Return a group that moves new points as the surface at their middles."""
     field = np.zeros((n, 3))
     field[group.ids] = group.moves
@@ -225,7 +225,7 @@ class Refined:
             out[which] = (inside & (length[which, None] > self._longest)).any(axis=1)
         return out
 
-    def packed(self, grown: PartData) -> dict[str, Array]:
+    def pack_finer(self, grown: PartData) -> dict[str, Array]:
         """Return the finer mesh of the part with the points, as arrays to keep: new vertices are in cells of their
         own.
         """

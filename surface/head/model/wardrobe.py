@@ -136,13 +136,13 @@ def with_garments(head: HeadData, garments: tuple[Garment, ...], where: str) -> 
         if garment.fit is not None and garment.fit != outline(head, garment.anchors):
             raise HeadFileError(f"{where}: {garment.worn.path.stem} was made for another head", hint=OTHER_HEAD)
         try:
-            parts += [_seated(worn, garment, head, where) for worn in garment.parts]
+            parts += [_seat(worn, garment, head, where) for worn in garment.parts]
         except DAMAGED as error:
             raise HeadFileError(f"{garment.worn.path}: is damaged: {reason(error)}", hint=HINT) from error
     return replace(head, parts=parts)
 
 
-def _seated(worn: WornPart, garment: Garment, head: HeadData, where: str) -> PartData:
+def _seat(worn: WornPart, garment: Garment, head: HeadData, where: str) -> PartData:
     a = worn.arrays
     anchor, follow = np.asarray(a["anchor"], float), np.asarray(a["follow"], float)
     n = len(anchor)

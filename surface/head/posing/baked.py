@@ -152,10 +152,12 @@ def apply_decimated(parts: Iterable[HeadPart], decimated: Mapping[str, Triangles
     for part in parts:
         if np.array_equal(decimated.get(part.name, ()), tessellation_key(part)):
             found = {level: decimated.get(f"{part.name}/{level}") for level in LEVELS}
-            part.decimated = {level: t for level, t in found.items() if t is not None and _valid(t, len(part.vertices))}
+            part.decimated = {
+                level: t for level, t in found.items() if t is not None and _is_valid(t, len(part.vertices))
+            }
 
 
-def _valid(triangles: Triangles, vertices: int) -> bool:
+def _is_valid(triangles: Triangles, vertices: int) -> bool:
     """Are there any, and are all indices in range?"""
     shaped = triangles.ndim == 2 and triangles.shape[1] == 3 and len(triangles) > 0
     return bool(shaped and triangles.min() >= 0 and triangles.max() < vertices)

@@ -79,7 +79,7 @@ class EyeballClearance:
         start, ids, share = weights_at(surface, places)
         self.ids, self.table = _inverse(start, ids, share, surface.points, REGULARISATION[radius > 0])
         near, local = np.unique(ids, return_inverse=True)
-        self.sampling = near, *tiled(start, local, share), np.searchsorted(near, self.ids)
+        self.sampling = near, *tile_weights(start, local, share), np.searchsorted(near, self.ids)
         self.samples, (s, p) = np.empty((len(places), 4)), (len(places), len(near))
         self.work = (np.zeros((p, 3)), np.full((p, 3), np.nan), np.zeros((p, 3), np.float32),
                      np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(4))  # fmt: skip
@@ -212,7 +212,7 @@ def weights_at(surface: DCPSurface, uv: Floats) -> tuple[Ints, Ints, Floats]:
     return start, ids.astype(np.int64) % surface.n, share / np.bincount(rows, share, len(uv))[rows]
 
 
-def tiled(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Floats32]:
+def tile_weights(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Floats32]:
     """Return weights as :func:`weights_at` gives them, for eight places at a time: tile t takes eight ``share (8 m,)``
     each of the points ``ids (m,)`` from ``start[t]`` to ``start[t + 1]``."""
     places, n = len(start) - 1, int(ids.max(initial=0)) + 1

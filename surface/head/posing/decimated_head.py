@@ -67,7 +67,7 @@ class DecimatedHead:
     def __init__(self, head: Head, parts: Sequence[HeadPart], level: str, wanted: Mapping[str, Ints]) -> None:
         self._pivot, self._read_pose = head.data.neck.pivot, head.read_pose
         triangles = {part.name: part.decimated.get(level, part.triangles) for part in parts}
-        kept, self.parts, first = _kept(head, triangles, wanted), [], 0
+        kept, self.parts, first = _kept_vertices(head, triangles, wanted), [], 0
         for part in parts:
             self.parts.append(DecimatedPart(part, triangles[part.name], kept[part.name], first))
             first = self.parts[-1].last
@@ -113,7 +113,7 @@ class JoinedRig(SkinRig):
 
     def __init__(self, parts: Sequence[SkinPart], head: HeadData) -> None:
         of = {part.name: part for part in head.parts}
-        super().__init__(_joined([of[part.name] for part in parts]), head)
+        super().__init__(_join([of[part.name] for part in parts]), head)
         ends = np.cumsum([0, *(len(part.rig.rest) for part in parts)]).tolist()
         self.rows = {part.name: slice(a, b) for part, a, b in zip(parts, ends, ends[1:], strict=False)}
         self._rigs = [(part.rig, self.rows[part.name]) for part in parts]
@@ -138,7 +138,7 @@ class JoinedRig(SkinRig):
             rig.apply_contacts(pose, self.points[rows])
 
 
-def _joined(parts: Sequence[PartData]) -> PartData:
+def _join(parts: Sequence[PartData]) -> PartData:
     """Return points, groups, jaw and lids of several parts as those of one."""
     groups: dict[str, list[tuple[int, Group]]] = {}
     first = 0
@@ -229,7 +229,9 @@ class _Seams:
             stitch_border(vertices, normals, vertices, normals, *self._rows)
 
 
-def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
+def _kept_vertices(
+    head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]
+) -> dict[str, Ints]:
     """Return which vertices are drawn or wanted, by part, with those that seams put them between."""
     kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
     for stitch in reversed(head.stitches):  # a later seam may take what an earlier one moves

@@ -30,10 +30,10 @@ def read_fit_error(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, 
 
     Raises HeadFileError: the file is damaged, of a newer version, or was made for another mesh of a part.
     """
-    return read_baked(head, FIT_ERROR, parts, _unpacked)
+    return read_baked(head, FIT_ERROR, parts, _unpack)
 
 
-def _unpacked(stored: np.ndarray) -> Floats32:
+def _unpack(stored: np.ndarray) -> Floats32:
     """Return (m,): mm. Raises ValueError: an array that is not as it is written."""
     if stored.ndim != 1 or stored.dtype != np.uint16:
         raise ValueError(f"holds an array of shape {stored.shape} and type {stored.dtype}, expected (any,) uint16")

@@ -168,7 +168,7 @@ class Head:
         Raises ValueError: wrong shape or a value that is not a number; the head keeps its pose.
         """
         pose = self.read_pose(values)
-        turn = self._turned(pose.head)
+        turn = self._make_turn(pose.head)
         for part in self.parts:
             part.pose(pose, turn)
         for stitch in self._stitches:
@@ -200,9 +200,9 @@ class Head:
     def place_pose(self, pose: Pose, moved: Mapping[str, Floats]) -> tuple[list[Floats], Turn]:
         """:meth:`place_points` of a pose; ``moved`` : by part, what :meth:`.rig.SkinRig.move_all` found for it."""
         rows = [part.place_points(pose, moved.get(part.name)) for part in self.parts]
-        return rows, self._turned(pose.head)
+        return rows, self._make_turn(pose.head)
 
-    def _turned(self, angles: Floats) -> Turn:
+    def _make_turn(self, angles: Floats) -> Turn:
         """Return the rotation of a pose by its angles (3,); the last one, if they are the same."""
         key = angles.tobytes()
         if key != self._last_turn[0]:

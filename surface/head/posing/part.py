@@ -218,10 +218,10 @@ class RigidPart(HeadPart):
             return
         self._last_key, self.changed = key, [(0, len(self._rest))]
         self._motion = rigid_motion(self.follows, self._head, pose)
-        after = self._after(pose, turn)
+        after = self._turn_motion(pose, turn)
         move_rigid(self._rest, self._rest_normals, *after, self.vertices, self.normals)
 
-    def _after(self, pose: Pose, turn: Turn) -> tuple[Floats32, Floats32]:
+    def _turn_motion(self, pose: Pose, turn: Turn) -> tuple[Floats32, Floats32]:
         """:meth:`Turn.after` of the part's motion in a pose, computed once for all parts that follow alike."""
         key = ("after", self.follows, id(self._head), id(turn))
         if key not in pose.found:

@@ -236,12 +236,12 @@ def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
     """Everything in a pose that :func:`rigid_motion` depends on, gathered once for all parts that follow alike."""
     key = ("key", follows, id(head))
     if key not in pose.found:
-        pose.found[key] = _key_of(follows, head, pose)
+        pose.found[key] = _make_key(follows, head, pose)
     found: tuple[float, ...] = pose.found[key]
     return found
 
 
-def _key_of(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
+def _make_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
     """Write what :func:`motion_key` returns."""
     if follows == "jaw":
         return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))
@@ -258,12 +258,12 @@ def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floa
     """
     key = ("motion", follows, id(head))
     if key not in pose.found:
-        pose.found[key] = _motion_of(follows, head, pose)
+        pose.found[key] = _make_motion(follows, head, pose)
     linear, shift = pose.found[key]
     return linear, shift
 
 
-def _motion_of(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
+def _make_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
     """Write what :func:`rigid_motion` returns."""
     linear, shift = np.eye(3), np.zeros(3)
     if follows == "jaw":

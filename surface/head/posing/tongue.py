@@ -223,12 +223,12 @@ class TongueRest:
         low, high = _thickness(at, z)
         self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
         self._lower, upper = (_edges(head, follows, sign) for follows, sign in (("jaw", 1.0), ("skull", -1.0)))
-        self._upper = _by_depth(upper, -1.0)
+        self._upper = _sort_by_depth(upper, -1.0)
         self._order = np.zeros(0, np.int64)  # of what lies below the tongue, by depth
 
     def share(self, pose: Pose) -> float:
         """Return how much of the correction a pose takes, 0..1: none while the tongue is in the mouth."""
-        return _eased(float(pose.shapes[TONGUE]), *PUT_OUT)
+        return _ease(float(pose.shapes[TONGUE]), *PUT_OUT)
 
     def apply(self, pose: Pose, lip: Floats, linear: Floats, shift: Floats, points: Floats) -> None:
         """Move control points (n, 3) in place; ``lip (k, 3)`` are samples of the lower lip, and the lower teeth are
@@ -239,18 +239,18 @@ class TongueRest:
         below = len(lip) + len(self._lower)
         if len(self._order) != below:
             self._order = np.arange(below)
-        aside = SIDEWAYS * _eased(float(pose.shapes[TONGUE]), *BEYOND)
+        aside = SIDEWAYS * _ease(float(pose.shapes[TONGUE]), *BEYOND)
         rest_tongue(*self._sides, lip, self._lower, self._upper, linear, shift, self._fade, self._sideways, self._thick,
                     share, aside, self._order, points)  # fmt: skip
 
 
-def _eased(x: float, low: float, high: float) -> float:
+def _ease(x: float, low: float, high: float) -> float:
     """Return 0 up to ``low``, 1 from ``high`` on, and smooth between."""
     t = min(max((x - low) / (high - low), 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-def _by_depth(at: Floats, sign: float) -> Floats:
+def _sort_by_depth(at: Floats, sign: float) -> Floats:
     """Return points (k, 3) by rising z, with y times ``sign``."""
     rising: Floats = at[np.argsort(at[:, 2])] * (1.0, sign, 1.0)
     return rising

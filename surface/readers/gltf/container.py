@@ -53,7 +53,7 @@ class Gltf:
         if not binary and raw.lstrip()[:1] != b"{":
             why = "is no glTF file: neither its binary form nor JSON" if raw else "is empty"
             raise FitError(f"{path}: {why}", hint="export the head as .glb")
-        text, self._chunk = self._chunks(raw) if binary else (raw, None)
+        text, self._chunk = self._split_chunks(raw) if binary else (raw, None)
         try:
             self.document = parse_json(decode(text))
         except ValueError as e:
@@ -72,7 +72,7 @@ class Gltf:
         """Return the error for an element of the file."""
         return FitError(f"{self.path}: {where}: {why}", hint=hint)
 
-    def _chunks(self, raw: bytes) -> tuple[bytes, bytes | None]:
+    def _split_chunks(self, raw: bytes) -> tuple[bytes, bytes | None]:
         """Return JSON text and binary chunk of a .glb."""
         if len(raw) < 20:
             raise self.error("header", "the file is cut short")
@@ -212,11 +212,11 @@ class Gltf:
         extensions = self.value(view, "extensions", dict, where, {})
         for name in MESHOPT:
             if name in extensions:
-                data = self._decompressed(self.value(extensions, name, dict, where), index, f"{where}.{name}")
+                data = self._decompress(self.value(extensions, name, dict, where), index, f"{where}.{name}")
                 return data, 0, len(data)
-        return self._stored(view, where)
+        return self._locate_view(view, where)
 
-    def _stored(self, view: dict[str, Any], where: str) -> tuple[bytes, int, int]:
+    def _locate_view(self, view: dict[str, Any], where: str) -> tuple[bytes, int, int]:
         """Return the buffer that a view lies in, where in it the view starts, and its length."""
         start, size = self._length(view, "byteOffset", where, 0), self._length(view, "byteLength", where)
         data = self._buffer(view.get("buffer"), where)
@@ -224,14 +224,14 @@ class Gltf:
             raise self.error(where, f"ends at byte {start + size}, but the buffer has {len(data)}: it is cut short")
         return data, start, size
 
-    def _decompressed(self, packed: dict[str, Any], index: int, where: str) -> bytes:
+    def _decompress(self, packed: dict[str, Any], index: int, where: str) -> bytes:
         """Return the bytes of a buffer view that meshopt has compressed."""
         if index in self._unpacked:
             return self._unpacked[index]
         count, stride = self._length(packed, "count", where), self._length(packed, "byteStride", where)
         if count > MAX_ELEMENTS or count * stride + sum(map(len, self._unpacked.values())) > DATA_LIMIT:
             raise self.error(where, f"holds {count} elements of {stride} bytes: too many", "export the head alone")
-        data, start, size = self._stored(packed, where)
+        data, start, size = self._locate_view(packed, where)
         mode = self.value(packed, "mode", str, where)
         filtered = self.value(packed, "filter", str, where, "NONE")
         from surface.readers.gltf.meshopt import decode_view  # most files need no numba to be read

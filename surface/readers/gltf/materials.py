@@ -77,7 +77,7 @@ def _number(value: Any, default: float) -> float:
     return float(value) if good else default
 
 
-def _four(value: Any) -> tuple[float, float, float, float]:
+def _read_colour(value: Any) -> tuple[float, float, float, float]:
     """Return a colour; 1 for each part of it that is missing."""
     every = value if isinstance(value, list) else []
     r, g, b, a = (_number(every[k] if k < len(every) else None, 1.0) for k in range(4))
@@ -88,8 +88,8 @@ def _colour_and_texture(table: dict[str, Any]) -> tuple[tuple[float, float, floa
     """Colour and reference of the texture, of metal and rough materials, or else of the older kind."""
     usual, old = _table(table.get("pbrMetallicRoughness")), _extension(table, _OLD)
     if old and not usual:
-        return _four(old.get("diffuseFactor")), _table(old.get("diffuseTexture"))
-    return _four(usual.get("baseColorFactor")), _table(usual.get("baseColorTexture"))
+        return _read_colour(old.get("diffuseFactor")), _table(old.get("diffuseTexture"))
+    return _read_colour(usual.get("baseColorFactor")), _table(usual.get("baseColorTexture"))
 
 
 def _vrm_colour_and_texture(file: Gltf, index: int) -> tuple[tuple[float, float, float, float], dict[str, Any]]:
@@ -99,12 +99,12 @@ def _vrm_colour_and_texture(file: Gltf, index: int) -> tuple[tuple[float, float,
     every = _extension(file.document, "VRM").get("materialProperties")
     own = _table(every[index]) if isinstance(every, list) and index < len(every) else {}
     texture = _table(own.get("textureProperties")).get("_MainTex")
-    r, g, b, a = _four(_table(own.get("vectorProperties")).get("_Color"))
-    colour = (_linear(r), _linear(g), _linear(b), a)
+    r, g, b, a = _read_colour(_table(own.get("vectorProperties")).get("_Color"))
+    colour = (_to_linear(r), _to_linear(g), _to_linear(b), a)
     return colour, {} if texture is None else {"index": texture}
 
 
-def _linear(srgb: float) -> float:
+def _to_linear(srgb: float) -> float:
     """Return linear intensity of a part of an sRGB colour (IEC 61966-2-1)."""
     return float(srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4)
 

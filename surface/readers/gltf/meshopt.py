@@ -160,7 +160,7 @@ def _number(stream, at, end):
 
 
 @kernel
-def _signed(number):
+def _to_signed(number):
     """Return the difference that an unsigned number stands for: 0, -1, 1, -2 ..."""
     return ~(number >> 1) if number & 1 else number >> 1
 
@@ -175,7 +175,7 @@ def _read_indices(stream, out):
         if at > end:
             return False
         base = number & 1
-        last[base] = (last[base] + _signed(number >> 1)) & 0xFFFFFFFF
+        last[base] = (last[base] + _to_signed(number >> 1)) & 0xFFFFFFFF
         out[k] = last[base]
     return at == end
 
@@ -211,12 +211,12 @@ def _beside_edge(stream, end, code, state, edges, corners, found):
         c = corners[(state[CORNER] - 1 - third) & 15]
     else:
         if third == 0:
-            c = _next(state)
+            c = _next_index(state)
         elif third < 15:
             state[LAST] += 2 * np.int64(third) - 27  # one less, or one more
             c = state[LAST]
         else:
-            c = _given(stream, end, state)
+            c = _read_index(stream, end, state)
         _remember_corner(corners, state, c)
     found[0], found[1], found[2] = a, b, c
     _remember_edge(edges, state, c, b)
@@ -240,9 +240,9 @@ def _anywhere(stream, end, code, state, edges, corners, found):
     for k in range(3):
         kind = (FREE if code == EXPLICIT else 0) if k == 0 else (kinds >> (8 - 4 * k)) & 15
         if kind == 0:
-            found[k] = _next(state)
+            found[k] = _next_index(state)
         elif kind == FREE:
-            found[k] = _given(stream, end, state)
+            found[k] = _read_index(stream, end, state)
         else:
             found[k] = corners[(known - kind) & 15]
             continue
@@ -252,17 +252,17 @@ def _anywhere(stream, end, code, state, edges, corners, found):
 
 
 @kernel
-def _next(state):
+def _next_index(state):
     """Return the number that follows the greatest so far."""
     state[NEXT] += 1
     return state[NEXT] - 1
 
 
 @kernel
-def _given(stream, end, state):
+def _read_index(stream, end, state):
     """Return a number that the stream gives, as a difference to the last that was given."""
     number, state[AT] = _number(stream, state[AT], end)
-    state[LAST] += _signed(number)
+    state[LAST] += _to_signed(number)
     return state[LAST]
 
 

@@ -57,7 +57,7 @@ def _faces(file: PlyFile, vertex: Element) -> tuple[Ints, Floats, Ints]:
     if rows is not None:
         more = _strips(_indices(file, "tristrips", rows[0]), rows[1])
         faces = np.vstack([faces, np.column_stack([more, np.full(len(more), -1)])])
-    uv, face_uv = _mapped(element, vertex, faces, origin, corner)
+    uv, face_uv = _map_texture(element, vertex, faces, origin, corner)
     return faces, uv, face_uv
 
 
@@ -100,7 +100,7 @@ def _strips(index: Ints, starts: Ints) -> Ints:
     return solid
 
 
-def _mapped(
+def _map_texture(
     element: Element | None, vertex: Element, faces: Ints, origin: Ints, corner: Ints
 ) -> tuple[Floats, Ints]:  # fmt: skip
     """Return texture coordinates (t, 2) and faces of them: of every corner of a face, or of vertices, or none."""

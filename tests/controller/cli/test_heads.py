@@ -129,7 +129,7 @@ def fitted(monkeypatch):
 
     monkeypatch.setattr("surface.fit.api.fit_head", fit_head)
     monkeypatch.setattr("surface.fit.points.report.face_bounds", lambda found: "face: 1.2 mm [max]")
-    monkeypatch.setattr("controller.cli.heads._checked", lambda out: [])
+    monkeypatch.setattr("controller.cli.heads._check", lambda out: [])
     monkeypatch.setattr("surface.view.draw.decimate.decimate_head", lambda out: calls.append(("decimate", out)))
     monkeypatch.setattr("surface.view.pictures.occlusion.shade_head", shade)
     monkeypatch.setattr(
@@ -191,7 +191,7 @@ def test_a_fit_can_be_forced_and_then_says_what_is_wrong(fitted, tmp_path, monke
     words = ["fit", "a.glb", "-o", str(tmp_path / "mine")]
     assert CliRunner().invoke(make_app(), words).exit_code == 0 and not report.forced
     report.faults = ("48 mm off", "all turned over")
-    monkeypatch.setattr("controller.cli.heads._checked", lambda out: [f"check: {out.name} has a spike"])
+    monkeypatch.setattr("controller.cli.heads._check", lambda out: [f"check: {out.name} has a spike"])
     said = CliRunner().invoke(make_app(), [*words, "--force"])
     assert report.forced
     wanted = ["written by --force: 48 mm off", "written by --force: all turned over", "check: mine has a spike"]

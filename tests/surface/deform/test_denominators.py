@@ -11,7 +11,7 @@ from surface import DCPSurface
 from surface.bench.bench import sheet
 from surface.deform import denominators as module
 from surface.deform.deformation import Deformation
-from surface.deform.denominators import MAX_SUM, MIN_SUM, farthest, unusable
+from surface.deform.denominators import MAX_SUM, MIN_SUM, farthest, first_unusable
 
 
 def along(knots: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -120,7 +120,7 @@ def test_the_first_vertex_without_a_usable_sum_is_found() -> None:
     )
 
     def found(inv_w: np.ndarray, dw: np.ndarray = none, cells: tuple[int, ...] = (0, 1, 2)) -> int:
-        return int(unusable(np.array(cells), cell_start, tile_start, inv_w, dw, order_at, order))
+        return int(first_unusable(np.array(cells), cell_start, tile_start, inv_w, dw, order_at, order))
 
     good, slopes = np.ones(32, np.float32), np.zeros(64, np.float32)
     assert found(good) == -1

@@ -23,7 +23,7 @@ from surface.head.posing.contact import (
     by_lanes,
     contact_rows,
     height_limits,
-    tiled,
+    tile_weights,
     weights_at,
 )
 
@@ -194,7 +194,7 @@ def test_weights_are_those_of_the_surface_and_add_up() -> None:
     np.testing.assert_allclose(dense.sum(axis=1), 1.0)
     exact = surface.basis_matrix(uv).toarray()
     assert np.abs(dense - exact).max() < 0.02 and (dense[dense > 0] > 0.004).all()
-    tile_start, tile_ids, packed = tiled(start, ids, share)
+    tile_start, tile_ids, packed = tile_weights(start, ids, share)
     again = np.zeros((40, surface.n))
     for tile in range(5):
         rows = slice(tile_start[tile], tile_start[tile + 1])
