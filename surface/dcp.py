@@ -65,7 +65,7 @@ class DCPSurface(ControlPoints):
         return self.sample(self._inside(uv), side)[2]
 
     def covered(self, uv: ArrayLike) -> np.ndarray:
-        """Return (m,) bool: does any control point cover ``uv (m, 2)``? False outside :attr:`rect`, too."""
+        """Return which of ``uv (m, 2)`` any control point covers, (m,) bool; False outside :attr:`rect`, too."""
         return self.sample(uv, None)[1] >= 0
 
     def derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:

@@ -24,17 +24,17 @@ from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import border_edges
 
 SEWN_MM = 0.4  # distance within which two borders are sewn
-ALONG_MM = 1.2  # edges with less border than this between them are neighbours, and not sewn to each other
-WIDE_MM = 1.2  # least width of a hole: the diameter of a round one, twice the height of a slit
+ALONG_MM = 1.2  # edges with less border than this between them are neighbours, which are never sewn to each other
+MIN_WIDTH_MM = 1.2  # least width of a hole: the diameter of a round one, twice the height of a slit
 APART_MM = 1.0  # distance between borders sewn at rest from which a seam is open
 SHEETS = ("skin", "mouth", "tongue")  # materials of the sheets that have to be closed
-END_MM = 40.0  # wider openings are where the mesh ends, as on a head without scalp under its hair
-SEEN = 0.1  # least share of a hole's area that is visible from outside: the root of an ear lies under other skin
-FACING = 0.3  # least cosine between a hole's outward normal and a viewer behind the head for it to face that viewer
+MESH_END_MM = 40.0  # wider openings are where the mesh ends, as on a head without scalp under its hair
+MIN_VISIBLE = 0.1  # fraction of a hole's area that must be visible from outside: roots of ears are hidden
+MIN_FACING_COS = 0.3  # between a hole's outward normal and the direction to a viewer behind the head
 CAP_STEPS = 60  # pixels over the cap of a hole
 VIEWS = ((0, 0), (60, 0), (-60, 0), (120, 0), (-120, 0), (180, 0), (0, -60), (0, 60))  # yaw and pitch, degrees
-MOUTH_REACH = 0.75  # in widths of the mouth, from its middle
-EYE_REACH = 1.7  # in radii: a loop whose middle is so near to an eye's centre is its opening
+MOUTH_RADIUS = 0.75  # of the area that belongs to the mouth, around its middle, in widths of the mouth
+EYE_RADIUS = 1.7  # of the area that belongs to an eye, around its centre, in radii of the eyeball
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Borders:
 
 
 def _edge_ends(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
-    """Return (e, 2, 3): as :meth:`Borders.at` gives them."""
+    """Return the ends (e, 2, 3) of edges as :meth:`Borders.at` does."""
     out = np.empty((len(part), 2, 3))
     for k in np.unique(part):
         out[part == k] = vertices[k][ends[part == k]]
@@ -105,11 +105,11 @@ def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Border
     found = []
     for loop in _find_loops(subject, borders):
         (middle, width), part = _measure_loop(at[loop]), subject.parts[borders.part[loop[0]]]
-        wide = width >= WIDE_MM * subject.scale and not _in_openings(subject, mouth, middle[None])[0]
+        wide = width >= MIN_WIDTH_MM * subject.scale and not _in_openings(subject, mouth, middle[None])[0]
         if wide and is_seen(subject, part, at[loop]):
             length = float(np.linalg.norm(at[loop, 1] - at[loop, 0], axis=1).sum())
             text = f"a hole in part {part.name!r}, {length:.0f} mm around: {places.name(middle)}"
-            found.append((text, width > END_MM * subject.scale, part is subject.parts[subject.skin[0]]))
+            found.append((text, width > MESH_END_MM * subject.scale, part is subject.parts[subject.skin[0]]))
     ends = any(large for _, large, _ in found)
     for text, large, main in found:
         yield Finding("hole", text, f"close it in the mesh, then {AGAIN}", warning=large or (ends and not main))
@@ -217,13 +217,13 @@ def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
     area = 0.5 * float(np.linalg.norm(out, axis=1).sum())
     for yaw, pitch in VIEWS:
         turn = view_rotation(yaw, pitch)
-        faces = float(turn[2] @ out.sum(axis=0)) > FACING * 2.0 * area
+        faces = float(turn[2] @ out.sum(axis=0)) > MIN_FACING_COS * 2.0 * area
         if abs(yaw) > 90 and not (faces and part.material == "skin"):
             continue
         (x0, y0, _), (x1, y1, _) = (f(cap @ turn.T, axis=0).tolist() for f in (np.min, np.max))
         step = max(x1 - x0, y1 - y0, 1e-3) / CAP_STEPS
         picture = View((x0, x1), (y0, y1), step, turn).draw(shapes)
-        if (picture.parts == len(shapes) - 1).sum() * step**2 > SEEN * area:
+        if (picture.parts == len(shapes) - 1).sum() * step**2 > MIN_VISIBLE * area:
             return True
     return False
 
@@ -233,7 +233,7 @@ def _in_openings(subject: Subject, mouth: Mouth | None, at: Floats) -> Bools:
     out = np.zeros(len(at), bool)
     if subject.eyes is not None:
         for side in (n for n in (0, 1) if subject.eye(n) is not None):
-            out |= np.linalg.norm(at - subject.eyes[side], axis=1) < EYE_REACH * subject.head.data.eye_radius
+            out |= np.linalg.norm(at - subject.eyes[side], axis=1) < EYE_RADIUS * subject.head.data.eye_radius
     if mouth is not None:
-        out |= np.linalg.norm(at - mouth.middle, axis=1) < MOUTH_REACH * mouth.width
+        out |= np.linalg.norm(at - mouth.middle, axis=1) < MOUTH_RADIUS * mouth.width
     return out

@@ -1,4 +1,4 @@
-"""Points sorted into cubes, so that those near a place are found without looking at all of them.
+"""A spatial hash of points: they are sorted into cubes, so that those near a place are found quickly.
 
 Only cubes that hold points take memory, however far apart the points lie.
 """
@@ -21,8 +21,8 @@ CORNER = 0.57  # edge of a cube relative to its diagonal, just below 1 / sqrt(3)
 class Cells:
     """Points (m, 3) by cubes.
 
-    keys : (c, 3) whole numbers of the cubes that hold points, rising by x, then y, then z.
-    start, order : the points of cube k are ``order (m,)`` from ``start[k]`` to ``start[k + 1]``, rising.
+    keys : (c, 3) whole numbers of the cubes that hold points, sorted by x, then y, then z.
+    start, order : the points of cube k are ``order (m,)`` from ``start[k]`` to ``start[k + 1]``, ascending.
     own : (m,) the cube of each point.
     """
 
@@ -61,7 +61,7 @@ def sort_into_cells(points: Floats, size: float) -> Cells:
 
 @kernel
 def first_from(keys: Any, x: Any, y: Any, z: Any) -> Any:
-    """Return the number of the first of ``keys (c, 3)``, which rise, that does not come before (x, y, z)."""
+    """Return the number of the first of the sorted ``keys (c, 3)`` that does not come before (x, y, z)."""
     low, high = 0, len(keys)
     while low < high:
         middle = (low + high) // 2

@@ -14,8 +14,8 @@ from surface.base.arrays import Bools, Floats, Ints
 from surface.base.jit import inlined, kernel, merged
 from surface.mesh.boxtree import LEAF, BoxTree
 
-ENCLOSED = 10.0  # times the depth that is looked for: how far away the back of the flesh may be that encloses a point
-OBLIQUE = 1.5  # a vertex lies no deeper than it is away from the crossing along its own surface, times this
+ENCLOSED = 10.0  # maximum distance to the back of the flesh that encloses a point, in depths that are searched for
+OBLIQUE = 1.5  # maximum depth of a vertex, relative to its distance from the crossing along its own surface
 
 
 @inlined
@@ -41,7 +41,7 @@ def _passes(p: Any, d0: Any, d1: Any, d2: Any, a: Any, b: Any, c: Any) -> Any:
 
 @inlined
 def _is_on_one_side(x: Any, y: Any) -> Any:
-    """Do all corners of a triangle x (3, 3) lie on one side of the plane of y (3, 3)?"""
+    """Whether all corners of a triangle x (3, 3) lie on one side of the plane of y (3, 3)."""
     e0, e1, e2 = y[1, 0] - y[0, 0], y[1, 1] - y[0, 1], y[1, 2] - y[0, 2]
     f0, f1, f2 = y[2, 0] - y[0, 0], y[2, 1] - y[0, 1], y[2, 2] - y[0, 2]
     n0, n1, n2 = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
@@ -54,7 +54,7 @@ def _is_on_one_side(x: Any, y: Any) -> Any:
 
 @kernel
 def _do_cross(x: Any, y: Any) -> Any:
-    """Do two triangles (3, 3) pass through each other?"""
+    """Whether two triangles (3, 3) pass through each other."""
     if _is_on_one_side(x, y) or _is_on_one_side(y, x):
         return False
     for k in range(3):
@@ -68,7 +68,7 @@ def _do_cross(x: Any, y: Any) -> Any:
 
 @inlined
 def _is_apart(node: Any, low: Any, high: Any, least: Any, most: Any) -> Any:
-    """Has the box of a node nothing in common with another one?"""
+    """Whether the box of a node is disjoint from another one."""
     return (
         low[node, 0] > most[0] or high[node, 0] < least[0] or low[node, 1] > most[1] or high[node, 1] < least[1]
         or low[node, 2] > most[2] or high[node, 2] < least[2]
@@ -77,19 +77,19 @@ def _is_apart(node: Any, low: Any, high: Any, least: Any, most: Any) -> Any:
 
 @inlined
 def _has_vertex(ids: Any, j: Any, v: Any) -> Any:
-    """Is a vertex a corner of triangle j?"""
+    """Whether a vertex is a corner of triangle j."""
     return ids[j, 0] == v or ids[j, 1] == v or ids[j, 2] == v
 
 
 @inlined
 def _are_neighbours(ids: Any, i: Any, j: Any) -> Any:
-    """Have two triangles a corner in common?"""
+    """Whether two triangles share a corner."""
     return _has_vertex(ids, j, ids[i, 0]) or _has_vertex(ids, j, ids[i, 1]) or _has_vertex(ids, j, ids[i, 2])
 
 
 @inlined
 def _is_outside(j: Any, corners: Any, least: Any, most: Any) -> Any:
-    """Has the box of a triangle nothing in common with another one?"""
+    """Whether the box of a triangle is disjoint from another one."""
     out = False
     for k in range(3):
         a, b, c = corners[j, 0, k], corners[j, 1, k], corners[j, 2, k]
@@ -225,7 +225,7 @@ class Crossings:
 
     same : (n,) number of each vertex, equal for those in one place. kind : (t,) of each triangle.
     meets : (kinds, kinds) bool, symmetric: which kinds are tested against each other.
-    asked : (t,) bool, of each pair one is of these; all without it.
+    asked : (t,) bool, triangles of which each pair must have at least one; default: all.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""What every parameter moves: nothing at all, the wrong side, an eye that does not close."""
+"""Find parameters that move nothing or the wrong side, and blinks that do not close an eye."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from surface.check.subject import Subject
 from surface.head.model.parameters import SHAPES
 
 MIN_MOVE_MM = 0.1  # a parameter that moves nothing further than this has no effect
-ASIDE = 0.06  # of the distance between the eyes: how far off the middle a side begins
-SHUT_MM = 0.5  # what may show of an eye in a blink
-OPEN_MM = 1.0  # what shows of an eye that is open
-ACROSS = ("jaw", "mouth")  # their Left and Right are where they go; of all others, where they are
+ASIDE = 0.06  # distance from the middle at which a side begins, in distances between the eyes
+SHUT_MM = 0.5  # maximum visible height of an eye in a blink
+OPEN_MM = 1.0  # minimum visible height of an open eye
+ACROSS = ("jaw", "mouth")  # names whose Left or Right is the direction of motion; of all others it is the place
 
 
 def empty_shapes(subject: Subject) -> Iterator[Finding]:
@@ -29,7 +29,7 @@ def empty_shapes(subject: Subject) -> Iterator[Finding]:
 
 
 def _is_idle(subject: Subject, name: str) -> bool:
-    """Has the head groups of that name, of which none moves anything? Wrinkles may move all the same."""
+    """Whether the head has groups of that name, none of which moves anything, and no joint of it."""
     groups = [g for p in subject.head.data.parts for g in p.groups if g.name == name]
     joint = name == "jawOpen" and subject.head.data.jaw.angle_rad > 0
     most = max((float(np.abs(g.moves).max(initial=0.0)) for g in groups), default=np.inf)
@@ -93,7 +93,7 @@ def _middle(subject: Subject) -> tuple[float, float]:
 
 
 def _mean_offset(subject: Subject, name: str, middle: float) -> float:
-    """Return how far from the middle the vertices lie that a parameter moves, mm, meant by how far they move."""
+    """Return how far from the middle the vertices lie that a parameter moves, mm, weighted by how far they move."""
     moves = [np.linalg.norm(m, axis=1) for m in subject.moves(name)]
     total = sum(float(m.sum()) for m in moves)
     along = sum(float(m @ v[:, 0]) for m, v in zip(moves, subject.rest, strict=True))
@@ -101,7 +101,7 @@ def _mean_offset(subject: Subject, name: str, middle: float) -> float:
 
 
 def _direction(subject: Subject, name: str) -> float:
-    """-1..1: how much of the motion of a parameter goes to the subject's left."""
+    """Return the fraction, -1..1, of a parameter's motion that goes to the subject's left."""
     moves: Floats = np.concatenate(subject.moves(name)).astype(np.float64)
     total = float(np.linalg.norm(moves, axis=1).sum())
     return float(moves[:, 0].sum()) / total if total > 0 else 0.0

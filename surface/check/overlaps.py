@@ -26,15 +26,15 @@ from surface.head.model.parameters import SHAPES
 # Materials that skin may not pass through, and by how much it may, mm at usual size. Lips are pressed against teeth and
 # rolled round them in many shapes, where nobody sees it: teeth are looked at at rest and with an open jaw.
 LIMITS_MM = {"skin": 4.0, "eye": 2.0, "teeth": 2.0}
-BITTEN = ("", "jawOpen")  # shapes in which teeth are looked at; "" is the neutral face
-REACH_MM = 12.0  # the deepest overlap that is measured
+TEETH_SHAPES = ("", "jawOpen")  # in which overlaps with teeth are checked; "" is the neutral face
+MAX_DEPTH_MM = 12.0  # of an overlap that is measured
 MIN_DEPTH_MM = 0.3
-SAID_MM = 1.0  # less is not said at the end of a fit
+MIN_REPORTED_MM = 1.0  # overlaps below this are not reported at the end of a fit
 AREA_MM2 = 10.0
-MOVED_MM = 0.1  # what moves less is where it was at rest
+MOVED_MM = 0.1  # what moves less counts as unmoved
 VIEWS = ((0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (180.0, 0.0), (0.0, -40.0), (0.0, 40.0))
-STEP_MM = 0.8  # of a pixel of the pictures that determine what is visible
-MAX_PIXELS = 900  # of such a picture
+STEP_MM = 0.8  # pixel size of the pictures that determine what is visible
+MAX_PIXELS = 900  # width or height of such a picture
 WORDS = {"skin": "itself", "eye": "the eyeball", "teeth": "the teeth"}
 
 
@@ -76,7 +76,7 @@ def overlap_notes(head: HeadData) -> list[str]:
     """Return the deepest overlap of a head's skin with each material, in words; none where all are shallow."""
     subject = Subject(Head(head))
     found = overlaps(subject, Places(subject, find_mouth(subject)))
-    return [str(one) for one in found if one.mm > SAID_MM * subject.scale]
+    return [str(one) for one in found if one.mm > MIN_REPORTED_MM * subject.scale]
 
 
 class _Body:
@@ -126,15 +126,15 @@ class _Body:
         return whole[same]
 
     def overlaps(self, shape: str, places: Places) -> Iterator[Overlap]:
-        """Those of one shape, by material."""
+        """Return the overlaps of one shape, by material."""
         subject, scale = self._subject, self._subject.scale
         at = self._at(subject.at_one(shape) if shape else subject.rest)
         pairs = self._crossings.pairs(at, least=MOVED_MM * scale if shape else -1.0)
         for material, limit in LIMITS_MM.items():
-            if material == "teeth" and shape not in BITTEN:
+            if material == "teeth" and shape not in TEETH_SHAPES:
                 continue
             kind = self._kinds.index(material)
-            rows, depth = self._crossings.depths(pairs, 0, kind, REACH_MM * scale, MIN_DEPTH_MM * scale)
+            rows, depth = self._crossings.depths(pairs, 0, kind, MAX_DEPTH_MM * scale, MIN_DEPTH_MM * scale)
             order = np.argsort(-depth)
             wide = np.flatnonzero(np.cumsum(self._area[rows[order]]) >= AREA_MM2 * scale**2)
             if len(wide):

@@ -77,7 +77,7 @@ class Picture:
 
 
 def view_rotation(yaw_deg: float, pitch_deg: float = 0.0) -> Floats:
-    """Return (3, 3): for a viewer at ``yaw_deg`` to the subject's left and ``pitch_deg`` above."""
+    """Return the view rotation (3, 3) of a viewer at ``yaw_deg`` to the subject's left and ``pitch_deg`` above."""
     yaw, pitch = np.radians(yaw_deg), np.radians(pitch_deg)
     about_y = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
     about_x = np.array([[1, 0, 0], [0, np.cos(pitch), -np.sin(pitch)], [0, np.sin(pitch), np.cos(pitch)]])

@@ -318,7 +318,7 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
 
 @nonallocating
 def join_ranges(cells, total, cell_start, gap, out):
-    """Write the vertex ranges of rising cells, joined where fewer than ``gap`` vertices lie between; returns their
+    """Write the vertex ranges of ascending cells, joined where fewer than ``gap`` vertices lie between; returns their
     number."""
     count = 0
     for q in range(total):

@@ -34,12 +34,12 @@ from .updates import REFUSED, measure, move_points
 from .working import middles, work_arrays
 
 Table = TypeVar("Table", bound=ControlPoints)
-LIMIT = 256  # differences a cell takes before it is computed again
-BIAS = 6.0  # cost of one row's difference, in rows computed again (measured)
-GAP = 256  # unchanged vertices between two changed ranges that are uploaded rather than left out
-RECOMPUTE_FRACTION = 0.75  # from this part of the points on, everything is computed again
-PARTS = 4  # into which a thread's share of the cells is cut
-SMALL = 500_000  # weights below which one thread is as fast as two
+LIMIT = 256  # differences that a cell takes before it is computed again
+BIAS = 6.0  # cost of one row's difference, relative to computing a row again (measured)
+GAP = 256  # changed ranges with fewer unchanged vertices between them are joined
+RECOMPUTE_FRACTION = 0.75  # of the points moved, from which on everything is computed again
+PARTS = 4  # into which the cells of a thread are divided
+SMALL = 500_000  # number of weights below which one thread is as fast as two
 
 
 class Deformation(Generic[Table]):
@@ -105,7 +105,7 @@ class Deformation(Generic[Table]):
 
     @property
     def changed(self) -> list[tuple[int, int]]:
-        """Vertex ranges (start, stop) that the last update touched, rising."""
+        """Vertex ranges (start, stop) that the last update touched, ascending."""
         return [(int(a), int(b)) for a, b in self._ranges[: self._count]]
 
     @property
@@ -310,7 +310,7 @@ class Deformation(Generic[Table]):
             )
 
     def _update(self, cells: Ints) -> None:
-        """Bring ``cells (k,)``, rising, up to date with their changed weights, which are summed."""
+        """Bring ``cells (k,)``, ascending, up to date with their changed weights, which are summed."""
         self._compute(cells.astype(np.int32))
         self._count = apply.join_ranges(cells, len(cells), self.lists.cell_start, GAP, self._ranges)
 
@@ -351,7 +351,7 @@ def _rows(rows: ArrayLike, name: str) -> Floats:
 
 
 def _sum_by_id(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
-    """Return each id once."""
+    """Return each id once, with its sum of moves or its last position."""
     if not relative:
         unique, last = np.unique(which[::-1], return_index=True)
         return unique, np.ascontiguousarray(rows[::-1][last])

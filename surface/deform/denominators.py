@@ -11,7 +11,7 @@ from surface.base.jit import inlined, kernel
 from .binding import arrays_of
 from .groupsums import HEAD, STEP, factor_counts
 
-MIN_SUM = 1e-36  # of the weights at a vertex: float32 has fewer digits for smaller numbers
+MIN_SUM = 1e-36  # of the weights at a vertex; smaller float32 numbers have fewer digits
 MAX_SUM = 3e37  # of weights times distances: ten times that is still a float32, see :func:`farthest`
 
 

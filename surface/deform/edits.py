@@ -18,7 +18,7 @@ from .storage import Storage, expand, make_restore
 def change_weights(
     basis: Basis, lists: Lists, storage: Storage, mesh: Mesh, which: Ints, weights: Floats
 ) -> Ints:  # fmt: skip
-    """Give points ``which (k,)`` other ``weights (k,)``; returns the rising cells that changed, which get plain
+    """Give points ``which (k,)`` other ``weights (k,)``; returns the ascending cells that changed, which get plain
     weights."""
     which, cells = basis.copies(which), [np.zeros(0, dtype=np.int64)]
     basis.weights[which] = np.tile(weights, len(basis.shifts))
@@ -33,7 +33,7 @@ def change_weights(
 def change_knots(
     basis: Basis, lists: Lists, storage: Storage, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]
 ) -> Ints:  # fmt: skip
-    """Give point i other knots; returns the rising cells that changed, which get plain weights.
+    """Give point i other knots; returns the ascending cells that changed, which get plain weights.
 
     ``ValueError`` where a vertex would be covered by no point; nothing is changed then.
     """
@@ -184,7 +184,7 @@ def _compact(lists: Lists) -> None:
 
 @kernel
 def _list_only_covered(cells, places, cell_start, rows, room, at, value, out):
-    """Write vertices at which a point with rows ``places`` in ``cells`` is the only one; returns their number."""
+    """List the vertices at which a point with rows ``places`` in ``cells`` is the only one; return their number."""
     count = 0
     for q in range(cells.shape[0]):
         c = cells[q]

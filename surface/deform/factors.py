@@ -1,7 +1,7 @@
 """Weights of cells as products of factors in u and in v, which take less memory than the weights themselves.
 
 A weight is b(u) b(v) w. The vertices of a cell share most of their coordinates, so a control point has few different
-factors b(u) w and b(v) there. They are stored once for each different coordinate, in rising order, with their slopes
+factors b(u) w and b(v) there. They are stored once for each different coordinate, in ascending order, with their slopes
 after them; equal rows of different cells and points are stored once. A tile picks its eight factors from a window of
 eight, so that the order of vertices does not matter. A cell keeps plain weights where these are cheaper or a tile's
 coordinates fit no window.
@@ -24,8 +24,9 @@ from .groupsums import HEAD, STEP
 from .lists import LANES, Basis, Lists, cells_by_point
 
 PLAIN = -1  # in ``rows_at``: the cell has plain weights
-COST = 1.0, 1.5  # without and with normals: factors that need more operations than so many times plain weights are
-# slower (measured on sheets and heads; they read less memory)
+# Operations of factors relative to plain weights, without and with normals, beyond which factors are slower (measured on
+# sheets and heads; they read less memory).
+MAX_COST = 1.0, 1.5
 MAX_NUMBERS = 1 << 30  # numbers that are stored as factors; further cells keep plain weights
 MIX = 0x9E3779B1  # multiplier of the hash (Knuth, The Art of Computer Programming 6.4)
 
@@ -37,7 +38,7 @@ class Factors:
     rows_at : (c,) int64, where every cell's rows start in ``factor_u`` and ``factor_v``; PLAIN without factors
     picks_at : (c,) int64, where every cell's picks start in ``picks``
     factor_u, factor_v : (k,) int32, where the factors of a cell's rows start in ``factors``
-    factors : (f,) float32: those of a row in rising order of their coordinates, then as many slopes if there are any
+    factors : (f,) float32: those of a row in ascending order of their coordinates, then as many slopes if there are any
     picks : (p,) int32: how many factors the rows of a cell have in u and in v; then, by tile, which of a window's
         eight the lanes take in u, which in v, and where the windows start
     slopes : are there any?
@@ -60,15 +61,16 @@ class Factors:
 
 
 def no_factors(cells: int) -> Factors:
-    """Return plain weights for that many cells."""
+    """Return empty factors of that many cells, all with plain weights."""
     single = np.zeros(0, np.int32)
     return Factors(np.full(cells, PLAIN), np.zeros(cells, np.int64), single, single, np.zeros(0, np.float32), single)
 
 
 def factorize(
-    basis: Basis, lists: Lists, mesh: Mesh, entries: Ints | None = None, cost: tuple[float, float] = COST
+    basis: Basis, lists: Lists, mesh: Mesh, entries: Ints | None = None, cost: tuple[float, float] = MAX_COST
 ) -> Factors:
-    """Find factors of cells where these need at most ``cost`` times as many operations as weights, see :data:`COST`.
+    """Find factors of cells where these need at most ``cost`` times as many operations as weights, see
+    :data:`MAX_COST`.
 
     entries : (c,) rows of eight weights that a cell needs without factors; as many as its block has if not given
         The lists of points of such cells are sorted; their blocks stay, see :mod:`.storage`.
@@ -122,7 +124,7 @@ def expand_factors(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
 
 @kernel
 def _sort_distinct(uv, side, axis, values, rank, order):
-    """Write distinct coordinates of a cell's vertices, rising, into ``values (k, 2)``, and each vertex's place among
+    """Write distinct coordinates of a cell's vertices, ascending, into ``values (k, 2)``, and each vertex's place among
     them into ``rank``; returns how many there are."""
     count = distinct(uv, side, axis, values, rank)
     before = values[:count].copy()

@@ -20,7 +20,7 @@ from surface.spline import weighing
 from surface.spline.controlpoints import ControlPoints
 
 LANES = 8
-STEP = 100_000  # vertices whose weights are computed between two reports of progress
+CHUNK_VERTICES = 100_000  # whose weights are computed between two reports of progress
 
 
 @dataclass
@@ -103,7 +103,7 @@ def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Pro
     at, ids_at = np.zeros(len(count) + 1, dtype=np.int64), np.zeros(len(count) + 1, dtype=np.int64)
     rows = np.zeros(len(count), dtype=np.int64)
     arrays = surface.arrays()
-    steps = np.linspace(0, len(count), max(1, len(mesh.uv) // STEP) + 1).astype(np.int64)
+    steps = np.linspace(0, len(count), max(1, len(mesh.uv) // CHUNK_VERTICES) + 1).astype(np.int64)
     for begin, end in pairwise(steps):
         progress("weights", float(begin) / max(len(count), 1))
         weighing.fill_blocks(
@@ -119,7 +119,7 @@ def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Pro
 
 
 def _shorten(table: np.ndarray, used: int) -> np.ndarray:
-    """Return the first ``used`` numbers of a table, whose memory is given back if there are more."""
+    """Return the first ``used`` numbers of a table, whose memory is released if there are more."""
     return table if used >= len(table) else table[:used].copy()
 
 

@@ -20,8 +20,8 @@ from surface.base.jit import kernel
 from .lists import LANES, Lists
 
 PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lanes follow the mesh's order
-CHOICE = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
-WORTH = 0.97  # of the rows without reordering: with more than these left, vertices stay in order
+CANDIDATES = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
+MAX_REMAINING = 0.97  # fraction of rows that reordering may leave; if it leaves more, vertices stay in order
 MAX_ROWS = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
 
 
@@ -76,8 +76,8 @@ def order_vertices(lists: Lists) -> Order:
         lists.at,
         lists.value,
         lists.slope,
-        CHOICE,
-        WORTH,
+        CANDIDATES,
+        MAX_REMAINING,
         MAX_ROWS,
         *found,
     )
@@ -134,8 +134,9 @@ def unpack_cell(lists: Lists, made: Packed, c: int) -> list[Floats32]:
 
 @kernel
 def _mark_points(size, rows, at, value, slope, masks):
-    """Return bit k of ``masks[s]`` : does point k of a cell with a block at ``at`` reach its vertex s? Returns how many
-    do."""
+    """Set bit k of ``masks[s]`` if point k of a cell with a block at ``at`` influences its vertex s.
+
+    Returns the number of set bits."""
     count = 0
     for s in range(size):
         masks[s] = 0

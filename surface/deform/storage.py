@@ -1,7 +1,7 @@
-"""How the weights of each cell are kept: as blocks, see :mod:`.lists`, packed, or as factors.
+"""Storage of the weights of each cell: as blocks, see :mod:`.lists`, packed, or as factors.
 
-Each cell takes the way that needs fewest operations. Weights and knots change in blocks only, so that the cells of a
-change get blocks first.
+Each cell uses the kind of storage that needs the fewest operations. Weights and knots change in blocks only, so that
+the cells of a change get blocks first.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def _take_out(lists: Lists, kept: Bools) -> None:
 
 
 def make_restore(lists: Lists, storage: Storage) -> Callable[[], None]:
-    """Return what takes back the next calls of :func:`expand`, if nothing else was changed meanwhile."""
+    """Return a function that undoes the next calls of :func:`expand`, if nothing else was changed meanwhile."""
     value, slope, used = lists.value, lists.slope, lists.used
     places = [lists.at, lists.room, storage.factors.rows_at, storage.packed.packed_at, storage.packed.order_at]
     before = [array.copy() for array in places]

@@ -64,7 +64,7 @@ def add_row(
 
 @kernel
 def find_affected(ids, delta, count, point_start, point_count, point_cell, hits, pull, affected):
-    """List the cells that the first ``count`` of ``ids`` reach, rising; returns their number.
+    """List the cells that the first ``count`` of ``ids`` reach, ascending; returns their number.
 
     ``hits`` counts by how many each is reached, and ``pull`` adds up how far these move.
     """

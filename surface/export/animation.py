@@ -19,7 +19,7 @@ _LOOK = [[_AT[f"eyeLook{d}{side}"] for d in ("Down", "Up", "Out", "In")] for sid
 class Animation:
     """Values of parameters over time.
 
-    name : for people. times_s : (n,) float64 from 0, rising. values : (n, 59) float64, in the order of
+    name : for people. times_s : (n,) float64 from 0, ascending. values : (n, 59) float64, in the order of
     :data:`surface.head.model.parameters.NAMES`. own : (n,) how much of each of a user's own groups is shown, by name.
 
     Raises ExportError: times or values that cannot be.

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.head import Head
-from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
+from surface.head.model.parameters import SHAPES, TONGUE_JAW
 
 MIN_MOVE_MM = 0.002  # smaller displacements are zero
 MIN_NORMAL = 1e-4  # smaller changes of normals are zero
 # Shapes that make sense only together with another one: exported is what they add to it.
-BASE_POSES = {"mouthClose": {"jawOpen": 1.0}, "tongueOut": {"jawOpen": TONGUE_NEEDS}}
+BASE_POSES = {"mouthClose": {"jawOpen": 1.0}, "tongueOut": {"jawOpen": TONGUE_JAW}}
 _EYES = ("left_eye", "right_eye")
 _PAINTED = ("iris", "sclera", "iris_radius")
 

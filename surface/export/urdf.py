@@ -28,7 +28,7 @@ from surface.head.model.joints import BASE, JAW, ROS_AXES, SKULL, Joint, JointLi
 from surface.head.posing.part import HeadPart
 
 _EYES = {"left_eye": "leftEyePitch", "right_eye": "rightEyePitch"}
-_MIN_FRACTION = 0.5  # share of a motion from which on skin belongs to what moves
+_MIN_FRACTION = 0.5  # of a motion, from which on skin belongs to the moving link
 _EFFORT_NM = 1.0
 _STL_HEADER = b"written by omote; metres, x forward, y left, z up".ljust(80)
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
@@ -55,7 +55,7 @@ class Piece:
         return f"{self.link}-{self.name}.stl"
 
     def corners(self) -> Floats32:
-        """Return (t, 3, 3): mm."""
+        """Return the corners (t, 3, 3), mm."""
         both = [self.triangles, self.triangles[:, ::-1]] if self.part.material in _STRIPS else [self.triangles]
         found: Floats32 = self.part.vertices[np.concatenate(both)]
         return found

@@ -69,7 +69,7 @@ def _add_half(head: Head, name: str, parts: list[ExportPart]) -> None:
 
 
 def _reduce(part: ExportPart, triangles: NDArray[np.integer]) -> tuple[Ints, ExportPart]:
-    """Return the vertices (k,) that triangles (t, 3) use, rising, and the part of these, without shapes that hardly
+    """Return the vertices (k,) that triangles (t, 3) use, ascending, and the part of these, without shapes that hardly
     move."""
     kept = np.unique(triangles)
     moves, turns = {}, {}
@@ -158,7 +158,7 @@ def _strip_uv(own: HeadPart, kept: Ints) -> Floats32:
 
 
 def _lash_strength(vertices: Floats32, own: HeadPart, kept: Ints) -> Floats:
-    """Return (m, 1): lashes of the lower lid are fainter."""
+    """Return the strength (m, 1) of lashes; those of the lower lid are fainter."""
     strip = np.floor(np.asarray(own.uv)[kept, 0] / 2.0)
     heights: Mapping[float, float] = {s: float(vertices[strip == s, 1].mean()) for s in np.unique(strip)}
     middle = float(np.mean(list(heights.values())))

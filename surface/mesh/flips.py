@@ -55,7 +55,7 @@ def _cotangent(xyz, apex, a, b):
 
 @kernel
 def _flip_round(xyz, triangles, kept, pairs):
-    """Return one pass; a pair whose triangles were already changed in this pass is checked again."""
+    """Flip edges in one pass; a pair whose triangles were already changed in this pass is checked again."""
     count = 0
     for e in range(pairs.shape[0]):
         s, t = pairs[e, 0], pairs[e, 1]

@@ -13,7 +13,9 @@ from surface.base.jit import kernel
 
 
 def _by_band(segments: Floats) -> tuple[float, float, Ints, Ints]:
-    """Return segments by band of v: v0, bands per unit of v, list starts (bands + 1,), segment ids, rising per band."""
+    """Return segments by band of v: v0, bands per unit of v, list starts (bands + 1,), segment ids, ascending per
+    band.
+    """
     low, high = float(segments[:, [1, 3]].min()), float(segments[:, [1, 3]].max())
     bands = max(1, len(segments) // 2)
     scale = bands / max(high - low, 1e-300)

@@ -20,7 +20,7 @@ class Mesh:
     triangles : (t, 3) int32, counter-clockwise seen from where the normals point
     uv : (m, 2) float64
     side : (m,) int64, from which side a vertex on a slit evaluates the surface: bit 1 from the left in u, bit 2 in v
-    cell : (m,) int32, rising: the vertices of a cell are consecutive
+    cell : (m,) int32, ascending: the vertices of a cell are consecutive
     cell_start : (c + 1,) int64, first vertex of every cell
     list_start : (c + 1,) int64, where every cell's list starts in ``list_ids``
     list_ids : (k,) int32 control points that reach a vertex of the cell

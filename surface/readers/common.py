@@ -34,7 +34,7 @@ class Ties:
 
     @classmethod
     def of(cls, rows: Sequence[Mapping[int, float]], points: Mapping[int, Floats]) -> Ties:
-        """From shares by the file's number of each control point, and the file's points by number."""
+        """Make ties from each control point's shares by the file's number, and the file's points by number."""
         column = {number: k for k, number in enumerate(sorted(points))}
         every = [(k, column[number], share) for k, row in enumerate(rows) for number, share in row.items()]
         at, of, shares = zip(*every, strict=True)

@@ -7,9 +7,10 @@ import numpy as np
 from surface.base.arrays import Bools, Floats, Ints
 from surface.dcp import DCPSurface
 
-STARTS, MOST_STARTS = 48, 360  # samples along u and v where a search may begin: evenly, and three in each knot span
+STARTS = 48  # even samples along u and v where a search may begin; three in each knot span are added
+MAX_STARTS = 360  # samples along u and v
 ITERATIONS = 40
-AT_ONCE = 4_000_000  # distances compared in one step: 32 MB
+BATCH_DISTANCES = 4_000_000  # distances compared in one step: 32 MB
 GOOD = 1e-9  # of the surface's size: nearer points need no second search
 
 
@@ -63,8 +64,8 @@ def _stations(knots: Floats, start: float, end: float) -> Floats:
     lines = np.unique(np.append(knots, [start, end]))
     lines = lines[(lines >= start) & (lines <= end)]
     within = (lines[:-1, None] + np.diff(lines)[:, None] * np.array([1, 3, 5]) / 6).ravel()
-    if len(within) > MOST_STARTS:
-        within = within[np.linspace(0, len(within) - 1, MOST_STARTS).astype(int)]
+    if len(within) > MAX_STARTS:
+        within = within[np.linspace(0, len(within) - 1, MAX_STARTS).astype(int)]
     return np.unique(np.concatenate([np.linspace(start, end, STARTS), within]))
 
 
@@ -81,7 +82,7 @@ def _nearest(samples: Floats, points: Floats) -> Ints:
     middle = samples.mean(axis=0)
     s, p = samples - middle, points - middle
     length = (s * s).sum(axis=1)
-    step = max(1, AT_ONCE // max(len(s), 1))
+    step = max(1, BATCH_DISTANCES // max(len(s), 1))
     parts = [np.argmin(length - 2 * p[k : k + step] @ s.T, axis=1) for k in range(0, len(p), step)]
     return np.concatenate(parts) if parts else np.zeros(0, np.int64)
 

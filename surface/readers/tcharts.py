@@ -263,7 +263,7 @@ class _Sheet:
         self._count += 1
 
     def add_patch(self, face: int, sampled: Sampled, points: dict[int, Floats]) -> float:
-        """Write a face at a star point; returns how far it is from what it was fitted to."""
+        """Add a patch for a face at a star point; return the greatest distance from the samples it was fitted to."""
         patch = fit_patch(sampled)
         width, height = sampled.size
         lines = [np.concatenate([[0.0] * 3, np.linspace(0.0, x, SPANS + 1), [x] * 3]) for x in (width, height)]
@@ -318,7 +318,7 @@ def find_seams(mesh: Complex, sides: Mapping[int, tuple[int, Floats]]) -> list[t
 
 
 def _key(mesh: Complex, *places: Floats) -> tuple[float, ...]:
-    """Return equal for places (2,) that differ by rounding only."""
+    """Return a key that is equal for places (2,) that differ by rounding only."""
     return tuple(round(x / (10.0 * mesh.near)) for place in places for x in place.tolist())
 
 

@@ -48,7 +48,7 @@ class Copy:
         return self.knots_u[0], self.knots_u[-1], self.knots_v[0], self.knots_v[-1]
 
     def key(self, near: float) -> tuple[int, ...]:
-        """Return equal for copies that differ by rounding only."""
+        """Return a key that is equal for copies that differ by rounding only."""
         return (self.grip, *(round(x / near) for x in (*self.knots_u, *self.knots_v)))
 
 
@@ -297,7 +297,7 @@ class Ray:
 
 
 def nearest(row: list[float], x: float) -> int:
-    """Place of the number in a rising row that is nearest to x, the first of several."""
+    """Place of the number in a sorted row that is nearest to x, the first of several."""
     k = bisect_left(row, x)
     if k == len(row) or (k > 0 and x - row[k - 1] <= row[k] - x):
         return bisect_left(row, row[k - 1])
@@ -310,7 +310,7 @@ def overlap(a: Rect, b: Rect, near: float) -> bool:
 
 
 def _merge_values(row: list[float], near: float) -> list[float]:
-    """Return distinct values of a rising row."""
+    """Return distinct values of a sorted row."""
     return row[:1] + [b for a, b in pairwise(row) if b - a > near]
 
 

@@ -18,7 +18,7 @@ MIN_SPAN, MAX_KNOT = 1e-30, 1e30  # knots that float64 can divide by, also in pr
 
 
 def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str = "right") -> Floats:
-    """Return blending function over ``knots``, or its derivative, at ``x``.
+    """Return the values (m,) of the blending function over ``knots``, or its derivative, at ``x``.
 
     knots : (p + 2,) float64, not decreasing
     x : (m,) float64

@@ -65,7 +65,8 @@ class ControlPoints:
         closed_u: Interval = None,
         closed_v: Interval = None,
     ) -> Self:
-        """From the arrays of :attr:`padded`, (n, w) float64, and of :attr:`degrees`: the fast way from a binary file.
+        """Make control points from arrays as of :attr:`padded`, (n, w) float64, and :attr:`degrees`, without
+        conversion.
 
         Row i of the knots holds ``degrees[i] + 2`` and repeats the last one. Errors are those of the constructor.
         """

@@ -17,7 +17,7 @@ from surface.base.jit import inlined, kernel
 from .blends import blend, blend1, blend2
 
 TINY = 1e-290  # denominators below this count as "nothing covers"
-RUN = 256  # samples that are computed together, and the most bins and points they may reach for that
+RUN = 256  # maximum number of samples that are computed together, and of the bins and of the points they reach
 
 
 @inlined
@@ -55,8 +55,7 @@ def fill_bins(knots_u, knots_v, grid, shape, start, ids, count_only):
 
 @kernel
 def points_in(box, knots_u, knots_v, grid, shape, start, ids, out):
-    """Write points whose closed support meets ``box``; writes them to ``out`` as far as it has room, returns the
-    number."""
+    """Write the points whose closed support meets ``box`` to ``out``, as far as it has room; return their number."""
     last_u, last_v = knots_u.shape[1] - 1, knots_v.shape[1] - 1
     a0, a1 = bin_along(box[0], grid[0], grid[2], shape[0]), bin_along(box[1], grid[0], grid[2], shape[0])
     b0, b1 = bin_along(box[2], grid[1], grid[3], shape[1]), bin_along(box[3], grid[1], grid[3], shape[1])
@@ -91,7 +90,7 @@ def bounding_box(uv, low, high, box):
 
 @kernel
 def points_near(uv, knots_u, knots_v, grid, shape, start, bins, out):
-    """Write points whose support meets the rectangle around samples, rising, into ``out``.
+    """Write points whose support meets the rectangle around samples, ascending, into ``out``.
 
     Returns their number; -1 if a sample is outside the grid, or if more bins or points than ``RUN`` meet it.
     """
@@ -129,7 +128,8 @@ def distinct(uv, side, axis, values, index):
 
 @kernel
 def blend_along(knots, i, p, values, count, slopes, work, out):
-    """Write one blending function (and its slope) at distinct coordinates into ``out (k, 2)``; any nonzero?"""
+    """Write one blending function (and its slope) at distinct coordinates into ``out (k, 2)``; return whether any
+    is nonzero."""
     found = False
     for k in range(count):
         if slopes:

@@ -29,7 +29,8 @@ def _put_row(value, slope, at, rows, row, tiles, numbers):
 
 @kernel
 def _combine(along_u, along_v, at_u, at_v, count, weight, out):
-    """Write b w and its derivatives of one point at a cell's vertices into ``out (3, count)``; any nonzero?"""
+    """Write b w and its derivatives of one point at a cell's vertices into ``out (3, count)``; return whether any is
+    nonzero."""
     found = False
     for j in range(count):
         a0, a1 = along_u[at_u[j], 0] * weight, along_u[at_u[j], 1] * weight

@@ -21,8 +21,8 @@ from surface.head.model.placement import Placement
 from surface.mesh.domain import Slit
 
 VERSION = 2
-PLAIN = 1  # of heads whose parts are neither closed nor flipped and have no rectangle: older omotes read them
-ANY = -1  # length of an axis that may have any
+PLAIN = 1  # version of heads whose parts are neither closed nor flipped and have no rectangle: older omotes read them
+ANY = -1  # in a shape: an axis of any length
 ARRAYS: dict[str, tuple[int | str, ...]] = {  # key of a part: its array's shape; "n" is the number of control points
     "points": ("n", 3), "weights": ("n",), "knots_u": ("n", ANY), "knots_v": ("n", ANY), "degrees": ("n", 2),
     "loops": (ANY, 2), "loop_ends": (ANY,), "slits": (ANY, 3), "group_ids": (ANY,), "group_ends": (ANY,),
@@ -301,7 +301,7 @@ def save_data(folder: str | Path, head: HeadData) -> None:
 
 
 def _arrays(head: HeadData) -> dict[str, Array]:
-    """Everything that goes into head.npz."""
+    """Return the content of head.npz."""
     arrays = {f"{p.name}/{k}": v for p in head.parts for k, v in _part_arrays(p).items()}
     for i, s in enumerate(head.seams):
         arrays |= {f"seams/{i}/a": s.uv_a, f"seams/{i}/b": s.uv_b}
@@ -324,7 +324,7 @@ def _part_arrays(p: PartData) -> dict[str, Array]:
 
 
 def _table(head: HeadData) -> dict[str, Any]:
-    """Everything that goes into head.toml."""
+    """Return the content of head.toml."""
     return {
         "format": VERSION if any(_extent_table(p) or p.cuts for p in head.parts) else PLAIN,
         "name": head.name,

@@ -14,11 +14,11 @@ from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
 from surface.head.model.parameters import smoothstep
 
-SPAN = 0.62  # of a knot, in widths across a line; along it spans are as long as the points are apart
-TAPER = 0.3  # share of a line's length over which its ends run out
-REGULARISATION = 0.03  # weight of moving no point, relative to that of the samples of an average one
+SPAN = 0.62  # of knots across a line, in widths of the furrow; along it spans are the distances of the points
+TAPER = 0.3  # fraction of a line's length over which the depth fades at each end
+REGULARISATION = 0.03  # weight of zero moves, relative to that of an average point's samples
 EVENNESS = 1.0  # weight of second differences along a line of near points, relative to an average one's sample
-RIDGE = 0.35  # height of the skin along both sides of a furrow, in its depths
+RIDGE = 0.35  # height of the ridges along both sides of a furrow, in its depths
 
 
 @dataclass(frozen=True)
@@ -61,8 +61,7 @@ def furrow_moves(f: Furrow, surface: DCPSurface, ids: Ints) -> Floats:
 
 
 def even_moves(f: Furrow, surface: DCPSurface, ids: Ints) -> Floats:
-    """Return (k, 3): as :func:`furrow_moves`, for points near each other: the line sinks by the depth, and nothing
-    ripples."""
+    """Return the moves (k, 3) of points near each other: the line sinks evenly by the depth, without ripples."""
     normal, _, _ = _normals(f, surface)
     matrix = surface.basis_matrix(f.uv).tocsc()[:, ids].toarray()
     bends = np.diff(np.eye(len(ids)), 2, axis=0)

@@ -1,10 +1,10 @@
-"""Light control points: added to a part of a head, they leave its surface where it is until they are moved.
+"""Light control points: added to a part of a head, they do not change its surface until they are moved.
 
-A control point with knots of its own has little weight, :data:`WEIGHT`, and lies on the surface S. With W the sum of
-all b w and N the numerator of Eq. (1), it turns N / W into (N + b w P) / (W + b w), a change by b w (P - S) / (W + b w)
-which is less than WEIGHT times the distance over which b reaches, 0.0002 mm where that is 2 mm. A move of it by D adds
-b w D to the numerator and nothing to the denominator, as in Eq. (2): to move the skin by d it is moved by d W / (b w),
-far away from the face. In the limit of no weight it is the infinite control point of Piegl, "On the use of infinite
+A light control point has knots of its own and little weight, :data:`WEIGHT`, and lies on the surface S. With W the sum
+of all b w and N the numerator of Eq. (1), it turns N / W into (N + b w P) / (W + b w), a change by b w (P - S) / (W + b
+w) which is less than WEIGHT times the distance over which b reaches, 0.0002 mm where that is 2 mm. A move of it by D
+adds b w D to the numerator and nothing to the denominator, as in Eq. (2): to move the skin by d it is moved by d W / (b
+w), far away from the face. In the limit of no weight it is the infinite control point of Piegl, "On the use of infinite
 control points in CAGD" (1987), whose displacement is a pure addition to the numerator.
 """
 
@@ -23,9 +23,9 @@ from surface.mesh.mesh import Mesh
 from surface.mesh.splitedges import Middles, split_edges
 
 WEIGHT = 1e-4
-EDGES = 0.5  # longest edge of triangles where such points reach, in spans of their knots
-REACH = 1.7  # spans from its middle within which a point is followed
-ROUNDS = 6  # of splitting edges, each halves them
+MAX_EDGE = 0.5  # of triangles that such points influence, in spans of their knots
+REACH = 1.7  # distance from a point's middle within which edges are split, in spans
+MAX_ROUNDS = 6  # of splitting edges; each halves them
 MIN_EDGE_MM = 0.25  # no edge is split that is shorter than twice this
 Coarser = Callable[[str, Mesh], Mapping[str, Ints]]
 _SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
@@ -35,7 +35,7 @@ _SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 class LightPoints:
     """Light control points of one part.
 
-    part : its name. knots_u, knots_v : (k, 5) knots of cubic blending functions, rising.
+    part : its name. knots_u, knots_v : (k, 5) knots of cubic blending functions, ascending.
     """
 
     part: str
@@ -96,7 +96,7 @@ def with_light(
 
 
 def check_light(part: PartData, own: LightPoints) -> None:
-    """ValueError where light points cannot belong to a part."""
+    """Raise ValueError if light points cannot belong to a part."""
     if part.follows != "skin" or part.closed_u is not None or part.closed_v is not None:
         raise ValueError(f"part {part.name!r} takes no control points: it is rigid, or closed")
     for name in ("knots_u", "knots_v"):
@@ -166,7 +166,7 @@ class Refined:
         self._spans = np.column_stack([np.diff(k, axis=1).mean(axis=1) for k in (own.knots_u, own.knots_v)])
         _, along_u, along_v = self._surface.derivatives(own.centres)
         millimetres = np.column_stack([np.linalg.norm(along_u, axis=1), np.linalg.norm(along_v, axis=1)])
-        self._longest = np.maximum(EDGES * (self._spans * millimetres).min(axis=1), 2 * MIN_EDGE_MM)
+        self._longest = np.maximum(MAX_EDGE * (self._spans * millimetres).min(axis=1), 2 * MIN_EDGE_MM)
         self._uv, self._places = mesh.uv, mesh.vertices
         self.triangles = self._refine(np.asarray(mesh.triangles, np.int64))
         inner = {level: (each < self._count).all(axis=1) for level, each in coarser.items()}
@@ -179,7 +179,7 @@ class Refined:
 
     @property
     def ends(self) -> Ints:
-        """(k, 2) the vertices between which each new one lies, which may be new ones before it."""
+        """(k, 2) the two vertices between which each new one lies; they may be earlier new ones."""
         return np.array(self._middles.ends, np.int64).reshape(-1, 2)
 
     def _refine(self, triangles: Ints) -> Ints:
@@ -187,7 +187,7 @@ class Refined:
         Both triangles of an edge that they reach are near; the others, which are most, are not looked at."""
         near = self._near(self._uv[triangles])
         others, triangles = triangles[~near], triangles[near]
-        for _ in range(ROUNDS if len(triangles) else 0):
+        for _ in range(MAX_ROUNDS if len(triangles) else 0):
             before = len(triangles)
             triangles = split_edges(triangles, self._is_long, self._middles)
             self._place()
@@ -247,7 +247,7 @@ class Refined:
         return pack(finer, grown.budget)
 
     def _with_own(self, first: int) -> list[Array]:
-        """By cell of the mesh its points, with those light ones that reach it."""
+        """Return, by cell of the mesh, its points and the light points that reach it."""
         boxes, _ = self.mesh.cell_boxes
         u, v = self._own.knots_u, self._own.knots_v
         lists = []

@@ -18,7 +18,7 @@ from surface.mesh.mesh import Mesh
 from surface.mesh.tessellate import unit_normals
 
 KEYS = ("mesh_uv", "mesh_triangles", "mesh_side", "mesh_cell_start", "mesh_list_start", "mesh_list_ids", "mesh_made")
-LOOP_SHARE = 0.4  # how near a border follows its loop, in chord errors
+LOOP_SHARE = 0.4  # distance within which a border follows its loop, in chord errors
 
 
 def make_surface(data: PartData) -> DCPSurface:
@@ -113,7 +113,7 @@ def unpack(
 
 
 def _kinds_valid(arrays: dict[str, Array], vertices: tuple[int, ...]) -> bool:
-    """Are the arrays numbers of the right shapes, and no list empty?"""
+    """Whether the arrays hold numbers of the right shapes, and no list is empty."""
     uv, triangles, side, *lists = (arrays[key] for key in KEYS[:-1])
     shaped = uv.shape == (*vertices, 2) and triangles.shape[1:] == (3,) and side.shape == vertices
     whole = all(a.dtype.kind in "iu" for a in (triangles, side, *lists)) and uv.dtype.kind == "f"
@@ -121,7 +121,7 @@ def _kinds_valid(arrays: dict[str, Array], vertices: tuple[int, ...]) -> bool:
 
 
 def _indices_valid(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
-    """Are all indices in range?"""
+    """Whether all indices are in range."""
     if not len(triangles) or len(start) != len(list_start):
         return False
     whole = start[0] == 0 and start[-1] == len(uv) and list_start[0] == 0 and list_start[-1] == len(ids)

@@ -37,9 +37,11 @@ _LOOK_DOWN = [_AT[f"eyeLookDown{s}"] for s in SIDES]
 _OPENERS = [[_AT[f"eye{e}{s}"] for e in ("LookUp", "Wide")] for s in SIDES]
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
 _BELOW = [_AT[n] for n in ("mouthRollLower", "mouthShrugLower", "mouthPressLeft", "mouthPressRight")]
-GIVE_WAY, GIVEN = 0.75, 0.5  # share of what raises the lower lip that a tongue takes away; tongueOut from which on
-TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # jawOpen at least, for the whole tongue; how much earlier the jaw opens
-LID_SHARE = 0.72  # of a blink, which the upper lid goes down at a whole look down
+LIP_YIELD = 0.75  # fraction by which a tongue that is out reduces what raises the lower lip
+LIP_YIELD_AT = 0.5  # tongueOut from which on that is complete
+TONGUE_JAW = 0.33  # minimum jawOpen for the whole tongue
+TONGUE_JAW_LEAD = 1.7  # how much earlier the jaw opens than the tongue comes out
+LID_SHARE = 0.72  # fraction of a blink by which the upper lid goes down at a full look down
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
 
 
@@ -92,9 +94,9 @@ def read_pose(values: Floats) -> Pose:
         raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
     given = np.minimum(np.maximum(v, _LOW), 1.0).tolist()
     shapes, angle = given[: len(SHAPES)], given[len(SHAPES) :]
-    needed = TONGUE_NEEDS * min(1.0, TONGUE_FIRST * shapes[_TONGUE])
+    needed = TONGUE_JAW * min(1.0, TONGUE_JAW_LEAD * shapes[_TONGUE])
     jaw = shapes[_JAW] = max(shapes[_JAW], needed)
-    given = 1.0 - GIVE_WAY * min(1.0, shapes[_TONGUE] / GIVEN)
+    given = 1.0 - LIP_YIELD * min(1.0, shapes[_TONGUE] / LIP_YIELD_AT)
     for i in _BELOW:  # the lower lip gives way to the tongue
         shapes[i] *= given
     gaze = [_gaze([shapes[i] for i in _LOOK[side]], side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)]
@@ -134,7 +136,7 @@ def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float
 
 
 def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
-    """Return hermite step 3 t^2 - 2 t^3 of ``x``, 0 at ``low`` and 1 at ``high``, constant beyond them."""
+    """Return the Hermite step 3 t^2 - 2 t^3 of ``x``, 0 at ``low`` and 1 at ``high``, constant beyond them."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 

@@ -44,5 +44,5 @@ class Placement:
         return rows @ self.turn
 
     def moved(self, shift: Floats) -> Placement:
-        """This placement, followed by a shift (3,), mm."""
+        """Return this placement followed by a shift (3,), mm."""
         return Placement(self.turn, self.scale, self.shift + shift, self.unit)

@@ -11,7 +11,7 @@ from surface.base.arrays import Floats
 SWAYS = ("swayYaw", "swayPitch", "swayRoll")
 """Groups of what sways, per radian by which it lies ahead of the head."""
 _AXES = np.eye(3)[[1, 0, 2]]  # yaw turns about y, pitch about x, roll about z
-_HZ, _DAMPING = 2.1, 0.38  # of hair at the length of a head, by eye; 1 would be without overshoot
+_HZ, _DAMPING = 2.1, 0.38  # of hair as long as a head, chosen by eye; damping 1 has no overshoot
 _MAX_RAD, _MAX_S = 0.16, 0.5
 
 

@@ -26,8 +26,8 @@ from surface.mesh.mesh import Mesh
 
 SHADE, DECIMATED = "occlusion.npz", "decimated.npz"
 LEVELS = ("full", "fast")
-STEPS = 1 << 14  # of u and v per unit
-OFFSET = 1 / 3  # of a step: halves, quarters and so on never lie between two steps, where a last bit would decide
+STEPS = 1 << 14  # per unit of u and v
+OFFSET = 1 / 3  # of a step, so that dyadic fractions never lie on the border of two steps, where rounding would decide
 Shares = Mapping[str, NDArray[np.floating]]
 Triangles = NDArray[np.int32]
 Unpacked = TypeVar("Unpacked")
@@ -141,8 +141,9 @@ def write_decimated(head: str | Path, parts: Iterable[HeadPart], decimated: Mapp
 
 
 def tessellation_key(part: HeadPart) -> Triangles:
-    """Return (3,): that identifies a part's mesh with its seams: numbers of vertices and triangles, and a sum over
-    these."""
+    """Return three integers that identify a part's mesh with its seams: numbers of vertices and triangles, and a sum
+    over these.
+    """
     check = zlib.crc32(np.ascontiguousarray(part.triangles, np.int32).tobytes()) & 0x7FFFFFFF
     return np.array([len(part.vertices), len(part.triangles), check], np.int32)
 
@@ -158,6 +159,6 @@ def apply_decimated(parts: Iterable[HeadPart], decimated: Mapping[str, Triangles
 
 
 def _is_valid(triangles: Triangles, vertices: int) -> bool:
-    """Are there any, and are all indices in range?"""
+    """Whether there are any triangles and all indices are in range."""
     shaped = triangles.ndim == 2 and triangles.shape[1] == 3 and len(triangles) > 0
     return bool(shaped and triangles.min() >= 0 and triangles.max() < vertices)

@@ -22,21 +22,22 @@ from surface.head.posing.contact_kernels import find_gaps, find_heights, follow_
 from surface.head.posing.contact_solve import clear_eyeball, gather_near, part_sides, place_all
 from surface.spline.kernels import fill_rows, row_capacity
 
-CONTACT_SHARE = 2 / 3  # of the rows at an opening can touch the other side; in the others the correction fades out
+CONTACT_SHARE = 2 / 3  # fraction of the rows at an opening that can touch the other side; in the rest corrections fade
 SOFT_MM = 0.1
 OVERLAP_MM = (0.28, 0.9)  # allowed overlap of lips and of lids: triangles cut about that off the edges of both sides
-NEARLY_MM, HIDDEN_MM = 1.2, 0.25  # lips nearer than the first at rest are closed; so far each hides the other then
+NEARLY_MM = 1.2  # lips nearer than this at rest count as closed
+HIDDEN_MM = 0.25  # by which each of two closed lips hides the other
 PASSES, TOLERANCE_MM = 3, 0.1  # corrections are repeated while bending leaves more than this
-LIFT_GAIN = 1.6  # of what a lid is off: least squares hold it back, because its neighbours need not move
-LID_MM = 1.2  # thickness of a lid: what rests nearer to the eyeball than that never sinks further
-TOUCH_MM = 0.05  # least distance of what rests on the eyeball
-HOLD_MM = (1.2, 2.4)  # what rests nearer to the eyeball than the first is held on it; further than the second, free
+LIFT_GAIN = 1.6  # corrections of lids are multiplied by it, because regularised least squares fall short
+LID_MM = 1.2  # thickness of a lid: skin that is nearer to the eyeball at rest never sinks further
+TOUCH_MM = 0.05  # minimum distance from the eyeball
+HOLD_MM = (1.2, 2.4)  # skin nearer to the eyeball at rest than the first is held on it, beyond the second it is free
 FORWARD = np.array([0.0, 0.0, 1.0])
-REGULARISATION = (0.02, 0.05)  # for lips and lids: weight of moving no control point, relative to a sample's
+REGULARISATION = (0.02, 0.05)  # for lips and lids: weight of zero moves of control points, relative to a sample's
 MIN_WEIGHT = 0.004  # of a control point in a sample: those with less are left out of it
-FAR_MM = 18.0  # from every sample: points with large spans so far away would move brow and chin
+FAR_MM = 18.0  # points further than this from every sample stay, since they would move brow and chin
 MIN_SHARE = 0.02  # of a sample: points with less everywhere are not moved
-_MAX_CACHED = 12  # tables that are kept: those of two heads
+_MAX_CACHED = 12  # tables in the cache, those of two heads
 _FOUND: OrderedDict[bytes, tuple[Ints, Floats]] = OrderedDict()
 
 
@@ -118,7 +119,7 @@ class ContactSolver:
         self._press, self._rows = OVERLAP_MM[lids], rows
 
     def apply(self, axis: Floats, points: Floats, seal: float = 0.0) -> Floats:
-        """Write correct control points (n, 3) in place; returns what :meth:`Follower.apply` takes, overwritten by each
+        """Correct control points (n, 3) in place; return what :meth:`Follower.apply` takes, overwritten by each
         call.
 
         For lips that is the overlap (2 k,) in mm that was found in each column, for lids how far their samples (2 k m,)

@@ -14,7 +14,7 @@ from surface.spline.lanes import add, fma_at, item, load, store3, zero
 # The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
-SIGHT = 0.7  # tangent of 35 degrees: so far from the front, lips that are closed still look closed
+MAX_SIGHT = 0.7  # tangent of 35 degrees: up to this far from the front, closed lips still look closed
 # coefficients of Taylor's series: of x**10 to 1, of the sine over x and of the cosine
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(5, -1, -1))
 COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(5, -1, -1))
@@ -212,10 +212,11 @@ def hidden_to(across: Floats, edge: Floats, at: float, sign: float) -> float:
 
 @kernel
 def find_gaps(samples: Floats, gaps: Floats) -> None:
-    """How far an opening stands open, ``gaps (2, k)``, as seen from the front and :data:`SIGHT` aside of it, where it
-    is widest, from ``samples (2, k, m, 3)`` as :func:`find_overlap` takes them: from the lowest of each column of the
-    upper side to the highest of the lower side in the same line of sight, below 0 where one hides behind the other;
-    and for each column of the lower side in turn."""
+    """How far an opening stands open, ``gaps (2, k)``, as seen from the front and :data:`MAX_SIGHT` aside of it,
+    where it is widest, from ``samples (2, k, m, 3)`` as :func:`find_overlap` takes them: from the lowest of each
+    column of the upper side to the highest of the lower side in the same line of sight, below 0 where one hides
+    behind the other; and for each column of the lower side in turn.
+    """
     columns = samples.shape[1]
     edges, across = np.empty((2, columns, 3)), np.empty((2, columns))
     trace_edges(samples, edges)
@@ -223,7 +224,7 @@ def find_gaps(samples: Floats, gaps: Floats) -> None:
     for way in range(-1, 2):
         for side in range(2):
             for k in range(columns):
-                across[side, k] = edges[side, k, 0] - way * SIGHT * edges[side, k, 2]
+                across[side, k] = edges[side, k, 0] - way * MAX_SIGHT * edges[side, k, 2]
         for side in range(2):
             sign = 1.0 - 2.0 * side
             for k in range(columns):

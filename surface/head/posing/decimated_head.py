@@ -30,7 +30,7 @@ class DecimatedPart:
 
     part : the head's own.
     first, last : its vertices are those from ``first`` to before ``last``.
-    kept : (m,) int64, which vertices of the part they are, rising.
+    kept : (m,) int64, which vertices of the part they are, ascending.
     triangles : (t, 3) int32, of these.
     changed : ranges [start, stop) of these that the last pose touched.
     """
@@ -203,7 +203,7 @@ class _Rigid:
 
 
 class _Seams:
-    """All seams of a head, closed in one go, one after the other."""
+    """All seams of a head, closed in one call."""
 
     def __init__(self, stitches: Sequence[SeamStitch], parts: Sequence[DecimatedPart]) -> None:
         by_name = {decimated.part.name: decimated for decimated in parts}
@@ -242,7 +242,7 @@ def _kept_vertices(
 
 
 def submesh(mesh: Mesh, ids: Ints) -> Mesh:
-    """Of a mesh only vertices ``ids (k,)``, rising, and the cells that have any; no triangles."""
+    """Return a mesh of only the vertices ``ids (k,)``, ascending, and the cells that have any; without triangles."""
     cells, cell = np.unique(mesh.cell[ids], return_inverse=True)
     lists = [mesh.points_of(c) for c in cells.tolist()]
     return Mesh(

@@ -34,7 +34,7 @@ def read_fit_error(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, 
 
 
 def _unpack(stored: np.ndarray) -> Floats32:
-    """Return (m,): mm. Raises ValueError: an array that is not as it is written."""
+    """Return the distances (m,), mm. Raises ValueError: the array is damaged."""
     if stored.ndim != 1 or stored.dtype != np.uint16:
         raise ValueError(f"holds an array of shape {stored.shape} and type {stored.dtype}, expected (any,) uint16")
     return np.where(stored == UNKNOWN, np.nan, STEP_MM * stored).astype(np.float32)

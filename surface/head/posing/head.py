@@ -198,7 +198,9 @@ class Head:
         return self.place_pose(self.read_pose(values), {})
 
     def place_pose(self, pose: Pose, moved: Mapping[str, Floats]) -> tuple[list[Floats], Turn]:
-        """:meth:`place_points` of a pose; ``moved`` : by part, what :meth:`.rig.SkinRig.move_all` found for it."""
+        """Do the same as :meth:`place_points` for a pose; ``moved`` : by part, what :meth:`.rig.SkinRig.move_all`
+        found for it.
+        """
         rows = [part.place_points(pose, moved.get(part.name)) for part in self.parts]
         return rows, self._make_turn(pose.head)
 

@@ -1,4 +1,4 @@
-"""Displacements of control points by groups, laid out so that a pose reads few bytes of them and in one go.
+"""Displacements of control points by groups, laid out so that a pose reads few bytes of them and in one pass.
 
 A group moves some control points of a part. Each displacement is needed once a pose, so time goes to reading them:
 eight points make a tile, and of every group only the tiles that it moves are kept, one after the other. Points are put
@@ -61,7 +61,7 @@ class Moves:
         return self._table().reshape(len(self.used), self._n, 3)[:, ids]
 
     def _tiles_of(self, group: Group) -> tuple[np.ndarray, Floats32]:
-        """Return which tiles a group moves, rising, and by how much their points, (k, LANES, 3)."""
+        """Return which tiles a group moves, ascending, and by how much their points, (k, LANES, 3)."""
         rows = np.zeros((self._tiles * LANES, 3), np.float32)
         place = np.empty(self._n, np.int64)
         place[self._order] = np.arange(self._n)

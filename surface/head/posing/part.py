@@ -222,7 +222,7 @@ class RigidPart(HeadPart):
         move_rigid(self._rest, self._rest_normals, *after, self.vertices, self.normals)
 
     def _turn_motion(self, pose: Pose, turn: Turn) -> tuple[Floats32, Floats32]:
-        """:meth:`Turn.after` of the part's motion in a pose, computed once for all parts that follow alike."""
+        """Return :meth:`Turn.after` of the part's motion in a pose, computed once for all parts that follow alike."""
         key = ("after", self.follows, id(self._head), id(turn))
         if key not in pose.found:
             pose.found[key] = turn.after(*self._motion)

@@ -19,7 +19,7 @@ from surface.head.posing.moves import Moves
 from surface.head.posing.tongue import tongue_rest
 
 CLEARANCE_GRID = (72, 36)  # samples of the part behind the lids, along u and v
-CLEARANCE_RADII = 1.4  # in eyeball radii: nearer points of the part behind the lids are kept outside the eyeball
+CLEARANCE_RADII = 1.4  # distance in eyeball radii below which points behind the lids are kept outside the eyeball
 UNDONE_MM = 20.0  # displacement by mouthClose that takes back the whole motion of the jaw
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
 
@@ -75,9 +75,11 @@ class SkinRig:
         return moved
 
     def apply(self, pose: Pose, moved: Floats | None = None) -> Floats:
-        """Write positions (n, 3) of all control points before the head turns, overwritten by the next call; corrections
-        at the part's own contacts are put into ``pose.pushes``. ``moved (n, 3)`` : where groups alone move them, if
-        that is known."""
+        """Return the positions (n, 3) of all control points before the head turns, overwritten by the next call.
+
+        Corrections at the part's own contacts are put into ``pose.pushes``, and those of lips into ``pose.lip``.
+        moved : (n, 3) positions as moved by groups alone, if known.
+        """
         np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
         key = self._pose_key(pose)
         if key != self._last_key:
@@ -112,7 +114,7 @@ class SkinRig:
             clearance.apply(_axis_of(pose, eye), points)
 
     def _pose_key(self, pose: Pose) -> tuple[object, ...]:
-        """Everything in a pose that the part's points depend on."""
+        """Return everything in a pose that the part's points depend on."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
         gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
         seals = (seal.amount(pose.shapes) for seal in self._seals)
@@ -195,7 +197,7 @@ def _path_of(pose: Pose, jaw: Jaw) -> tuple[Floats, Floats]:
 
 
 def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballClearance]]:
-    """By eye, what keeps the part out of the eyeball; none unless it is sewn to lids from behind."""
+    """Return, by eye, what keeps the part out of the eyeball; empty unless the part is sewn to lids from behind."""
     lids = [c for c in head.contacts if c.eye >= 0 and part.name in c.followers]
     if not any(s.part_b == part.name and s.part_a == c.part for s in head.seams for c in lids):
         return []
@@ -233,7 +235,9 @@ def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
 
 
 def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
-    """Everything in a pose that :func:`rigid_motion` depends on, gathered once for all parts that follow alike."""
+    """Return everything in a pose that :func:`rigid_motion` depends on, computed once for all parts that follow
+    alike.
+    """
     key = ("key", follows, id(head))
     if key not in pose.found:
         pose.found[key] = _make_key(follows, head, pose)
@@ -242,7 +246,7 @@ def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
 
 
 def _make_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
-    """Write what :func:`motion_key` returns."""
+    """Compute the result of :func:`motion_key`."""
     if follows == "jaw":
         return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))
     if follows in ("left_eye", "right_eye"):
@@ -264,7 +268,7 @@ def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floa
 
 
 def _make_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
-    """Write what :func:`rigid_motion` returns."""
+    """Compute the result of :func:`rigid_motion`."""
     linear, shift = np.eye(3), np.zeros(3)
     if follows == "jaw":
         linear, shift = _path_of(pose, head.jaw)

@@ -13,8 +13,8 @@ from surface.head.model.data import Seam
 from surface.head.posing.kernels import nearest_on_line, stitch_border
 from surface.head.posing.part import HeadPart
 
-NEAR = 2e-3  # in (u, v): a vertex nearer than this to the seam's polyline is on it
-SAME = 1e-4  # in points of the seam: vertices nearer than this are one
+NEAR = 2e-3  # in (u, v): vertices nearer than this to the seam's polyline are on it
+SAME = 1e-4  # along the seam, in points of its polyline: vertices nearer than this coincide
 
 
 class SeamStitch:

@@ -41,7 +41,7 @@ def find_rise(
 ) -> float:  # fmt: skip
     """Fill ``rise (s,)`` with how far stations ``under (s, 3)`` have to be lifted, and return the greatest of these.
 
-    below : (k, 3) points that the stations have to stay above, sorted by rising z. Those further away than ``reach``,
+    below : (k, 3) points that the stations have to stay above, sorted by z. Those further away than ``reach``,
         measured horizontally, do not count, and nearer ones count less the further away they are.
     clear, soft : distance to keep, and how much earlier lifting begins. All lengths are mm.
     again : stations have only been lifted since the last call, so those that were not too low are left out.
@@ -115,7 +115,7 @@ def press(
 ) -> None:  # fmt: skip
     """Move control points (n, 3) of the tongue until its stations clear the points ``against (k, 3)``.
 
-    start, ids, weights, sign : as in :func:`place_stations`. against : sorted by rising z, y multiplied by ``sign``.
+    start, ids, weights, sign : as in :func:`place_stations`. against : sorted by z, y multiplied by ``sign``.
     fade, part, share : as in :func:`lift_sections`.
     """
     stations, rise, lift = np.zeros((len(start) - 1, 3)), np.zeros(len(start) - 1), np.zeros(len(points))
@@ -128,7 +128,7 @@ def press(
 
 @nonallocating
 def sort_by_depth(at: Floats, order: Ints, out: Floats) -> None:
-    """Copy points ``at (k, 3)`` to ``out (k, 3)`` by rising z; ``order (k,)`` becomes the row that each comes from.
+    """Copy points ``at (k, 3)`` to ``out (k, 3)`` sorted by z; ``order (k,)`` becomes the row that each comes from.
 
     The search starts from the order of the last call, which is nearly right from one frame of a motion to the next.
     """
@@ -251,7 +251,7 @@ def _ease(x: float, low: float, high: float) -> float:
 
 
 def _sort_by_depth(at: Floats, sign: float) -> Floats:
-    """Return points (k, 3) by rising z, with y times ``sign``."""
+    """Return points (k, 3) sorted by z, with y times ``sign``."""
     rising: Floats = at[np.argsort(at[:, 2])] * (1.0, sign, 1.0)
     return rising
 

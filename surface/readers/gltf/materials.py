@@ -134,7 +134,8 @@ def _image(images: _Images, source: Any) -> tuple[bytes | None, str]:
 
 
 def _image_of_uv(moved: dict[str, Any]) -> _Rows:
-    """From texture coordinates with v up to places in the picture, which ``KHR_texture_transform`` may move.
+    """Return the map from texture coordinates with v up to places in the picture, which ``KHR_texture_transform`` may
+    move.
 
     The extension's matrix is translation times rotation times scale, of coordinates whose v points down.
     """

@@ -101,7 +101,7 @@ def _local_matrix(file: Gltf, node: dict[str, Any], where: str) -> Floats:
 
 
 def _numbers(file: Gltf, table: dict[str, Any], key: str, where: str, default: list[Any]) -> Floats:
-    """As many finite numbers as the default has."""
+    """Return finite numbers of a key, as many as the default has."""
     try:
         out = np.array(file.value(table, key, list, where, default), float)
     except (TypeError, ValueError) as e:

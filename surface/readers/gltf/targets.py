@@ -27,7 +27,9 @@ class TargetNames:
         self._made: dict[int, list[str]] = {}
 
     def of(self, index: int) -> list[str]:
-        """As many names as any primitive of a mesh has targets, or more where the file names more."""
+        """Return the names of a mesh's targets, as many as any primitive has targets, or more if the file names
+        more.
+        """
         if index not in self._made:
             mesh = _table(self._meshes[index])
             primitives = [_table(p) for p in _list(mesh.get("primitives"))]

@@ -85,7 +85,7 @@ def _polygons(starts: Ints) -> tuple[Ints, Ints]:
 
 
 def _strips(index: Ints, starts: Ints) -> Ints:
-    """Return (t, 3): triangles of strips, whose every second one runs the other way round; -1 ends a strip."""
+    """Return (t, 3): triangles of strips, whose every second one is oriented the other way; -1 ends a strip."""
     ends = np.zeros(len(index) + 1, bool)
     ends[starts] = True
     ends[1:] |= index < 0

@@ -21,7 +21,7 @@ TYPES = {
     "float32": "f4", "float64": "f8",
 }  # fmt: skip
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-HEAD_LIMIT = 1 << 20  # bytes
+HEADER_LIMIT = 1 << 20  # bytes
 MAX_PROPERTIES = 64
 HINT = "save the mesh again as .ply or .obj"
 
@@ -78,7 +78,7 @@ class PlyFile:
         """Fill elements and comments; returns where the rows begin."""
         if not data.startswith(b"ply"):
             raise self.error("header", "is damaged or no PLY file: it does not begin with ply")
-        end = data.find(b"end_header", 0, HEAD_LIMIT)
+        end = data.find(b"end_header", 0, HEADER_LIMIT)
         stop = data.find(b"\n", end)
         if end < 0 or stop < 0:
             raise self.error("header", "is damaged: it has no end_header")

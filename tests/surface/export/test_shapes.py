@@ -6,7 +6,7 @@ from small_head import all_points, part, sheet, small_head
 
 from surface.export.shapes import MIN_MOVE_MM, export_parts, unit
 from surface.head import Head
-from surface.head.model.parameters import TONGUE_NEEDS
+from surface.head.model.parameters import TONGUE_JAW
 
 
 def one_part(**other) -> Head:
@@ -67,7 +67,7 @@ def test_vertices_that_hardly_move_are_zero_where_others_move():
     assert length[length > 0].min() >= MIN_MOVE_MM
 
 
-@pytest.mark.parametrize(("name", "opened"), [("mouthClose", 1.0), ("tongueOut", TONGUE_NEEDS)])
+@pytest.mark.parametrize(("name", "opened"), [("mouthClose", 1.0), ("tongueOut", TONGUE_JAW)])
 def test_shapes_over_an_open_jaw_are_what_they_add_to_it(name, opened):
     head = one_part(groups=[all_points(name, (1, 5, 0)), all_points("jawOpen", (0, -7, 0))])
     head.pose(head.values({"jawOpen": opened}))
