@@ -24,8 +24,8 @@ from .groupsums import HEAD, STEP
 from .lists import LANES, Basis, Lists, cells_by_point
 
 PLAIN = -1  # in ``rows_at``: the cell has plain weights
-# Operations of factors relative to plain weights, without and with normals, beyond which factors are slower (measured on
-# sheets and heads; they read less memory).
+# Operations of factors relative to plain weights, without and with normals, beyond which factors are slower (measured
+# on sheets and heads; they read less memory).
 MAX_COST = 1.0, 1.5
 MAX_NUMBERS = 1 << 30  # numbers that are stored as factors; further cells keep plain weights
 MIX = 0x9E3779B1  # multiplier of the hash (Knuth, The Art of Computer Programming 6.4)

@@ -1,4 +1,4 @@
-"""The button that stops the servos: above everything else in the window, wherever that lies."""
+"""The button that stops the servos; it is above everything else in the window."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 from controller.panels.overlay.colours import RED, packed
 
 LABEL = "STOP servos"
-_LINES, _CORNER_LINES = 2.0, 9.0  # height, and width where it has no place in the panel, in heights of a line of text
-_OWNER = 0x53544F50  # of the mouse's button while the pointer is on it: nothing below it hears the click
+_LINES, _CORNER_LINES = 2.0, 9.0  # height, and width in a corner of the window, in heights of a line of text
+_OWNER = 0x53544F50  # id that owns the mouse button while the pointer is on it, so that nothing below is clicked
 _BRIGHTER, _DARKER = 1.2, 0.75
 
 
@@ -32,12 +32,12 @@ class Box(NamedTuple):
 
 
 class StopButton:
-    """Draws it, once a frame, and stops as soon as the mouse's button goes down on it.
+    """Draws the button once per frame, and stops the servos as soon as the mouse button is pressed on it.
 
     stop : stops the servos.
 
-    It has a place in the panel. Where that is not whole in view, it is drawn in a corner of the window. It is drawn
-    over floating windows and menus and hears the mouse before them: none of them can hide it or take its click.
+    It has a place in the panel; if that is not fully visible, it is drawn in a corner of the window. It is drawn over
+    floating windows and menus and handles the mouse before them, so none of them can hide it or take its click.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class StopButton:
         self.box = Box(0.0, 0.0, 0.0, 0.0)
 
     def leave_room(self, imgui: Any) -> None:
-        """Make room for it where the next widget of a window shall be."""
+        """Reserve its place at the position of the next widget."""
         imgui.invisible_button(
             LABEL, imgui.ImVec2(-1.0, _LINES * imgui.get_font_size())
         )  # no place to drag a window by
@@ -61,7 +61,7 @@ class StopButton:
             self._slot = box
 
     def __call__(self, imgui: Any) -> None:
-        """Draw it, and hear the mouse."""
+        """Draw it and handle the mouse."""
         self.box, self._slot = self._slot or _corner(imgui), None
         over = self.box.holds(imgui.get_io().mouse_pos)
         if over:

@@ -27,7 +27,7 @@ class Capture:
     """Takes pictures and records, into ``folder``.
 
     area : of the window, which gives the next picture. newest : the newest parameters (P,). clock : seconds.
-    parameters : without them, those of the base vocabulary.
+    parameters : default: those of the base vocabulary.
     jobs : writes clips beside the picture.
     message : what was written last, or why it was not. last : the last recording as a take, which can be edited.
     """
@@ -119,7 +119,7 @@ class Capture:
             self._write(path, lambda to: _write_table(to, self._parameters.names, np.array(rows)))
 
     def __call__(self) -> None:
-        """Add the present face to the recording; called once a frame. It ends by itself after ten minutes."""
+        """Add the present face to the recording; called once per frame. It ends automatically after ten minutes."""
         self._film()
         if self._rows is None:
             return

@@ -1,4 +1,4 @@
-"""What the panel knows of servos, links and faults: asks the body a few times a second and keeps the last half minute.
+"""State of servos, links and faults for the panel: it is requested a few times a second and kept for half a minute.
 
 Independent of the window library.
 """
@@ -18,7 +18,7 @@ from controller.panels.session.problems import Problems
 PERIOD_S = 0.2
 KEPT_S = 30.0
 _PATIENCE_S = 2.0
-"""An answer that has not come by then is asked for again."""
+"""Time after which an unanswered request is repeated."""
 _ROWS = round(KEPT_S / PERIOD_S)
 
 
@@ -33,7 +33,7 @@ class History:
         self._times, self._rows = np.full(_ROWS, np.nan), np.full((len(names), _ROWS), np.nan)
 
     def add(self, time_s: float, row: Mapping[str, Any]) -> None:
-        """Add a row; what is not known of it is NaN."""
+        """Add a row; unknown values are NaN."""
         found = (row.get(name) for name in self.names)
         self._rows[:, self._next] = [np.nan if value is None else float(value) for value in found]
         self._times[self._next] = time_s
@@ -46,7 +46,7 @@ class History:
 
 
 class Feed:
-    """Asks for details and keeps them; called once a frame.
+    """Requests details from the control process (body) and keeps them; called once per frame.
 
     send : sends requests to the body. newest : the newest answer of the body; None before the first.
     problems : hears of what went wrong. clock : seconds.
@@ -65,7 +65,7 @@ class Feed:
         self.histories: dict[str, History] = {}
 
     def __call__(self) -> None:
-        """Take an answer that has come, and ask for the next one."""
+        """Store a new answer, and request the next one."""
         now_s, newest = self._clock(), self._newest()
         if newest is not None and newest is not self.details:
             self.details, self._waits = newest, False
@@ -82,12 +82,12 @@ class Feed:
             self._problems.add(note)
 
     def history(self, servo: Mapping[str, Any]) -> History:
-        """Return what a servo was asked and reported: the columns of :attr:`COLUMNS`."""
+        """Return the wanted and the reported values of a servo: the columns of :attr:`COLUMNS`."""
         return self.histories.setdefault(servo_key(servo), History(self.COLUMNS))
 
     @property
     def waiting(self) -> bool:
-        """Whether nothing was heard yet."""
+        """Whether no answer has come yet."""
         return not (self.details.servos or self.details.links or self.details.buses)
 
 

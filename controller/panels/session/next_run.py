@@ -1,4 +1,4 @@
-"""What the run goes on with after its window has closed: another stage, or the same with more vocabularies."""
+"""What to open after the window has closed: another stage (configuration file), or the same with more vocabularies."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ class NextRun:
 
 
 def carried_to(run: NextRun, parameters: Parameters) -> History | None:
-    """Return what was set and can be taken back, for ``parameters``: those that they lack are left out."""
+    """Return the settings with their undo history for ``parameters``; parameters that are missing there are left
+    out.
+    """
     history, at = run.carried, [parameters.find(name) for name in run.names]
     if history is None:
         return None

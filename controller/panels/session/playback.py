@@ -1,4 +1,4 @@
-"""Where the timeline's line is: plays and scrubs a timeline or a recording by holding the face of the moment.
+"""Plays and scrubs a timeline or a take (a recorded performance) by holding the face of the current moment.
 
 Independent of the window library.
 """
@@ -25,20 +25,20 @@ from controller.takes.timeline import Ease, key_of_face, load_timeline, save_sho
 from controller.vocabulary.vocabulary import Vocabulary
 
 _MIN_LENGTH_S = 1.0
-"""A timeline that is shorter is drawn as long as this."""
+"""Length at which shorter timelines are drawn."""
 JITTER_S = 0.05
 
 
 class Playback:
-    """Shows moments, and edits the timeline at the line; called once a frame.
+    """Shows moments, and edits the timeline at the line; called once per frame.
 
     newest : the newest parameters (P,). send : sends requests to the body. clock : seconds.
-    parameters : without them, those of the base vocabulary. sound : plays the timeline's sound.
+    parameters : default: those of the base vocabulary. sound : plays the timeline's sound.
 
     Attributes
     ----------
-    position_s : of the line. playing : whether it moves by itself. selected : the number of a key, None for none.
-    range_s : the part of a recording that is marked.
+    position_s : the current moment. playing : whether it advances. selected : the number of a key; None for none.
+    range_s : the marked part of a take.
     """
 
     def __init__(

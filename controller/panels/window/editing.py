@@ -23,7 +23,7 @@ from surface.view.docks import PictureArea
 from surface.view.scene.camera import Camera
 
 _WHITE, _PIN, _ADDED = 0xFFFFFFFF, 0xFF3C78E6, 0xFF50D2F0
-_FEWEST = 3  # picks of a line
+_MIN_PICKS = 3  # of a line
 Tool = Literal["pull the face", "pull the skin", "wrinkle", "add points", "remove points"]
 TOOLS: tuple[Tool, ...] = get_args(Tool)
 
@@ -47,7 +47,7 @@ class Brush:
 
 
 class MouseEditing:
-    """Drags points of the face with the mouse; called once a frame.
+    """Drags points of the face with the mouse; called once per frame.
 
     area : where the picture is. copy : loads the same head again, without the control points that were added here.
     newest : the newest parameters (P,).
@@ -182,7 +182,7 @@ class MouseEditing:
     def _wrinkle(self, stroke: Sequence[tuple[float, float]], screen: Screen) -> None:
         brush, values = self.brush, self._newest()
         made = None
-        if len(stroke) >= _FEWEST:
+        if len(stroke) >= _MIN_PICKS:
             made = self.editor.wrinkle(
                 stroke, screen, values, brush.depth_mm, brush.width_mm, tied=brush.symmetric
             )  # fmt: skip

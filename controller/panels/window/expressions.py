@@ -28,7 +28,7 @@ class ExpressionButtons:
         self._intensity = 1.0
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         imgui.set_next_item_width(-imgui.calc_text_size("intensity").x - imgui.get_font_size())

@@ -26,7 +26,7 @@ HELP = {
 
 @dataclass
 class Keys:
-    """Carries out keys; called once a frame.
+    """Carries out keys; called once per frame.
 
     actions : what each key of ImGui does, by its name there: ``space``, ``r``. with_ctrl : the same, with Ctrl held.
     always : what keys do also while text is typed.
@@ -56,7 +56,7 @@ class Keys:
             self._help(imgui, below)
 
     def _help(self, imgui: Any, below: float) -> None:
-        """At the right of the window and below ``below``, in text as small as it takes to show all of it."""
+        """Draw the help at the right of the window below ``below``, in text small enough to show all of it."""
         size, line, style = imgui.get_io().display_size, imgui.get_font_size(), imgui.get_style()
         below = below if below < size.y / 2 else 0.0  # STOP is in the lower corner
         room = size.x - 2 * style.window_padding.x, size.y - below - 2 * style.window_padding.y

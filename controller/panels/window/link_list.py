@@ -16,7 +16,7 @@ class LinkList:
         self._feed = feed
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         links = self._feed.details.links

@@ -1,4 +1,4 @@
-"""How the face looks, changed while it is shown: theme, quality, person, another head.
+"""Changes the appearance of the face while it is shown: theme, quality, person, another head.
 
 A head is loaded in a thread of its own, then the window draws it; the servos notice nothing. Independent of the window
 library, but for drawing.
@@ -27,7 +27,7 @@ _THEMES, _QUALITIES = (get_args(PictureSettings.model_fields[key].annotation) fo
 
 
 class Looks:
-    """Changes the look of a stage's face.
+    """Changes the appearance (look) of a stage's face.
 
     swap : draws a head with settings from now on. jobs : loads it.
 
@@ -83,7 +83,7 @@ class Looks:
         self._jobs.drop(_CHANGING)
 
     def show(self, look: Look | None) -> None:
-        """Show a look; the first one without. What fails is reported, and the face stays."""
+        """Show a look, or the initial one for None. If it fails, that is reported and the face stays."""
         look = look or self.first
         before, self._shown = self._shown, look
         stage = self._stage(look)
@@ -120,14 +120,14 @@ def person_names() -> list[str]:
 
 
 class LookControls:
-    """Draws the choices; ``looks`` : carries them out, through ``commands``, so that they can be taken back."""
+    """Draws the choices; ``looks`` : carries them out, through ``commands``, so that they can be undone."""
 
     def __init__(self, looks: Looks, commands: Commands) -> None:
         self._looks, self._commands = looks, commands
         self._persons = [NOBODY, *person_names()]
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         look = self._commands.now.look or self._looks.first

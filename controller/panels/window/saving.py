@@ -1,7 +1,7 @@
 """Saves the present face, or moved control points, into the user's own vocabulary; draws what that needs.
 
-An expression and a gesture are known at once. A group and a corrective are parameters, which the window opens again
-with; everything that was set is kept.
+An expression and a gesture can be used immediately. A group and a corrective are parameters, which the window opens
+again with; everything that was set is kept.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 STEMS: dict[Kind, str] = {
     "expression": "face", "gesture": "gesture", "group": "fold", "corrective": "corrective", "anchor": "anchor",
 }  # fmt: skip
-"""What a name begins with that omote chooses."""
+"""Beginnings of the names that omote chooses, by kind."""
 ABOUT: dict[Kind, str] = {
     "expression": "the present face, as a mood",
     "gesture": "the present face, which keeps the mood meanwhile",
@@ -73,7 +73,7 @@ class Saving:
         self.message, self._name = "", ""
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         width = imgui.get_content_region_avail().x
@@ -152,7 +152,7 @@ class Saving:
         return self._open_again(name, {})
 
     def _anchor(self, name: str) -> str:
-        """Return an anchor is known as an expression, too: the face that the pull made."""
+        """Save the anchor of a servo, and the face that the pull made as an expression."""
         place, pull = self._editor().last_pull(self._newest())
         check_name(name, self._words.vocabulary)
         path = self._words.own.parent / f"{name}-anchor.toml"

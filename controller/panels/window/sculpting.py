@@ -24,7 +24,7 @@ _SETTINGS: dict[Tool, tuple[tuple[str, str, float, float], ...]] = {
 
 
 class SculptPanel:
-    """Draws the tab; called once a frame.
+    """Draws the tab; called once per frame.
 
     mouse : uses the tools. commands : undo what was sculpted.
     """

@@ -26,7 +26,7 @@ class ServoBars:
         self.plotted: list[str] = []
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         details = self._feed.details
@@ -52,7 +52,7 @@ class ServoBars:
         imgui.table_setup_column("state", fixed, imgui.calc_text_size("-000.0 deg  00 C").x)
 
     def _bus(self, imgui: Any, bus: Mapping[str, Any]) -> None:
-        """Whether a bus drives its servos, and why not."""
+        """Draw whether a bus drives its servos, and why not."""
         fault = str(bus["fault"])
         words = fault or ("torque on" if bus["running"] else "torque off")
         colour = AMBER if fault else BRIGHT_GREEN if bus["running"] else GREY
@@ -75,7 +75,7 @@ class ServoBars:
         self._state(imgui, servo)
 
     def toggle(self, key: str) -> None:
-        """Plot a servo, or no longer."""
+        """Start or stop plotting a servo."""
         if key in self.plotted:
             self.plotted.remove(key)
         else:

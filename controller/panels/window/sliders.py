@@ -32,7 +32,7 @@ class Sliders:
         self._mirror = self._parameters.mirror()
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         imgui.set_next_item_width(-imgui.calc_text_size("both sides").x - 4 * imgui.get_frame_height() / 2)
@@ -73,7 +73,7 @@ class Sliders:
             imgui.end_table()
 
     def _row(self, imgui: Any, name: str, row: Sequence[int]) -> None:
-        """The lock with the name, and the slider."""
+        """Draw the lock with the name, and the slider."""
         imgui.table_next_row()
         imgui.table_next_column()
         held = all(i in self._commands.now.held for i in row)
@@ -101,7 +101,7 @@ class Sliders:
             self._commands.hold(dict.fromkeys(row, float(np.clip(value, low, high))), ("hold", *row))
 
     def _measured(self, imgui: Any, row: Sequence[int], low: float, high: float) -> None:
-        """A mark where the servos are, and its value where the mouse is."""
+        """Draw a mark at the measured value, and the value itself while the mouse points at it."""
         measured = [] if self._state is None else [self._state.measured(i) for i in row]
         known = [x for x in measured if x is not None]
         if not known:

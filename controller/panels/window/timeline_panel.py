@@ -19,9 +19,9 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 _LOADED = (".toml", ".csv", ".wav")
 _TRACK_LINES, _NEAR = 3.2, 0.45
-_KEY_LINES = 0.35  # half the width of a key
-_LABEL = 2.0  # from a tick to its label, points
-_TICK_LINES = 3.0  # least distance of two ticks, in heights of a line
+_KEY_LINES = 0.35  # half the width of a key, in heights of a line of text
+_LABEL = 2.0  # distance from a tick to its label, points
+_TICK_LINES = 3.0  # minimum distance of two ticks, in heights of a line of text
 
 
 class TimelinePanel:
@@ -41,7 +41,7 @@ class TimelinePanel:
         self._dragged: int | None = None
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         self._controls(imgui)
@@ -189,7 +189,7 @@ class TimelinePanel:
             imgui.text_wrapped(self._message)
 
     def _hearing(self, imgui: Any) -> None:
-        """The sound that plays with the timeline."""
+        """Draw the choice of the sound that plays with the timeline."""
         sound = self._commands.now.timeline.sound
         if sound is not None:
             imgui.text_wrapped(f"sound: {sound.name}")

@@ -30,7 +30,7 @@ class View:
         self.overlays: Callable[[], None] | None = None
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         imgui.separator_text("camera")

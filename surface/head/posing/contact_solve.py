@@ -4,8 +4,8 @@ sides parted, as often as it takes.
 Everything happens on a copy of the control points near the opening, relative to the eyeball's centre. The tuples that
 the kernels take are made by :mod:`.contact`:
 
-``sampling`` : near (p,) control points of the samples; start, ids, share as :func:`.contact.tiled` gives them, with
-    indices into ``near``; own (k,) indices into ``near`` of the points that are moved
+``sampling`` : near (p,) control points of the samples; start, ids, share as :func:`.contact.tile_weights` gives them,
+    with indices into ``near``; own (k,) indices into ``near`` of the points that are moved
 ``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table of
     :func:`.contact_kernels.lift_points`
 ``work`` : local, found (p, 3) float64; single (p, 3), room (24,) float32; samples (s, 4), heights, lifts (s,) float64;
