@@ -47,14 +47,15 @@ class DCPSurface(ControlPoints):
         control_points: ArrayLike,
         weights: ArrayLike | None = None,
     ) -> Self:
-        """The same surface as a NURBS surface; arguments and errors as :func:`surface.spline.nurbs.nurbs_arrays`.
+        """Return the same surface as a NURBS surface; arguments and errors as
+        :func:`surface.spline.nurbs.nurbs_arrays`.
 
         Point (i, j) of the net becomes control point ``i * nv + j``.
         """
         return cls(*nurbs_arrays(degree_u, degree_v, knots_u, knots_v, control_points, weights))
 
     def evaluate(self, uv: ArrayLike, side: ArrayLike | None = None) -> Floats:
-        """Points (m, 3) float64 of the surface at ``uv (m, 2)``, NaN rows where nothing covers (u, v).
+        """Return points (m, 3) float64 of the surface at ``uv (m, 2)``, NaN rows where nothing covers (u, v).
 
         ``side (m,)`` int: 1 takes the limit from the left in u, 2 in v, 3 in both.
 
@@ -64,21 +65,22 @@ class DCPSurface(ControlPoints):
         return self.sample(self._inside(uv), side)[2]
 
     def covered(self, uv: ArrayLike) -> np.ndarray:
-        """(m,) bool: does any control point cover ``uv (m, 2)``? False outside :attr:`rect`, too."""
+        """Return which of ``uv (m, 2)`` any control point covers, (m,) bool; False outside :attr:`rect`, too."""
         return self.sample(uv, None)[1] >= 0
 
     def derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
-        """S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; arguments as :meth:`evaluate`."""
+        """Return S, S_u and S_v, each (m, 3) float64, NaN rows where nothing covers; arguments as :meth:`evaluate`."""
         out = self.sample_derivatives(self._inside(uv), side)[1]
         return out[:, 0].copy(), out[:, 1].copy(), out[:, 2].copy()
 
     def second_derivatives(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats, Floats]:
-        """S_uu, S_uv and S_vv, each (m, 3) float64, NaN rows where nothing covers; arguments as :meth:`evaluate`."""
+        """Return S_uu, S_uv and S_vv, each (m, 3) float64, NaN rows where nothing covers; arguments as
+        :meth:`evaluate`."""
         out = self.sample_derivatives(self._inside(uv), side, second=True)[1]
         return out[:, 3].copy(), out[:, 4].copy(), out[:, 5].copy()
 
     def curvatures(self, uv: ArrayLike, side: ArrayLike | None = None) -> tuple[Floats, Floats]:
-        """Gaussian and mean curvature, (m,) float64 each, per length squared and per length.
+        """Return Gaussian and mean curvature, (m,) float64 each, per length squared and per length.
 
         Arguments are as for :meth:`evaluate`. The mean one is positive where the surface bends towards S_u x S_v. Both
         are NaN where nothing covers or S_u x S_v vanishes (do Carmo, Differential Geometry of Curves and Surfaces 3-3).
@@ -95,7 +97,7 @@ class DCPSurface(ControlPoints):
         return gaussian, mean
 
     def insert_knot(self, axis: str, value: float, ids: ArrayLike | None = None) -> Refinement[Self]:
-        """The same surface with one more knot at ``value`` along ``axis`` ("u" or "v"), exactly.
+        """Return the same surface with one more knot at ``value`` along ``axis`` ("u" or "v"), exactly.
 
         Only points ``ids`` are split (all if left out), and of these those whose subdomain holds it inside. Returns the
         new surface, and how data of the old points is carried over.
@@ -103,7 +105,7 @@ class DCPSurface(ControlPoints):
         return insert_knot(self, axis, value, ids)
 
     def refine(self, region: tuple[float, float, float, float]) -> Refinement[Self]:
-        """The same surface with half as wide control points where ``region`` (u0, u1, v0, v1) is, exactly.
+        """Return the same surface with half as wide control points where ``region`` (u0, u1, v0, v1) is, exactly.
 
         Points whose subdomain does not reach the region stay as they are.
         """
@@ -112,14 +114,14 @@ class DCPSurface(ControlPoints):
     def basis_matrix(
         self, uv: ArrayLike, derivative: tuple[int, int] = (0, 0), side: ArrayLike | None = None
     ) -> csr_matrix:
-        """Rational weights, (m, n) float64: ``basis_matrix(uv) @ points`` is ``evaluate(uv)``.
+        """Return rational weights, (m, n) float64: ``basis_matrix(uv) @ points`` is ``evaluate(uv)``.
 
         ``derivative`` is (0, 0), (1, 0) for S_u or (0, 1) for S_v. Rows where nothing covers are empty.
         """
         return basis_matrices(self, self._inside(uv), [derivative], side)[0]
 
     def basis_rows(self, uv: ArrayLike) -> Rows:
-        """Rational weights for products with few columns, without scipy: ``basis_rows(uv) @ points`` is
+        """Return rational weights for products with few columns, without scipy: ``basis_rows(uv) @ points`` is
         ``evaluate(uv)``."""
         return basis_rows(self, self._inside(uv))
 
@@ -137,7 +139,7 @@ class DCPSurface(ControlPoints):
         measured: bool = True,
         progress: Progress = no_progress,
     ) -> Mesh:
-        """A watertight mesh by quad tree (paper, 2.3).
+        """Return a watertight mesh by quad tree (paper, 2.3).
 
         max_points : quarter cells until at most so many control points reach each
         chord_error : quarter cells until the surface is this near to their triangles, in units of the points;
@@ -164,7 +166,8 @@ class DCPSurface(ControlPoints):
     def deformation(
         self, mesh: Mesh, *, normals: bool = True, threads: int = 1, progress: Progress = no_progress
     ) -> Deformation[Self]:
-        """A mesh from :meth:`tessellate` that follows moves of control points, changes of weights and of knots (Eq. 2).
+        """Return a mesh from :meth:`tessellate` that follows moves of control points, changes of weights and of knots
+        (Eq. 2).
 
         See :class:`surface.deform.deformation.Deformation` for the arguments.
         """

@@ -1,4 +1,4 @@
-"""Panels: what a person sees and moves of a run, each in a folder of its own.
+"""Panels, by which a person watches and controls a run: one in a window, one in web browsers.
 
-In: the body's values and state. Out: requests of a person to the body. Imports base to face.
+In: values and state of the control process (body). Out: requests of a person to it. Imports base to face.
 """

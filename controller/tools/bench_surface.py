@@ -54,13 +54,13 @@ def bench_surface(seconds: float, log: Log, vertices: int = VERTICES, name: str 
     """
     head = Head.load(find_config("heads", name))
     deforming = [(part.surface, part.mesh) for part in head.parts if part.follows == "skin"]
-    kinds: list[tuple[str, list[cold.Body], str]] = [
-        (f"head {head.name}", deforming, cold.REACH),
-        ("three levels", [cold.hierarchical(vertices // 2)], cold.REACH),
-        ("scattered points", [cold.scattered(vertices // 50, vertices // 2)], cold.REACH),
+    subjects: list[tuple[str, list[cold.Case], str]] = [
+        (f"head {head.name}", deforming, cold.FULL_BOUND),
+        ("three levels", [cold.hierarchical(vertices // 2)], cold.FULL_BOUND),
+        ("scattered points", [cold.scattered(vertices // 50, vertices // 2)], cold.FULL_BOUND),
         ("sheet", [sheet(vertices)], "<= 1.0"),
     ]
-    rows = [row for kind in kinds for row in cold.cold_rows(*kind[:2], seconds, kind[2], report=log)]
+    rows = [row for s in subjects for row in cold.cold_rows(*s[:2], seconds, s[2], report=log)]
     title = f"about {vertices:,} vertices, 16 influences, one thread, caches warm"
     return [("caches cold, as in a frame; ratios with the ends of their 95 % interval", rows),
             (title, speed_table(vertices, seconds, log))]  # fmt: skip

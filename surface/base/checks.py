@@ -1,4 +1,4 @@
-"""Checks of array arguments: each returns a clean array or raises ``ValueError`` with the argument's name and index."""
+"""Checks of array arguments: they raise ``ValueError`` with the argument's name and the index; most return an array."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from numpy.typing import ArrayLike
 
 from surface.base.arrays import Bools, Floats, Ints
 
-LEAST_WEIGHT, MOST_WEIGHT = 1e-30, 1e30
+MIN_WEIGHT, MAX_WEIGHT = 1e-30, 1e30
 
 
 def numbers(values: ArrayLike, name: str) -> Floats:
-    """A float64 copy; ``ValueError`` naming the first element that is no number, or not of the usual shape."""
+    """Return a float64 copy.
+
+    ``ValueError`` names the first element that is no number, or whose shape differs from that of most elements.
+    """
     try:
         return np.array(values, dtype=np.float64, order="C")
     except (ValueError, TypeError):
@@ -32,14 +35,14 @@ def numbers(values: ArrayLike, name: str) -> Floats:
 
 
 def require(good: Bools | np.bool_, values: Floats, name: str, wanted: str = "finite") -> None:
-    """``ValueError`` with the index and the value of the first element that is not ``good``."""
+    """Raise ``ValueError`` with the index and the value of the first element that is not ``good``."""
     if not good.all():
         at = tuple(np.argwhere(~good)[0].tolist())
         raise ValueError(f"{name}[{', '.join(map(str, at))}]: must be {wanted}, got {values[at].tolist()}")
 
 
 def check_points(points: ArrayLike, name: str = "points") -> Floats:
-    """(n, 3) float64 copy; ``ValueError`` for another shape, no points, or numbers that are not finite."""
+    """Return a copy (n, 3) float64; ``ValueError`` for another shape, no points, or numbers that are not finite."""
     xyz = numbers(points, name)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise ValueError(f"{name}: shape {xyz.shape}, expected (n, 3)")
@@ -50,14 +53,14 @@ def check_points(points: ArrayLike, name: str = "points") -> Floats:
 
 
 def require_weights(weights: Floats, name: str = "weights") -> None:
-    """``ValueError`` for the first weight that is not positive, or beyond what 32-bit sums can hold."""
+    """Raise ``ValueError`` for the first weight that is not positive, or that 32-bit sums cannot hold."""
     require(np.isfinite(weights) & (weights > 0), weights, name, "positive and finite")
-    within = (weights >= LEAST_WEIGHT) & (weights <= MOST_WEIGHT)
-    require(within, weights, name, f"between {LEAST_WEIGHT:g} and {MOST_WEIGHT:g} (scale all weights alike)")
+    within = (weights >= MIN_WEIGHT) & (weights <= MAX_WEIGHT)
+    require(within, weights, name, f"between {MIN_WEIGHT:g} and {MAX_WEIGHT:g} (scale all weights alike)")
 
 
 def check_weights(weights: ArrayLike, name: str = "weights", n: int | None = None) -> Floats:
-    """(n,) float64 copy; ``ValueError`` for another shape or weights that :func:`require_weights` refuses."""
+    """Return a copy (n,) float64; ``ValueError`` for another shape or weights that :func:`require_weights` refuses."""
     w = numbers(weights, name)
     if w.ndim != 1:
         raise ValueError(f"{name}: shape {w.shape}, expected (n,)")
@@ -68,7 +71,7 @@ def check_weights(weights: ArrayLike, name: str = "weights", n: int | None = Non
 
 
 def integers(ids: ArrayLike) -> Ints:
-    """(k,) int64; ``ValueError`` for anything else."""
+    """Return the integers (k,) int64; ``ValueError`` for anything else."""
     if type(ids) is np.ndarray and ids.dtype == np.int64 and ids.ndim == 1 and ids.flags.c_contiguous:
         return ids
     try:
@@ -81,7 +84,7 @@ def integers(ids: ArrayLike) -> Ints:
 
 
 def check_ids(ids: ArrayLike, n: int) -> Ints:
-    """(k,) int64 numbers of control points; ``ValueError`` for the first that is not one of ``n``."""
+    """Return (k,) int64: numbers of control points; ``ValueError`` for the first that is not one of ``n``."""
     which = integers(ids)
     bad = (which < 0) | (which >= n)
     if bad.any():
@@ -91,7 +94,7 @@ def check_ids(ids: ArrayLike, n: int) -> Ints:
 
 
 def check_uv(uv: ArrayLike, name: str = "uv") -> Floats:
-    """(m, 2) float64; ``ValueError`` for another shape or NaN."""
+    """Return the samples (m, 2) float64; ``ValueError`` for another shape or NaN."""
     fast = isinstance(uv, np.ndarray) and uv.dtype == np.float64
     samples = np.ascontiguousarray(uv) if fast else numbers(uv, name)
     if samples.ndim != 2 or samples.shape[1] != 2:
@@ -103,7 +106,8 @@ def check_uv(uv: ArrayLike, name: str = "uv") -> Floats:
 def check_inside(
     samples: Floats, rect: tuple[float, float, float, float], closed: tuple[object, object], name: str = "uv"
 ) -> Floats:
-    """``samples (m, 2)``; ``ValueError`` for the first outside ``rect``, whose closed directions have no outside."""
+    """Return ``samples (m, 2)``; ``ValueError`` for the first outside ``rect``, whose closed directions have no
+    outside."""
     for axis, word in enumerate("uv"):
         low, high = rect[2 * axis], rect[2 * axis + 1]
         out = (samples[:, axis] < low) | (samples[:, axis] > high)
@@ -114,7 +118,7 @@ def check_inside(
 
 
 def check_sides(samples: Floats, side: ArrayLike | None) -> Ints:
-    """(m,) int64 copy of the wanted limits; ``ValueError`` for another shape or others than 0 to 3."""
+    """Return a copy (m,) int64 of the limits to take; ``ValueError`` for another shape or values beyond 0 to 3."""
     if side is None:
         return np.zeros(len(samples), dtype=np.int64)
     fast = isinstance(side, np.ndarray) and side.dtype == np.int64

@@ -11,6 +11,6 @@ SCALE = np.array([[0.16, 0.28, 0.55], [0.15, 0.50, 0.42], [0.72, 0.62, 0.10], [0
 
 
 def error_colours(error: Floats) -> Floats:
-    """(m, 3) linear RGB of errors (m,), mm."""
+    """Return (m, 3): linear RGB of errors (m,), mm."""
     at = np.clip(error / FULL_MM, 0.0, 1.0) * (len(SCALE) - 1)
     return np.stack([np.interp(at, np.arange(len(SCALE)), SCALE[:, k]) for k in range(3)], axis=1)

@@ -39,4 +39,4 @@ class ViewError(SurfaceError):
 
 
 class MissingPackage(SurfaceError, ImportError):
-    """A package that an extra brings is not installed; :attr:`hint` is the command that installs it."""
+    """An optional package is not installed; :attr:`hint` is the command that installs it."""

@@ -1,4 +1,4 @@
-"""Packages that only some of omote needs, and the extras that bring them: a missing one is named before work begins."""
+"""Optional packages and the extras that install them; missing ones are reported before work begins."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ EXTRAS = {
     "pylsl": ("pylsl", "lsl"),
     "websockets": ("websockets", "web"),
 }
-"""Name of a package and the extra of pyproject.toml that brings it, by the name under which it is imported."""
+"""Name of a package and the extra of pyproject.toml that installs it, by the name of its module."""
 
 
 def require(what: str, *modules: str) -> None:
-    """Check that packages are installed, without importing them; ``what`` needs them, as in "the window".
+    """Check that packages are installed, without importing them; ``what`` is what needs them, such as "the window".
 
     Raises MissingPackage, which names the packages that are missing and the command that installs them.
     """
@@ -42,7 +42,7 @@ def require(what: str, *modules: str) -> None:
 
 @contextmanager
 def importing(what: str, *modules: str) -> Iterator[None]:
-    """Context of the import of packages: MissingPackage where one is not installed or cannot be loaded."""
+    """Context in which packages are imported; raise MissingPackage if one is not installed or cannot be loaded."""
     require(what, *modules)
     try:
         yield

@@ -1,4 +1,4 @@
-"""Finds the program ffmpeg: that on the path, or that of the package imageio-ffmpeg."""
+"""Find the program ffmpeg: on the path, or in the package imageio-ffmpeg."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from importlib.util import find_spec
 from pathlib import Path
 
 INSTALL = "apt install ffmpeg, or pip install imageio-ffmpeg"
-"""What to type where there is none."""
+"""What to type if there is none."""
 
 
 def find_ffmpeg() -> str | None:
-    """The program's path; None where there is none."""
+    """Return the program's path; None where there is none."""
     if found := shutil.which("ffmpeg"):
         return found
     if find_spec("imageio_ffmpeg") is None:
@@ -25,5 +25,5 @@ def find_ffmpeg() -> str | None:
 
 
 def source(path: Path) -> list[str]:
-    """Options that read a file alone: neither a protocol in its name nor a playlist in it reaches a network."""
+    """Return options that read only this file: a protocol in its name or a playlist in it cannot reach a network."""
     return ["-protocol_whitelist", "file,pipe", "-i", f"file:{path.resolve()}"]

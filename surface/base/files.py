@@ -1,9 +1,9 @@
-"""Reading files that strangers wrote: nothing but files, and never more than a limit.
+"""Reading untrusted files: only regular files, and never more bytes than a limit.
 
-Every reader of omote takes its bytes from here, so that a named pipe, a device, a file of many gigabytes, brackets that
-are nested a thousand deep or an archive that unpacks to terabytes is one message and not a program that hangs. What is
-wrong with a file itself is an :class:`OSError` with a ``strerror``, what is wrong with its content a
-:class:`ValueError`; the readers add which file it was and what to do.
+Every reader of omote gets its bytes from here. So a named pipe, a device, a file of many gigabytes, brackets nested a
+thousand deep or an archive that unpacks to terabytes leads to an error message, and the program does not hang. Errors
+of access are an :class:`OSError` with a ``strerror``, errors of content a :class:`ValueError`; the readers add which
+file it was and what to do.
 """
 
 from __future__ import annotations
@@ -32,9 +32,9 @@ TEXT_LIMIT = 64 << 20
 DATA_LIMIT = 1 << 30
 """Bytes of a mesh, a surface file, a sound or an archive, before and after unpacking."""
 
-MOST_DEPTH = 64
-"""Tables and lists inside each other."""
-_DEEP = f"nested too deeply: {MOST_DEPTH} tables and lists inside each other are the most"
+MAX_DEPTH = 64
+"""Maximum nesting depth of tables and lists."""
+_DEEP = f"nested too deeply: {MAX_DEPTH} tables and lists inside each other are the most"
 
 DAMAGED = (
     OSError, ValueError, TypeError, OverflowError, EOFError, KeyError, IndexError, NotImplementedError, RuntimeError,
@@ -61,7 +61,7 @@ class _Error(Protocol):
 
 @contextmanager
 def reading(path: str | os.PathLike[str], error: _Error, hint: str = "") -> Iterator[None]:
-    """Raise as `error`, with the file's name and what to do next, whatever the functions here raise.
+    """Context that converts errors of these functions to `error`, with the file's name and what to do next.
 
     hint : what to do about wrong content.
     """
@@ -100,7 +100,7 @@ def _check_kind(found: os.stat_result, limit: int) -> None:
 
 
 def read_file(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> bytes:
-    """All bytes of a regular file. Raises OSError, as :func:`open_file`."""
+    """Return all bytes of a regular file. Raises OSError, as :func:`open_file`."""
     with open_file(path, limit) as file:
         data = file.read(os.fstat(file.fileno()).st_size + 1)
         while len(data) <= limit and (more := file.read(_CHUNK)):  # it grows, or is the kernel's
@@ -111,7 +111,7 @@ def read_file(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> bytes:
 
 
 def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
-    """The text of a UTF-8 file, with or without a byte order mark.
+    """Return the text of a UTF-8 file, with or without a byte order mark.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
 
 
 def decode(data: bytes) -> str:
-    """UTF-8, with or without a byte order mark, as text. Raises ValueError, which names the likely encoding."""
+    """Decode UTF-8, with or without a byte order mark. Raises ValueError, which names the likely encoding."""
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -136,17 +136,17 @@ def _encoding(data: bytes) -> str:
 
 
 def read_toml(path: str | os.PathLike[str], limit: int = CONFIG_LIMIT) -> dict[str, Any]:
-    """A TOML file as a table. Raises OSError and ValueError, as :func:`read_text` and :func:`parse_toml`."""
+    """Read a TOML file as a table. Raises OSError and ValueError, as :func:`read_text` and :func:`parse_toml`."""
     return parse_toml(read_text(path, limit))
 
 
 def read_json(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> Any:
-    """A JSON file. Raises OSError and ValueError, as :func:`read_text` and :func:`parse_json`."""
+    """Read a JSON file. Raises OSError and ValueError, as :func:`read_text` and :func:`parse_json`."""
     return parse_json(read_text(path, limit))
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """TOML as a table. Raises ValueError with line and column, also where it is nested too deeply."""
+    """Parse TOML into a table. Raises ValueError with line and column, also where it is nested too deeply."""
     try:
         return _shallow(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
@@ -156,7 +156,7 @@ def parse_toml(text: str) -> dict[str, Any]:
 
 
 def parse_json(text: str | bytes, **options: Any) -> Any:
-    """JSON; `options` are those of :func:`json.loads`. Raises ValueError, also where it is nested too deeply."""
+    """Parse JSON; `options` are those of :func:`json.loads`. Raises ValueError, also where it is nested too deeply."""
     try:
         return _shallow(json.loads(text, **options))
     except json.JSONDecodeError as error:
@@ -166,9 +166,9 @@ def parse_json(text: str | bytes, **options: Any) -> Any:
 
 
 def _shallow(value: Parsed) -> Parsed:
-    """The value, once it is known that a few calls inside each other reach all of it."""
+    """Return the value; raise ValueError if its tables and lists are nested too deeply."""
     level: list[Any] = [value]
-    for _ in range(MOST_DEPTH):
+    for _ in range(MAX_DEPTH):
         level = [
             inner for each in level if isinstance(each, dict | list)
             for inner in (each.values() if isinstance(each, dict) else each)
@@ -179,7 +179,7 @@ def _shallow(value: Parsed) -> Parsed:
 
 
 def read_npz(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> dict[str, NDArray[Any]]:
-    """All arrays of an ``.npz`` archive, which together take at most `limit` bytes unpacked.
+    """Return all arrays of an ``.npz`` archive, which together take at most `limit` bytes unpacked.
 
     Raises
     ------
@@ -206,13 +206,13 @@ def read_npz(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> dict[str,
 
 
 def _is_text(array: NDArray[Any]) -> bool:
-    """Are all characters of an array of texts code points that may be printed and written?"""
+    """Whether all characters of an array of strings are code points that may be printed and written."""
     points = np.frombuffer(array.astype(array.dtype.newbyteorder("=")).tobytes(), np.uint32)
     return bool(((points < 0xD800) | ((points > 0xDFFF) & (points <= sys.maxunicode))).all())
 
 
 def _check_archive(file: IO[bytes], limit: int) -> None:
-    """Refuse an archive that says itself that it unpacks to more than `limit`; zipfile enforces what it says."""
+    """Refuse an archive whose declared unpacked size exceeds `limit`; zipfile enforces the declared sizes."""
     with zipfile.ZipFile(file) as archive:
         size = sum(entry.file_size for entry in archive.infolist())
     if size > limit:

@@ -57,47 +57,47 @@ def _skip_scipy() -> None:
 
 _skip_scipy()
 PACKAGE = Path(__file__).parents[1]
-LONGEST_WAIT_S = 120.0
-"""For a kernel that another process compiles; the largest takes seconds, on a busy machine many."""
+MAX_WAIT_S = 120.0
+"""Maximum wait for a kernel that another process compiles; the largest takes seconds, on a busy machine many."""
 IMPORT = re.compile(r"^from[ ]+(\.*)([\w.]*)[ ]+import[ ]+(\([^)]*\)|[^\n#]*)", re.MULTILINE)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile a function at its first call for each set of argument types, keep the code on disk, release the GIL."""
-    return _compiled(
+    return _compile(
         function, _nrt=True
     )  # else it inherits the setting of a caller that is :func:`nonallocating`, and cannot allocate
 
 
 def nonallocating(function: Callable[..., Any]) -> Any:
-    """As :func:`kernel`, for functions that allocate no array: numba then counts no references to arrays.
+    """Do the same as :func:`kernel`, for functions that allocate no array: numba then counts no references to arrays.
 
     Counting them takes two calls for every array that an inlined function is given. LLVM cannot inline these calls, so
     it stores all vector registers before each of them, which may take half of the time of a short loop.
     """
-    return _compiled(function, _nrt=False)
+    return _compile(function, _nrt=False)
 
 
 def inlined(function: Callable[..., Any]) -> Any:
-    """As :func:`kernel`, and numba inlines the function wherever another kernel calls it."""
-    return _compiled(function, inline="always")
+    """Do the same as :func:`kernel`, and numba inlines the function wherever another kernel calls it."""
+    return _compile(function, inline="always")
 
 
 def merged(function: Callable[..., Any]) -> Any:
-    """As :func:`kernel`, and LLVM inlines the function wherever another kernel calls it.
+    """Do the same as :func:`kernel`, and LLVM inlines the function wherever another kernel calls it.
 
     It is for functions of so many arrays that passing them takes longer than a small update does. Unlike a function
     that is :func:`inlined`, one that is merged may return from within a loop.
     """
-    return _compiled(function, forceinline=True)
+    return _compile(function, forceinline=True)
 
 
 def declared(*signatures: Any) -> Callable[[Callable[..., Any]], Any]:
-    """As :func:`kernel`, but compile for these types of arguments at once, and for no others."""
-    return lambda function: _compiled(function, signatures)
+    """Do the same as :func:`kernel`, but compile immediately, for these types of arguments and no others."""
+    return lambda function: _compile(function, signatures)
 
 
-def _compiled(function: Callable[..., Any], signatures: Sequence[Any] = (), **options: Any) -> Any:
+def _compile(function: Callable[..., Any], signatures: Sequence[Any] = (), **options: Any) -> Any:
     dispatcher = njit(nogil=True, **options)(function)
     try:
         dispatcher.enable_caching()
@@ -139,14 +139,14 @@ def _compile_in_one_process(dispatcher: Any) -> None:
     compile_or_load, name = dispatcher.compile, dispatcher._cache._cache_file._index_path
 
     def alone(signature: Any) -> Any:
-        with global_compiler_lock, _held(name):
+        with global_compiler_lock, _hold_lock(name):
             return compile_or_load(signature)
 
     dispatcher.compile = alone
 
 
 @contextmanager
-def _held(name: str) -> Iterator[None]:
+def _hold_lock(name: str) -> Iterator[None]:
     """Hold the lock of a name within the context; other processes of this installation wait for it.
 
     Systems without such locks go on without one.
@@ -164,8 +164,8 @@ def _held(name: str) -> Iterator[None]:
 
 
 def _wait_for(descriptor: int, place: int) -> None:
-    """Lock one byte of a file; give up where the file system has no locks, or after :data:`LONGEST_WAIT_S`."""
-    end = time.monotonic() + LONGEST_WAIT_S
+    """Lock one byte of a file; give up where the file system has no locks, or after :data:`MAX_WAIT_S`."""
+    end = time.monotonic() + MAX_WAIT_S
     while time.monotonic() < end:
         try:
             fcntl.lockf(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
@@ -178,7 +178,7 @@ def _wait_for(descriptor: int, place: int) -> None:
 
 @cache
 def _lock_file() -> int | None:
-    """Descriptor of the lock file beside the compiled code, one byte of which stands for each kernel.
+    """Return the descriptor of the lock file beside the compiled code, in which each kernel locks one byte.
 
     None where there can be no such file. It stays open, because closing any descriptor of a file releases all locks
     that the process holds in it.
@@ -223,12 +223,12 @@ def _watch_imports(dispatcher: Any) -> Any:
 
 @cache
 def _digest(file: Path) -> str:
-    """Digest of a file and of its dependencies."""
+    """Return the digest of a file and of its dependencies."""
     return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(dependencies(file)))).hexdigest()
 
 
 def dependencies(file: Path) -> set[Path]:
-    """A file, the files of the package that it imports when it is loaded, those these import, and so on."""
+    """Return a file, the files of the package that it imports when it is loaded, those these import, and so on."""
     found, waiting = {file}, [file]
     while waiting:
         new = _imports(waiting.pop()) - found
@@ -239,7 +239,7 @@ def dependencies(file: Path) -> set[Path]:
 
 @cache
 def _imports(file: Path) -> frozenset[Path]:
-    """Files of the package that a file imports with ``from ... import ...`` at the left margin."""
+    """Return files of the package that a file imports with ``from ... import ...`` at the left margin."""
     out = set()
     for dots, module, names in IMPORT.findall(file.read_text(encoding="utf-8")):
         parts = module.split(".") if module else []

@@ -1,4 +1,4 @@
-"""Progress callbacks of long computations: they get a stage's name and the part of the whole that is done, 0 to 1."""
+"""Progress callbacks of long computations: they get a stage's name and the fraction of the work done, 0 to 1."""
 
 from __future__ import annotations
 
@@ -12,5 +12,5 @@ def no_progress(stage: str, part: float) -> None:
 
 
 def part_of(progress: Progress, low: float, high: float) -> Progress:
-    """A callback for a step that takes from ``low`` to ``high`` of the whole."""
+    """Return a callback for a step that takes from ``low`` to ``high`` of the whole."""
     return lambda stage, part: progress(stage, low + part * (high - low))

@@ -1,4 +1,4 @@
-"""Writing files whole or not at all: to a temporary file beside the old one, which it replaces at the end."""
+"""Atomic writing: to a temporary file beside the old one, which it replaces at the end."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-_LONGEST_STEM, _LONGEST_SUFFIX = 40, 16
-"""Characters of a file's name that the temporary name repeats: of four bytes each, they fit into the 255 of a name."""
+_MAX_STEM, _MAX_SUFFIX = 40, 16
+"""Characters of a file's name that the temporary name repeats; at four bytes each they fit into its 255 bytes."""
 
 
 @contextmanager
@@ -33,8 +33,8 @@ def replacing(path: Path) -> Iterator[Path]:
             yield temporary
         return
     target = Path(os.path.realpath(path))
-    suffix = path.suffix if len(path.suffix) <= _LONGEST_SUFFIX else ""
-    temporary = target.with_name(f".{path.stem[:_LONGEST_STEM]}-{secrets.token_hex(6)}{suffix}")
+    suffix = path.suffix if len(path.suffix) <= _MAX_SUFFIX else ""
+    temporary = target.with_name(f".{path.stem[:_MAX_STEM]}-{secrets.token_hex(6)}{suffix}")
     try:
         # created with the permissions that the system gives new files
         os.close(os.open(temporary, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o666))
@@ -69,7 +69,7 @@ def _copying_into(path: Path, stream: int | None) -> Iterator[Path]:
 
 
 def _stream_into(file: os.stat_result) -> int | None:
-    """The descriptor of standard output or error where that goes into a file; None for any other file."""
+    """Return the descriptor of standard output or error where that goes into a file; None for any other file."""
     for stream in (1, 2):
         with suppress(OSError):  # it is closed
             if os.path.samestat(file, os.fstat(stream)):
@@ -78,7 +78,7 @@ def _stream_into(file: os.stat_result) -> int | None:
 
 
 def _status(path: Path) -> os.stat_result | None:
-    """What the system says about a file, links followed; None where there is none yet."""
+    """Return what the system says about a file, links followed; None where there is none yet."""
     try:
         return path.stat()
     except FileNotFoundError:

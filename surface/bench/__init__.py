@@ -1,4 +1,4 @@
-"""Benchmarks of the surface engine against other programs and against the memory's speed.
+"""Benchmarks of the surface engine against reference implementations and the speed of memory.
 
-In: nothing, or a surface. Out: tables of figures. Imports any room of the surface.
+In: nothing, or a surface. Out: tables of times and ratios. Imports any room of the surface.
 """

@@ -1,6 +1,6 @@
-"""Benchmarks of the engine beside other libraries, all in one run on one machine. Prints nothing.
+"""Benchmarks of the surface engine and of other libraries with warm caches, all in one run on one machine.
 
-Times are the least of many calls: on a machine with other work that is the steadiest figure.
+Nothing is printed. Times are the minimum of many calls, the most repeatable figure on a machine that does other work.
 """
 
 from __future__ import annotations
@@ -23,8 +23,8 @@ from surface.mesh.mesh import Mesh
 
 from . import peers
 
-SHARES = (0.02, 0.1)  # of the vertices that groups reach
-BUILD_SECONDS = 10.0  # what building a large tree and its lists may take
+GROUP_FRACTIONS = (0.02, 0.1)  # of all vertices that the measured groups influence
+MAX_BUILD_S = 10.0  # bound for building a large tree and its lists
 Report = Callable[[str], None]
 
 
@@ -37,11 +37,10 @@ class Measure:
     """One row of a table.
 
     name : what was measured
-    milliseconds : least time of one call; 0 for rows that are a ratio of sizes
-    ratio, against : a ratio, or None, and its other side
-    reach : the bound the ratio shall keep, as text (``"<= 1.8"``, ``"0.9 to 1.1"``), or empty
-    interval : where the ratio lies with a confidence of 95 %, if that was measured; then the whole of it shall keep the
-        bound
+    milliseconds : minimum time of one call, with cold caches the median; 0 if the row is no time
+    ratio, against : a ratio, or None, and the name of what it is relative to
+    reach : bound of the ratio, as text (``"<= 1.8"``, ``"0.9 to 1.1"``), or empty
+    interval : 95 % confidence interval of the ratio, if it was measured; then all of it must meet the bound
     """
 
     name: str
@@ -53,7 +52,7 @@ class Measure:
 
     @property
     def kept(self) -> bool | None:
-        """Whether the ratio keeps its bound; None without one."""
+        """Whether the ratio meets its bound; None if there is no bound or no ratio."""
         if not self.reach or self.ratio is None:
             return None
         low, high = self.interval or (self.ratio, self.ratio)
@@ -64,12 +63,12 @@ class Measure:
 
 
 def least(call: Callable[[], object], seconds: float = 0.3) -> float:
-    """Least time of a call in milliseconds, over at least five calls and ``seconds``."""
+    """Return the minimum time of a call, ms, over at least five calls and ``seconds``."""
     return least_of([call], seconds)[0]
 
 
 def least_of(calls: list[Callable[[], object]], seconds: float = 0.3) -> list[float]:
-    """As :func:`least` for several calls in turn, so that what disturbs one disturbs the others as well."""
+    """Do the same as :func:`least` for several calls in turn, so that a disturbance affects all of them."""
     for call in calls:
         call()
     best, count, end = np.full(len(calls), np.inf), 0, time.perf_counter() + seconds * len(calls)
@@ -83,9 +82,9 @@ def least_of(calls: list[Callable[[], object]], seconds: float = 0.3) -> list[fl
 
 
 def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, report: Report = no_report) -> list[Measure]:
-    """Full evaluation, updates of a point, a group and everything, and peers, for any surface and mesh.
+    """Measure full evaluation, updates of a point, of groups and of all points, and reference implementations.
 
-    Each row is repeated for ``seconds``; ``report`` gets its name before.
+    Each row is repeated for ``seconds``; ``report`` is called with its name first.
     """
     rows: list[Measure] = []
     with_normals, plain = surface.deformation(mesh), surface.deformation(mesh, normals=False)
@@ -101,28 +100,31 @@ def measure(surface: DCPSurface, mesh: Mesh, *, seconds: float = 0.3, report: Re
     add("all positions and normals", with_normals.refresh, "all positions", "<= 3.5", full)
     for name, ids in (("every point", np.arange(surface.n)), ("one point", nearest(surface, 1))):
         add(f"{name} moved, with normals", alternating(with_normals, ids), "all positions", "", full)
-    groups = {len(ids): (ids, part) for ids, part in (group(surface, mesh, share) for share in SHARES)}
-    for count, (ids, part) in groups.items():  # one, where a single point reaches more than either share
+    groups = {len(ids): (ids, part) for ids, part in (group(surface, mesh, share) for share in GROUP_FRACTIONS)}
+    for count, (ids, part) in groups.items():  # only one row if a single point influences more than either fraction
         name = f"group of {count} moved, which reaches {100 * part:.1f} %"
         add(name, alternating(plain, ids), "its part of all positions", "<= 1.5", part * full)
     return rows + peer_rows(peers.vertex_sums(mesh), surface, mesh, full, seconds, report)
 
 
 def peer_rows(
-    found: Iterable[peers.Peer], surface: DCPSurface, mesh: Mesh, full: float, seconds: float, report: Report
+    implementations: Iterable[peers.Peer], surface: DCPSurface, mesh: Mesh, full: float, seconds: float, report: Report
 ) -> list[Measure]:
-    """Other ways to the same vertices; their ratios say how many times longer they take than ``full``."""
+    """Measure reference implementations that compute the same vertices; ratios are their times over ``full``, ms."""
     rows = []
-    for peer in found:
+    for peer in implementations:
         report(peer.name)
         with peers.one_thread():
-            took = peer.share * least(peer.prepare(surface, mesh), seconds)
+            took = peer.time_factor * least(peer.prepare(surface, mesh), seconds)
         rows.append(Measure(f"{peer.name}, positions", took, took / full, "all positions", peer.reach))
     return rows
 
 
 def sheet(vertices: int = 100_000) -> tuple[DCPSurface, Mesh]:
-    """A bicubic sheet of about so many vertices; its cells are knot spans of about 8 x 8, with 16 points each."""
+    """Return a bicubic sheet and a mesh of about so many vertices.
+
+    A cell of the mesh is a knot span: 16 control points influence its 8 x 8 vertices or so.
+    """
     spans = max(2, round(np.sqrt(vertices / 64)))
     level = max(0, round(np.log2(np.sqrt(vertices) / spans)))
     spans = max(2, round(np.sqrt(vertices) / 2**level))
@@ -132,7 +134,7 @@ def sheet(vertices: int = 100_000) -> tuple[DCPSurface, Mesh]:
 
 
 def bumpy(points: int) -> DCPSurface:
-    """A bumpy bicubic sheet, 200 long and wide, over the unit square, of about so many control points."""
+    """Return a bumpy bicubic sheet, 200 x 200, over the unit square, with about so many control points."""
     side = max(5, round(np.sqrt(points)))
     knots = np.concatenate([[0.0] * 3, np.linspace(0, 1, side - 2), [1.0] * 3])
     x, y = np.meshgrid(np.linspace(0, 200, side), np.linspace(0, 200, side), indexing="ij")
@@ -140,7 +142,7 @@ def bumpy(points: int) -> DCPSurface:
 
 
 def speed_table(vertices: int = 100_000, seconds: float = 0.3, report: Report = no_report) -> list[Measure]:
-    """The engine at its memory limit: about 100,000 vertices, 16 influences, one thread, float32."""
+    """Measure the engine and all reference implementations on :func:`sheet`: one thread, float32."""
     surface, mesh = sheet(vertices)
     rows = measure(surface, mesh, seconds=seconds, report=report)
     full = next(row.milliseconds for row in rows if row.name == "all positions")
@@ -148,7 +150,7 @@ def speed_table(vertices: int = 100_000, seconds: float = 0.3, report: Report = 
 
 
 def large_table(vertices: int = 1_000_000, seconds: float = 0.5, report: Report = no_report) -> list[Measure]:
-    """Two threads against one, and memory, for a million vertices."""
+    """Compare two threads with one, and measure memory, on a sheet of about so many vertices."""
     report(f"{vertices} vertices")
     surface, mesh = sheet(vertices)
     one = surface.deformation(mesh, normals=False)
@@ -164,7 +166,7 @@ def large_table(vertices: int = 1_000_000, seconds: float = 0.5, report: Report 
             lambda: list(pool.map(np.sum, halves)),
         ]
         single, double, read, shared = least_of(calls, seconds)
-    bound = max(0.7, 1.15 * shared / read)  # where two readers gain little, two threads cannot gain more
+    bound = max(0.7, 1.15 * shared / read)  # two threads cannot gain more than two readers of the memory do
     name = f"all positions, {len(mesh.vertices)} vertices"
     return [
         Measure(name, single, single / read, "one read of the weights", "<= 0.8"),
@@ -175,7 +177,7 @@ def large_table(vertices: int = 1_000_000, seconds: float = 0.5, report: Report 
 
 
 def build_table(points: int = 100_000, level: int = 7, progress: Progress = no_progress) -> list[Measure]:
-    """Time of building quad tree and lists by either rule, for 100,000 control points and a million vertices.
+    """Measure building the quad tree and its lists, by either criterion for splitting cells.
 
     ``level`` is the deepest level of the tree under 8 x 8 roots, which bounds the vertices to (8 * 2**level + 1)**2.
     """
@@ -187,39 +189,39 @@ def build_table(points: int = 100_000, level: int = 7, progress: Progress = no_p
         surface.deformation(mesh, progress=part_of(progress, 0.85, 1.0))
         took = time.perf_counter() - begin
         name = f"tree and lists by {title}: {surface.n} points, {len(mesh.vertices)} vertices"
-        rows.append(Measure(name, 1e3 * took, took / BUILD_SECONDS, f"{BUILD_SECONDS:.0f} s", "<= 1"))
+        rows.append(Measure(name, 1e3 * took, took / MAX_BUILD_S, f"{MAX_BUILD_S:.0f} s", "<= 1"))
     return rows
 
 
 def alternating(deformation: Deformation[DCPSurface], ids: np.ndarray) -> Callable[[], object]:
-    """A call that moves the points there and back in turn."""
-    here = deformation.points[ids].copy()
-    places = cycle((here + 0.01 * np.ptp(deformation.points, axis=0).max(), here))
-    return lambda: deformation.set_positions(ids, next(places))
+    """Return a call that moves the points forth and back in turn."""
+    original = deformation.points[ids].copy()
+    positions = cycle((original + 0.01 * np.ptp(deformation.points, axis=0).max(), original))
+    return lambda: deformation.set_positions(ids, next(positions))
 
 
 def nearest(surface: DCPSurface, count: int) -> np.ndarray:
-    """The ``count`` points whose subdomains lie nearest to the middle of all."""
+    """Return the sorted indices of the ``count`` points whose subdomains are nearest to the median centre."""
     supports: Floats = surface.supports
     centre = np.stack([supports[:, :2].mean(axis=1), supports[:, 2:].mean(axis=1)], axis=1)
     distance = np.linalg.norm(centre - np.median(centre, axis=0), axis=1)
     return np.sort(np.argsort(distance, kind="stable")[:count])
 
 
-def group(surface: DCPSurface, mesh: Mesh, share: float) -> tuple[np.ndarray, float]:
-    """The fewest neighbouring points that reach ``share`` of the vertices, and the share they really reach."""
+def group(surface: DCPSurface, mesh: Mesh, fraction: float) -> tuple[np.ndarray, float]:
+    """Return the fewest neighbouring points that influence ``fraction`` of the vertices, and the actual fraction."""
 
-    def reach(count: int) -> float:
-        return share_reached(surface, mesh, nearest(surface, count))
+    def reached_by(count: int) -> float:
+        return fraction_reached(surface, mesh, nearest(surface, count))
 
-    count = bisect_left(range(surface.n), share, lo=1, key=reach)
-    return nearest(surface, count), reach(count)
+    count = bisect_left(range(surface.n), fraction, lo=1, key=reached_by)
+    return nearest(surface, count), reached_by(count)
 
 
-def share_reached(surface: DCPSurface, mesh: Mesh, ids: np.ndarray) -> float:
-    """Part of the vertices at which one of the points has weight."""
+def fraction_reached(surface: DCPSurface, mesh: Mesh, ids: np.ndarray) -> float:
+    """Return the fraction of the vertices at which at least one of the points has weight."""
     hit = np.zeros(len(mesh.uv), dtype=bool)
-    copies = surface.all_supports.reshape(-1, surface.n, 4)[:, ids].reshape(-1, 4)  # of a closed surface's points
+    copies = surface.all_supports.reshape(-1, surface.n, 4)[:, ids].reshape(-1, 4)  # a closed surface repeats points
     u, v = mesh.uv.T
     for start, end, low, high in copies:
         hit |= (u > start) & (u < end) & (v > low) & (v < high)

@@ -1,4 +1,4 @@
-"""Uniform against adaptive meshes at equal deviation (paper, 2.3, figures 2 and 3)."""
+"""Comparison of uniform and adaptive meshes at equal deviation from the surface (paper, 2.3, figures 2 and 3)."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from surface.mesh.mesh import Mesh
 
 from .bench import Report, no_report
 
-FINER = 4  # samples of the reference per edge of the uniform mesh
-MOST_SAMPLES = 40  # along an edge of one large triangle
-DEEPER = 2  # levels the adaptive meshes may go below the uniform one: to the reference's samples
+SAMPLES_PER_EDGE = 4  # of the surface, per median edge of the uniform mesh
+MAX_SAMPLES = 40  # along an edge of one large triangle
+EXTRA_LEVELS = 2  # that adaptive meshes may be deeper than the uniform one, down to the spacing of the samples
 
 
 @dataclass(frozen=True)
 class Variant:
     """One way to tessellate: uniform, by control points (as in the paper) or by chord error.
 
-    ``deviation`` is the greatest distance of the reference samples from the mesh, in units of the points; ``saving``
-    the part of the uniform mesh's vertices that is not needed.
+    deviation : distance of the surface from the mesh, as :func:`deviation` measures it, in units of the points.
+    saving : fraction of the uniform mesh's vertices that is saved; negative if more are needed.
     """
 
     name: str
@@ -43,54 +43,57 @@ def compare(
     quantile: float | None = 1.0,
     report: Report = no_report,
 ) -> list[Variant]:
-    """A uniform mesh, and the smallest adaptive ones that deviate no more.
+    """Return a uniform mesh, and of each kind of adaptive mesh the smallest found that deviates no more.
 
-    The uniform mesh is quartered ``level`` times below the roots. A ``quantile`` of 1 compares greatest deviations,
-    0.99 those that 99 % of the area keep, None root mean squares over the area.
+    A method that finds no such mesh is left out. The uniform mesh is quartered ``level`` times below the roots.
+    ``quantile`` is that of :func:`deviation`.
 
-    The reference is the surface itself, sampled everywhere at a spacing of a quarter of the uniform mesh's edges.
+    The surface itself is the reference; samples are a quarter of the uniform mesh's median edge apart, or less.
     """
-    where = Domain.of(surface) if domain is None else domain
+    region = Domain.of(surface) if domain is None else domain
     size = float(np.linalg.norm(np.ptp(surface.points, axis=0)))
     report("uniform")
     uniform = surface.tessellate(
-        chord_error=1e9, measured=False, min_depth=level, max_depth=level, domain=where, loop_error=1e9
+        chord_error=1e9, measured=False, min_depth=level, max_depth=level, domain=region, loop_error=1e9
     )
-    spacing = _edge(uniform) / FINER
+    spacing = _edge(uniform) / SAMPLES_PER_EDGE
     bound = deviation(surface, uniform, spacing, quantile)
     total = len(uniform.vertices)
     loop_error = max(bound, 0.1 * _edge(uniform))
     found = [Variant("uniform", uniform, bound, 0.0)]
 
-    def off(mesh: Mesh) -> float:
+    def measure_deviation(mesh: Mesh) -> float:
         if len(mesh.vertices) > 4 * total:
-            return 0.0  # so fine that it need not be measured, and no candidate
+            return 0.0  # too large to be a candidate, so it is not measured; the search goes on with a coarser limit
         return deviation(surface, mesh, spacing, quantile)
 
     adaptive = partial(
-        surface.tessellate, measured=False, max_depth=level + DEEPER, domain=where, loop_error=loop_error
+        surface.tessellate, measured=False, max_depth=level + EXTRA_LEVELS, domain=region, loop_error=loop_error
     )
-    ways: list[tuple[str, Callable[[float], Mesh], float, float]] = [
+    methods: list[tuple[str, Callable[[float], Mesh], float, float]] = [
         ("by control points", lambda limit: adaptive(max_points=round(limit)), float(surface.n), 4.0),
         ("by chord error", lambda limit: adaptive(chord_error=limit), 0.1 * size, 1e-6 * size),
     ]
-    for name, make, coarse, fine in ways:
+    for name, make, coarse, fine in methods:
         report(name)
-        best = _search(make, off, coarse, fine, bound)
+        best = _search(make, measure_deviation, coarse, fine, bound)
         if best is not None:
             found.append(Variant(name, *best, 1.0 - len(best[0].vertices) / total))
     return found
 
 
 def _search(
-    make: Callable[[float], Mesh], off: Callable[[Mesh], float], coarse: float, fine: float, bound: float
+    make: Callable[[float], Mesh], measure: Callable[[Mesh], float], coarse: float, fine: float, bound: float
 ) -> tuple[Mesh, float] | None:
-    """Bisect (by ratio) for the coarsest limit whose mesh deviates no more than ``bound``."""
+    """Bisect on a logarithmic scale for the coarsest limit whose mesh deviates no more than ``bound``.
+
+    Return the smallest such mesh found and its deviation, or None.
+    """
     best: tuple[Mesh, float] | None = None
     for _ in range(14):
         limit = float(np.sqrt(coarse * fine))
         mesh = make(limit)
-        reached = off(mesh)
+        reached = measure(mesh)
         if reached <= bound:
             if reached > 0 and (best is None or len(mesh.vertices) < len(best[0].vertices)):
                 best = mesh, reached
@@ -103,38 +106,38 @@ def _search(
 
 
 def _edge(mesh: Mesh) -> float:
-    """Median length of a mesh's edges."""
+    """Return the median length of the first edges of a mesh's triangles."""
     a, b = (mesh.vertices[mesh.triangles[:, k]] for k in (0, 1))
     return float(np.median(np.linalg.norm(b - a, axis=1)))
 
 
 def deviation(surface: DCPSurface, mesh: Mesh, spacing: float, quantile: float | None = 1.0) -> float:
-    """Distance between a surface and a mesh of it: of the surface's points from the planes of their triangles.
+    """Return the deviation of a mesh from its surface: distances of surface points from the planes of their triangles.
 
-    Samples are at most ``spacing`` apart. ``quantile`` 1 asks for the greatest distance, 0.99 for the one that 99 % of
-    the area do not exceed, None for the root mean square over the area.
+    Samples are about ``spacing`` apart, but at most :data:`MAX_SAMPLES` lie along an edge. A ``quantile`` of 1 gives
+    the maximum distance, 0.99 the one that 99 % of the area do not exceed, None the root mean square over the area.
     """
     corner, uv, side = mesh.vertices[mesh.triangles], mesh.uv[mesh.triangles], mesh.side[mesh.triangles]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    parts = np.clip(np.ceil(longest / spacing).astype(np.int64), 2, MOST_SAMPLES)
+    parts = np.clip(np.ceil(longest / spacing).astype(np.int64), 2, MAX_SAMPLES)
     found, weight = [np.zeros(0)], [np.zeros(0)]
     for n in np.unique(parts):
-        at = np.flatnonzero(parts == n)
-        share = _lattice(int(n))
+        rows = np.flatnonzero(parts == n)
+        lattice = _lattice(int(n))
         points = surface.evaluate(
-            np.einsum("sk,tkc->tsc", share, uv[at]).reshape(-1, 2),
-            side=np.repeat(np.bitwise_or.reduce(side[at], axis=1), len(share)),
+            np.einsum("sk,tkc->tsc", lattice, uv[rows]).reshape(-1, 2),
+            side=np.repeat(np.bitwise_or.reduce(side[rows], axis=1), len(lattice)),
         )
-        offset = points.reshape(len(at), -1, 3) - np.einsum("sk,tkc->tsc", share, corner[at])
-        normal = np.cross(corner[at, 1] - corner[at, 0], corner[at, 2] - corner[at, 0])
+        offset = points.reshape(len(rows), -1, 3) - np.einsum("sk,tkc->tsc", lattice, corner[rows])
+        normal = np.cross(corner[rows, 1] - corner[rows, 0], corner[rows, 2] - corner[rows, 0])
         area = np.maximum(np.linalg.norm(normal, axis=1), 1e-300)
         found.append(np.abs(np.einsum("tsc,tc->ts", offset, normal / area[:, None])).ravel())
-        weight.append(np.repeat(area / len(share), len(share)))
+        weight.append(np.repeat(area / len(lattice), len(lattice)))
     return _quantile(np.concatenate(found), np.concatenate(weight), quantile)
 
 
 def _quantile(values: Floats, weights: Floats, quantile: float | None) -> float:
-    """The value that the given part of the weight does not exceed, or the root mean square; NaN values are left out."""
+    """Return the weighted quantile, or for None the weighted root mean square; NaN values are left out."""
     good = np.isfinite(values)
     if quantile is None:
         whole = float(weights[good].sum())
@@ -148,11 +151,11 @@ def _quantile(values: Floats, weights: Floats, quantile: float | None) -> float:
 
 
 def _lattice(n: int) -> Floats:
-    """(s, 3): barycentric coordinates that divide every edge in n, without the corners."""
+    """Return barycentric coordinates (s, 3) of a lattice that divides every edge in n parts, without the corners."""
     i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
     keep = i + j <= n
-    share = np.stack([i[keep], j[keep], n - i[keep] - j[keep]], axis=1) / n
-    inner: Floats = share[share.max(axis=1) < 1]
+    lattice = np.stack([i[keep], j[keep], n - i[keep] - j[keep]], axis=1) / n
+    inner: Floats = lattice[lattice.max(axis=1) < 1]
     return inner
 
 
@@ -178,7 +181,7 @@ def draw(variants: list[Variant], path: str | Path, *, height: int = 900) -> Non
 
 
 def _draw_mesh(pen: object, mesh: Mesh, place: Floats) -> None:
-    """Triangles from the farthest to the nearest, shaded, with their edges."""
+    """Draw shaded triangles with their edges, from the farthest to the nearest."""
     corner = mesh.vertices[mesh.triangles]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     light = np.abs(normal @ [0.3, 0.3, 0.9]) / np.maximum(np.linalg.norm(normal, axis=1), 1e-300)

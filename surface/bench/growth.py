@@ -1,4 +1,4 @@
-"""How time and memory grow with vertices and with control points, and a log-log plot of it."""
+"""Benchmark of how time and memory grow with the numbers of vertices and control points, and its log-log plot."""
 
 from __future__ import annotations
 
@@ -23,12 +23,13 @@ READ, FULL, MOVE, LISTS, MEMORY = (
     "tree and lists built, ms",
     "weights and lists, MB",
 )
-REACH = {(0, FULL): "0.9 to 1.1", (0, MEMORY): "0.9 to 1.1", (0, MOVE): "-0.1 to 0.1"}
+SLOPE_BOUNDS = {(0, FULL): "0.9 to 1.1", (0, MEMORY): "0.9 to 1.1", (0, MOVE): "-0.1 to 0.1"}
+"""Bounds of slopes, by axis (index in ``AXES``) and name of a series."""
 
 
 @dataclass
 class Series:
-    """One quantity (its name with the unit) at rising sizes: of vertices (axis 0) or of control points (axis 1)."""
+    """One quantity, named with its unit, at ascending numbers of vertices (axis 0) or control points (axis 1)."""
 
     name: str
     axis: int
@@ -37,7 +38,7 @@ class Series:
 
     @property
     def slope(self) -> float:
-        """Exponent of a power law through the points: the slope on logarithmic scales."""
+        """Exponent of the power law fitted to the points, which is the slope on logarithmic scales."""
         return float(np.polyfit(np.log(self.size), np.log(self.amount), 1)[0])
 
 
@@ -47,21 +48,21 @@ def growth(
     seconds: float = 0.3,
     report: Report = no_report,
 ) -> list[Series]:
-    """Measure sheets of rising size; the least time of calls repeated for ``seconds`` counts.
+    """Measure sheets of ascending size; times are the minimum of calls repeated for ``seconds``.
 
-    ``vertices`` are sizes with one control point per 64 vertices, so that 16 reach each; ``points`` are numbers of
-    control points under about a quarter of the largest of ``vertices``.
+    vertices : numbers of vertices, with one control point per 64 vertices, so that 16 influence each vertex.
+    points : numbers of control points, each with a mesh of equal cells that is the same for all of them.
     """
     found: list[tuple[int, int, dict[str, float]]] = []
     for count in vertices:
         report(f"growth: {count} vertices")
         surface, mesh = sheet(count)
-        found.append((0, len(mesh.vertices), _amounts(surface, mesh.leaves, seconds)))
+        found.append((0, len(mesh.vertices), _measure_amounts(surface, mesh.leaves, seconds)))
     cells = max(16, round(np.sqrt(max(vertices)) / 2))
     for count in points:
         report(f"growth: {count} control points")
         surface = bumpy(count)
-        found.append((1, surface.n, _amounts(surface, cells * cells, seconds)))
+        found.append((1, surface.n, _measure_amounts(surface, cells * cells, seconds)))
     of_axis = [[(size, amounts) for axis, size, amounts in found if axis == k] for k in range(2)]
     return [
         Series(name, axis, [size for size, _ in rows], [amounts[name] for _, amounts in rows])
@@ -70,8 +71,8 @@ def growth(
     ]
 
 
-def _amounts(surface: DCPSurface, leaves: int, seconds: float) -> dict[str, float]:
-    """Measure one surface with a mesh of so many equal cells."""
+def _measure_amounts(surface: DCPSurface, leaves: int, seconds: float) -> dict[str, float]:
+    """Measure one surface with a mesh of ``leaves`` equal cells; return amounts by name of the series."""
     side = round(np.sqrt(leaves))
     level = max(k for k in range(4) if side % (1 << k) == 0)
     begin = time.perf_counter()
@@ -84,41 +85,44 @@ def _amounts(surface: DCPSurface, leaves: int, seconds: float) -> dict[str, floa
 
 
 def slopes(series: list[Series]) -> list[Measure]:
-    """The exponents as rows of a table."""
+    """Return the exponents as rows of a table."""
     return [
         Measure(f"{line.name}: {line.amount[0]:.3g} to {line.amount[-1]:.3g}", 0.0, line.slope,
-                f"slope in {AXES[line.axis]}", REACH.get((line.axis, line.name), ""))
+                f"slope in {AXES[line.axis]}", SLOPE_BOUNDS.get((line.axis, line.name), ""))
         for line in series
     ]  # fmt: skip
 
 
 COLOURS = ("#9aa2ad", "#1b6ca8", "#c0392b", "#27865b", "#8e44ad")
-PANEL, EDGE, GAP = (400, 420), (70, 50), 250
+PANEL, MARGIN, GAP = (400, 420), (70, 50), 250  # px: width and height of a panel and margins; room for labels
 
 
 def plot(series: list[Series], path: str | Path) -> None:
-    """Write two log-log panels as SVG, against vertices and against control points, with slopes at the lines."""
-    width = 2 * (PANEL[0] + GAP) + EDGE[0]
+    """Write two log-log plots, over vertices and over control points, as SVG; labels of lines give their slopes."""
+    width = 2 * (PANEL[0] + GAP) + MARGIN[0]
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{PANEL[1] + 2 * EDGE[1] + 20}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{PANEL[1] + 2 * MARGIN[1] + 20}" '
         'font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="white"/>'
     ]
     amounts = np.log10([y for line in series for y in line.amount])
     low, high = np.floor(amounts.min()), np.ceil(amounts.max())
     for axis in range(2):
-        own = [line for line in series if line.axis == axis]
-        sizes = np.log10([x for line in own for x in line.size])
+        lines = [line for line in series if line.axis == axis]
+        sizes = np.log10([x for line in lines for x in line.size])
         frame = np.floor(sizes.min() + 0.1), np.ceil(sizes.max() - 0.1), low, high
-        parts += _panel(own, frame, EDGE[0] + axis * (PANEL[0] + GAP), AXES[axis])
+        parts += _panel(lines, frame, MARGIN[0] + axis * (PANEL[0] + GAP), AXES[axis])
     Path(path).write_text("\n".join([*parts, "</svg>"]), encoding="utf-8")
 
 
 def _panel(lines: list[Series], frame: tuple[float, float, float, float], left: float, title: str) -> list[str]:
-    """Grid, lines and labels of one panel; ``frame`` holds powers of ten."""
+    """Return the SVG elements of one panel: grid, lines and labels.
+
+    frame : exponents of ten at the left, right, lower and upper border. left : px.
+    """
     x0, x1, y0, y1 = frame
 
     def place(x: float, y: float) -> tuple[float, float]:
-        return left + (x - x0) / (x1 - x0) * PANEL[0], EDGE[1] + (y1 - y) / (y1 - y0) * PANEL[1]
+        return left + (x - x0) / (x1 - x0) * PANEL[0], MARGIN[1] + (y1 - y) / (y1 - y0) * PANEL[1]
 
     parts = []
     for power in range(int(x0), int(x1) + 1):
@@ -143,7 +147,7 @@ def _panel(lines: list[Series], frame: tuple[float, float, float, float], left: 
 
 
 def _spread(heights: list[float], step: float = 15.0) -> list[float]:
-    """Heights of labels, moved down where they would overlap."""
+    """Return heights of labels, px, moved down where they would overlap."""
     out, last = list(heights), -np.inf
     for k in np.argsort(heights):
         last = out[k] = max(heights[k], last + step)

@@ -1,6 +1,6 @@
-"""Other ways to the same vertices, for comparison: sparse matrices, blendshapes, stencil tables, spline libraries.
+"""Reference implementations that compute the same vertices by sparse matrix, blendshapes, stencils or a spline library.
 
-splinepy and geomdl are measured where they are installed; nothing here needs them.
+The libraries splinepy and geomdl are measured only if they are installed.
 """
 
 from __future__ import annotations
@@ -19,24 +19,27 @@ from surface.dcp import DCPSurface
 from surface.mesh.mesh import Mesh
 
 BLENDSHAPES = 52
-SAMPLES = 200  # vertices that geomdl computes; all would take minutes
+GEOMDL_VERTICES = 200  # that geomdl computes; all would take minutes
 
 Evaluator = Callable[[], object]
 
 
 class Peer(NamedTuple):
-    """A way to compute the vertices; its time counts ``share`` times, and ``reach`` is as of a ``Measure``."""
+    """A reference implementation.
+
+    time_factor : the measured time is multiplied by it. reach : bound, as of a :class:`.bench.Measure`.
+    """
 
     name: str
     prepare: Callable[[DCPSurface, Mesh], Evaluator]
-    share: float = 1.0
+    time_factor: float = 1.0
     reach: str = ""
 
 
 def vertex_sums(mesh: Mesh) -> list[Peer]:
-    """Ways that sum control points or shapes for any mesh.
+    """Return implementations that sum control points or blendshapes, for a mesh of any surface.
 
-    Blendshapes read as many MB as their name says, and are only as slow as memory where caches hold less.
+    The row of blendshapes names the MB it reads: memory limits its speed only if the caches hold less.
     """
     megabytes = BLENDSHAPES * 3 * 4 * len(mesh.vertices) / 1e6
     return [
@@ -47,13 +50,13 @@ def vertex_sums(mesh: Mesh) -> list[Peer]:
 
 
 def libraries(mesh: Mesh) -> list[Peer]:
-    """Spline libraries that are installed, for a sheet of :mod:`.bench`; they evaluate basis functions each time."""
-    known = [Peer("splinepy", splinepy), Peer("geomdl", geomdl, len(mesh.uv) / SAMPLES)]
+    """Return the installed spline libraries, for a sheet of :mod:`.bench`; they evaluate basis functions each time."""
+    known = [Peer("splinepy", splinepy), Peer("geomdl", geomdl, len(mesh.uv) / GEOMDL_VERTICES)]
     return [peer for peer in known if importlib.util.find_spec(peer.name) is not None]
 
 
 def one_thread() -> AbstractContextManager[object]:
-    """Keep numpy's matrix products to one thread where threadpoolctl is installed; else they use what they find."""
+    """Limit numpy's matrix products to one thread if threadpoolctl is installed; otherwise do nothing."""
     if importlib.util.find_spec("threadpoolctl") is None:
         return nullcontext()
     limits: AbstractContextManager[object] = importlib.import_module("threadpoolctl").threadpool_limits(1)
@@ -61,24 +64,24 @@ def one_thread() -> AbstractContextManager[object]:
 
 
 def sparse_matrix(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """scipy's compressed sparse rows times the control points, float32."""
+    """Return a product of scipy's compressed sparse rows and the control points, float32."""
     matrix = surface.basis_matrix(mesh.uv, side=mesh.side).astype(np.float32)
     points = surface.points.astype(np.float32)
     return lambda: matrix @ points
 
 
 def blendshapes(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """52 blendshape weights times 52 displacements of every vertex, float32."""
+    """Return a product of 52 blendshape weights and 52 displacements of every vertex, float32."""
     shapes = np.ones((BLENDSHAPES, 3 * len(mesh.vertices)), dtype=np.float32)
     amounts = np.ones(BLENDSHAPES, dtype=np.float32)
     return lambda: amounts @ shapes
 
 
 def stencils(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """A stencil table, evaluated row by row with one thread, float32.
+    """Return the evaluation of a stencil table, row by row with one thread, float32.
 
-    It keeps, per vertex, how many control points reach it, which they are and with what weight, as Pixar's OpenSubdiv
-    does (``Far::StencilTable``).
+    The table holds, per vertex, the number, indices and weights of the control points that influence it, as in
+    Pixar's OpenSubdiv (``Far::StencilTable``).
     """
     matrix = surface.basis_matrix(mesh.uv, side=mesh.side)
     sizes, ids = np.diff(matrix.indptr).astype(np.int32), matrix.indices.astype(np.int32)
@@ -107,28 +110,28 @@ def _apply_stencils(sizes, ids, weights, points, out):  # type: ignore[no-untype
 
 
 def splinepy(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """splinepy's compiled NURBS, one thread."""
+    """Return the evaluation by splinepy's compiled NURBS, one thread."""
     library = importlib.import_module("splinepy")
     side, points, knots = net_of(surface)
-    net = points.reshape(side, side, 3).transpose(1, 0, 2).reshape(-1, 3)  # u runs fastest there
+    net = points.reshape(side, side, 3).transpose(1, 0, 2).reshape(-1, 3)  # splinepy varies u fastest
     spline = library.NURBS([3, 3], [knots, knots], net, np.ones((len(net), 1)))
     uv = np.ascontiguousarray(mesh.uv)
     return lambda: spline.evaluate(uv, nthreads=1)
 
 
 def geomdl(surface: DCPSurface, mesh: Mesh) -> Evaluator:
-    """geomdl's NURBS in plain Python, for the first :data:`SAMPLES` vertices."""
+    """Return the evaluation by geomdl's NURBS in plain Python, for the first :data:`GEOMDL_VERTICES` vertices."""
     side, points, knots = net_of(surface)
     spline = importlib.import_module("geomdl.NURBS").Surface()
     spline.degree_u = spline.degree_v = 3
     spline.set_ctrlpts(np.hstack([points, np.ones((len(points), 1))]).tolist(), side, side)
     spline.knotvector_u = spline.knotvector_v = knots.tolist()
-    uv = mesh.uv[:SAMPLES].tolist()
+    uv = mesh.uv[:GEOMDL_VERTICES].tolist()
     return lambda: spline.evaluate_list(uv)
 
 
 def net_of(surface: DCPSurface) -> tuple[int, Floats, Floats]:
-    """Side of a square bicubic net, its points ``(n, 3)`` and its knot vector, as :func:`.bench.sheet` makes it."""
+    """Return the side of a square bicubic net made by :func:`.bench.sheet`, its points (n, 3) and its knot vector."""
     side = int(np.sqrt(surface.n))
     knots = np.concatenate([surface.padded[1][:side, 0], surface.padded[1][side - 1, 1:]])
     return side, surface.points, knots

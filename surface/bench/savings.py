@@ -1,7 +1,8 @@
-"""What the quad tree saves on ten different surfaces, at equal deviation of 99 % of the area and at equal RMS.
+"""Benchmark of the vertices that a quad tree saves on different surfaces, compared with a uniform mesh.
 
-One surface flatters or blames a method: what counts is how curvature is spread. So these go from a sheet with one small
-hill to surfaces that are curved everywhere alike, where a quad tree can save nothing.
+The meshes compared have equal deviation over 99 % of the area, or equal root mean square (RMS) deviation. The saving
+depends on how curvature is distributed, so a single surface would favour one method. The surfaces here range from a
+sheet with one small hill to surfaces that are equally curved everywhere, on which a quad tree can save nothing.
 """
 
 from __future__ import annotations
@@ -19,14 +20,17 @@ from .bench import Report, no_report
 from .comparison import compare
 
 Subject = tuple[str, DCPSurface, Domain | None]
+"""Name, surface, and the domain to tessellate; None for all of it."""
 MEASURES: dict[str, float | None] = {"deviation of 99 % of the area": 0.99, "RMS": None}
-WAYS = ("by control points", "by chord error")
+METHODS = ("by control points", "by chord error")
 
 
 @dataclass(frozen=True)
 class Saving:
-    """The part of a uniform mesh's vertices that the quad tree saves on one surface at an equal measure; NaN where no
-    mesh of up to four times the size is as good."""
+    """Fractions of a uniform mesh's vertices that two kinds of quad tree save on one surface at an equal measure.
+
+    NaN if no mesh of up to four times the uniform mesh's size is as good.
+    """
 
     name: str
     measure: str
@@ -35,7 +39,7 @@ class Saving:
 
 
 def savings(subjects: Sequence[Subject], level: int, report: Report = no_report) -> list[Saving]:
-    """Compare on every surface by both measures; the least saving by chord error comes first, measure by measure.
+    """Return the savings on every surface, measure by measure, sorted by ascending saving by chord error.
 
     The uniform mesh is quartered ``level`` times below its roots.
     """
@@ -45,15 +49,15 @@ def savings(subjects: Sequence[Subject], level: int, report: Report = no_report)
         for name, surface, domain in subjects:
             report(f"{name}: {measure}")
             best = {v.name: v.saving for v in compare(surface, domain, level=level, quantile=quantile)}
-            rows.append(Saving(name, measure, *(best.get(way, np.nan) for way in WAYS)))
+            rows.append(Saving(name, measure, *(best.get(method, np.nan) for method in METHODS)))
         found += sorted(rows, key=lambda row: np.nan_to_num(row.by_chord, nan=-np.inf))
     return found
 
 
 def nine_surfaces() -> list[Subject]:
-    """Nine NURBS surfaces of about 100 units, each curved in another way."""
+    """Return nine surfaces about 100 units in size, each curved in a different way."""
     sheets: list[Subject] = [(name, _sheet(shape), None) for name, shape in SHEETS.items()]
-    return [*sheets, ("ball", _turned(_half_circle), None), ("vase", _turned(_vase), None), ("ring", _ring(), None)]
+    return [*sheets, ("ball", _revolve(_half_circle), None), ("vase", _revolve(_vase), None), ("ring", _ring(), None)]
 
 
 def _half_circle(t: Floats) -> tuple[Floats, Floats]:
@@ -101,26 +105,29 @@ SHEETS: dict[str, Callable[[Floats, Floats], Floats]] = {
 }  # fmt: skip
 
 
-def _clamped(count: int) -> Floats:
+def _clamped_knots(count: int) -> Floats:
+    """Return the clamped, uniform cubic knot vector of ``count`` control points."""
     return np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, count - 2), [1.0] * 3])
 
 
 def _sheet(height: Callable[[Floats, Floats], Floats], count: int = 40) -> DCPSurface:
-    """A cubic net 100 x 100 over the unit square, as high as ``height`` says for x and y from 0 to 1."""
-    knots = _clamped(count)
+    """Return a bicubic surface 100 x 100 whose control points are at ``height(x, y)``, x and y from 0 to 1."""
+    knots = _clamped_knots(count)
     place = np.array([knots[k + 1 : k + 4].mean() for k in range(count)])
     x, y = np.meshgrid(place, place, indexing="ij")
     return DCPSurface.from_nurbs(3, 3, knots, knots, np.stack([100 * x, 100 * y, height(x, y)], axis=-1))
 
 
-def _turned(profile: Callable[[Floats], tuple[Floats, Floats]], count: int = 24) -> DCPSurface:
-    """A profile (radius and height, in parts of 50, for t from 0 to 1) turned about z: exact circles of degree 2
-    (Piegl and Tiller, The NURBS Book, 8.5)."""
-    knots = _clamped(count)
+def _revolve(profile: Callable[[Floats], tuple[Floats, Floats]], count: int = 24) -> DCPSurface:
+    """Return the surface of revolution about z of a profile: radius and height in units of 50, for t from 0 to 1.
+
+    Its circles are exact, of degree 2 (Piegl and Tiller, The NURBS Book, 8.5).
+    """
+    knots = _clamped_knots(count)
     t = np.array([knots[k + 1 : k + 4].mean() for k in range(count)])
     radius, height = profile(t)
-    round_ = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]])
-    flat = round_[:, None] * radius[None, :, None]
+    circle = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0]])
+    flat = circle[:, None] * radius[None, :, None]
     net = 50 * np.dstack([flat, np.broadcast_to(height, flat.shape[:2])])
     weights = np.repeat([[1.0], [np.sqrt(0.5)]] * 4 + [[1.0]], count, axis=1)
     around = [0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1]
@@ -128,7 +135,7 @@ def _turned(profile: Callable[[Floats], tuple[Floats, Floats]], count: int = 24)
 
 
 def _ring(around: int = 24, across: int = 12) -> DCPSurface:
-    """A torus of cubic control points, closed in both directions."""
+    """Return a cubic torus, closed in both directions."""
     a, b = 2 * np.pi * np.arange(around) / around, 2 * np.pi * np.arange(across) / across
     radius = 35 + 15 * np.cos(b)
     net = np.stack([np.outer(np.cos(a), radius), np.outer(np.sin(a), radius), np.tile(15 * np.sin(b), (around, 1))], -1)

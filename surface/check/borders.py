@@ -18,23 +18,23 @@ from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import Mouth
 from surface.check.network import Network
 from surface.check.places import Places
-from surface.check.raster import View, turned
+from surface.check.raster import View, view_rotation
 from surface.check.subject import Subject, pose_of
 from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import border_edges
 
 SEWN_MM = 0.4  # distance within which two borders are sewn
-ALONG_MM = 1.2  # edges with less border than this between them are neighbours, and not sewn to each other
-WIDE_MM = 1.2  # least width of a hole: the diameter of a round one, twice the height of a slit
+ALONG_MM = 1.2  # edges with less border than this between them are neighbours, which are never sewn to each other
+MIN_WIDTH_MM = 1.2  # least width of a hole: the diameter of a round one, twice the height of a slit
 APART_MM = 1.0  # distance between borders sewn at rest from which a seam is open
 SHEETS = ("skin", "mouth", "tongue")  # materials of the sheets that have to be closed
-END_MM = 40.0  # wider openings are where the mesh ends, as on a head without scalp under its hair
-SEEN = 0.1  # least share of a hole's area that is visible from outside: the root of an ear lies under other skin
-FACING = 0.3  # least cosine between a hole's outward normal and a viewer behind the head for it to face that viewer
+MESH_END_MM = 40.0  # wider openings are where the mesh ends, as on a head without scalp under its hair
+MIN_VISIBLE = 0.1  # fraction of a hole's area that must be visible from outside: roots of ears are hidden
+MIN_FACING_COS = 0.3  # between a hole's outward normal and the direction to a viewer behind the head
 CAP_STEPS = 60  # pixels over the cap of a hole
 VIEWS = ((0, 0), (60, 0), (-60, 0), (120, 0), (-120, 0), (180, 0), (0, -60), (0, 60))  # yaw and pitch, degrees
-MOUTH_REACH = 0.75  # in widths of the mouth, from its middle
-EYE_REACH = 1.7  # in radii: a loop whose middle is so near to an eye's centre is its opening
+MOUTH_RADIUS = 0.75  # of the area that belongs to the mouth, around its middle, in widths of the mouth
+EYE_RADIUS = 1.7  # of the area that belongs to an eye, around its centre, in radii of the eyeball
 
 
 @dataclass(frozen=True)
@@ -55,12 +55,12 @@ class Borders:
     network: Network
 
     def at(self, vertices: list[Floats32]) -> Floats:
-        """(e, 2, 3) ends of the edges, mm, for the posed vertices (v, 3) of every part."""
-        return _ends_at(self.part, self.ends, vertices)
+        """Return (e, 2, 3): ends of the edges, mm, for the posed vertices (v, 3) of every part."""
+        return _edge_ends(self.part, self.ends, vertices)
 
 
-def _ends_at(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
-    """(e, 2, 3) as :meth:`Borders.at` gives them."""
+def _edge_ends(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
+    """Return the ends (e, 2, 3) of edges as :meth:`Borders.at` does."""
     out = np.empty((len(part), 2, 3))
     for k in np.unique(part):
         out[part == k] = vertices[k][ends[part == k]]
@@ -68,10 +68,10 @@ def _ends_at(part: Ints, ends: Ints, vertices: list[Floats32]) -> Floats:
 
 
 def find_borders(subject: Subject) -> Borders:
-    """All border edges, and which of them are sewn at rest."""
+    """Return all border edges, and which of them are sewn at rest."""
     numbers = [k for k, p in enumerate(subject.parts) if p.material in SHEETS and p.follows == "skin"]
     starts = np.cumsum([0, *(len(v) for v in subject.rest)])
-    pairs = [(k, border_edges(_welded(subject, k).astype(np.int32))) for k in numbers]
+    pairs = [(k, border_edges(_weld(subject, k).astype(np.int32))) for k in numbers]
     part = np.concatenate([np.full(len(e), k) for k, e in pairs] or [np.zeros(0, int)]).astype(np.int64)
     ends = np.concatenate([e for _, e in pairs] or [np.zeros((0, 2), int)]).astype(np.int64)
     ids = ends + starts[part][:, None]
@@ -85,8 +85,8 @@ def find_borders(subject: Subject) -> Borders:
     return Borders(part, ends, ids, mate >= 0, mate, network)
 
 
-def _welded(subject: Subject, number: int) -> Ints:
-    """(t, 3) triangles of a part, where vertices in one place are one; triangles without area are dropped."""
+def _weld(subject: Subject, number: int) -> Ints:
+    """Return (t, 3): triangles of a part, where vertices in one place are one; triangles without area are dropped."""
     at, triangles = subject.rest[number], subject.parts[number].triangles
     _, first, same = np.unique(np.round(at / (1e-3 * subject.scale)), axis=0, return_index=True, return_inverse=True)
     corner = first[same.ravel()][triangles]
@@ -96,20 +96,20 @@ def _welded(subject: Subject, number: int) -> Ints:
 
 
 def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Borders) -> Iterator[Finding]:
-    """Holes at rest, and seams that open in a pose.
+    """Find holes at rest, and seams that open in a pose.
 
     A very wide hole is where the skin of a mesh ends, as under hair. It is a warning, and so are the holes in smaller
     parts of such a head, such as the roots of its ears.
     """
     at = borders.at(subject.rest)
     found = []
-    for loop in _loops(subject, borders):
-        (middle, width), part = _form(at[loop]), subject.parts[borders.part[loop[0]]]
-        wide = width >= WIDE_MM * subject.scale and not _in_openings(subject, mouth, middle[None])[0]
+    for loop in _find_loops(subject, borders):
+        (middle, width), part = _measure_loop(at[loop]), subject.parts[borders.part[loop[0]]]
+        wide = width >= MIN_WIDTH_MM * subject.scale and not _in_openings(subject, mouth, middle[None])[0]
         if wide and is_seen(subject, part, at[loop]):
             length = float(np.linalg.norm(at[loop, 1] - at[loop, 0], axis=1).sum())
             text = f"a hole in part {part.name!r}, {length:.0f} mm around: {places.name(middle)}"
-            found.append((text, width > END_MM * subject.scale, part is subject.parts[subject.skin[0]]))
+            found.append((text, width > MESH_END_MM * subject.scale, part is subject.parts[subject.skin[0]]))
     ends = any(large for _, large, _ in found)
     for text, large, main in found:
         yield Finding("hole", text, f"close it in the mesh, then {AGAIN}", warning=large or (ends and not main))
@@ -117,7 +117,7 @@ def holes(subject: Subject, mouth: Mouth | None, places: Places, borders: Border
 
 
 def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, places: Places) -> Iterator[Finding]:
-    """The seam that opens furthest, with the pose in which it does."""
+    """Find the seam that opens furthest, with the pose in which it does."""
     worst, where, pose = 0.0, np.zeros(3), ""
     reach, along = 4.0 * APART_MM * subject.scale, ALONG_MM * subject.scale
     rest = borders.at(subject.rest).mean(axis=1)
@@ -138,11 +138,11 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
         yield Finding("hole", text, AGAIN)
 
 
-def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
-    """Edges of every chain that is sewn to nothing, without the outer border of each sheet."""
+def _find_loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
+    """Return edges of every chain that is sewn to nothing, without the outer border of each sheet."""
     free, at = np.flatnonzero(~borders.sewn), borders.at(subject.rest)
-    chains = _chains(_joined(borders, at, free, SEWN_MM * subject.scale))
-    sheet = _sheets(subject, borders)
+    chains = _find_chains(_join_ends(borders, at, free, SEWN_MM * subject.scale))
+    sheet = _find_sheets(subject, borders)
     lengths = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
     rows = [free[c] for c in chains]
     outer: dict[int, tuple[float, int]] = {}
@@ -153,31 +153,33 @@ def _loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
     yield from (row for k, row in enumerate(rows) if k not in longest)
 
 
-def _joined(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
-    """(k, 2) ends of the edges ``rows (k,)``; ends nearer than ``reach`` mm to each other, as at a seam, are one."""
+def _join_ends(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
+    """Return (k, 2): ends of the edges ``rows (k,)``; ends nearer than ``reach`` mm to each other, as at a seam, are
+    one."""
     ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
     known = np.unique(ends, return_inverse=True)[1].reshape(-1)
     return joined_nearer(points, known, reach).reshape(-1, 2)
 
 
-def _chains(ids: Ints) -> list[Ints]:
-    """Rows of edges (e, 2) of each connected component."""
+def _find_chains(ids: Ints) -> list[Ints]:
+    """Return rows of edges (e, 2) of each connected component."""
     label = _components(ids, int(ids.max(initial=-1)) + 1)
     own = label[ids[:, 0]] if len(ids) else np.zeros(0, np.int64)
     return [np.flatnonzero(own == k) for k in np.unique(own)]
 
 
-def _sheets(subject: Subject, borders: Borders) -> Ints:
-    """(v,) number of the sheet that each vertex belongs to; triangles and seams connect the vertices of a sheet."""
+def _find_sheets(subject: Subject, borders: Borders) -> Ints:
+    """Return (v,): number of the sheet that each vertex belongs to; triangles and seams connect the vertices of a
+    sheet."""
     starts = np.cumsum([0, *(len(v) for v in subject.rest)])
-    links = [_welded(subject, k)[:, [0, 1, 1, 2]].reshape(-1, 2) + starts[k] for k in np.unique(borders.part)]
+    links = [_weld(subject, k)[:, [0, 1, 1, 2]].reshape(-1, 2) + starts[k] for k in np.unique(borders.part)]
     sewn = np.flatnonzero(borders.sewn)
     links.append(np.column_stack([borders.ids[sewn, 0], borders.ids[borders.mate[sewn], 0]]))
     return _components(np.concatenate(links), int(starts[-1]))
 
 
 def _components(links: Ints, count: int) -> Ints:
-    """(count,) for each node the least number in its connected component; ``links (k, 2)`` connect nodes."""
+    """Return (count,): for each node the least number in its connected component; ``links (k, 2)`` connect nodes."""
     label = np.arange(count)
     while len(links):
         least = np.minimum(label[links[:, 0]], label[links[:, 1]])
@@ -192,9 +194,9 @@ def _components(links: Ints, count: int) -> Ints:
     return label
 
 
-def _form(ends: Floats) -> tuple[Floats, float]:
-    """Middle (3,) and width of a loop, mm. The width is four times the area divided by the length: the diameter of a
-    circle, and twice the height of a slit."""
+def _measure_loop(ends: Floats) -> tuple[Floats, float]:
+    """Return the middle (3,) and width of a loop, mm. The width is four times the area divided by the length: the
+    diameter of a circle, and twice the height of a slit."""
     middle = ends.reshape(-1, 3).mean(axis=0)
     area = 0.5 * np.linalg.norm(np.cross(ends[:, 0] - middle, ends[:, 1] - middle).sum(axis=0))
     return middle, float(4.0 * area / max(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum(), 1e-9))
@@ -214,24 +216,24 @@ def is_seen(subject: Subject, part: HeadPart, ends: Floats) -> bool:
     out = -np.cross(ends[:, 0] - middle, ends[:, 1] - middle)  # triangles have a hole on their right
     area = 0.5 * float(np.linalg.norm(out, axis=1).sum())
     for yaw, pitch in VIEWS:
-        turn = turned(yaw, pitch)
-        faces = float(turn[2] @ out.sum(axis=0)) > FACING * 2.0 * area
+        turn = view_rotation(yaw, pitch)
+        faces = float(turn[2] @ out.sum(axis=0)) > MIN_FACING_COS * 2.0 * area
         if abs(yaw) > 90 and not (faces and part.material == "skin"):
             continue
         (x0, y0, _), (x1, y1, _) = (f(cap @ turn.T, axis=0).tolist() for f in (np.min, np.max))
         step = max(x1 - x0, y1 - y0, 1e-3) / CAP_STEPS
         picture = View((x0, x1), (y0, y1), step, turn).draw(shapes)
-        if (picture.parts == len(shapes) - 1).sum() * step**2 > SEEN * area:
+        if (picture.parts == len(shapes) - 1).sum() * step**2 > MIN_VISIBLE * area:
             return True
     return False
 
 
 def _in_openings(subject: Subject, mouth: Mouth | None, at: Floats) -> Bools:
-    """(m,) which of the places (m, 3) belong to the rim of the mouth, or of an eye that has an eyeball."""
+    """Return (m,): which of the places (m, 3) belong to the rim of the mouth, or of an eye that has an eyeball."""
     out = np.zeros(len(at), bool)
     if subject.eyes is not None:
         for side in (n for n in (0, 1) if subject.eye(n) is not None):
-            out |= np.linalg.norm(at - subject.eyes[side], axis=1) < EYE_REACH * subject.head.data.eye_radius
+            out |= np.linalg.norm(at - subject.eyes[side], axis=1) < EYE_RADIUS * subject.head.data.eye_radius
     if mouth is not None:
-        out |= np.linalg.norm(at - mouth.middle, axis=1) < MOUTH_REACH * mouth.width
+        out |= np.linalg.norm(at - mouth.middle, axis=1) < MOUTH_RADIUS * mouth.width
     return out

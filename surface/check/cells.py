@@ -1,4 +1,4 @@
-"""Points sorted into cubes, so that those near a place are found without looking at all of them.
+"""A spatial hash of points: they are sorted into cubes, so that those near a place are found quickly.
 
 Only cubes that hold points take memory, however far apart the points lie.
 """
@@ -13,7 +13,7 @@ import numpy as np
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.jit import kernel
 
-MOST = float(1 << 60)  # cubes on either side of the origin; what lies further away shares the last one
+MAX_CUBE = float(1 << 60)  # cubes on either side of the origin; what lies further away shares the last one
 CORNER = 0.57  # edge of a cube relative to its diagonal, just below 1 / sqrt(3)
 
 
@@ -21,8 +21,8 @@ CORNER = 0.57  # edge of a cube relative to its diagonal, just below 1 / sqrt(3)
 class Cells:
     """Points (m, 3) by cubes.
 
-    keys : (c, 3) whole numbers of the cubes that hold points, rising by x, then y, then z.
-    start, order : the points of cube k are ``order (m,)`` from ``start[k]`` to ``start[k + 1]``, rising.
+    keys : (c, 3) whole numbers of the cubes that hold points, sorted by x, then y, then z.
+    start, order : the points of cube k are ``order (m,)`` from ``start[k]`` to ``start[k + 1]``, ascending.
     own : (m,) the cube of each point.
     """
 
@@ -32,24 +32,24 @@ class Cells:
     own: Ints
 
     def columns(self) -> tuple[Ints, Ints]:
-        """(c, 9) each: the points in the 27 cubes around cube k are those of ``order`` from ``first[k, i]`` to
+        """Return (c, 9): each: the points in the 27 cubes around cube k are those of ``order`` from ``first[k, i]`` to
         ``last[k, i]``, for i from 0 to 8."""
         return self.columns_at(self.keys)
 
     def columns_at(self, keys: Ints) -> tuple[Ints, Ints]:
-        """As :meth:`columns` for any cubes ``keys (k, 3)``."""
+        """Do the same as :meth:`columns` for any cubes ``keys (k, 3)``."""
         first, last = np.zeros((len(keys), 9), np.int64), np.zeros((len(keys), 9), np.int64)
         _fill_columns(keys, self.keys, self.start, first, last)
         return first, last
 
 
 def cubes(points: Floats, size: float) -> Ints:
-    """(m, 3) the cube of each of points (m, 3), with edges of ``size``; one has a corner at the origin."""
-    return np.clip(np.floor(points / size), -MOST, MOST).astype(np.int64)
+    """Return (m, 3): the cube of each of points (m, 3), with edges of ``size``; one has a corner at the origin."""
+    return np.clip(np.floor(points / size), -MAX_CUBE, MAX_CUBE).astype(np.int64)
 
 
 def sort_into_cells(points: Floats, size: float) -> Cells:
-    """Points (m, 3), at least one, by cubes with edges of ``size``."""
+    """Return points (m, 3), at least one, by cubes with edges of ``size``."""
     at = cubes(points, size)
     order = np.lexsort(at.T[::-1])
     rises = np.append(True, (at[order[1:]] != at[order[:-1]]).any(axis=1))
@@ -61,7 +61,7 @@ def sort_into_cells(points: Floats, size: float) -> Cells:
 
 @kernel
 def first_from(keys: Any, x: Any, y: Any, z: Any) -> Any:
-    """The number of the first of ``keys (c, 3)``, which rise, that does not come before (x, y, z)."""
+    """Return the number of the first of the sorted ``keys (c, 3)`` that does not come before (x, y, z)."""
     low, high = 0, len(keys)
     while low < high:
         middle = (low + high) // 2
@@ -85,7 +85,7 @@ def _fill_columns(wanted: Any, keys: Any, start: Any, first: Any, last: Any) -> 
 
 
 def any_nearer(points: Floats, others: Floats, least: float) -> Bools:
-    """(k,) whether any of others (r, 3) is nearer than ``least`` to each of points (k, 3)."""
+    """Return (k,): whether any of others (r, 3) is nearer than ``least`` to each of points (k, 3)."""
     near = np.zeros(len(points), np.bool_)
     if len(others):
         cells = sort_into_cells(others, least)
@@ -108,13 +108,13 @@ def _any_nearer(points: Any, others: Any, first: Any, last: Any, order: Any, lea
 
 @kernel
 def _square(p: Any, q: Any) -> Any:
-    """Square of the distance of two places (3,)."""
+    """Return the square of the distance of two places (3,)."""
     return (p[0] - q[0]) ** 2 + (p[1] - q[1]) ** 2 + (p[2] - q[2]) ** 2
 
 
 def joined_nearer(points: Floats, known: Ints, reach: float) -> Ints:
-    """(m,) the same number for those of points (m, 3) that chains of points nearer than ``reach`` to the next connect,
-    or that have the same number ``known (m,)``, from 0 to below m, already."""
+    """Return (m,): the same number for those of points (m, 3) that chains of points nearer than ``reach`` to the next
+    connect, or that have the same number ``known (m,)``, from 0 to below m, already."""
     root = np.arange(len(points))
     if len(points):
         _, first = np.unique(known, return_index=True)
@@ -128,7 +128,7 @@ def joined_nearer(points: Floats, known: Ints, reach: float) -> Ints:
 
 @kernel
 def _root_of(root: Any, k: Any) -> Any:
-    """The last point of the chain of ``root`` from point k on, which becomes shorter by that."""
+    """Return the last point of the chain of ``root`` from point k on, which becomes shorter by that."""
     while root[k] != k:
         root[k] = root[root[k]]
         k = root[k]

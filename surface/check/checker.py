@@ -13,13 +13,13 @@ from surface.check.places import Places
 from surface.check.subject import Subject
 from surface.head import Head
 
-GAPE_MM = 1.2  # most height of the opening between closed lips
+MAX_GAP_MM = 1.2  # maximum height of the gap between closed lips
 
 
 def check_head(head: Head) -> list[Finding]:
-    """Everything that is wrong with a head; empty for a good one. The head is left at rest.
+    """Return all defects of a head; an empty list for a good one. The head is left at rest.
 
-    Looks at the head at rest and with every parameter at 1, from its geometry alone. Lengths are limited in millimetres
+    The geometry is checked at rest and with every parameter at 1. Lengths are limited in millimetres
     of a head of usual size, and grow with the distance between the eyes.
     """
     subject = Subject(head)
@@ -38,7 +38,7 @@ def check_head(head: Head) -> list[Finding]:
 
 
 def not_finite(subject: Subject) -> Iterator[Finding]:
-    """Poses that throw vertices out of space."""
+    """Find poses with vertices that are not finite."""
     for name in ("", *subject.head.parameters):
         vertices = subject.at_one(name) if name else subject.rest
         bad = [p.name for p, v in zip(subject.parts, vertices, strict=True) if not np.isfinite(v).all()]
@@ -49,15 +49,15 @@ def not_finite(subject: Subject) -> Iterator[Finding]:
 
 
 def unsealed_lips(subject: Subject, mouth: Mouth | None) -> Iterator[Finding]:
-    """Lips that gape at rest, or where mouthClose should close them over an open jaw."""
+    """Find lips that gape at rest, or where mouthClose should close them over an open jaw."""
     if mouth is None:
         return
     at_rest, x = lips_gap(subject, mouth, subject.rest)
     hint = f"close the lips in the mesh, then {AGAIN}"
-    if at_rest > GAPE_MM * subject.scale:
+    if at_rest > MAX_GAP_MM * subject.scale:
         yield Finding("unsealed lips", f"the neutral face has its lips {at_rest:.1f} mm apart at x = {x:.0f} mm", hint)
     if "mouthClose" in subject.claimed:
         closed, x = lips_gap(subject, mouth, subject.at_one("mouthClose"))
-        if closed > max(GAPE_MM * subject.scale, at_rest + 0.5 * GAPE_MM * subject.scale):
+        if closed > max(MAX_GAP_MM * subject.scale, at_rest + 0.5 * MAX_GAP_MM * subject.scale):
             text = f"jawOpen = 1 with mouthClose = 1 leaves the lips {closed:.1f} mm apart at x = {x:.0f} mm"
             yield Finding("unsealed lips", text, f"make mouthClose bring the lips together over jawOpen, then {AGAIN}")

@@ -14,14 +14,14 @@ from surface.base.arrays import Bools, Floats, Ints
 from surface.base.jit import inlined, kernel, merged
 from surface.mesh.boxtree import LEAF, BoxTree
 
-ENCLOSED = 10.0  # times the depth that is looked for: how far away the back of the flesh may be that encloses a point
-OBLIQUE = 1.5  # a vertex lies no deeper than it is away from the crossing along its own surface, times this
+ENCLOSED = 10.0  # maximum distance to the back of the flesh that encloses a point, in depths that are searched for
+OBLIQUE = 1.5  # maximum depth of a vertex, relative to its distance from the crossing along its own surface
 
 
 @inlined
 def _passes(p: Any, d0: Any, d1: Any, d2: Any, a: Any, b: Any, c: Any) -> Any:
-    """Where the segment from p by d passes through the triangle a, b, c: 0..1 out of its back, -1..0 into its front, 2
-    where it does not."""
+    """Return where the segment from p by d passes through the triangle a, b, c: 0..1 out of its back, -1..0 into its
+    front, 2 where it does not."""
     e0, e1, e2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     f0, f1, f2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
     h0, h1, h2 = d1 * f2 - d2 * f1, d2 * f0 - d0 * f2, d0 * f1 - d1 * f0
@@ -40,8 +40,8 @@ def _passes(p: Any, d0: Any, d1: Any, d2: Any, a: Any, b: Any, c: Any) -> Any:
 
 
 @inlined
-def _one_side(x: Any, y: Any) -> Any:
-    """Do all corners of a triangle x (3, 3) lie on one side of the plane of y (3, 3)?"""
+def _is_on_one_side(x: Any, y: Any) -> Any:
+    """Whether all corners of a triangle x (3, 3) lie on one side of the plane of y (3, 3)."""
     e0, e1, e2 = y[1, 0] - y[0, 0], y[1, 1] - y[0, 1], y[1, 2] - y[0, 2]
     f0, f1, f2 = y[2, 0] - y[0, 0], y[2, 1] - y[0, 1], y[2, 2] - y[0, 2]
     n0, n1, n2 = e1 * f2 - e2 * f1, e2 * f0 - e0 * f2, e0 * f1 - e1 * f0
@@ -53,9 +53,9 @@ def _one_side(x: Any, y: Any) -> Any:
 
 
 @kernel
-def _cross(x: Any, y: Any) -> Any:
-    """Do two triangles (3, 3) pass through each other?"""
-    if _one_side(x, y) or _one_side(y, x):
+def _do_cross(x: Any, y: Any) -> Any:
+    """Whether two triangles (3, 3) pass through each other."""
+    if _is_on_one_side(x, y) or _is_on_one_side(y, x):
         return False
     for k in range(3):
         m = (k + 1) % 3
@@ -67,8 +67,8 @@ def _cross(x: Any, y: Any) -> Any:
 
 
 @inlined
-def _apart(node: Any, low: Any, high: Any, least: Any, most: Any) -> Any:
-    """Has the box of a node nothing in common with another one?"""
+def _is_apart(node: Any, low: Any, high: Any, least: Any, most: Any) -> Any:
+    """Whether the box of a node is disjoint from another one."""
     return (
         low[node, 0] > most[0] or high[node, 0] < least[0] or low[node, 1] > most[1] or high[node, 1] < least[1]
         or low[node, 2] > most[2] or high[node, 2] < least[2]
@@ -76,20 +76,20 @@ def _apart(node: Any, low: Any, high: Any, least: Any, most: Any) -> Any:
 
 
 @inlined
-def _has(ids: Any, j: Any, v: Any) -> Any:
-    """Is a vertex a corner of triangle j?"""
+def _has_vertex(ids: Any, j: Any, v: Any) -> Any:
+    """Whether a vertex is a corner of triangle j."""
     return ids[j, 0] == v or ids[j, 1] == v or ids[j, 2] == v
 
 
 @inlined
-def _neighbours(ids: Any, i: Any, j: Any) -> Any:
-    """Have two triangles a corner in common?"""
-    return _has(ids, j, ids[i, 0]) or _has(ids, j, ids[i, 1]) or _has(ids, j, ids[i, 2])
+def _are_neighbours(ids: Any, i: Any, j: Any) -> Any:
+    """Whether two triangles share a corner."""
+    return _has_vertex(ids, j, ids[i, 0]) or _has_vertex(ids, j, ids[i, 1]) or _has_vertex(ids, j, ids[i, 2])
 
 
 @inlined
-def _outside(j: Any, corners: Any, least: Any, most: Any) -> Any:
-    """Has the box of a triangle nothing in common with another one?"""
+def _is_outside(j: Any, corners: Any, least: Any, most: Any) -> Any:
+    """Whether the box of a triangle is disjoint from another one."""
     out = False
     for k in range(3):
         a, b, c = corners[j, 0, k], corners[j, 1, k], corners[j, 2, k]
@@ -99,14 +99,15 @@ def _outside(j: Any, corners: Any, least: Any, most: Any) -> Any:
 
 @merged
 def _next_leaf(stack: Any, top: Any, low: Any, high: Any, leaves: Any, least: Any, most: Any) -> Any:
-    """First triangle of the next leaf whose box meets another one, or -1; and how many nodes are on the stack.
+    """Return the first triangle of the next leaf whose box meets another one, or -1; and how many nodes are on the
+    stack.
 
     ``stack`` holds the nodes of the tree that are still to be searched.
     """
     while top > 0:
         top -= 1
         node = stack[top]
-        if _apart(node, low, high, least, most):
+        if _is_apart(node, low, high, least, most):
             continue
         if node >= leaves:
             return (node - leaves) * LEAF, top
@@ -133,9 +134,14 @@ def _search(
             if first < 0:
                 break
             for j in range(first, min(len(corners), first + LEAF)):
-                if j == i or (moved[j] and j < i) or not meets[kind[i], kind[j]] or _outside(j, corners, least, most):
+                if (
+                    j == i
+                    or (moved[j] and j < i)
+                    or not meets[kind[i], kind[j]]
+                    or _is_outside(j, corners, least, most)
+                ):
                     continue
-                if not _neighbours(ids, i, j) and _cross(corners[i], corners[j]):
+                if not _are_neighbours(ids, i, j) and _do_cross(corners[i], corners[j]):
                     if used < len(out):
                         out[used, 0], out[used, 1] = i, j
                     used += 1
@@ -179,7 +185,7 @@ def _first_back(
             if first < 0:
                 break
             for j in range(first, min(len(corners), first + LEAF)):
-                if not passed[kind[j]] or _outside(j, corners, least, most) or _has(ids, j, own[i]):
+                if not passed[kind[j]] or _is_outside(j, corners, least, most) or _has_vertex(ids, j, own[i]):
                     continue
                 t = _passes(p, d0, d1, d2, corners[j, 0], corners[j, 1], corners[j, 2])
                 if abs(t) < best:
@@ -219,7 +225,7 @@ class Crossings:
 
     same : (n,) number of each vertex, equal for those in one place. kind : (t,) of each triangle.
     meets : (kinds, kinds) bool, symmetric: which kinds are tested against each other.
-    asked : (t,) bool, of each pair one is of these; all without it.
+    asked : (t,) bool, triangles of which each pair must have at least one; default: all.
     """
 
     def __init__(
@@ -238,7 +244,7 @@ class Crossings:
         self._start = np.searchsorted(edges[:, 0], np.arange(self._count + 1))
 
     def pairs(self, vertices: Floats, *, least: float = -1.0) -> Ints:
-        """(k, 2) rows of ``tree.triangles`` that cross with the mesh's vertices (n, 3) where they are now.
+        """Return (k, 2): rows of ``tree.triangles`` that cross with the mesh's vertices (n, 3) where they are now.
 
         least : mm; only pairs of which one of those asked for has moved further than that from rest.
         """
@@ -254,8 +260,9 @@ class Crossings:
         return out[:used]
 
     def depths(self, pairs: Ints, passing: int, passed: int, reach: float, least: float) -> tuple[Ints, Floats]:
-        """Vertices (k,) of triangles asked for, of a kind ``passing``, that lie behind triangles of a kind ``passed``,
-        of pairs as :meth:`pairs` found them last, and how deep, mm: more than ``least``, no deeper than ``reach``."""
+        """Return vertices (k,) of triangles asked for, of a kind ``passing``, that lie behind triangles of a kind
+        ``passed``, of pairs as :meth:`pairs` found them last, and how deep, mm: more than ``least``, no deeper than
+        ``reach``."""
         both = np.concatenate([pairs, pairs[:, ::-1]])
         both = both[(self.kind[both[:, 0]] == passing) & (self.kind[both[:, 1]] == passed)]
         if not len(both):
@@ -282,7 +289,7 @@ class Crossings:
         return out
 
     def _normals(self, at: Floats) -> Floats:
-        """(n, 3) unit normals at vertices."""
+        """Return (n, 3): unit normals at vertices."""
         corner = self.tree.corners
         cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         own = self._ids.ravel()
@@ -291,8 +298,8 @@ class Crossings:
         return unit
 
     def _seeds(self, pairs: Ints, way: Floats) -> tuple[Floats, Floats, Floats, Ints]:
-        """The ends of edges behind what they pass: ways (n, 3), the triangle's longest edge (n,), the distance (n,),
-        which is 0 there, and a queue (n,) of them."""
+        """Return the ends of edges behind what they pass: ways (n, 3), the triangle's longest edge (n,), the distance
+        (n,), which is 0 there, and a queue (n,) of them."""
         ways, length, far = np.zeros((self._count, 3)), np.zeros(self._count), np.full(self._count, np.inf)
         hit = way.any(axis=2)
         ids, corner = self._ids[pairs[:, 0]], self.tree.corners[pairs[:, 0]]
@@ -305,7 +312,7 @@ class Crossings:
         return ways, length, far, queue
 
     def _cut(self, pairs: Ints, cut: Bools) -> Bools:
-        """(edges,) which of the mesh's edges, both ways, pass through something."""
+        """Return (edges,): which of the mesh's edges, both ways, pass through something."""
         ends = self._ids[pairs[:, 0]]
         a, b = ends[cut], np.roll(ends, -1, axis=1)[cut]
         out = np.zeros(len(self._keys), bool)

@@ -21,5 +21,5 @@ class Finding:
     warning: bool = False
 
     def line(self, folder: str) -> str:
-        """All of it in one line, for a head in a folder."""
+        """Return all of it in one line, for a head in a folder."""
         return f"{self.kind}: {self.text}; next: {self.hint.replace('{folder}', folder)}"

@@ -1,4 +1,4 @@
-"""What every parameter moves: nothing at all, the wrong side, an eye that does not close."""
+"""Find parameters that move nothing or the wrong side, and blinks that do not close an eye."""
 
 from __future__ import annotations
 
@@ -12,37 +12,37 @@ from surface.check.lids import eye_opening
 from surface.check.subject import Subject
 from surface.head.model.parameters import SHAPES
 
-LEAST_MM = 0.1  # a parameter that moves nothing further than this has no effect
-ASIDE = 0.06  # of the distance between the eyes: how far off the middle a side begins
-SHUT_MM = 0.5  # what may show of an eye in a blink
-OPEN_MM = 1.0  # what shows of an eye that is open
-ACROSS = ("jaw", "mouth")  # their Left and Right are where they go; of all others, where they are
+MIN_MOVE_MM = 0.1  # a parameter that moves nothing further than this has no effect
+ASIDE = 0.06  # distance from the middle at which a side begins, in distances between the eyes
+SHUT_MM = 0.5  # maximum visible height of an eye in a blink
+OPEN_MM = 1.0  # minimum visible height of an open eye
+ACROSS = ("jaw", "mouth")  # names whose Left or Right is the direction of motion; of all others it is the place
 
 
 def empty_shapes(subject: Subject) -> Iterator[Finding]:
-    """Parameters that the head has a group or a joint for, and that move nothing of their own."""
+    """Find parameters that the head has a group or a joint for, and that move nothing of their own."""
     for name in subject.claimed:
         most = max(float(np.abs(m).max(initial=0.0)) for m in subject.moves(name))
-        if most < LEAST_MM * subject.scale or _is_idle(subject, name):
+        if most < MIN_MOVE_MM * subject.scale or _is_idle(subject, name):
             text = f"{name} = 1 moves nothing, though the head has something of that name"
             yield Finding("empty shape", text, f"export the mesh with this shape, then {AGAIN}")
 
 
 def _is_idle(subject: Subject, name: str) -> bool:
-    """Has the head groups of that name, of which none moves anything? Wrinkles may move all the same."""
+    """Whether the head has groups of that name, none of which moves anything, and no joint of it."""
     groups = [g for p in subject.head.data.parts for g in p.groups if g.name == name]
     joint = name == "jawOpen" and subject.head.data.jaw.angle_rad > 0
     most = max((float(np.abs(g.moves).max(initial=0.0)) for g in groups), default=np.inf)
-    return most < LEAST_MM * subject.scale and not joint
+    return most < MIN_MOVE_MM * subject.scale and not joint
 
 
 def swapped_sides(subject: Subject) -> Iterator[Finding]:
-    """Parameters of one side that move the other. Left is the subject's, at greater x."""
+    """Find parameters of one side that move the other. Left is the subject's, at greater x."""
     middle, apart = _middle(subject)
     wrong = []
     for name in subject.claimed:
-        offset = _direction(subject, name) if _goes_across(name) else _where(subject, name, middle) / apart
-        if offset * _side(name) < -ASIDE:
+        offset = _direction(subject, name) if _goes_across(name) else _mean_offset(subject, name, middle) / apart
+        if offset * _side_of(name) < -ASIDE:
             wrong.append(name)
     if wrong:
         more = f" and {len(wrong) - 4} more" if len(wrong) > 5 else ""
@@ -55,7 +55,7 @@ def swapped_sides(subject: Subject) -> Iterator[Finding]:
 
 
 def blind_lids(subject: Subject) -> Iterator[Finding]:
-    """Eyes that a blink does not close."""
+    """Find eyes that a blink does not close."""
     names = ("eyeBlinkLeft", "eyeBlinkRight")
     any_blink = any(n in subject.claimed for n in names)
     for side, name in enumerate(names):
@@ -73,8 +73,8 @@ def blind_lids(subject: Subject) -> Iterator[Finding]:
             yield Finding("blind lid", text, f"make the shape close the lids, then {AGAIN}")
 
 
-def _side(name: str) -> int:
-    """1 for a parameter of the left side, -1 of the right, 0 of neither."""
+def _side_of(name: str) -> int:
+    """Return 1 for a parameter of the left side, -1 of the right, 0 of neither."""
     left = name.endswith("Left") or name.startswith("leftEye")
     right = name.endswith("Right") or name.startswith("rightEye")
     return int(left) - int(right)
@@ -85,15 +85,15 @@ def _goes_across(name: str) -> bool:
 
 
 def _middle(subject: Subject) -> tuple[float, float]:
-    """x of the middle of the face, and the distance between the eyes, mm."""
+    """Return x of the middle of the face, and the distance between the eyes, mm."""
     if subject.eyes is not None:
         return float(subject.eyes[:, 0].mean()), max(float(np.ptp(subject.eyes[:, 0])), 1e-6)
     xs = np.concatenate([subject.rest[k][:, 0] for k in subject.skin] or [np.zeros(2)])
     return float(0.5 * (xs.min() + xs.max())), max(0.35 * float(np.ptp(xs)), 1e-6)
 
 
-def _where(subject: Subject, name: str, middle: float) -> float:
-    """How far from the middle the vertices lie that a parameter moves, mm, meant by how far they move."""
+def _mean_offset(subject: Subject, name: str, middle: float) -> float:
+    """Return how far from the middle the vertices lie that a parameter moves, mm, weighted by how far they move."""
     moves = [np.linalg.norm(m, axis=1) for m in subject.moves(name)]
     total = sum(float(m.sum()) for m in moves)
     along = sum(float(m @ v[:, 0]) for m, v in zip(moves, subject.rest, strict=True))
@@ -101,7 +101,7 @@ def _where(subject: Subject, name: str, middle: float) -> float:
 
 
 def _direction(subject: Subject, name: str) -> float:
-    """-1..1: how much of the motion of a parameter goes to the subject's left."""
+    """Return the fraction, -1..1, of a parameter's motion that goes to the subject's left."""
     moves: Floats = np.concatenate(subject.moves(name)).astype(np.float64)
     total = float(np.linalg.norm(moves, axis=1).sum())
     return float(moves[:, 0].sum()) / total if total > 0 else 0.0

@@ -14,18 +14,21 @@ from surface.base.arrays import Bools, Floats, Floats32, Ints
 from surface.check.raster import NOTHING, Picture, View, enclosed
 from surface.check.subject import Subject
 
-STEP = 0.5  # mm of a pixel where the lips are looked for, times the head's scale
-FINE = 0.15  # of a pixel where their gap is measured
-TORN = 0.3  # of the largest motion: a step of that height from one pixel to the next is the line of the lips
-LEAST_MM = 3.0  # that the chin must go down
-DEEP_MM, LIPS_MM = 9.0, 15.0  # skin so far behind the lips, and no higher or lower, is the inside of the mouth
-PARTED_MM = 12.0  # of lips at rest: a higher opening is none between lips
-INNER = 0.5  # of the width of the mouth, in which its gap is measured
+STEP_MM = 0.5  # pixel size when finding the lips, times the head's scale
+FINE_STEP_MM = 0.15  # pixel size when measuring their gap, times the head's scale
+MIN_STEP = 0.3  # of motion between neighbouring pixels at the line of the lips, as a fraction of the largest motion
+MIN_DROP_MM = 3.0  # distance that the chin must move down when the jaw opens
+DEEP_MM = 9.0  # skin at least this far behind the lips is the inside of the mouth
+LIPS_MM = 15.0  # if it is no higher or lower than this
+MAX_GAP_MM = 12.0  # between lips at rest: a higher opening is not the one between lips
+INNER_WIDTH = 0.5  # fraction of the width of the mouth in which its gap is measured
 
 
 @dataclass(frozen=True)
 class Mouth:
-    """The line of the lips at rest: x (k,) rising, y (k,), z (k,), mm; ``drop`` is how far the lower lip goes down."""
+    """The line of the lips at rest: x (k,) ascending, y (k,), z (k,), mm; ``drop`` is how far the lower lip goes
+    down.
+    """
 
     x: Floats
     y: Floats
@@ -44,17 +47,17 @@ class Mouth:
 
 
 def find_mouth(subject: Subject) -> Mouth | None:
-    """The line of the lips; None where no jaw opens."""
+    """Return the line of the lips; None where no jaw opens."""
     if "jawOpen" not in subject.claimed or not len(subject.skin):
         return None
     moves = [m[:, 1].astype(np.float64) for m in subject.moves("jawOpen")]
     drop = -min(float(moves[k].min()) for k in subject.skin)
-    if drop < LEAST_MM * subject.scale:
+    if drop < MIN_DROP_MM * subject.scale:
         return None
-    picture = _front(subject)
-    down, below = _over_gaps(_values(subject, picture, moves), round(PARTED_MM / STEP))
+    picture = _draw_front(subject)
+    down, below = _fill_gaps(_values(subject, picture, moves), round(MAX_GAP_MM / STEP_MM))
     step = np.where(np.isfinite(down[1:]) & np.isfinite(down[:-1]), down[1:] - down[:-1], 0.0)
-    torn: Bools = step > TORN * np.nanmax(-down)
+    torn: Bools = step > MIN_STEP * np.nanmax(-down)
     columns = _longest_run(np.asarray(torn.any(axis=0)))
     if len(columns) < 5:
         return None
@@ -64,16 +67,18 @@ def find_mouth(subject: Subject) -> Mouth | None:
     return Mouth(x, y, picture.depth[rows, columns], float(np.nanmax(-down)))
 
 
-def _front(subject: Subject) -> Picture:
-    """The skin at rest from the front."""
+def _draw_front(subject: Subject) -> Picture:
+    """Return the skin at rest from the front."""
     at = np.concatenate([subject.rest[k] for k in subject.skin])
-    view = View((at[:, 0].min(), at[:, 0].max()), (at[:, 1].min(), at[:, 1].max()), STEP * subject.scale)
+    view = View((at[:, 0].min(), at[:, 0].max()), (at[:, 1].min(), at[:, 1].max()), STEP_MM * subject.scale)
     shapes = subject.shapes(subject.rest)
     return view.draw([s if k in subject.skin else None for k, s in enumerate(shapes)])
 
 
 def _values(subject: Subject, picture: Picture, of: list[Floats]) -> Floats:
-    """(h, w) values at the vertices (m,) of every part, meant over the triangle at each pixel; NaN where none is."""
+    """Return (h, w): values at the vertices (m,) of every part, averaged over the triangle at each pixel; NaN where
+    none is.
+    """
     out = np.full(picture.depth.shape, np.nan)
     for k in np.unique(picture.parts[picture.parts != NOTHING]):
         here = picture.parts == k
@@ -81,8 +86,8 @@ def _values(subject: Subject, picture: Picture, of: list[Floats]) -> Floats:
     return out
 
 
-def _over_gaps(values: Floats, most: int) -> tuple[Floats, Ints]:
-    """Values (h, w) with what is above a gap of at most ``most`` rows in it, too, and how high the gap below is.
+def _fill_gaps(values: Floats, most: int) -> tuple[Floats, Ints]:
+    """Return values (h, w) with what is above a gap of at most ``most`` rows in it, too, and how high the gap below is.
 
     Lips that are parted at rest show nothing between them; the line of the lips runs along the lower one's edge.
     """
@@ -97,7 +102,7 @@ def _over_gaps(values: Floats, most: int) -> tuple[Floats, Ints]:
 
 
 def _longest_run(hits: Bools, most_gap: int = 2) -> Ints:
-    """Indices of the longest run of hits, with gaps of a few filled."""
+    """Return indices of the longest run of hits, with gaps of a few filled."""
     at = np.flatnonzero(hits)
     if not len(at):
         return at
@@ -107,24 +112,25 @@ def _longest_run(hits: Bools, most_gap: int = 2) -> Ints:
 
 
 def lips_gap(subject: Subject, mouth: Mouth, vertices: list[Floats32]) -> tuple[float, float]:
-    """Largest height of the opening between the lips, mm, and the x where it is, in the middle half of the mouth."""
-    scale, half = subject.scale, 0.5 * INNER * mouth.width
+    """Return the largest height of the opening between the lips, mm, and the x where it is, in the middle half of the
+    mouth."""
+    scale, half = subject.scale, 0.5 * INNER_WIDTH * mouth.width
     centre = mouth.middle
     view = View(
         (centre[0] - half, centre[0] + half),
         (centre[1] - mouth.drop - 25.0 * scale, centre[1] + 20.0 * scale),
-        FINE * scale,
+        FINE_STEP_MM * scale,
     )
     picture = view.draw(subject.shapes(vertices))
-    inside = _values(subject, picture, [_inside(v, mouth, scale) for v in subject.rest])
+    inside = _values(subject, picture, [_mark_inside(v, mouth, scale) for v in subject.rest])
     solid = np.isin(picture.parts, subject.skin) & (inside < 0.5)
     height = enclosed(~solid, solid).sum(axis=0) * view.step
     column = int(height.argmax())
     return float(height[column]), picture.at(0, column)[0]
 
 
-def _inside(rest: Floats32, mouth: Mouth, scale: float) -> Floats:
-    """(m,) 1 for vertices (m, 3) that at rest lie behind the lips, as the inside of the mouth does; else 0."""
+def _mark_inside(rest: Floats32, mouth: Mouth, scale: float) -> Floats:
+    """Return (m,): 1 for vertices (m, 3) that at rest lie behind the lips, as the inside of the mouth does; else 0."""
     away = rest.astype(np.float64) - mouth.middle
     beside = np.abs(away[:, 0]) < 0.5 * mouth.width
     behind = away[:, 2] < -DEEP_MM * scale

@@ -28,8 +28,8 @@ class Network:
         self._ways = start, order // 2, self.ends[:, ::-1].ravel()[order], np.asarray(length, np.float64)
 
     def nearest(self, at: Floats, rows: Ints, reach: float, along: float) -> tuple[Floats, Ints]:
-        """Distance (k,) of the middles of edges ``rows (k,)`` from the nearest other edge, and its number; infinite and
-        -1 where none is nearer than ``reach`` mm. Of several in the same distance the first counts.
+        """Return the distance (k,) of the middles of edges ``rows (k,)`` from the nearest other edge, and its number;
+        infinite and -1 where none is nearer than ``reach`` mm. Of several in the same distance the first counts.
 
         at : (e, 2, 3) where the ends of all edges are, mm.
         along : edges with less border than this between them, mm, are neighbours and left out, and so are those that
@@ -72,7 +72,7 @@ def _mark_ways(ends: Any, start: Any, edge: Any, far: Any, length: Any, reach: f
 
 @kernel
 def _edge_square(p: Any, a: Any, b: Any) -> Any:
-    """Square of the distance of ``p (3,)`` from the edge between ``a`` and ``b``."""
+    """Return the square of the distance of ``p (3,)`` from the edge between ``a`` and ``b``."""
     d0, d1, d2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
     length = d0 * d0 + d1 * d1 + d2 * d2
     t = 0.0
@@ -84,7 +84,7 @@ def _edge_square(p: Any, a: Any, b: Any) -> Any:
 
 @kernel
 def _box_square(p: Any, low: Any, high: Any) -> Any:
-    """Square of the distance of ``p (3,)`` from a box."""
+    """Return the square of the distance of ``p (3,)`` from a box."""
     square = 0.0
     for k in range(3):
         square += max(low[k] - p[k], p[k] - high[k], 0.0) ** 2

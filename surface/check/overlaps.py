@@ -17,7 +17,7 @@ from surface.check.crossings import Crossings
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
-from surface.check.raster import NOTHING, View, turned
+from surface.check.raster import NOTHING, View, view_rotation
 from surface.check.subject import Subject
 from surface.head import Head
 from surface.head.model.data import HeadData
@@ -26,15 +26,15 @@ from surface.head.model.parameters import SHAPES
 # Materials that skin may not pass through, and by how much it may, mm at usual size. Lips are pressed against teeth and
 # rolled round them in many shapes, where nobody sees it: teeth are looked at at rest and with an open jaw.
 LIMITS_MM = {"skin": 4.0, "eye": 2.0, "teeth": 2.0}
-BITTEN = ("", "jawOpen")  # shapes in which teeth are looked at; "" is the neutral face
-REACH_MM = 12.0  # the deepest overlap that is measured
-LEAST_MM = 0.3
-SAID_MM = 1.0  # less is not said at the end of a fit
+TEETH_SHAPES = ("", "jawOpen")  # in which overlaps with teeth are checked; "" is the neutral face
+MAX_DEPTH_MM = 12.0  # of an overlap that is measured
+MIN_DEPTH_MM = 0.3
+MIN_REPORTED_MM = 1.0  # overlaps below this are not reported at the end of a fit
 AREA_MM2 = 10.0
-MOVED_MM = 0.1  # what moves less is where it was at rest
+MOVED_MM = 0.1  # what moves less counts as unmoved
 VIEWS = ((0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (180.0, 0.0), (0.0, -40.0), (0.0, 40.0))
-STEP_MM = 0.8  # of a pixel of the pictures that determine what is visible
-MOST_STEPS = 900  # of such a picture
+STEP_MM = 0.8  # pixel size of the pictures that determine what is visible
+MAX_PIXELS = 900  # width or height of such a picture
 WORDS = {"skin": "itself", "eye": "the eyeball", "teeth": "the teeth"}
 
 
@@ -54,7 +54,7 @@ class Overlap:
 
 
 def overlaps(subject: Subject, places: Places) -> list[Overlap]:
-    """The deepest overlap of skin with each material, over all shapes; deepest relative to its limit first."""
+    """Return the deepest overlap of skin with each material, over all shapes; deepest relative to its limit first."""
     found: dict[str, Overlap] = {}
     body = _Body(subject)
     for shape in ("", *(n for n in subject.claimed if n in SHAPES)) if len(body.numbers) else ():
@@ -64,7 +64,8 @@ def overlaps(subject: Subject, places: Places) -> list[Overlap]:
 
 
 def overlapping(subject: Subject, places: Places) -> Iterator[Finding]:
-    """Overlaps beyond their limits. Skin in itself is a warning: folds of lips and ears do that on good heads, too."""
+    """Find overlaps beyond their limits. Skin in itself is a warning: folds of lips and ears do that on good heads,
+    too."""
     for one in overlaps(subject, places):
         if one.mm > one.limit:
             text, hint = f"{one} ({one.limit:.1f} mm at most)", f"correct the shape in the mesh, then {AGAIN}"
@@ -72,10 +73,10 @@ def overlapping(subject: Subject, places: Places) -> Iterator[Finding]:
 
 
 def overlap_notes(head: HeadData) -> list[str]:
-    """The deepest overlap of a head's skin with each material, in words; none where all are shallow."""
+    """Return the deepest overlap of a head's skin with each material, in words; none where all are shallow."""
     subject = Subject(Head(head))
     found = overlaps(subject, Places(subject, find_mouth(subject)))
-    return [str(one) for one in found if one.mm > SAID_MM * subject.scale]
+    return [str(one) for one in found if one.mm > MIN_REPORTED_MM * subject.scale]
 
 
 class _Body:
@@ -96,44 +97,44 @@ class _Body:
         same = np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
         meets = np.zeros((len(LIMITS_MM),) * 2, bool)
         meets[0] = meets[:, 0] = True
-        seen = self._seen(triangles) & (kind == 0)
+        seen = self._are_visible(triangles) & (kind == 0)
         self._crossings = Crossings(self._rest, triangles, same, kind, meets, seen)
         self._area = self._areas(triangles[seen], same)
 
     def _at(self, vertices: list[Floats32]) -> Floats:
         return np.concatenate([vertices[k] for k in self.numbers]).astype(np.float64)
 
-    def _seen(self, triangles: Ints) -> Bools:
-        """(t,) which triangles can be seen from outside at rest, or have a corner of such a one."""
+    def _are_visible(self, triangles: Ints) -> Bools:
+        """Return (t,): which triangles can be seen from outside at rest, or have a corner of such a one."""
         seen = np.zeros(len(triangles), bool)
         for yaw, pitch in VIEWS:
-            at = self._rest @ turned(yaw, pitch).T
+            at = self._rest @ view_rotation(yaw, pitch).T
             (x0, y0, _), (x1, y1, _) = at.min(axis=0), at.max(axis=0)
-            step = max(STEP_MM * self._subject.scale, (x1 - x0) / MOST_STEPS, (y1 - y0) / MOST_STEPS)
+            step = max(STEP_MM * self._subject.scale, (x1 - x0) / MAX_PIXELS, (y1 - y0) / MAX_PIXELS)
             shape = self._rest.astype(np.float32), triangles.astype(np.int32)
-            picture = View((x0, x1), (y0, y1), step, turned(yaw, pitch)).draw([shape])
+            picture = View((x0, x1), (y0, y1), step, view_rotation(yaw, pitch)).draw([shape])
             seen[picture.rows[picture.parts != NOTHING]] = True
         corners = np.zeros(len(self._rest), bool)
         corners[triangles[seen]] = True
         return np.asarray(corners[triangles].any(axis=1))
 
     def _areas(self, triangles: Ints, same: Ints) -> Floats:
-        """(n,) mm² of triangles that belongs to each vertex at rest; of those in one place together."""
+        """Return (n,): mm² of triangles that belongs to each vertex at rest; of those in one place together."""
         a, b, c = (self._rest[triangles[:, k]] for k in range(3))
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
         whole: Floats = np.bincount(same[triangles].ravel(), np.repeat(area, 3), len(self._rest)).astype(np.float64)
         return whole[same]
 
     def overlaps(self, shape: str, places: Places) -> Iterator[Overlap]:
-        """Those of one shape, by material."""
+        """Return the overlaps of one shape, by material."""
         subject, scale = self._subject, self._subject.scale
         at = self._at(subject.at_one(shape) if shape else subject.rest)
         pairs = self._crossings.pairs(at, least=MOVED_MM * scale if shape else -1.0)
         for material, limit in LIMITS_MM.items():
-            if material == "teeth" and shape not in BITTEN:
+            if material == "teeth" and shape not in TEETH_SHAPES:
                 continue
             kind = self._kinds.index(material)
-            rows, depth = self._crossings.depths(pairs, 0, kind, REACH_MM * scale, LEAST_MM * scale)
+            rows, depth = self._crossings.depths(pairs, 0, kind, MAX_DEPTH_MM * scale, MIN_DEPTH_MM * scale)
             order = np.argsort(-depth)
             wide = np.flatnonzero(np.cumsum(self._area[rows[order]]) >= AREA_MM2 * scale**2)
             if len(wide):

@@ -43,7 +43,7 @@ class Places:
         return (x, y * down / (1.0 if name in BY_LIPS else TO_LIPS), z) if y < 0 else (x, y, z)
 
     def name(self, point: Floats, material: str = "skin") -> str:
-        """The place of a point (3,) at rest, mm, on a part of a material."""
+        """Return the place of a point (3,) at rest, mm, on a part of a material."""
         x, y, z = (np.asarray(point, float) - self.centre) / self.apart
         side = "" if abs(x) < ASIDE else "left " if x > 0 else "right "
         if material in INNER:
@@ -55,7 +55,7 @@ class Places:
 
 
 def _eyes(subject: Subject, mouth: Mouth | None) -> tuple[Floats, float]:
-    """(3,) the middle between the eyes, at the front of the eyeballs, and the distance between the eyes, mm."""
+    """Return (3,): the middle between the eyes, at the front of the eyeballs, and the distance between the eyes, mm."""
     if subject.eyes is not None:
         apart = max(float(np.linalg.norm(subject.eyes[0] - subject.eyes[1])), 1e-6)
         front = np.array([0.0, 0.0, subject.head.data.eye_radius])

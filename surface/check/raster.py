@@ -50,7 +50,7 @@ class View:
     turn: Floats = field(default_factory=lambda: np.eye(3))
 
     def draw(self, shapes: Sequence[Shape | None]) -> Picture:
-        """The picture of vertices (m, 3) and triangles (t, 3); None leaves a part out and keeps its number."""
+        """Return the picture of vertices (m, 3) and triangles (t, 3); None leaves a part out and keeps its number."""
         size = tuple(max(2, int((b - a) / self.step) + 1) for a, b in (self.y, self.x))
         depth = np.full(size, -np.inf)
         parts, rows = np.full(size, NOTHING, np.int64), np.full(size, NOTHING, np.int64)
@@ -76,8 +76,8 @@ class Picture:
         return self.view.x[0] + column * self.view.step, self.view.y[0] + row * self.view.step
 
 
-def turned(yaw_deg: float, pitch_deg: float = 0.0) -> Floats:
-    """(3, 3) for a viewer at ``yaw_deg`` to the subject's left and ``pitch_deg`` above."""
+def view_rotation(yaw_deg: float, pitch_deg: float = 0.0) -> Floats:
+    """Return the view rotation (3, 3) of a viewer at ``yaw_deg`` to the subject's left and ``pitch_deg`` above."""
     yaw, pitch = np.radians(yaw_deg), np.radians(pitch_deg)
     about_y = np.array([[np.cos(yaw), 0, -np.sin(yaw)], [0, 1, 0], [np.sin(yaw), 0, np.cos(yaw)]])
     about_x = np.array([[1, 0, 0], [0, np.cos(pitch), -np.sin(pitch)], [0, np.sin(pitch), np.cos(pitch)]])
@@ -86,7 +86,7 @@ def turned(yaw_deg: float, pitch_deg: float = 0.0) -> Floats:
 
 
 def enclosed(open_: Bools, solid: Bools) -> Bools:
-    """(h, w) pixels of ``open_`` that have ``solid`` ones below and above them in their column."""
+    """Return (h, w): pixels of ``open_`` that have ``solid`` ones below and above them in their column."""
     below = np.maximum.accumulate(solid, axis=0)
     above = np.maximum.accumulate(solid[::-1], axis=0)[::-1]
     return open_ & below & above

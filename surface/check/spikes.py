@@ -30,8 +30,8 @@ PAIRED = 0.6  # least height at the mirror image, relative to the greatest allow
 MIRROR_MM = 10.0  # greatest distance from the mirror image at which a horn or pointed ear counts as the other of a pair
 NOSE = 0.35  # half the width of the nose, in distances of the eyes: a nose may have any length
 SPACING = 0.6  # of the samples, in radii of the ring
-MOST_LISTED = 1 << 25  # samples on all rings together; the shipped head has 3 million
-MOST_STEPS = 40  # samples along an edge: a triangle that needs more is wrong anyway
+MAX_LISTED = 1 << 25  # samples on all rings together; the shipped head has 3 million
+MAX_STEPS = 40  # samples along an edge: a triangle that needs more is wrong anyway
 
 
 @nonallocating
@@ -47,7 +47,7 @@ def ring_heights(points: Any, own: Any, first: Any, last: Any, order: Any, ring:
     """
     for i in range(len(out)):
         near = first[own[i]], last[own[i]], order
-        x, y, z = _way_from_ring(points, i, *near, ring, values, enough)
+        x, y, z = _sum_from_ring(points, i, *near, ring, values, enough)
         length = np.sqrt(x * x + y * y + z * z)
         out[i] = 0.0
         if length >= 1e-9:
@@ -55,7 +55,7 @@ def ring_heights(points: Any, own: Any, first: Any, last: Any, order: Any, ring:
 
 
 @nonallocating
-def _way_from_ring(
+def _sum_from_ring(
     points: Any, i: int, first: Any, last: Any, order: Any, ring: Any, values: Any, enough: float
 ) -> Any:
     """Sum of the ways to value i from those on its ring; none at all where one of them is nearer than ``enough``."""
@@ -75,7 +75,7 @@ def _way_from_ring(
 def _least_along(
     points: Any, i: int, first: Any, last: Any, order: Any, ring: Any, values: Any, x: float, y: float, z: float
 ) -> Any:  # fmt: skip
-    """The least height of value i above one on its ring, along the unit vector (x, y, z)."""
+    """Return the least height of value i above one on its ring, along the unit vector (x, y, z)."""
     least = np.inf
     for column in range(len(first)):
         for e in range(first[column], last[column]):
@@ -135,7 +135,7 @@ class Samples:
     vertices: int
 
     def at(self, vertices: list[Floats32]) -> Floats:
-        """(m, 3) values at the samples, interpolated from those at the vertices (v, 3) of every part."""
+        """Return (m, 3): values at the samples, interpolated from those at the vertices (v, 3) of every part."""
         out = np.empty((len(self.part), 3))
         for k in np.unique(self.part):
             mix(np.flatnonzero(self.part == k), self.corners, self.share, vertices[k], out)
@@ -143,12 +143,14 @@ class Samples:
 
 
 def find_samples(subject: Subject, spacing: float) -> Samples:
-    """Samples of all skin that deforms, no further apart than ``spacing`` mm; vertices come first."""
+    """Return samples of all skin that deforms, no further apart than ``spacing`` mm; vertices come first."""
     found, more = [], []
     for k, part in enumerate(subject.parts):
         if part.material == "skin" and part.follows == "skin":
             used = np.unique(part.triangles)
-            corners, share = _filled(subject.rest[k].astype(np.float64), part.triangles.astype(np.int64), spacing)
+            corners, share = _sample_triangles(
+                subject.rest[k].astype(np.float64), part.triangles.astype(np.int64), spacing
+            )
             whole = np.tile([1.0, 0.0, 0.0], (len(used), 1))
             found.append((np.full(len(used), k), np.repeat(used[:, None], 3, axis=1), whole))
             more.append((np.full(len(corners), k), corners, share))
@@ -157,11 +159,13 @@ def find_samples(subject: Subject, spacing: float) -> Samples:
     return Samples(number.astype(np.int64), corners.astype(np.int64), share, sum(len(x[0]) for x in found))
 
 
-def _filled(at: Floats, triangles: Ints, spacing: float) -> tuple[Ints, Floats]:
-    """Corners (m, 3) and weights (m, 3) of places inside triangles that have edges longer than ``spacing`` mm."""
+def _sample_triangles(at: Floats, triangles: Ints, spacing: float) -> tuple[Ints, Floats]:
+    """Return corners (m, 3) and weights (m, 3) of places inside triangles that have edges longer than ``spacing``
+    mm.
+    """
     corner = at[triangles]
     longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
-    steps = np.minimum(np.ceil(longest / spacing), MOST_STEPS).astype(int)
+    steps = np.minimum(np.ceil(longest / spacing), MAX_STEPS).astype(int)
     corners, shares = [np.zeros((0, 3), np.int64)], [np.zeros((0, 3))]
     for n in np.unique(steps[steps > 1]):
         i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij")
@@ -176,7 +180,7 @@ def _filled(at: Floats, triangles: Ints, spacing: float) -> tuple[Ints, Floats]:
 class Rings:
     """Samples round each of the first ``count`` of points (m, 3), between two distances from it.
 
-    They are listed, unless the lists would be longer than :data:`MOST_LISTED`: these grow with the square of how
+    They are listed, unless the lists would be longer than :data:`MAX_LISTED`: these grow with the square of how
     densely samples lie. Then they are searched for at every question.
     """
 
@@ -186,22 +190,22 @@ class Rings:
         near = cells.own, *cells.columns(), cells.order
         begin, ids = np.zeros(count + 1, np.int64), np.zeros(0, np.int64)
         used = list_rings(self._points, *near, self._ring, begin, ids)
-        if used <= MOST_LISTED:
+        if used <= MAX_LISTED:
             ids = np.zeros(used, np.int64)
             list_rings(self._points, *near, self._ring, begin, ids)
             near = np.arange(count), begin[:count, None], begin[1:, None], ids
         self._near = near
 
     def heights(self, values: Floats, enough: float = 0.0) -> Floats:
-        """(k,) height of each of the first k of values (m, 3); it may be 0 where it is less than ``enough``."""
+        """Return (k,): height of each of the first k of values (m, 3); it may be 0 where it is less than ``enough``."""
         out = np.zeros(self._count)
         ring_heights(self._points, *self._near, self._ring, np.ascontiguousarray(values), enough, out)
         return out
 
 
-def without_rims(points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
-    """``height (k,)`` of the first k of points (m, 3), 0 where it is below ``least``, and where a point of a free
-    border, ``rims (r, 3)``, is nearer than ``off`` mm: corners of a border always stick out."""
+def drop_rims(points: Floats, rims: Floats, height: Floats, least: float, off: float) -> Floats:
+    """Return ``height (k,)`` of the first k of points (m, 3), 0 where it is below ``least``, and where a point of a
+    free border, ``rims (r, 3)``, is nearer than ``off`` mm: corners of a border always stick out."""
     rows = np.flatnonzero(height > least)
     rows = rows[~any_nearer(points[rows], rims, off)]
     out = np.zeros(len(height))
@@ -210,7 +214,7 @@ def without_rims(points: Floats, rims: Floats, height: Floats, least: float, off
 
 
 def spikes(subject: Subject, places: Places, borders: Borders) -> Iterator[Finding]:
-    """The steepest spike at rest, and the steepest in any pose."""
+    """Find the steepest spike at rest, and the steepest in any pose."""
     rims = borders.at(subject.rest)[~borders.sewn].reshape(-1, 3)
     found = [_spikes(subject, places, rims, r * subject.scale, steep) for r, steep in RINGS.items()]
     for kind in zip(*found, strict=True):
@@ -227,11 +231,11 @@ def _spikes(
         return [None, None]
     at, off = samples.at(subject.rest), OFF_RIM * radius
     rings = Rings(at, samples.vertices, radius)
-    height = without_rims(at, rims, rings.heights(at), PAIRED * steep * radius, off)
-    height[_allowed(subject, at[: samples.vertices], height, places)] = 0.0
+    height = drop_rims(at, rims, rings.heights(at), PAIRED * steep * radius, off)
+    height[_may_stick_out(subject, at[: samples.vertices], height, places)] = 0.0
     worst, best, name, where = int(height.argmax()), 0.0, "", 0
     for pose in (n for n in subject.claimed if n in SHAPES):
-        moved = _moved(
+        moved = _heights_in_pose(
             subject, places, samples.at(subject.moves(pose)), rings, at, rims, radius, max(best, MOVED * radius)
         )
         if moved.max() > best:
@@ -247,24 +251,26 @@ def _spikes(
     ]
 
 
-def _moved(
+def _heights_in_pose(
     subject: Subject, places: Places, moves: Floats, rings: Rings, at: Floats, rims: Floats, radius: float,
     enough: float,
 ) -> Floats:  # fmt: skip
-    """(k,) heights in the displacements ``moves (m, 3)`` of samples at (m, 3), mm.
+    """Return (k,): heights in the displacements ``moves (m, 3)`` of samples at (m, 3), mm.
 
     They are 0 below ``enough``, and where the other side of the face moves alike.
     """
-    moved = without_rims(at, rims, rings.heights(moves, enough), enough, OFF_RIM * radius)
+    moved = drop_rims(at, rims, rings.heights(moves, enough), enough, OFF_RIM * radius)
     low = moved < MIRRORED * radius
     if (moved[low] > 0.0).any():
-        height = without_rims(at, rims, rings.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
+        height = drop_rims(at, rims, rings.heights(moves, PAIRED * enough), PAIRED * enough, OFF_RIM * radius)
         moved[low & _has_mirror_image(subject, at[: len(height)], height, places)] = 0.0
     return moved
 
 
 def _has_mirror_image(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
-    """(k,) which samples at (k, 3) with a height (k,) above 0 have another such sample near their mirror image."""
+    """Return (k,): which samples at (k, 3) with a height (k,) above 0 have another such sample near their mirror
+    image.
+    """
     middle, far = places.centre[0], MIRROR_MM * subject.scale
     out = np.zeros(len(at), bool)
     steep = np.flatnonzero(height)
@@ -278,8 +284,8 @@ def _has_mirror_image(subject: Subject, at: Floats, height: Floats, places: Plac
 
 @kernel
 def mirror_images(points: Any, mirrored: Any, first: Any, last: Any, order: Any, far: float) -> Any:
-    """(k,) whether any of points (k, 3) is nearer than ``far`` to the mirror image (k, 3) of each, and further than
-    ``far`` to the side of the point itself.
+    """Return (k,): whether any of points (k, 3) is nearer than ``far`` to the mirror image (k, 3) of each, and further
+    than ``far`` to the side of the point itself.
 
     All points that near a mirror image are those of ``order`` from ``first[i, c]`` to ``last[i, c]``, for every column
     c.
@@ -300,8 +306,8 @@ def mirror_images(points: Any, mirrored: Any, first: Any, last: Any, order: Any,
     return out
 
 
-def _allowed(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
-    """(m,) which samples may stick out: those of the nose, and those that have a mirror image."""
+def _may_stick_out(subject: Subject, at: Floats, height: Floats, places: Places) -> Bools:
+    """Return (m,): which samples may stick out: those of the nose, and those that have a mirror image."""
     middle, apart = places.centre[0], places.apart
     out: Bools = np.abs(at[:, 0] - middle) < NOSE * apart
     out &= (at[:, 2] > places.centre[2]) & (at[:, 1] < places.centre[1] + 0.3 * apart)

@@ -1,4 +1,4 @@
-"""Does the head stand as a head does: its size, before the camera, eyes where they belong, parts the right way out."""
+"""Check a head's size, its place before the camera, its eyes, and that no part is inside out."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from surface.base.arrays import Bools, Floats, Floats32
 from surface.check.findings import AGAIN, Finding
 from surface.check.lids import eye_opening
 from surface.check.mouth import Mouth
-from surface.check.raster import NOTHING, Picture, View, turned
+from surface.check.raster import NOTHING, Picture, View, view_rotation
 from surface.check.subject import HAIR, SIDES, Subject
 from surface.view.scene.camera import Camera
 
-EYES_RANGE_MM = (30.0, 140.0)  # between the eyes of a head in millimetres, small and large ones included
-HEIGHT_RANGE_MM = (90.0, 900.0)  # of its skin
-INSIDE = 0.95  # of the picture from its middle to its edge, in which eyes and mouth have to be
-CLOSE = 0.6  # of the radius: how far the middle of an eyeball may lie from the point about which it turns
-VIEWS = (0.0, 38.0, -38.0, 90.0, -90.0, 180.0)  # degrees, from which a head is looked at
+EYES_RANGE_MM = (30.0, 140.0)  # distance between the eyes of any head that is in millimetres
+HEIGHT_RANGE_MM = (90.0, 900.0)  # height of its skin
+MAX_OFFSET = 0.95  # of eyes and mouth from the picture's middle; 1 is its edge
+MAX_OFF_PIVOT = 0.6  # distance of an eyeball's middle from its pivot, in its radii
+VIEWS = (0.0, 38.0, -38.0, 90.0, -90.0, 180.0)  # yaw of the views of a head, degrees
 POSES: tuple[dict[str, float], ...] = ({}, {"jawOpen": 1.0})
-INSIDE_OUT = 0.6  # of what shows of a part: its back
-LEAST_PIXELS = 60
+MAX_BACK = 0.6  # fraction of a part's visible pixels that may show its back
+MIN_PIXELS = 60
 SOLID = ("teeth", "gums", "tongue", "eye")  # materials of parts that are seen from outside only
 
 
 def wrong_unit(subject: Subject) -> Iterator[Finding]:
-    """A head that is far too big or too small to be one in millimetres."""
+    """Find a head that is far too big or too small to be one in millimetres."""
     if subject.eyes is not None:
         size, (low, high), what = float(np.linalg.norm(subject.eyes[0] - subject.eyes[1])), EYES_RANGE_MM, "eyes are"
     else:
@@ -39,13 +39,13 @@ def wrong_unit(subject: Subject) -> Iterator[Finding]:
 
 
 def off_camera(subject: Subject, mouth: Mouth | None) -> Iterator[Finding]:
-    """A face that the front camera does not see, or sees from behind."""
-    marks = _marks(subject, mouth)
+    """Find a face that the front camera does not see, or sees from behind."""
+    marks = _face_landmarks(subject, mouth)
     clip = np.column_stack([marks, np.ones(len(marks))]) @ np.asarray(Camera.front().matrix(1.0), float).T
     behind = bool((clip[:, 3] <= 0).any())
     at = clip[:, :2] / np.maximum(np.abs(clip[:, 3:]), 1e-9)
     hint = f"{AGAIN}, with --up and --forward if the axes of the mesh were guessed wrong"
-    if behind or np.abs(at).max() > INSIDE:
+    if behind or np.abs(at).max() > MAX_OFFSET:
         middle = ", ".join(f"{v:.0f}" for v in marks.mean(axis=0))
         yield Finding("off camera", f"the face is not in the front camera's picture: it lies at ({middle}) mm", hint)
     elif not _faces_forward(subject):
@@ -53,7 +53,7 @@ def off_camera(subject: Subject, mouth: Mouth | None) -> Iterator[Finding]:
 
 
 def missing_eyes(subject: Subject) -> Iterator[Finding]:
-    """Eyeballs that are not there, not where they turn, or that nobody sees."""
+    """Find eyeballs that are not there, not where they turn, or that nobody sees."""
     present = [subject.eye(side) is not None for side in (0, 1)]
     if not any(present) and subject.eyes is None:
         text = "the head has no eyes: gaze will not show"
@@ -63,7 +63,7 @@ def missing_eyes(subject: Subject) -> Iterator[Finding]:
         if not present[side]:
             text = f"no part follows {SIDES[side]}: the {word} eye is a hole"
             yield Finding("missing eye", text, f"export the mesh with both eyeballs, then {AGAIN}")
-        elif (off := _off_pivot(subject, side)) > CLOSE * subject.head.data.eye_radius:
+        elif (off := _off_pivot(subject, side)) > MAX_OFF_PIVOT * subject.head.data.eye_radius:
             text = f"the {word} eyeball lies {off:.1f} mm from the point about which it turns"
             yield Finding("missing eye", text, "correct pivots.eyes in head.toml")
         elif eye_opening(subject, side, subject.rest) == 0.0:
@@ -72,7 +72,7 @@ def missing_eyes(subject: Subject) -> Iterator[Finding]:
 
 
 def inside_out(subject: Subject) -> Iterator[Finding]:
-    """Parts that show their back: by the way their triangles run, or by their normals."""
+    """Find parts that show their back: by the way their triangles run, or by their normals."""
     seen = np.zeros(len(subject.parts))
     backs = np.zeros((2, len(subject.parts)))
     for values in POSES:
@@ -85,17 +85,18 @@ def inside_out(subject: Subject) -> Iterator[Finding]:
                 backs[:, k] += by_way, by_normal
     subject.posed_now({})
     for k, part in enumerate(subject.parts):
-        if seen[k] < LEAST_PIXELS and part.material in SOLID:
-            seen[k], *backs[:, k] = _alone(subject, k)
+        if seen[k] < MIN_PIXELS and part.material in SOLID:
+            seen[k], *backs[:, k] = _sides_shown_alone(subject, k)
     for part, count, (by_way, by_normal) in zip(subject.parts, seen, backs.T, strict=True):
-        if count >= LEAST_PIXELS and max(by_way, by_normal) > INSIDE_OUT * count:
-            what = "triangles run" if by_way > INSIDE_OUT * count else "normals point"
+        if count >= MIN_PIXELS and max(by_way, by_normal) > MAX_BACK * count:
+            what = "triangles run" if by_way > MAX_BACK * count else "normals point"
             text = f"part {part.name!r}: its {what} inwards, {100 * max(by_way, by_normal) / count:.0f} % of what shows"
             yield Finding("inside-out part", text, f"make all faces of the mesh look outwards, then {AGAIN}")
 
 
-def _alone(subject: Subject, number: int) -> tuple[int, int, int]:
-    """As :func:`_sides_shown`, of one part that nothing else hides: only what is no lining shows its outside then."""
+def _sides_shown_alone(subject: Subject, number: int) -> tuple[int, int, int]:
+    """Do the same as :func:`_sides_shown`, of one part that nothing else hides: only what is no lining shows its
+    outside then."""
     picture = _picture(subject, [v if k == number else v[:0] for k, v in enumerate(subject.rest)], 0.0)
     normals = [p.normals for p in subject.parts]
     return _sides_shown(subject, picture, subject.rest, normals).get(number, (0, 0, 0))
@@ -118,7 +119,7 @@ def _sides_shown(
 
 
 def _picture(subject: Subject, vertices: list[Floats32], yaw: float) -> Picture:
-    turn, step = turned(yaw), 1.2 * subject.scale
+    turn, step = view_rotation(yaw), 1.2 * subject.scale
     at = np.concatenate(vertices) @ turn.T
     low, high = at.min(axis=0), at.max(axis=0)
     most = 600 * step  # a head of any size makes a picture of a size that can be drawn
@@ -128,7 +129,7 @@ def _picture(subject: Subject, vertices: list[Floats32], yaw: float) -> Picture:
 
 
 def _faces_forward(subject: Subject) -> bool:
-    """Does the skin that moves most, the face, lie in front of the rest?"""
+    """Whether the skin that moves most, the face, lies in front of the rest."""
     moves = np.zeros(sum(len(subject.rest[k]) for k in subject.skin))
     for name in subject.claimed:
         if not name.startswith(("head", "leftEye", "rightEye")):
@@ -140,8 +141,8 @@ def _faces_forward(subject: Subject) -> bool:
     return float(moves @ z / moves.sum()) >= float(z.min() + 0.35 * np.ptp(z))
 
 
-def _marks(subject: Subject, mouth: Mouth | None) -> Floats:
-    """(k, 3) places of the face: eyes and mouth, or the middle of the skin's front."""
+def _face_landmarks(subject: Subject, mouth: Mouth | None) -> Floats:
+    """Return (k, 3): places of the face: eyes and mouth, or the middle of the skin's front."""
     marks = [] if subject.eyes is None else list(subject.eyes)
     marks += [] if mouth is None else [mouth.middle]
     if marks:

@@ -33,7 +33,7 @@ class Subject:
         self.rest = self.posed({})
 
     def posed(self, values: Mapping[str, float]) -> list[Floats32]:
-        """Vertices (m, 3) of every part in a pose."""
+        """Return vertices (m, 3) of every part in a pose."""
         key = tuple(sorted(values.items()))
         if key not in self._kept:
             self.head.pose(self.head.values(values))
@@ -41,21 +41,21 @@ class Subject:
         return self._kept[key]
 
     def posed_now(self, values: Mapping[str, float]) -> list[Floats32]:
-        """As :meth:`posed`, and the parts are in that pose afterwards, for their normals."""
+        """Do the same as :meth:`posed`, and the parts are in that pose afterwards, for their normals."""
         self.head.pose(self.head.values(values))
         return self.posed(values)
 
     def at_one(self, name: str) -> list[Floats32]:
-        """Vertices of every part with one parameter at 1, and at least what it needs to show."""
+        """Return vertices of every part with one parameter at 1, and at least what it needs to show."""
         return self.posed(pose_of(name))
 
     def moves(self, name: str) -> list[Floats32]:
-        """(m, 3) how a parameter at 1 moves the vertices of every part."""
+        """Return (m, 3): how a parameter at 1 moves the vertices of every part."""
         before = self.posed({"jawOpen": 1.0}) if name == "mouthClose" else self.rest
         return [np.asarray(b - a) for a, b in zip(before, self.at_one(name), strict=True)]
 
     def shapes(self, vertices: list[Floats32], *, without: tuple[str, ...] = HAIR) -> list[Shape | None]:
-        """What a picture is drawn from, less the parts of some materials."""
+        """Return what a picture is drawn from, less the parts of some materials."""
         pairs = zip(self.parts, vertices, strict=True)
         return [None if p.material in without else (v, p.triangles) for p, v in pairs]
 
@@ -99,5 +99,5 @@ class Subject:
 
 
 def pose_of(name: str) -> dict[str, float]:
-    """The pose in which a parameter at 1 shows: mouthClose closes what the jaw has opened."""
+    """Return the pose in which a parameter at 1 shows: mouthClose closes what the jaw has opened."""
     return {name: 1.0, "jawOpen": 1.0} if name == "mouthClose" else {name: 1.0}

@@ -32,11 +32,11 @@ from surface.spline.lanes import (
 )
 
 from .binding import arrays_of
-from .groupsums import HEAD, STEP, join_all, join_values, sum_groups, wide
+from .groupsums import HEAD, STEP, factor_counts, join_all, join_values, sum_groups
 from .packedsums import AHEAD, sum_all_packed, sum_packed, write_lanes
 
 AHEAD_OUT = 384  # coordinates of vertices that are fetched before they are written: 16 tiles
-MOST_SQUARE = np.float32(1e36)  # of a vector's length
+MAX_SQUARE = np.float32(1e36)  # of a vector's length
 
 
 @inlined
@@ -51,7 +51,7 @@ def gather(points, ids, first, rows, origin, c, local):
 
 @inlined
 def sum_values(value, at, rows, local):
-    """Three sums of one tile; four rows at a time so that additions do not wait for each other."""
+    """Return three sums of one tile; four rows at a time so that additions do not wait for each other."""
     x0, y0, z0 = zero(), zero(), zero()
     x1, y1, z1 = zero(), zero(), zero()
     x2, y2, z2 = zero(), zero(), zero()
@@ -76,7 +76,7 @@ def sum_values(value, at, rows, local):
 
 @inlined
 def sum_all(value, slope, at, rows, local):
-    """Nine sums of one tile: the numerators of the position and of its derivatives in u and in v."""
+    """Return nine sums of one tile: the numerators of the position and of its derivatives in u and in v."""
     x, y, z = zero(), zero(), zero()
     ax, ay, az, bx, by, bz = zero(), zero(), zero(), zero(), zero(), zero()
     for k in range(rows):
@@ -90,7 +90,7 @@ def sum_all(value, slope, at, rows, local):
 
 @inlined
 def cross(ax, ay, az, bx, by, bz):
-    """a x b, and the square of its length."""
+    """Return a x b, and the square of its length."""
     nx, ny = sub(mul(ay, bz), mul(az, by)), sub(mul(az, bx), mul(ax, bz))
     nz = sub(mul(ax, by), mul(ay, bx))
     return nx, ny, nz, add(add(mul(nx, nx), mul(ny, ny)), mul(nz, nz))
@@ -98,12 +98,12 @@ def cross(ax, ay, az, bx, by, bz):
 
 @inlined
 def unit_cross(ax, ay, az, bx, by, bz, sign):
-    """Unit vectors along a x b, times ``sign``; zero where the product vanishes.
+    """Return unit vectors along a x b, times ``sign``; zero where the product vanishes.
 
     Where its square is beyond float32, a and b are shortened first.
     """
     nx, ny, nz, square = cross(ax, ay, az, bx, by, bz)
-    if reaches(square, MOST_SQUARE):
+    if reaches(square, MAX_SQUARE):
         a, b = most_of(ax, ay, az), most_of(bx, by, bz)
         nx, ny, nz, square = cross(div(ax, a), div(ay, a), div(az, a), div(bx, b), div(by, b), div(bz, b))
     scale = div(splat(sign), root(add(square, splat(np.float32(1e-30)))))
@@ -112,14 +112,14 @@ def unit_cross(ax, ay, az, bx, by, bz, sign):
 
 @inlined
 def positions_of(tile, x, y, z, inv_w):
-    """Positions of one tile relative to the cell's origin, from their numerators."""
+    """Return positions of one tile relative to the cell's origin, from their numerators."""
     w = load(inv_w, 8 * tile)
     return mul(x, w), mul(y, w), mul(z, w)
 
 
 @inlined
 def normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw):
-    """Normals of one tile: the direction of S_u x S_v by the quotient rule, without its common factor."""
+    """Return normals of one tile: the direction of S_u x S_v by the quotient rule, without its common factor."""
     wu, wv = load(dw, 16 * tile), load(dw, 16 * tile + 8)
     ax, ay, az = sub(ax, mul(x, wu)), sub(ay, mul(y, wu)), sub(az, mul(z, wu))
     bx, by, bz = sub(bx, mul(x, wv)), sub(by, mul(y, wv)), sub(bz, mul(z, wv))
@@ -133,7 +133,7 @@ def store_numerators(
 ):  # fmt: skip
     """Store the numerators of one cell, whose points are in ``local``, for later differences."""
     base, at, groups = first_tile * (72 if slopes else 24), head + HEAD, 0
-    wide_u, wide_v = wide(row, head, picks)
+    wide_u, wide_v = factor_counts(row, head, picks)
     if row >= 0:
         groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, slopes, local, starts, scratch)
     for tile in range(first_tile, end_tile):
@@ -169,7 +169,7 @@ def store_numerators(
 
 @inlined
 def load_tile(tile, size, sign, inv_w, dw, numerators):
-    """Positions relative to the cell's origin, and normals if there are any, of one tile from its numerators."""
+    """Return positions relative to the cell's origin, and normals if there are any, of one tile from its numerators."""
     base = tile * size
     x, y, z = load(numerators, base), load(numerators, base + 8), load(numerators, base + 16)
     x, y, z = positions_of(tile, x, y, z, inv_w)
@@ -273,7 +273,7 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
         gather(points, ids, ids_at[c], rows, origin, c, local)
         px, py, pz = splat(np.float32(origin[c, 0])), splat(np.float32(origin[c, 1])), splat(np.float32(origin[c, 2]))
         place, step, row, pick_at, tile = at[c], room[c] * 8, rows_at[c], picks_at[c] + HEAD, tile_start[c]
-        wide_u, wide_v = wide(row, picks_at[c], picks)
+        wide_u, wide_v = factor_counts(row, picks_at[c], picks)
         groups = 0
         if row >= 0:
             groups = sum_groups(
@@ -318,7 +318,8 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
 
 @nonallocating
 def join_ranges(cells, total, cell_start, gap, out):
-    """Vertex ranges of rising cells, joined where fewer than ``gap`` vertices lie between; returns their number."""
+    """Write the vertex ranges of ascending cells, joined where fewer than ``gap`` vertices lie between; returns their
+    number."""
     count = 0
     for q in range(total):
         start, stop = cell_start[cells[q]], cell_start[cells[q] + 1]

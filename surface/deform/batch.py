@@ -54,11 +54,11 @@ class DeformationBatch:
         if count < 1:
             raise ValueError(f"count: must be at least 1, not {count}")
         self._source, own = source, source.own_arrays()
-        self._arrays = {name: _repeated(array, count) for name, array in own.items()}
+        self._arrays = {name: _repeat(array, count) for name, array in own.items()}
         self._n, self._copies = source.basis.n, len(source.basis.shifts)
         every = [{name: array[k] for name, array in self._arrays.items()} for k in range(count)]
         self._tables = np.stack([address_table(source.addressed() | arrays) for arrays in every])
-        self._cells, self._sign, self._rooms = source.work()
+        self._cells, self._sign, self._scratch = source.work()
         self._cuts = slices(source.weights_of_cells * WEIGHT_BYTES, SLICE_BYTES)
         self._waiting: dict[int, None] = {}
         shape = count, len(source.vertices), 3
@@ -102,7 +102,7 @@ class DeformationBatch:
     def _compute(self, copies: list[int]) -> None:
         if copies:
             which = np.array(copies, np.int64)
-            compute_copies(self._tables, which, self._cells, self._cuts, self._sign, *self._rooms)
+            compute_copies(self._tables, which, self._cells, self._cuts, self._sign, *self._scratch)
 
     def _recentre(self, copy: int) -> None:
         """As the source does where its origins do not fit any more."""
@@ -114,8 +114,8 @@ class DeformationBatch:
 
 
 def slices(sizes: NDArray[np.int64], most: int) -> Ints:
-    """Where to cut a row of things of these ``sizes (c,)`` so that no slice exceeds ``most``, but for single things:
-    ``(k + 1,)`` from 0 to c."""
+    """Return where to cut a row of things of these ``sizes (c,)`` so that no slice exceeds ``most``, but for single
+    things: ``(k + 1,)`` from 0 to c."""
     cuts, total = [0], 0
     for c, size in enumerate(sizes.tolist()):
         if total + size > most and cuts[-1] < c:
@@ -125,8 +125,10 @@ def slices(sizes: NDArray[np.int64], most: int) -> Ints:
     return np.array([*cuts, len(sizes)], np.int64)
 
 
-def _repeated(array: NDArray[Any], count: int) -> NDArray[Any]:
-    """(count, ...) copies of an array, with room behind the last: kernels read four numbers of a row of three."""
+def _repeat(array: NDArray[Any], count: int) -> NDArray[Any]:
+    """Return (count, ...): copies of an array, with room behind the last: kernels read four numbers of a row of
+    three.
+    """
     room = np.zeros(count * array.size + LANES, array.dtype)
     room[: count * array.size] = np.tile(array.ravel(), count)
     return room[: count * array.size].reshape(count, *array.shape)

@@ -37,7 +37,7 @@ Kernels unpack that tuple once.
 
 
 def address_table(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-    """(2 k,) int64: address and length of the k arrays of ``NAMES``; the arrays must outlive the table."""
+    """Return (2 k,) int64: address and length of the k arrays of ``NAMES``; the arrays must outlive the table."""
     table = []
     for name in NAMES:
         if not arrays[name].flags.c_contiguous:
@@ -48,7 +48,7 @@ def address_table(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
 
 @intrinsic
 def _pointer(typingctx, address):
-    """An address as a pointer."""
+    """Return an address as a pointer."""
 
     def generate(context, builder, signature, args):
         return builder.inttoptr(args[0], ir.IntType(8).as_pointer())
@@ -68,7 +68,7 @@ def _rows(table, k, width, dtype):
 
 @merged
 def arrays_of(table):
-    """The arrays of a table; types and widths are in the order of ``NAMES``."""
+    """Return the arrays of a table; types and widths are in the order of ``NAMES``."""
     return (
         _flat(table, 0, np.int64), _flat(table, 1, np.int64), _flat(table, 2, np.int64), _flat(table, 3, np.int64),
         _flat(table, 4, np.int64), _flat(table, 5, np.int64), _flat(table, 6, np.int32), _flat(table, 7, np.float32),

@@ -26,20 +26,20 @@ from surface.spline.controlpoints import ControlPoints
 
 from . import apply, edits
 from .binding import address_table
-from .denominators import denominators, farthest, unusable
+from .denominators import denominators, farthest, first_unusable
 from .lists import LANES, Basis, build_lists
-from .merging import merged
+from .merging import merge_cells
 from .storage import compress
 from .updates import REFUSED, measure, move_points
 from .working import middles, work_arrays
 
 Table = TypeVar("Table", bound=ControlPoints)
-LIMIT = 256  # differences a cell takes before it is computed again
-BIAS = 6.0  # cost of one row's difference, in rows computed again (measured)
-GAP = 256  # unchanged vertices between two changed ranges that are uploaded rather than left out
-MOST_MOVED = 0.75  # from this part of the points on, everything is computed again
-PARTS = 4  # into which a thread's share of the cells is cut
-SMALL = 500_000  # weights below which one thread is as fast as two
+LIMIT = 256  # differences that a cell takes before it is computed again
+BIAS = 6.0  # cost of one row's difference, relative to computing a row again (measured)
+GAP = 256  # changed ranges with fewer unchanged vertices between them are joined
+RECOMPUTE_FRACTION = 0.75  # of the points moved, from which on everything is computed again
+PARTS = 4  # into which the cells of a thread are divided
+SMALL = 500_000  # number of weights below which one thread is as fast as two
 
 
 class Deformation(Generic[Table]):
@@ -75,12 +75,12 @@ class Deformation(Generic[Table]):
             raise ValueError(f"mesh: was made from another surface: this one has {surface.n} points")
         if mesh.structure and mesh.structure != surface.structure:
             raise ValueError("mesh: was made from another surface, with other knots: tessellate this one")
-        self.mesh, self.basis = merged(mesh), Basis.of(surface)
+        self.mesh, self.basis = merge_cells(mesh), Basis.of(surface)
         self.lists = build_lists(surface, self.mesh, normals, progress)
         self._work = self.lists.rows * np.diff(self.lists.tile_start) * LANES  # weights by cell, however they are kept
         self.storage = compress(self.basis, self.lists, self.mesh)
         self._sign, self._threads = np.float32(-1 if mesh.flip else 1), threads
-        self._most = int(MOST_MOVED * len(surface.arrays()[4]))
+        self._most = int(RECOMPUTE_FRACTION * len(surface.arrays()[4]))
         self._pool: ThreadPoolExecutor | None = None  # started when first used
         self._make = partial(type(surface).from_padded, closed_u=surface.closed[0], closed_v=surface.closed[1])
         self._arrays = work_arrays(self.mesh, surface.arrays()[4], int(self.lists.tile_start[-1]), normals)
@@ -105,7 +105,7 @@ class Deformation(Generic[Table]):
 
     @property
     def changed(self) -> list[tuple[int, int]]:
-        """Vertex ranges (start, stop) that the last update touched, rising."""
+        """Vertex ranges (start, stop) that the last update touched, ascending."""
         return [(int(a), int(b)) for a, b in self._ranges[: self._count]]
 
     @property
@@ -140,19 +140,19 @@ class Deformation(Generic[Table]):
         self._place(self._all, _rows(xyz, "xyz"), False)
 
     def own_arrays(self) -> dict[str, np.ndarray]:
-        """What differs between deformations of one mesh that share weights and knots, by the names of
+        """Return what differs between deformations of one mesh that share weights and knots, by the names of
         :data:`.binding.NAMES`."""
         return {
             name: self._arrays[name] for name in ("points", "origin", "vertices", "normals", "differences", "extent")
         }
 
     def addressed(self) -> dict[str, np.ndarray]:
-        """All arrays that kernels take, by the names of :data:`.binding.NAMES`."""
+        """Return all arrays that kernels take, by the names of :data:`.binding.NAMES`."""
         return vars(self.lists) | self._arrays | self.storage.arrays
 
     def work(self) -> tuple[np.ndarray, np.float32, list[np.ndarray]]:
-        """What kernels take besides: all cells, the sign of normals, scratch space of a thread."""
-        return self._cells, self._sign, [np.zeros_like(room) for room in self._rooms()]
+        """Return what kernels take besides: all cells, the sign of normals, scratch space of a thread."""
+        return self._cells, self._sign, [np.zeros_like(room) for room in self._scratch()]
 
     @property
     def weights_of_cells(self) -> Ints:
@@ -243,7 +243,7 @@ class Deformation(Generic[Table]):
         if target.shape != (len(which), 3):
             raise ValueError(f"{name}: shape {target.shape}, expected {(len(which), 3)}")
         if len(which) > n:  # ids that are given several times: the last position counts, moves add up
-            which, target = _gathered(check_ids(which, n), target, relative)
+            which, target = _sum_by_id(check_ids(which, n), target, relative)
         if copies > 1:
             which, target = self.basis.copies(check_ids(which, n)), np.tile(target, (copies, 1))
         found = move_points(self._addresses, which, target, relative, self._most, LIMIT, BIAS, GAP, self._sign)
@@ -295,7 +295,7 @@ class Deformation(Generic[Table]):
         are so far away that these cannot hold their sums."""
         arrays = self._arrays
         order = self.storage.packed.order_at, self.storage.packed.order
-        bad = unusable(cells, self.lists.cell_start, self.lists.tile_start, arrays["inv_w"], arrays["dw"], *order)
+        bad = first_unusable(cells, self.lists.cell_start, self.lists.tile_start, arrays["inv_w"], arrays["dw"], *order)
         if bad >= 0:
             u, v = self.mesh.uv[bad]
             raise ValueError(
@@ -310,15 +310,15 @@ class Deformation(Generic[Table]):
             )
 
     def _update(self, cells: Ints) -> None:
-        """Bring ``cells (k,)``, rising, up to date with their changed weights, which are summed."""
+        """Bring ``cells (k,)``, ascending, up to date with their changed weights, which are summed."""
         self._compute(cells.astype(np.int32))
         self._count = apply.join_ranges(cells, len(cells), self.lists.cell_start, GAP, self._ranges)
 
     def _compute(self, cells: np.ndarray) -> None:
-        apply.compute_cells(self._addresses, cells, 0, len(cells), self._sign, *self._rooms())
+        apply.compute_cells(self._addresses, cells, 0, len(cells), self._sign, *self._scratch())
 
-    def _rooms(self) -> list[np.ndarray]:
-        """Scratch space of the kernels."""
+    def _scratch(self) -> list[np.ndarray]:
+        """Return scratch space of the kernels."""
         return [self._arrays[name] for name in ("local", "scratch", "starts")]
 
     def _compute_in_parts(self) -> None:
@@ -331,7 +331,7 @@ class Deformation(Generic[Table]):
         turns = count()  # next(turns) is one step: no two threads take the same part
 
         def work() -> None:
-            rooms = [np.zeros_like(room) for room in self._rooms()]
+            rooms = [np.zeros_like(room) for room in self._scratch()]
             while (part := next(turns)) < parts:
                 begin, end = cuts[part], cuts[part + 1]
                 apply.compute_cells(self._addresses, self._cells, begin, end, self._sign, *rooms)
@@ -343,15 +343,15 @@ class Deformation(Generic[Table]):
 
 
 def _rows(rows: ArrayLike, name: str) -> Floats:
-    """Float64 numbers in order, not copied where they are that already."""
+    """Return float64 numbers in order, not copied where they are that already."""
     if type(rows) is np.ndarray and rows.dtype == np.float64 and rows.flags.c_contiguous:
         return rows
     fast = isinstance(rows, np.ndarray) and rows.dtype.kind == "f"
     return np.ascontiguousarray(rows, dtype=np.float64) if fast else numbers(rows, name)
 
 
-def _gathered(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
-    """Each id once."""
+def _sum_by_id(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
+    """Return each id once, with its sum of moves or its last position."""
     if not relative:
         unique, last = np.unique(which[::-1], return_index=True)
         return unique, np.ascontiguousarray(rows[::-1][last])
@@ -362,7 +362,7 @@ def _gathered(which: Ints, rows: Floats, relative: bool) -> tuple[Ints, Floats]:
 
 
 def _view(flat: np.ndarray) -> np.ndarray:
-    """(m, 3) read-only view."""
+    """Return (m, 3): read-only view."""
     view = flat.reshape(-1, 3)
     view.flags.writeable = False
     return view

@@ -9,16 +9,16 @@ from surface.base.arrays import Floats
 from surface.base.jit import inlined, kernel
 
 from .binding import arrays_of
-from .groupsums import HEAD, STEP, wide
+from .groupsums import HEAD, STEP, factor_counts
 
-LEAST_SUM = 1e-36  # of the weights at a vertex: float32 has fewer digits for smaller numbers
-MOST_SUM = 3e37  # of weights times distances: ten times that is still a float32, see :func:`farthest`
+MIN_SUM = 1e-36  # of the weights at a vertex; smaller float32 numbers have fewer digits
+MAX_SUM = 3e37  # of weights times distances: ten times that is still a float32, see :func:`farthest`
 
 
 @inlined
 def _sum_entries(value, slope, first, end, slopes, j):
-    """Sums of b w, b_u w and b_v w in lane j of the rows of eight from ``first`` to ``end``; the greatest of these
-    sums without signs."""
+    """Return sums of b w, b_u w and b_v w in lane j of the rows of eight from ``first`` to ``end``; the greatest of
+    these sums without signs."""
     w, wu, wv, au, av = 0.0, 0.0, 0.0, 0.0, 0.0
     for e in range(first, end):
         w += value[8 * e + j]
@@ -30,7 +30,7 @@ def _sum_entries(value, slope, first, end, slopes, j):
 
 @inlined
 def _sum_factors(rows, row, tile, wide_u, wide_v, factor_u, factor_v, factors, picks, slopes, j):
-    """The same sums of a cell with factors, whose tile has its picks at ``tile``."""
+    """Return the same sums of a cell with factors, whose tile has its picks at ``tile``."""
     w, wu, wv, au, av = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(row, row + rows):
         at_u = factor_u[k] + picks[tile + 16] + picks[tile + j]
@@ -44,7 +44,7 @@ def _sum_factors(rows, row, tile, wide_u, wide_v, factor_u, factor_v, factors, p
 
 @inlined
 def _heaviest_group(rows, row, wide_u, factor_u, factor_v, factors, slopes):
-    """The greatest sum of factors in u, without signs, of a group of points with the same factors in v."""
+    """Return the greatest sum of factors in u, without signs, of a group of points with the same factors in v."""
     most = 0.0
     for column in range(2 * wide_u if slopes else wide_u):
         total = 0.0
@@ -69,7 +69,7 @@ def denominators(table, cells):
     slopes = dw.shape[0] > 0
     for q in range(cells.shape[0]):
         c = cells[q]
-        wide_u, wide_v = wide(rows_at[c], picks_at[c], picks)
+        wide_u, wide_v = factor_counts(rows_at[c], picks_at[c], picks)
         heavy[c] = 0.0
         if rows_at[c] >= 0:
             heavy[c] = _heaviest_group(rows[c], rows_at[c], wide_u, factor_u, factor_v, factors, slopes)
@@ -89,15 +89,15 @@ def denominators(table, cells):
             if cell_start[c] + lane - 8 * tile_start[c] >= cell_start[c + 1]:
                 w = 1.0  # lanes that fill up the last tile
             heavy[c] = max(heavy[c], most)
-            inv_w[lane] = 1.0 / w if w >= LEAST_SUM else np.inf
+            inv_w[lane] = 1.0 / w if w >= MIN_SUM else np.inf
             if slopes:
                 dw[16 * (lane // 8) + j], dw[16 * (lane // 8) + 8 + j] = wu, wv
 
 
 @kernel
-def unusable(cells, cell_start, tile_start, inv_w, dw, order_at, order):
-    """The first vertex of ``cells`` whose weights add up to less than ``LEAST_SUM`` or to more than float32 has, or
-    whose derivative weights do; -1 if there is none."""
+def first_unusable(cells, cell_start, tile_start, inv_w, dw, order_at, order):
+    """Return the first vertex of ``cells`` whose weights add up to less than ``MIN_SUM`` or to more than float32 has,
+    or whose derivative weights do; -1 if there is none."""
     for q in range(cells.shape[0]):
         c = cells[q]
         for vertex in range(cell_start[c], cell_start[c + 1]):
@@ -114,9 +114,9 @@ def unusable(cells, cell_start, tile_start, inv_w, dw, order_at, order):
 
 
 def farthest(heavy: Floats) -> float:
-    """The greatest coordinate with which no sum of weights times places leaves the range of float32.
+    """Return the greatest coordinate with which no sum of weights times places leaves the range of float32.
 
     ``heavy (c,)`` are the greatest sums of weights. Places are relative to origins that lie at most five times as far
     away (see :mod:`.updates`), and for normals one such sum is subtracted from another.
     """
-    return MOST_SUM / max(1.0, float(heavy.max(initial=0.0)))
+    return MAX_SUM / max(1.0, float(heavy.max(initial=0.0)))

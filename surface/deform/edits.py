@@ -12,13 +12,13 @@ from surface.spline.basis import blending
 from surface.spline.kernels import points_in
 
 from .lists import LANES, Basis, Lists, cells_by_point, grow, write_rows
-from .storage import Storage, expand, remember
+from .storage import Storage, expand, make_restore
 
 
 def change_weights(
     basis: Basis, lists: Lists, storage: Storage, mesh: Mesh, which: Ints, weights: Floats
 ) -> Ints:  # fmt: skip
-    """Give points ``which (k,)`` other ``weights (k,)``; returns the rising cells that changed, which get plain
+    """Give points ``which (k,)`` other ``weights (k,)``; returns the ascending cells that changed, which get plain
     weights."""
     which, cells = basis.copies(which), [np.zeros(0, dtype=np.int64)]
     basis.weights[which] = np.tile(weights, len(basis.shifts))
@@ -33,12 +33,12 @@ def change_weights(
 def change_knots(
     basis: Basis, lists: Lists, storage: Storage, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]
 ) -> Ints:  # fmt: skip
-    """Give point i other knots; returns the rising cells that changed, which get plain weights.
+    """Give point i other knots; returns the ascending cells that changed, which get plain weights.
 
     ``ValueError`` where a vertex would be covered by no point; nothing is changed then.
     """
     copies = [(b * basis.n + i, [knots[k] + shift[k] for k in range(2)]) for b, shift in enumerate(basis.shifts)]
-    restore = remember(lists, storage)
+    restore = make_restore(lists, storage)
     for copy, shifted in copies:
         expand(lists, storage, np.union1d(lists.entries_of(copy)[0], _cells_in(mesh, shifted)))
         vertex = _first_uncovered(lists, mesh, copy, shifted)
@@ -49,9 +49,11 @@ def change_knots(
 
 
 def _first_uncovered(lists: Lists, mesh: Mesh, i: int, knots: list[Floats]) -> int:
-    """The first vertex that only point i covers and that the new knots do not reach, or -1."""
+    """Return the first vertex that only point i covers and that the new knots do not reach, or -1."""
     found = np.zeros(len(mesh.uv), dtype=np.int64)
-    count = _only_covering(*lists.entries_of(i), lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found)
+    count = _list_only_covered(
+        *lists.entries_of(i), lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found
+    )
     for vertex in found[:count]:
         value = 1.0
         for k in range(2):
@@ -65,7 +67,7 @@ def _first_uncovered(lists: Lists, mesh: Mesh, i: int, knots: list[Floats]) -> i
 def _replace_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[Floats], degrees: list[int]) -> Ints:
     """Write point i's knots and update its rows and lists; returns the cells that changed."""
     for k in range(2):
-        basis.knots[k] = _with_row(basis.knots[k], i, knots[k])
+        basis.knots[k] = _replace_row(basis.knots[k], i, knots[k])
         basis.degrees[k][i] = degrees[k]
     old, old_rows = lists.entries_of(i)
     cells = np.union1d(old, _cells_in(mesh, knots))
@@ -80,8 +82,8 @@ def _replace_knots(basis: Basis, lists: Lists, mesh: Mesh, i: int, knots: list[F
     return cells[held | nonzero]
 
 
-def _with_row(table: Floats, i: int, row: Floats) -> Floats:
-    """Knots with row i replaced; wider where the row needs it."""
+def _replace_row(table: Floats, i: int, row: Floats) -> Floats:
+    """Return knots with row i replaced; wider where the row needs it."""
     if len(row) > table.shape[1]:
         table = np.hstack([table, np.repeat(table[:, -1:], len(row) - table.shape[1], axis=1)])
     table[i] = row[-1]
@@ -90,7 +92,7 @@ def _with_row(table: Floats, i: int, row: Floats) -> Floats:
 
 
 def _cells_in(mesh: Mesh, knots: list[Floats]) -> Ints:
-    """Cells whose vertices lie within the rectangle of the knots."""
+    """Return cells whose vertices lie within the rectangle of the knots."""
     boxes, bins = mesh.cell_boxes
     box = np.array([knots[0][0], knots[0][-1], knots[1][0], knots[1][-1]])
     out, along = np.zeros(len(boxes), dtype=np.int32), [np.ascontiguousarray(boxes[:, k : k + 2]) for k in (0, 2)]
@@ -99,7 +101,7 @@ def _cells_in(mesh: Mesh, knots: list[Floats]) -> Ints:
 
 
 def _blocks(lists: Lists, c: int) -> list[np.ndarray]:
-    """Views of a cell's weights (tiles, room, 8) and derivative weights (tiles, room, 16), if there are any."""
+    """Return views of a cell's weights (tiles, room, 8) and derivative weights (tiles, room, 16), if there are any."""
     room, at = lists.room[c], lists.at[c]
     tiles = lists.tile_start[c + 1] - lists.tile_start[c]
     end = at + tiles * room * LANES
@@ -108,7 +110,7 @@ def _blocks(lists: Lists, c: int) -> list[np.ndarray]:
 
 
 def _entry(lists: Lists, i: int, c: int) -> int:
-    """The index of point i's entry for cell c."""
+    """Return the index of point i's entry for cell c."""
     start = lists.point_start[i]
     return int(start + np.argmax(lists.point_cell[start : start + lists.point_count[i]] == c))
 
@@ -181,8 +183,8 @@ def _compact(lists: Lists) -> None:
 
 
 @kernel
-def _only_covering(cells, places, cell_start, rows, room, at, value, out):
-    """Vertices at which a point with rows ``places`` in ``cells`` is the only one; returns their number."""
+def _list_only_covered(cells, places, cell_start, rows, room, at, value, out):
+    """List the vertices at which a point with rows ``places`` in ``cells`` is the only one; return their number."""
     count = 0
     for q in range(cells.shape[0]):
         c = cells[q]

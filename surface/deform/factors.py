@@ -1,7 +1,7 @@
 """Weights of cells as products of factors in u and in v, which take less memory than the weights themselves.
 
 A weight is b(u) b(v) w. The vertices of a cell share most of their coordinates, so a control point has few different
-factors b(u) w and b(v) there. They are stored once for each different coordinate, in rising order, with their slopes
+factors b(u) w and b(v) there. They are stored once for each different coordinate, in ascending order, with their slopes
 after them; equal rows of different cells and points are stored once. A tile picks its eight factors from a window of
 eight, so that the order of vertices does not matter. A cell keeps plain weights where these are cheaper or a tile's
 coordinates fit no window.
@@ -17,16 +17,17 @@ import numpy as np
 from surface.base.arrays import Floats32, Ints
 from surface.base.jit import kernel
 from surface.mesh.mesh import Mesh
-from surface.spline.kernels import along, distinct
+from surface.spline.kernels import blend_along, distinct
 from surface.spline.lanes import PICKS_FAST
 
 from .groupsums import HEAD, STEP
 from .lists import LANES, Basis, Lists, cells_by_point
 
 PLAIN = -1  # in ``rows_at``: the cell has plain weights
-COST = 1.0, 1.5  # without and with normals: factors that need more operations than so many times plain weights are
-# slower (measured on sheets and heads; they read less memory)
-MOST = 1 << 30  # numbers that are stored as factors; further cells keep plain weights
+# Operations of factors relative to plain weights, without and with normals, beyond which factors are slower (measured
+# on sheets and heads; they read less memory).
+MAX_COST = 1.0, 1.5
+MAX_NUMBERS = 1 << 30  # numbers that are stored as factors; further cells keep plain weights
 MIX = 0x9E3779B1  # multiplier of the hash (Knuth, The Art of Computer Programming 6.4)
 
 
@@ -37,7 +38,7 @@ class Factors:
     rows_at : (c,) int64, where every cell's rows start in ``factor_u`` and ``factor_v``; PLAIN without factors
     picks_at : (c,) int64, where every cell's picks start in ``picks``
     factor_u, factor_v : (k,) int32, where the factors of a cell's rows start in ``factors``
-    factors : (f,) float32: those of a row in rising order of their coordinates, then as many slopes if there are any
+    factors : (f,) float32: those of a row in ascending order of their coordinates, then as many slopes if there are any
     picks : (p,) int32: how many factors the rows of a cell have in u and in v; then, by tile, which of a window's
         eight the lanes take in u, which in v, and where the windows start
     slopes : are there any?
@@ -60,15 +61,16 @@ class Factors:
 
 
 def no_factors(cells: int) -> Factors:
-    """Plain weights for that many cells."""
+    """Return empty factors of that many cells, all with plain weights."""
     single = np.zeros(0, np.int32)
     return Factors(np.full(cells, PLAIN), np.zeros(cells, np.int64), single, single, np.zeros(0, np.float32), single)
 
 
 def factorize(
-    basis: Basis, lists: Lists, mesh: Mesh, entries: Ints | None = None, cost: tuple[float, float] = COST
+    basis: Basis, lists: Lists, mesh: Mesh, entries: Ints | None = None, cost: tuple[float, float] = MAX_COST
 ) -> Factors:
-    """Find factors of cells where these need at most ``cost`` times as many operations as weights, see :data:`COST`.
+    """Find factors of cells where these need at most ``cost`` times as many operations as weights, see
+    :data:`MAX_COST`.
 
     entries : (c,) rows of eight weights that a cell needs without factors; as many as its block has if not given
         The lists of points of such cells are sorted; their blocks stay, see :mod:`.storage`.
@@ -85,7 +87,7 @@ def factorize(
     *used, room = _factor_cells(
         *basis.knots, *basis.degrees, basis.weights, mesh.uv, mesh.side, lists.cell_start, lists.tile_start, lists.rows,
         lists.ids_at, lists.ids, entries, slopes, cost[slopes], int(tiles.max()), made.rows_at, made.picks_at, factor_u,
-        factor_v, factors, picks, _slots(2 * listed), _slots(cells),
+        factor_v, factors, picks, _make_slots(2 * listed), _make_slots(cells),
     )  # fmt: skip
     by_point = cells_by_point(lists.ids, lists.rows, len(lists.point_start))
     lists.point_start, lists.point_count, lists.point_cell, lists.point_row = by_point
@@ -94,13 +96,13 @@ def factorize(
     return Factors(made.rows_at, made.picks_at, u, v, others[0], others[1], slopes, made.sums + room)
 
 
-def _slots(entries: int) -> Ints:
-    """An empty hash table, at most half of which so many entries fill."""
+def _make_slots(entries: int) -> Ints:
+    """Return an empty hash table, at most half of which so many entries fill."""
     return np.zeros(1 << (2 * entries).bit_length(), np.int64)
 
 
-def products(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
-    """(tiles, rows, 8) b w of a cell with factors, and (tiles, rows, 16) b_u w and b_v w if it has slopes."""
+def expand_factors(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
+    """Return (tiles, rows, 8): b w of a cell with factors, and (tiles, rows, 16) b_u w and b_v w if it has slopes."""
     rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
     head, first = factors.picks_at[c], factors.rows_at[c]
     wide, picks = factors.picks[head : head + HEAD], factors.picks[head + HEAD : head + HEAD + STEP * tiles]
@@ -121,9 +123,9 @@ def products(factors: Factors, lists: Lists, c: int) -> list[Floats32]:
 
 
 @kernel
-def _ordered(uv, side, axis, values, rank, order):
-    """Distinct coordinates of a cell's vertices, rising, into ``values (k, 2)``, and each vertex's place among them
-    into ``rank``; returns how many there are."""
+def _sort_distinct(uv, side, axis, values, rank, order):
+    """Write distinct coordinates of a cell's vertices, ascending, into ``values (k, 2)``, and each vertex's place among
+    them into ``rank``; returns how many there are."""
     count = distinct(uv, side, axis, values, rank)
     before = values[:count].copy()
     for k in range(count):
@@ -156,8 +158,8 @@ def _put_windows(rank, size, wide, axis, tiles, picks):
 
 
 @kernel
-def _stored(row, size, table, used, slots):
-    """The place of ``row[:size]`` in ``table``, where it is added at ``used`` if it is new; both int32."""
+def _intern_row(row, size, table, used, slots):
+    """Return the place of ``row[:size]`` in ``table``, where it is added at ``used`` if it is new; both int32."""
     total, last = np.uint32(size), slots.shape[0] - 1
     for k in range(size):
         total = np.uint32((total ^ np.uint32(row[k])) * np.uint32(MIX))
@@ -180,7 +182,7 @@ def _stored(row, size, table, used, slots):
 @kernel
 def _factor_row(knots, i, p, values, many, wide, weight, slopes, work, numbers, row):
     """One point's factors, times its weight, in ``row``; zeros where there are fewer than ``wide``."""
-    along(knots, i, p, values, many, True, work, numbers)
+    blend_along(knots, i, p, values, many, True, work, numbers)
     row[:] = 0.0
     for k in range(many):
         row[k] = numbers[k, 0] * weight
@@ -204,8 +206,8 @@ def _sort_rows(keys, ids):
 
 
 @kernel
-def _operations(rows, entries, groups, tiles, wide_u, slopes):
-    """How many operations on eight numbers a cell takes with plain weights and with factors."""
+def _count_operations(rows, entries, groups, tiles, wide_u, slopes):
+    """Return how many operations on eight numbers a cell takes with plain weights and with factors."""
     if slopes:
         return 9 * entries, 6 * rows * (wide_u // 8) + 17 * groups * tiles
     return 3 * entries, 3 * rows * (wide_u // 8) + 7 * groups * tiles
@@ -225,10 +227,10 @@ def _factor_cells(
     for c in range(rows.shape[0]):
         first, last, tiles, at = cell_start[c], cell_start[c + 1], tile_start[c + 1] - tile_start[c], used[0]
         cell_uv, sides, size = uv[first:last], side[first:last], last - first
-        many_u = _ordered(cell_uv, sides, 0, values_u, rank_u, order)
-        many_v = _ordered(cell_uv, sides, 1, values_v, rank_v, order)
+        many_u = _sort_distinct(cell_uv, sides, 0, values_u, rank_u, order)
+        many_v = _sort_distinct(cell_uv, sides, 1, values_v, rank_v, order)
         wide_u, wide_v = (many_u + 7) // 8 * 8, (many_v + 7) // 8 * 8
-        if used[1] + each * (wide_u + wide_v) * rows[c] > min(MOST, len(factors)):
+        if used[1] + each * (wide_u + wide_v) * rows[c] > min(MAX_NUMBERS, len(factors)):
             continue
         if not (
             _put_windows(rank_u, size, wide_u, 0, tiles, own) and _put_windows(rank_v, size, wide_v, 1, tiles, own)
@@ -237,19 +239,19 @@ def _factor_cells(
         for k in range(rows[c]):
             i = ids[ids_at[c] + k]
             _factor_row(knots_v, i, pv[i], values_v, many_v, wide_v, 1.0, slopes, work, numbers, row)
-            factor_v[at + k] = _stored(bits, each * wide_v, table, used[1], slots)
+            factor_v[at + k] = _intern_row(bits, each * wide_v, table, used[1], slots)
             used[1] = max(used[1], factor_v[at + k] + each * wide_v)
         points = ids[ids_at[c] : ids_at[c] + rows[c]].copy()
         groups = _sort_rows(factor_v[at : at + rows[c]], points)
-        plain, factored = _operations(rows[c], entries[c], groups, tiles, wide_u, slopes)
+        plain, factored = _count_operations(rows[c], entries[c], groups, tiles, wide_u, slopes)
         if factored > cost * plain:
             continue
         for k in range(rows[c]):
             i = ids[ids_at[c] + k] = points[k]
             _factor_row(knots_u, i, pu[i], values_u, many_u, wide_u, weights[i], slopes, work, numbers, row)
-            factor_u[at + k] = _stored(bits, each * wide_u, table, used[1], slots)
+            factor_u[at + k] = _intern_row(bits, each * wide_u, table, used[1], slots)
             used[1] = max(used[1], factor_u[at + k] + each * wide_u)
-        picks_at[c] = _stored(own, HEAD + STEP * tiles, picks, used[2], pick_slots)
+        picks_at[c] = _intern_row(own, HEAD + STEP * tiles, picks, used[2], pick_slots)
         used[2] = max(used[2], picks_at[c] + HEAD + STEP * tiles)
         rows_at[c] = at
         used[0] += rows[c]

@@ -15,8 +15,8 @@ HEAD, STEP = 2, 18  # numbers of a cell's picks before those of its tiles, and p
 
 @inlined
 def sum_groups(factors, factor_u, factor_v, row, rows, wide_u, slopes, local, starts, sums):
-    """First half of a factorized sum: of the points of a cell that have the same factors in v, for every coordinate in
-    u; returns how many groups of such points there are.
+    """Write the first half of a factorized sum: of the points of a cell that have the same factors in v, for every
+    coordinate in u; returns how many groups of such points there are.
 
     ``starts`` gets where each group's factors in v start; ``sums`` from 24 on, group after group, ``wide_u`` numbers
     each for x, y and z, and if there are ``slopes`` as many for their derivatives in u.
@@ -50,7 +50,7 @@ def sum_groups(factors, factor_u, factor_v, row, rows, wide_u, slopes, local, st
 
 @inlined
 def join_values(groups, wide_u, tile, factors, picks, starts, sums):
-    """Second half: the sums of one tile, as :func:`sum_values`; its picks start at ``tile``."""
+    """Return the second half: the sums of one tile, as :func:`sum_values`; its picks start at ``tile``."""
     x, y, z = zero(), zero(), zero()
     at, low_v = 24 + picks[tile + 16], picks[tile + 17]
     for g in range(groups):
@@ -64,7 +64,7 @@ def join_values(groups, wide_u, tile, factors, picks, starts, sums):
 
 @inlined
 def join_all(groups, wide_u, wide_v, tile, factors, picks, starts, sums):
-    """Second half: the sums of one tile, as :func:`sum_all`."""
+    """Return the second half: the sums of one tile, as :func:`sum_all`."""
     x, y, z = zero(), zero(), zero()
     ax, ay, az, bx, by, bz = zero(), zero(), zero(), zero(), zero(), zero()
     at, low_v = 24 + picks[tile + 16], picks[tile + 17]
@@ -88,8 +88,8 @@ def join_all(groups, wide_u, wide_v, tile, factors, picks, starts, sums):
 
 
 @inlined
-def wide(row, head, picks):
-    """How many factors the rows of a cell have in u and in v; 0 where it has plain weights."""
+def factor_counts(row, head, picks):
+    """Return how many factors the rows of a cell have in u and in v; 0 where it has plain weights."""
     u, v = 0, 0
     if row >= 0:
         u, v = picks[head], picks[head + 1]
@@ -98,13 +98,13 @@ def wide(row, head, picks):
 
 @inlined
 def product(factors, picks, at_u, at_v, tile):
-    """Eight weights b w of a tile, from the factors in u and v whose windows start at ``at_u`` and ``at_v``."""
+    """Return eight weights b w of a tile, from the factors in u and v whose windows start at ``at_u`` and ``at_v``."""
     return mul(pick(factors, at_u, picks, tile), pick(factors, at_v, picks, tile + 8))
 
 
 @inlined
 def slope_products(factors, picks, at_u, at_v, wide_u, wide_v, tile):
-    """Eight each of b w, b_u w and b_v w of a tile; slopes lie ``wide_u`` and ``wide_v`` after the factors."""
+    """Return eight each of b w, b_u w and b_v w of a tile; slopes lie ``wide_u`` and ``wide_v`` after the factors."""
     a, b = pick(factors, at_u, picks, tile), pick(factors, at_v, picks, tile + 8)
     u, v = pick(factors, at_u + wide_u, picks, tile), pick(factors, at_v + wide_v, picks, tile + 8)
     return mul(a, b), mul(u, b), mul(a, v)

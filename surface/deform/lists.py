@@ -20,7 +20,7 @@ from surface.spline import weighing
 from surface.spline.controlpoints import ControlPoints
 
 LANES = 8
-STEP = 100_000  # vertices whose weights are computed between two reports of progress
+CHUNK_VERTICES = 100_000  # whose weights are computed between two reports of progress
 
 
 @dataclass
@@ -62,7 +62,7 @@ class Lists:
         return sum(value.nbytes for value in vars(self).values() if isinstance(value, np.ndarray))
 
     def entries_of(self, i: int) -> tuple[Ints, Ints]:
-        """The cells that point i reaches and its row in their blocks, (k,) int64 each."""
+        """Return the cells that point i reaches and its row in their blocks, (k,) int64 each."""
         entries = slice(self.point_start[i], self.point_start[i] + self.point_count[i])
         return self.point_cell[entries].astype(np.int64), self.point_row[entries].astype(np.int64)
 
@@ -82,17 +82,18 @@ class Basis:
 
     @classmethod
     def of(cls, surface: ControlPoints) -> Self:
-        """A copy of the arrays of ``surface``."""
+        """Return a copy of the arrays of ``surface``."""
         ku, kv, pu, pv, _, weights = (array.copy() for array in surface.arrays())
         return cls(surface.n, surface.shifts, [ku, kv], [pu, pv], weights)
 
     def copies(self, which: Ints) -> Ints:
-        """Points ``which (k,)`` and their shifted copies, (b k,), block after block."""
+        """Return points ``which (k,)`` and their shifted copies, (b k,), block after block."""
         return np.concatenate([which + block * self.n for block in range(len(self.shifts))])
 
 
 def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Progress = no_progress) -> Lists:
-    """Weights of ``surface`` for the vertices of its ``mesh``; also derivative weights where ``normals`` are wanted."""
+    """Return weights of ``surface`` for the vertices of its ``mesh``; also derivative weights where ``normals`` are
+    wanted."""
     count = np.diff(mesh.cell_start)
     tiles = (count + LANES - 1) // LANES
     most = int((np.diff(mesh.list_start) * tiles).sum()) * LANES
@@ -102,7 +103,7 @@ def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Pro
     at, ids_at = np.zeros(len(count) + 1, dtype=np.int64), np.zeros(len(count) + 1, dtype=np.int64)
     rows = np.zeros(len(count), dtype=np.int64)
     arrays = surface.arrays()
-    steps = np.linspace(0, len(count), max(1, len(mesh.uv) // STEP) + 1).astype(np.int64)
+    steps = np.linspace(0, len(count), max(1, len(mesh.uv) // CHUNK_VERTICES) + 1).astype(np.int64)
     for begin, end in pairwise(steps):
         progress("weights", float(begin) / max(len(count), 1))
         weighing.fill_blocks(
@@ -113,17 +114,18 @@ def build_lists(surface: ControlPoints, mesh: Mesh, normals: bool, progress: Pro
     used, ids = int(at[-1]), ids[: int(ids_at[-1])].copy()
     cell_start = mesh.cell_start.copy()  # not the read-only one: kernels are compiled for one kind of array only
     tile_start, by_point = np.concatenate([[0], np.cumsum(tiles)]), cells_by_point(ids, rows, len(arrays[4]))
-    blocks = _shortened(value, used), _shortened(slope, 2 * used)
+    blocks = _shorten(value, used), _shorten(slope, 2 * used)
     return Lists(cell_start, tile_start, rows, rows.copy(), at[:-1].copy(), ids_at[:-1].copy(), ids, *blocks, *by_point)
 
 
-def _shortened(table: np.ndarray, used: int) -> np.ndarray:
-    """The first ``used`` numbers of a table, whose memory is given back if there are more."""
+def _shorten(table: np.ndarray, used: int) -> np.ndarray:
+    """Return the first ``used`` numbers of a table, whose memory is released if there are more."""
     return table if used >= len(table) else table[:used].copy()
 
 
 def cells_by_point(ids: np.ndarray, rows: Ints, n: int) -> tuple[Ints, Ints, np.ndarray, np.ndarray]:
-    """``point_start``, ``point_count``, ``point_cell`` and ``point_row`` of n points from contiguous lists of cells."""
+    """Return ``point_start``, ``point_count``, ``point_cell`` and ``point_row`` of n points from contiguous lists of
+    cells."""
     cell = np.repeat(np.arange(len(rows), dtype=np.int32), rows)
     row = np.arange(len(ids)) - np.repeat(np.cumsum(rows) - rows, rows)
     order = np.argsort(ids, kind="stable")
@@ -145,7 +147,7 @@ def write_rows(basis: Basis, lists: Lists, mesh: Mesh, i: int, cells: Ints, rows
 
 
 def grow(table: np.ndarray, wanted: int) -> np.ndarray:
-    """The table with zeros after it, at least ``wanted`` long in all, with some room for more."""
+    """Return the table with zeros after it, at least ``wanted`` long in all, with some room for more."""
     if wanted <= len(table):
         return table
     return np.concatenate([table, np.zeros(max(wanted, len(table) * 5 // 4) - len(table), dtype=table.dtype)])

@@ -16,23 +16,23 @@ from surface.base.jit import kernel
 from surface.mesh.mesh import Mesh
 
 PER_POINT = 45.0  # cost of a point in a cell's list, in weights (measured; that of the mesh's cells is 10)
-MOST = 256  # vertices of a joined cell
+MAX_VERTICES = 256  # vertices of a joined cell
 
 
-def merged(mesh: Mesh, per_point: float = PER_POINT, most: int = MOST) -> Mesh:
-    """The mesh with cells joined where one list costs less than two; vertices keep their order."""
+def merge_cells(mesh: Mesh, per_point: float = PER_POINT, most: int = MAX_VERTICES) -> Mesh:
+    """Return the mesh with cells joined where one list costs less than two; vertices keep their order."""
     cells, points = len(mesh.cell_start) - 1, int(mesh.list_ids.max(initial=-1)) + 1
     begins = np.zeros(cells, np.bool_)
     kept = np.zeros(len(mesh.list_ids), np.bool_)
     _join(mesh.cell_start, mesh.list_start, mesh.list_ids, per_point, most, np.full(points, -1), begins, kept)
     if begins.all():
         return mesh
-    return _joined(mesh, begins, kept)
+    return _make_joined(mesh, begins, kept)
 
 
-def _joined(mesh: Mesh, begins: Bools, kept: Bools) -> Mesh:
-    """The mesh whose cells are those that ``begins (c,)`` says, each with the cells after it; ``kept (k,)`` says which
-    of the listed points are the first of their kind in a new cell."""
+def _make_joined(mesh: Mesh, begins: Bools, kept: Bools) -> Mesh:
+    """Return the mesh whose cells are those that ``begins (c,)`` says, each with the cells after it; ``kept (k,)`` says
+    which of the listed points are the first of their kind in a new cell."""
     at = np.flatnonzero(begins)
     start = np.append(mesh.cell_start[at], mesh.cell_start[-1])
     total = np.concatenate([[0], np.cumsum(kept)])

@@ -11,7 +11,7 @@ AHEAD = 1024  # weights that are prefetched before they are needed
 
 @inlined
 def sum_packed(packed, entry_row, e, end, local):
-    """Three sums of the tile with entries ``e`` to ``end``, as :func:`.apply.sum_values`."""
+    """Return three sums of the tile with entries ``e`` to ``end``, as :func:`.apply.sum_values`."""
     x0, y0, z0 = zero(), zero(), zero()
     x1, y1, z1 = zero(), zero(), zero()
     x2, y2, z2 = zero(), zero(), zero()
@@ -37,7 +37,7 @@ def sum_packed(packed, entry_row, e, end, local):
 
 @inlined
 def sum_all_packed(packed, packed_slope, entry_row, first, end, local):
-    """Nine sums of the tile with entries ``first`` to ``end``, as :func:`.apply.sum_all`."""
+    """Return nine sums of the tile with entries ``first`` to ``end``, as :func:`.apply.sum_all`."""
     x, y, z = zero(), zero(), zero()
     ax, ay, az, bx, by, bz = zero(), zero(), zero(), zero(), zero(), zero()
     for e in range(first, end):

@@ -20,9 +20,9 @@ from surface.base.jit import kernel
 from .lists import LANES, Lists
 
 PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lanes follow the mesh's order
-CHOICE = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
-WORTH = 0.97  # of the rows without reordering: with more than these left, vertices stay in order
-MOST = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
+CANDIDATES = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
+MAX_REMAINING = 0.97  # fraction of rows that reordering may leave; if it leaves more, vertices stay in order
+MAX_ROWS = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
 
 
 @dataclass
@@ -70,7 +70,16 @@ def order_vertices(lists: Lists) -> Order:
     cells, tiles = len(lists.rows), int(lists.tile_start[-1])
     found = Order(np.zeros(LANES * tiles, np.uint16), np.zeros(cells, np.bool_), np.zeros(cells, np.int64))
     _order_cells(
-        lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, CHOICE, WORTH, MOST, *found
+        lists.cell_start,
+        lists.tile_start,
+        lists.rows,
+        lists.at,
+        lists.value,
+        lists.slope,
+        CANDIDATES,
+        MAX_REMAINING,
+        MAX_ROWS,
+        *found,
     )
     return found
 
@@ -79,14 +88,14 @@ def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
     """Pack those of the ``wanted (c,)`` cells that have rows of zeros."""
     tiles = np.diff(lists.tile_start)
     blocks = lists.rows * tiles
-    chosen = wanted & (order.entries < blocks) & (lists.rows < MOST) & (np.diff(lists.cell_start) <= MOST)
+    chosen = wanted & (order.entries < blocks) & (lists.rows < MAX_ROWS) & (np.diff(lists.cell_start) <= MAX_ROWS)
     entries, moved = int(order.entries[chosen].sum()), chosen & order.moved
     made = Packed(
-        packed_at=_starts(tiles + 1, chosen), tile_entry=np.zeros(int((tiles + 1)[chosen].sum()), np.int64),
+        packed_at=_cell_starts(tiles + 1, chosen), tile_entry=np.zeros(int((tiles + 1)[chosen].sum()), np.int64),
         entry_row=np.zeros(entries, np.uint16), packed=np.zeros(LANES * entries, np.float32),
         packed_slope=np.zeros(2 * LANES * entries if len(lists.slope) else 0, np.float32),
-        places_at=_starts(blocks, chosen), places=np.zeros(int(blocks[chosen].sum()), np.uint16),
-        order_at=_starts(LANES * tiles, moved), order=order.order[np.repeat(moved, LANES * tiles)],
+        places_at=_cell_starts(blocks, chosen), places=np.zeros(int(blocks[chosen].sum()), np.uint16),
+        order_at=_cell_starts(LANES * tiles, moved), order=order.order[np.repeat(moved, LANES * tiles)],
     )  # fmt: skip
     _pack_cells(
         lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, *vars(made).values()
@@ -94,15 +103,15 @@ def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
     return made
 
 
-def _starts(sizes: Ints, chosen: Bools) -> Ints:
-    """(c,) where each of the ``chosen`` cells starts if they follow each other; PLAIN for the others."""
+def _cell_starts(sizes: Ints, chosen: Bools) -> Ints:
+    """Return (c,): where each of the ``chosen`` cells starts if they follow each other; PLAIN for the others."""
     held = np.where(chosen, sizes, 0)
     return np.where(chosen, np.cumsum(held) - held, PLAIN)
 
 
-def unpacked(lists: Lists, made: Packed, c: int) -> list[Floats32]:
-    """(tiles, rows, 8) b w of a packed cell, and (tiles, rows, 16) b_u w and b_v w if it has slopes, in the mesh's
-    order."""
+def unpack_cell(lists: Lists, made: Packed, c: int) -> list[Floats32]:
+    """Return (tiles, rows, 8): b w of a packed cell, and (tiles, rows, 16) b_u w and b_v w if it has slopes, in the
+    mesh's order."""
     rows, tiles = int(lists.rows[c]), int(lists.tile_start[c + 1] - lists.tile_start[c])
     size = int(lists.cell_start[c + 1] - lists.cell_start[c])
     first, at = int(made.packed_at[c]), int(made.order_at[c])
@@ -124,8 +133,10 @@ def unpacked(lists: Lists, made: Packed, c: int) -> list[Floats32]:
 
 
 @kernel
-def _marks(size, rows, at, value, slope, masks):
-    """Bit k of ``masks[s]`` : does point k of a cell with a block at ``at`` reach its vertex s? Returns how many do."""
+def _mark_points(size, rows, at, value, slope, masks):
+    """Set bit k of ``masks[s]`` if point k of a cell with a block at ``at`` influences its vertex s.
+
+    Returns the number of set bits."""
     count = 0
     for s in range(size):
         masks[s] = 0
@@ -143,8 +154,8 @@ def _marks(size, rows, at, value, slope, masks):
 
 
 @kernel
-def _bits(word):
-    """How many bits of a number are set (Warren, Hacker's Delight 5-1)."""
+def _count_bits(word):
+    """Return how many bits of a number are set (Warren, Hacker's Delight 5-1)."""
     word = word - ((word >> np.uint64(1)) & np.uint64(0x5555555555555555))
     word = (word & np.uint64(0x3333333333333333)) + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
     word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
@@ -152,29 +163,29 @@ def _bits(word):
 
 
 @kernel
-def _entries(size, masks, order, union):
-    """How many rows of tiles of eight vertices in the given order are not all zero."""
+def _count_entries(size, masks, order, union):
+    """Return how many rows of tiles of eight vertices in the given order are not all zero."""
     count = 0
     for first in range(0, size, 8):
         union[:] = 0
         for j in range(first, min(first + 8, size)):
             union |= masks[order[j]]
         for word in union:
-            count += _bits(word)
+            count += _count_bits(word)
     return count
 
 
 @kernel
 def _next_vertex(masks, union, left, choice):
-    """Which of the first ``choice`` of the vertices ``left`` adds fewest points to the ``union`` of a tile, and shares
-    most with it."""
+    """Return which of the first ``choice`` of the vertices ``left`` adds fewest points to the ``union`` of a tile, and
+    shares most with it."""
     best, found = 1 << 60, 0
     for q in range(min(choice, len(left))):
         more, common = 0, 0
         for k in range(len(union)):
             word = masks[left[q], k]
-            more += _bits(word & ~union[k])
-            common += _bits(word & union[k])
+            more += _count_bits(word & ~union[k])
+            common += _count_bits(word & union[k])
         if (more << 20) - common < best:
             best, found = (more << 20) - common, q
     return found
@@ -209,12 +220,12 @@ def _order_cells(cell_start, tile_start, rows, at, value, slope, choice, worth, 
     for c in range(rows.shape[0]):
         size, wide = cell_start[c + 1] - cell_start[c], (rows[c] + 63) >> 6
         masks, union = all_masks[:, :wide], np.zeros(wide, np.uint64)
-        reached = _marks(size, rows[c], at[c], value, slope, masks)
-        entries[c] = _entries(size, masks, same, union)
+        reached = _mark_points(size, rows[c], at[c], value, slope, masks)
+        entries[c] = _count_entries(size, masks, same, union)
         chosen = same
         if size <= most and reached < rows[c] * size:
             _arrange(size, masks, choice, union, left, other)
-            count = _entries(size, masks, other, union)
+            count = _count_entries(size, masks, other, union)
             if count <= worth * entries[c]:
                 entries[c], moved[c], chosen = count, True, other
         for s in range(size):

@@ -1,7 +1,7 @@
-"""How the weights of each cell are kept: as blocks, see :mod:`.lists`, packed, or as factors.
+"""Storage of the weights of each cell: as blocks, see :mod:`.lists`, packed, or as factors.
 
-Each cell takes the way that needs fewest operations. Weights and knots change in blocks only, so that the cells of a
-change get blocks first.
+Each cell uses the kind of storage that needs the fewest operations. Weights and knots change in blocks only, so that
+the cells of a change get blocks first.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import numpy as np
 from surface.base.arrays import Bools, Ints
 from surface.mesh.mesh import Mesh
 
-from .factors import Factors, factorize, products
+from .factors import Factors, expand_factors, factorize
 from .lists import LANES, Basis, Lists, grow
-from .packing import PLAIN, Packed, order_vertices, pack, unpacked
+from .packing import PLAIN, Packed, order_vertices, pack, unpack_cell
 
 
 class Storage(NamedTuple):
@@ -36,7 +36,7 @@ class Storage(NamedTuple):
         return vars(self.factors) | vars(self.packed)
 
     def blocks(self, cells: Ints) -> Bools:
-        """Which of ``cells (k,)`` have blocks, (k,) bool."""
+        """Return which of ``cells (k,)`` have blocks, (k,) bool."""
         held: Bools = (self.factors.rows_at[cells] < 0) & (self.packed.packed_at[cells] < 0)
         return held
 
@@ -62,8 +62,8 @@ def _take_out(lists: Lists, kept: Bools) -> None:
     lists.used = len(lists.value)
 
 
-def remember(lists: Lists, storage: Storage) -> Callable[[], None]:
-    """What takes back the next calls of :func:`expand`, if nothing else was changed meanwhile."""
+def make_restore(lists: Lists, storage: Storage) -> Callable[[], None]:
+    """Return a function that undoes the next calls of :func:`expand`, if nothing else was changed meanwhile."""
     value, slope, used = lists.value, lists.slope, lists.used
     places = [lists.at, lists.room, storage.factors.rows_at, storage.packed.packed_at, storage.packed.order_at]
     before = [array.copy() for array in places]
@@ -80,7 +80,7 @@ def expand(lists: Lists, storage: Storage, cells: Ints) -> None:
     """Give ``cells (k,)`` blocks, at the end of the arrays of ``lists``, before they are changed."""
     factors, packed = storage
     for c in cells[~storage.blocks(cells)]:
-        blocks = products(factors, lists, c) if factors.rows_at[c] >= 0 else unpacked(lists, packed, c)
+        blocks = expand_factors(factors, lists, c) if factors.rows_at[c] >= 0 else unpack_cell(lists, packed, c)
         end = lists.used + blocks[0].size
         lists.value = grow(lists.value, end)
         lists.value[lists.used : end] = blocks[0].ravel()

@@ -4,7 +4,7 @@
 
 Each difference rounds a numerator, by at most ``ROUNDING`` of its size. So every cell keeps a bound on its numerators
 per weight (``span``: what they were made of, and all moves since) and on the sum of these errors (``drift``), and is
-computed again before the drift exceeds ``MOST_DRIFT`` of the surface's size. That size is measured again when points
+computed again before the drift exceeds ``MAX_DRIFT`` of the surface's size. That size is measured again when points
 have moved so far in all that it may have changed. Everything is computed again, from other origins, where the surface
 is less than half as large as it was at any time since origins were chosen, or its middle is further away from the one
 it had then than it is large. So no point is further away from an origin than 2.5 times the surface's size.
@@ -20,14 +20,14 @@ from surface.spline.lanes import load
 
 from .apply import compute_cells, finish_cell, gather, join_ranges, store_numerators
 from .binding import arrays_of
-from .groupsums import HEAD, STEP, product, slope_products, wide
+from .groupsums import HEAD, STEP, factor_counts, product, slope_products
 from .packedsums import add_packed_row, add_products
 
 NOT_STORED = -1  # in ``differences``: the cell's numerators are not stored
 STORE = -2  # in ``differences``: compute and store them now
 VALID = 1 << 62  # what :func:`first_invalid` returns where nothing is wrong
 ROUNDING = 6e-8  # half a unit in the last place of float32
-MOST_DRIFT = 8e-7  # of the surface's size
+MAX_DRIFT = 8e-7  # of the surface's size
 REFUSED = 1 << 61  # subtracted from results of :func:`move_points` that mean a bad argument
 
 
@@ -41,7 +41,7 @@ def add_row(
     Its plain weights start at ``place``, or it is the ``row`` in the factors, unless that is -1.
     """
     size, at = 72 if slopes else 24, head + HEAD
-    wide_u, wide_v = wide(row, head, picks)
+    wide_u, wide_v = factor_counts(row, head, picks)
     for tile in range(first_tile, end_tile):
         base = tile * size
         if row >= 0:
@@ -64,7 +64,7 @@ def add_row(
 
 @kernel
 def find_affected(ids, delta, count, point_start, point_count, point_cell, hits, pull, affected):
-    """List the cells that the first ``count`` of ``ids`` reach, rising; returns their number.
+    """List the cells that the first ``count`` of ``ids`` reach, ascending; returns their number.
 
     ``hits`` counts by how many each is reached, and ``pull`` adds up how far these move.
     """
@@ -115,7 +115,7 @@ def choose_recomputed(
 
 @inlined
 def largest(local, rows):
-    """The greatest coordinate of the first ``rows`` of ``local``, without sign."""
+    """Return the greatest coordinate of the first ``rows`` of ``local``, without sign."""
     most = 0.0
     for k in range(rows):
         most = max(most, abs(local[k, 0]), abs(local[k, 1]), abs(local[k, 2]))
@@ -124,7 +124,7 @@ def largest(local, rows):
 
 @nonallocating
 def reach_along(points, k):
-    """The least and the greatest of coordinate k of ``points (n, 3)``."""
+    """Return the least and the greatest of coordinate k of ``points (n, 3)``."""
     low, high = points[0, k], points[0, k]
     for i in range(points.shape[0]):
         low, high = min(low, points[i, k]), max(high, points[i, k])
@@ -184,7 +184,7 @@ def update_cells(table, count, limit, bias, sign):
     total = find_affected(moved_ids, delta, count, point_start, point_count, point_cell, hits, pull, affected)
     again = choose_recomputed(
         total, affected, hits, pull, differences, span, drift, rows, rows_at, slopes, limit, bias,
-        MOST_DRIFT * extent[0], recomputed,
+        MAX_DRIFT * extent[0], recomputed,
     )  # fmt: skip
     for q in range(count):
         i = moved_ids[q]
@@ -230,8 +230,8 @@ def update_cells(table, count, limit, bias, sign):
 
 @nonallocating
 def first_invalid(ids, rows, relative, points, farthest):
-    """The first row with an id out of range (as ``-1 - row``), or one that leads to a number that is not finite or
-    beyond ``farthest`` (``row``); or VALID."""
+    """Return the first row with an id out of range (as ``-1 - row``), or one that leads to a number that is not finite
+    or beyond ``farthest`` (``row``); or VALID."""
     n = points.shape[0]
     for q in range(ids.shape[0]):
         if ids[q] < 0 or ids[q] >= n:

@@ -13,7 +13,7 @@ from .updates import NOT_STORED
 
 
 def work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[str, np.ndarray]:
-    """The arrays of an update that are not in the lists, by their names in :data:`.binding.NAMES`.
+    """Return the arrays of an update that are not in the lists, by their names in :data:`.binding.NAMES`.
 
     origin : (c, 3) float64, which positions within a cell are relative to
     inv_w, dw, numerators : (8 t,), (16 t,) or (0,), (72 t,) or (24 t,) float32 by tile, see :mod:`.apply`
@@ -40,7 +40,7 @@ def work_arrays(mesh: Mesh, points: Floats, tiles: int, normals: bool) -> dict[s
 
 
 def middles(vertices: np.ndarray, cell_start: Ints) -> Floats:
-    """(c, 3) the middle of each cell's vertices (m, 3)."""
+    """Return (c, 3): the middle of each cell's vertices (m, 3)."""
     if not len(vertices):
         return np.zeros((len(cell_start) - 1, 3))
     middles: Floats = np.add.reduceat(vertices, cell_start[:-1], dtype=np.float64) / np.diff(cell_start)[:, None]
@@ -48,5 +48,5 @@ def middles(vertices: np.ndarray, cell_start: Ints) -> Floats:
 
 
 def with_room(rows: Floats) -> Floats:
-    """A copy of ``rows (n, 3)``, with room behind it: kernels read four numbers of a row."""
+    """Return a copy of ``rows (n, 3)``, with room behind it: kernels read four numbers of a row."""
     return np.concatenate([rows, np.zeros((1, 3))])[: len(rows)]

@@ -32,11 +32,11 @@ def __getattr__(name: str) -> Any:
 
 
 def exporters(extra: Iterable[Exporter] = ()) -> tuple[Exporter, ...]:
-    """The exporters of this folder, by module, and ``extra`` ones after them.
+    """Return the exporters of this folder, by module, and ``extra`` ones after them.
 
     Raises ExportError: an exporter was made for another omote, or two want the same suffix.
     """
-    found = (*_own()[0], *extra)
+    found = (*_shipped()[0], *extra)
     owner: dict[str, Exporter] = {}
     for one in found:
         if one.api != API:
@@ -50,8 +50,8 @@ def exporters(extra: Iterable[Exporter] = ()) -> tuple[Exporter, ...]:
 
 
 @cache
-def _own() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
-    """Exporters of this folder, and what is missing for those that cannot be imported."""
+def _shipped() -> tuple[tuple[Exporter, ...], tuple[str, ...]]:
+    """Return exporters of this folder, and what is missing for those that cannot be imported."""
     found, missing = [], []
     for module in pkgutil.iter_modules(__path__):
         try:
@@ -95,14 +95,14 @@ def export_head(
                 hint = "choose a folder that can be written to" if there else f"mkdir -p {path.parent}"
                 raise ExportError(f"{path}: cannot be written ({e.strerror or e})", hint=hint) from e
     *most, last = (suffix for one in known for suffix in one.suffixes)
-    why = "".join(f"; {note}" for note in _own()[1])
+    why = "".join(f"; {note}" for note in _shipped()[1])
     raise ExportError(
         f"{path}: is neither {', '.join(most)} nor {last}{why}", hint="for example: omote export head.glb"
     )
 
 
 def _writer(exporter: Exporter, frame: str, animation: Animation | None, web: bool) -> Write:
-    """What writes in a frame, an animation, or for the web."""
+    """Return what writes in a frame, an animation, or for the web."""
     if web:
         if exporter.write_web is None or frame != "head" or animation is not None:
             raise ExportError(

@@ -19,7 +19,7 @@ _LOOK = [[_AT[f"eyeLook{d}{side}"] for d in ("Down", "Up", "Out", "In")] for sid
 class Animation:
     """Values of parameters over time.
 
-    name : for people. times_s : (n,) float64 from 0, rising. values : (n, 59) float64, in the order of
+    name : for people. times_s : (n,) float64 from 0, ascending. values : (n, 59) float64, in the order of
     :data:`surface.head.model.parameters.NAMES`. own : (n,) how much of each of a user's own groups is shown, by name.
 
     Raises ExportError: times or values that cannot be.
@@ -40,7 +40,7 @@ class Animation:
             raise ExportError(f"{self.name}: holds values that are no numbers", hint="check the take")
 
     def weights(self) -> Floats:
-        """(n, 52) weight of every shape, in the order of SHAPES, combined as the head combines them.
+        """Return (n, 52): weight of every shape, in the order of SHAPES, combined as the head combines them.
 
         Angles of the eyes become the shapes that turn them, and lids with them; see :func:`read_pose`.
         """
@@ -54,12 +54,16 @@ class Animation:
         return np.clip(shown, 0.0, 1.0, out=shown)
 
     def weights_of(self, names: Iterable[str]) -> Floats:
-        """(n, k) weights of shapes and of a user's own groups, by name; 0 of groups that the animation lacks."""
+        """Return (n, k): weights of shapes and of a user's own groups, by name; 0 of groups that the animation
+        lacks.
+        """
         shown, still = dict(zip(SHAPES, self.weights().T, strict=True)), np.zeros(len(self.times_s))
         return np.column_stack([shown[name] if name in shown else self.own.get(name, still) for name in names])
 
     def head_quaternions(self) -> Floats | None:
-        """(n, 4) rotation of the head, x, y, z, w, of one sign from frame to frame; None where it never turns."""
+        """Return (n, 4): rotation of the head, x, y, z, w, of one sign from frame to frame; None where it never
+        turns.
+        """
         angles = np.array([read_pose(row).head for row in self.values])
         if not angles.any():
             return None
@@ -69,7 +73,7 @@ class Animation:
 
 
 def _quaternion(matrix: Floats) -> Floats:
-    """(4,) x, y, z, w of a rotation by less than 180 degrees."""
+    """Return (4,): x, y, z, w of a rotation by less than 180 degrees."""
     w = 0.5 * np.sqrt(max(1.0 + np.trace(matrix), 1e-12))
     axis = np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
     found: Floats = np.append(axis / (4.0 * w), w)

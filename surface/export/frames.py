@@ -16,7 +16,7 @@ FRAMES = ("head", "file")
 
 
 def placement_of(head: Head) -> Placement:
-    """The placement of a head. Raises ExportError: nothing is known of the file that it was fitted to."""
+    """Return the placement of a head. Raises ExportError: nothing is known of the file that it was fitted to."""
     if head.data.placement is None:
         raise ExportError(
             f"{head.name}: the head's folder does not say how its mesh was placed",
@@ -26,7 +26,7 @@ def placement_of(head: Head) -> Placement:
 
 
 def in_file(parts: list[ExportPart], placement: Placement, per_unit: float = 1.0) -> list[ExportPart]:
-    """Parts in the axes, origin and unit of the file, times ``per_unit``."""
+    """Return parts in the axes, origin and unit of the file, times ``per_unit``."""
 
     def points(rows: Floats | Floats32) -> Floats32:
         return (per_unit * placement.file_points(np.asarray(rows, float))).astype(np.float32)

@@ -26,7 +26,7 @@ def write_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
 
 
 def write_glb_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
-    """As :func:`write_glb`, in axes, origin and unit of the file that the head was fitted to."""
+    """Do the same as :func:`write_glb`, in axes, origin and unit of the file that the head was fitted to."""
     _refuse_angles(pose)
     placement = placement_of(head)
     parts = in_file(export_parts(head), placement, 1.0 / float(METRES))
@@ -35,7 +35,8 @@ def write_glb_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list
 
 
 def write_animated_glb(head: Head, animation: Animation, path: Path, pose: Mapping[str, float]) -> list[Path]:
-    """As :func:`write_glb`, with an animation: weights of shapes over time, and a joint that turns the head."""
+    """Do the same as :func:`write_glb`, with an animation: weights of shapes over time, and a joint that turns the
+    head."""
     _refuse_angles(pose)
     parts = export_parts(head)
     document = Document(head, parts, pose)
@@ -45,7 +46,7 @@ def write_animated_glb(head: Head, animation: Animation, path: Path, pose: Mappi
 
 
 def write_web_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
-    """As :func:`write_glb`, small and for pages of browsers; see :mod:`surface.export.glb_web`."""
+    """Do the same as :func:`write_glb`, small and for pages of browsers; see :mod:`surface.export.glb_web`."""
     if is_posed(head, pose):
         raise ExportError("a file for the web is written at rest", hint="leave out --set and --expression, or --web")
     _replace(path, web_glb(head))

@@ -25,7 +25,7 @@ class GlbBuffers:
         self.content: dict[str, Any] = {}
 
     def bytes(self) -> bytes:
-        """The whole .glb."""
+        """Return the whole .glb."""
         self._pad()
         document = self.content | {"buffers": [{"byteLength": len(self._data)}]}
         text = json.dumps(document, separators=(",", ":"), ensure_ascii=True).encode()

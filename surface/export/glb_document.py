@@ -101,7 +101,7 @@ class Document(GlbBuffers):
         return list(self._materials).index(name)
 
     def _eye_texture(self, picture: NDArray[np.uint8]) -> int:
-        """Index of a texture of eyes; the same picture is kept once."""
+        """Return the index of a texture of eyes; the same picture is kept once."""
         png = png_bytes(picture)
         if png not in self._eyes:
             self._eyes.append(png)
@@ -110,7 +110,7 @@ class Document(GlbBuffers):
         return self._eyes.index(png)
 
     def _target(self, rows: Floats32, *, bounds: bool = False) -> int:
-        """An accessor of displacements, sparse where most of them are zero."""
+        """Return an accessor of displacements, sparse where most of them are zero."""
         ids = np.flatnonzero(rows.any(axis=1))
         if not 0 < len(ids) < SPARSE * len(rows):
             return self._floats(rows, bounds=bounds)

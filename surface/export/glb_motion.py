@@ -60,7 +60,7 @@ class _Motion:
 
 
 def _numbers(document: Document, rows: Floats, *, bounds: bool = False) -> int:
-    """An accessor of scalars or quaternions, which are no vertices."""
+    """Return an accessor of scalars or quaternions, which are no vertices."""
     values = np.ascontiguousarray(rows, np.float32)
     kind = {1: "SCALAR", 4: "VEC4"}[values.shape[1]]
     return document.accessor(values, _FLOAT, kind, bounds=bounds, bufferView=document.view(values))

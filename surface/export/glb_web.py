@@ -39,7 +39,7 @@ from surface.head import Head
 METRES = 0.001
 _FORMAT = 1
 """Version of what ``extras.omote`` of the document holds."""
-_MOST = 32_700  # steps from the middle of the head
+_MAX_STEPS = 32_700  # steps from the middle of the head
 _COARSE_MM, _COARSE_NORMAL = 0.03, 8  # moves are whole multiples of these: mm, and steps of a 16-bit normal
 _FADES = {"brow": ((0.72, 0.50, 0.30, 2.4), True), "lash": ((0.85, 0.15, 0.0, 0.0), False)}
 _HAIR = ("strand", "tress")
@@ -47,7 +47,7 @@ _LINEAR, _MIPMAPS, _REPEAT, _CLAMP = 9729, 9987, 10497, 33071
 
 
 def web_glb(head: Head) -> bytes:
-    """A head as a small .glb (glTF 2.0 with KHR_mesh_quantization), of which gzip takes away another half."""
+    """Return a head as a small .glb (glTF 2.0 with KHR_mesh_quantization), of which gzip takes away another half."""
     return _WebDocument(head, web_parts(head)).bytes()
 
 
@@ -138,7 +138,7 @@ class _WebDocument(GlbBuffers):
         return self.accessor(index, UINT if wide else USHORT, "SCALAR", bufferView=self.view(index, ELEMENT_BUFFER))
 
     def _vertices(self, rows: Array, component: int, *, bounds: bool = False, **more: Any) -> int:
-        """An accessor of a vertex attribute (m, k), each row padded to whole words of four bytes."""
+        """Return an accessor of a vertex attribute (m, k), each row padded to whole words of four bytes."""
         size = rows.shape[1] * rows.itemsize
         stride = size + -size % 4
         padded = np.zeros((len(rows), stride // rows.itemsize), rows.dtype)
@@ -147,7 +147,7 @@ class _WebDocument(GlbBuffers):
         return self.accessor(rows, component, f"VEC{rows.shape[1]}", bounds=bounds, bufferView=view, **more)
 
     def _binding(self, share: Floats) -> dict[str, int]:
-        """Joints and weights by the share (m,) of the head's rotation that each vertex follows."""
+        """Return joints and weights by the share (m,) of the head's rotation that each vertex follows."""
         weights, joints = np.zeros((len(share), 4), np.uint8), np.zeros((len(share), 4), np.uint8)
         weights[:, 0] = np.rint(255.0 * share)
         weights[:, 1] = 255 - weights[:, 0]
@@ -157,7 +157,9 @@ class _WebDocument(GlbBuffers):
         return {"JOINTS_0": self._vertices(joints, UBYTE), "WEIGHTS_0": self._vertices(weights, UBYTE, normalized=True)}
 
     def _target(self, moves: Floats | Floats32, turns: Floats32, coarse: int) -> dict[str, int]:
-        """A morph target of moves (m, 3) in steps and changes of normals (m, 3), sparse over the same vertices."""
+        """Return a morph target of moves (m, 3) in steps and changes of normals (m, 3), sparse over the same
+        vertices.
+        """
         steps = (coarse * np.rint(moves / coarse)).astype(np.int16)
         bent = np.rint(np.clip(turns, -1.0, 1.0) * 127.0).astype(np.int8)
         ids = np.flatnonzero(steps.any(axis=1) | bent.any(axis=1))
@@ -178,7 +180,7 @@ class _WebDocument(GlbBuffers):
         )
 
     def _skin(self, still: int, turning: int) -> dict[str, Any]:
-        """The two joints; their inverse bind matrices take steps to metres about each joint."""
+        """Return the two joints; their inverse bind matrices take steps to metres about each joint."""
         bind = np.zeros((2, 4, 4), np.float32)
         bind[:, [0, 1, 2], [0, 1, 2]], bind[:, 3, 3] = METRES * self._step_mm, 1.0
         bind[:, 3, :3] = METRES * self._middle  # column-major: the translation is the last row
@@ -188,7 +190,7 @@ class _WebDocument(GlbBuffers):
         return {"joints": [still, turning], "inverseBindMatrices": inverse}
 
     def _material(self, one: WebPart) -> int:
-        """Index of a part's material; the same one is kept once."""
+        """Return the index of a part's material; the same one is kept once."""
         kind, picture = one.part.material, _picture(one)
         key = kind, b"" if picture is None else png_bytes(picture)
         if key not in self._known:
@@ -228,24 +230,24 @@ def _picture(one: WebPart) -> Picture | None:
 
 
 def _grid(vertices: list[Floats32], middle: Floats | None = None) -> tuple[Floats, float]:
-    """Middle (3,) and step, mm, of whole steps that reach all vertices from the middle with 16 bits."""
+    """Return the middle (3,) and step, mm, of whole steps that reach all vertices from the middle with 16 bits."""
     if not vertices:
         return np.zeros(3), 1.0
     low, high = (edge(np.concatenate(vertices), axis=0).astype(float) for edge in (np.min, np.max))
     centre = 0.5 * (low + high) if middle is None else np.asarray(middle, float)
     reach = max(float(np.abs(np.stack([low, high]) - centre).max()), 1.0)
-    return centre, 1.25 * reach / _MOST  # moves go further than the face at rest
+    return centre, 1.25 * reach / _MAX_STEPS  # moves go further than the face at rest
 
 
 def _normal_steps(normals: Floats32) -> Array:
-    """16-bit normals, a little coarse, so that they compress."""
+    """Return 16-bit normals, a little coarse, so that they compress."""
     steps = _COARSE_NORMAL * np.rint(normals * (32_767 / _COARSE_NORMAL))
     found: Array = np.clip(steps, -32_767, 32_767).astype(np.int16)
     return found
 
 
 def _colour_steps(colours: Floats32) -> Array:
-    """16-bit linear colours of 256 steps as the eye sees them, so that they compress."""
+    """Return 16-bit linear colours of 256 steps as the eye sees them, so that they compress."""
     seen = np.rint(np.sqrt(colours) * 255.0) / 255.0
     steps: Array = np.rint(seen**2 * 65_535.0).astype(np.uint16)
     return steps

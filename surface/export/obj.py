@@ -30,7 +30,7 @@ def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
 
 
 def write_obj_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
-    """As :func:`write_obj`, but in the axes, origin and unit of the file that the head was fitted to."""
+    """Do the same as :func:`write_obj`, but in the axes, origin and unit of the file that the head was fitted to."""
     placement = placement_of(head)
     title = f"# {head.name}{_OWN} in the frame of its source"
     parts = export_parts(head, pose, shapes=not is_posed(head, pose))
@@ -105,7 +105,7 @@ def _rows(word: str, rows: Floats32) -> list[str]:
 
 
 def _moved_rows(rows: list[str], vertices: Floats32, moves: Floats32) -> list[str]:
-    """The rows of vertices (n, 3) after moves (n, 3); ``rows`` are theirs before, and most do not move."""
+    """Return the rows of vertices (n, 3) after moves (n, 3); ``rows`` are theirs before, and most do not move."""
     out, moved = rows.copy(), np.flatnonzero(moves.any(axis=1))
     for k, row in zip(moved.tolist(), _rows("v", vertices[moved] + moves[moved]), strict=True):
         out[k] = row

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.head import Head
-from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
+from surface.head.model.parameters import SHAPES, TONGUE_JAW
 
-LEAST_MM = 0.002  # smaller displacements are zero
-LEAST_NORMAL = 1e-4  # smaller changes of normals are zero
+MIN_MOVE_MM = 0.002  # smaller displacements are zero
+MIN_NORMAL = 1e-4  # smaller changes of normals are zero
 # Shapes that make sense only together with another one: exported is what they add to it.
-BASE_POSES = {"mouthClose": {"jawOpen": 1.0}, "tongueOut": {"jawOpen": TONGUE_NEEDS}}
+BASE_POSES = {"mouthClose": {"jawOpen": 1.0}, "tongueOut": {"jawOpen": TONGUE_JAW}}
 _EYES = ("left_eye", "right_eye")
 _PAINTED = ("iris", "sclera", "iris_radius")
 
@@ -45,7 +45,7 @@ class ExportPart:
 
 
 def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes: bool = True) -> list[ExportPart]:
-    """All parts in a pose (at rest without one), and what every shape adds to the face at rest."""
+    """Return all parts in a pose (at rest without one), and what every shape adds to the face at rest."""
     head.pose(head.values(pose or {}))
     out = []
     for part in head.parts:
@@ -81,9 +81,8 @@ def is_posed(head: Head, pose: Mapping[str, float]) -> bool:
 
 
 def _shapes(head: Head) -> dict[str, Mapping[str, float]]:
-    """Shapes that move anything, each with the face that it is added to: those of groups, of turning eyes and jaw,
-    and a user's own behind them.
-    """
+    """Return shapes that move anything, each with the face that it is added to: those of groups, of turning eyes and
+    jaw, and a user's own behind them."""
     follow = {part.follows for part in head.parts}
     names = set(head.groups)
     if follow & set(_EYES):
@@ -99,26 +98,26 @@ def _add_shape(head: Head, name: str, base: Mapping[str, float], parts: list[Exp
     before = [(part.vertices.copy(), unit(part.normals)) for part in head.parts]
     head.pose(head.values({**base, name: 1.0}))
     for out, part, (vertices, normals) in zip(parts, head.parts, before, strict=True):
-        moved = _without_noise(part.vertices - vertices, LEAST_MM)
+        moved = _zero_noise(part.vertices - vertices, MIN_MOVE_MM)
         if moved.any():
             out.displacements[name] = moved
-            out.normal_changes[name] = _without_noise(unit(part.normals) - normals, LEAST_NORMAL)
+            out.normal_changes[name] = _zero_noise(unit(part.normals) - normals, MIN_NORMAL)
 
 
-def _without_noise(rows: Floats32, least: float) -> Floats32:
-    """Rows, zero where all components are smaller than ``least``."""
+def _zero_noise(rows: Floats32, least: float) -> Floats32:
+    """Return rows, zero where all components are smaller than ``least``."""
     return np.where(np.abs(rows).max(axis=1, keepdims=True) < least, np.float32(0), rows)
 
 
 def unit(normals: Floats32) -> Floats32:
-    """Rows scaled to length 1; zero rows become +z."""
+    """Return rows scaled to length 1; zero rows become +z."""
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return np.where(length > 1e-6, normals / np.maximum(length, 1e-6), np.array([0.0, 0.0, 1.0])).astype(np.float32)
 
 
 def _manifold(vertices: Floats32, triangles: NDArray[np.int32]) -> NDArray[np.int32]:
-    """Triangles without the slivers by which more than two meet in an edge: a tessellation has a few at its seams, and
-    other programs refuse them."""
+    """Return triangles without the slivers by which more than two meet in an edge: a tessellation has a few at its
+    seams, and other programs refuse them."""
     kept = np.array(triangles)
     for _ in range(8):
         start, end = kept.ravel().astype(np.int64), kept[:, [1, 2, 0]].ravel().astype(np.int64)
@@ -133,7 +132,7 @@ def _manifold(vertices: Floats32, triangles: NDArray[np.int32]) -> NDArray[np.in
 
 
 def _smallest(triangles: NDArray[np.int32], area: Floats, edge: Ints, count: Ints) -> Ints:
-    """The smallest triangle at each directed edge that several have."""
+    """Return the smallest triangle at each directed edge that several have."""
     out = []
     for k in np.flatnonzero(count > 1):
         at = np.flatnonzero((edge == k).any(axis=1))
@@ -142,7 +141,7 @@ def _smallest(triangles: NDArray[np.int32], area: Floats, edge: Ints, count: Int
 
 
 def _in_unit_square(uv: Floats32) -> Floats32:
-    """Texture coordinates; where any lies outside of the unit square, all are scaled evenly into it."""
+    """Return texture coordinates; where any lies outside of the unit square, all are scaled evenly into it."""
     low, high = uv.min(axis=0), uv.max(axis=0)
     if low.min() >= 0 and high.max() <= 1:
         return uv.copy()

@@ -26,13 +26,13 @@ _PNG_KINDS = {1: 0, 3: 2, 4: 6}
 
 @cache
 def materials() -> dict[str, Any]:
-    """The table of materials beside this module."""
+    """Return the table of materials beside this module."""
     return files.read_toml(Path(__file__).with_name("materials.toml"))
 
 
 def png_bytes(picture: Picture) -> bytes:
-    """A picture (height, width, channels) uint8 of 1, 3 or 4 channels, top row first, as a PNG file; without Pillow,
-    which exporting does not need.
+    """Return a picture (height, width, channels) uint8 of 1, 3 or 4 channels, top row first, as a PNG file; without
+    Pillow, which exporting does not need.
 
     (PNG specification, second edition: signature, IHDR, IDAT, IEND.)
     """
@@ -45,34 +45,34 @@ def png_bytes(picture: Picture) -> bytes:
     return out
 
 
-def encoded(linear: Floats) -> Picture:
-    """Linear colours 0..1 as sRGB bytes (IEC 61966-2-1)."""
+def encode_srgb(linear: Floats) -> Picture:
+    """Return linear colours 0..1 as sRGB bytes (IEC 61966-2-1)."""
     c = np.clip(linear, 0.0, 1.0)
     curve = np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
     return np.rint(255.0 * curve).astype(np.uint8)
 
 
-def decoded(srgb: Floats) -> Floats:
-    """sRGB colours 0..1 as linear ones."""
+def decode_srgb(srgb: Floats) -> Floats:
+    """Return sRGB colours 0..1 as linear ones."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def eye_column(part: ExportPart) -> Picture:
-    """(256, 4, 3) pupil, iris and white along v of an eye part; the first row is its top, where v is 1."""
+    """Return (256, 4, 3): pupil, iris and white along v of an eye part; the first row is its top, where v is 1."""
     stops, plain = materials()["eye_texture"], materials()["eye_colours"]
     colours = np.array([stop["colour"] for stop in stops])
     for k, stop in enumerate(stops):
         wanted = part.painted.get(stop.get("of", ""))
         if wanted is not None:
-            share = decoded(colours[k]) * np.asarray(wanted, float) / np.array(plain[stop["of"]])
-            colours[k] = encoded(share) / 255.0
+            share = decode_srgb(colours[k]) * np.asarray(wanted, float) / np.array(plain[stop["of"]])
+            colours[k] = encode_srgb(share) / 255.0
     v = 1.0 - (np.arange(256) + 0.5) / 256
     column = np.stack([np.interp(v, [stop["v"] for stop in stops], colours[:, k]) for k in range(3)], axis=1)
     return np.repeat(np.rint(255 * column).astype(np.uint8)[:, None], 4, axis=1)
 
 
 def eye_rings(part: ExportPart) -> list[tuple[str, float, float, Floats]]:
-    """Pupil, iris and white of an eye part, where a mesh has one colour.
+    """Return the pupil, iris and white of an eye part, where a mesh has one colour.
 
     Of each the name, from and to which distance from the eye's axis it reaches, in the eye's radii, and linear RGB.
     """
@@ -83,14 +83,15 @@ def eye_rings(part: ExportPart) -> list[tuple[str, float, float, Floats]]:
 
 
 def _eye_colours(part: ExportPart) -> tuple[Floats, Floats, float]:
-    """Linear RGB of iris and white, and the radius of the iris in those of the eyeball."""
+    """Return linear RGB of iris and white, and the radius of the iris in those of the eyeball."""
     plain = materials()["eye_colours"]
     iris, sclera = (np.asarray(part.painted.get(name, plain[name]), float) for name in ("iris", "sclera"))
     return iris, sclera, float(np.ravel(part.painted.get("iris_radius", plain["iris_radius"]))[0])
 
 
 def eye_picture(part: ExportPart, size: int = 256) -> Picture:
-    """(size, size, 3) an eye looked at from the front, as far as :data:`EYE_RIM`; fibres run out from the pupil."""
+    """Return (size, size, 3): an eye looked at from the front, as far as :data:`EYE_RIM`; fibres run out from the
+    pupil."""
     iris, sclera, radius = _eye_colours(part)
     y, x = (((np.arange(size) + 0.5) / size - 0.5) / EYE_RIM for _ in range(2))
     r, angle = np.hypot(y[:, None], x[None]), np.arctan2(y[:, None], x[None])
@@ -102,11 +103,11 @@ def eye_picture(part: ExportPart, size: int = 256) -> Picture:
     tint *= ((1.0 - 0.8 * smoothstep(t, 0.72, 1.0)) * smoothstep(t, -0.06, 0.12))[..., None]
     white = sclera * (1.0 - smoothstep(r, 0.60, 1.0)[..., None] * (1.0 - np.array([0.92, 0.70, 0.62])))
     share = smoothstep(q, 0.90, 1.06)[..., None]
-    return encoded(tint * (1.0 - share) + white * share)
+    return encode_srgb(tint * (1.0 - share) + white * share)
 
 
 def _fibres(angle: Floats, t: Floats) -> Floats:
-    """Brightness of fibres, about 0.5, by the angle about the pupil and how far out they are."""
+    """Return the brightness of fibres, about 0.5, by the angle about the pupil and how far out they are."""
     random, out = np.random.default_rng(11), np.full(angle.shape, 0.5)
     for count in (17, 23, 31, 43, 61, 83):
         phase, wave, drift = random.uniform(0.0, 2.0 * np.pi, 3)
@@ -116,7 +117,7 @@ def _fibres(angle: Floats, t: Floats) -> Floats:
 
 
 def strip_picture(fade: tuple[float, float, float, float], soft: bool, size: tuple[int, int] = (64, 256)) -> Picture:
-    """(height, width, 4) cover of a strip of brow or lashes: along it from left to right, roots below.
+    """Return (height, width, 4): cover of a strip of brow or lashes: along it from left to right, roots below.
 
     fade : cover at the root, at the tip, share of the length over which each end fades, and strength of the strands.
     soft : its long sides fade, too.
@@ -135,19 +136,19 @@ def strip_picture(fade: tuple[float, float, float, float], soft: bool, size: tup
 
 
 def strand_picture(size: int = 128) -> Picture:
-    """(size, size, 4) noise that tiles: brightness of strands, and alpha that, times a vertex's cover, falls below
-    :data:`STRAND_CUTOFF` where the strand is taller than the cover."""
+    """Return (size, size, 4): noise that tiles: brightness of strands, and alpha that, times a vertex's cover, falls
+    below :data:`STRAND_CUTOFF` where the strand is taller than the cover."""
     random = np.random.default_rng(7)
     fine, coarse, light = (_tiling_noise(random, size, falloff) for falloff in (0.5, 1.0, 0.5))
     height = np.clip(0.5 + 0.21 * coarse + 0.13 * fine, 0.05, 2.0)
     picture = np.zeros((size, size, 4), np.uint8)
-    picture[..., :3] = encoded(np.clip(0.62 + 0.14 * light + 0.10 * coarse, 0.1, 1.0))[..., None]
+    picture[..., :3] = encode_srgb(np.clip(0.62 + 0.14 * light + 0.10 * coarse, 0.1, 1.0))[..., None]
     picture[..., 3] = np.rint(255 * np.clip(STRAND_CUTOFF / height, 0.0, 1.0)).astype(np.uint8)
     return picture
 
 
 def _tiling_noise(random: np.random.Generator, size: int, falloff: float) -> Floats:
-    """Noise (size, size) that tiles, zero mean, unit deviation; amplitude falls as frequency**-falloff."""
+    """Return noise (size, size) that tiles, zero mean, unit deviation; amplitude falls as frequency**-falloff."""
     frequency = np.fft.fftfreq(size) * size
     radius = np.hypot(frequency[:, None], frequency[None, :])
     shape = np.where(radius > 2.0, np.maximum(radius, 1.0) ** -falloff, 0.0)

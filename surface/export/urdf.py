@@ -28,7 +28,7 @@ from surface.head.model.joints import BASE, JAW, ROS_AXES, SKULL, Joint, JointLi
 from surface.head.posing.part import HeadPart
 
 _EYES = {"left_eye": "leftEyePitch", "right_eye": "rightEyePitch"}
-_MOST = 0.5  # share of a motion from which on skin belongs to what moves
+_MIN_FRACTION = 0.5  # of a motion, from which on skin belongs to the moving link
 _EFFORT_NM = 1.0
 _STL_HEADER = b"written by omote; metres, x forward, y left, z up".ljust(80)
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("unused", "<u2")])
@@ -55,7 +55,7 @@ class Piece:
         return f"{self.link}-{self.name}.stl"
 
     def corners(self) -> Floats32:
-        """(t, 3, 3) mm."""
+        """Return the corners (t, 3, 3), mm."""
         both = [self.triangles, self.triangles[:, ::-1]] if self.part.material in _STRIPS else [self.triangles]
         found: Floats32 = self.part.vertices[np.concatenate(both)]
         return found
@@ -88,7 +88,7 @@ def write_urdf(
 
 
 def _pieces(head: Head, pose: Mapping[str, float]) -> list[Piece]:
-    """The triangles (t, 3) of each part that each link carries."""
+    """Return the triangles (t, 3) of each part that each link carries."""
     exported, found = export_parts(head, pose, shapes=False), list[Piece]()
     opened = [part.vertices.copy() for part in _posed(head, {**pose, JAW: 1.0})]
     for part, own, wide in zip(exported, head.parts, opened, strict=True):
@@ -96,13 +96,13 @@ def _pieces(head: Head, pose: Mapping[str, float]) -> list[Piece]:
         carrier = _carriers(head, own, part.vertices, wide)
         of_triangle = np.sort(carrier[part.triangles], axis=1)[:, 1]  # as two of its corners or the middle one
         for number in np.unique(of_triangle).tolist():
-            found += _coloured(links[number], part, part.triangles[of_triangle == number])
+            found += _split_by_colour(links[number], part, part.triangles[of_triangle == number])
     head.pose(head.values({}))
     return found
 
 
-def _coloured(link: str, part: ExportPart, triangles: Ints) -> list[Piece]:
-    """A piece of each colour: one, but for an eyeball."""
+def _split_by_colour(link: str, part: ExportPart, triangles: Ints) -> list[Piece]:
+    """Return a piece of each colour: one, but for an eyeball."""
     if part.material != "eye":
         colour = np.asarray(materials().get(part.material, materials()["skin"])["colour"], float)
         return [Piece(link, part.name, part, triangles, part.material, colour)]
@@ -116,7 +116,7 @@ def _coloured(link: str, part: ExportPart, triangles: Ints) -> list[Piece]:
 
 
 def _off_axis(part: ExportPart, triangles: Ints) -> Floats:
-    """(t,) how far the middles of triangles of an eyeball are from its axis, in its radii; 2 on its back."""
+    """Return (t,): how far the middles of triangles of an eyeball are from its axis, in its radii; 2 on its back."""
     away = part.vertices[triangles].astype(float).mean(axis=1) - part.pivot
     distance: Floats = np.hypot(away[:, 0], away[:, 1]) / np.linalg.norm(away, axis=1)
     return np.where(away[:, 2] > 0.0, distance, 2.0)
@@ -128,19 +128,19 @@ def _posed(head: Head, pose: Mapping[str, float]) -> tuple[HeadPart, ...]:
 
 
 def _carriers(head: Head, part: HeadPart, rest: Floats32, opened: Floats32) -> Ints:
-    """(m,) the link of each vertex: 0 the base, 1 the skull, 2 the jaw, 3 and 4 the eyes."""
+    """Return (m,): the link of each vertex: 0 the base, 1 the skull, 2 the jaw, 3 and 4 the eyes."""
     if part.follows in _EYES:
         return np.full(len(rest), 3 + list(_EYES).index(part.follows))
     if part.follows in ("jaw", "skull"):
         return np.full(len(rest), 2 if part.follows == "jaw" else 1)
-    whole = _swing(head, rest)
+    whole = _jaw_swing(head, rest)
     share = (np.asarray(opened - rest, float) * whole).sum(axis=1) / np.maximum((whole * whole).sum(axis=1), 1e-9)
-    still = head.data.neck.share(rest.astype(float)) < _MOST
-    return np.where(still, 0, np.where(share > _MOST, 2, 1))
+    still = head.data.neck.share(rest.astype(float)) < _MIN_FRACTION
+    return np.where(still, 0, np.where(share > _MIN_FRACTION, 2, 1))
 
 
-def _swing(head: Head, points: Floats32) -> Floats:
-    """(m, 3) how far the whole motion of the jaw moves points that are fixed to it, mm."""
+def _jaw_swing(head: Head, points: Floats32) -> Floats:
+    """Return (m, 3): how far the whole motion of the jaw moves points that are fixed to it, mm."""
     jaw = head.data.jaw
     sine, cosine = np.sin(jaw.angle_rad), np.cos(jaw.angle_rad)
     turn = np.array([[1.0, 0.0, 0.0], [0.0, cosine, -sine], [0.0, sine, cosine]])
@@ -187,7 +187,7 @@ def _add_joint(robot: ET.Element, joint: Joint, parent: Floats) -> None:
 
 
 def _stl(corners: Floats32) -> bytes:
-    """Triangles (t, 3, 3) as a binary STL."""
+    """Return triangles (t, 3, 3) as a binary STL."""
     facets = np.zeros(len(corners), _FACET)
     facets["corners"] = corners
     facets["normal"] = unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))

@@ -14,7 +14,7 @@ from surface.export.textures import EYE_RIM, materials
 from surface.head import Head
 from surface.head.posing.part import HeadPart
 
-LEAST_MM, LEAST_NORMAL = 0.03, 0.012
+MIN_MOVE_MM, MIN_NORMAL = 0.03, 0.012
 """Smaller moves of vertices, and smaller changes of their normals, are left out."""
 HALVES = ("eyeBlinkLeft", "eyeBlinkRight", "eyeLookDownLeft", "eyeLookDownRight", "jawOpen")
 HALF = "Half"
@@ -44,7 +44,7 @@ class WebPart:
 
 
 def web_parts(head: Head, level: str = "full") -> list[WebPart]:
-    """All parts of a head, with the triangles of ``level`` where the head has them."""
+    """Return all parts of a head, with the triangles of ``level`` where the head has them."""
     exported = export_parts(head)
     for name in HALVES:
         _add_half(head, name, exported)
@@ -52,8 +52,8 @@ def web_parts(head: Head, level: str = "full") -> list[WebPart]:
     found = []
     for part, own in zip(exported, head.parts, strict=True):
         triangles = own.decimated.get(level)
-        kept, small = _reduced(part, part.triangles if triangles is None else triangles)
-        found.append(_coloured(small, own, kept, front))
+        kept, small = _reduce(part, part.triangles if triangles is None else triangles)
+        found.append(_add_material_data(small, own, kept, front))
     return found
 
 
@@ -68,15 +68,16 @@ def _add_half(head: Head, name: str, parts: list[ExportPart]) -> None:
     head.pose(head.values({}))
 
 
-def _reduced(part: ExportPart, triangles: NDArray[np.integer]) -> tuple[Ints, ExportPart]:
-    """The vertices (k,) that triangles (t, 3) use, rising, and the part of these, without shapes that hardly move."""
+def _reduce(part: ExportPart, triangles: NDArray[np.integer]) -> tuple[Ints, ExportPart]:
+    """Return the vertices (k,) that triangles (t, 3) use, ascending, and the part of these, without shapes that hardly
+    move."""
     kept = np.unique(triangles)
     moves, turns = {}, {}
     for name, rows in part.displacements.items():
         move, turn = rows[kept], part.normal_changes[name][kept]
-        here = np.abs(move).max(axis=1) >= LEAST_MM
+        here = np.abs(move).max(axis=1) >= MIN_MOVE_MM
         if here.any():
-            moved = (here | (np.abs(turn).max(axis=1) >= LEAST_NORMAL))[:, None]
+            moved = (here | (np.abs(turn).max(axis=1) >= MIN_NORMAL))[:, None]
             moves[name], turns[name] = np.where(moved, move, 0.0), np.where(moved, turn, 0.0)
     return kept, replace(
         part, vertices=part.vertices[kept], normals=part.normals[kept], uv=part.uv[kept],
@@ -85,8 +86,8 @@ def _reduced(part: ExportPart, triangles: NDArray[np.integer]) -> tuple[Ints, Ex
     )  # fmt: skip
 
 
-def _coloured(part: ExportPart, own: HeadPart, kept: Ints, front: float) -> WebPart:
-    """The part with what its material needs; ``front`` : the front of the teeth, mm."""
+def _add_material_data(part: ExportPart, own: HeadPart, kept: Ints, front: float) -> WebPart:
+    """Return the part with what its material needs; ``front`` : the front of the teeth, mm."""
     a = _Attributes(own, kept)
     table = materials().get(part.material, materials()["skin"])
     plain = np.asarray(table["colour"], np.float32)
@@ -138,7 +139,7 @@ def _bytes(shares: Floats32) -> NDArray[np.uint8]:
 
 
 def _eye_uv(part: ExportPart) -> Floats32:
-    """(m, 2) an eyeball looked at from its front; behind its equator everything is as at the equator."""
+    """Return (m, 2): an eyeball looked at from its front; behind its equator everything is as at the equator."""
     away = part.vertices - part.pivot.astype(np.float32)
     if not part.pivot.any():
         away = part.vertices - part.vertices.mean(axis=0)
@@ -150,14 +151,14 @@ def _eye_uv(part: ExportPart) -> Floats32:
 
 
 def _strip_uv(own: HeadPart, kept: Ints) -> Floats32:
-    """(m, 2) along a strip of hair and from its tips down; strips of one part lie two units of u apart."""
+    """Return (m, 2): along a strip of hair and from its tips down; strips of one part lie two units of u apart."""
     u, v = np.asarray(own.uv, np.float32)[kept].T
     uv: Floats32 = np.clip(np.column_stack([u - 2.0 * np.floor(u / 2.0), 1.0 - v]), 0.0, 1.0).astype(np.float32)
     return uv
 
 
 def _lash_strength(vertices: Floats32, own: HeadPart, kept: Ints) -> Floats:
-    """(m, 1) lashes of the lower lid are fainter."""
+    """Return the strength (m, 1) of lashes; those of the lower lid are fainter."""
     strip = np.floor(np.asarray(own.uv)[kept, 0] / 2.0)
     heights: Mapping[float, float] = {s: float(vertices[strip == s, 1].mean()) for s in np.unique(strip)}
     middle = float(np.mean(list(heights.values())))

@@ -10,11 +10,11 @@ from surface.base.jit import kernel
 
 
 @kernel
-def fill_shares(uv: Any, triangles: Any, point: Any, out: Any) -> Any:
+def fill_barycentric(uv: Any, triangles: Any, point: Any, out: Any) -> Any:
     """Fill ``out (t, 3)`` with the barycentric coordinates of ``point (2,)`` in each of ``triangles (t, 3)``.
 
-    ``uv (m, 2)`` are their corners. Triangles without area hold nothing and get -inf. Returns the first triangle whose
-    least coordinate is greatest.
+    ``uv (m, 2)`` are the vertices. Triangles without area get -inf. Returns the triangle whose least coordinate is
+    greatest, the first of several: the one that holds the point, if any does.
     """
     best, greatest, u, v = 0, -np.inf, point[0], point[1]
     for t in range(len(triangles)):

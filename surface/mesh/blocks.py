@@ -1,7 +1,8 @@
-"""Group a mesh's vertices into cells that share one list of control points (paper, 2.4).
+"""Group a mesh's vertices into cells that share one list of control points (section 2.4 of the paper).
 
-A cell is a branch of the quad tree, chosen so that applying its weights costs least: a large cell wastes weights
-on points that reach only some of its vertices, a small one reads control points too often.
+A cell is a node of the quad tree, at any level, with all vertices below it. Nodes are chosen so that applying their
+weights is cheapest: a large cell stores weights of points that influence only some of its vertices, while small cells
+read the same control points many times.
 """
 
 # mypy: allow-untyped-defs
@@ -16,13 +17,13 @@ from surface.spline.kernels import bounding_box, points_in
 from surface.spline.weighing import mark_reaching
 
 LANES = 8  # float32 numbers per vector operation
-PER_POINT = 10.0  # cost of reading a control point, in weights
-MOST = 4096  # vertices of the largest cell, so that a block's sums stay in the cache
+PER_POINT = 10.0  # cost of reading a control point, relative to that of applying one weight
+MAX_VERTICES = 4096  # of a cell, so that its sums stay in the cache
 
 
 @kernel
 def morton(x, y):
-    """(m,) int64: bits of x and y in turn, for 0 <= x, y < 2**24."""
+    """Return the Morton codes (m,) int64, the interleaved bits of x and y (m,), for 0 <= x, y < 2**24."""
     out = np.zeros(x.shape[0], dtype=np.int64)
     for s in range(x.shape[0]):
         for bit in range(24):
@@ -32,17 +33,20 @@ def morton(x, y):
 
 
 @kernel
-def least_codes(triangles, owner, leaf_code, code):
-    """Lower ``code (m,)`` to the least code of the leaves whose triangles use a vertex."""
+def lower_codes(triangles, leaf, leaf_code, code):
+    """Lower ``code (m,)`` of each vertex to the minimum code of the leaves whose triangles use it.
+
+    ``leaf (t,)`` is the leaf of every triangle.
+    """
     for t in range(triangles.shape[0]):
         for k in range(3):
             vertex = triangles[t, k]
-            code[vertex] = min(code[vertex], leaf_code[owner[t]])
+            code[vertex] = min(code[vertex], leaf_code[leaf[t]])
 
 
 @kernel
 def unit_cross(a, b, out, bad):
-    """Unit vectors along a x b; ``bad`` says where the product is too short to have a direction."""
+    """Write unit vectors along a x b to ``out``, and to ``bad`` where the product is too short to have a direction."""
     for s in range(a.shape[0]):
         x = a[s, 1] * b[s, 2] - a[s, 2] * b[s, 1]
         y = a[s, 2] * b[s, 0] - a[s, 0] * b[s, 2]
@@ -55,9 +59,10 @@ def unit_cross(a, b, out, bad):
 
 
 def group(code: Ints, depth: int, uv: Floats, surface: ControlPoints) -> Ints:
-    """First vertices of the cells, (c + 1,) int64, for vertices ``uv (m, 2)`` that rise by ``code (m,)`` int64.
+    """Return the first vertex of every cell and the number of vertices, (c + 1,) int64.
 
-    The low ``2 * depth`` bits of a code are the Morton code of the leaf within its root.
+    Vertices ``uv (m, 2)`` are sorted by ``code (m,)`` int64, whose low ``2 * depth`` bits are the Morton code of
+    the leaf within its root.
     """
     start = np.zeros(len(code) + 1, dtype=np.int64)
     count = _group(code, depth, uv, *surface.arrays()[:2], *surface.bin_arrays(), start)
@@ -67,22 +72,23 @@ def group(code: Ints, depth: int, uv: Floats, surface: ControlPoints) -> Ints:
 
 @kernel
 def count_points(boxes, knots_u, knots_v, grid, shape, start, ids, out):
-    """Number of points whose support meets each of ``boxes (k, 4)``."""
-    none = np.zeros(0, dtype=np.int32)
+    """Write to ``out (k,)`` the number of points whose support meets each of ``boxes (k, 4)``."""
+    no_ids = np.zeros(0, dtype=np.int32)
     for k in range(boxes.shape[0]):
-        out[k] = points_in(boxes[k], knots_u, knots_v, grid, shape, start, ids, none)
+        out[k] = points_in(boxes[k], knots_u, knots_v, grid, shape, start, ids, no_ids)
 
 
 @kernel
-def _cost(uv, low, high, knots_u, knots_v, grid, shape, start, ids, box, none):
+def _cost(uv, low, high, knots_u, knots_v, grid, shape, start, ids, box, no_ids):
+    """Return the cost of a cell of the vertices from ``low`` to below ``high``."""
     bounding_box(uv, low, high, box)
-    points = points_in(box, knots_u, knots_v, grid, shape, start, ids, none)
+    points = points_in(box, knots_u, knots_v, grid, shape, start, ids, no_ids)
     return points * ((high - low + LANES - 1) // LANES * LANES + PER_POINT)
 
 
 @kernel
-def _next_edge(code, low, high, shift):
-    """End of the run from ``low`` on with equal ``code >> shift``."""
+def _run_end(code, low, high, shift):
+    """Return the end of the run of vertices from ``low`` on with equal ``code >> shift``, which are one node's."""
     end = low + 1
     while end < high and (code[end] >> shift) == (code[low] >> shift):
         end += 1
@@ -90,42 +96,48 @@ def _next_edge(code, low, high, shift):
 
 
 @kernel
-def _splits(code, uv, low, high, shift, knots_u, knots_v, grid, shape, start, ids, box, none):
-    """Are the four parts of a branch cheaper than the whole?"""
+def _should_descend(code, uv, low, high, shift, knots_u, knots_v, grid, shape, start, ids, box, no_ids):
+    """Whether to visit the children of a node, as they are cheaper than one cell, or the node has only one child.
+
+    Nodes of too many vertices are always split, leaves and nodes of at most one vector of vertices never.
+    """
     if shift == 0 or high - low <= LANES:
         return False
-    if high - low > MOST or _next_edge(code, low, high, shift - 2) == high:
+    if high - low > MAX_VERTICES or _run_end(code, low, high, shift - 2) == high:
         return True
     parts, a = 0.0, low
     while a < high:
-        b = _next_edge(code, a, high, shift - 2)
-        parts += _cost(uv, a, b, knots_u, knots_v, grid, shape, start, ids, box, none)
+        b = _run_end(code, a, high, shift - 2)
+        parts += _cost(uv, a, b, knots_u, knots_v, grid, shape, start, ids, box, no_ids)
         a = b
-    return parts < _cost(uv, low, high, knots_u, knots_v, grid, shape, start, ids, box, none)
+    return parts < _cost(uv, low, high, knots_u, knots_v, grid, shape, start, ids, box, no_ids)
 
 
 @kernel
 def _group(code, depth, uv, knots_u, knots_v, grid, shape, start, ids, out):
-    """Visit the branches in order: go down a level where that is cheaper, else take the branch as a cell."""
-    box, none = np.zeros(4), np.zeros(0, dtype=np.int32)
+    """Visit the nodes depth first; descend where that is cheaper, otherwise make the node a cell.
+
+    Writes the first vertex of every cell to ``out``; returns the number of cells.
+    """
+    box, no_ids = np.zeros(4), np.zeros(0, dtype=np.int32)
     ends, shifts = np.zeros(depth + 2, dtype=np.int64), np.zeros(depth + 2, dtype=np.int64)
     count, low, top = 0, 0, -1
     while low < code.shape[0]:
         if top < 0:
             top, shifts[0] = 0, 2 * depth
-            ends[0] = _next_edge(code, low, code.shape[0], 2 * depth)
+            ends[0] = _run_end(code, low, code.shape[0], 2 * depth)
         high, shift = ends[top], shifts[top]
-        if _splits(code, uv, low, high, shift, knots_u, knots_v, grid, shape, start, ids, box, none):
+        if _should_descend(code, uv, low, high, shift, knots_u, knots_v, grid, shape, start, ids, box, no_ids):
             top += 1
-            shifts[top], ends[top] = shift - 2, _next_edge(code, low, high, shift - 2)
+            shifts[top], ends[top] = shift - 2, _run_end(code, low, high, shift - 2)
             continue
         out[count] = low
         count, low = count + 1, high
-        while top >= 0 and ends[top] == low:  # up to the first branch with a part left, then to that part
+        while top >= 0 and ends[top] == low:  # go up to the nearest node with an unvisited child
             top -= 1
         if top >= 0:
             top += 1
-            ends[top] = _next_edge(code, low, ends[top - 1], shifts[top])
+            ends[top] = _run_end(code, low, ends[top - 1], shifts[top])
     return count
 
 
@@ -139,9 +151,10 @@ def _fill_lists(cell_start, uv, knots_u, knots_v, grid, shape, start, ids, list_
 
 
 def point_lists(cell_start: Ints, uv: Floats, side: Ints, surface: ControlPoints) -> tuple[Ints, np.ndarray]:
-    """Control points that reach a vertex of each cell: ``list_start (c + 1,)`` and ``list_ids (k,)``, rising per cell.
+    """Return the control points that influence a vertex of each cell: ``list_start (c + 1,)`` and ``list_ids (k,)``.
 
-    A point counts that has a weight at a vertex, or a derivative of it, at the limit that the vertex takes (``side``).
+    Lists are ascending. A point is in the list if it has a weight at a vertex of the cell, or a derivative of it, at
+    the limit that the vertex takes (``side``).
     """
     start = np.zeros(len(cell_start), dtype=np.int64)
     arrays = (cell_start, uv, *surface.arrays()[:2], *surface.bin_arrays(), start)

@@ -1,6 +1,6 @@
-"""A tree of boxes over triangles in the order of a space curve, for searches in a mesh that moves.
+"""A bounding box tree over triangles sorted along a space-filling curve, for searches in a mesh that moves.
 
-The order is found once, at rest; for a pose only the boxes are made again.
+The order is computed once, at rest; for a pose only the boxes are computed again.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from surface.base.arrays import Floats, Ints
 from surface.base.jit import kernel
 
 LEAF = 4  # triangles in a leaf
-BITS = 10  # of each coordinate in the space curve
+BITS = 10  # of each coordinate on the curve
 
 
 @kernel
 def _refit(corners: Any, low: Any, high: Any, leaves: int) -> None:
-    """Boxes ``low``, ``high`` (2 leaves, 3) of a complete tree, with root 1, over triangles ``corners (t, 3, 3)``."""
+    """Write the boxes ``low``, ``high`` (2 leaves, 3) of a complete tree over triangles ``corners (t, 3, 3)``."""
     for leaf in range(leaves):
         node = leaves + leaf
         for k in range(3):
@@ -35,11 +35,12 @@ def _refit(corners: Any, low: Any, high: Any, leaves: int) -> None:
 
 
 class BoxTree:
-    """Boxes round triangles (t, 3) over vertices at rest (n, 3).
+    """A complete binary tree of boxes around triangles (t, 3) over vertices at rest (n, 3).
 
-    order : (t,) the triangles in the tree's order, in which it counts them; triangles : (t, 3) in that order.
-    corners : (t, 3, 3) where the mesh is now; low, high : (2 leaves, 3) boxes of all nodes, the root is 1, the
-        children of node k are 2 k and 2 k + 1, leaf j is node ``leaves`` + j with triangles from LEAF * j on.
+    order : (t,) indices of the triangles, sorted along the curve. triangles : (t, 3) in that order.
+    corners : (t, 3, 3) their corners where the mesh is now, in that order.
+    low, high : (2 leaves, 3) boxes of the nodes. Node 1 is the root, 2 k and 2 k + 1 are the children of node k. Leaf j
+        is node ``leaves`` + j and holds LEAF triangles from LEAF * j on.
     """
 
     def __init__(self, rest: Floats, triangles: Ints) -> None:
@@ -51,13 +52,13 @@ class BoxTree:
         self.move(rest)
 
     def move(self, vertices: Floats) -> None:
-        """Put the mesh's vertices (n, 3) elsewhere."""
+        """Set the positions of the vertices (n, 3) and compute the boxes again."""
         self.corners = np.ascontiguousarray(np.asarray(vertices, np.float64)[self.triangles])
         _refit(self.corners, self.low, self.high, self.leaves)
 
 
 def _curve(points: Floats) -> Ints:
-    """(m,) places of points (m, 3) on Morton's curve."""
+    """Return the positions (m,) of points (m, 3) along the Morton curve."""
     low, extent = points.min(axis=0), max(float(np.ptp(points, axis=0).max()), 1e-12)
     cell = ((points - low) / extent * ((1 << BITS) - 1)).astype(np.int64)
     key = np.zeros(len(points), np.int64)

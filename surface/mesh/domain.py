@@ -35,7 +35,7 @@ class Slit:
             raise ValueError(f"Slit: needs finite at and start < end, got {self}")
 
     def holds(self, uv: Floats) -> np.ndarray:
-        """(m,) bool: which of ``uv (m, 2)`` lie on the open segment."""
+        """Return (m,) bool: which of ``uv (m, 2)`` lie on the open segment."""
         across, along = (uv[:, 1], uv[:, 0]) if self.axis == "u" else (uv[:, 0], uv[:, 1])
         held: np.ndarray = (across == self.at) & (along > self.start) & (along < self.end)
         return held
@@ -82,11 +82,11 @@ class Domain:
 
     @classmethod
     def of(cls, surface: ControlPoints) -> Domain:
-        """The rectangle that holds every subdomain of ``surface``."""
+        """Return the rectangle that holds every subdomain of ``surface``."""
         return cls(surface.rect)
 
     def inside(self, uv: ArrayLike) -> np.ndarray:
-        """(m,) bool: which of ``uv (m, 2)`` are in the rectangle and inside by the even-odd rule."""
+        """Return (m,) bool: which of ``uv (m, 2)`` are in the rectangle and inside by the even-odd rule."""
         from . import loops  # compiled: loaded when first used
 
         samples = np.ascontiguousarray(np.asarray(uv, dtype=np.float64))
@@ -115,7 +115,7 @@ class Domain:
 
 
 def _check_marks(marks: ArrayLike) -> Floats:
-    """Marks as (k, 2) float64."""
+    """Return marks as (k, 2) float64."""
     points = numbers(marks, "marks")
     if not points.size:
         return np.zeros((0, 2))
@@ -127,7 +127,7 @@ def _check_marks(marks: ArrayLike) -> Floats:
 
 
 def _check_loop(loop: ArrayLike, index: int) -> Floats:
-    """A loop as (k, 2) float64 without repeated points."""
+    """Return a loop as (k, 2) float64 without repeated points."""
     ring = numbers(loop, f"loops[{index}]")
     if ring.ndim != 2 or ring.shape[1] != 2:
         raise ValueError(f"loops[{index}]: shape {ring.shape}, expected (k, 2)")

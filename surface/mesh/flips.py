@@ -24,13 +24,13 @@ def improve(points: Floats, triangles: Ints, kept: Ints, rounds: int = 6) -> Non
 
 
 def edge_keys(triangles: Ints) -> tuple[Ints, int]:
-    """(3 t,) keys of edges, ``least end * width + greatest end`` of each triangle in turn, and the width."""
+    """Return (3 t,): keys of edges, ``least end * width + greatest end`` of each triangle in turn, and the width."""
     edges, width = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), int(triangles.max(initial=0)) + 1
     return edges.min(axis=1) * width + edges.max(axis=1), width
 
 
 def edge_pairs(triangles: Ints) -> Ints:
-    """(e, 2) pairs of triangles that share an edge."""
+    """Return (e, 2): pairs of triangles that share an edge."""
     key = edge_keys(triangles)[0]
     order = np.argsort(key, kind="stable")
     same = key[order][1:] == key[order][:-1]
@@ -46,7 +46,7 @@ def _normal(xyz, i, j, k):
 
 @kernel
 def _cotangent(xyz, apex, a, b):
-    """Cotangent of the angle at ``apex``."""
+    """Return cotangent of the angle at ``apex``."""
     ax, ay, az = xyz[a, 0] - xyz[apex, 0], xyz[a, 1] - xyz[apex, 1], xyz[a, 2] - xyz[apex, 2]
     bx, by, bz = xyz[b, 0] - xyz[apex, 0], xyz[b, 1] - xyz[apex, 1], xyz[b, 2] - xyz[apex, 2]
     nx, ny, nz = _normal(xyz, apex, a, b)
@@ -55,7 +55,7 @@ def _cotangent(xyz, apex, a, b):
 
 @kernel
 def _flip_round(xyz, triangles, kept, pairs):
-    """One pass; a pair whose triangles were already changed in this pass is checked again."""
+    """Flip edges in one pass; a pair whose triangles were already changed in this pass is checked again."""
     count = 0
     for e in range(pairs.shape[0]):
         s, t = pairs[e, 0], pairs[e, 1]

@@ -13,7 +13,9 @@ from surface.base.jit import kernel
 
 
 def _by_band(segments: Floats) -> tuple[float, float, Ints, Ints]:
-    """Segments by band of v: v0, bands per unit of v, list starts (bands + 1,), segment ids, rising per band."""
+    """Return segments by band of v: v0, bands per unit of v, list starts (bands + 1,), segment ids, ascending per
+    band.
+    """
     low, high = float(segments[:, [1, 3]].min()), float(segments[:, [1, 3]].max())
     bands = max(1, len(segments) // 2)
     scale = bands / max(high - low, 1e-300)
@@ -31,7 +33,7 @@ def _band(v, low, scale, bands):
 
 
 def inside(segments: Floats, uv: Floats) -> np.ndarray:
-    """(m,) bool: even-odd rule for ``uv (m, 2)``."""
+    """Return (m,) bool: even-odd rule for ``uv (m, 2)``."""
     out = np.zeros(len(uv), dtype=np.bool_)
     _inside(segments, uv, *_by_band(segments), out)
     return out
@@ -53,7 +55,7 @@ def _inside(segments, uv, low, scale, start, ids, out):
 
 
 def crossings(segments: Floats, a: Floats, b: Floats) -> Floats:
-    """Where edges cross a loop, as a fraction (e,) of each, 0..1: the crossing nearest to the middle.
+    """Return where edges cross a loop, as a fraction (e,) of each, 0..1: the crossing nearest to the middle.
 
     ``a``, ``b`` (e, 2) float64 are the end points, one inside and one outside.
     """
@@ -85,7 +87,7 @@ def _crossings(segments, a, b, low, scale, start, ids, out):
 
 
 def corners(loop: Floats, scale: tuple[float, float], angle: float = 40.0) -> np.ndarray:
-    """(k,) bool: which points of a closed polyline (k, 2) turn by more than ``angle`` degrees.
+    """Return (k,) bool: which points of a closed polyline (k, 2) turn by more than ``angle`` degrees.
 
     ``scale`` turns u and v into lengths.
     """
@@ -97,7 +99,9 @@ def corners(loop: Floats, scale: tuple[float, float], angle: float = 40.0) -> np
 
 
 def resample(loop: Floats, scale: tuple[float, float], step: float) -> tuple[Floats, np.ndarray]:
-    """The loop (k, 2) with points added so that no segment is longer than ``step``, and which are corners (k,)."""
+    """Return the loop (k, 2) with points added so that no segment is longer than ``step``, and which are corners
+    (k,).
+    """
     after = np.roll(loop, -1, axis=0)
     length = np.linalg.norm((after - loop) * np.asarray(scale), axis=1)
     pieces = np.maximum(1, np.ceil(length / step).astype(np.int64))

@@ -20,7 +20,7 @@ class Mesh:
     triangles : (t, 3) int32, counter-clockwise seen from where the normals point
     uv : (m, 2) float64
     side : (m,) int64, from which side a vertex on a slit evaluates the surface: bit 1 from the left in u, bit 2 in v
-    cell : (m,) int32, rising: the vertices of a cell are consecutive
+    cell : (m,) int32, ascending: the vertices of a cell are consecutive
     cell_start : (c + 1,) int64, first vertex of every cell
     list_start : (c + 1,) int64, where every cell's list starts in ``list_ids``
     list_ids : (k,) int32 control points that reach a vertex of the cell
@@ -49,7 +49,7 @@ class Mesh:
                 value.flags.writeable = False
 
     def points_of(self, cell: int) -> np.ndarray:
-        """(k,) int32: control points that reach a cell."""
+        """Return (k,) int32: control points that reach a cell."""
         return self.list_ids[self.list_start[cell] : self.list_start[cell + 1]]
 
     @cached_property
@@ -64,7 +64,7 @@ class Mesh:
 
 
 def border_edges(triangles: NDArray[np.int32]) -> Ints:
-    """(k, 2) edges that only one triangle has, in the direction of that triangle."""
+    """Return (k, 2): edges that only one triangle has, in the direction of that triangle."""
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     key, back = edges[:, 0] << 32 | edges[:, 1], edges[:, 1] << 32 | edges[:, 0]
     return edges[~np.isin(key, back)]

@@ -1,7 +1,7 @@
-"""Quad trees over (u, v): a grid of root cells, quartering, 2:1 balance, conforming triangles (paper, 2.3).
+"""Quad trees over (u, v): a grid of root cells, quartering, 2:1 balance, conforming triangles (paper, section 2.3).
 
 At level L the domain is a grid of ``roots * 2**L`` cells; cell (i, j) covers the lattice square from
-``(i, j) * 2**(depth - L)`` on. Lattice lines at root borders are exactly the wanted (u, v).
+``(i, j) * 2**(depth - L)`` on. Lattice lines at root borders have exactly the given (u, v).
 """
 
 from __future__ import annotations
@@ -18,9 +18,10 @@ from surface.base.progress import Progress, no_progress
 
 @dataclass(frozen=True)
 class Lattice:
-    """Integer coordinates over the domain: rising root borders, and the deepest level a cell can have.
+    """Integer coordinates over the domain.
 
-    ``joined`` says which directions are joined at their ends, so that cells there are neighbours.
+    lines_u, lines_v : sorted borders of the root cells. depth : deepest level of a cell.
+    joined : whether u, and v, are closed, so that the first and the last cells are neighbours.
     """
 
     lines_u: Floats
@@ -30,16 +31,16 @@ class Lattice:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Roots along u and v."""
+        """Number of root cells along u and v."""
         return len(self.lines_u) - 1, len(self.lines_v) - 1
 
     @property
     def roots(self) -> Ints:
-        """(n, 2): indices of the root cells."""
+        """Return the indices (n, 2) of the root cells."""
         return np.argwhere(np.ones(self.shape, dtype=bool))
 
     def uv(self, x: Ints, y: Ints) -> Floats:
-        """(m, 2): parameters of lattice points."""
+        """Return the parameters (m, 2) of lattice points."""
         return np.stack([self._along(self.lines_u, x), self._along(self.lines_v, y)], axis=-1)
 
     def _along(self, lines: Floats, x: Ints) -> Floats:
@@ -50,11 +51,11 @@ class Lattice:
         return places
 
     def key(self, x: Ints, y: Ints) -> Ints:
-        """(m,) one integer per lattice point."""
+        """Return one integer (m,) per lattice point."""
         return y * ((self.shape[0] << self.depth) + 1) + x
 
     def point(self, key: Ints) -> tuple[Ints, Ints]:
-        """The inverse of :meth:`key`."""
+        """Invert :meth:`key`."""
         width = (self.shape[0] << self.depth) + 1
         return key % width, key // width
 
@@ -72,10 +73,10 @@ NEIGHBOURS = np.array([[0, -1], [1, 0], [0, 1], [-1, 0]])  # below, right, above
 
 
 def grow(lattice: Lattice, split: SplitTest, progress: Progress = no_progress) -> tuple[Leaves, list[Ints]]:
-    """Quarter cells as long as ``split(level, cells (n, 2))``, (n,) bool, says, then balance 2:1 over edges.
+    """Quarter the cells for which ``split(level, cells (n, 2))``, (n,) bool, is true, then balance 2:1 over edges.
 
-    Returns the leaf cells and, per level, the sorted codes of cells that were split; see :func:`codes`. Progress takes
-    every level for twice the work of the one before.
+    Returns the leaf cells and, per level, the sorted codes of cells that were split; see :func:`codes`. Progress
+    assumes that every level takes twice as long as the one before.
     """
     cells = lattice.roots
     inner: list[Ints] = []
@@ -88,14 +89,14 @@ def grow(lattice: Lattice, split: SplitTest, progress: Progress = no_progress) -
 
 
 def children(cells: Ints) -> Ints:
-    """(4 n, 2): the four quarters of every cell."""
+    """Return the four quarters of every cell, (4 n, 2)."""
     quarters = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
     out: Ints = (2 * cells[:, None, :] + quarters).reshape(-1, 2)
     return out
 
 
 def codes(lattice: Lattice, level: int, cells: Ints) -> Ints:
-    """(n,) one integer per cell of a level; cells outside the domain give -1."""
+    """Return one integer (n,) per cell of a level; -1 for cells outside the domain."""
     size = np.array(lattice.shape) << level
     if any(lattice.joined):
         cells = np.where(lattice.joined, cells % size, cells)
@@ -109,7 +110,7 @@ def _decode(lattice: Lattice, level: int, code: Ints) -> Ints:
 
 
 def contains(sorted_codes: Ints, code: Ints) -> np.ndarray:
-    """(n,) bool: membership in a sorted array."""
+    """Return which of ``code (n,)`` are in a sorted array, (n,) bool."""
     if not len(sorted_codes):
         return np.zeros(len(code), dtype=bool)
     at = np.minimum(np.searchsorted(sorted_codes, code), len(sorted_codes) - 1)
@@ -137,7 +138,10 @@ def _balance(lattice: Lattice, inner: list[Ints]) -> tuple[Leaves, list[Ints]]:
 
 
 def _parents_around(cells: Ints) -> Ints:
-    """(3 n, 2) the parents of cells (n, 2) and of their edge neighbours: two of the four have the same parent."""
+    """Return the parents (3 n, 2) of cells (n, 2) and of their edge neighbours.
+
+    They are three per cell, since two of the neighbours have the cell's own parent.
+    """
     own = cells // 2
     beside = 2 * (cells % 2) - 1  # towards the neighbours that have another one
     steps = beside[:, None, :] * np.array([[0, 0], [1, 0], [0, 1]])
@@ -146,7 +150,7 @@ def _parents_around(cells: Ints) -> Ints:
 
 
 def quarter(lattice: Lattice, leaves: Leaves, inner: list[Ints], which: Ints) -> tuple[Leaves, list[Ints]]:
-    """The tree with the leaves ``which (k,)`` quartered, too; ``inner`` and what is returned are as of :func:`grow`."""
+    """Quarter the leaves ``which (k,)``, too, and balance; ``inner`` and the results are as of :func:`grow`."""
     cells = [_decode(lattice, level, code) for level, code in enumerate(inner)]
     for level in np.unique(leaves.level[which]):
         more = leaves.cell[which[leaves.level[which] == level]]
@@ -155,7 +159,7 @@ def quarter(lattice: Lattice, leaves: Leaves, inner: list[Ints], which: Ints) ->
 
 
 def patterns(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> Ints:
-    """(n,) which of :data:`TEMPLATES` the triangles of every leaf are."""
+    """Return the index (n,) in :data:`TEMPLATES` of the triangles of every leaf."""
     pattern = np.zeros(len(leaves.level), dtype=np.int64)
     for level in np.unique(leaves.level):
         if level >= len(inner):
@@ -170,7 +174,7 @@ def patterns(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> Ints:
 
 
 def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[Ints, Ints]:
-    """Triangles without cracks: a leaf's edges have vertices at their middles where neighbours are smaller.
+    """Triangulate the leaves without cracks: an edge has a vertex in its middle if the neighbour is smaller.
 
     Returns lattice keys (t, 3) int64, counter-clockwise in (u, v), and the leaf of every triangle, (t,) int64.
     """
@@ -183,7 +187,7 @@ def triangulate(lattice: Lattice, leaves: Leaves, inner: list[Ints]) -> tuple[In
 
 @kernel
 def _emit(level, cell, pattern, depth, width, templates, keys):  # type: ignore[no-untyped-def]
-    """Lattice keys of the triangles of every leaf; corners 0-3 and edge middles 4-7, see :func:`_templates`."""
+    """Write lattice keys of the triangles of every leaf to ``keys``; see :func:`_templates`."""
     x, y = np.array([0, 2, 2, 0, 1, 2, 1, 0]), np.array([0, 0, 2, 2, 0, 1, 2, 1])
     row = 0
     for leaf in range(level.shape[0]):
@@ -199,7 +203,7 @@ def _emit(level, cell, pattern, depth, width, templates, keys):  # type: ignore[
 
 
 def _templates() -> Ints:
-    """(17, 6, 3): triangles over corners 0-3 and middles 4-7 by pattern of smaller neighbours; -1 fills up.
+    """Return triangles (17, 6, 3) over corners 0-3 and middles 4-7, by pattern of smaller neighbours; -1 pads.
 
     Pattern bits: below, right, above, left. Pattern 16 is pattern 0 with the other diagonal.
     """

@@ -1,4 +1,4 @@
-"""Split edges of a triangle mesh in two: every triangle at a split edge is cut, so that no cracks open."""
+"""Split edges of a triangle mesh in two, and all triangles at them, so that no cracks open."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ Corners 3 to 5 are the middles of these edges."""
 
 
 class Middles:
-    """Vertices in the middles of edges, each made once, whichever triangles ask for it.
+    """Numbers the new vertices in the middles of edges; triangles that share an edge share its vertex.
 
-    first : number of the first new vertex.
+    first : index of the first new vertex.
     """
 
     def __init__(self, first: int) -> None:
@@ -35,7 +35,7 @@ class Middles:
         self.ends: list[tuple[int, int]] = []
 
     def of(self, edges: Ints) -> Ints:
-        """(k,) the vertices in the middles of ``edges (k, 2)``."""
+        """Return the vertices (k,) in the middles of ``edges (k, 2)``."""
         return np.array([self._number(min(a, b), max(a, b)) for a, b in edges.tolist()], np.int64)
 
     def _number(self, a: int, b: int) -> int:
@@ -47,9 +47,9 @@ class Middles:
 
 
 def split_edges(triangles: Ints, wanted: Callable[[Ints], Bools], middles: Middles) -> Ints:
-    """Triangles (t', 3) with every wanted edge split once; edges that only one triangle has are left whole.
+    """Return triangles (t', 3) with every wanted edge split once; border edges are not split.
 
-    wanted : says of edges (k, 2), lower end first, which to split. middles : gets the new vertices.
+    wanted : returns of edges (k, 2), lower end first, which to split. middles : numbers the new vertices.
     """
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     low = np.sort(edges, axis=1)

@@ -1,4 +1,7 @@
-"""Which cells of a quad tree to quarter: too many control points, too far from the surface, too coarse for a loop."""
+"""Decide which cells of a quad tree to quarter.
+
+That is those with too many control points, too far from the surface, or too large to follow a trim loop.
+"""
 
 from __future__ import annotations
 
@@ -15,12 +18,12 @@ from . import blocks, chords, loops, quadtree
 from .domain import Domain
 from .quadtree import Lattice, Leaves
 
-MOST_CELLS = 4_000_000
-RIM = 64  # cells along a side where the border of what is covered is followed
+MAX_CELLS = 4_000_000
+RIM = 64  # along each side of the domain, to which cells are split where the border of the covered area runs
 
 
 class Limits(NamedTuple):
-    """How fine a mesh shall be; see :meth:`surface.DCPSurface.tessellate`. ``ValueError`` from :meth:`check`."""
+    """Limits of a mesh's resolution; see :meth:`surface.DCPSurface.tessellate`."""
 
     max_points: int | None
     chord_error: float | None
@@ -31,7 +34,7 @@ class Limits(NamedTuple):
     measured: bool = True
 
     def check(self) -> None:
-        """``ValueError`` for the first limit that is out of range."""
+        """Raise ``ValueError`` for the first limit that is out of range."""
         if self.max_points is not None and self.max_points < 1:
             raise ValueError(f"max_points: must be at least 1, not {self.max_points}")
         for name, error in (("chord_error", self.chord_error), ("loop_error", self.loop_error)):
@@ -43,13 +46,13 @@ class Limits(NamedTuple):
             return
         if np.shape(self.roots) != (2,) or not all(int(count) == count >= 1 for count in self.roots):
             raise ValueError(f"roots: needs two whole numbers of 1 or more, got {self.roots!r}")
-        if self.roots[0] * self.roots[1] > MOST_CELLS:
-            raise ValueError(f"roots: {self.roots[0]} x {self.roots[1]} cells are more than {MOST_CELLS}")
+        if self.roots[0] * self.roots[1] > MAX_CELLS:
+            raise ValueError(f"roots: {self.roots[0]} x {self.roots[1]} cells are more than {MAX_CELLS}")
 
 
 @dataclass
 class SplitTests:
-    """Which cells are to be quartered; ``scale`` are lengths per unit of u and of v."""
+    """Tests of which cells to quarter; ``scale`` are lengths per unit of u and of v."""
 
     surface: ControlPoints
     domain: Domain
@@ -60,7 +63,7 @@ class SplitTests:
     anchors: tuple[Floats, Floats] | None = None
 
     def follow_loops(self, error: float) -> None:
-        """Ask for cells small enough that edges follow the loops within ``error``."""
+        """Require cells small enough for edges to follow the loops within ``error``."""
         for loop in self.domain.loops:
             ring = np.asarray(loop)
             around = np.linalg.norm((np.roll(ring, -1, axis=0) - ring) * self.scale, axis=1).sum()
@@ -71,8 +74,8 @@ class SplitTests:
             self.rings.append((points, size))
 
     def split(self, level: int, cells: Ints) -> np.ndarray:
-        """(n,) bool: which cells of a level to quarter."""
-        if len(cells) > MOST_CELLS:
+        """Return which cells of a level to quarter, (n,) bool."""
+        if len(cells) > MAX_CELLS:
             raise ValueError(
                 f"max_depth: {len(cells)} cells at level {level}; ask for a larger chord_error or max_points"
             )
@@ -88,14 +91,14 @@ class SplitTests:
         return chosen
 
     def _rects(self, level: int, cells: Ints) -> Floats:
-        """(n, 4): u0, u1, v0, v1."""
+        """Return the rectangles u0, u1, v0, v1 of cells, (n, 4)."""
         shift = self.lattice.depth - level
         low = self.lattice.uv(cells[:, 0] << shift, cells[:, 1] << shift)
         high = self.lattice.uv((cells[:, 0] + 1) << shift, (cells[:, 1] + 1) << shift)
         return np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1]], axis=1)
 
     def _active(self, rect: Floats, cells: Ints, level: int) -> tuple[np.ndarray, np.ndarray]:
-        """Which cells have a part in the domain, and which are too large for a loop that runs through them."""
+        """Return which cells overlap the domain, and which are too large for a loop that runs through them."""
         coarse = np.zeros(len(cells), dtype=bool)
         if not self.rings:
             return np.ones(len(cells), dtype=bool), coarse
@@ -112,7 +115,7 @@ class SplitTests:
         return active, coarse
 
     def _find(self, level: int, uv: Floats) -> Ints:
-        """Codes of the cells that hold ``uv``; -1 outside the rectangle."""
+        """Return the codes of the cells that hold ``uv``; -1 outside the rectangle."""
         index = []
         for k, lines in enumerate((self.lattice.lines_u, self.lattice.lines_v)):
             root = np.searchsorted(lines, uv[:, k], side="right") - 1
@@ -122,14 +125,16 @@ class SplitTests:
         return quadtree.codes(self.lattice, level, np.stack(index, axis=1))
 
     def _counts(self, rect: Floats) -> Ints:
-        """(n,): points whose subdomain shares an area, not only an edge, with each rectangle."""
+        """Return the number (n,) of points whose subdomain shares an area, not only an edge, with each rectangle."""
         out, inner = np.zeros(len(rect), dtype=np.int64), np.nextafter(rect, [np.inf, -np.inf, np.inf, -np.inf])
         blocks.count_points(inner, *self.surface.arrays()[:2], *self.surface.bin_arrays(), out)
         return out
 
     def tighten(self, leaves: Leaves, inner: list[Ints], error: float) -> tuple[Leaves, list[Ints]]:
-        """Quarter leaves until the surface is nowhere further than ``error`` from their triangles, or the tree
-        has no more levels; ``inner`` and what is returned are as of :func:`.quadtree.grow`."""
+        """Quarter leaves until the surface is nowhere further than ``error`` from their triangles.
+
+        Leaves of the deepest level stay. ``inner`` and the results are as of :func:`.quadtree.grow`.
+        """
         passed, creases = np.zeros(0, dtype=np.int64), chords.crease_lines(self.surface)
         while True:
             pattern = quadtree.patterns(self.lattice, leaves, inner)
@@ -142,7 +147,7 @@ class SplitTests:
             leaves, inner = quadtree.quarter(self.lattice, leaves, inner, left[far])
 
     def _keys(self, leaves: Leaves) -> Ints:
-        """(n,) one integer for every leaf that there may be."""
+        """Return one integer (n,) per leaf, unique over all levels."""
         shift = self.lattice.depth - leaves.level
         corner = self.lattice.key(leaves.cell[:, 0] << shift, leaves.cell[:, 1] << shift)
         return corner * (self.lattice.depth + 1) + leaves.level
@@ -150,7 +155,7 @@ class SplitTests:
     def _too_far(
         self, leaves: Leaves, pattern: Ints, which: Ints, error: float, creases: tuple[Floats, Floats]
     ) -> Bools:
-        """(k,) bool: from the triangles of which of the leaves ``which (k,)`` the surface is too far."""
+        """Return of which of the leaves ``which (k,)`` the surface is too far from the triangles, (k,) bool."""
         far = np.zeros(len(which), dtype=bool)
         for level in np.unique(leaves.level[which]):
             at = np.flatnonzero(leaves.level[which] == level)
@@ -159,11 +164,14 @@ class SplitTests:
             at = at[active := self._active(rect, cells, int(level))[0]]
             uv = chords.sample_places(rect[active], creases)
             side = inner_side(uv, uv[:, 12], self.domain)
-            far[at] = chords.measured_errors(self.surface, uv, side, pattern[which[at]]) > error
+            far[at] = chords.measure_errors(self.surface, uv, side, pattern[which[at]]) > error
         return far
 
     def _errors(self, level: int, cells: Ints) -> Floats:
-        """Greatest distance of the surface from the cell's chords, at edge middles and the centre; 0 if uncovered."""
+        """Return the greatest distance of the surface from each cell's chords; 0 if uncovered.
+
+        It is measured at edge middles and the centre, and at control points in the cell.
+        """
         shift = self.lattice.depth - level
         step = 1 << shift
         corner = cells << shift
@@ -184,9 +192,9 @@ class SplitTests:
         return worst
 
     def _add_anchors(self, level: int, cells: Ints, p: Floats, worst: Floats) -> None:
-        """Raise ``worst`` to how far the surface is from its cell near control points.
+        """Raise ``worst`` to the error of the cell near control points.
 
-        So a feature between the samples of a large cell is not overlooked: where there is detail there are points.
+        Thus features between the samples of a large cell are found: where there is detail, there are control points.
         """
         if self.anchors is None:
             self.anchors = _anchors(self.surface, self.domain)
@@ -205,7 +213,7 @@ class SplitTests:
 
 
 def _anchors(surface: ControlPoints, domain: Domain) -> tuple[Floats, Floats]:
-    """(k, 2) and (k, 3): the surface where the blending functions of its points are near their greatest."""
+    """Return the (u, v) near the maxima of the points' blending functions, (k, 2), and the surface there, (k, 3)."""
     knots, degrees = surface.padded, surface.degrees
     uv = np.zeros((surface.n, 2))
     for k in range(2):
@@ -221,7 +229,7 @@ def _anchors(surface: ControlPoints, domain: Domain) -> tuple[Floats, Floats]:
 
 
 def inner_side(uv: Floats, centre: Floats, domain: Domain) -> Ints:
-    """(n, k): limits that points of cells (n, k, 2) take so that they belong to their cell's side of every slit."""
+    """Return the limits (n, k) that points of cells (n, k, 2) take to belong to their cell's side of every slit."""
     side = np.zeros(uv.shape[:-1], dtype=np.int64)
     for slit in domain.slits:
         axis, bit = (1, 2) if slit.axis == "u" else (0, 1)
@@ -231,7 +239,7 @@ def inner_side(uv: Floats, centre: Floats, domain: Domain) -> Ints:
 
 
 def _chord_errors(p: Floats) -> Floats:
-    """(n,): distances for the nine points ``p (n, 9, 3)`` of cells, rows of three from the low corner up."""
+    """Return the chord errors (n,) of cells with nine points ``p (n, 9, 3)``, rows of three from the low corner."""
     worst = np.zeros(len(p))
     for a, middle, b in ((0, 1, 2), (0, 3, 6), (2, 5, 8), (6, 7, 8)):
         worst = np.fmax(worst, _off_line(p[:, a], p[:, middle], p[:, b]))
@@ -240,7 +248,7 @@ def _chord_errors(p: Floats) -> Floats:
 
 
 def _off_line(a: Floats, middle: Floats, b: Floats) -> Floats:
-    """Distance of ``middle`` from the line a-b."""
+    """Return the distance of ``middle`` from the line a-b."""
     along, offset = b - a, middle - a
     length = np.maximum((along * along).sum(axis=1), 1e-300)
     part = np.clip((offset * along).sum(axis=1) / length, 0, 1)

@@ -1,4 +1,4 @@
-"""Tessellation: watertight triangle meshes of a surface over a domain, by quad tree (paper, 2.3)."""
+"""Tessellate a surface over a domain into a watertight triangle mesh, by quad tree (section 2.3 of the paper)."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ from .quadtree import Lattice, Leaves
 from .splitting import Limits, SplitTests, inner_side
 from .trim import Flat, replace_vertices, trim
 
-MOST_ROOTS = 24  # along the longer side
-CHUNK = 1 << 17  # vertices that are evaluated between two reports of progress
+MAX_ROOTS = 24  # root cells along the longer side
+CHUNK_VERTICES = 1 << 17  # evaluated between two reports of progress
 
 
 def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: bool, progress: Progress) -> Mesh:
-    """See :meth:`surface.DCPSurface.tessellate`."""
+    """Do what :meth:`surface.DCPSurface.tessellate` says."""
     limits.check()
-    size = size_of(surface)
+    size = diagonal_of(surface)
     if limits.max_points is None and limits.chord_error is None:
         limits = limits._replace(chord_error=1e-3 * size)
-    scale = _lengths(surface, domain)
+    scale = _mean_scale(surface, domain)
     joined = surface.closed[0] == tuple(domain.rect[:2]), surface.closed[1] == tuple(domain.rect[2:])  # goes around
     lattice = _lattice(domain, scale, limits.max_depth, limits.roots, joined)
     tests = SplitTests(surface, domain, lattice, scale, limits)
@@ -46,8 +46,8 @@ def tessellate(surface: ControlPoints, domain: Domain, limits: Limits, flip: boo
     return _finish(surface, flat, domain, lattice, leaves, flip, part_of(progress, 0.6, 1.0))
 
 
-def _lengths(surface: ControlPoints, domain: Domain) -> tuple[float, float]:
-    """Mean length on the surface per unit of u and of v."""
+def _mean_scale(surface: ControlPoints, domain: Domain) -> tuple[float, float]:
+    """Return the mean length on the surface per unit of u and of v."""
     u0, u1, v0, v1 = domain.rect
     steps = (np.arange(24) + 0.5) / 24
     uv = np.stack(np.meshgrid(u0 + steps * (u1 - u0), v0 + steps * (v1 - v0)), axis=-1).reshape(-1, 2)
@@ -63,7 +63,10 @@ def _lengths(surface: ControlPoints, domain: Domain) -> tuple[float, float]:
 def _lattice(
     domain: Domain, scale: tuple[float, float], depth: int, roots: tuple[int, int] | None, joined: tuple[bool, bool]
 ) -> Lattice:
-    """Roots bordered by the rectangle and by the lines of all slits, roughly square on the surface."""
+    """Return root cells whose borders include those of the rectangle and the lines of all slits.
+
+    Cells are roughly square on the surface, unless ``roots`` gives their number along u and v.
+    """
     u0, u1, v0, v1 = domain.rect
     cuts: tuple[list[float], list[float]] = ([u0, u1], [v0, v1])
     for slit in domain.slits:
@@ -75,14 +78,14 @@ def _lattice(
         return Lattice(_divide(lines_u, (u1 - u0) / roots[0]), _divide(lines_v, (v1 - v0) / roots[1]), depth, joined)
     extent = (u1 - u0) * scale[0], (v1 - v0) * scale[1]
     least = min(float(np.diff(lines_u).min()) * scale[0], float(np.diff(lines_v).min()) * scale[1])
-    edge = max(min(*extent, 1.2 * least), max(extent) / MOST_ROOTS)
+    edge = max(min(*extent, 1.2 * least), max(extent) / MAX_ROOTS)
     # A ring of fewer than three cells would fold flat.
     edges = [min(edge, extent[k] / 3) if joined[k] else edge for k in range(2)]
     return Lattice(_divide(lines_u, edges[0] / scale[0]), _divide(lines_v, edges[1] / scale[1]), depth, joined)
 
 
 def _divide(borders: Floats, edge: float) -> Floats:
-    """Borders with equal parts of about ``edge`` put between them."""
+    """Return the borders with others between them, in equal steps of about ``edge``."""
     pieces = np.maximum(1, np.rint(np.diff(borders) / edge).astype(np.int64))
     parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(borders, borders[1:], pieces, strict=False)]
     return np.concatenate([*parts, borders[-1:]])
@@ -91,20 +94,20 @@ def _divide(borders: Floats, edge: float) -> Floats:
 def _finish(
     surface: ControlPoints, flat: Flat, domain: Domain, lattice: Lattice, leaves: Leaves, flip: bool, progress: Progress
 ) -> Mesh:
-    """Split vertices on slits, evaluate, drop uncovered triangles, order by cell, make the lists."""
+    """Split vertices on slits, evaluate, drop uncovered triangles, sort by cell, and list control points by cell."""
     flat, side = _open_slits(flat, domain)
-    code = _codes(flat, lattice, leaves)
-    place, out = _evaluated(surface, flat.uv, side, code, part_of(progress, 0.1, 0.7))
+    code = _vertex_codes(flat, lattice, leaves)
+    place, out = _evaluate(surface, flat.uv, side, code, part_of(progress, 0.1, 0.7))
     keep = (side >= 0)[flat.triangles].all(axis=1)
     if not keep.all():
         flat = Flat(flat.uv, flat.triangles[keep], flat.owner[keep])
-        code = _codes(flat, lattice, leaves)
-    flat = _without_poles(surface, flat, out[place, 0], domain)
-    code = _codes(flat, lattice, leaves)
+        code = _vertex_codes(flat, lattice, leaves)
+    flat = _drop_poles(surface, flat, out[place, 0], domain)
+    code = _vertex_codes(flat, lattice, leaves)
     if any(lattice.joined):
         flat = _weld(flat, side, domain, lattice.joined)
     progress("cells", 0.7)
-    order = _used_in_order(flat, code)
+    order = _sort_used(flat, code)
     code, out = code[order], out[place[order]]
     rank = np.zeros(len(flat.uv), dtype=np.int32)
     rank[order] = np.arange(len(order))
@@ -131,26 +134,28 @@ def _finish(
     )
 
 
-def size_of(surface: ControlPoints) -> float:
-    """The diagonal of the box around the control points; 1 where they are all in one place."""
+def diagonal_of(surface: ControlPoints) -> float:
+    """Return the diagonal of the control points' box; 1 if they are all in one place."""
     return float(np.linalg.norm(np.ptp(surface.points, axis=0))) or 1.0
 
 
-def _without_poles(surface: ControlPoints, flat: Flat, points: Floats, domain: Domain) -> Flat:
-    """Leave out triangles with an edge on a border of the rectangle that is a single point in space, as at the pole of
-    a sphere: they have no area. ``points`` (m, 3) are those of the vertices."""
-    kept, near = np.ones(len(flat.triangles), dtype=bool), 1e-9 * size_of(surface)
+def _drop_poles(surface: ControlPoints, flat: Flat, points: Floats, domain: Domain) -> Flat:
+    """Drop triangles without area at a pole, a border of the rectangle that is a single point in space.
+
+    ``points (m, 3)`` are the positions of the vertices.
+    """
+    kept, near = np.ones(len(flat.triangles), dtype=bool), 1e-9 * diagonal_of(surface)
     for number in range(4):
         on = (flat.uv[:, number // 2] == domain.rect[number])[flat.triangles]
-        at = np.concatenate([points[flat.triangles[on]], surface.sample(_along(domain, number), None)[2]])
+        at = np.concatenate([points[flat.triangles[on]], surface.sample(_border_samples(domain, number), None)[2]])
         if (np.ptp(at, axis=0) <= near).all():
             beyond = np.linalg.norm(points[flat.triangles] - at[0], axis=2).max(axis=1) > near
             kept &= (on.sum(axis=1) < 2) | ~beyond
     return flat if kept.all() else Flat(flat.uv, flat.triangles[kept], flat.owner[kept])
 
 
-def _along(domain: Domain, number: int) -> Floats:
-    """(33, 2) places along a border of the rectangle: 0 and 1 where u ends, 2 and 3 where v does."""
+def _border_samples(domain: Domain, number: int) -> Floats:
+    """Return (33, 2) samples along a border of the rectangle: 0 and 1 at the ends of u, 2 and 3 at those of v."""
     axis, low, high = number // 2, np.array(domain.rect[::2]), np.array(domain.rect[1::2])
     uv: Floats = low + np.linspace(0.0, 1.0, 33)[:, None] * (high - low)
     uv[:, axis] = domain.rect[number]
@@ -158,7 +163,7 @@ def _along(domain: Domain, number: int) -> Floats:
 
 
 def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
-    """Give the vertices on an open slit one copy per side; returns the limit each vertex takes."""
+    """Give vertices on an open slit one copy per side; return the triangulation and the limit each vertex takes."""
     if not domain.slits:
         return flat, np.zeros(len(flat.uv), dtype=np.int64)
     side = inner_side(flat.uv[flat.triangles], flat.uv[flat.triangles].mean(axis=1), domain)
@@ -166,16 +171,16 @@ def _open_slits(flat: Flat, domain: Domain) -> tuple[Flat, Ints]:
     return Flat(flat.uv[copies // 4], triangles, flat.owner), copies % 4
 
 
-def _evaluated(surface: ControlPoints, uv: Floats, side: Ints, code: Ints, progress: Progress) -> tuple[Ints, Floats]:
-    """S, S_u and S_v ``(m, 3, 3)``, neighbours after each other, and the index of each vertex in that.
+def _evaluate(surface: ControlPoints, uv: Floats, side: Ints, code: Ints, progress: Progress) -> tuple[Ints, Floats]:
+    """Evaluate in the order of codes; return the row of each vertex (m,), and rows of S, S_u and S_v (m, 3, 3).
 
-    ``side`` gets the limits that were taken.
+    The limits that were taken are written to ``side``; -1 where nothing covers a vertex.
     """
     order, out = np.argsort(code, kind="stable"), np.zeros((len(uv), 3, 3))
-    for first in range(0, len(order), CHUNK):
+    for first in range(0, len(order), CHUNK_VERTICES):
         progress("vertices", first / len(order))
-        part = order[first : first + CHUNK]
-        side[part], out[first : first + CHUNK] = surface.sample_derivatives(uv[part], side[part])
+        part = order[first : first + CHUNK_VERTICES]
+        side[part], out[first : first + CHUNK_VERTICES] = surface.sample_derivatives(uv[part], side[part])
     place = np.zeros(len(order), dtype=np.int64)
     place[order] = np.arange(len(order))
     return place, out
@@ -195,20 +200,20 @@ def _weld(flat: Flat, side: Ints, domain: Domain, joined: tuple[bool, bool]) -> 
     return replace_vertices(flat, target[target])  # the corner of a torus goes both ways
 
 
-def _codes(flat: Flat, lattice: Lattice, leaves: Leaves) -> Ints:
-    """(m,) code of the first leaf that uses a vertex; the greatest number for vertices that none uses."""
+def _vertex_codes(flat: Flat, lattice: Lattice, leaves: Leaves) -> Ints:
+    """Return the code (m,) of the first leaf that uses each vertex; the greatest integer for unused vertices."""
     shift = lattice.depth - leaves.level
     x, y = leaves.cell[:, 0] << shift, leaves.cell[:, 1] << shift
     unit = 1 << lattice.depth
     root = (y >> lattice.depth) * lattice.shape[0] + (x >> lattice.depth)
     leaf_code = (root << (2 * lattice.depth)) | blocks.morton(x % unit, y % unit)
     code = np.full(len(flat.uv), np.iinfo(np.int64).max)
-    blocks.least_codes(flat.triangles, flat.owner, leaf_code, code)
+    blocks.lower_codes(flat.triangles, flat.owner, leaf_code, code)
     return code
 
 
-def _used_in_order(flat: Flat, code: Ints) -> Ints:
-    """Used vertices, rising by code."""
+def _sort_used(flat: Flat, code: Ints) -> Ints:
+    """Return the used vertices, sorted by code."""
     used = np.zeros(len(flat.uv), dtype=bool)
     used[flat.triangles] = True
     order = np.argsort(code, kind="stable")
@@ -216,7 +221,7 @@ def _used_in_order(flat: Flat, code: Ints) -> Ints:
 
 
 def unit_normals(points: Floats, su: Floats, sv: Floats, triangles: np.ndarray) -> Floats:
-    """(m, 3) unit vectors along S_u x S_v; where that vanishes, the mean of the triangles around."""
+    """Return unit vectors (m, 3) along S_u x S_v; where that vanishes, the mean normal of the triangles around."""
     normal, bad = np.zeros(su.shape), np.zeros(len(su), dtype=np.bool_)
     blocks.unit_cross(su, sv, normal, bad)
     if bad.any():

@@ -14,47 +14,47 @@ from surface.base import keys
 from surface.base.arrays import Floats, Ints
 
 from . import flips, loops
-from .barycentric import fill_shares
+from .barycentric import fill_barycentric
 from .domain import Domain, Slit
 
-ROUNDS = 4  # a triangle at a sharp corner is split so many times at most
-ALONG = 0.5, 0.25, 0.75, 0.1, 0.9  # parts of an edge at which it is tested for running through the inside
-SNAP = 0.28  # share of the shortest edge at a vertex: a crossing nearer than this moves the vertex onto the loop
-LOCKED = -2
-FLAT = 1e-9  # area of a triangle without one, in squares of its sides
+MAX_SPLIT_ROUNDS = 4  # at a sharp corner or a mark
+EDGE_SAMPLES = 0.5, 0.25, 0.75, 0.1, 0.9  # fractions of an edge at which it is tested for being inside
+SNAP_FRACTION = 0.28  # of the shortest edge at a vertex: a crossing nearer than this moves the vertex onto the loop
+LOCKED = -2  # in place of the number of a line: the vertex must not move
+MAX_FLAT_AREA = 1e-9  # triangles of less than this count as flat; in squared lengths of two sides
 
 
 @dataclass
 class Flat:
-    """A triangulation of (u, v): vertices (m, 2), counter-clockwise triangles (t, 3), and their leaf cells (t,)."""
+    """A triangulation of (u, v): vertices (m, 2), and counter-clockwise triangles (t, 3)."""
 
     uv: Floats
     triangles: Ints
-    owner: Ints
+    owner: Ints  # (t,) the leaf cell of every triangle
 
 
 def trim(flat: Flat, domain: Domain, scale: tuple[float, float]) -> Flat:
-    """The part of a conforming triangulation of the rectangle inside the domain's loops.
+    """Return the part of a conforming triangulation of the rectangle that is inside the domain's loops.
 
     ``scale`` are lengths per unit of u and of v, so that "near" means near on the surface.
     """
-    flat = _near_or_inside(flat, domain)
+    flat = _drop_outside(flat, domain)
     if not len(flat.triangles):
         return flat
-    lines = _lines(flat.uv, domain)
+    lines = _sliding_lines(flat.uv, domain)
     fixed = np.zeros(len(flat.uv), dtype=bool)
     flat, lines, fixed = _place_corners(flat, domain, scale, lines, fixed)
     sign = np.where(domain.inside(flat.uv), 1, -1)
     sign[fixed] = 0
     _snap(flat, domain, scale, lines, sign)
-    flat, sign = _uncover(flat, domain, sign)
-    flat = _without_flat(_merged(_cut(_through_marks(flat, domain), domain, scale, sign)))
-    flips.improve(flat.uv * np.asarray(scale), flat.triangles, lines_of_edges(flat.uv, domain))
+    flat, sign = _split_crossing_edges(flat, domain, sign)
+    flat = _drop_flat_border(_merge_coincident(_cut(_split_at_marks(flat, domain), domain, scale, sign)))
+    flips.improve(flat.uv * np.asarray(scale), flat.triangles, slit_masks(flat.uv, domain))
     return compact(flat)
 
 
-def _merged(flat: Flat) -> Flat:
-    """Make one vertex of the ends of edges without length: a loop's point that two vertices were moved to."""
+def _merge_coincident(flat: Flat) -> Flat:
+    """Merge the ends of edges without length, which arise where two vertices were moved to one point of a loop."""
     edges = _edges(flat.triangles)
     edges = edges[(flat.uv[edges[:, 0]] == flat.uv[edges[:, 1]]).all(axis=1)]
     target = np.arange(len(flat.uv))
@@ -71,32 +71,35 @@ def replace_vertices(flat: Flat, target: Ints) -> Flat:
     return Flat(flat.uv, triangles[whole], flat.owner[whole])
 
 
-def _through_marks(flat: Flat, domain: Domain) -> Flat:
-    """Let edges run through marks that vertices have been moved beside: a triangle without area whose longest edge a
-    mark divides, and the one beyond that edge if there is one, become two that have the mark as a corner."""
+def _split_at_marks(flat: Flat, domain: Domain) -> Flat:
+    """Flip edges that run through a mark without having it as an end.
+
+    A vertex was moved there, so a triangle without area has the mark on its longest edge. It and the triangle across
+    that edge, if there is one, become two triangles with the mark as a corner.
+    """
     for mark in np.asarray(domain.marks):
         for vertex in np.flatnonzero((flat.uv == mark).all(axis=1)).tolist():
-            for _ in range(ROUNDS):
-                if (row := _flat_at(flat, vertex)) is not None:
-                    flat = _turned(flat, vertex, row)
+            for _ in range(MAX_SPLIT_ROUNDS):
+                if (row := _find_flat(flat, vertex)) is not None:
+                    flat = _flip_edge(flat, vertex, row)
     return flat
 
 
-def _flat_at(flat: Flat, vertex: int) -> int | None:
-    """A triangle without area that has ``vertex`` on its longest edge, if any."""
+def _find_flat(flat: Flat, vertex: int) -> int | None:
+    """Return a triangle without area that has ``vertex`` on its longest edge, or None."""
     rows = np.flatnonzero((flat.triangles == vertex).any(axis=1))
     others = flat.triangles[rows][flat.triangles[rows] != vertex].reshape(-1, 2)
     a, b = (flat.uv[others[:, k]] - flat.uv[vertex] for k in range(2))
     along = (a * b).sum(axis=1)
-    found = rows[(np.abs(_cross(a, b)) <= FLAT * (a**2 + b**2).sum(axis=1)) & (along < 0)]
+    found = rows[(np.abs(_cross(a, b)) <= MAX_FLAT_AREA * (a**2 + b**2).sum(axis=1)) & (along < 0)]
     return int(found[0]) if len(found) else None
 
 
-def _turned(flat: Flat, vertex: int, row: int) -> Flat:
-    """Without triangle ``row``, whose edge opposite to ``vertex`` is turned in the pair with the one beyond it."""
+def _flip_edge(flat: Flat, vertex: int, row: int) -> Flat:
+    """Flip the edge of triangle ``row`` opposite to ``vertex``; without a triangle across that edge, drop ``row``."""
     triangle = flat.triangles[row]
     p, q = np.roll(triangle, -int(np.argmax(triangle == vertex)))[1:].tolist()
-    beyond = _across(flat.triangles, p, q)
+    beyond = _find_across(flat.triangles, p, q)
     hit, added = [row], np.zeros((0, 3), np.int64)
     if beyond is not None:
         corner = int(flat.triangles[beyond].sum() - p - q)
@@ -105,8 +108,8 @@ def _turned(flat: Flat, vertex: int, row: int) -> Flat:
     return Flat(flat.uv, np.concatenate([np.delete(flat.triangles, hit, axis=0), added]), owner)
 
 
-def _without_flat(flat: Flat) -> Flat:
-    """Drop triangles without area that have two edges on the border: what they leave is the same domain."""
+def _drop_flat_border(flat: Flat) -> Flat:
+    """Drop triangles without area, or turned over, that have two edges on the border; the domain stays the same."""
     while True:
         a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
         _, _, back = keys.unique(flips.edge_keys(flat.triangles)[0])
@@ -124,26 +127,26 @@ def compact(flat: Flat) -> Flat:
     return Flat(flat.uv[used], (np.cumsum(used) - 1)[flat.triangles], flat.owner)
 
 
-def lines_of_edges(uv: Floats, domain: Domain) -> Ints:
-    """(m,) bit mask per vertex: which slits it is on. An edge lies on a slit if its ends share a bit."""
+def slit_masks(uv: Floats, domain: Domain) -> Ints:
+    """Return a bit mask (m,) of the slits that each vertex is on; an edge lies on a slit if its ends share a bit."""
     mask = np.zeros(len(uv), dtype=np.int64)
     for bit, slit in enumerate(domain.slits):
-        mask[slit.holds(uv) | _ends(slit, uv)] |= 1 << bit
+        mask[slit.holds(uv) | _are_ends(slit, uv)] |= 1 << bit
     return mask
 
 
-def _near_or_inside(flat: Flat, domain: Domain) -> Flat:
-    """Drop triangles with no corner inside: nothing of them is kept."""
+def _drop_outside(flat: Flat, domain: Domain) -> Flat:
+    """Drop triangles of which nothing is inside."""
     sign = np.where(domain.inside(flat.uv), 1, -1)
     keep = np.any(sign[flat.triangles] > 0, axis=1)
-    for a, b in _covered(flat, domain, sign)[0]:
-        keep[_beside(flat.triangles, a, b)] = True
+    for a, b in _find_crossing_edges(flat, domain, sign)[0]:
+        keep[_find_beside(flat.triangles, a, b)] = True
     # A corner of a loop may lie in a triangle whose own corners are all outside.
     low, high = flat.uv[flat.triangles].min(axis=1), flat.uv[flat.triangles].max(axis=1)
     for tip in _all_corners(domain, (1.0, 1.0)):
         around = np.flatnonzero(((low <= tip) & (tip <= high)).all(axis=1))
         own = Flat(flat.uv, flat.triangles[around], flat.owner[around])
-        keep[around] |= _weights_in(own, tip).min(axis=1, initial=np.inf) >= 0
+        keep[around] |= _barycentric(own, tip).min(axis=1, initial=np.inf) >= 0
     return compact(Flat(flat.uv, flat.triangles[keep], flat.owner[keep]))
 
 
@@ -152,29 +155,32 @@ def _all_corners(domain: Domain, scale: tuple[float, float]) -> Floats:
     return np.concatenate([*(ring[loops.corners(ring, scale)] for ring in rings), np.asarray(domain.marks)])
 
 
-def _lines(uv: Floats, domain: Domain) -> Ints:
-    """(m,) the slit or border each vertex may slide along, -1 for free ones, LOCKED where two meet or at an end."""
+def _sliding_lines(uv: Floats, domain: Domain) -> Ints:
+    """Return the line (m,), a slit or border, that each vertex may slide along.
+
+    -1 for free vertices, :data:`LOCKED` where two lines meet or at an end.
+    """
     line = np.full(len(uv), -1, dtype=np.int64)
     u0, u1, v0, v1 = domain.rect
     groups = [uv[:, 0] == u0, uv[:, 0] == u1, uv[:, 1] == v0, uv[:, 1] == v1]
-    groups += [(lines_of_edges(uv, domain) >> bit & 1).astype(bool) for bit in range(len(domain.slits))]
+    groups += [(slit_masks(uv, domain) >> bit & 1).astype(bool) for bit in range(len(domain.slits))]
     for index, on in enumerate(groups):
         line[on] = np.where(line[on] == -1, index, LOCKED)
     for slit in domain.slits:
-        line[_ends(slit, uv)] = LOCKED
+        line[_are_ends(slit, uv)] = LOCKED
     return line
 
 
-def _ends(slit: Slit, uv: Floats) -> np.ndarray:
-    """(m,) bool: which of ``uv (m, 2)`` are end points of a slit."""
+def _are_ends(slit: Slit, uv: Floats) -> np.ndarray:
+    """Return which of ``uv (m, 2)`` are end points of a slit, (m,) bool."""
     across, along = (uv[:, 1], uv[:, 0]) if slit.axis == "u" else (uv[:, 0], uv[:, 1])
     return np.asarray((across == slit.at) & ((along == slit.start) | (along == slit.end)))
 
 
-def _weights_in(flat: Flat, point: Floats) -> Floats:
-    """(t, 3): barycentric coordinates of a point in every triangle; -inf in those without area, which hold nothing."""
+def _barycentric(flat: Flat, point: Floats) -> Floats:
+    """Return barycentric coordinates (t, 3) of a point in every triangle; -inf in triangles without area."""
     shares = np.empty((len(flat.triangles), 3))
-    fill_shares(flat.uv, flat.triangles, point, shares)
+    fill_barycentric(flat.uv, flat.triangles, point, shares)
     return shares
 
 
@@ -185,31 +191,31 @@ def _cross(a: Floats, b: Floats) -> Floats:
 def _place_corners(
     flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, fixed: np.ndarray
 ) -> tuple[Flat, Ints, np.ndarray]:
-    """Put a vertex at every sharp corner and mark of a loop, and one where each of its sides leaves the corner's fan.
+    """Put a vertex at every sharp corner and mark of a loop, and where the loop leaves the triangles around a corner.
 
-    So the sides at a corner are edges of the mesh, and a wedge narrower than a triangle is not lost.
+    Thus the sides at a corner are edges of the mesh, and a wedge narrower than a triangle is not lost.
     """
     for mark in np.asarray(domain.marks):
-        flat, line, fixed = _place(flat, mark, line, fixed, slides=True)
+        flat, line, fixed = _place_vertex(flat, mark, line, fixed, slides=True)
     tips = _all_corners(domain, scale)
     for tip in tips:
-        flat, line, fixed = _place(flat, tip, line, fixed)
+        flat, line, fixed = _place_vertex(flat, tip, line, fixed)
     for tip in tips:
         at = np.flatnonzero((flat.uv == tip).all(axis=1) & fixed)
-        for point in _leaving(flat, domain, int(at[0])) if len(at) else ():
-            flat, line, fixed = _place(flat, point, line, fixed)
+        for point in _fan_crossings(flat, domain, int(at[0])) if len(at) else ():
+            flat, line, fixed = _place_vertex(flat, point, line, fixed)
     return flat, line, fixed
 
 
-def _place(
+def _place_vertex(
     flat: Flat, point: Floats, line: Ints, fixed: np.ndarray, *, slides: bool = False
 ) -> tuple[Flat, Ints, np.ndarray]:
     """Move a close free vertex to ``point``, or split a triangle there.
 
-    ``slides``: one of the rectangle's border, too, along it or where it is so close that the border bends by nothing.
+    ``slides`` : vertices on the rectangle's border may move, too: along the border, or if they are very close.
     """
     inside = np.empty((len(flat.triangles), 3))
-    triangle = int(fill_shares(flat.uv, flat.triangles, point, inside))
+    triangle = int(fill_barycentric(flat.uv, flat.triangles, point, inside))
     share = inside[triangle]
     if share.min() < -1e-9:
         return flat, line, fixed
@@ -225,8 +231,8 @@ def _place(
     return flat, line, fixed
 
 
-def _leaving(flat: Flat, domain: Domain, vertex: int) -> Floats:
-    """(k, 2): where loops cross the edges opposite to a vertex in the triangles around it."""
+def _fan_crossings(flat: Flat, domain: Domain, vertex: int) -> Floats:
+    """Return the points (k, 2) where loops cross edges opposite to a vertex in the triangles around it."""
     around = flat.triangles[(flat.triangles == vertex).any(axis=1)]
     opposite = around[around != vertex].reshape(-1, 2)
     a, b = flat.uv[opposite[:, 0]][:, None], flat.uv[opposite[:, 1]][:, None]
@@ -241,11 +247,11 @@ def _leaving(flat: Flat, domain: Domain, vertex: int) -> Floats:
 
 
 def _insert(flat: Flat, point: Floats, triangle: int, share: Floats) -> Flat:
-    """Split one triangle in three at ``point``, or the two beside an edge in four where it is close to that edge."""
+    """Split a triangle in three at ``point``, or, if that is close to an edge, the two beside the edge in four."""
     new, hit = len(flat.uv), [triangle]
     a, b, c = np.roll(flat.triangles[triangle], -int(np.argmin(share)))  # b-c is the nearest edge
     added = [(a, b, new), (a, new, c)]
-    beside = _across(flat.triangles, b, c) if share.min() < 0.15 else None
+    beside = _find_across(flat.triangles, b, c) if share.min() < 0.15 else None
     if beside is None:
         added.append((b, c, new))
     else:
@@ -253,17 +259,17 @@ def _insert(flat: Flat, point: Floats, triangle: int, share: Floats) -> Flat:
         hit.append(beside)
         added += [(d, c, new), (d, new, b)]
     owner = np.repeat(flat.owner[hit], len(added) // len(hit))
-    return _with_point(flat, point, np.array(hit), np.array(added), owner)
+    return _replace_triangles(flat, point, np.array(hit), np.array(added), owner)
 
 
-def _with_point(flat: Flat, point: Floats, hit: Ints, added: Ints, owner: Ints) -> Flat:
-    """Add a vertex, and triangles with their leaf cells in place of the ``hit`` ones."""
+def _replace_triangles(flat: Flat, point: Floats, hit: Ints, added: Ints, owner: Ints) -> Flat:
+    """Add a vertex, and replace the triangles ``hit`` by those ``added``, of leaf cells ``owner``."""
     triangles = np.concatenate([np.delete(flat.triangles, hit, axis=0), added])
     return Flat(np.vstack([flat.uv, point]), triangles, np.append(np.delete(flat.owner, hit), owner))
 
 
-def _across(triangles: Ints, b: int, c: int) -> int | None:
-    """The triangle that holds the directed edge c-b, if any."""
+def _find_across(triangles: Ints, b: int, c: int) -> int | None:
+    """Return the triangle that has the directed edge from c to b, or None."""
     corners = np.ascontiguousarray(triangles).reshape(-1)
     at = np.flatnonzero(corners == c)
     found = at[corners[at - at % 3 + (at + 1) % 3] == b] // 3
@@ -271,7 +277,7 @@ def _across(triangles: Ints, b: int, c: int) -> int | None:
 
 
 def _edges(triangles: Ints) -> Ints:
-    """(e, 2) undirected edges, each once, smaller index first."""
+    """Return the undirected edges (e, 2), each once, smaller index first."""
     key, width = flips.edge_keys(triangles)
     return np.stack(np.divmod(np.unique(key), width), axis=1)
 
@@ -285,38 +291,38 @@ def _snap(flat: Flat, domain: Domain, scale: tuple[float, float], line: Ints, si
     crossed = sign[edges[:, 0]] * sign[edges[:, 1]] < 0
     edges, length = edges[crossed], length[crossed]
     t = loops.crossings(domain.segments, flat.uv[edges[:, 0]], flat.uv[edges[:, 1]])
-    where = flat.uv[edges[:, 0]] + t[:, None] * (flat.uv[edges[:, 1]] - flat.uv[edges[:, 0]])
-    near = np.concatenate([t, 1 - t]) * np.concatenate([length, length])
+    crossing = flat.uv[edges[:, 0]] + t[:, None] * (flat.uv[edges[:, 1]] - flat.uv[edges[:, 0]])
+    distance = np.concatenate([t, 1 - t]) * np.concatenate([length, length])
     vertex, other = np.concatenate([edges[:, 0], edges[:, 1]]), np.concatenate([edges[:, 1], edges[:, 0]])
-    may = (line[vertex] == -1) | ((line[vertex] >= 0) & (line[vertex] == line[other]))
-    chosen = np.flatnonzero(may & (near < SNAP * shortest[vertex]))
-    chosen = chosen[np.argsort(-near[chosen], kind="stable")]  # the nearest crossing is written last
-    flat.uv[vertex[chosen]] = np.concatenate([where, where])[chosen]
+    may_move = (line[vertex] == -1) | ((line[vertex] >= 0) & (line[vertex] == line[other]))
+    chosen = np.flatnonzero(may_move & (distance < SNAP_FRACTION * shortest[vertex]))
+    chosen = chosen[np.argsort(-distance[chosen], kind="stable")]  # the nearest crossing is written last
+    flat.uv[vertex[chosen]] = np.concatenate([crossing, crossing])[chosen]
     sign[vertex[chosen]] = 0
 
 
-def _uncover(flat: Flat, domain: Domain, sign: Ints) -> tuple[Flat, Ints]:
-    """Split edges that run through the inside though neither end lies there, where they cross a loop.
+def _split_crossing_edges(flat: Flat, domain: Domain, sign: Ints) -> tuple[Flat, Ints]:
+    """Split edges that run through the inside although no end is inside, where they cross a loop.
 
-    At sharp corners such edges are left by vertices that were moved onto a loop; what lies beside them would be lost.
+    They arise at sharp corners when vertices are moved onto a loop. Unsplit, they would be dropped with what is inside.
     """
-    for _ in range(ROUNDS):
-        edges, within = _covered(flat, domain, sign)
+    for _ in range(MAX_SPLIT_ROUNDS):
+        edges, within = _find_crossing_edges(flat, domain, sign)
         if not len(edges):
             break
         outer = np.where(sign[edges[:, 0]] < 0, edges[:, 0], edges[:, 1])
         t = loops.crossings(domain.segments, within, flat.uv[outer])
         points = within + t[:, None] * (flat.uv[outer] - within)
         for (a, b), point in zip(edges, points, strict=True):
-            flat = _split(flat, int(a), int(b), point)
+            flat = _split_edge(flat, int(a), int(b), point)
         sign = np.append(sign, np.zeros(len(edges), sign.dtype))
     return flat, sign
 
 
-def _covered(flat: Flat, domain: Domain, sign: Ints) -> tuple[Ints, Floats]:
-    """Edges (e, 2) without an end inside, one outside, that run through the inside; and a point of each in there.
+def _find_crossing_edges(flat: Flat, domain: Domain, sign: Ints) -> tuple[Ints, Floats]:
+    """Return edges (e, 2) that run through the inside, with no end inside and one outside, and an inner point of each.
 
-    Edges of triangles that moved vertices turned over are left alone: halves of those would be kept upside down.
+    Edges of triangles that moved vertices turned over are left out: halves of those would be kept upside down.
     """
     a, b, c = (flat.uv[flat.triangles[:, k]] for k in range(3))
     turned = _edges(flat.triangles[_cross(b - a, c - a) <= 0])
@@ -324,26 +330,26 @@ def _covered(flat: Flat, domain: Domain, sign: Ints) -> tuple[Ints, Floats]:
     edges = edges[~np.isin(edges @ [len(flat.uv), 1], turned @ [len(flat.uv), 1])]
     edges = edges[(sign[edges].max(axis=1) <= 0) & (sign[edges].min(axis=1) < 0)]
     a, b = flat.uv[edges[:, 0]], flat.uv[edges[:, 1]]
-    tried = np.stack([a + t * (b - a) for t in ALONG])
-    inside = domain.inside(tried.reshape(-1, 2)).reshape(len(ALONG), -1)
+    tried = np.stack([a + t * (b - a) for t in EDGE_SAMPLES])
+    inside = domain.inside(tried.reshape(-1, 2)).reshape(len(EDGE_SAMPLES), -1)
     hit = np.flatnonzero(inside.any(axis=0))
     return edges[hit], tried[inside[:, hit].argmax(axis=0), hit]
 
 
-def _split(flat: Flat, a: int, b: int, point: Floats) -> Flat:
-    """Put a vertex on the edge a-b, for the triangles on both its sides."""
-    beside = _beside(flat.triangles, a, b)
+def _split_edge(flat: Flat, a: int, b: int, point: Floats) -> Flat:
+    """Put a vertex on the edge a-b, and split the triangles beside it."""
+    beside = _find_beside(flat.triangles, a, b)
     halves = [np.where(flat.triangles[beside] == end, len(flat.uv), flat.triangles[beside]) for end in (a, b)]
-    return _with_point(flat, point, beside, np.concatenate(halves), np.tile(flat.owner[beside], 2))
+    return _replace_triangles(flat, point, beside, np.concatenate(halves), np.tile(flat.owner[beside], 2))
 
 
-def _beside(triangles: Ints, a: int, b: int) -> Ints:
-    """The triangles that have an edge, in whichever direction."""
+def _find_beside(triangles: Ints, a: int, b: int) -> Ints:
+    """Return the triangles that have an edge, in either direction."""
     return np.flatnonzero(((triangles == a) | (triangles == b)).sum(axis=1) == 2)
 
 
 def _cut(flat: Flat, domain: Domain, scale: tuple[float, float], sign: Ints) -> Flat:
-    """Keep inner triangles, drop outer ones, clip crossed ones."""
+    """Keep triangles inside, drop those outside, and clip those that a loop crosses."""
     signs = sign[flat.triangles]
     low, high = signs.min(axis=1), signs.max(axis=1)
     keep = (low >= 0) & (high > 0)
@@ -359,7 +365,7 @@ def _cut(flat: Flat, domain: Domain, scale: tuple[float, float], sign: Ints) -> 
 def _clip(
     flat: Flat, domain: Domain, scale: tuple[float, float], sign: Ints, crossed: Ints
 ) -> tuple[Floats, Ints, Ints]:
-    """Vertices with the cut ones appended, triangles of the clipped cells, and the triangle each came from."""
+    """Return the vertices and those on cut edges, the triangles of clipped cells, and the triangle each came from."""
     triangles = flat.triangles[crossed]
     width = len(flat.uv)
     pairs = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 3, 2), axis=2)
@@ -379,7 +385,7 @@ def _clip(
 
 
 def _assemble(tri: Ints, edge: Ints, s: Ints, xy: Floats, crossed: Ints) -> tuple[Ints, Ints]:
-    """Triangles of the inner parts by case of corner signs; see :func:`_clip`."""
+    """Return the triangles of the inner parts by the signs of the corners; see :func:`_clip`."""
     tip = s[:, 0] > 0  # one positive, two negative
     left = (s[:, 0] < 0) & (s[:, 1] > 0) & (s[:, 2] == 0)
     right = (s[:, 0] < 0) & (s[:, 1] == 0) & (s[:, 2] > 0)

@@ -31,7 +31,7 @@ SUFFIXES = tuple(_READERS)
 
 
 def read_surface(path: str | os.PathLike[str], leave_out: LeaveOut | None = None) -> list[NamedSurface]:
-    """All surfaces of a file, at least one.
+    """Return all surfaces of a file, at least one.
 
     path : its suffix chooses the format: one of :data:`SUFFIXES`
     leave_out : is called with the error of each object or face of a .3dm file that cannot be read, and the rest is

@@ -34,7 +34,7 @@ class Ties:
 
     @classmethod
     def of(cls, rows: Sequence[Mapping[int, float]], points: Mapping[int, Floats]) -> Ties:
-        """From shares by the file's number of each control point, and the file's points by number."""
+        """Make ties from each control point's shares by the file's number, and the file's points by number."""
         column = {number: k for k, number in enumerate(sorted(points))}
         every = [(k, column[number], share) for k, row in enumerate(rows) for number, share in row.items()]
         at, of, shares = zip(*every, strict=True)
@@ -42,7 +42,7 @@ class Ties:
         return cls(np.array(at), np.array(of), np.array(shares), len(rows), own)
 
     def apply(self, values: Floats) -> Floats:
-        """(n, c) values of the control points for those of the file's points (m, c)."""
+        """Return (n, c): values of the control points for those of the file's points (m, c)."""
         out = np.zeros((self.count, values.shape[1]))
         np.add.at(out, self.row, self.share[:, None] * values[self.column])
         return out
@@ -69,7 +69,7 @@ class NamedSurface:
 
 
 def summary(item: NamedSurface) -> str:
-    """One line that describes a surface: control points, degrees, domain, trim loops and slits."""
+    """Return one line that describes a surface: control points, degrees, domain, trim loops and slits."""
     surface, domain = item.surface, item.domain
     degrees = " x ".join("/".join(map(str, np.unique(p))) for p in surface.degrees)
     u0, u1, v0, v1 = surface.rect if domain is None else domain.rect
@@ -90,21 +90,21 @@ class Location:
     where: str = ""
 
     def at(self, where: str) -> Location:
-        """Another place in the same file."""
+        """Return another place in the same file."""
         return Location(self.path, where)
 
     def child(self, where: str) -> Location:
-        """A place inside this one: ``where`` is appended."""
+        """Return a place inside this one: ``where`` is appended."""
         return Location(self.path, self.where + where)
 
     def error(self, why: str, *, hint: str = "") -> SurfaceFileError:
-        """The error to raise for this place."""
+        """Return the error to raise for this place."""
         place = f"{self.path}, {self.where}" if self.where else str(self.path)
         return SurfaceFileError(f"{place}: {why}", hint=hint or "export the file again, or take it from a copy")
 
 
 def read_text(path: Path, errors: str = "strict") -> str:
-    """A file's content as UTF-8; ``SurfaceFileError`` where it cannot be read."""
+    """Return a file's content as UTF-8; ``SurfaceFileError`` where it cannot be read."""
     data = read_bytes(path, TEXT_LIMIT)
     try:
         return decode(data) if errors == "strict" else data.decode("utf-8-sig", errors)
@@ -113,6 +113,6 @@ def read_text(path: Path, errors: str = "strict") -> str:
 
 
 def read_bytes(path: Path, limit: int = DATA_LIMIT) -> bytes:
-    """A file's content; ``SurfaceFileError`` where it cannot be read."""
+    """Return a file's content; ``SurfaceFileError`` where it cannot be read."""
     with reading(path, SurfaceFileError):
         return read_file(path, limit)

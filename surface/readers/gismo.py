@@ -28,10 +28,10 @@ from .common import Location, NamedSurface, read_text
 from .thb import Hierarchy, Level, dyadic_refinement
 
 KINDS = ("TensorBSpline2", "TensorNurbs2", "HBSpline2", "THBSpline2")
-MOST_LEVELS = 16
-MOST_CELLS = 1 << 24
-MOST_FUNCTIONS = 1 << 14  # along one direction, where a file only says how many
-LARGEST = 1e100  # of knots: their products stay finite
+MAX_LEVELS = 16
+MAX_CELLS = 1 << 24
+MAX_FUNCTIONS = 1 << 14  # along one direction, where a file only says how many
+MAX_KNOT = 1e100  # of knots: their products stay finite
 CLOSE = 1e-14  # of the range of the knots
 
 
@@ -41,31 +41,31 @@ class Element(ElementTree.Element):
     location: Location
 
     def children(self, tag: str) -> list[Element]:
-        """Children with that tag."""
+        """Return children with that tag."""
         return cast(list[Element], self.findall(tag))
 
     def first(self, tag: str) -> Element:
-        """The first child with that tag; there must be one."""
+        """Return the first child with that tag; there must be one."""
         found = self.children(tag)
         if not found:
             raise self.location.error(f"has no <{tag}>")
         return found[0]
 
     def required(self, name: str) -> str:
-        """An attribute that must be there."""
+        """Return an attribute that must be there."""
         if name not in self.attrib:
             raise self.location.error(f'has no attribute "{name}"')
         return self.attrib[name]
 
     def integer(self, name: str, low: int, high: int) -> int:
-        """A whole number in an attribute, ``low`` to ``high``."""
+        """Return a whole number in an attribute, ``low`` to ``high``."""
         text = self.required(name)
         if not text.strip().isdecimal() or not low <= int(text) <= high:
             raise self.location.error(f'{name}="{text}" must be a whole number from {low} to {high}')
         return int(text)
 
     def numbers(self, count: int | None = None) -> Floats:
-        """(k,) finite numbers of the text, ``count`` of them if given."""
+        """Return (k,): finite numbers of the text, ``count`` of them if given."""
         if self.get("format", "ascii").lower() != "ascii":
             raise self.location.error(f'format="{self.get("format")}" is not read', hint="write it as ASCII")
         words = "".join([self.text or "", *(child.tail or "" for child in self)]).split()
@@ -81,7 +81,7 @@ class Element(ElementTree.Element):
 
 
 def read(path: Path) -> list[NamedSurface]:
-    """The surfaces of a file; ``SurfaceFileError`` names line and element."""
+    """Return the surfaces of a file; ``SurfaceFileError`` names line and element."""
     root = parse_xml(Location(path), read_text(path))
     if root.tag != "xml":
         raise root.location.error("is no G+Smo file: its root must be <xml>")
@@ -89,7 +89,7 @@ def read(path: Path) -> list[NamedSurface]:
 
 
 def parse_xml(file: Location, text: str) -> Element:
-    """The root element; ``SurfaceFileError`` with the line where the text is not XML."""
+    """Return the root element; ``SurfaceFileError`` with the line where the text is not XML."""
     parser = expat.ParserCreate()
     body = text.lstrip()  # G+Smo writes lines before the declaration, which XML forbids
     skipped = text[: len(text) - len(body)].count("\n")
@@ -142,7 +142,7 @@ def _surface(element: Element, number: int) -> NamedSurface:
 
 
 def _level(element: Element) -> Level:
-    """A tensor-product basis."""
+    """Return a tensor-product basis."""
     sides = element.children("Basis")
     if len(sides) != 2:
         raise element.location.error(f"has {len(sides)} directions, a surface has 2")
@@ -159,17 +159,17 @@ def _refuse_periodic(element: Element) -> None:
 
 
 def _knots(element: Element) -> tuple[int, Floats]:
-    """Degree and knot vector."""
+    """Return degree and knot vector."""
     _refuse_periodic(element)
     p = element.integer("degree", 0, MAX_DEGREE)
     if element.get("mode") == "uniform":
-        count = element.integer("csize", p + 1, MOST_FUNCTIONS)
+        count = element.integer("csize", p + 1, MAX_FUNCTIONS)
         return p, np.concatenate([[0.0] * p, np.linspace(0, 1, count - p + 1), [1.0] * p])
     knots = element.numbers()
     if len(knots) < 2 * p + 2:
         raise element.location.error(f"holds {len(knots)} knots, degree {p} needs {2 * p + 2} at least")
-    if (np.abs(knots) > LARGEST).any():
-        raise element.location.error(f"holds knots beyond {LARGEST:g}")
+    if (np.abs(knots) > MAX_KNOT).any():
+        raise element.location.error(f"holds knots beyond {MAX_KNOT:g}")
     steps = np.diff(knots)
     if (steps < 0).any():
         k = int(np.argmax(steps < 0)) + 1
@@ -185,7 +185,7 @@ def _knots(element: Element) -> tuple[int, Floats]:
 
 
 def _coefficients(element: Element, count: int) -> Floats:
-    """(count, 3) float64."""
+    """Return (count, 3): float64."""
     coefs = element.first("coefs")
     dimension = coefs.integer("geoDim", 1, 9)
     if dimension not in (2, 3):
@@ -210,7 +210,7 @@ def _tensor(element: Element, level: Level, weights: Element | None) -> DCPSurfa
 
 def _hierarchical(element: Element, basis: Element, kind: str) -> tuple[DCPSurface, Level]:
     boxes = basis.children("box")
-    levels = _levels(basis, max((box.integer("level", 0, MOST_LEVELS) for box in boxes), default=0))
+    levels = _levels(basis, max((box.integer("level", 0, MAX_LEVELS) for box in boxes), default=0))
     hierarchy = Hierarchy(levels, _depth(boxes, levels))
     coefficients = _coefficients(element, len(hierarchy.active))
     if kind == "HBSpline2":
@@ -219,7 +219,7 @@ def _hierarchical(element: Element, basis: Element, kind: str) -> tuple[DCPSurfa
 
 
 def _levels(basis: Element, finest: int) -> list[Level]:
-    """Levels 0 to ``finest``, each nested in the next."""
+    """Return levels 0 to ``finest``, each nested in the next."""
     given = basis.children("Basis")
     levels = [_level(basis.first("Basis"))]
     if basis.get("manualLevels", "false").lower() == "true":
@@ -231,8 +231,8 @@ def _levels(basis: Element, finest: int) -> list[Level]:
     while len(levels) <= finest:
         levels.append(dyadic_refinement(levels[-1]))
         nu, nv = levels[-1].shape
-        if nu * nv > MOST_CELLS:
-            raise basis.location.error(f"its finest level has {nu} x {nv} functions, more than {MOST_CELLS}")
+        if nu * nv > MAX_CELLS:
+            raise basis.location.error(f"its finest level has {nu} x {nv} functions, more than {MAX_CELLS}")
     return levels[: finest + 1]
 
 
@@ -246,11 +246,11 @@ def _check_nested(element: Element, coarse: Level, fine: Level) -> None:
 
 
 def _depth(boxes: list[Element], levels: list[Level]) -> Ints:
-    """(a, b): the level of every cell of the finest level's knot lines."""
+    """Return (a, b): the level of every cell of the finest level's knot lines."""
     lines = [np.unique(t) for t in levels[-1].knots]
     depth = np.zeros([len(x) - 1 for x in lines], dtype=np.int64)
     for box in boxes:
-        number = box.integer("level", 0, MOST_LEVELS)
+        number = box.integer("level", 0, MAX_LEVELS)
         corners = [int(x) for x in box.numbers(4)]
         slices = []
         for axis in range(2):

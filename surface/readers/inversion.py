@@ -7,14 +7,15 @@ import numpy as np
 from surface.base.arrays import Bools, Floats, Ints
 from surface.dcp import DCPSurface
 
-STARTS, MOST_STARTS = 48, 360  # samples along u and v where a search may begin: evenly, and three in each knot span
+STARTS = 48  # even samples along u and v where a search may begin; three in each knot span are added
+MAX_STARTS = 360  # samples along u and v
 ITERATIONS = 40
-AT_ONCE = 4_000_000  # distances compared in one step: 32 MB
+BATCH_DISTANCES = 4_000_000  # distances compared in one step: 32 MB
 GOOD = 1e-9  # of the surface's size: nearer points need no second search
 
 
 def invert(surface: DCPSurface, points: Floats) -> tuple[Floats, Floats]:
-    """The nearest (u, v) of points near the surface.
+    """Return the nearest (u, v) of points near the surface.
 
     Gauss-Newton steps from the nearest of a grid of samples; points that are not met exactly are searched for again
     from the nearest sample in each quarter of the rectangle, since the nearest of all may lie on another fold.
@@ -53,7 +54,7 @@ def search_between(surface: DCPSurface, points: Floats, uv: Floats, distance: Fl
 
 
 def _grid(surface: DCPSurface) -> Floats:
-    """(s, 2) even samples of the rectangle, and three in each knot span."""
+    """Return (s, 2): even samples of the rectangle, and three in each knot span."""
     u0, u1, v0, v1 = surface.rect
     axes = [_stations(k, a, b) for k, a, b in zip(surface.padded, (u0, v0), (u1, v1), strict=True)]
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -63,13 +64,13 @@ def _stations(knots: Floats, start: float, end: float) -> Floats:
     lines = np.unique(np.append(knots, [start, end]))
     lines = lines[(lines >= start) & (lines <= end)]
     within = (lines[:-1, None] + np.diff(lines)[:, None] * np.array([1, 3, 5]) / 6).ravel()
-    if len(within) > MOST_STARTS:
-        within = within[np.linspace(0, len(within) - 1, MOST_STARTS).astype(int)]
+    if len(within) > MAX_STARTS:
+        within = within[np.linspace(0, len(within) - 1, MAX_STARTS).astype(int)]
     return np.unique(np.concatenate([np.linspace(start, end, STARTS), within]))
 
 
 def _quarters(surface: DCPSurface, grid: Floats) -> list[Ints]:
-    """Samples of each quarter of the rectangle that has any."""
+    """Return samples of each quarter of the rectangle that has any."""
     u0, u1, v0, v1 = surface.rect
     high = grid > [(u0 + u1) / 2, (v0 + v1) / 2]
     label = high[:, 0] + 2 * high[:, 1]
@@ -77,17 +78,17 @@ def _quarters(surface: DCPSurface, grid: Floats) -> list[Ints]:
 
 
 def _nearest(samples: Floats, points: Floats) -> Ints:
-    """(k,) which sample (s, 3) is nearest to each point (k, 3)."""
+    """Return (k,): which sample (s, 3) is nearest to each point (k, 3)."""
     middle = samples.mean(axis=0)
     s, p = samples - middle, points - middle
     length = (s * s).sum(axis=1)
-    step = max(1, AT_ONCE // max(len(s), 1))
+    step = max(1, BATCH_DISTANCES // max(len(s), 1))
     parts = [np.argmin(length - 2 * p[k : k + step] @ s.T, axis=1) for k in range(0, len(p), step)]
     return np.concatenate(parts) if parts else np.zeros(0, np.int64)
 
 
 def _gauss_newton(surface: DCPSurface, points: Floats, starts: Floats) -> tuple[Floats, Floats]:
-    """Gauss-Newton steps that stay in the rectangle, shortened where they lead away; (u, v) and distances."""
+    """Return Gauss-Newton steps that stay in the rectangle, shortened where they lead away; (u, v) and distances."""
     u0, u1, v0, v1 = surface.rect
     low, high = np.array([u0, v0]), np.array([u1, v1])
     uv, moving = starts.copy(), np.arange(len(starts))
@@ -107,7 +108,7 @@ def _gauss_newton(surface: DCPSurface, points: Floats, starts: Floats) -> tuple[
 
 
 def _step(surface: DCPSurface, points: Floats, uv: Floats) -> Floats:
-    """(k, 2) the Gauss-Newton step of each point."""
+    """Return (k, 2): the Gauss-Newton step of each point."""
     s, su, sv = surface.derivatives(uv)
     r = points - s
     a, b, c = (su * su).sum(1), (su * sv).sum(1), (sv * sv).sum(1)

@@ -13,8 +13,8 @@ from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT, read_file, reading
 
 PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}  # by their first bytes
-MOST_VERTICES = 400_000
-MOST_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
+MAX_VERTICES = 400_000
+MAX_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Material:
     image_of_uv: tuple[tuple[float, float, float], tuple[float, float, float]] = ((1.0, 0.0, 0.0), (0.0, -1.0, 1.0))
 
     def in_picture(self, uv: Floats) -> Floats:
-        """Places (t, 2) of texture coordinates (t, 2) in the texture: 0..1 to the right, 0..1 down."""
+        """Return places (t, 2) of texture coordinates (t, 2) in the texture: 0..1 to the right, 0..1 down."""
         matrix = np.array(self.image_of_uv)
         out: Floats = uv @ matrix[:, :2].T + matrix[:, 2]
         return out
@@ -81,12 +81,12 @@ class MeshData:
 
 
 def linear(srgb: Floats) -> Floats:
-    """Linear intensities of sRGB ones, 0..1 (IEC 61966-2-1)."""
+    """Return linear intensities of sRGB ones, 0..1 (IEC 61966-2-1)."""
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def kind_of_picture(data: bytes) -> str:
-    """The MIME type of a picture by its first bytes; "" for one that is not PNG, JPEG or WebP."""
+    """Return the MIME type of a picture by its first bytes; "" for one that is not PNG, JPEG or WebP."""
     return next((kind for start, kind in PICTURES.items() if data.startswith(start)), "")
 
 
@@ -95,15 +95,15 @@ def check_size(where: str, vertices: int, shapes: int) -> None:
 
     Raises FitError: naming the file and the number that is too large.
     """
-    if vertices > MOST_VERTICES:
-        raise FitError(f"{where}: {vertices} vertices; {MOST_VERTICES} are the most", hint="decimate the mesh first")
-    if vertices * shapes > MOST_MOVES:
+    if vertices > MAX_VERTICES:
+        raise FitError(f"{where}: {vertices} vertices; {MAX_VERTICES} are the most", hint="decimate the mesh first")
+    if vertices * shapes > MAX_MOVES:
         raise FitError(f"{where}: {shapes} shapes of {vertices} vertices are too many",
                        hint="leave out shapes that are not ARKit's, or decimate the mesh")  # fmt: skip
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a file that is not too large. Raises FitError: missing, unreadable or too large."""
+    """Return the content of a file that is not too large. Raises FitError: missing, unreadable or too large."""
     if not os.path.exists(path):
         raise FitError(f"{path}: no such mesh file", hint="give the path of a .glb, .gltf, .vrm, .obj or .npz mesh")
     with reading(path, FitError):

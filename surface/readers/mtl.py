@@ -15,7 +15,7 @@ from surface.readers.meshdata import Material, kind_of_picture, read_bytes
 
 
 def read_mtl(folder: Path, names: str) -> dict[str, Material]:
-    """Materials by name, of the file or files that a line ``mtllib`` names; none where they cannot be read."""
+    """Return materials by name, of the file or files that a line ``mtllib`` names; none where they cannot be read."""
     out: dict[str, dict[str, Any]] = {}
     one = _lines(folder, names)
     for text in one if one is not None else [t for n in names.split() for t in _lines(folder, n) or []]:
@@ -28,21 +28,23 @@ def read_mtl(folder: Path, names: str) -> dict[str, Material]:
 
 
 def picture_beside(folder: Path, name: str) -> tuple[bytes | None, str]:
-    """A PNG, JPEG or WebP file in the folder, and its MIME type; None and "" where there is none of that name."""
+    """Return a PNG, JPEG or WebP file in the folder, and its MIME type; None and "" where there is none of that
+    name.
+    """
     data = _data(folder, name)
     mime = kind_of_picture(data or b"")
     return (data, mime) if mime else (None, "")
 
 
-def _beside(folder: Path, name: str) -> Path | None:
-    """The path of a file in the folder or below it; None for any other."""
+def _path_beside(folder: Path, name: str) -> Path | None:
+    """Return the path of a file in the folder or below it; None for any other."""
     relative = Path(name.replace("\\", "/"))
     inside = name and "\0" not in name and not relative.is_absolute() and ".." not in relative.parts
     return folder / relative if inside else None
 
 
 def _data(folder: Path, name: str) -> bytes | None:
-    path = _beside(folder, name)
+    path = _path_beside(folder, name)
     try:
         return read_bytes(path) if path is not None and path.is_file() else None
     except (FitError, OSError, ValueError):
@@ -70,7 +72,7 @@ def _take(row: dict[str, Any], word: str, rest: str) -> None:
 
 
 def _material(folder: Path, name: str, row: dict[str, Any]) -> Material:
-    """A material; a texture replaces the colour, which many programs write as grey beside it."""
+    """Return a material; a texture replaces the colour, which many programs write as grey beside it."""
     data = _data(folder, row.get("texture", "")) or _data(folder, (row.get("texture", "").split() or [""])[-1])
     mime = kind_of_picture(data or b"")
     r, g, b = (1.0, 1.0, 1.0) if mime else row.get("colour", (1.0, 1.0, 1.0))

@@ -21,7 +21,7 @@ MAPPED = ("uv", "face_uv")
 
 
 def read_npz(path: Path) -> MeshData:
-    """A mesh in this layout; its indices are checked later, with those of all other meshes.
+    """Return a mesh in this layout; its indices are checked later, with those of all other meshes.
 
     Raises FitError: the file is missing or damaged, lacks a key, or holds an array of another kind or shape.
     """

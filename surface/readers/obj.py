@@ -14,12 +14,12 @@ from surface.readers.mtl import read_mtl
 
 Corner = tuple[int, int]
 Lines = list[tuple[int, bytes]]
-MOST_INDEX = 2**31 - 1
+MAX_INDEX = 2**31 - 1
 NEUTRAL = ("neutral", "basis", "base", "rest")
 
 
 def read_obj(path: Path, shapes: Path | None = None) -> MeshData:
-    """An OBJ file and its shapes.
+    """Return an OBJ file and its shapes.
 
     path : the neutral face; or a folder with neutral.obj (or basis, base, rest) and one OBJ a shape.
     shapes : folder with one OBJ a shape, named as the shape is; if None, FOLDER/NAME_shapes beside FOLDER/NAME.obj.
@@ -80,7 +80,7 @@ class _Parser:
         self._library = ""
 
     def _error(self, line: int, why: str) -> FitError:
-        """The error for a line, counted from 1."""
+        """Return the error for a line, counted from 1."""
         return FitError(f"{self.path}, line {line}: {why}", hint="export the file again")
 
     def read(self, *, only_points: bool = False) -> None:
@@ -106,7 +106,7 @@ class _Parser:
                 material = rest.strip().decode("utf-8", "replace")
 
     def points(self, lines: Lines, word: str, width: int = 3) -> Floats:
-        """(n, width) numbers of the lines; further numbers of a line (weights, colours) are ignored."""
+        """Return (n, width): numbers of the lines; further numbers of a line (weights, colours) are ignored."""
         out = np.zeros((len(lines), width))
         for row, (number, text) in enumerate(lines):
             try:
@@ -120,8 +120,8 @@ class _Parser:
         return out
 
     def colours(self) -> Floats | None:
-        """(n, 3) linear RGB of vertices, where every one has three numbers from 0 to 1 behind its place, as ZBrush and
-        MeshLab write them (sRGB); None elsewhere."""
+        """Return (n, 3): linear RGB of vertices, where every one has three numbers from 0 to 1 behind its place, as
+        ZBrush and MeshLab write them (sRGB); None elsewhere."""
         rows = [text.split() for _, text in self.vertices]
         if not rows or any(len(row) not in (6, 7) for row in rows):
             return None
@@ -144,7 +144,7 @@ class _Parser:
         self._piece += [self._pieces.setdefault(piece, len(self._pieces))] * len(parts)
 
     def _corner(self, number: int, text: bytes) -> Corner:
-        """Vertex and texture coordinate, counted from 0; -1 for no texture coordinate."""
+        """Return the vertex and texture coordinate, counted from 0; -1 for no texture coordinate."""
         words = text.split(b"/")
         try:
             vertex, texture = int(words[0]), int(words[1]) if len(words) > 1 and words[1] else 0
@@ -152,14 +152,14 @@ class _Parser:
             raise self._error(number, f"{text[:20].decode('utf-8', 'replace')!r} is no corner of a face") from e
         v = vertex - 1 if vertex > 0 else len(self.vertices) + vertex
         t = texture - 1 if texture >= 0 else len(self._textures) + texture
-        if max(v, t) > MOST_INDEX:
+        if max(v, t) > MAX_INDEX:
             raise self._error(number, f"corner {text[:40].decode('utf-8', 'replace')} points beyond the last vertex")
         if vertex == 0 or v < 0 or t < -1:
             raise self._error(number, f"corner {text.decode('utf-8', 'replace')} points before the first vertex")
         return v, t
 
     def mesh(self, vertices: Floats, names: tuple[str, ...], deltas: Floats) -> MeshData:
-        """The parsed faces and texture coordinates with these vertices and shapes."""
+        """Return the parsed faces and texture coordinates with these vertices and shapes."""
         filled = np.full((len(self._faces), 4, 2), -1, np.int64)
         for row, corners in enumerate(self._faces):
             filled[row, : len(corners)] = corners

@@ -35,7 +35,7 @@ from surface.mesh.domain import Domain, Slit
 from .common import Location, NamedSurface, read_text
 
 FORMAT, VERSION = "omote surface", 1
-LARGEST = sys.float_info.max
+MAX_NUMBER = sys.float_info.max
 
 
 def is_plain(path: Path) -> bool:
@@ -48,7 +48,7 @@ def is_plain(path: Path) -> bool:
 
 
 def read(path: Path) -> list[NamedSurface]:
-    """The surfaces of a file; ``SurfaceFileError`` names line or element."""
+    """Return the surfaces of a file; ``SurfaceFileError`` names line or element."""
     file = Location(path)
     table = _parse(file, read_text(path))
     if not isinstance(table, dict) or table.get("format") != FORMAT:
@@ -71,7 +71,7 @@ def _parse(file: Location, text: str) -> Any:
 
 
 def _surface(here: Location, row: Any) -> NamedSurface:
-    """One entry of "surfaces"."""
+    """Return one entry of "surfaces"."""
     if not isinstance(row, dict):
         raise here.error(f"must be a table, not {row!r:.40}")
     points = [_point(here.child(f".points[{i}]"), point) for i, point in enumerate(_list(here, row, "points"))]
@@ -86,7 +86,7 @@ def _surface(here: Location, row: Any) -> NamedSurface:
 
 
 def _point(here: Location, point: Any) -> tuple[list[float], float, list[float], list[float]]:
-    """Position, weight and both knot vectors of one control point."""
+    """Return the position, weight and both knot vectors of one control point."""
     if not isinstance(point, dict):
         raise here.error(f"must be a table, not {point!r:.40}")
     missing = [key for key in ("position", "knots_u", "knots_v") if key not in point]
@@ -138,9 +138,9 @@ def _items(here: Location, value: Any) -> list[Any]:
 
 
 def _numbers(here: Location, value: Any, count: int | None = None) -> list[float]:
-    """A list of finite numbers, ``count`` of them if given."""
+    """Return a list of finite numbers, ``count`` of them if given."""
     row = _items(here, value)
-    good = all(isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) <= LARGEST for x in row)
+    good = all(isinstance(x, (int, float)) and not isinstance(x, bool) and abs(x) <= MAX_NUMBER for x in row)
     if not good or (count is not None and len(row) != count):
         raise here.error(f"must be {count or 'degree + 2'} finite numbers, not {value!r:.60}")
     return [float(x) for x in row]

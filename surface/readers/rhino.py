@@ -28,7 +28,7 @@ from .common import LeaveOut, Location, NamedSurface, read_bytes
 from .trimloops import TrimEdge, loop_over, polyline
 
 PATIENCE_S, BYTES_PER_S = 0.7, 20e6  # of processor time, and how much more for large files
-MOST_BYTES, GROWTH = 300_000_000, 40  # of memory, and how much more for each byte of the file, which may be compressed
+MAX_BYTES, GROWTH = 300_000_000, 40  # of memory, and how much more for each byte of the file, which may be compressed
 TRIAL = """
 import sys, rhino3dm
 try:
@@ -43,7 +43,7 @@ CHORD_ERROR = 1e-4  # of the face's size: chords of a trim loop from the edge
 
 
 def read(path: Path, leave_out: LeaveOut | None = None) -> list[NamedSurface]:
-    """The surfaces of a file; ``SurfaceFileError`` names the object, ``MissingPackage`` the package rhino3dm.
+    """Return the surfaces of a file; ``SurfaceFileError`` names the object, ``MissingPackage`` the package rhino3dm.
 
     leave_out : takes the error of each object or face that cannot be read; without it the first is raised.
     """
@@ -75,7 +75,7 @@ def _is_readable(data: bytes) -> bool:
     processor time and memory.
     """
     seconds = PATIENCE_S + len(data) / BYTES_PER_S
-    command = [sys.executable, "-P", "-c", TRIAL, str(seconds), str(MOST_BYTES + GROWTH * len(data))]
+    command = [sys.executable, "-P", "-c", TRIAL, str(seconds), str(MAX_BYTES + GROWTH * len(data))]
     try:
         trial = subprocess.run(command, input=data, capture_output=True, timeout=30 * seconds, check=False)
     except subprocess.TimeoutExpired:
@@ -84,7 +84,7 @@ def _is_readable(data: bytes) -> bool:
 
 
 def _object(here: Location, rhino3dm: Any, shape: Any, name: str, skip: LeaveOut) -> list[NamedSurface]:
-    """The surfaces of one object; none for curves, points and meshes."""
+    """Return the surfaces of one object; none for curves, points and meshes."""
     if type(shape).__name__ == "SubD":
         raise here.error("is a subdivision surface, which is no DCP surface", hint="convert it to NURBS in Rhino")
     if isinstance(shape, rhino3dm.Extrusion):
@@ -97,7 +97,7 @@ def _object(here: Location, rhino3dm: Any, shape: Any, name: str, skip: LeaveOut
 
 
 def _faces(here: Location, brep: Any, name: str, skip: LeaveOut) -> list[NamedSurface]:
-    """The faces of a polysurface, but those that ``skip`` takes the error of."""
+    """Return the faces of a polysurface, but those that ``skip`` takes the error of."""
     out, count = [], len(brep.Faces)
     for k in range(count):
         title = name if count == 1 else f"{name} face {k}"
@@ -109,7 +109,7 @@ def _faces(here: Location, brep: Any, name: str, skip: LeaveOut) -> list[NamedSu
 
 
 def _nurbs(here: Location, shape: Any) -> tuple[DCPSurface, Domain | None]:
-    """A surface of openNURBS, and its domain if that is less than its points reach."""
+    """Return a surface of openNURBS, and its domain if that is less than its points reach."""
     if not shape.IsValid or (form := shape.ToNurbsSurface()) is None:
         raise here.error("is not valid, or has no NURBS form", hint="repair it in Rhino: _SelBadObjects")
     count = form.Points.CountU, form.Points.CountV
@@ -144,7 +144,7 @@ def _nurbs(here: Location, shape: Any) -> tuple[DCPSurface, Domain | None]:
 
 
 def _full_knots(degree: int, inner: list[float], *, periodic: bool) -> Floats:
-    """One direction's knots with the first and last one, which openNURBS omits.
+    """Return one direction's knots with the first and last one, which openNURBS omits.
 
     In a closed direction they are those that a whole turn further on, or back, the file has. In others nothing inside
     the domain depends on them.
@@ -159,7 +159,7 @@ def _full_knots(degree: int, inner: list[float], *, periodic: bool) -> Floats:
 
 
 def _face(here: Location, brep: Any, face: Any) -> tuple[DCPSurface, Domain | None]:
-    """A face's surface, trimmed where the face is."""
+    """Return a face's surface, trimmed where the face is."""
     surface, domain = _nurbs(here, face.UnderlyingSurface())
     rect = domain.rect if domain is not None else surface.rect
     alone = face.DuplicateFace(False)  # openNURBS says of whole polysurfaces only whether they are untrimmed
@@ -184,7 +184,7 @@ def _face(here: Location, brep: Any, face: Any) -> tuple[DCPSurface, Domain | No
 
 
 def _edges(brep: Any, loop: Any, error: float) -> list[TrimEdge]:
-    """The edges of a loop as it runs, in points whose chords deviate from them by less than ``error``."""
+    """Return the edges of a loop as it runs, in points whose chords deviate from them by less than ``error``."""
     out = []
     for k in range(loop.TrimCount):
         trim = loop.Trims[k]

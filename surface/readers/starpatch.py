@@ -48,14 +48,17 @@ class Patch:
     shares: Floats
 
     def deviation(self, sampled: Sampled, points: Floats) -> float:
-        """Greatest distance of the patch from the limit surface at the samples; grips lie at points (g, 3)."""
+        """Return the greatest distance of the patch from the limit surface at the samples; grips lie at points (g,
+        3).
+        """
         basis = _basis(np.linspace(0.0, 1.0, COUNT))
         at = np.einsum("ia,jb,abg->ijg", basis, basis, self.shares) @ points
         return float(np.linalg.norm(at - sampled.limit @ points, axis=-1).max())
 
 
 def limit_samples(mesh: Complex, face: int, along: Along) -> Sampled:
-    """Samples of one face; ``along`` gives shares at places along a link, where the face that it borders is regular."""
+    """Return samples of one face; ``along`` gives shares at places along a link, where the face that it borders is
+    regular."""
     layout = Layout(mesh, face, 0)
     rect = layout.rects[face]
     size = rect[1] - rect[0], rect[3] - rect[2]
@@ -66,11 +69,11 @@ def limit_samples(mesh: Complex, face: int, along: Along) -> Sampled:
     order = list(dict.fromkeys([*grips.values(), *extra]))
     column = {grip: k for k, grip in enumerate(order)}
     limit = _limit(loops, {v: column[g] for v, g in grips.items()}, corners, len(order))
-    return Sampled(order, size, limit, _corrected(limit, [_rows(side, column) for side in sides]))
+    return Sampled(order, size, limit, _correct_sides(limit, [_rows(side, column) for side in sides]))
 
 
 def _rows(side: list[dict[int, float]] | None, column: dict[int, int]) -> Floats | None:
-    """(COUNT, g) shares along a side."""
+    """Return (COUNT, g): shares along a side."""
     if side is None:
         return None
     out = np.zeros((len(side), len(column)))
@@ -81,7 +84,8 @@ def _rows(side: list[dict[int, float]] | None, column: dict[int, int]) -> Floats
 
 
 def _sides(mesh: Complex, face: int, along: Along) -> list[list[dict[int, float]] | None]:
-    """Shares along the four sides, each in the order of the face's links; None beside another star face or nothing.
+    """Return shares along the four sides, each in the order of the face's links; None beside another star face or
+    nothing.
 
     Sides of several links, at T-junctions, are taken link by link.
     """
@@ -112,7 +116,7 @@ def _side(mesh: Complex, way: list[int], along: Along) -> list[dict[int, float]]
 
 
 def _around(mesh: Complex, face: int) -> tuple[list[list[int]], dict[int, int]]:
-    """Vertices around each face near one, that one first; and the own grip of each of these vertices."""
+    """Return vertices around each face near one, that one first; and the own grip of each of these vertices."""
     links = mesh.file.links
     by_vertex: dict[int, set[int]] = {}
     for number, loop in mesh.loops.items():
@@ -127,7 +131,7 @@ def _around(mesh: Complex, face: int) -> tuple[list[list[int]], dict[int, int]]:
 
 
 def _limit(loops: list[list[int]], grips: dict[int, int], corners: dict[int, Floats], width: int) -> Floats:
-    """(COUNT, COUNT, width) shares of grips at the first face's lattice, on the limit surface."""
+    """Return (COUNT, COUNT, width): shares of grips at the first face's lattice, on the limit surface."""
     order = {v: k for k, v in enumerate(dict.fromkeys(v for loop in loops for v in loop))}
     shares, places = np.zeros((len(order), width)), np.full((len(order), 2), np.nan)
     for vertex, k in order.items():
@@ -136,19 +140,19 @@ def _limit(loops: list[list[int]], grips: dict[int, int], corners: dict[int, Flo
             places[k] = corners[vertex]
     faces = [[order[v] for v in loop] for loop in loops]
     for _ in range(LEVELS):
-        faces, shares, places = _subdivided(faces, shares, places)
-    shares = _on_limit(faces, shares)
+        faces, shares, places = _subdivide(faces, shares, places)
+    shares = _project_to_limit(faces, shares)
     out = np.full((COUNT, COUNT, width), np.nan)
     for k in np.flatnonzero(np.isfinite(places[:, 0])).tolist():
         i, j = np.rint(places[k] * (COUNT - 1)).astype(int)
         if np.abs(places[k] * (COUNT - 1) - (i, j)).max() < 1e-6:
             out[i, j] = shares[k]
-    return _filled(out)
+    return _fill(out)
 
 
-def _filled(lattice: Floats) -> Floats:
-    """A lattice in which places without samples, as at T-junctions, are interpolated along their row and column; where
-    neither has samples on both sides, the nearest sample counts."""
+def _fill(lattice: Floats) -> Floats:
+    """Return a lattice in which places without samples, as at T-junctions, are interpolated along their row and column;
+    where neither has samples on both sides, the nearest sample counts."""
     known = np.isfinite(lattice[..., 0])
     if known.all():
         return lattice
@@ -173,7 +177,7 @@ def _filled(lattice: Floats) -> Floats:
 
 
 def _neighbours(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
-    """Faces by their edges."""
+    """Return faces by their edges."""
     edges: dict[tuple[int, int], list[int]] = {}
     for k, face in enumerate(faces):
         for a, b in zip(face, face[1:] + face[:1], strict=True):
@@ -181,8 +185,9 @@ def _neighbours(faces: list[list[int]]) -> dict[tuple[int, int], list[int]]:
     return edges
 
 
-def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list[list[int]], Floats, Floats]:
-    """One step of Catmull and Clark's subdivision on rows (n, w); places are means, which is right on one face only."""
+def _subdivide(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list[list[int]], Floats, Floats]:
+    """Return one step of Catmull and Clark's subdivision on rows (n, w); places are means, which is right on one face
+    only."""
     edges, n = _neighbours(faces), len(x)
     centres = np.array([x[face].mean(axis=0) for face in faces])
     number = {edge: n + k for k, edge in enumerate(edges)}
@@ -190,7 +195,7 @@ def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list
         [0.5 * (x[a] + x[b]) if len(own) == 1 else 0.25 * (x[a] + x[b]) + 0.5 * centres[own].mean(axis=0)
          for (a, b), own in edges.items()]
     )  # fmt: skip
-    corners = _smoothed(faces, edges, centres, x)
+    corners = _smooth(faces, edges, centres, x)
     first = n + len(edges)
     quads = []
     for k, face in enumerate(faces):
@@ -202,10 +207,10 @@ def _subdivided(faces: list[list[int]], x: Floats, places: Floats) -> tuple[list
     return quads, np.concatenate([corners, middles, centres]), np.concatenate([places, between, inside])
 
 
-def _smoothed(
+def _smooth(
     faces: list[list[int]], edges: dict[tuple[int, int], list[int]], centres: Floats, x: Floats
 ) -> Floats:  # fmt: skip
-    """New places of the old vertices."""
+    """Return new places of the old vertices."""
     valence, free = np.zeros(len(x)), np.zeros(len(x))
     around, middle, border = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
     for (a, b), own in edges.items():
@@ -226,8 +231,8 @@ def _smoothed(
     return smoothed
 
 
-def _on_limit(faces: list[list[int]], x: Floats) -> Floats:
-    """Vertices of quads moved to the limit surface (Halstead, Kass and DeRose 1993)."""
+def _project_to_limit(faces: list[list[int]], x: Floats) -> Floats:
+    """Return vertices of quads moved to the limit surface (Halstead, Kass and DeRose 1993)."""
     edges = _neighbours(faces)
     valence, free = np.zeros(len(x)), np.zeros(len(x))
     beside, across, border = np.zeros_like(x), np.zeros_like(x), np.zeros_like(x)
@@ -250,8 +255,8 @@ def _on_limit(faces: list[list[int]], x: Floats) -> Floats:
     return moved
 
 
-def _corrected(limit: Floats, sides: list[Floats | None]) -> Floats:
-    """The lattice moved by a Coons patch so that its sides are the exact ones where these are known.
+def _correct_sides(limit: Floats, sides: list[Floats | None]) -> Floats:
+    """Return the lattice moved by a Coons patch so that its sides are the exact ones where these are known.
 
     sides : (COUNT, g) from (0, 0) on: v = 0 along u, u = 1 along v, v = 1 back along u, u = 0 back along v.
     """
@@ -272,28 +277,28 @@ def _corrected(limit: Floats, sides: list[Floats | None]) -> Floats:
 
 
 def _corner(after: Floats | None, before: Floats | None) -> Floats:
-    """What is missing at a corner between two sides; nothing where neither is known."""
+    """Return what is missing at a corner between two sides; nothing where neither is known."""
     known = [row for row in (None if after is None else after[0], None if before is None else before[-1])
              if row is not None]  # fmt: skip
     return np.mean(known, axis=0) if known else np.zeros(1)
 
 
 def _basis(t: Floats) -> Floats:
-    """(m, SPANS + 3) cubic B-splines over 0 to 1 with clamped ends."""
+    """Return (m, SPANS + 3): cubic B-splines over 0 to 1 with clamped ends."""
     knots = np.concatenate([[0.0] * 3, np.linspace(0.0, 1.0, SPANS + 1), [1.0] * 3])
     inside = np.minimum(t, 1.0 - 1e-15)
     return np.stack([blending(knots[i : i + 5], inside) for i in range(SPANS + 3)], axis=1)
 
 
 def fit_patch(sampled: Sampled) -> Patch:
-    """The bicubic patch nearest to the samples whose corners and sides depend on those of the samples only."""
-    fit = _fitting()
+    """Return the bicubic patch nearest to the samples whose corners and sides depend on those of the samples only."""
+    fit = _fitting_matrix()
     shares: Floats = np.einsum("ai,bj,ijg->abg", fit, fit, sampled.wanted)
     return Patch(shares)
 
 
-def _fitting() -> Floats:
-    """(SPANS + 3, COUNT): control points of the cubic spline nearest to samples, through the first and last."""
+def _fitting_matrix() -> Floats:
+    """Return (SPANS + 3, COUNT): control points of the cubic spline nearest to samples, through the first and last."""
     basis = _basis(np.linspace(0.0, 1.0, COUNT))
     inner = np.linalg.pinv(basis[1:-1, 1:-1])
     ends = np.zeros((2, COUNT))

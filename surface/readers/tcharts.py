@@ -47,7 +47,7 @@ class Boxes:
 
 
 def overlaps(rects: Floats, rect: Floats, near: float) -> Bools:
-    """Which of ``rects (k, 4)`` share more than a border with ``rect (4,)``: as :func:`.tlayout.overlap`."""
+    """Return which of ``rects (k, 4)`` share more than a border with ``rect (4,)``: as :func:`.tlayout.overlap`."""
     u0, u1, v0, v1 = rects.T
     shared: Bools = (u0 < rect[1] - near) & (rect[0] < u1 - near) & (v0 < rect[3] - near) & (rect[2] < v1 - near)
     return shared
@@ -92,7 +92,7 @@ class Chart:
 
 
 def read_complex(file: TsmFile, name: str) -> NamedSurface:
-    """The surface of a T-mesh of any form; ``SurfaceFileError`` names the line."""
+    """Return the surface of a T-mesh of any form; ``SurfaceFileError`` names the line."""
     mean = float(np.mean(list(file.edges.values())))
     if mean < 1.0:  # charts are distinguished by absolute distances; their size has no meaning
         file.edges = {edge: length / mean for edge, length in file.edges.items()}
@@ -100,11 +100,11 @@ def read_complex(file: TsmFile, name: str) -> NamedSurface:
     layouts = {face: Layout(mesh, face) for face in mesh.loops if not mesh.is_star(face)}
     charts = _charts(mesh, layouts)
     points = {grip: np.array(row[:3]) for grip, (_, row) in file.grips.items()}
-    return _assembled(mesh, charts, points, name)
+    return _assemble(mesh, charts, points, name)
 
 
 def _charts(mesh: Complex, layouts: dict[int, Layout]) -> list[Chart]:
-    """Regular faces in charts, each as large as it can get from where it begins."""
+    """Return regular faces in charts, each as large as it can get from where it begins."""
     seen = {face: layout.copies(face) for face, layout in layouts.items()}
     charts, left = [], set(seen)
     while left:
@@ -127,7 +127,7 @@ def _charts(mesh: Complex, layouts: dict[int, Layout]) -> list[Chart]:
 
 
 def _moved_rect(rect: Rect, place: tuple[float, float, int]) -> Rect:
-    """A face's rectangle in its chart."""
+    """Return a face's rectangle in its chart."""
     corners = np.array([[rect[0], rect[2]], [rect[1], rect[3]]])
     du, dv, quarter = place
     for _ in range(quarter % 4):
@@ -139,7 +139,7 @@ def _moved_rect(rect: Rect, place: tuple[float, float, int]) -> Rect:
 def _neighbours(
     mesh: Complex, layouts: dict[int, Layout], face: int, place: tuple[float, float, int]
 ) -> list[tuple[int, tuple[float, float, int]]]:
-    """Regular faces beside a face, and where they would lie in its chart."""
+    """Return regular faces beside a face, and where they would lie in its chart."""
     layout, out = layouts[face], []
     for number in mesh.loops[face]:
         opposite = mesh.file.links[number].opposite
@@ -164,7 +164,7 @@ def _turned(at: Floats, quarter: int) -> Floats:
 
 
 def _surface_of(chart: Chart, points: dict[int, Floats], weights: dict[int, float]) -> DCPSurface:
-    """The chart's control points alone."""
+    """Return the chart's control points alone."""
     copies = list(chart.copies.values())
     return DCPSurface(
         [points[c.grip] for c in copies], [weights[c.grip] for c in copies], [c.knots_u for c in copies],
@@ -184,7 +184,7 @@ class _Exact:
         self._layouts: dict[int, Layout] = {}
 
     def along(self, link: int, count: int) -> list[dict[int, float]] | None:
-        """Shares of grips at ``count`` places along a link, from its vertex on, where its face is regular."""
+        """Return shares of grips at ``count`` places along a link, from its vertex on, where its face is regular."""
         face = self._mesh.file.links[link].face
         if face not in self._of:
             return None
@@ -208,8 +208,8 @@ class _Exact:
         return out
 
 
-def _assembled(mesh: Complex, charts: list[Chart], points: dict[int, Floats], name: str) -> NamedSurface:
-    """All charts and patches in one plane."""
+def _assemble(mesh: Complex, charts: list[Chart], points: dict[int, Floats], name: str) -> NamedSurface:
+    """Return all charts and patches in one plane."""
     sheet = _Sheet(mesh)
     exact = _Exact(mesh, charts, points)
     for chart in charts:
@@ -218,7 +218,7 @@ def _assembled(mesh: Complex, charts: list[Chart], points: dict[int, Floats], na
     for face in (f for f in mesh.loops if mesh.is_star(f)):
         sampled = limit_samples(mesh, face, exact.along)
         deviation = max(deviation, sheet.add_patch(face, sampled, points))
-    return sheet.finished(points, name, deviation)
+    return sheet.finish(points, name, deviation)
 
 
 class _Sheet:
@@ -243,7 +243,7 @@ class _Sheet:
             self._sides[number] = self._count, ends + np.array(place[:2]) + shift
 
     def _place(self, knots_u: list[Floats], knots_v: list[Floats]) -> Floats:
-        """(2,) how far control points are moved so that they lie beside all before."""
+        """Return (2,): how far control points are moved so that they lie beside all before."""
         low = min(float(k[0]) for k in knots_u)
         shift = np.array([self._next - low, -min(float(k[0]) for k in knots_v)])
         self._next += max(float(k[-1]) for k in knots_u) - low + self._gap
@@ -263,7 +263,7 @@ class _Sheet:
         self._count += 1
 
     def add_patch(self, face: int, sampled: Sampled, points: dict[int, Floats]) -> float:
-        """A face at a star point; returns how far it is from what it was fitted to."""
+        """Add a patch for a face at a star point; return the greatest distance from the samples it was fitted to."""
         patch = fit_patch(sampled)
         width, height = sampled.size
         lines = [np.concatenate([[0.0] * 3, np.linspace(0.0, x, SPANS + 1), [x] * 3]) for x in (width, height)]
@@ -279,8 +279,8 @@ class _Sheet:
         self._count += 1
         return patch.deviation(sampled, np.array([points[g] for g in sampled.grips]))
 
-    def finished(self, points: dict[int, Floats], name: str, deviation: float) -> NamedSurface:
-        """The surface."""
+    def finish(self, points: dict[int, Floats], name: str, deviation: float) -> NamedSurface:
+        """Return the surface."""
         ties = Ties.of(self._ties, points)
         surface = DCPSurface(ties.apply(ties.points), self._weights, *self._knots)
         every = np.concatenate(self._loops)
@@ -291,7 +291,8 @@ class _Sheet:
 
 
 def find_seams(mesh: Complex, sides: Mapping[int, tuple[int, Floats]]) -> list[tuple[Floats, Floats]]:
-    """Where borders of charts are one line in space, see :class:`.common.NamedSurface`; the first chart comes first.
+    """Return where borders of charts are one line in space, see :class:`.common.NamedSurface`; the first chart comes
+    first.
 
     sides : by link, the number of its chart and its start and end (2, 2) there.
     """
@@ -317,13 +318,13 @@ def find_seams(mesh: Complex, sides: Mapping[int, tuple[int, Floats]]) -> list[t
 
 
 def _key(mesh: Complex, *places: Floats) -> tuple[float, ...]:
-    """Equal for places (2,) that differ by rounding only."""
+    """Return a key that is equal for places (2,) that differ by rounding only."""
     return tuple(round(x / (10.0 * mesh.near)) for place in places for x in place.tolist())
 
 
 def find_corners(mesh: Complex, sides: Mapping[int, tuple[int, Floats]]) -> list[tuple[Floats, Floats]]:
-    """The places where three borders of charts or more are one point in space, as seams of no length: all follow the
-    first chart's, whatever seams along their sides have made of them before."""
+    """Return the places where three borders of charts or more are one point in space, as seams of no length: all follow
+    the first chart's, whatever seams along their sides have made of them before."""
     around: dict[int, dict[tuple[float, ...], tuple[int, Floats]]] = {}
     for link, (chart, line) in sides.items():
         here = around.setdefault(mesh.file.links[link].vertex, {})
@@ -336,7 +337,7 @@ def find_corners(mesh: Complex, sides: Mapping[int, tuple[int, Floats]]) -> list
 
 
 def outlines(rects: list[Rect], near: float) -> list[Floats]:
-    """Closed polylines (k, 2) around a union of rectangles that do not overlap, by walking along its border."""
+    """Return closed polylines (k, 2) around a union of rectangles that do not overlap, by walking along its border."""
     values = [_distinct([r[k] for r in rects for k in pair], near) for pair in ((0, 1), (2, 3))]
     sides: set[tuple[tuple[int, int], tuple[int, int]]] = set()
     for rect in rects:
@@ -358,7 +359,7 @@ def _distinct(values: list[float], near: float) -> Floats:
 
 
 def _rings(sides: set[tuple[tuple[int, int], tuple[int, int]]]) -> list[list[tuple[int, int]]]:
-    """Closed walks along directed sides; where two meet in a corner, the one that turns left most is taken."""
+    """Return closed walks along directed sides; where two meet in a corner, the one that turns left most is taken."""
     out = []
     while sides:
         a, b = min(sides)
@@ -376,12 +377,12 @@ def _rings(sides: set[tuple[tuple[int, int], tuple[int, int]]]) -> list[list[tup
 
 
 def _left(a: Floats, b: Floats) -> float:
-    """How far a step b turns left after a step a: -pi to pi."""
+    """Return how far a step b turns left after a step a: -pi to pi."""
     return float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
 
 
 def _corners(ring: Floats) -> Floats:
-    """A ring without points on straight lines."""
+    """Return a ring without points on straight lines."""
     before, after = ring - np.roll(ring, 1, axis=0), np.roll(ring, -1, axis=0) - ring
     bends: Floats = ring[np.abs(before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]) > 0]
     return bends

@@ -36,18 +36,18 @@ class Level:
         return nu, nv
 
     def local_knots(self, axis: int, index: int) -> Floats:
-        """The degree + 2 knots of a function."""
+        """Return the degree + 2 knots of a function."""
         return self.knots[axis][index : index + self.degrees[axis] + 2]
 
 
 def dyadic_refinement(level: Level) -> Level:
-    """The next level of a dyadic hierarchy: one more knot in the middle of every span."""
+    """Return the next level of a dyadic hierarchy: one more knot in the middle of every span."""
     u, v = (np.sort(np.append(t, (np.unique(t)[1:] + np.unique(t)[:-1]) / 2)) for t in level.knots)
     return Level(level.degrees, (u, v))
 
 
 def knot_insertion(coarse: Floats, fine: Floats, degree: int) -> Floats:
-    """Coefficients of coarse B-splines in finer ones.
+    """Return coefficients of coarse B-splines in finer ones.
 
     coarse, fine : knots; the fine ones hold all coarse ones
 
@@ -65,7 +65,7 @@ def knot_insertion(coarse: Floats, fine: Floats, degree: int) -> Floats:
 
 
 def _ratio(part: Floats, whole: Floats) -> Floats:
-    """part / whole, 0 where whole is 0."""
+    """Return part / whole, 0 where whole is 0."""
     return np.where(whole > 0, part / np.where(whole > 0, whole, 1.0), 0.0)
 
 
@@ -100,7 +100,7 @@ class Hierarchy:
         self.active = np.array(active, dtype=np.int64).reshape(-1, 3)
 
     def _support(self, number: int, i: int, j: int) -> Ints:
-        """Levels of the cells in the support of a function."""
+        """Return levels of the cells in the support of a function."""
         slices = []
         for axis, index in enumerate((i, j)):
             knots = self.levels[number].local_knots(axis, index)
@@ -108,12 +108,12 @@ class Hierarchy:
         return self.depth[slices[0], slices[1]]
 
     def _coarsest(self, number: int, i: int, j: int) -> int:
-        """The least level in the support of a function; -1 for an empty support."""
+        """Return the least level in the support of a function; -1 for an empty support."""
         cells = self._support(number, i, j)
         return int(cells.min()) if cells.size else -1
 
     def to_truncated(self, coefficients: Floats) -> Floats:
-        """Coefficients for the truncated basis that give what ``coefficients (n, 3)`` give for the plain one.
+        """Return coefficients for the truncated basis that give what ``coefficients (n, 3)`` give for the plain one.
 
         They are those of the sum so far in each level's own basis (Giannelli, Jüttler and Speleers 2014,
         preservation of coefficients).
@@ -131,7 +131,7 @@ class Hierarchy:
         return out
 
     def control_points(self, coefficients: Floats) -> tuple[Floats, Floats, list[Floats], list[Floats]]:
-        """DCPs of the surface with ``coefficients (n, 3)`` over the truncated basis.
+        """Return DCPs of the surface with ``coefficients (n, 3)`` over the truncated basis.
 
         Returns points (m, 3), weights (m,), and m knot vectors for u and for v.
         """
@@ -173,6 +173,6 @@ class Hierarchy:
         return self._truncated[key]
 
     def _children(self, number: int, i: int, j: int) -> list[tuple[int, int]]:
-        """The next level's functions that a function is a sum of."""
+        """Return the next level's functions that a function is a sum of."""
         u, v = self._insertions[number]
         return list(product(u[i].nonzero()[0].tolist(), v[j].nonzero()[0].tolist()))

@@ -36,7 +36,7 @@ class Copy:
     knots_v: Knots
 
     def moved(self, du: float, dv: float, quarter: int) -> Copy:
-        """The same, turned by quarters of a turn anticlockwise about (0, 0), then moved."""
+        """Return the same, turned by quarters of a turn anticlockwise about (0, 0), then moved."""
         u, v = self.knots_u, self.knots_v
         for _ in range(quarter % 4):
             u, v = tuple(-x for x in reversed(v)), u
@@ -48,7 +48,7 @@ class Copy:
         return self.knots_u[0], self.knots_u[-1], self.knots_v[0], self.knots_v[-1]
 
     def key(self, near: float) -> tuple[int, ...]:
-        """Equal for copies that differ by rounding only."""
+        """Return a key that is equal for copies that differ by rounding only."""
         return (self.grip, *(round(x / near) for x in (*self.knots_u, *self.knots_v)))
 
 
@@ -80,7 +80,7 @@ class Complex:
         return loops
 
     def _around(self, first: int) -> list[int]:
-        """Links of a face from a corner on; ``SurfaceFileError`` where it does not close as a rectangle."""
+        """Return links of a face from a corner on; ``SurfaceFileError`` where it does not close as a rectangle."""
         links, loop = self.file.links, [first]
         while links[loop[-1]].next != first:
             loop.append(links[loop[-1]].next)
@@ -136,7 +136,8 @@ class Complex:
         return out
 
     def quarter(self, vertex: int, leaving: int, way: int) -> int:
-        """How far the frame of a regular vertex is turned in a plane where the link ``leaving`` it points ``way``."""
+        """Return how far the frame of a regular vertex is turned in a plane where the link ``leaving`` it points
+        ``way``."""
         _, link, word = self.file.vertices[vertex]
         for _ in range(5):
             if leaving == link:
@@ -217,7 +218,7 @@ class Layout:
         return tuple(np.array(r).reshape(-1, 4) for r in rows)  # type: ignore[return-value]
 
     def _knots(self, axis: int, at: tuple[float, float], inward: int) -> Knots | None:
-        """The five knots of a grip along u (0) or v (1); None where it would lie outside."""
+        """Return the five knots of a grip along u (0) or v (1); None where it would lie outside."""
         near, x, y = self.mesh.near, at[axis], at[1 - axis]
         if (axis, y) not in self._rays:
             lines = self._lines[axis]
@@ -234,14 +235,14 @@ class Layout:
         return tuple(row[centre - 2 : centre + 3])
 
     def _reaching(self, axis: int, at: tuple[float, float], inward: int, rect: Rect) -> Knots | None:
-        """As :meth:`_knots`; None also where the grip would not act inside a rectangle."""
+        """Do the same as :meth:`_knots`; None also where the grip would not act inside a rectangle."""
         low, high = rect[2 * axis : 2 * axis + 2]
         knots = self._knots(axis, at, inward)
         acts = knots is not None and knots[0] < high - self.mesh.near and knots[-1] > low + self.mesh.near
         return knots if acts else None
 
     def copies(self, face: int) -> list[Copy]:
-        """The grips that act in a face that is laid out, with their knots."""
+        """Return the grips that act in a face that is laid out, with their knots."""
         near, rect, out = self.mesh.near, self.rects[face], {}
         done = set()
         for number, (u, v, way) in self.places.items():
@@ -278,16 +279,16 @@ class Ray:
         self._rows: dict[tuple[float, float], list[float]] = {}
 
     def row(self, x: float) -> tuple[list[float], float, float]:
-        """Knots between the two places of the outline about x, with four at each, and these places; infinity where the
-        layout ends without one."""
+        """Return knots between the two places of the outline about x, with four at each, and these places; infinity
+        where the layout ends without one."""
         k = bisect_right(self._starts, x + self._near)
         low = self._starts[k - 1] if k else -np.inf
         k = bisect_left(self._ends, x - self._near)
         high = self._ends[k] if k < len(self._ends) else np.inf
         if (low, high) not in self._rows:
             first, last = bisect_right(self._all, low + self._near), bisect_left(self._all, high - self._near)
-            inner = _merged(self._all[first:last], self._near)
-            row = _extended(inner, x, low, high)
+            inner = _merge_values(self._all[first:last], self._near)
+            row = _extend(inner, x, low, high)
             found = [low] * 4 * bool(np.isfinite(low)) + row + [high] * 4 * bool(np.isfinite(high))
             if not inner:
                 return found, low, high  # these depend on x
@@ -296,7 +297,7 @@ class Ray:
 
 
 def nearest(row: list[float], x: float) -> int:
-    """Place of the number in a rising row that is nearest to x, the first of several."""
+    """Place of the number in a sorted row that is nearest to x, the first of several."""
     k = bisect_left(row, x)
     if k == len(row) or (k > 0 and x - row[k - 1] <= row[k] - x):
         return bisect_left(row, row[k - 1])
@@ -308,13 +309,13 @@ def overlap(a: Rect, b: Rect, near: float) -> bool:
     return a[0] < b[1] - near and b[0] < a[1] - near and a[2] < b[3] - near and b[2] < a[3] - near
 
 
-def _merged(row: list[float], near: float) -> list[float]:
-    """Distinct values of a rising row."""
+def _merge_values(row: list[float], near: float) -> list[float]:
+    """Return distinct values of a sorted row."""
     return row[:1] + [b for a, b in pairwise(row) if b - a > near]
 
 
-def _extended(inner: list[float], x: float, low: float, high: float) -> list[float]:
-    """Knots with three more where the layout ends without an outline: equal intervals beyond what is known."""
+def _extend(inner: list[float], x: float, low: float, high: float) -> list[float]:
+    """Return knots with three more where the layout ends without an outline: equal intervals beyond what is known."""
     if np.isfinite(low) and np.isfinite(high):
         return inner
     row = inner or [x]

@@ -18,12 +18,12 @@ from surface.dcp import DCPSurface
 
 from .inversion import invert, search_between
 
-MOST_POINTS = 1024  # points along one edge
-MOST_DISTANCE = 3e-3  # of the face's size: an edge from its face; modelling tolerances are smaller
+MAX_POINTS = 1024  # points along one edge
+MAX_DISTANCE = 3e-3  # of the face's size: an edge from its face; modelling tolerances are smaller
 SEAM = 1e-3  # of a closed direction: nearer to its ends a point may belong to either
 CLOSES = 1e-6  # of the size: two borders that agree so well are one seam
 AT_POLE = 1e-3  # of the rectangle: nearer to a border that is a pole, a point is the pole
-MOST_SEAMS = 8  # edges along seams in one loop
+MAX_SEAMS = 8  # edges along seams in one loop
 OPEN = 0.02  # of the rectangle: ends of neighbouring edges that are further apart leave the loop open
 
 Rect = tuple[float, float, float, float]
@@ -42,18 +42,19 @@ class TrimEdge:
 
 
 def polyline(point: Callable[[float], Floats], start: float, end: float, error: float) -> Floats:
-    """(k, 3): points of a curve whose chords deviate from it by less than ``error``, or :data:`MOST_POINTS` points."""
+    """Return (k, 3): points of a curve whose chords deviate from it by less than ``error``, or :data:`MAX_POINTS`
+    points."""
     count = 8
     while True:
         fine = np.array([point(t) for t in np.linspace(start, end, 2 * count + 1)])
         deviation = np.linalg.norm(fine[1::2] - (fine[:-2:2] + fine[2::2]) / 2, axis=1).max()
-        if deviation < error or count >= MOST_POINTS:
+        if deviation < error or count >= MAX_POINTS:
             return fine[::2] if deviation < error else fine
         count *= 2
 
 
 def loop_over(surface: DCPSurface, rect: Rect, edges: list[TrimEdge], size: float) -> Floats:
-    """(k, 2): corners of the loop that ``edges`` make, in order, in the rectangle ``rect``.
+    """Return (k, 2): corners of the loop that ``edges`` make, in order, in the rectangle ``rect``.
 
     size : of the face, in space.
 
@@ -68,14 +69,14 @@ def loop_over(surface: DCPSurface, rect: Rect, edges: list[TrimEdge], size: floa
     parts, distances = np.split(uv, cuts), np.split(distance, cuts)  # views
     for curve, part, off in zip(curves, parts, distances, strict=True):
         search_between(surface, curve.points, part, off, CLOSES * size)
-    if not (distance < MOST_DISTANCE * size).all():
+    if not (distance < MAX_DISTANCE * size).all():
         raise ValueError(f"lies up to {np.nanmax(distance):.3g} from its face")
     for part in parts:
         _leave_poles(part, rect, _poles(surface, rect, size))
     free = _seams(parts, rect, _closes(surface, rect, size))
-    if len(free) > MOST_SEAMS:
-        raise ValueError(f"runs along seams {len(free)} times, more than the {MOST_SEAMS} that are read")
-    loop = _chained(parts, free, rect, _joined(edges))
+    if len(free) > MAX_SEAMS:
+        raise ValueError(f"runs along seams {len(free)} times, more than the {MAX_SEAMS} that are read")
+    loop = _chain(parts, free, rect, _follow_directly(edges))
     extent = np.array([rect[1] - rect[0], rect[3] - rect[2]])
     if any((np.abs(np.diff(part, axis=0)) > extent / 2).any() for part in parts):
         raise ValueError("crosses the seam of its face, which is not read")
@@ -83,7 +84,8 @@ def loop_over(surface: DCPSurface, rect: Rect, edges: list[TrimEdge], size: floa
 
 
 def _borders(surface: DCPSurface, rect: Rect, axis: int) -> tuple[Floats, Floats]:
-    """(17, 3) points along the border where the coordinate ``axis`` is least, and along that where it is greatest."""
+    """Return (17, 3): points along the border where the coordinate ``axis`` is least, and along that where it is
+    greatest."""
     t = np.linspace(rect[2 - 2 * axis], rect[3 - 2 * axis], 17)
     both = [np.column_stack([np.full(17, end), t]) for end in rect[2 * axis : 2 * axis + 2]]
     low, high = (surface.evaluate(uv[:, ::-1] if axis else uv) for uv in both)
@@ -91,7 +93,7 @@ def _borders(surface: DCPSurface, rect: Rect, axis: int) -> tuple[Floats, Floats
 
 
 def _poles(surface: DCPSurface, rect: Rect, size: float) -> list[tuple[int, float]]:
-    """Axis and coordinate of every border of the rectangle that is one point in space."""
+    """Return the axis and coordinate of every border of the rectangle that is one point in space."""
     found = []
     for axis in range(2):
         for end, points in zip(rect[2 * axis : 2 * axis + 2], _borders(surface, rect, axis), strict=True):
@@ -120,7 +122,7 @@ def _closes(surface: DCPSurface, rect: Rect, size: float) -> tuple[bool, bool]:
 
 
 def _seams(parts: list[Floats], rect: Rect, closes: tuple[bool, bool]) -> list[tuple[int, int]]:
-    """Part and axis of every edge along a seam; the ends of the others are put to the side they come from."""
+    """Return part and axis of every edge along a seam; the ends of the others are put to the side they come from."""
     free = []
     for k, uv in enumerate(parts):
         for axis in np.flatnonzero(closes):
@@ -143,15 +145,15 @@ def _settle(x: Floats, near: Bools, low: float, high: float) -> None:
             x[k] = low if left else high
 
 
-def _joined(edges: list[TrimEdge]) -> Bools:
-    """(c,) of each edge in space, whether the next one follows without a pole between."""
+def _follow_directly(edges: list[TrimEdge]) -> Bools:
+    """Return (c,): of each edge in space, whether the next one follows without a pole between."""
     curves = [k for k, edge in enumerate(edges) if not edge.is_pole]
     following = [*curves[1:], curves[0] + len(edges)]
     return np.array([b == a + 1 for a, b in zip(curves, following, strict=True)])
 
 
-def _chained(parts: list[Floats], free: list[tuple[int, int]], rect: Rect, joined: Bools) -> Floats:
-    """The corners of the loop with each edge along a seam at the end that leaves the smallest gaps; among equals
+def _chain(parts: list[Floats], free: list[tuple[int, int]], rect: Rect, joined: Bools) -> Floats:
+    """Return the corners of the loop with each edge along a seam at the end that leaves the smallest gaps; among equals
     the one that runs anticlockwise. ``parts`` are changed."""
     extent = np.array([rect[1] - rect[0], rect[3] - rect[2]])
     best: tuple[float, float, tuple[int, ...]] | None = None
@@ -167,7 +169,7 @@ def _chained(parts: list[Floats], free: list[tuple[int, int]], rect: Rect, joine
     if best[0] > OPEN:
         raise ValueError("does not close over (u, v)")
     _put(parts, free, best[2], rect)
-    return _without_repeats(np.concatenate(parts))
+    return _drop_repeats(np.concatenate(parts))
 
 
 def _put(parts: list[Floats], free: list[tuple[int, int]], sides: tuple[int, ...], rect: Rect) -> None:
@@ -176,13 +178,13 @@ def _put(parts: list[Floats], free: list[tuple[int, int]], sides: tuple[int, ...
 
 
 def _area(loop: Floats) -> float:
-    """Signed area, positive anticlockwise."""
+    """Return signed area, positive anticlockwise."""
     x, y = loop.T
     return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
 
 
-def _without_repeats(loop: Floats) -> Floats:
-    """The closed polyline without points that repeat the one before."""
+def _drop_repeats(loop: Floats) -> Floats:
+    """Return the closed polyline without points that repeat the one before."""
     step = np.abs(loop - np.roll(loop, 1, axis=0)).max(axis=1)
     kept: Floats = loop[step > 1e-12 * np.abs(loop).max()]
     return kept

@@ -46,7 +46,7 @@ class Anchor:
 
 
 def read(path: Path) -> list[NamedSurface]:
-    """The surface of a file; ``SurfaceFileError`` names the line."""
+    """Return the surface of a file; ``SurfaceFileError`` names the line."""
     location = Location(path)
     file = parse(location, read_text(path, errors="replace"))  # comments may be in any encoding
     _require(file, "degree", "3", "T-splines of degree 3 are read")
@@ -94,7 +94,7 @@ def _require(file: TsmFile, key: str, value: str, why: str) -> None:
 
 
 def _anchors(file: TsmFile, mesh: TMesh) -> dict[int, Anchor]:
-    """Anchors by grip number."""
+    """Return anchors by grip number."""
     out: dict[int, Anchor] = {}
     counts = dict.fromkeys(mesh.uv, 0)
     for number, (_, own, vertex) in enumerate(file.owners):
@@ -199,7 +199,7 @@ class TMesh:
                 raise self._file.error(line, f"edge {edge} is creased inside the surface", HINT)
 
     def _edges_across(self, axis: int) -> Floats:
-        """(k, 3): coordinate along ``axis`` of every edge across it, and where the edge starts and ends."""
+        """Return (k, 3): coordinate along ``axis`` of every edge across it, and where the edge starts and ends."""
         rows = []
         for number, link in self._file.links.items():
             if self._direction[number] == 1 - axis:
@@ -208,12 +208,12 @@ class TMesh:
         return np.array(rows)
 
     def direction(self, vertex: int, side: int) -> int:
-        """The direction in the plane of a side of a vertex' own frame."""
+        """Return the direction in the plane of a side of a vertex' own frame."""
         _, link, word = self._file.vertices[vertex]
         return (side + self._direction[link] - COMPASS[word]) % 4
 
     def _ends(self, uv: tuple[float, float]) -> tuple[int, int]:
-        """Along each direction: 1 at the low end of the rectangle, -1 at the high end, 0 between."""
+        """Return along each direction: 1 at the low end of the rectangle, -1 at the high end, 0 between."""
         u0, u1, v0, v1 = self._rect
         return int(uv[0] == u0) - int(uv[0] == u1), int(uv[1] == v0) - int(uv[1] == v1)
 
@@ -222,11 +222,11 @@ class TMesh:
         return all(step in (0, end) for step, end in zip(anchor.inward, self._ends(anchor.uv), strict=True))
 
     def grips_at(self, uv: tuple[float, float]) -> int:
-        """How many grips a vertex there has: 1 inside, 2 on a side, 4 at a corner."""
+        """Return how many grips a vertex there has: 1 inside, 2 on a side, 4 at a corner."""
         return int(2 ** sum(abs(end) for end in self._ends(uv)))
 
     def knots(self, axis: int, anchor: Anchor) -> list[float]:
-        """The five knots of a grip along u (0) or v (1)."""
+        """Return the five knots of a grip along u (0) or v (1)."""
         x, y = anchor.uv[axis], anchor.uv[1 - axis]
         low, high = self._rect[2 * axis], self._rect[2 * axis + 1]
         lines = self._lines[axis]

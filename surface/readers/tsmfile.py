@@ -56,12 +56,12 @@ class TsmFile:
     missing: dict[int, int] = field(default_factory=dict)
 
     def error(self, line: int, why: str, hint: str = "") -> SurfaceFileError:
-        """The error for a line."""
+        """Return the error for a line."""
         return self.location.at(f"line {line}").error(why, hint=hint)
 
 
 def parse(location: Location, text: str) -> TsmFile:
-    """The records of a file; ``SurfaceFileError`` names the line."""
+    """Return the records of a file; ``SurfaceFileError`` names the line."""
     out = TsmFile(location)
     lines = text.splitlines()
     if not lines or lines[0].split()[:1] != [HEADER]:

@@ -14,11 +14,11 @@ from surface.base.arrays import Floats, Ints
 from surface.base.checks import require
 
 MAX_DEGREE = 9
-LEAST_SPAN, MOST_KNOT = 1e-30, 1e30  # knots that float64 can divide by, also in products and second derivatives
+MIN_SPAN, MAX_KNOT = 1e-30, 1e30  # knots that float64 can divide by, also in products and second derivatives
 
 
 def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str = "right") -> Floats:
-    """Blending function over ``knots``, or its derivative, at ``x``.
+    """Return the values (m,) of the blending function over ``knots``, or its derivative, at ``x``.
 
     knots : (p + 2,) float64, not decreasing
     x : (m,) float64
@@ -43,7 +43,8 @@ def blending(knots: ArrayLike, x: ArrayLike, derivative: int = 0, *, side: str =
 
 
 def pad_knots(knots: object, name: str, n: int) -> tuple[Floats, Ints]:
-    """Knot vectors of n points, n sequences of degree + 2 numbers each or an (n, degree + 2) array, as one array.
+    """Return knot vectors of n points, n sequences of degree + 2 numbers each or an (n, degree + 2) array, as one
+    array.
 
     Returns (n, w) float64, whose rows repeat their last knot up to the largest length w, and degrees (n,) int64.
     ``ValueError`` with the argument's ``name`` and the index of the first bad knot vector.
@@ -62,7 +63,7 @@ def pad_knots(knots: object, name: str, n: int) -> tuple[Floats, Ints]:
 
 
 def _stack(rows: list[ArrayLike], name: str) -> tuple[Floats, Ints]:
-    """Rows of different lengths into one padded array."""
+    """Return rows of different lengths into one padded array."""
     flat = [_row(row, f"{name}[{i}]") for i, row in enumerate(rows)]
     lengths = np.array([len(row) for row in flat], dtype=np.int64)
     _check_degrees(lengths - 2, name)
@@ -74,7 +75,7 @@ def _stack(rows: list[ArrayLike], name: str) -> tuple[Floats, Ints]:
 
 
 def _row(row: ArrayLike, name: str) -> Floats:
-    """One knot vector."""
+    """Return one knot vector."""
     try:
         values = np.asarray(row, dtype=np.float64)
     except (TypeError, ValueError):
@@ -111,18 +112,18 @@ def check_knots(padded: Floats, degrees: Ints, name: str) -> None:
 
 def _check_spans(padded: Floats, steps: Floats, name: str) -> None:
     """Raise ``ValueError`` for knots that are neither equal nor far enough apart to divide by, or too large."""
-    far = np.abs(padded) > MOST_KNOT
-    bad = ((steps > 0) & (steps < LEAST_SPAN)) | far[:, 1:] | far[:, :-1]
+    far = np.abs(padded) > MAX_KNOT
+    bad = ((steps > 0) & (steps < MIN_SPAN)) | far[:, 1:] | far[:, :-1]
     if bad.any():
         i, k = (int(x) for x in np.argwhere(bad)[0])
         raise ValueError(
             f"{name}[{i}]: knots {k} and {k + 1} are {padded[i, k]} and {padded[i, k + 1]}; make them equal, or scale "
-            f"the knots: they must differ by {LEAST_SPAN:g} or more and lie within {MOST_KNOT:g}"
+            f"the knots: they must differ by {MIN_SPAN:g} or more and lie within {MAX_KNOT:g}"
         )
 
 
 def check_padded(knots: ArrayLike, degrees: ArrayLike, axis: str, n: int) -> tuple[Floats, Ints]:
-    """Clean copies of knots ``(n, w)`` and degrees ``(n,)`` of n points; ``ValueError`` as :func:`pad_knots`."""
+    """Return clean copies of knots ``(n, w)`` and degrees ``(n,)`` of n points; ``ValueError`` as :func:`pad_knots`."""
     rows = np.array(knots, dtype=np.float64, order="C", ndmin=2)
     p = np.array(degrees, dtype=np.int64, ndmin=1)
     for name, given in (("knots", rows), ("degrees", p)):

@@ -26,7 +26,7 @@ class Bins:
 
 
 def build_bins(knots_u: Floats, knots_v: Floats) -> Bins:
-    """Bins about as large as the median support of points with these padded knots, (n, w) float64 each."""
+    """Return bins about as large as the median support of points with these padded knots, (n, w) float64 each."""
     from . import kernels  # compiled: loaded when first used
 
     axes = [_axis(knots_u), _axis(knots_v)]
@@ -45,7 +45,7 @@ def build_bins(knots_u: Floats, knots_v: Floats) -> Bins:
 
 
 def _axis(knots: Floats) -> tuple[float, float, int]:
-    """Low end, high end and wanted number of bins along one direction."""
+    """Return low end, high end and wanted number of bins along one direction."""
     low, high = float(knots[:, 0].min()), float(knots[:, -1].max())
     if high <= low:
         high = low + 1.0

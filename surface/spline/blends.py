@@ -14,7 +14,7 @@ from surface.base.jit import inlined, kernel
 
 @inlined
 def span(knots, i, p, x, left):
-    """Index j of the knot interval that holds x, [t_j, t_j+1), or (t_j, t_j+1] from the left; -1 if none."""
+    """Return the index j of the knot interval that holds x, [t_j, t_j+1), or (t_j, t_j+1] from the left; -1 if none."""
     if left:
         if not (knots[i, 0] < x <= knots[i, p + 1]):
             return -1
@@ -32,7 +32,7 @@ def span(knots, i, p, x, left):
 
 @inlined
 def ratio(a, b):
-    """a / b with 0 for b = 0, the convention for repeated knots (Piegl and Tiller, The NURBS Book, 2.2)."""
+    """Return a / b with 0 for b = 0, the convention for repeated knots (Piegl and Tiller, The NURBS Book, 2.2)."""
     return a / b if b > 0.0 else 0.0
 
 
@@ -54,7 +54,7 @@ def cox_de_boor(knots, i, p, x, j, top, work):
 
 @inlined
 def cubic(knots, i, x, j):
-    """Value and first derivative for degree 3 in knot interval j, written out: most surfaces are cubic."""
+    """Return the value and first derivative for degree 3 in knot interval j, written out: most surfaces are cubic."""
     t0, t1, t2, t3, t4 = knots[i, 0], knots[i, 1], knots[i, 2], knots[i, 3], knots[i, 4]
     low, high = 0.0, 0.0  # the two functions of degree 2
     if j == 0:
@@ -73,7 +73,7 @@ def cubic(knots, i, x, j):
 
 @kernel
 def blend(knots, i, p, x, left, work):
-    """Value of point i's blending function at x."""
+    """Return the value of point i's blending function at x."""
     j = span(knots, i, p, x, left)
     if j < 0:
         return 0.0
@@ -85,7 +85,7 @@ def blend(knots, i, p, x, left, work):
 
 @kernel
 def blend1(knots, i, p, x, left, work):
-    """Value and first derivative of point i's blending function at x."""
+    """Return the value and first derivative of point i's blending function at x."""
     j = span(knots, i, p, x, left)
     if j < 0:
         return 0.0, 0.0
@@ -101,7 +101,7 @@ def blend1(knots, i, p, x, left, work):
 
 @kernel
 def blend2(knots, i, p, x, left, work):
-    """Value, first and second derivative of point i's blending function at x."""
+    """Return the value, first and second derivative of point i's blending function at x."""
     j = span(knots, i, p, x, left)
     if j < 0:
         return 0.0, 0.0, 0.0

@@ -11,11 +11,11 @@ import numpy as np
 from surface.base.arrays import Floats
 
 Interval = tuple[float, float] | None
-MOST_PERIODS = 16  # that knots may reach over: each takes a copy of every point
+MAX_PERIODS = 16  # that knots may reach over: each takes a copy of every point
 
 
 def check_closed(closed: tuple[Interval, Interval]) -> tuple[Interval, Interval]:
-    """The intervals as floats; ``ValueError`` where start is not below end."""
+    """Return the intervals as floats; ``ValueError`` where start is not below end."""
     out: list[Interval] = []
     for name, interval in zip(("closed_u", "closed_v"), closed, strict=True):
         if interval is None:
@@ -32,7 +32,7 @@ def check_closed(closed: tuple[Interval, Interval]) -> tuple[Interval, Interval]
 
 
 def shifts_of(knots: tuple[Floats, Floats], closed: tuple[Interval, Interval]) -> Floats:
-    """(b, 2): shifts in u and v of all copies that may reach the closed intervals, (0, 0) first."""
+    """Return (b, 2): shifts in u and v of all copies that may reach the closed intervals, (0, 0) first."""
     along = []
     for name, rows, interval in zip(("closed_u", "closed_v"), knots, closed, strict=True):
         if interval is None:
@@ -40,8 +40,8 @@ def shifts_of(knots: tuple[Floats, Floats], closed: tuple[Interval, Interval]) -
             continue
         period = interval[1] - interval[0]
         reach = max(interval[1], float(rows[:, -1].max())) - min(interval[0], float(rows[:, 0].min()))
-        if not reach <= MOST_PERIODS * period:
-            raise ValueError(f"{name}: knots reach over {reach:g}, more than {MOST_PERIODS} periods of {period:g}")
+        if not reach <= MAX_PERIODS * period:
+            raise ValueError(f"{name}: knots reach over {reach:g}, more than {MAX_PERIODS} periods of {period:g}")
         lowest = min(-1, int(np.floor((interval[0] - rows[:, -1].max()) / period)))
         highest = max(1, int(np.ceil((interval[1] - rows[:, 0].min()) / period)))
         along.append([0.0, *(k * period for k in range(lowest, highest + 1) if k)])
@@ -49,7 +49,7 @@ def shifts_of(knots: tuple[Floats, Floats], closed: tuple[Interval, Interval]) -
 
 
 def wrap(uv: Floats, closed: tuple[Interval, Interval]) -> Floats:
-    """``uv (m, 2)`` with closed directions brought into start <= x < end."""
+    """Return ``uv (m, 2)`` with closed directions brought into start <= x < end."""
     if closed == (None, None):
         return uv
     out = uv.copy()

@@ -65,7 +65,8 @@ class ControlPoints:
         closed_u: Interval = None,
         closed_v: Interval = None,
     ) -> Self:
-        """From the arrays of :attr:`padded`, (n, w) float64, and of :attr:`degrees`: the fast way from a binary file.
+        """Make control points from arrays as of :attr:`padded`, (n, w) float64, and :attr:`degrees`, without
+        conversion.
 
         Row i of the knots holds ``degrees[i] + 2`` and repeats the last one. Errors are those of the constructor.
         """
@@ -78,7 +79,7 @@ class ControlPoints:
         return table
 
     def with_points(self, points: ArrayLike) -> Self:
-        """The same control points at other positions ``(n, 3)``; knots and bins are shared."""
+        """Return the same control points at other positions ``(n, 3)``; knots and bins are shared."""
         xyz = check_points(points)
         if xyz.shape != (self._n, 3):
             raise ValueError(f"points: shape {xyz.shape}, expected {(self._n, 3)}")
@@ -131,12 +132,12 @@ class ControlPoints:
     @property
     def knots_u(self) -> Sequence[Floats]:
         """n arrays of degree + 2 knots, read-only."""
-        return _without_padding(self.padded[0], self.degrees[0])
+        return _strip_padding(self.padded[0], self.degrees[0])
 
     @property
     def knots_v(self) -> Sequence[Floats]:
         """n arrays of degree + 2 knots, read-only."""
-        return _without_padding(self.padded[1], self.degrees[1])
+        return _strip_padding(self.padded[1], self.degrees[1])
 
     @property
     def degrees(self) -> tuple[Ints, Ints]:
@@ -182,22 +183,24 @@ class ControlPoints:
         return self._bins
 
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """Knots in u and v, degrees, points and weights, shifted copies included; what the kernels take."""
+        """Return knots in u and v, degrees, points and weights, shifted copies included; what the kernels take."""
         return self._ku, self._kv, self._pu, self._pv, self._points, self._weights
 
     def bin_arrays(self) -> tuple[np.ndarray, ...]:
-        """The arrays of :attr:`bins`, as the kernels take them."""
+        """Return the arrays of :attr:`bins`, as the kernels take them."""
         return self.bins.grid, self.bins.shape, self.bins.start, self.bins.ids
 
     def sample(self, uv: ArrayLike, side: ArrayLike | None) -> tuple[Floats, np.ndarray, Floats]:
-        """Checked samples, the limit that was taken (-1: uncovered) and S (m, 3); as :meth:`sample_derivatives`."""
+        """Return checked samples, the limit that was taken (-1: uncovered) and S (m, 3); as
+        :meth:`sample_derivatives`.
+        """
         samples, sides, out = self._sample(uv, side, 1)
         return samples, sides, out[:, 0]
 
     def sample_derivatives(
         self, uv: ArrayLike, side: ArrayLike | None = None, *, second: bool = False
     ) -> tuple[Ints, Floats]:
-        """Derivatives, and the limits that were taken; places outside :attr:`rect` are uncovered, not refused.
+        """Return derivatives, and the limits that were taken; places outside :attr:`rect` are uncovered, not refused.
 
         Returns the limit (m,) int64 that each evaluation really takes, -1 where nothing covers, and (m, 3, 3) float64
         with S, S_u, S_v, or (m, 6, 3) with S_uu, S_uv, S_vv after them.
@@ -213,5 +216,5 @@ class ControlPoints:
         return samples, sides, out
 
 
-def _without_padding(knots: Floats, degrees: Ints) -> list[Floats]:
+def _strip_padding(knots: Floats, degrees: Ints) -> list[Floats]:
     return [row[: p + 2] for row, p in zip(knots, degrees, strict=True)]

@@ -17,12 +17,12 @@ from surface.base.jit import inlined, kernel
 from .blends import blend, blend1, blend2
 
 TINY = 1e-290  # denominators below this count as "nothing covers"
-RUN = 256  # samples that are computed together, and the most bins and points they may reach for that
+RUN = 256  # maximum number of samples that are computed together, and of the bins and of the points they reach
 
 
 @inlined
 def bin_of(u, v, grid, shape):
-    """Bin of (u, v), or -1 outside the grid; ``grid`` = (u0, v0, bins per u, bins per v, u1, v1)."""
+    """Return the bin of (u, v), or -1 outside the grid; ``grid`` = (u0, v0, bins per u, bins per v, u1, v1)."""
     if not (grid[0] <= u <= grid[4] and grid[1] <= v <= grid[5]):
         return -1
     a = min(int((u - grid[0]) * grid[2]), shape[0] - 1)
@@ -32,7 +32,7 @@ def bin_of(u, v, grid, shape):
 
 @inlined
 def bin_along(x, start, scale, count):
-    """Bin of a coordinate along one direction; the first or last one outside the grid."""
+    """Return the bin of a coordinate along one direction; the first or last one outside the grid."""
     return max(0, min(int((x - start) * scale), count - 1))
 
 
@@ -55,7 +55,7 @@ def fill_bins(knots_u, knots_v, grid, shape, start, ids, count_only):
 
 @kernel
 def points_in(box, knots_u, knots_v, grid, shape, start, ids, out):
-    """Points whose closed support meets ``box``; writes them to ``out`` as far as it has room, returns the number."""
+    """Write the points whose closed support meets ``box`` to ``out``, as far as it has room; return their number."""
     last_u, last_v = knots_u.shape[1] - 1, knots_v.shape[1] - 1
     a0, a1 = bin_along(box[0], grid[0], grid[2], shape[0]), bin_along(box[1], grid[0], grid[2], shape[0])
     b0, b1 = bin_along(box[2], grid[1], grid[3], shape[1]), bin_along(box[3], grid[1], grid[3], shape[1])
@@ -90,7 +90,7 @@ def bounding_box(uv, low, high, box):
 
 @kernel
 def points_near(uv, knots_u, knots_v, grid, shape, start, bins, out):
-    """Points whose support meets the rectangle around samples, rising, into ``out``.
+    """Write points whose support meets the rectangle around samples, ascending, into ``out``.
 
     Returns their number; -1 if a sample is outside the grid, or if more bins or points than ``RUN`` meet it.
     """
@@ -111,7 +111,7 @@ def points_near(uv, knots_u, knots_v, grid, shape, start, bins, out):
 
 @kernel
 def distinct(uv, side, axis, values, index):
-    """Distinct coordinates (with the limit they take in ``values (k, 2)``) of samples; returns how many."""
+    """Write distinct coordinates (with the limit they take in ``values (k, 2)``) of samples; returns how many."""
     count = 0
     for s in range(uv.shape[0]):
         x, left = uv[s, axis], float(side[s] >> axis & 1)
@@ -127,8 +127,9 @@ def distinct(uv, side, axis, values, index):
 
 
 @kernel
-def along(knots, i, p, values, count, slopes, work, out):
-    """One blending function (and its slope) at distinct coordinates into ``out (k, 2)``; any nonzero?"""
+def blend_along(knots, i, p, values, count, slopes, work, out):
+    """Write one blending function (and its slope) at distinct coordinates into ``out (k, 2)``; return whether any
+    is nonzero."""
     found = False
     for k in range(count):
         if slopes:
@@ -187,9 +188,9 @@ def sum_run(knots_u, knots_v, pu, pv, points, weights, ids, uv, side, slopes, wo
     acc[:m] = 0.0
     for q in range(ids.shape[0]):
         i = ids[q]
-        if not along(knots_u, i, pu[i], values_u, many_u, slopes, work, along_u):
+        if not blend_along(knots_u, i, pu[i], values_u, many_u, slopes, work, along_u):
             continue
-        if not along(knots_v, i, pv[i], values_v, many_v, slopes, work, along_v):
+        if not blend_along(knots_v, i, pv[i], values_v, many_v, slopes, work, along_v):
             continue
         for s in range(m):
             a0, a1 = along_u[index_u[s], 0], along_u[index_u[s], 1]
@@ -293,7 +294,7 @@ def sample(knots_u, knots_v, pu, pv, points, weights, grid, shape, start, bins, 
 
 @kernel
 def row_capacity(grid, shape, start, uv):
-    """Upper bound of the number of influences of all samples together."""
+    """Return the upper bound of the number of influences of all samples together."""
     total = 0
     for s in range(uv.shape[0]):
         cell = bin_of(uv[s, 0], uv[s, 1], grid, shape)

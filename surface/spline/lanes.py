@@ -22,7 +22,7 @@ PAIRS = [k // 2 + k % 2 * LANES for k in range(2 * LANES)]  # x0 y0 x1 y1 ... of
 
 
 def _has_avx2() -> bool:
-    """Will numba compile for a processor with AVX2?"""
+    """Whether numba compiles for a processor with AVX2."""
     if config.CPU_NAME is not None or config.CPU_FEATURES is not None:
         return "+avx2" in (config.CPU_FEATURES or "").split(",")
     try:
@@ -31,7 +31,7 @@ def _has_avx2() -> bool:
         return False
 
 
-PICKS_FAST = _has_avx2()  # is :func:`pick` one instruction?
+PICKS_FAST = _has_avx2()  # whether :func:`pick` is one instruction
 FLAGS = ("contract", "nsz", "arcp")  # a multiplication and an addition may become one instruction
 
 
@@ -91,7 +91,7 @@ def zero(context, builder, kinds, args):
 
 @_operation(lanes, None, types.intp)
 def load(context, builder, kinds, args):
-    """``array[index : index + 8]``."""
+    """Load ``array[index : index + 8]``."""
     return builder.load(_pointer(context, builder, kinds[0], *args), align=4)
 
 
@@ -133,7 +133,7 @@ load_x, load_y, load_z = (_loader3(part) for part in range(3))  # of eight vecto
 
 @_operation(types.void, None, types.intp)
 def prefetch(context, builder, kinds, args):
-    """Ask for the cache line of ``array[index]``, which may lie beyond the array's end."""
+    """Prefetch the cache line of ``array[index]``, which may lie beyond the array's end."""
     data = context.make_array(kinds[0])(context, builder, args[0]).data
     pointer = builder.bitcast(builder.gep(data, [args[1]]), ir.IntType(8).as_pointer())
     kind = ir.FunctionType(ir.VoidType(), [pointer.type, INDEX, INDEX, INDEX])
@@ -144,7 +144,7 @@ def prefetch(context, builder, kinds, args):
 
 @_operation(types.void, None, types.intp, lanes)
 def store(context, builder, kinds, args):
-    """``array[index : index + 8] = value``."""
+    """Store ``array[index : index + 8] = value``."""
     builder.store(args[2], _pointer(context, builder, kinds[0], *args[:2]), align=4)
     return context.get_dummy_value()
 
@@ -190,7 +190,7 @@ def root(context, builder, kinds, args):
 
 @_operation(lanes, lanes, lanes, lanes)
 def most_of(context, builder, kinds, args):
-    """The greatest of three numbers without their signs, and at least 1e-37, in every lane."""
+    """Return the greatest absolute value of three numbers, and at least 1e-37, in every lane."""
     kind = ir.FunctionType(VECTOR, [VECTOR])
     size = builder.module.declare_intrinsic(f"llvm.fabs.v{LANES}f32", fnty=kind)
     most = ir.Constant(VECTOR, [1e-37] * LANES)
@@ -201,7 +201,7 @@ def most_of(context, builder, kinds, args):
 
 @_operation(types.boolean, lanes, types.float32)
 def reaches(context, builder, kinds, args):
-    """Is a number in any lane at least this one, or none at all (NaN)?"""
+    """Whether any lane holds a number of at least this one, or NaN."""
     found = builder.fcmp_unordered(">=", args[0], _splat(builder, args[1]))
     return builder.icmp_unsigned("!=", builder.bitcast(found, ir.IntType(LANES)), ir.IntType(LANES)(0))
 

@@ -36,7 +36,7 @@ class Rows:
     count: int
 
     def __matmul__(self, points: ArrayLike) -> Floats:
-        """(m, ...) float64 sums for values (n, ...) of the control points."""
+        """Return (m, ...) float64: sums for values (n, ...) of the control points."""
         values = np.asarray(points, np.float64)[self.column]
         terms = values.reshape(len(values), math.prod(values.shape[1:])).T * self.share
         sums: Floats = np.stack([np.bincount(self.row, term, self.count) for term in terms], axis=1)
@@ -44,7 +44,7 @@ class Rows:
 
 
 def basis_rows(surface: ControlPoints, uv: ArrayLike) -> Rows:
-    """The weights of :meth:`surface.DCPSurface.basis_matrix`, for products with few columns."""
+    """Return the weights of :meth:`surface.DCPSurface.basis_matrix`, for products with few columns."""
     (share,), column, start = _ratios(surface, uv, [(0, 0)], None)
     return Rows(share, column, np.repeat(np.arange(len(start) - 1), np.diff(start)), len(start) - 1)
 
@@ -52,7 +52,7 @@ def basis_rows(surface: ControlPoints, uv: ArrayLike) -> Rows:
 def basis_matrices(
     surface: ControlPoints, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None = None
 ) -> list[csr_matrix]:
-    """Several matrices of :meth:`surface.DCPSurface.basis_matrix`, for hardly more than the time of one.
+    """Return several matrices of :meth:`surface.DCPSurface.basis_matrix`, for hardly more than the time of one.
 
     Raises MissingPackage: scipy is not installed.
     """
@@ -71,7 +71,7 @@ def basis_matrices(
 def _ratios(
     surface: ControlPoints, uv: ArrayLike, derivatives: Sequence[tuple[int, int]], side: ArrayLike | None
 ) -> tuple[list[Floats], Ints, Ints]:
-    """Rational weights (k,) or their derivatives, the control point of each (k,), and row starts (m + 1,)."""
+    """Return rational weights (k,) or their derivatives, the control point of each (k,), and row starts (m + 1,)."""
     from .kernels import TINY  # compiled: loaded when first used
 
     for wanted in derivatives:
@@ -91,13 +91,13 @@ def _ratios(
 
 
 def _sums(data: Floats, start: Ints) -> tuple[Ints, Floats]:
-    """The row of every entry of ``data (k, 3)``, and the sums (m, 3) over each row."""
+    """Return the row of every entry of ``data (k, 3)``, and the sums (m, 3) over each row."""
     rows = np.repeat(np.arange(len(start) - 1), np.diff(start))
     return rows, np.stack([np.bincount(rows, data[:, k], len(start) - 1) for k in range(3)], axis=1)
 
 
 def _rows(surface: ControlPoints, samples: Floats, sides: np.ndarray) -> tuple[Floats, np.ndarray, Ints]:
-    """b w and its derivatives (k, 3), columns (k,) and row starts (m + 1,), a chunk at a time."""
+    """Return b w and its derivatives (k, 3), columns (k,) and row starts (m + 1,), a chunk at a time."""
     from . import kernels
 
     data, columns, counts = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int32)], []

@@ -19,7 +19,7 @@ def nurbs_arrays(
     control_points: ArrayLike,
     weights: ArrayLike | None = None,
 ) -> tuple[Floats, Floats, Floats, Floats]:
-    """Control points of a NURBS surface, each with its own slice of the knot vectors.
+    """Return control points of a NURBS surface, each with its own slice of the knot vectors.
 
     degree_u, degree_v : 0 to 9
     knots_u, knots_v : (nu + degree_u + 1,), (nv + degree_v + 1,) float64
@@ -47,7 +47,7 @@ def nurbs_arrays(
 
 
 def _local_knots(knots: ArrayLike, axis: str, count: int, degree: int) -> Floats:
-    """(count, degree + 2): the knots of each blending function along one direction."""
+    """Return (count, degree + 2): the knots of each blending function along one direction."""
     if degree != int(degree) or not 0 <= degree <= MAX_DEGREE:
         raise ValueError(f"degree_{axis}: must be a whole number from 0 to {MAX_DEGREE}, not {degree}")
     row = numbers(knots, f"knots_{axis}")

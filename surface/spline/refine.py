@@ -36,7 +36,7 @@ class Refinement(Generic[Table]):
     share: Floats
 
     def carry(self, values: ArrayLike) -> Floats:
-        """Data of the old points (n, ...), such as displacements, for the new ones (n', ...)."""
+        """Return data of the old points (n, ...), such as displacements, for the new ones (n', ...)."""
         old = np.asarray(values, dtype=np.float64)
         new = np.zeros((self.surface.n, *old.shape[1:]))
         np.add.at(new, self.point, old[self.parent] * self.share.reshape(-1, *[1] * (old.ndim - 1)))
@@ -55,7 +55,7 @@ class _Pieces(NamedTuple):
     split: Bools
 
     def take(self, index: np.ndarray) -> _Pieces:
-        """The pieces at ``index``."""
+        """Return the pieces at ``index``."""
         return _Pieces(*(array[index] for array in self))
 
 
@@ -103,7 +103,7 @@ def _pieces(surface: ControlPoints) -> _Pieces:
 
 
 def _middles(knots: Floats, low: float, high: float) -> Floats:
-    """(n, w - 1): middles of the knot spans that share more than an end with low..high, NaN for the others."""
+    """Return (n, w - 1): middles of the knot spans that share more than an end with low..high, NaN for the others."""
     a, b = knots[:, :-1], knots[:, 1:]
     return np.where((b > a) & (a < high) & (b > low), (a + b) / 2, np.nan)
 
@@ -128,12 +128,12 @@ def _split(pieces: _Pieces, axis: int, value: Floats, chosen: np.ndarray) -> _Pi
 
 
 def _part(length: Floats, whole: Floats) -> Floats:
-    """min(1, length / whole), 1 where whole is 0."""
+    """Return min(1, length / whole), 1 where whole is 0."""
     return np.minimum(1.0, length / np.where(whole > 0, whole, length))
 
 
 def _halves(rows: Floats, x: Floats, p: Ints) -> tuple[Floats, Floats]:
-    """Knots with x inserted: without the last one, and without the first one."""
+    """Return knots with x inserted: without the last one, and without the first one."""
     column = np.arange(rows.shape[1])
     real = column < (p + 2)[:, None]
     full = np.sort(np.hstack([np.where(real, rows, np.inf), x[:, None]]), axis=1)  # p + 3 numbers, then inf

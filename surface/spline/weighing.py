@@ -10,7 +10,7 @@ import numpy as np
 
 from surface.base.jit import kernel
 
-from .kernels import along, distinct
+from .kernels import blend_along, distinct
 
 INSIDE = 1e-9  # of a subdomain's width: a function of degree 9 is greater than 1e-90 there
 
@@ -29,7 +29,8 @@ def _put_row(value, slope, at, rows, row, tiles, numbers):
 
 @kernel
 def _combine(along_u, along_v, at_u, at_v, count, weight, out):
-    """b w and its derivatives of one point at a cell's vertices into ``out (3, count)``; any nonzero?"""
+    """Write b w and its derivatives of one point at a cell's vertices into ``out (3, count)``; return whether any is
+    nonzero."""
     found = False
     for j in range(count):
         a0, a1 = along_u[at_u[j], 0] * weight, along_u[at_u[j], 1] * weight
@@ -63,9 +64,9 @@ def fill_blocks(
         count, tiles = 0, (size + 7) // 8
         for q in range(list_start[c], list_start[c + 1]):
             i = list_ids[q]
-            if not along(knots_u, i, pu[i], values_u, many_u, True, work, along_u):
+            if not blend_along(knots_u, i, pu[i], values_u, many_u, True, work, along_u):
                 continue
-            if not along(knots_v, i, pv[i], values_v, many_v, True, work, along_v):
+            if not blend_along(knots_v, i, pv[i], values_v, many_v, True, work, along_v):
                 continue
             if _combine(along_u, along_v, at_u, at_v, size, weights[i], numbers[count]):
                 ids[ids_at[c] + count] = i
@@ -79,7 +80,7 @@ def fill_blocks(
 
 
 @kernel
-def _inside(knots, i, x):
+def _is_well_inside(knots, i, x):
     """Whether ``x`` lies so far inside the knots of point i that its blending function cannot vanish there, not even
     by rounding."""
     low, high = knots[i, 0], knots[i, knots.shape[1] - 1]
@@ -91,7 +92,7 @@ def _inside(knots, i, x):
 def _surely_reaches(knots_u, knots_v, i, uv):
     """Whether one of the places ``uv (m, 2)`` lies well inside the subdomain of point i."""
     j = 0
-    while j < uv.shape[0] and not (_inside(knots_u, i, uv[j, 0]) and _inside(knots_v, i, uv[j, 1])):
+    while j < uv.shape[0] and not (_is_well_inside(knots_u, i, uv[j, 0]) and _is_well_inside(knots_v, i, uv[j, 1])):
         j += 1
     return j < uv.shape[0]
 
@@ -120,8 +121,8 @@ def mark_reaching(knots_u, knots_v, pu, pv, uv, side, cell_start, list_start, li
             if many_u == 0:
                 many_u = distinct(cell_uv, sides, 0, values_u, at_u)
                 many_v = distinct(cell_uv, sides, 1, values_v, at_v)
-            found = along(knots_u, i, pu[i], values_u, many_u, True, work, along_u)
-            found = found and along(knots_v, i, pv[i], values_v, many_v, True, work, along_v)
+            found = blend_along(knots_u, i, pu[i], values_u, many_u, True, work, along_u)
+            found = found and blend_along(knots_v, i, pv[i], values_v, many_v, True, work, along_v)
             reach[q] = found and _combine(along_u, along_v, at_u, at_v, size, 1.0, numbers)
 
 
@@ -139,9 +140,9 @@ def rewrite_rows(
         along_u, along_v, values = np.zeros((size, 2)), np.zeros((size, 2)), np.zeros((size, 2))
         numbers, cell_uv, sides = np.zeros((3, tiles * 8)), uv[first : first + size], side[first : first + size]
         many = distinct(cell_uv, sides, 0, values, at_u)
-        found = along(knots_u, i, pu[i], values, many, True, work, along_u)
+        found = blend_along(knots_u, i, pu[i], values, many, True, work, along_u)
         many = distinct(cell_uv, sides, 1, values, at_v)
-        found = along(knots_v, i, pv[i], values, many, True, work, along_v) and found
+        found = blend_along(knots_v, i, pv[i], values, many, True, work, along_v) and found
         nonzero[q] = found and _combine(along_u, along_v, at_u, at_v, size, weights[i], numbers)
         if places[q] >= 0:
             _put_row(value, slope, at[c], rows[c], places[q], tiles, numbers)

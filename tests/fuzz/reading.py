@@ -89,7 +89,7 @@ def _tried_in_fork(data: bytes) -> bool:
         code = 1
         try:
             signal.setitimer(signal.ITIMER_PROF, rhino.PATIENCE_S + len(data) / rhino.BYTES_PER_S)
-            most = _data_bytes() + rhino.MOST_BYTES + rhino.GROWTH * len(data)
+            most = _data_bytes() + rhino.MAX_BYTES + rhino.GROWTH * len(data)
             resource.setrlimit(resource.RLIMIT_DATA, (most, most))
             code = int(rhino3dm.File3dm.FromByteArray(data) is None)
         finally:

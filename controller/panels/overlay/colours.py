@@ -23,10 +23,10 @@ OTHER: Colour = (0.8, 0.8, 0.8, 1.0)
 
 
 def layer_colour(name: str) -> Colour:
-    """The colour of a layer; a stage's own layers share one."""
+    """Return the colour of a layer; a stage's own layers share one."""
     return LAYERS.get(name, OTHER)
 
 
 def packed(imgui: Any, colour: Colour, alpha: float = 1.0) -> int:
-    """A colour as ImGui's draw lists take it."""
+    """Return a colour as ImGui's draw lists take it."""
     return int(imgui.color_convert_float4_to_u32(imgui.ImVec4(*colour[:3], colour[3] * alpha)))

@@ -1,4 +1,4 @@
-"""Shows how far the face lies from the mesh that it was fitted to, as colours on the face with their scale in mm."""
+"""Shows the distance between the face and the mesh that it was fitted to as colours, with their scale in mm."""
 
 from __future__ import annotations
 
@@ -20,35 +20,35 @@ NONE = (
     "omote fit MESH -o HEAD --keep measures it"
 )
 _TITLE = "mm between face and mesh"
-_WIDE, _HIGH, _EDGE = 16.0, 0.7, 0.8  # of the scale and of the room about it, in heights of a line of text
+_WIDE, _HIGH, _EDGE = 16.0, 0.7, 0.8  # width and height of the scale and its margin, in heights of a line of text
 _SHADE, _TEXT = (0.05, 0.05, 0.06, 0.75), (0.92, 0.92, 0.92, 1.0)
 
 
 class FitErrorView:
-    """Paints the face while it is switched on.
+    """Paints the face while it is enabled.
 
-    head : the one that is drawn. area : where the picture is. redraw : draws the same head anew.
+    head : the one that is drawn. area : of the picture. redraw : draws the same head again.
     """
 
     def __init__(self, head: Head, area: PictureArea, redraw: Callable[[], None]) -> None:
         self.on = False
         self._area, self._redraw = area, redraw
         self._colours, self._painted = FitColours(), False
-        self._see(head)
+        self._read_error(head)
 
-    def _see(self, head: Head) -> None:
+    def _read_error(self, head: Head) -> None:
         self._figures, self._gaps = figures_of(head), unmeasured(head)
 
     def dress(self, head: Head, theme: Theme) -> Theme:
-        """Paint a head that is drawn from now on, or take the paint off; returns the theme that shows it so."""
-        self._see(head)
+        """Paint a head that is about to be drawn, or remove the paint; return the theme with which to show it."""
+        self._read_error(head)
         self._painted = self.on and self._colours.paint(head)
         if not self._painted:
             self._colours.clear()
         return plain_theme(theme) if self._painted else theme
 
-    def draw_choice(self) -> None:
-        """The part of the panel that switches it, and what it says of the head."""
+    def draw_checkboxes(self) -> None:
+        """Draw the check box and, while it is on, the figures of the error or why there are none."""
         from imgui_bundle import imgui  # optional
 
         changed, on = imgui.checkbox("fit error##overlay", self.on)
@@ -58,13 +58,13 @@ class FitErrorView:
             imgui.text_wrapped(str(self._figures) if self._figures is not None else NONE)
 
     def switch(self, *, on: bool) -> None:
-        """Switch it on or off; the face is drawn anew where that changes its colours."""
+        """Enable or disable it; the face is drawn again if that changes its colours."""
         self.on = on
         if self._figures is not None:
             self._redraw()
 
     def __call__(self) -> None:
-        """Draw the scale in a corner of the picture; called once a frame."""
+        """Draw the scale in a corner of the picture; called once per frame."""
         if not self._painted:
             return
         from imgui_bundle import imgui  # optional
@@ -88,7 +88,7 @@ class FitErrorView:
 
     @staticmethod
     def _draw_bar(imgui: Any, draw: Any, corner: tuple[float, float], wide: float) -> None:
-        """The colours from 0 to the end of the scale, with the distance under each."""
+        """Draw the colours from 0 to the end of the scale, with the distance under each."""
         (left, top), line, vec = corner, imgui.get_font_size(), imgui.ImVec2
         ends = np.linspace(left, left + wide, len(SCALE)).tolist()
         colours = [_encoded(imgui, each) for each in SCALE]
@@ -102,6 +102,6 @@ class FitErrorView:
 
 
 def _encoded(imgui: Any, linear: Any) -> int:
-    """A linear RGB (3,) as ImGui draws it, as bright as it is on the lit face."""
+    """Return a linear RGB (3,) as ImGui draws it, as bright as it is on the lit face."""
     red, green, blue = (np.asarray(linear, np.float64) ** (1 / 2.2)).tolist()
     return packed(imgui, (red, green, blue, 1.0))

@@ -1,4 +1,4 @@
-"""The button that stops the servos: above everything else in the window, wherever that lies."""
+"""The button that stops the servos; it is above everything else in the window."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any, NamedTuple
 from controller.panels.overlay.colours import RED, packed
 
 LABEL = "STOP servos"
-_LINES, _CORNER_LINES = 2.0, 9.0  # height, and width where it has no place in the panel, in heights of a line of text
-_OWNER = 0x53544F50  # of the mouse's button while the pointer is on it: nothing below it hears the click
+_LINES, _CORNER_LINES = 2.0, 9.0  # height, and width in a corner of the window, in heights of a line of text
+_OWNER = 0x53544F50  # id that owns the mouse button while the pointer is on it, so that nothing below is clicked
 _BRIGHTER, _DARKER = 1.2, 0.75
 
 
@@ -32,12 +32,12 @@ class Box(NamedTuple):
 
 
 class StopButton:
-    """Draws it, once a frame, and stops as soon as the mouse's button goes down on it.
+    """Draws the button once per frame, and stops the servos as soon as the mouse button is pressed on it.
 
     stop : stops the servos.
 
-    It has a place in the panel. Where that is not whole in view, it is drawn in a corner of the window. It is drawn
-    over floating windows and menus and hears the mouse before them: none of them can hide it or take its click.
+    It has a place in the panel; if that is not fully visible, it is drawn in a corner of the window. It is drawn over
+    floating windows and menus and handles the mouse before them, so none of them can hide it or take its click.
 
     Attributes
     ----------
@@ -50,18 +50,18 @@ class StopButton:
         self.box = Box(0.0, 0.0, 0.0, 0.0)
 
     def leave_room(self, imgui: Any) -> None:
-        """Make room for it where the next widget of a window shall be."""
+        """Reserve its place at the position of the next widget."""
         imgui.invisible_button(
             LABEL, imgui.ImVec2(-1.0, _LINES * imgui.get_font_size())
         )  # no place to drag a window by
         low, high, draw = imgui.get_item_rect_min(), imgui.get_item_rect_max(), imgui.get_window_draw_list()
         seen = draw.get_clip_rect_min(), draw.get_clip_rect_max()
         box = Box(low.x, low.y, high.x, high.y)
-        if box.within(Box(seen[0].x, seen[0].y, seen[1].x, seen[1].y)) and box.right - box.left >= _least(imgui):
+        if box.within(Box(seen[0].x, seen[0].y, seen[1].x, seen[1].y)) and box.right - box.left >= _min_width(imgui):
             self._slot = box
 
     def __call__(self, imgui: Any) -> None:
-        """Draw it, and hear the mouse."""
+        """Draw it and handle the mouse."""
         self.box, self._slot = self._slot or _corner(imgui), None
         over = self.box.holds(imgui.get_io().mouse_pos)
         if over:
@@ -85,13 +85,13 @@ class StopButton:
         draw.add_text(imgui.ImVec2(*at), packed(imgui, (1.0, 1.0, 1.0, 1.0)), LABEL)
 
 
-def _least(imgui: Any) -> float:
-    """Width that shows the label whole."""
+def _min_width(imgui: Any) -> float:
+    """Return the width that shows the label whole."""
     return float(imgui.calc_text_size(LABEL).x + imgui.get_font_size())
 
 
 def _corner(imgui: Any) -> Box:
-    """The lower right corner of the window."""
+    """Return the lower right corner of the window."""
     size, line = imgui.get_io().display_size, imgui.get_font_size()
     right, bottom = size.x - line, size.y - line
     return Box(right - _CORNER_LINES * line, bottom - _LINES * line, right, bottom)

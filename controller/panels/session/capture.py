@@ -19,7 +19,7 @@ from surface.view.docks import PictureArea
 from surface.view.pictures.clip import write_clip
 from surface.view.pictures.sheet import write_png
 
-LONGEST_S = 600.0
+MAX_S = 600.0
 _CLIP_HEIGHT = 480
 
 
@@ -27,7 +27,7 @@ class Capture:
     """Takes pictures and records, into ``folder``.
 
     area : of the window, which gives the next picture. newest : the newest parameters (P,). clock : seconds.
-    parameters : without them, those of the base vocabulary.
+    parameters : default: those of the base vocabulary.
     jobs : writes clips beside the picture.
     message : what was written last, or why it was not. last : the last recording as a take, which can be edited.
     """
@@ -78,7 +78,7 @@ class Capture:
         self._promised.add(path)
         self.message = f"writing {path}"
         self._jobs.start(f"writing {path.name}", lambda _: self._write_clip(clip, path),
-                         lambda count: self._wrote(path, f", {count} pictures"))  # fmt: skip
+                         lambda count: self._report_written(path, f", {count} pictures"))  # fmt: skip
 
     def _write_clip(self, clip: Recorder, path: Path) -> int:
         """Write a clip, in another thread; returns how many pictures it has."""
@@ -89,16 +89,16 @@ class Capture:
             self.message = str(error)
             raise
 
-    def _wrote(self, path: Path, more: str = "") -> None:
+    def _report_written(self, path: Path, more: str = "") -> None:
         self.message = f"wrote {path}{more}"
 
     def _film(self) -> None:
         """Take the next picture for the clip where one is due, and nobody else wants it."""
         clip, at_s = self._clip, self._clock() - self._clip_began
         if clip is not None and clip.wants(at_s) and self._area.wanted is None:
-            self._area.wanted = lambda picture: self._keep(clip, picture, at_s)
+            self._area.wanted = lambda picture: self._add_to_clip(clip, picture, at_s)
 
-    def _keep(self, clip: Recorder, picture: np.ndarray, at_s: float) -> None:
+    def _add_to_clip(self, clip: Recorder, picture: np.ndarray, at_s: float) -> None:
         """Add a picture to a clip; one of another size ends it, as where the window was resized."""
         if clip is not self._clip:
             return
@@ -114,17 +114,17 @@ class Capture:
             return
         rows, self._rows = self._rows, None
         if rows:
-            self.last = _take_of(self._parameters, np.array(rows))
+            self.last = _make_take(self._parameters, np.array(rows))
             path = self._free("recording", ".csv")
             self._write(path, lambda to: _write_table(to, self._parameters.names, np.array(rows)))
 
     def __call__(self) -> None:
-        """Add the present face to the recording; called once a frame. It ends by itself after ten minutes."""
+        """Add the present face to the recording; called once per frame. It ends automatically after ten minutes."""
         self._film()
         if self._rows is None:
             return
         self._rows.append(np.append(self.seconds, self._newest()))
-        if self.seconds > LONGEST_S:
+        if self.seconds > MAX_S:
             self.toggle()
 
     def _write_picture(self, picture: np.ndarray) -> None:
@@ -133,19 +133,19 @@ class Capture:
     def _write(self, path: Path, write: Callable[[Path], None]) -> None:
         try:
             write(path)
-            self._wrote(path)
+            self._report_written(path)
         except OMOTE_ERRORS as error:
             self.message = str(error)
 
     def _free(self, stem: str, suffix: str) -> Path:
-        """The first name with a number that no file has."""
+        """Return the first name with a number that no file has."""
         number = 1
         while (path := self._folder / f"{stem}{number}{suffix}").exists() or path in self._promised:
             number += 1
         return path
 
 
-def _take_of(parameters: Parameters, rows: Floats) -> Take:
+def _make_take(parameters: Parameters, rows: Floats) -> Take:
     values = rows[:, 1:].copy()
     values.flags.writeable = False
     return Take(

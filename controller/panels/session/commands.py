@@ -1,7 +1,4 @@
-"""What the user has set in the panel, with undo and redo.
-
-Independent of the window library.
-"""
+"""The settings that the user makes in the panel, with undo and redo; independent of the window library."""
 
 from __future__ import annotations
 
@@ -17,7 +14,7 @@ from controller.takes.livelink import Take
 from controller.takes.timeline import Timeline
 from surface.head.model.light import LightPoints
 
-_NEUTRAL_S = 0.6
+_NEUTRAL_S = 0.6  # duration of the return to the neutral face
 _NOTHING_SHOWN = Show("neutral", 1.0)
 
 
@@ -25,12 +22,12 @@ _NOTHING_SHOWN = Show("neutral", 1.0)
 class Settings:
     """Everything that the user has set in the panel at one moment.
 
-    held : parameters by index and the values they are held at. expression : the one that is shown.
-    gaze : the point that is looked at, see :class:`controller.body.messages.LookAt`. life : amount of idle motion.
-    moves : (n, 3) mm that the control points of the face were moved by hand; None for none.
-    light : control points that were added to the face; they are the last of ``moves``.
-    look : theme, quality, person and head; None for those of the stage.
-    timeline : keys that become a show. take : the recording that is edited.
+    held : values at which parameters are held, by index. expression : the one that is shown.
+    gaze : the point to look at, see :class:`controller.body.messages.LookAt`. life : amount of idle motion, 0..1.
+    moves : (n, 3) displacements of the face's control points by hand, mm; None if nothing was moved.
+    light : light control points, see :mod:`surface.head.model.light`, that were added; the last rows of ``moves``.
+    look : appearance: theme, quality, person and head; None for those of the stage (the configuration file).
+    timeline : key frames of a show, a scripted performance. take : the recorded performance that is edited.
     """
 
     held: Mapping[int, float] = field(default_factory=dict)
@@ -46,7 +43,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class History:
-    """What is set, what can be taken back (the newest last), and what can be done again (the next last)."""
+    """The current settings, those to undo (the newest last), and those to redo (the next last)."""
 
     now: Settings
     past: tuple[Settings, ...] = ()
@@ -54,12 +51,12 @@ class History:
 
 
 class Commands:
-    """Changes what the user has set, sends it to the body, and undoes changes without limit.
+    """Changes the settings, sends them to the control process (body), and undoes changes without limit.
 
-    send : sends requests to the body. life : amount of idle motion at first.
-    show_moves : draws the control points moved by (n, 3) mm, or where they were for None.
-    show_light : draws a face with added control points; set by who can.
-    show_look : shows a look, or the first one for None; set by who can.
+    send : sends requests to the body. life : initial amount of idle motion, 0..1.
+    show_moves : draws the control points displaced by (n, 3) mm, or undisplaced for None.
+    show_light : draws a face with added control points. show_look : draws a look, or the initial one for None. Both do
+        nothing until the window replaces them.
     """
 
     def __init__(
@@ -79,29 +76,29 @@ class Commands:
 
     @property
     def undoable(self) -> bool:
-        """Whether there is something to take back."""
+        """Whether there is a change to undo."""
         return bool(self._past)
 
     @property
     def redoable(self) -> bool:
-        """Whether there is something taken back to do again."""
+        """Whether there is a change to redo."""
         return bool(self._future)
 
     @property
     def history(self) -> History:
-        """All that another window needs to go on with what was set here."""
+        """Everything that another window needs to continue with these settings."""
         return History(self.now, tuple(self._past), tuple(self._future))
 
-    def carry_on(self, history: History) -> None:
-        """Continue with the history of another window: send its settings to the body; undo and redo work as there."""
+    def restore(self, history: History) -> None:
+        """Continue with the history of another window: send its settings to the body, and undo and redo as there."""
         self._past, self._future = list(history.past), list(history.future)
         self._apply(history.now)
         self.end_step()
 
-    def turn_to(self, before: str, name: str, life: float) -> None:
-        """Go on with what was set of another head, which the body has kept; ``before`` is kept for later.
+    def switch_head(self, before: str, name: str, life: float) -> None:
+        """Switch to the settings of another head, which the body still has, and remember those of head ``before``.
 
-        ``life`` : its amount of idle motion, where nothing was set of it yet.
+        life : amount of idle motion of a head of which nothing was set yet.
         """
         self._others[before] = self.history
         history = self._others.get(name, History(Settings(life=life)))
@@ -130,26 +127,29 @@ class Commands:
         """Show an expression."""
         self.change(replace(self.now, expression=Show(name, intensity)), step)
 
-    def look(self, point: tuple[float, float, float] | None, step: Hashable = None) -> None:
+    def set_gaze(self, point: tuple[float, float, float] | None, step: Hashable = None) -> None:
         """Look at a point, or at nothing in particular."""
         self.change(replace(self.now, gaze=point), step)
 
-    def live(self, amount: float, step: Hashable = None) -> None:
+    def set_life(self, amount: float, step: Hashable = None) -> None:
         """Set the amount of idle motion, 0..1."""
         self.change(replace(self.now, life=amount), step)
 
-    def move(self, moves: Floats | None, step: Hashable = None) -> None:
-        """Move control points; None puts all of them back, and takes those out that were added."""
+    def set_moves(self, moves: Floats | None, step: Hashable = None) -> None:
+        """Displace control points; None resets all of them and removes those that were added."""
         light = self.now.light if moves is not None else ()
         self.change(replace(self.now, moves=moves, light=light), step)
 
     def add_points(self, light: LightPoints, moves: Floats, own: int) -> None:
-        """Add control points (k) to the face, moved by ``moves`` (k, 3); ``own`` : how many it has without any."""
+        """Add control points (k) to the face, moved by ``moves`` (k, 3), mm.
+
+        own : number of control points without any added ones.
+        """
         before = np.zeros((own, 3)) if self.now.moves is None else self.now.moves
         self.change(replace(self.now, moves=np.concatenate([before, moves]), light=(*self.now.light, light)))
 
     def remove_point(self, number: int) -> None:
-        """Take out one of the control points that were added, by its number among them."""
+        """Remove one of the added control points, by its number among them."""
         moves = self.now.moves
         if moves is None:
             return
@@ -162,45 +162,47 @@ class Commands:
         rest = np.delete(moves, own + number, axis=0)
         self.change(replace(self.now, moves=rest, light=tuple(each for each in light if len(each))))
 
-    def appear(self, look: Look | None) -> None:
-        """Change the look."""
+    def set_look(self, look: Look | None) -> None:
+        """Change the appearance."""
         self.change(replace(self.now, look=look))
 
-    def arrange(self, timeline: Timeline, step: Hashable = None) -> None:
+    def set_timeline(self, timeline: Timeline, step: Hashable = None) -> None:
         """Change the timeline."""
         self.change(replace(self.now, timeline=timeline), step)
 
-    def retake(self, take: Take | None) -> None:
-        """Edit a recording, or another version of it."""
+    def set_take(self, take: Take | None) -> None:
+        """Change the take that is edited, or to another version of it."""
         self.change(replace(self.now, take=take))
 
-    def neutral(self) -> None:
-        """Give everything back and return to the neutral face; idle motion, moved control points and the look stay."""
+    def return_to_neutral(self) -> None:
+        """Release held parameters, expression and gaze, and return to the neutral face; all other settings stay."""
         self._remember()
         kept = {name: getattr(self.now, name) for name in ("life", "moves", "light", "look", "timeline", "take")}
         self.now = Settings(**kept)
         self.send(Neutral(_NEUTRAL_S))
 
     def change(self, to: Settings, step: Hashable = None) -> None:
-        """Set everything that differs; changes with one ``step``, as of one drag, are taken back together."""
+        """Apply settings; consecutive changes with the same ``step``, such as those of one drag, are undone
+        together.
+        """
         if step is None or step != self._step:
             self._remember()
         self._step = step
         self._apply(to)
 
     def end_step(self) -> None:
-        """The next change is one of its own."""
+        """End the current step: the next change is undone separately."""
         self._step = None
 
     def undo(self) -> None:
-        """Take the last change back; without one nothing happens."""
+        """Undo the last change, if there is one."""
         if self._past:
             self._future.append(self.now)
             self._apply(self._past.pop())
         self.end_step()
 
     def redo(self) -> None:
-        """Do again what was taken back last; without it nothing happens."""
+        """Redo the change that was undone last, if there is one."""
         if self._future:
             self._past.append(self.now)
             self._apply(self._future.pop())
@@ -224,7 +226,7 @@ class Commands:
 
 
 def _differences(before: Settings, after: Settings) -> Iterator[PanelRequest]:
-    """Requests that change ``before`` to ``after``."""
+    """Return requests that change ``before`` to ``after``."""
     for index in before.held.keys() - after.held.keys():
         yield Hold(index, None)
     for index, value in after.held.items():

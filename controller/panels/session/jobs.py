@@ -1,4 +1,4 @@
-"""What takes long beside the picture: each job can be cancelled, and its result is taken by the window."""
+"""Long work in background threads: each job can be cancelled, and its result is delivered in the window's thread."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ class Cancelled(Exception):
 class Job:
     """Work in a thread of its own.
 
-    title : for people. done : gets the result, in the window's thread. given_up : called there instead, where the user
-    cancels it or it fails.
+    title : shown to the user. done : gets the result, in the window's thread. given_up : is called there instead if the
+    user cancels the job or it fails.
 
     Attributes
     ----------
-    cancelled : the user does not want it any more. replaced : another one does its work. since_s : when it began.
+    cancelled : by the user. replaced : dropped for another job. since_s : when it began.
     """
 
     def __init__(
@@ -51,7 +51,7 @@ class Job:
 
     @property
     def running(self) -> bool:
-        """Whether it goes on."""
+        """Whether it still runs."""
         return self._thread.is_alive()
 
     def join(self, limit_s: float) -> None:
@@ -75,7 +75,7 @@ class Job:
 
 
 class Jobs:
-    """The jobs that run now; called once a frame.
+    """The jobs that run now; called once per frame.
 
     problems : hears of those that fail.
     """
@@ -95,13 +95,13 @@ class Jobs:
         return job
 
     def drop(self, title: str) -> None:
-        """Take nothing from jobs of a title: nobody needs them any more."""
+        """Drop jobs of a title: their results are no longer needed."""
         for job in self.running:
             if job.title == title:
                 job.cancelled = job.replaced = True
 
     def __call__(self) -> None:
-        """Take the results of those that have ended."""
+        """Deliver the results of jobs that have ended."""
         for job in [job for job in self.running if not job.running]:
             self.running.remove(job)
             job.finish(self._problems)

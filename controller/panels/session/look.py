@@ -1,4 +1,4 @@
-"""The look of the face that the user chose."""
+"""The appearance of the face (look) that the user chose."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class Look:
-    """What the user chose. person : a name or a file, empty for nobody. head : a folder; the stage's own without."""
+    """The choices. person : a name or a file, empty for nobody. head : a folder; the stage's own without."""
 
     theme: str
     quality: str

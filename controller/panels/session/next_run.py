@@ -1,4 +1,4 @@
-"""What the run goes on with after its window has closed: another stage, or the same with more vocabularies."""
+"""What to open after the window has closed: another stage (configuration file), or the same with more vocabularies."""
 
 from __future__ import annotations
 
@@ -30,24 +30,26 @@ class NextRun:
 
 
 def carried_to(run: NextRun, parameters: Parameters) -> History | None:
-    """What was set and can be taken back, for ``parameters``: those that they lack are left out."""
+    """Return the settings with their undo history for ``parameters``; parameters that are missing there are left
+    out.
+    """
     history, at = run.carried, [parameters.find(name) for name in run.names]
     if history is None:
         return None
     now, past, future = (
-        tuple(_fitted(each, at, parameters) for each in settings)
+        tuple(_fit_settings(each, at, parameters) for each in settings)
         for settings in ((history.now,), history.past, history.future)
     )
     more = {parameters.index(name): value for name, value in run.held.items()}
     return History(replace(now[0], held={**now[0].held, **more}), past, future)
 
 
-def _fitted(settings: Settings, at: Sequence[int | None], parameters: Parameters) -> Settings:
+def _fit_settings(settings: Settings, at: Sequence[int | None], parameters: Parameters) -> Settings:
     held = {new: value for i, value in settings.held.items() if (new := at[i]) is not None}
-    return replace(settings, held=held, take=_fitted_take(settings.take, at, parameters))
+    return replace(settings, held=held, take=_fit_take(settings.take, at, parameters))
 
 
-def _fitted_take(take: Take | None, at: Sequence[int | None], parameters: Parameters) -> Take | None:
+def _fit_take(take: Take | None, at: Sequence[int | None], parameters: Parameters) -> Take | None:
     if take is None:
         return None
     values, mask = np.tile(parameters.neutral(), (len(take.values), 1)), np.zeros(len(parameters), bool)

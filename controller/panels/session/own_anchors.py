@@ -12,7 +12,7 @@ from controller.base.files import replacing
 from controller.base.parameters import Floats, Parameters
 from controller.robot.robot import load_robot
 
-_LEAST_MM = 1.0
+_MIN_MOVE_MM = 1.0
 _REACH_MM, _SWING_DEG = 25.0, 30.0
 
 
@@ -24,7 +24,7 @@ def save_anchor(path: Path, name: str, place: Floats, pull: Floats, parameters: 
     Raises ParameterError: the point was hardly pulled, or there is such a file. ControllerError: it cannot be written.
     """
     far_mm = float(np.linalg.norm(pull))
-    if far_mm < _LEAST_MM:
+    if far_mm < _MIN_MOVE_MM:
         raise ParameterError("no point was pulled", hint="Ctrl and drag the point where the servo pulls")
     if path.exists():
         raise ParameterError(f"{path}: there is such a file already", hint="choose another name")

@@ -18,8 +18,8 @@ from controller.vocabulary.vocabulary import Vocabulary
 from surface.base.files import read_text, reading
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,63}")
-_LEAST = 0.005
-_MOST_BYTES = 1 << 20
+_MIN_VALUE = 0.005
+_MAX_BYTES = 1 << 20
 
 
 def save_expression(
@@ -38,7 +38,7 @@ def save_expression(
     ControllerError: the file cannot be read or written, or is wrong.
     """
     check_name(name, known)
-    still = np.abs(values - parameters.rest) < _LEAST
+    still = np.abs(values - parameters.rest) < _MIN_VALUE
     face = np.clip(np.where(still, parameters.rest, np.round(values, 3)), parameters.low, parameters.high)
     weights: Floats = face - parameters.rest
     if not weights.any():
@@ -59,7 +59,7 @@ def append(path: Path, table: Mapping[str, Any], check: Callable[[Path], object]
     before = "# Saved in the window of omote run.\n"
     if path.exists():
         with reading(path, ConfigError):
-            before = read_text(path, _MOST_BYTES)
+            before = read_text(path, _MAX_BYTES)
     with replacing(path) as temporary:
         temporary.write_text(f"{before.rstrip()}\n\n{tomli_w.dumps(table)}", encoding="utf-8")
         try:

@@ -21,7 +21,7 @@ from surface.head import Head
 from surface.head.model.light import WEIGHT
 from surface.head.model.parameters import SHAPES
 
-_MOST_TIMES, _LEAST_VALUE, _LEAST_PRODUCT = 3, 0.1, 0.05
+_MAX_FACTORS, _MIN_VALUE, _MIN_PRODUCT = 3, 0.1, 0.05
 
 
 class Place(NamedTuple):
@@ -61,7 +61,7 @@ def save_corrective(
     """
     times = tuple(parameters.names[i] for i in _strongest(face, parameters))
     product = float(np.prod([face[parameters.index(each)] for each in times]))
-    if not times or product < _LEAST_PRODUCT:
+    if not times or product < _MIN_PRODUCT:
         raise ParameterError(
             "a corrective belongs to a face: none of its shapes is strong", hint="show the face, then move the skin"
         )
@@ -72,9 +72,10 @@ def save_corrective(
 
 
 def place_of(head: Head, group: GroupMoves) -> Place:
-    """Region and profile of the shape that moves the same control points the most; the mouth's where none does."""
-    part, group = next(part for part in head.data.parts if part.name == group.part), _on_own_points(head, group)
-    moved = {each.name: _shared(each.ids, each.moves, group) for each in part.groups if each.name in SHAPES}
+    """Return the region and profile of the shape that moves the same control points the most; the mouth's where none
+    does."""
+    part, group = next(part for part in head.data.parts if part.name == group.part), _drop_added_points(head, group)
+    moved = {each.name: _overlap(each.ids, each.moves, group) for each in part.groups if each.name in SHAPES}
     if not any(moved.values()):
         return Place("mouth", "mouth")
     shapes: Mapping[str, Any] = read_toml(config_dir() / "vocabularies" / "arkit.toml")["parameters"]
@@ -82,8 +83,8 @@ def place_of(head: Head, group: GroupMoves) -> Place:
     return Place(shape["region"], shape["profile"])
 
 
-def _on_own_points(head: Head, group: GroupMoves) -> GroupMoves:
-    """A group with those of the head's own control points that count most where it adds some."""
+def _drop_added_points(head: Head, group: GroupMoves) -> GroupMoves:
+    """Return a group with those of the head's own control points that count most where it adds some."""
     if group.light is None:
         return group
     share = head.part(group.part).surface.basis_matrix(group.light.centres)
@@ -92,17 +93,17 @@ def _on_own_points(head: Head, group: GroupMoves) -> GroupMoves:
     return GroupMoves(group.part, np.concatenate([group.ids, ids]), np.concatenate([group.moves, moves]))
 
 
-def _shared(ids: np.ndarray, moves: np.ndarray, group: GroupMoves) -> float:
-    """How far a shape moves the control points of a group, each weighted with how far the group moves it."""
+def _overlap(ids: np.ndarray, moves: np.ndarray, group: GroupMoves) -> float:
+    """Return how far a shape moves the control points of a group, each weighted with how far the group moves it."""
     far = np.zeros(max(ids.max(initial=-1), group.ids.max(initial=-1)) + 1)
     np.add.at(far, ids, np.linalg.norm(np.asarray(moves, float), axis=1))
     return float((far[group.ids] * np.linalg.norm(group.moves, axis=1)).sum())
 
 
 def _strongest(face: Floats, parameters: Parameters) -> list[int]:
-    """The strongest shapes of a face, at most three."""
-    there = [i for i in range(parameters.base) if parameters.names[i] in SHAPES and face[i] >= _LEAST_VALUE]
-    return sorted(sorted(there, key=lambda i: -face[i])[:_MOST_TIMES])
+    """Return the strongest shapes of a face, at most three."""
+    there = [i for i in range(parameters.base) if parameters.names[i] in SHAPES and face[i] >= _MIN_VALUE]
+    return sorted(sorted(there, key=lambda i: -face[i])[:_MAX_FACTORS])
 
 
 def _save(

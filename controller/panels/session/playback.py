@@ -1,4 +1,4 @@
-"""Where the timeline's line is: plays and scrubs a timeline or a recording by holding the face of the moment.
+"""Plays and scrubs a timeline or a take (a recorded performance) by holding the face of the current moment.
 
 Independent of the window library.
 """
@@ -24,21 +24,21 @@ from controller.takes.reader import load_take
 from controller.takes.timeline import Ease, key_of_face, load_timeline, save_show
 from controller.vocabulary.vocabulary import Vocabulary
 
-_LEAST_S = 1.0
-"""A timeline that is shorter is drawn as long as this."""
+_MIN_LENGTH_S = 1.0
+"""Length at which shorter timelines are drawn."""
 JITTER_S = 0.05
 
 
 class Playback:
-    """Shows moments, and edits the timeline at the line; called once a frame.
+    """Shows moments, and edits the timeline at the line; called once per frame.
 
     newest : the newest parameters (P,). send : sends requests to the body. clock : seconds.
-    parameters : without them, those of the base vocabulary. sound : plays the timeline's sound.
+    parameters : default: those of the base vocabulary. sound : plays the timeline's sound.
 
     Attributes
     ----------
-    position_s : of the line. playing : whether it moves by itself. selected : the number of a key, None for none.
-    range_s : the part of a recording that is marked.
+    position_s : the current moment. playing : whether it advances. selected : the number of a key; None for none.
+    range_s : the marked part of a take.
     """
 
     def __init__(
@@ -75,7 +75,7 @@ class Playback:
     @property
     def shown_s(self) -> float:
         """Length of the scale that is drawn."""
-        return max(self.length_s * 1.1, _LEAST_S)
+        return max(self.length_s * 1.1, _MIN_LENGTH_S)
 
     def __call__(self) -> None:
         """Let the line go on while it plays; it stops at the end."""
@@ -138,13 +138,13 @@ class Playback:
         """Put a face, the present one without, on the timeline at the line."""
         timeline = self._commands.now.timeline
         key = key_of_face(self.position_s, self._newest() if face is None else face, self._parameters, ease, name)
-        self._commands.arrange(timeline.with_key(key))
+        self._commands.set_timeline(timeline.with_key(key))
         self.selected = next(i for i, each in enumerate(self._commands.now.timeline.keys) if each.at_s == key.at_s)
 
     def delete_key(self) -> None:
         """Take the selected key away."""
         if self.selected is not None:
-            self._commands.arrange(self._commands.now.timeline.without_key(self.selected))
+            self._commands.set_timeline(self._commands.now.timeline.without_key(self.selected))
             self.selected = None
 
     def move_key(self, number: int, at_s: float) -> None:
@@ -153,12 +153,12 @@ class Playback:
         low = keys[number - 1].at_s + 0.01 if number else 0.0
         high = keys[number + 1].at_s - 0.01 if number + 1 < len(keys) else np.inf
         at_s = round(min(max(at_s, low), high), 3)
-        self._commands.arrange(self._commands.now.timeline.with_time(number, at_s), ("key", number))
+        self._commands.set_timeline(self._commands.now.timeline.with_time(number, at_s), ("key", number))
 
     def edit(self, take: Take | None) -> None:
         """Edit a recording; the keys of the timeline for None."""
         self._pause()
-        self._commands.retake(take)
+        self._commands.set_take(take)
         self.position_s, self.range_s, self.selected = 0.0, None, None
 
     def edit_take(self, how: str) -> None:
@@ -167,11 +167,11 @@ class Playback:
         if take is None:
             raise ParameterError("there is no recording to edit", hint="R records")
         if how == "smooth":
-            self._commands.retake(smooth(take, JITTER_S))
+            self._commands.set_take(smooth(take, JITTER_S))
             return
         if self.range_s is None:
             raise ParameterError("no range of the recording is marked", hint="drag over it with the right mouse button")
-        self._commands.retake((keep if how == "keep" else cut_out)(take, *self.range_s))
+        self._commands.set_take((keep if how == "keep" else cut_out)(take, *self.range_s))
         self.range_s, self.position_s = None, 0.0
 
     def layer(self, above: Take) -> None:
@@ -179,13 +179,13 @@ class Playback:
         take = self._commands.now.take
         if take is None:
             raise ParameterError("there is no recording to lay another one over", hint="edit the recording first")
-        self._commands.retake(layer_over(take, above, min(self.position_s, take.duration_s)))
+        self._commands.set_take(layer_over(take, above, min(self.position_s, take.duration_s)))
 
     def hear(self, path: Path | None) -> None:
         """Play a sound with the timeline, or none. Raises ControllerError: it is none that can be played."""
         if path is not None:
             sound_length_s(path)
-        self._commands.arrange(replace(self._commands.now.timeline, sound=path))
+        self._commands.set_timeline(replace(self._commands.now.timeline, sound=path))
 
     def load(self, path: Path) -> None:
         """Edit what a file holds: a show that was made here, a take, or the lips of a voice.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from controller.base.parts import describe
 
-_MOST = 100
+_MAX_PROBLEMS = 100
 
 
 @dataclass
@@ -31,7 +31,7 @@ class Problems:
                 problem.times += 1
                 return
         self.unread.append(Problem(text))
-        del self.unread[:-_MOST]
+        del self.unread[:-_MAX_PROBLEMS]
 
     def dismiss(self) -> None:
         """The newest was read."""

@@ -28,7 +28,7 @@ class Captured:
     highest: float | None = None
 
     def angles(self) -> CapturedAngles | None:
-        """The three of them; None while one is missing, or they are not in order."""
+        """Return the three of them; None while one is missing, or they are not in order."""
         if self.lowest is None or self.neutral is None or self.highest is None:
             return None
         if not self.lowest <= self.neutral <= self.highest or self.lowest == self.highest:
@@ -48,7 +48,7 @@ class ServoCaptures:
         self._servos: dict[str, Mapping[str, Any]] = {}
 
     def of(self, servo: Mapping[str, Any]) -> Captured:
-        """What was captured of a servo."""
+        """Return what was captured of a servo."""
         return self._captured.get(servo_key(servo), Captured())
 
     def capture(self, servo: Mapping[str, Any], mark: Mark) -> None:
@@ -88,7 +88,7 @@ class ServoCaptures:
         return paths
 
     def _robot_of(self, servo: Mapping[str, Any]) -> str:
-        """The name of the robot that a servo belongs to."""
+        """Return the name of the robot that a servo belongs to."""
         parts = str(servo["bus"]).split("/")
         own = [each for each in self._robots if any(channel.name == servo["name"] for channel in each.channels)]
         named = [each for each in own if each.name in parts] or own

@@ -28,16 +28,16 @@ _BLOCK = 1 << 16  # frames
 
 
 def find_player() -> tuple[str, ...] | None:
-    """The command that plays a WAV file whose path follows; None where there is none."""
+    """Return the command that plays a WAV file whose path follows; None where there is none."""
     if sys.platform == "win32":
         return (sys.executable, "-c", _WINDOWS)
     return next((command for command in PLAYERS if shutil.which(command[0])), None)
 
 
 def sound_length_s(path: Path) -> float:
-    """How long the samples of a WAV file are. Raises ControllerError: it cannot be read, or is none."""
-    with _opened(path) as sound:
-        return sum(len(block) // sound.format.frame for block in _blocks(sound)) / sound.format.rate_hz
+    """Return how long the samples of a WAV file are. Raises ControllerError: it cannot be read, or is none."""
+    with _open(path) as sound:
+        return sum(len(block) // sound.format.frame for block in _read_blocks(sound)) / sound.format.rate_hz
 
 
 class SoundPlayer:
@@ -65,7 +65,7 @@ class SoundPlayer:
         command = self._command or find_player()
         if command is None:
             raise ControllerError("no program here plays sound", hint="sudo apt-get install alsa-utils, or ffmpeg")
-        self._rest = _from(path, from_s)
+        self._rest = _write_rest(path, from_s)
         if self._rest is not None:
             words = [*command, str(self._rest)]
             quiet = subprocess.DEVNULL
@@ -87,38 +87,38 @@ class SoundPlayer:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Sound]:
+def _open(path: Path) -> Iterator[Sound]:
     with reading(path, ControllerError, hint=HINT), open_file(path) as stream:
         yield open_sound(stream, str(path))
 
 
-def _blocks(sound: Sound) -> Iterator[bytes]:
-    """The remaining part of a sound."""
+def _read_blocks(sound: Sound) -> Iterator[bytes]:
+    """Return the remaining part of a sound."""
     while block := sound.read(_BLOCK):
         yield block
 
 
-def _from(path: Path, from_s: float) -> Path | None:
-    """A WAV file of what comes after a moment, as 16 bit PCM: not every player can begin in the middle, or reads every
-    kind of WAV. None where nothing comes."""
-    with _opened(path) as sound:
+def _write_rest(path: Path, from_s: float) -> Path | None:
+    """Return a WAV file of what comes after a moment, as 16 bit PCM: not every player can begin in the middle, or reads
+    every kind of WAV. None where nothing comes."""
+    with _open(path) as sound:
         form = sound.format
         skip = round(max(from_s, 0.0) * form.rate_hz)
         while skip > 0 and (block := sound.read(min(skip, _BLOCK))):
             skip -= len(block) // form.frame or skip
-        parts = [np.rint(form.frames(block) * 32767.0).astype("<i2") for block in _blocks(sound)]
+        parts = [np.rint(form.frames(block) * 32767.0).astype("<i2") for block in _read_blocks(sound)]
     if not any(map(len, parts)):
         return None
     try:
-        return _written(form, parts)
+        return _write_wav(form, parts)
     except OSError as error:
         raise ControllerError(
             f"{path}: cannot be played: no room in {tempfile.gettempdir()}: {error.strerror}", hint="make room there"
         ) from error
 
 
-def _written(form: SoundFormat, parts: Sequence[NDArray[np.int16]]) -> Path:
-    """A WAV file of samples, 16 bit PCM, that somebody else removes. Raises OSError, and leaves no file then."""
+def _write_wav(form: SoundFormat, parts: Sequence[NDArray[np.int16]]) -> Path:
+    """Return a WAV file of samples, 16 bit PCM, that somebody else removes. Raises OSError, and leaves no file then."""
     with tempfile.NamedTemporaryFile(prefix="omote-", suffix=".wav", delete=False) as file:
         path = Path(file.name)
         try:

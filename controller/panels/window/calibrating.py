@@ -29,7 +29,7 @@ class Calibrating:
         self._mirrors, self._name, self._message = False, "mine", ""
 
     def __call__(self, servos: list[Mapping[str, Any]]) -> None:
-        """Draw for the servos that were clicked; called once a frame."""
+        """Draw for the servos that were clicked; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         if self.mirror is not None:

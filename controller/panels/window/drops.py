@@ -81,7 +81,7 @@ class Drops:
 
     def _appear(self, **change: Any) -> None:
         look: Look = self._commands.now.look or self._looks.first
-        self._commands.appear(replace(look, **change))
+        self._commands.set_look(replace(look, **change))
 
     def _take_toml(self, path: Path) -> None:
         with reading(path, ConfigError):
@@ -116,7 +116,7 @@ def is_person(table: Mapping[str, Any]) -> bool:
 
 
 def free_folder(beside: Path, stem: str) -> Path:
-    """The first name with a number that nothing has."""
+    """Return the first name with a number that nothing has."""
     number = 1
     while (path := beside / f"{stem}-head{number}").exists():
         number += 1

@@ -23,7 +23,7 @@ from surface.view.docks import PictureArea
 from surface.view.scene.camera import Camera
 
 _WHITE, _PIN, _ADDED = 0xFFFFFFFF, 0xFF3C78E6, 0xFF50D2F0
-_FEWEST = 3  # picks of a line
+_MIN_PICKS = 3  # of a line
 Tool = Literal["pull the face", "pull the skin", "wrinkle", "add points", "remove points"]
 TOOLS: tuple[Tool, ...] = get_args(Tool)
 
@@ -47,7 +47,7 @@ class Brush:
 
 
 class MouseEditing:
-    """Drags points of the face with the mouse; called once a frame.
+    """Drags points of the face with the mouse; called once per frame.
 
     area : where the picture is. copy : loads the same head again, without the control points that were added here.
     newest : the newest parameters (P,).
@@ -94,7 +94,7 @@ class MouseEditing:
         self._commands.change(replace(now, light=editor.light, moves=moves))
 
     def find_editor(self) -> PointEditor:
-        """What drags the points of the head that is shown now."""
+        """Return what drags the points of the head that is shown now."""
         return self.editor
 
     def _show_moves(self, moves: Floats | None) -> None:
@@ -119,7 +119,7 @@ class MouseEditing:
         """Make the face look at what is under a pixel, half-way between its eyes and the camera."""
         towards = np.asarray(camera.eye, np.float64)
         point = screen.place(pixel, self._eyes + 0.5 * (towards - self._eyes)) - self._eyes
-        self._commands.look((float(point[0]), float(point[1]), float(point[2])), "gaze")
+        self._commands.set_gaze((float(point[0]), float(point[1]), float(point[2])), "gaze")
 
     def _use(self, imgui: Any, io: Any, pixel: tuple[float, float], screen: Screen, outside: bool) -> None:
         """Use the tool where Ctrl and the mouse are pressed, and continue an action that has begun."""
@@ -182,7 +182,7 @@ class MouseEditing:
     def _wrinkle(self, stroke: Sequence[tuple[float, float]], screen: Screen) -> None:
         brush, values = self.brush, self._newest()
         made = None
-        if len(stroke) >= _FEWEST:
+        if len(stroke) >= _MIN_PICKS:
             made = self.editor.wrinkle(
                 stroke, screen, values, brush.depth_mm, brush.width_mm, tied=brush.symmetric
             )  # fmt: skip
@@ -226,10 +226,10 @@ class MouseEditing:
         self.editor.release()
         moves = self.editor.moves
         if moves is not before and (before is not None or moves.any()):
-            self._commands.move(moves)
+            self._commands.set_moves(moves)
 
     def _face_wanted(self) -> Floats:
-        """(P,) the face with what is held by hand, which it may still be on its way to."""
+        """Return (P,): the face with what is held by hand, which it may still be on its way to."""
         values = self._newest().copy()
         for index, value in self._commands.now.held.items():
             values[index] = value

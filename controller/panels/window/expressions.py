@@ -28,7 +28,7 @@ class ExpressionButtons:
         self._intensity = 1.0
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         imgui.set_next_item_width(-imgui.calc_text_size("intensity").x - imgui.get_font_size())
@@ -101,7 +101,7 @@ class ExpressionButtons:
 
 
 def _free_height(taken: list[tuple[float, float, float]], x: float, y: float, width: float, height: float) -> float:
-    """The first height from ``y`` down where a label covers none of those ``taken`` (left, top, width)."""
+    """Return the first height from ``y`` down where a label covers none of those ``taken`` (left, top, width)."""
     while any(x < left + wide and left < x + width and abs(y - top) < height for left, top, wide in taken):
         y += 1.0
     return y

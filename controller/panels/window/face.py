@@ -112,7 +112,7 @@ class WindowFace:
         self._ended = False
         self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
         if carried is not None and (history := carried_to(carried, parameters)) is not None:
-            self._panel.commands.carry_on(history)
+            self._panel.commands.restore(history)
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
@@ -178,14 +178,14 @@ class WindowFace:
         self._area.remake = Remake(make, choice or settings.still_quality, done)
 
     def _draw_overlay_choice(self) -> None:
-        """What can be drawn over the picture, and what can be painted on the face."""
+        """Draw the check boxes of overlays and of the fit error."""
         if self._overlays is not None:
-            self._overlays.draw_choice()
+            self._overlays.draw_checkboxes()
         if self._fit_error is not None:
-            self._fit_error.draw_choice()
+            self._fit_error.draw_checkboxes()
 
     def _take_over(self, head: Head) -> None:
-        """Pose, drag and look at another head from now on."""
+        """Use another head for posing, dragging and gaze from now on."""
         self._head = head
         self._values.follow(head.parameters)
         self._viewpoint.reframe(framing_of(head))
@@ -193,10 +193,10 @@ class WindowFace:
             looks = self._looks
             self._mouse.change(head, looks.shown_light if looks else (), same=looks is not None and looks.only_light)
         if self._overlays is not None:
-            self._overlays.forget()
+            self._overlays.reload()
 
     def _mirror(self, state: PanelState, on: bool) -> None:
-        """Let the face show what the servos show, where they are known to, or what is wanted."""
+        """Show the pose measured by the servos, as far as it is known, or the wanted pose."""
         self._values.replaced = state.show_measured if on else None
 
     def _turn_to(self, looks: Looks, stage: Stage) -> None:
@@ -213,7 +213,7 @@ class WindowFace:
         self.next_run, self._ended = NextRun(stage), True
 
     def _open_again(self, stage: Stage, options: PanelOptions, history: History, held: Mapping[str, float]) -> None:
-        """Open the same stage with the user's vocabulary as it is now, and go on with what was set."""
+        """Open the same stage again with the user's current vocabulary, and keep the settings."""
         files = tuple(dict.fromkeys(each.resolve() for each in (*options.files, options.own_file)))
         self.next_run, self._ended = NextRun(stage.path, files, history, options.parameters.names, held), True
 
@@ -238,5 +238,5 @@ class WindowFace:
             self._fit_error()
 
     def report(self) -> dict[str, object]:
-        """Frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""
+        """Return frames that were drawn; see :meth:`controller.face.face.FrameLog.report`."""
         return {**self._log.report(self._settings, "window"), **qualities(self._choice)}

@@ -1,4 +1,4 @@
-"""Whose face the window shows and moves, in a stage with several heads."""
+"""Choice of the head that the window shows and controls, in a stage (configuration) with several heads."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class HeadSource:
-    """One head of a stage. stage : as if it were the only one. mailbox : its parameters. state : its state."""
+    """One head of a stage. stage : the stage reduced to this head. mailbox : its parameters. state : its state."""
 
     name: str
     stage: Stage
@@ -29,7 +29,7 @@ class HeadSource:
 
 
 class HeadChoice:
-    """Chooses between heads; each keeps what was set of it, with its own undo.
+    """Switches between heads; each keeps its settings, with its own undo.
 
     sources : in the order of the stage; empty for a stage of one head. values, state : what the window reads.
     tell : sends requests to the body; a request that names no head is for the first one.
@@ -61,7 +61,7 @@ class HeadChoice:
         self._tell(request if whole else ToHead(self._sources[self.chosen].name, request))
 
     def choose(self, number: int, commands: Commands) -> None:
-        """Show another head and move it from now on."""
+        """Show and control another head from now on."""
         if number == self.chosen:
             return
         before, self.chosen = self._sources[self.chosen], number
@@ -69,11 +69,11 @@ class HeadChoice:
         self._values.listen(now.mailbox)
         if self._state is not None:
             self._state.turn_to(now.state)
-        commands.turn_to(before.name, now.name, now.stage.settings.liveliness)
+        commands.switch_head(before.name, now.name, now.stage.settings.liveliness)
         self.show(now.stage)
 
     def draw(self, commands: Commands) -> None:
-        """The choice, where there are several; called once a frame."""
+        """Draw the list of heads, if there are several; called once per frame."""
         if len(self._sources) < 2:
             return
         from imgui_bundle import imgui  # optional

@@ -26,7 +26,7 @@ HELP = {
 
 @dataclass
 class Keys:
-    """Carries out keys; called once a frame.
+    """Carries out keys; called once per frame.
 
     actions : what each key of ImGui does, by its name there: ``space``, ``r``. with_ctrl : the same, with Ctrl held.
     always : what keys do also while text is typed.
@@ -56,7 +56,7 @@ class Keys:
             self._help(imgui, below)
 
     def _help(self, imgui: Any, below: float) -> None:
-        """At the right of the window and below ``below``, in text as small as it takes to show all of it."""
+        """Draw the help at the right of the window below ``below``, in text small enough to show all of it."""
         size, line, style = imgui.get_io().display_size, imgui.get_font_size(), imgui.get_style()
         below = below if below < size.y / 2 else 0.0  # STOP is in the lower corner
         room = size.x - 2 * style.window_padding.x, size.y - below - 2 * style.window_padding.y
@@ -81,7 +81,7 @@ class Keys:
 
 
 def _help_size(imgui: Any) -> tuple[float, float]:
-    """Width and height of the help in text of the usual size."""
+    """Return the width and height of the help in text of the usual size."""
     style = imgui.get_style()
     columns = (HELP.keys(), HELP.values())
     wide = sum(max(imgui.calc_text_size(words).x for words in column) + 2 * style.cell_padding.x for column in columns)

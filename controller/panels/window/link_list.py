@@ -16,7 +16,7 @@ class LinkList:
         self._feed = feed
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         links = self._feed.details.links
@@ -45,7 +45,7 @@ class LinkList:
 
 
 def state_of(link: Mapping[str, Any]) -> tuple[str, str]:
-    """``good``, ``waits`` or ``bad``, and in words whether a link is plugged in and what was wrong last."""
+    """Return ``good``, ``waits`` or ``bad``, and in words whether a link is plugged in and what was wrong last."""
     fault = str(link.get("fault") or "")
     if fault:
         return "bad", fault
@@ -57,7 +57,7 @@ def state_of(link: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def figures(link: Mapping[str, Any]) -> str:
-    """Rate, jitter, age, loss and counts, as far as a link reports them."""
+    """Return the rate, jitter, age, loss and counts, as far as a link reports them."""
     found = []
     if link.get("rate_hz") is not None:
         found.append(f"{link['rate_hz']:g} Hz, jitter {link.get('jitter_ms') or 0:g} ms")

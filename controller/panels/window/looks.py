@@ -1,4 +1,4 @@
-"""How the face looks, changed while it is shown: theme, quality, person, another head.
+"""Changes the appearance of the face while it is shown: theme, quality, person, another head.
 
 A head is loaded in a thread of its own, then the window draws it; the servos notice nothing. Independent of the window
 library, but for drawing.
@@ -27,7 +27,7 @@ _THEMES, _QUALITIES = (get_args(PictureSettings.model_fields[key].annotation) fo
 
 
 class Looks:
-    """Changes the look of a stage's face.
+    """Changes the appearance (look) of a stage's face.
 
     swap : draws a head with settings from now on. jobs : loads it.
 
@@ -83,7 +83,7 @@ class Looks:
         self._jobs.drop(_CHANGING)
 
     def show(self, look: Look | None) -> None:
-        """Show a look; the first one without. What fails is reported, and the face stays."""
+        """Show a look, or the initial one for None. If it fails, that is reported and the face stays."""
         look = look or self.first
         before, self._shown = self._shown, look
         stage = self._stage(look)
@@ -103,7 +103,7 @@ class Looks:
         return self._stage(self._shown).load_head(self.shown_light)
 
     def _stage(self, look: Look) -> Stage:
-        """The stage with a look. Raises ConfigError: no such person, or one that does not fit the head."""
+        """Return the stage with a look. Raises ConfigError: no such person, or one that does not fit the head."""
         stage = self.stage
         if look.head is not None:
             settings = stage.settings.model_copy(update={"identity": {}})
@@ -115,19 +115,19 @@ class Looks:
 
 
 def person_names() -> list[str]:
-    """Names of the shipped persons."""
+    """Return names of the shipped persons."""
     return sorted(path.stem for path in (config_dir() / "persons").glob("*.toml"))
 
 
 class LookControls:
-    """Draws the choices; ``looks`` : carries them out, through ``commands``, so that they can be taken back."""
+    """Draws the choices; ``looks`` : carries them out, through ``commands``, so that they can be undone."""
 
     def __init__(self, looks: Looks, commands: Commands) -> None:
         self._looks, self._commands = looks, commands
         self._persons = [NOBODY, *person_names()]
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         look = self._commands.now.look or self._looks.first
@@ -144,11 +144,11 @@ class LookControls:
 
     def choose(self, look: Look) -> None:
         """Change to a look."""
-        self._commands.appear(look)
+        self._commands.set_look(look)
 
 
 def _choose(imgui: Any, label: str, names: Sequence[str], chosen: str) -> str:
-    """One of ``names`` from a list that opens; what was chosen by a file keeps its own line."""
+    """Return one of ``names`` from a list that opens; what was chosen by a file keeps its own line."""
     listed = list(names) if chosen in names else [chosen, *names]
     imgui.set_next_item_width(imgui.get_font_size() * 9)
     changed, at = imgui.combo(label, listed.index(chosen), listed)

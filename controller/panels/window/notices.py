@@ -1,4 +1,4 @@
-"""Draws what went wrong and what is under way, on top of every tab."""
+"""Draws reported problems and running jobs at the top of every tab."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from controller.panels.session.problems import Problems
 
 
 def draw_problems(imgui: Any, problems: Problems) -> None:
-    """Draw the newest with a button that dismisses it; nothing without any."""
+    """Draw the newest problem, if there is one, with a button that dismisses it."""
     if not problems.unread:
         return
     newest, more = problems.unread[-1], len(problems.unread) - 1
@@ -28,7 +28,7 @@ def draw_problems(imgui: Any, problems: Problems) -> None:
 
 
 def draw_jobs(imgui: Any, jobs: Jobs) -> None:
-    """Draw a bar and a button that cancels for each; nothing without any."""
+    """Draw a progress bar and a cancel button for each job."""
     for job in [job for job in jobs.running if not job.cancelled]:
         imgui.progress_bar(-0.5 * (time.monotonic() - job.since_s) - 1e-3, imgui.ImVec2(-1, 0), job.title)
         if imgui.button(f"cancel##{job.title}"):

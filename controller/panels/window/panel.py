@@ -112,7 +112,7 @@ class Panel:
         self.heads: HeadChoice | None = None
 
     def docks(self) -> list[Dock]:
-        """The parts, as tabs beside the picture."""
+        """Return the parts, as tabs beside the picture."""
         parts: dict[str, Callable[[], None]] = {
             "Faces": self.expressions,
             "Sliders": self.sliders,
@@ -125,7 +125,7 @@ class Panel:
         return [Dock(title, "left", self._below_top(part)) for title, part in parts.items()]
 
     def __call__(self) -> None:
-        """What belongs to no tab: keys, recording; called once a frame."""
+        """Handle keys and recording, which belong to no tab; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         if self._state is not None:
@@ -171,19 +171,19 @@ class Panel:
         }
 
     def _neutral(self) -> None:
-        """Give everything back, servos that were turned by hand too."""
-        self.commands.neutral()
+        """Release everything that is held, also servos that were turned by hand."""
+        self.commands.return_to_neutral()
         if self.feed is not None:
             self.calibrating.forget()
 
     def _toggle_bare(self) -> None:
-        """The face alone on the whole screen, and back."""
+        """Show only the face on the whole screen, or return to the panel."""
         self.area.bare = not self.area.bare
         if self.area.bare != self.full_screen.on:
             self.full_screen.toggle()
 
     def _start_over_the_picture(self, imgui: Any) -> None:
-        """What ends a stop, above the button that stops in the corner of a picture that is alone."""
+        """Draw the button that ends a stop above the STOP button if only the picture is shown."""
         line, box = imgui.get_font_size(), self.stop.box
         imgui.set_next_window_pos(imgui.ImVec2(box.right, box.top - line), imgui.Cond_.always, imgui.ImVec2(1.0, 1.0))
         imgui.set_next_window_size(imgui.ImVec2(box.right - box.left + line, 0.0))
@@ -194,7 +194,7 @@ class Panel:
         imgui.end()
 
     def _below_top(self, part: Callable[[], None]) -> Callable[[], None]:
-        """A part below what every tab has on top."""
+        """Return a part below what every tab has on top."""
 
         def draw() -> None:
             from imgui_bundle import imgui  # optional
@@ -215,11 +215,11 @@ class Panel:
 
     @property
     def _stopped_by(self) -> str:
-        """Who stopped the servos; empty while they are not stopped."""
+        """Return who stopped the servos; empty while they are not stopped."""
         return self._state.stopped_by if self._state is not None else ""
 
     def _start(self, imgui: Any) -> None:
-        """Who stopped the servos, and the button that ends that: not where STOP is, which may be clicked twice."""
+        """Draw who stopped the servos and the button that ends it, away from STOP, which may be clicked twice."""
         imgui.text_wrapped(f"servos stopped by {self._stopped_by}")
         imgui.push_style_color(imgui.Col_.button, imgui.ImVec4(*GREEN))
         if imgui.button("START servos", imgui.ImVec2(-1, 0)):

@@ -1,7 +1,7 @@
 """Saves the present face, or moved control points, into the user's own vocabulary; draws what that needs.
 
-An expression and a gesture are known at once. A group and a corrective are parameters, which the window opens again
-with; everything that was set is kept.
+An expression and a gesture can be used immediately. A group and a corrective are parameters, which the window opens
+again with; everything that was set is kept.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 STEMS: dict[Kind, str] = {
     "expression": "face", "gesture": "gesture", "group": "fold", "corrective": "corrective", "anchor": "anchor",
 }  # fmt: skip
-"""What a name begins with that omote chooses."""
+"""Beginnings of the names that omote chooses, by kind."""
 ABOUT: dict[Kind, str] = {
     "expression": "the present face, as a mood",
     "gesture": "the present face, which keeps the mood meanwhile",
@@ -73,7 +73,7 @@ class Saving:
         self.message, self._name = "", ""
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         width = imgui.get_content_region_avail().x
@@ -99,7 +99,7 @@ class Saving:
         imgui.end_combo()
 
     def suggested(self, kind: Kind) -> str:
-        """A name that nothing has yet."""
+        """Return a name that nothing has yet."""
         words = self._words
         known = {fold(name) for name in (*words.vocabulary.names, *words.parameters.names)}
         names = (f"{STEMS[kind]}_{i}" for i in count(1))
@@ -134,7 +134,7 @@ class Saving:
         weights = save_expression(words.own, name, face, words.vocabulary, words.parameters, words.earlier, kind)
         words.vocabulary.add(Expression(name, weights, kind=kind))
         self._send(Learn(name, tuple(map(float, weights)), kind))
-        return f"wrote {name} to {shown(words.own)}"
+        return f"wrote {name} to {shorten_path(words.own)}"
 
     def _group(self, name: str) -> str:
         words, editor = self._words, self._editor()
@@ -152,12 +152,12 @@ class Saving:
         return self._open_again(name, {})
 
     def _anchor(self, name: str) -> str:
-        """An anchor is known as an expression, too: the face that the pull made."""
+        """Save the anchor of a servo, and the face that the pull made as an expression."""
         place, pull = self._editor().last_pull(self._newest())
         check_name(name, self._words.vocabulary)
         path = self._words.own.parent / f"{name}-anchor.toml"
         save_anchor(path, name, place, pull, self._words.parameters)
-        return f"{self._expression(name, 'user')}; its servo is in {shown(path)}"
+        return f"{self._expression(name, 'user')}; its servo is in {shorten_path(path)}"
 
     def _editor(self) -> PointEditor:
         if self.editor is None:
@@ -170,10 +170,10 @@ class Saving:
         if self.reopen is not None:
             now = replace(history.now, moves=None, light=())
             self.reopen(History(now, (*history.past, history.now), ()), held)
-        return f"wrote {name} to {shown(self._words.own)}"
+        return f"wrote {name} to {shorten_path(self._words.own)}"
 
 
-def shown(path: Path) -> Path:
-    """A path as a user names it: from the present folder where it is in there."""
+def shorten_path(path: Path) -> Path:
+    """Return a path as a user names it: from the present folder where it is in there."""
     here = Path.cwd()
     return path.relative_to(here) if path.is_relative_to(here) else path

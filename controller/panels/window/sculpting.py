@@ -24,7 +24,7 @@ _SETTINGS: dict[Tool, tuple[tuple[str, str, float, float], ...]] = {
 
 
 class SculptPanel:
-    """Draws the tab; called once a frame.
+    """Draws the tab; called once per frame.
 
     mouse : uses the tools. commands : undo what was sculpted.
     """
@@ -54,7 +54,7 @@ class SculptPanel:
         if editor.sculpted or self._commands.now.light:
             imgui.separator()
             if imgui.button("smooth it out"):
-                self._commands.move(None)
+                self._commands.set_moves(None)
             imgui.text_wrapped("Save it as a group, a slider of your own, or as a corrective: tab Faces.")
 
     @staticmethod

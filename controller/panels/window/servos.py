@@ -26,7 +26,7 @@ class ServoBars:
         self.plotted: list[str] = []
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         details = self._feed.details
@@ -52,7 +52,7 @@ class ServoBars:
         imgui.table_setup_column("state", fixed, imgui.calc_text_size("-000.0 deg  00 C").x)
 
     def _bus(self, imgui: Any, bus: Mapping[str, Any]) -> None:
-        """Whether a bus drives its servos, and why not."""
+        """Draw whether a bus drives its servos, and why not."""
         fault = str(bus["fault"])
         words = fault or ("torque on" if bus["running"] else "torque off")
         colour = AMBER if fault else BRIGHT_GREEN if bus["running"] else GREY
@@ -75,7 +75,7 @@ class ServoBars:
         self._state(imgui, servo)
 
     def toggle(self, key: str) -> None:
-        """Plot a servo, or no longer."""
+        """Start or stop plotting a servo."""
         if key in self.plotted:
             self.plotted.remove(key)
         else:
@@ -134,7 +134,7 @@ class ServoBars:
 
 
 def share(servo: Mapping[str, Any], angle_deg: float | None) -> float | None:
-    """Where an angle is between a servo's limits, 0..1; None where it is not known."""
+    """Return where an angle is between a servo's limits, 0..1; None where it is not known."""
     low, high = float(servo["low_deg"]), float(servo["high_deg"])
     if angle_deg is None or high <= low:
         return None
@@ -142,7 +142,7 @@ def share(servo: Mapping[str, Any], angle_deg: float | None) -> float | None:
 
 
 def tooltip(servo: Mapping[str, Any]) -> str:
-    """All that is known of a servo, in lines."""
+    """Return all that is known of a servo, in lines."""
     lines = [
         f"{servo['name']}: {servo['model']}, id {servo['id']} on {servo['bus']}",
         f"limits {servo['low_deg']:g} to {servo['high_deg']:g} deg, wanted {servo['wanted_deg']:g} deg",

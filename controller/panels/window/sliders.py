@@ -40,7 +40,7 @@ class Sliders:
         self._heard: dict[int, float] | None = None
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         imgui.set_next_item_width(-imgui.calc_text_size("both sides").x - 4 * imgui.get_frame_height() / 2)
@@ -52,7 +52,7 @@ class Sliders:
             self._region(imgui, region)
 
     def rows(self, region: str) -> list[tuple[int, ...]]:
-        """Indices that each slider of a region moves: two where sides are linked."""
+        """Return indices that each slider of a region moves: two where sides are linked."""
         members = [
             i
             for i in map(int, self._parameters.region(region))
@@ -111,7 +111,7 @@ class Sliders:
             imgui.end_table()
 
     def _row(self, imgui: Any, name: str, row: Sequence[int]) -> None:
-        """The lock with the name, and the slider."""
+        """Draw the lock with the name, and the slider."""
         imgui.table_next_row()
         imgui.table_next_column()
         held = all(self.held(i) is not None for i in row)
@@ -139,7 +139,7 @@ class Sliders:
             self._commands.hold(dict.fromkeys(row, float(np.clip(value, low, high))), ("hold", *row))
 
     def _measured(self, imgui: Any, row: Sequence[int], low: float, high: float) -> None:
-        """A mark where the servos are, and its value where the mouse is."""
+        """Draw a mark at the measured value, and the value itself while the mouse points at it."""
         measured = [] if self._state is None else [self._state.measured(i) for i in row]
         known = [x for x in measured if x is not None]
         if not known:
@@ -157,7 +157,7 @@ class Sliders:
         return f"   {count} held" if count else ""
 
     def _away(self, region: str) -> str:
-        """How far the servos of a region are from their wanted angles, for its title."""
+        """Return how far the servos of a region are from their wanted angles, for its title."""
         away = None if self._state is None else self._state.away_deg(region)
         return "" if away is None else f"   servos {away:.1f} deg away"
 

@@ -19,9 +19,9 @@ from controller.vocabulary.vocabulary import Vocabulary
 
 _LOADED = (".toml", ".csv", ".wav")
 _TRACK_LINES, _NEAR = 3.2, 0.45
-_KEY_LINES = 0.35  # half the width of a key
-_LABEL = 2.0  # from a tick to its label, points
-_TICK_LINES = 3.0  # least distance of two ticks, in heights of a line
+_KEY_LINES = 0.35  # half the width of a key, in heights of a line of text
+_LABEL = 2.0  # distance from a tick to its label, points
+_TICK_LINES = 3.0  # minimum distance of two ticks, in heights of a line of text
 
 
 class TimelinePanel:
@@ -41,7 +41,7 @@ class TimelinePanel:
         self._dragged: int | None = None
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         self._controls(imgui)
@@ -154,13 +154,13 @@ class TimelinePanel:
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         changed, self._ease = imgui.combo("easing", self._ease, list(EASES))
         if changed and playback.selected is not None:
-            self._commands.arrange(self._commands.now.timeline.with_ease(playback.selected, EASES[self._ease]))
+            self._commands.set_timeline(self._commands.now.timeline.with_ease(playback.selected, EASES[self._ease]))
         imgui.set_next_item_width(imgui.get_font_size() * 7)
         _, self._mark = imgui.input_text_with_hint("##mark", "name of a mark", self._mark)
         imgui.same_line()
         if imgui.button("mark"):
             at_s = None if self._mark in self._commands.now.timeline.marks else playback.position_s
-            self._try(lambda: self._commands.arrange(self._commands.now.timeline.with_mark(self._mark, at_s)))
+            self._try(lambda: self._commands.set_timeline(self._commands.now.timeline.with_mark(self._mark, at_s)))
 
     def _take_buttons(self, imgui: Any) -> None:
         flow = Flow(imgui)
@@ -191,7 +191,7 @@ class TimelinePanel:
             imgui.text_wrapped(self._message)
 
     def _hearing(self, imgui: Any) -> None:
-        """The sound that plays with the timeline."""
+        """Draw the choice of the sound that plays with the timeline."""
         sound = self._commands.now.timeline.sound
         if sound is not None:
             imgui.text_wrapped(f"sound: {sound.name}")
@@ -220,11 +220,11 @@ class TimelinePanel:
 
 
 def label_left(tick: float, width: float, right: float) -> float:
-    """Where the label of a tick begins: right of it, or left of it where it would go on beyond ``right``."""
+    """Return where the label of a tick begins: right of it, or left of it where it would go on beyond ``right``."""
     return tick + _LABEL if tick + _LABEL + width <= right else tick - _LABEL - width
 
 
 def tick_s(least_s: float) -> float:
-    """The least of 1, 2, 5, 10 and so on, and their tenths, that is ``least_s`` or more."""
+    """Return the least of 1, 2, 5, 10 and so on, and their tenths, that is ``least_s`` or more."""
     power = 10.0 ** math.floor(math.log10(max(least_s, 1e-3)))
     return next((power * factor for factor in (1.0, 2.0, 5.0) if power * factor >= least_s), power * 10.0)

@@ -30,7 +30,7 @@ class View:
         self.overlays: Callable[[], None] | None = None
 
     def __call__(self) -> None:
-        """Draw; called once a frame."""
+        """Draw; called once per frame."""
         from imgui_bundle import imgui  # optional
 
         imgui.separator_text("camera")
@@ -74,11 +74,11 @@ class View:
         imgui.set_next_item_width(-imgui.calc_text_size("liveliness").x - imgui.get_font_size())
         moved, amount = imgui.slider_float("liveliness", self._commands.now.life, 0.0, 1.0)
         if moved:
-            self._commands.live(amount, "life")
+            self._commands.set_life(amount, "life")
         if self._commands.now.gaze is None:
             imgui.text_disabled("Alt and click: look there")
         elif imgui.button("look at nothing"):
-            self._commands.look(None)
+            self._commands.set_gaze(None)
 
     def _draw_shows(self, imgui: Any) -> None:
         flow = Flow(imgui)

@@ -26,7 +26,7 @@ from surface.fit.source.layout import lay_out, open_flat_holes, straighten_holes
 from surface.fit.source.mesh import FitMesh, components, face_areas, triangles
 from surface.fit.source.owncharts import usable_islands
 from surface.fit.source.placing.frame import head_scale
-from surface.mesh.tessellate import MOST_ROOTS
+from surface.mesh.tessellate import MAX_ROOTS
 
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
@@ -152,7 +152,7 @@ def _part(
         finest=FINEST, bend=BEND, growth=GROWTH if face else 1.25,
         astray_mm=ASTRAY_MM * scale, spare=SPARE if face else 0,
     )  # fmt: skip
-    depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MOST_ROOTS))))
+    depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MAX_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth
     recipe = PartRecipe(name, material, "skin", [], request, budget, downweight_slivers=True)
     return recipe, [open_flat_holes(straighten_holes(i)) for i in lay_out(mesh, islands)]

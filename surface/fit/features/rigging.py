@@ -11,7 +11,7 @@ from surface.base.arrays import Floats, Ints
 from surface.fit.points.rigidfit import rigid_fit
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Group, Jaw, Rule
-from surface.head.model.parameters import TONGUE_NEEDS, smoothstep
+from surface.head.model.parameters import TONGUE_JAW, smoothstep
 from surface.head.posing.rig import jaw_path
 
 LEAST_MM = 0.004  # displacements smaller than this are dropped
@@ -73,7 +73,7 @@ def make_groups(points: Floats, moves: Floats, sources: dict[str, list[int]], ja
 
 
 def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
-    """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_NEEDS`: ``tongueOut``, straight
+    """The tongue put out between the lips, over a jaw that is open by :data:`TONGUE_JAW`: ``tongueOut``, straight
     ahead, and :data:`DROOP`, which bends it down once it is out.
 
     points : (n, 3) control points of the tongue at rest.
@@ -86,7 +86,7 @@ def tongue_groups(points: Floats, path: Floats, jaw: Jaw) -> list[Group]:
         _along_path(points, path[0, 0], path[-1, 0], PchipInterpolator(path[:, 0], rows))
         for rows in (path[:, 1:6], hanging)
     )
-    turn, shift = jaw_path(jaw, TONGUE_NEEDS)
+    turn, shift = jaw_path(jaw, TONGUE_JAW)
     held = np.clip((points[:, 2] - path[0, 0]) / 20.0, 0.0, 1.0)[:, None]
     ids = np.arange(len(points), dtype=np.int32)
     moves = straight - (points @ turn.T + shift), hung - straight

@@ -20,7 +20,7 @@ from surface.fit.source.mesh import FitMesh, triangles
 from surface.head import Head
 from surface.head.model.data import HeadData, PartData
 from surface.head.model.meshes import domain_of
-from surface.head.model.parameters import SHAPES, TONGUE_NEEDS
+from surface.head.model.parameters import SHAPES, TONGUE_JAW
 
 NO_TRIANGLES = np.zeros((0, 3), np.int64)
 
@@ -232,7 +232,7 @@ def _displacement(mesh: FitMesh, sources: dict[str, list[int]], shape: str) -> F
     """(n, 3) of the mesh's vertices in the pose that shows a shape."""
     amounts = {n: v for n, v in pose_of(shape).items() if n in sources} if shape != NEUTRAL else {}
     if shape == "tongueOut" and "jawOpen" in sources:  # opens the jaw as far as it needs
-        amounts["jawOpen"] = TONGUE_NEEDS
+        amounts["jawOpen"] = TONGUE_JAW
     out = np.zeros_like(mesh.vertices)
     for name, amount in amounts.items():
         out += amount * mesh.deltas[sources[name]].sum(axis=0)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.check.raster import NOTHING, View, turned
+from surface.check.raster import NOTHING, View, view_rotation
 
 PIXELS = 240  # along the longest side of a picture
 # yaw and pitch, degrees, and how much a picture counts: a mask shows its inside from behind, a head its back
@@ -30,11 +30,11 @@ def seen(pieces: Sequence[Samples]) -> tuple[Floats, Bools]:
     step = float(np.ptp(every, axis=0).max()) / PIXELS
     votes, front = np.zeros(len(pieces)), np.zeros(len(pieces))
     for yaw, pitch, share in VIEWS:
-        shown, back = _counts(pieces, every, turned(yaw, pitch), step)
+        shown, back = _counts(pieces, every, view_rotation(yaw, pitch), step)
         votes += share * (shown - 2.0 * back)
         front += shown if yaw == pitch == 0.0 else 0.0
     for k in np.flatnonzero(votes == 0.0).tolist():  # hidden by others
-        shown, back = _counts([pieces[k]], pieces[k][0], turned(0.0), step)
+        shown, back = _counts([pieces[k]], pieces[k][0], view_rotation(0.0), step)
         votes[k] = shown[0] - 2.0 * back[0]
     return front * step**2, votes < 0.0
 

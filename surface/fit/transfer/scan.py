@@ -18,7 +18,7 @@ from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
 from surface.fit.source.textures import Samples as Colours
 from surface.fit.transfer.colours import moved, scan_colours
 from surface.readers.gltf.mesh import read_gltf
-from surface.readers.meshdata import MOST_VERTICES, read_bytes
+from surface.readers.meshdata import MAX_VERTICES, read_bytes
 from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj
 from surface.readers.ply.mesh import read_ply
@@ -108,8 +108,8 @@ def make_scan(vertices: Floats, faces: Ints, where: str) -> Scan:
 
     Raises FitError: see :func:`read_scan`.
     """
-    if len(vertices) > MOST_VERTICES:
-        raise FitError(f"{where}: {len(vertices)} vertices; {MOST_VERTICES} are the most", hint="decimate it first")
+    if len(vertices) > MAX_VERTICES:
+        raise FitError(f"{where}: {len(vertices)} vertices; {MAX_VERTICES} are the most", hint="decimate it first")
     if not len(faces):
         raise FitError(f"{where}: holds no faces", hint="a cloud of points is not enough: export its triangles")
     if faces.min() < 0 or faces.max() >= len(vertices):

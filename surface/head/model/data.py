@@ -91,8 +91,10 @@ class Jaw:
 
 @dataclass(frozen=True)
 class Neck:
-    """How the head turns about ``pivot``, mm: points with y + slope * z above ``whole`` at rest follow fully, those
-    below ``still`` not at all, and the neck between bends."""
+    """How the neck bends when the head turns about ``pivot``, mm.
+
+    Points with y + slope * z above ``whole`` at rest follow fully, those below ``still`` not at all.
+    """
 
     pivot: tuple[float, float, float]
     slope: float = 0.35
@@ -100,7 +102,7 @@ class Neck:
     whole: float = -78.0
 
     def share(self, points: Floats) -> Floats:
-        """(n,) share of the head's rotation that each point at rest (n, 3) follows, 0..1."""
+        """Return (n,): share of the head's rotation that each point at rest (n, 3) follows, 0..1."""
         return smoothstep(points[:, 1] + self.slope * points[:, 2], self.still, self.whole)
 
 
@@ -127,8 +129,9 @@ class Contact:
     reach_mm : distance from the rim at which the correction has faded out. share : the upper side's part of it, 0..1.
     places : (2, columns, rows, 2) samples in (u, v), the upper side first, columns in the order of x, rows from the
         rim on; two thirds of the rows can touch the other side, in the rest the correction fades out.
-    cling : are lids brought back onto the eyeball where shapes lift them off it? If not, they only keep out of it.
-    seal : of lips; None for sides that only keep off each other.
+    cling : whether lids are also brought back onto the eyeball when shapes lift them off; if not, they only stay out of
+        it.
+    seal : of lips; None for sides that only stay apart.
     """
 
     name: str

@@ -26,7 +26,7 @@ Part = TypeVar("Part", bound=DrawnPart)
 
 
 def face_of(parts: Sequence[Part], contacts: Iterable[Contact]) -> Part | None:
-    """The part that is the face; None without skin.
+    """Return the part that is the face; None without skin.
 
     It is the skin with the most contacts, of lids and lips; of several, or without any, the one called "face"; without
     such a name the one with the most vertices, of equals the first.

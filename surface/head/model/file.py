@@ -21,8 +21,8 @@ from surface.head.model.placement import Placement
 from surface.mesh.domain import Slit
 
 VERSION = 2
-PLAIN = 1  # of heads whose parts are neither closed nor flipped and have no rectangle: older omotes read them
-ANY = -1  # length of an axis that may have any
+PLAIN = 1  # version of heads whose parts are neither closed nor flipped and have no rectangle: older omotes read them
+ANY = -1  # in a shape: an axis of any length
 ARRAYS: dict[str, tuple[int | str, ...]] = {  # key of a part: its array's shape; "n" is the number of control points
     "points": ("n", 3), "weights": ("n",), "knots_u": ("n", ANY), "knots_v": ("n", ANY), "degrees": ("n", 2),
     "loops": (ANY, 2), "loop_ends": (ANY,), "slits": (ANY, 3), "group_ids": (ANY,), "group_ends": (ANY,),
@@ -40,7 +40,7 @@ def _error(path: Path, key: str, why: str) -> HeadFileError:
     return HeadFileError(f"{path}: {key}: {why}", hint=HINT)
 
 
-def _checked(path: Path, key: str, a: Array, shape: tuple[int, ...]) -> Array:
+def _check(path: Path, key: str, a: Array, shape: tuple[int, ...]) -> Array:
     if a.ndim != len(shape) or any(w not in (ANY, g) for g, w in zip(a.shape, shape, strict=True)):
         raise _error(path, key, f"has shape {a.shape}, expected {shape}".replace("-1", "any"))
     if a.dtype.kind not in "fiu" or not np.isfinite(a).all():
@@ -60,16 +60,16 @@ class _Section:
         return _error(self.path, self.where + key, why)
 
     def read(self, **wanted: type | tuple[int, ...]) -> dict[str, Any]:
-        """Values by key, each of a type, or numbers of a shape: () a float, (k,) a tuple, else an array."""
+        """Return values by key, each of a type, or numbers of a shape: () a float, (k,) a tuple, else an array."""
         return {key: self._numbers(key, w) if isinstance(w, tuple) else self._value(key, w)
                 for key, w in wanted.items()}  # fmt: skip
 
     def section(self, key: str) -> _Section:
-        """The table under a key."""
+        """Return the table under a key."""
         return _Section(self.path, self._value(key, dict), f"{self.where}{key}.")
 
     def sections(self, key: str) -> list[_Section]:
-        """The tables of a list of them."""
+        """Return the tables of a list of them."""
         tables = self._value(key, list)
         for i, table in enumerate(tables):
             if not isinstance(table, dict):
@@ -87,7 +87,7 @@ class _Section:
             a = np.asarray(self._value(key, (list, int, float)), float)
         except (TypeError, ValueError) as e:
             raise self.error(key, "holds something that is not a number") from e
-        _checked(self.path, self.where + key, a, shape)
+        _check(self.path, self.where + key, a, shape)
         return a if a.ndim > 1 else tuple(a.tolist()) if a.ndim else float(a)
 
 
@@ -99,10 +99,10 @@ class _Arrays:
     stored: dict[str, Array]
 
     def read(self, key: str, shape: tuple[int, ...]) -> Array:
-        """The array of a key in the type that omote computes with, whatever it was stored in."""
+        """Return the array of a key in the type that omote computes with, whatever it was stored in."""
         if key not in self.stored:
             raise _error(self.path, key, "missing")
-        found = _checked(self.path, key, self.stored[key], shape)
+        found = _check(self.path, key, self.stored[key], shape)
         with np.errstate(invalid="ignore", over="ignore"):
             array = np.ascontiguousarray(found, TYPES.get(key.rsplit("/", 1)[-1], np.float64))
         lost = not np.isfinite(array).all() or (array.dtype.kind == "i" and (array != found).any())
@@ -111,7 +111,7 @@ class _Arrays:
         return array
 
     def split(self, key: str, a: Array, ends: Array) -> list[Array]:
-        """Runs of rows that end at ``ends``, an array kept under ``key``."""
+        """Return runs of rows that end at ``ends``, an array kept under ``key``."""
         if len(ends) and (ends[-1] != len(a) or (np.diff(ends) < 0).any() or ends[0] < 0):
             raise _error(self.path, key, f"does not match an array of {len(a)} rows")
         return np.split(a, ends[:-1]) if len(ends) else []
@@ -192,7 +192,7 @@ def _part(section: _Section, arrays: _Arrays) -> PartData:
 
 
 def _extent(section: _Section) -> dict[str, Any]:
-    """Which directions of a part are closed, its rectangle and its side; what is not there is left out."""
+    """Return which directions of a part are closed, its rectangle and its side; what is not there is left out."""
     shapes: dict[str, tuple[int, ...]] = {"closed_u": (2,), "closed_v": (2,), "rect": (4,)}
     found = section.read(**{key: shape for key, shape in shapes.items() if key in section.table})
     for key, ends in found.items():
@@ -205,7 +205,7 @@ def _extent(section: _Section) -> dict[str, Any]:
 
 
 def _cuts(arrays: _Arrays, key: str) -> tuple[Slit, ...]:
-    """Cuts of a part's mesh: rows of axis (0 along u, 1 along v), at, start, end."""
+    """Return cuts of a part's mesh: rows of axis (0 along u, 1 along v), at, start, end."""
     if key not in arrays.stored:
         return ()
     rows = arrays.read(key, (ANY, 4))
@@ -301,7 +301,7 @@ def save_data(folder: str | Path, head: HeadData) -> None:
 
 
 def _arrays(head: HeadData) -> dict[str, Array]:
-    """Everything that goes into head.npz."""
+    """Return the content of head.npz."""
     arrays = {f"{p.name}/{k}": v for p in head.parts for k, v in _part_arrays(p).items()}
     for i, s in enumerate(head.seams):
         arrays |= {f"seams/{i}/a": s.uv_a, f"seams/{i}/b": s.uv_b}
@@ -324,7 +324,7 @@ def _part_arrays(p: PartData) -> dict[str, Array]:
 
 
 def _table(head: HeadData) -> dict[str, Any]:
-    """Everything that goes into head.toml."""
+    """Return the content of head.toml."""
     return {
         "format": VERSION if any(_extent_table(p) or p.cuts for p in head.parts) else PLAIN,
         "name": head.name,
@@ -346,14 +346,14 @@ def _table(head: HeadData) -> dict[str, Any]:
 
 
 def _contact_table(contact: Contact) -> dict[str, Any]:
-    """A contact without its places and what is as usual; its seal, if it has one."""
+    """Return a contact without its places and what is as usual; its seal, if it has one."""
     usual = ("places", "seal", "cling") if contact.cling else ("places", "seal")
     table = {k: v for k, v in vars(contact).items() if k not in usual}
     return table | ({"seal": vars(contact.seal)} if contact.seal else {})
 
 
 def _extent_table(part: PartData) -> dict[str, Any]:
-    """What :func:`_extent` reads, without what is as usual."""
+    """Return what :func:`_extent` reads, without what is as usual."""
     ends = {key: getattr(part, key) for key in ("closed_u", "closed_v", "rect")}
     table: dict[str, Any] = {key: [float(x) for x in row] for key, row in ends.items() if row is not None}
     return table | ({"flip": True} if part.flip else {})

@@ -14,11 +14,11 @@ from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
 from surface.head.model.parameters import smoothstep
 
-SPAN = 0.62  # of a knot, in widths across a line; along it spans are as long as the points are apart
-TAPER = 0.3  # share of a line's length over which its ends run out
-REGULARISATION = 0.03  # weight of moving no point, relative to that of the samples of an average one
+SPAN = 0.62  # of knots across a line, in widths of the furrow; along it spans are the distances of the points
+TAPER = 0.3  # fraction of a line's length over which the depth fades at each end
+REGULARISATION = 0.03  # weight of zero moves, relative to that of an average point's samples
 EVENNESS = 1.0  # weight of second differences along a line of near points, relative to an average one's sample
-RIDGE = 0.35  # height of the skin along both sides of a furrow, in its depths
+RIDGE = 0.35  # height of the ridges along both sides of a furrow, in its depths
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,8 @@ class Furrow:
 
 
 def furrow_knots(f: Furrow, surface: DCPSurface) -> tuple[Floats, Floats]:
-    """Knots (k, 5) in u and in v: spans as wide as the furrow across it, as long as the points are apart along it."""
+    """Return knots (k, 5) in u and in v: spans as wide as the furrow across it, as long as the points are apart along
+    it."""
     _, su, sv = surface.derivatives(f.uv)
     along = np.abs(np.gradient(f.uv, axis=0))
     out = []
@@ -42,7 +43,7 @@ def furrow_knots(f: Furrow, surface: DCPSurface) -> tuple[Floats, Floats]:
 
 
 def furrow_moves(f: Furrow, surface: DCPSurface, ids: Ints) -> Floats:
-    """(k, 3) how the furrow's points ``ids`` move when it is whole: along the skin's normals, in least squares.
+    """Return (k, 3): how the furrow's points ``ids`` move when it is whole: along the skin's normals, in least squares.
 
     surface : with the points.
     """
@@ -60,7 +61,7 @@ def furrow_moves(f: Furrow, surface: DCPSurface, ids: Ints) -> Floats:
 
 
 def even_moves(f: Furrow, surface: DCPSurface, ids: Ints) -> Floats:
-    """(k, 3) as :func:`furrow_moves`, for points near each other: the line sinks by the depth, and nothing ripples."""
+    """Return the moves (k, 3) of points near each other: the line sinks evenly by the depth, without ripples."""
     normal, _, _ = _normals(f, surface)
     matrix = surface.basis_matrix(f.uv).tocsc()[:, ids].toarray()
     bends = np.diff(np.eye(len(ids)), 2, axis=0)
@@ -72,20 +73,20 @@ def even_moves(f: Furrow, surface: DCPSurface, ids: Ints) -> Floats:
 
 
 def _normals(f: Furrow, surface: DCPSurface) -> tuple[Floats, Floats, Floats]:
-    """Unit normals (k, 3) along the line, and the derivatives in u and in v."""
+    """Return the unit normals (k, 3) along the line, and the derivatives in u and in v."""
     _, su, sv = surface.derivatives(f.uv)
     normal = np.cross(su, sv)
     return normal / np.linalg.norm(normal, axis=1)[:, None], su, sv
 
 
 def _taper(f: Furrow, least: float = 0.15) -> Floats:
-    """(k,) share of the depth along the line, whose ends run out."""
+    """Return (k,): share of the depth along the line, whose ends run out."""
     t = np.linspace(0.0, 1.0, len(f.uv))
     return least + (1.0 - least) * smoothstep(np.minimum(t, 1.0 - t) / TAPER)
 
 
 def _sideways_step(f: Furrow, su: Floats, sv: Floats) -> Floats:
-    """(k, 2) step in (u, v) that is 1 mm of skin to the side of the line."""
+    """Return (k, 2): step in (u, v) that is 1 mm of skin to the side of the line."""
     tangent = np.gradient(f.uv, axis=0)
     forward = tangent[:, :1] * su + tangent[:, 1:] * sv
     normal = np.cross(su, sv)

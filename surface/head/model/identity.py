@@ -39,7 +39,7 @@ class Identity:
 
 
 def fingerprint(head: HeadData) -> int:
-    """CRC-32 over the knots of all control points of a head."""
+    """Return CRC-32 over the knots of all control points of a head."""
     out = 0
     for part in head.parts:
         for knots in (part.knots_u, part.knots_v):
@@ -48,7 +48,7 @@ def fingerprint(head: HeadData) -> int:
 
 
 def load_identities(head: str | Path) -> dict[str, Identity]:
-    """The identities of a head, given by its folder or its head.toml, by name; empty where it has none.
+    """Return the identities of a head, given by its folder or its head.toml, by name; empty where it has none.
 
     A start asks for them several times; they are read again only when the file has changed.
 
@@ -87,7 +87,7 @@ def _identities(file: Sidecar) -> dict[str, Identity]:
 
 
 def _moves(z: Mapping[str, Array], ids_prefix: str, moves_prefix: str) -> dict[str, tuple[Array, Floats32]]:
-    """Control points and their displacements, by what follows the prefixes of their keys."""
+    """Return control points and their displacements, by what follows the prefixes of their keys."""
     out = {}
     for key in z:
         if key.startswith(ids_prefix):
@@ -123,7 +123,7 @@ def save_identities(head: str | Path, identities: list[Identity]) -> Path:
 
 
 def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mapping[str, float], where: str) -> HeadData:
-    """The head with identities mixed in, each by 0 to 1.
+    """Return the head with identities mixed in, each by 0 to 1.
 
     Raises HeadFileError: no identity of that name, an amount out of range, or one that was made for another fit.
     """
@@ -148,7 +148,7 @@ def with_identities(head: HeadData, known: Mapping[str, Identity], wanted: Mappi
             parts[part] = replace(parts[part], points=points)
         for part, changes in identity.changes.items():
             for group in changes:
-                parts[part] = _changed(parts[part], group, amount)
+                parts[part] = _add_change(parts[part], group, amount)
     moved = replace(head.jaw, centre=tuple(jaw.tolist()))
     return replace(head, eyes=eyes, jaw=moved, parts=[parts[p.name] for p in head.parts])
 
@@ -162,8 +162,8 @@ def _check_fit(head: HeadData, identity: Identity, where: str) -> None:
                             hint="make it again: omote fit MESH -o FOLDER --keep --identities FILE")  # fmt: skip
 
 
-def _changed(part: PartData, change: Group, amount: float) -> PartData:
-    """The part with a multiple of ``change`` added to its group of the same name."""
+def _add_change(part: PartData, change: Group, amount: float) -> PartData:
+    """Return the part with a multiple of ``change`` added to its group of the same name."""
     total = np.zeros((len(part.points), 3), np.float32)
     total[change.ids] += np.float32(amount) * change.moves
     for g in part.groups:

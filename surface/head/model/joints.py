@@ -48,7 +48,7 @@ class Joint:
 
 
 def joints_of(head: HeadData, limits: Mapping[str, JointLimit] | None = None) -> list[Joint]:
-    """The joints of a head, parents first.
+    """Return the joints of a head, parents first.
 
     limits : by parameter, such as those of a robot's servos; elsewhere the joint turns as far as the parameter does.
     """

@@ -1,10 +1,10 @@
-"""Light control points: added to a part of a head, they leave its surface where it is until they are moved.
+"""Light control points: added to a part of a head, they do not change its surface until they are moved.
 
-A control point with knots of its own has little weight, :data:`WEIGHT`, and lies on the surface S. With W the sum of
-all b w and N the numerator of Eq. (1), it turns N / W into (N + b w P) / (W + b w), a change by b w (P - S) / (W + b w)
-which is less than WEIGHT times the distance over which b reaches, 0.0002 mm where that is 2 mm. A move of it by D adds
-b w D to the numerator and nothing to the denominator, as in Eq. (2): to move the skin by d it is moved by d W / (b w),
-far away from the face. In the limit of no weight it is the infinite control point of Piegl, "On the use of infinite
+A light control point has knots of its own and little weight, :data:`WEIGHT`, and lies on the surface S. With W the sum
+of all b w and N the numerator of Eq. (1), it turns N / W into (N + b w P) / (W + b w), a change by b w (P - S) / (W + b
+w) which is less than WEIGHT times the distance over which b reaches, 0.0002 mm where that is 2 mm. A move of it by D
+adds b w D to the numerator and nothing to the denominator, as in Eq. (2): to move the skin by d it is moved by d W / (b
+w), far away from the face. In the limit of no weight it is the infinite control point of Piegl, "On the use of infinite
 control points in CAGD" (1987), whose displacement is a pure addition to the numerator.
 """
 
@@ -23,10 +23,10 @@ from surface.mesh.mesh import Mesh
 from surface.mesh.splitedges import Middles, split_edges
 
 WEIGHT = 1e-4
-EDGES = 0.5  # longest edge of triangles where such points reach, in spans of their knots
-REACH = 1.7  # spans from its middle within which a point is followed
-ROUNDS = 6  # of splitting edges, each halves them
-LEAST_MM = 0.25  # no edge is split that is shorter than twice this
+MAX_EDGE = 0.5  # of triangles that such points influence, in spans of their knots
+REACH = 1.7  # distance from a point's middle within which edges are split, in spans
+MAX_ROUNDS = 6  # of splitting edges; each halves them
+MIN_EDGE_MM = 0.25  # no edge is split that is shorter than twice this
 Coarser = Callable[[str, Mesh], Mapping[str, Ints]]
 _SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 
@@ -35,7 +35,7 @@ _SAMPLES = np.array([0.0, 0.25, 0.5, 0.75, 1.0])
 class LightPoints:
     """Light control points of one part.
 
-    part : its name. knots_u, knots_v : (k, 5) knots of cubic blending functions, rising.
+    part : its name. knots_u, knots_v : (k, 5) knots of cubic blending functions, ascending.
     """
 
     part: str
@@ -51,12 +51,12 @@ class LightPoints:
         return np.column_stack([self.knots_u[:, 2], self.knots_v[:, 2]])
 
     def take(self, which: Ints) -> LightPoints:
-        """Some of them."""
+        """Return some of them."""
         return LightPoints(self.part, self.knots_u[which], self.knots_v[which])
 
 
 def join_light(points: Sequence[LightPoints]) -> dict[str, LightPoints]:
-    """All light points by part, in their order."""
+    """Return all light points by part, in their order."""
     names = dict.fromkeys(each.part for each in points)
     return {
         name: LightPoints(
@@ -71,7 +71,8 @@ def join_light(points: Sequence[LightPoints]) -> dict[str, LightPoints]:
 def with_light(
     data: HeadData, points: Sequence[LightPoints], coarser: Coarser = lambda name, mesh: {}
 ) -> tuple[HeadData, dict[str, Refined]]:  # fmt: skip
-    """The head with light control points behind those of each part, and the meshes of these parts, made finer there.
+    """Return the head with light control points behind those of each part, and the meshes of these parts, made finer
+    there.
 
     coarser : fewer triangles (t, 3) over the mesh of a part, by level; they are made finer, too.
 
@@ -90,12 +91,12 @@ def with_light(
         mesh = mesh or tessellate(part, surface, data.seams)
         refined[name] = Refined(mesh, own, part, coarser(name, mesh))
         grown = with_points(part, own)
-        parts[name] = replace(grown, mesh=refined[name].packed(grown))
+        parts[name] = replace(grown, mesh=refined[name].pack_finer(grown))
     return replace(data, parts=list(parts.values())), refined
 
 
 def check_light(part: PartData, own: LightPoints) -> None:
-    """ValueError where light points cannot belong to a part."""
+    """Raise ValueError if light points cannot belong to a part."""
     if part.follows != "skin" or part.closed_u is not None or part.closed_v is not None:
         raise ValueError(f"part {part.name!r} takes no control points: it is rigid, or closed")
     for name in ("knots_u", "knots_v"):
@@ -113,7 +114,9 @@ def check_light(part: PartData, own: LightPoints) -> None:
 
 
 def with_points(part: PartData, own: LightPoints) -> PartData:
-    """The part with the points behind its own: on the surface, and following every group and the jaw as it does."""
+    """Return the part with the points behind its own: on the surface, and following every group and the jaw as it
+    does.
+    """
     surface = make_surface(part)
     share, n, k = surface.basis_matrix(own.centres).tocsr(), surface.n, len(own)
     width = part.knots_u.shape[1]
@@ -121,21 +124,21 @@ def with_points(part: PartData, own: LightPoints) -> PartData:
         part,
         points=np.concatenate([part.points, share @ part.points]),
         weights=np.concatenate([part.weights, np.full(k, WEIGHT)]),
-        knots_u=np.concatenate([part.knots_u, _padded(own.knots_u, width)]),
-        knots_v=np.concatenate([part.knots_v, _padded(own.knots_v, part.knots_v.shape[1])]),
+        knots_u=np.concatenate([part.knots_u, _pad(own.knots_u, width)]),
+        knots_v=np.concatenate([part.knots_v, _pad(own.knots_v, part.knots_v.shape[1])]),
         degrees=np.concatenate([part.degrees, np.full((k, 2), 3)]),
-        groups=[_carried(group, share, n) for group in part.groups],
+        groups=[_carry_group(group, share, n) for group in part.groups],
         jaw=np.concatenate([part.jaw, share @ part.jaw]),
         lids=np.concatenate([part.lids, np.zeros(k)]),  # who is far from the face keeps no distance from the eyeball
     )
 
 
-def _padded(knots: Floats, width: int) -> Floats:
+def _pad(knots: Floats, width: int) -> Floats:
     return np.hstack([knots, np.repeat(knots[:, -1:], width - knots.shape[1], axis=1)])
 
 
-def _carried(group: Group, share: Array, n: int) -> Group:
-    """A group that moves new points as the surface at their middles."""
+def _carry_group(group: Group, share: Array, n: int) -> Group:
+    """Return a group that moves new points as the surface at their middles."""
     field = np.zeros((n, 3))
     field[group.ids] = group.moves
     extra = share @ field
@@ -163,7 +166,7 @@ class Refined:
         self._spans = np.column_stack([np.diff(k, axis=1).mean(axis=1) for k in (own.knots_u, own.knots_v)])
         _, along_u, along_v = self._surface.derivatives(own.centres)
         millimetres = np.column_stack([np.linalg.norm(along_u, axis=1), np.linalg.norm(along_v, axis=1)])
-        self._longest = np.maximum(EDGES * (self._spans * millimetres).min(axis=1), 2 * LEAST_MM)
+        self._longest = np.maximum(MAX_EDGE * (self._spans * millimetres).min(axis=1), 2 * MIN_EDGE_MM)
         self._uv, self._places = mesh.uv, mesh.vertices
         self.triangles = self._refine(np.asarray(mesh.triangles, np.int64))
         inner = {level: (each < self._count).all(axis=1) for level, each in coarser.items()}
@@ -176,15 +179,15 @@ class Refined:
 
     @property
     def ends(self) -> Ints:
-        """(k, 2) the vertices between which each new one lies, which may be new ones before it."""
+        """(k, 2) the two vertices between which each new one lies; they may be earlier new ones."""
         return np.array(self._middles.ends, np.int64).reshape(-1, 2)
 
     def _refine(self, triangles: Ints) -> Ints:
-        """Triangles (t', 3) with shorter edges where light points reach, of (t, 3) over the mesh's own vertices. Both
-        triangles of an edge that they reach are near; the others, which are most, are not looked at."""
+        """Return triangles (t', 3) with shorter edges where light points reach, of (t, 3) over the mesh's own vertices.
+        Both triangles of an edge that they reach are near; the others, which are most, are not looked at."""
         near = self._near(self._uv[triangles])
         others, triangles = triangles[~near], triangles[near]
-        for _ in range(ROUNDS if len(triangles) else 0):
+        for _ in range(MAX_ROUNDS if len(triangles) else 0):
             before = len(triangles)
             triangles = split_edges(triangles, self._is_long, self._middles)
             self._place()
@@ -193,7 +196,7 @@ class Refined:
         return np.concatenate([others, triangles])
 
     def _near(self, places: Floats) -> np.ndarray:
-        """(t,) which of polygons (t, k, 2) lie, by their boxes, where all light points together reach."""
+        """Return (t,): which of polygons (t, k, 2) lie, by their boxes, where all light points together reach."""
         reach, centres = REACH * self._spans, self._own.centres
         low, high = (centres - reach).min(axis=0), (centres + reach).max(axis=0)
         near: np.ndarray = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
@@ -208,7 +211,7 @@ class Refined:
             self._places = np.concatenate([self._places, self._surface.evaluate(uv)])
 
     def _is_long(self, edges: Ints) -> np.ndarray:
-        """(e,) which edges reach a light point and are longer than there is use for."""
+        """Return (e,): which edges reach a light point and are longer than there is use for."""
         length = np.linalg.norm(self._places[edges[:, 0]] - self._places[edges[:, 1]], axis=1)
         ends = self._uv[edges]
         reach, centres = REACH * self._spans, self._own.centres
@@ -222,8 +225,10 @@ class Refined:
             out[which] = (inside & (length[which, None] > self._longest)).any(axis=1)
         return out
 
-    def packed(self, grown: PartData) -> dict[str, Array]:
-        """The finer mesh of the part with the points, as arrays to keep: new vertices are in cells of their own."""
+    def pack_finer(self, grown: PartData) -> dict[str, Array]:
+        """Return the finer mesh of the part with the points, as arrays to keep: new vertices are in cells of their
+        own.
+        """
         mesh, surface = self.mesh, make_surface(grown)
         lists = self._with_own(surface.n - len(self._own))
         starts = [mesh.cell_start]
@@ -242,7 +247,7 @@ class Refined:
         return pack(finer, grown.budget)
 
     def _with_own(self, first: int) -> list[Array]:
-        """By cell of the mesh its points, with those light ones that reach it."""
+        """Return, by cell of the mesh, its points and the light points that reach it."""
         boxes, _ = self.mesh.cell_boxes
         u, v = self._own.knots_u, self._own.knots_v
         lists = []
@@ -252,7 +257,8 @@ class Refined:
         return lists
 
     def carry(self, values: Array) -> Array:
-        """Rows (m, ...) by vertex, behind the mesh's own those that seams added, with rows for new vertices between."""
+        """Return rows (m, ...) by vertex, behind the mesh's own those that seams added, with rows for new vertices
+        between."""
         own = [np.asarray(values[: self._count], np.float64)]
         rows = np.concatenate([own[0], np.zeros((len(self.ends), *values.shape[1:]))])
         for i, (a, b) in enumerate(self.ends.tolist(), self._count):

@@ -1,4 +1,4 @@
-"""How a person looks: skin, eyes, brows, and what is worn, apart from the shape of the head."""
+"""Appearance of a person (look): skin, eyes, brows, and what is worn, apart from the shape of the head."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ OWN_MELANIN = 0.2
 #: Density that blood adds to skin by channel: haemoglobin absorbs green and blue, and hardly any red.
 BLOOD = np.array((0.05, 0.34, 0.26))
 _AGED = {"wrinkleForehead": 0.75, "wrinkleFrown": 0.50, "wrinkleEye": 0.80, "wrinkleCheek": 0.90}
-"""Share of a wrinkle, by the beginning of its group's name, that is there at rest at the age of 1."""
+"""Amount of a wrinkle at rest at the age of 1, by the beginning of its group's name."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class Worn:
 
 @dataclass(frozen=True)
 class Look:
-    """A person's look; colours are linear RGB, None where the head's own stays.
+    """A person's appearance; colours are linear RGB, None to keep the head's own.
 
     melanin : 0 very light skin, 1 very dark; 0.2 is the shipped head's. None leaves the painted colours as they are.
     blood : density of blood under the skin against the usual, -1 pale to 1 ruddy.
@@ -70,7 +70,7 @@ class Look:
 
 
 def skin_tone(melanin: float, blood: float = 0.0) -> Floats:
-    """(3,) linear albedo of skin.
+    """Return (3,): linear albedo of skin.
 
     Melanin and blood absorb: each adds to the density, the negative logarithm of the albedo (Tsumura, Ojima, Sato et
     al., "Image-based skin color and texture analysis/synthesis by extracting hemoglobin and melanin information in the
@@ -82,7 +82,7 @@ def skin_tone(melanin: float, blood: float = 0.0) -> Floats:
 
 
 def skin_albedo(painted: Floats, melanin: float, blood: float, redness: Floats) -> Floats:
-    """(m, 3) albedo of painted skin (m, 3) for another melanin.
+    """Return (m, 3): albedo of painted skin (m, 3) for another melanin.
 
     What the paint adds to the base tone, in density, stays: by ``redness (m, 1)``, and less in darker skin, whose
     melanin covers the blood.
@@ -93,7 +93,7 @@ def skin_albedo(painted: Floats, melanin: float, blood: float, redness: Floats) 
 
 
 def with_age(head: HeadData, age: float) -> HeadData:
-    """The head with its wrinkles at rest, each by its share of ``age``, 0..1."""
+    """Return the head with its wrinkles at rest, each by its share of ``age``, 0..1."""
     shares = {
         group.name: age * share
         for part in head.parts

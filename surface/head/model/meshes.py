@@ -18,11 +18,11 @@ from surface.mesh.mesh import Mesh
 from surface.mesh.tessellate import unit_normals
 
 KEYS = ("mesh_uv", "mesh_triangles", "mesh_side", "mesh_cell_start", "mesh_list_start", "mesh_list_ids", "mesh_made")
-LOOP_SHARE = 0.4  # how near a border follows its loop, in chord errors
+LOOP_SHARE = 0.4  # distance within which a border follows its loop, in chord errors
 
 
 def make_surface(data: PartData) -> DCPSurface:
-    """The part's DCP surface."""
+    """Return the part's DCP surface."""
     return DCPSurface.from_padded(
         data.points, data.weights, data.knots_u, data.knots_v, data.degrees[:, 0], data.degrees[:, 1],
         closed_u=data.closed_u, closed_v=data.closed_v,
@@ -30,7 +30,7 @@ def make_surface(data: PartData) -> DCPSurface:
 
 
 def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) -> Mesh:
-    """Triangles for a part by its budget, with vertices where the head's seams begin and end."""
+    """Return triangles for a part by its budget, with vertices where the head's seams begin and end."""
     most, chord, depth = data.budget
     with np.errstate(divide="ignore", invalid="ignore"):  # triangles without area while borders are cut
         return surface.tessellate(
@@ -45,14 +45,14 @@ def tessellate(data: PartData, surface: DCPSurface, seams: Sequence[Seam] = ()) 
 
 
 def _ends(seams: Sequence[Seam], part: str) -> Floats:
-    """(k, 2) ends of a part's seams, where three borders or more meet; closed seams have none."""
+    """Return (k, 2): ends of a part's seams, where three borders or more meet; closed seams have none."""
     lines = [uv for s in seams for name, uv in ((s.part_a, s.uv_a), (s.part_b, s.uv_b)) if name == part]
     ends = [line[k] for line in lines for k in (0, -1) if not np.array_equal(line[0], line[-1])]
     return np.unique(np.array(ends, float).reshape(-1, 2), axis=0)
 
 
 def domain_of(data: PartData) -> Domain:
-    """The part's rectangle, or the one around its loops, trimmed by them.
+    """Return the part's rectangle, or the one around its loops, trimmed by them.
 
     ``ValueError`` for a part with neither.
     """
@@ -66,7 +66,7 @@ def domain_of(data: PartData) -> Domain:
 
 
 def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
-    """The mesh as arrays to store, without positions and normals, which the surface gives."""
+    """Return the mesh as arrays to store, without positions and normals, which the surface gives."""
     return {
         "mesh_uv": mesh.uv,
         "mesh_triangles": mesh.triangles.astype(np.int32),
@@ -81,7 +81,7 @@ def pack(mesh: Mesh, budget: tuple[int, float, int]) -> dict[str, Array]:
 def unpack(
     arrays: dict[str, Array], surface: DCPSurface, budget: tuple[int, float, int], *, rough: bool, flip: bool = False
 ) -> Mesh | None:
-    """The stored mesh, or None if it is absent, made with another budget or flip, or does not fit the surface.
+    """Return the stored mesh, or None if it is absent, made with another budget or flip, or does not fit the surface.
 
     ``rough`` leaves positions and normals to a deformation that computes them anyway: every vertex is put in the middle
     of its cell's control points.
@@ -113,7 +113,7 @@ def unpack(
 
 
 def _kinds_valid(arrays: dict[str, Array], vertices: tuple[int, ...]) -> bool:
-    """Are the arrays numbers of the right shapes, and no list empty?"""
+    """Whether the arrays hold numbers of the right shapes, and no list is empty."""
     uv, triangles, side, *lists = (arrays[key] for key in KEYS[:-1])
     shaped = uv.shape == (*vertices, 2) and triangles.shape[1:] == (3,) and side.shape == vertices
     whole = all(a.dtype.kind in "iu" for a in (triangles, side, *lists)) and uv.dtype.kind == "f"
@@ -121,7 +121,7 @@ def _kinds_valid(arrays: dict[str, Array], vertices: tuple[int, ...]) -> bool:
 
 
 def _indices_valid(uv: Array, triangles: Array, start: Array, list_start: Array, ids: Array, n: int) -> bool:
-    """Are all indices in range?"""
+    """Whether all indices are in range."""
     if not len(triangles) or len(start) != len(list_start):
         return False
     whole = start[0] == 0 and start[-1] == len(uv) and list_start[0] == 0 and list_start[-1] == len(ids)

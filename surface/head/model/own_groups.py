@@ -56,7 +56,8 @@ class OwnAmounts:
         return self.names.index(name)
 
     def __call__(self, values: Floats) -> Floats:
-        """(g,) amounts for values (P,) in the order of ``names``. Raises ValueError: one of them is not a number."""
+        """Return (g,): amounts for values (P,) in the order of ``names``. Raises ValueError: one of them is not a
+        number."""
         amounts: Floats = values[self._value]
         if np.isnan(amounts).any():
             raise ValueError(f"values: {self.names[self._value[int(np.argmax(np.isnan(amounts)))]]} is not a number")

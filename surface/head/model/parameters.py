@@ -37,9 +37,11 @@ _LOOK_DOWN = [_AT[f"eyeLookDown{s}"] for s in SIDES]
 _OPENERS = [[_AT[f"eye{e}{s}"] for e in ("LookUp", "Wide")] for s in SIDES]
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
 _BELOW = [_AT[n] for n in ("mouthRollLower", "mouthShrugLower", "mouthPressLeft", "mouthPressRight")]
-GIVE_WAY, GIVEN = 0.75, 0.5  # share of what raises the lower lip that a tongue takes away; tongueOut from which on
-TONGUE_NEEDS, TONGUE_FIRST = 0.33, 1.7  # jawOpen at least, for the whole tongue; how much earlier the jaw opens
-LID_SHARE = 0.72  # of a blink, which the upper lid goes down at a whole look down
+LIP_YIELD = 0.75  # fraction by which a tongue that is out reduces what raises the lower lip
+LIP_YIELD_AT = 0.5  # tongueOut from which on that is complete
+TONGUE_JAW = 0.33  # minimum jawOpen for the whole tongue
+TONGUE_JAW_LEAD = 1.7  # how much earlier the jaw opens than the tongue comes out
+LID_SHARE = 0.72  # fraction of a blink by which the upper lid goes down at a full look down
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
 
 
@@ -71,13 +73,13 @@ class Pose:
 
 
 def head_angles(values: Floats) -> Floats:
-    """(3,) yaw, pitch and roll of the head, rad, in parameter values (59,) in the order of NAMES."""
+    """Return (3,): yaw, pitch and roll of the head, rad, in parameter values (59,) in the order of NAMES."""
     angles: Floats = np.clip(values[len(SHAPES) : len(SHAPES) + 3], -1.0, 1.0) * HEAD_RAD
     return angles
 
 
 def read_pose(values: Floats) -> Pose:
-    """Parameter values (59,) in the order of NAMES, clipped, as a pose.
+    """Return parameter values (59,) in the order of NAMES, clipped, as a pose.
 
     mouthClose brings the lips together over an open jaw and is therefore never larger than jawOpen; tongueOut
     opens the jaw as far as it needs, ahead of the tongue, and keeps the lips off it. Blink and look down do not add up:
@@ -92,9 +94,9 @@ def read_pose(values: Floats) -> Pose:
         raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
     given = np.minimum(np.maximum(v, _LOW), 1.0).tolist()
     shapes, angle = given[: len(SHAPES)], given[len(SHAPES) :]
-    needed = TONGUE_NEEDS * min(1.0, TONGUE_FIRST * shapes[_TONGUE])
+    needed = TONGUE_JAW * min(1.0, TONGUE_JAW_LEAD * shapes[_TONGUE])
     jaw = shapes[_JAW] = max(shapes[_JAW], needed)
-    given = 1.0 - GIVE_WAY * min(1.0, shapes[_TONGUE] / GIVEN)
+    given = 1.0 - LIP_YIELD * min(1.0, shapes[_TONGUE] / LIP_YIELD_AT)
     for i in _BELOW:  # the lower lip gives way to the tongue
         shapes[i] *= given
     gaze = [_gaze([shapes[i] for i in _LOOK[side]], side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)]
@@ -113,7 +115,8 @@ def read_pose(values: Floats) -> Pose:
 
 
 def lid_down(look: float, blink: float) -> float:
-    """What a look down, 0..1, adds to a blink, 0..1, as a look down: how much further than the blink it takes the lid.
+    """Return what a look down, 0..1, adds to a blink, 0..1, as a look down: how much further than the blink it takes
+    the lid.
 
     The lid, in blinks, is at the greater of ``blink`` and LID_SHARE times ``look``, smooth where they are equal
     (a polynomial minimum; Quilez, "Smooth minimum", 2013); the width of that is none for an open and for a closed eye.
@@ -126,20 +129,20 @@ def lid_down(look: float, blink: float) -> float:
 
 
 def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float, float]:
-    """Yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes (down, in, out, up) together."""
+    """Return the yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes (down, in, out, up) together."""
     down, inward, outward, up = look
     yaw, pitch = yaw + (outward - inward) * (1 - 2 * side), pitch + down - up
     return min(max(yaw, -1.0), 1.0), min(max(pitch, -1.0), 1.0)
 
 
 def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
-    """Hermite step 3 t^2 - 2 t^3 of ``x``, 0 at ``low`` and 1 at ``high``, constant beyond them."""
+    """Return the Hermite step 3 t^2 - 2 t^3 of ``x``, 0 at ``low`` and 1 at ``high``, constant beyond them."""
     t = np.clip((x - low) / (high - low), 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
 def rotation(yaw: float, pitch: float, roll: float = 0.0) -> Floats:
-    """(3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
+    """Return (3, 3): roll about z first, then pitch about x, then yaw about y; rad, right-hand rule."""
     cy, cp, cr, sy, sp, sr = cos(yaw), cos(pitch), cos(roll), sin(yaw), sin(pitch), sin(roll)
     return np.array(
         [
@@ -151,7 +154,7 @@ def rotation(yaw: float, pitch: float, roll: float = 0.0) -> Floats:
 
 
 def rotation_vector(matrix: Floats) -> Floats:
-    """(3,) axis times angle of a rotation by less than 180 degrees."""
+    """Return (3,): axis times angle of a rotation by less than 180 degrees."""
     (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
     axis = (h - f, c - g, d - b)
     sine = 0.5 * hypot(*axis)

@@ -24,25 +24,25 @@ class Placement:
     unit: str = ""
 
     def points(self, rows: Floats) -> Floats:
-        """Points (..., 3) of the file in head space."""
+        """Return points (..., 3) of the file in head space."""
         return self.scale * (rows @ self.turn.T) + self.shift
 
     def moves(self, rows: Floats) -> Floats:
-        """Displacements (..., 3) of the file in head space."""
+        """Return displacements (..., 3) of the file in head space."""
         return self.scale * (rows @ self.turn.T)
 
     def file_points(self, rows: Floats) -> Floats:
-        """Points (..., 3) of head space in the file's frame."""
+        """Return points (..., 3) of head space in the file's frame."""
         return ((rows - self.shift) @ self.turn) / self.scale
 
     def file_moves(self, rows: Floats) -> Floats:
-        """Displacements (..., 3) of head space in the file's frame."""
+        """Return displacements (..., 3) of head space in the file's frame."""
         return (rows @ self.turn) / self.scale
 
     def file_directions(self, rows: Floats) -> Floats:
-        """Unit vectors (..., 3) of head space in the file's axes."""
+        """Return unit vectors (..., 3) of head space in the file's axes."""
         return rows @ self.turn
 
     def moved(self, shift: Floats) -> Placement:
-        """This placement, followed by a shift (3,), mm."""
+        """Return this placement followed by a shift (3,), mm."""
         return Placement(self.turn, self.scale, self.shift + shift, self.unit)

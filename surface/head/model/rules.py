@@ -34,8 +34,8 @@ class Drivers:
         self._of: Floats | None = None
 
     def amounts(self, shapes: Floats) -> Floats:
-        """(52 + r,) from the shapes (52,), overwritten by the next call; computed once for all parts of a head, which
-        pass the same array."""
+        """Return (52 + r,): from the shapes (52,), overwritten by the next call; computed once for all parts of a head,
+        which pass the same array."""
         if shapes is self._of:
             return self._amounts
         self._of = shapes
@@ -57,8 +57,8 @@ class SealDriver:
                                for other in reversed(SIDES)])  # fmt: skip
 
     def amount(self, shapes: Floats) -> float:
-        """1 while lips stay together, 0 where they are parted, smooth between; ``shapes (52,)``. Computed once for the
-        same array."""
+        """Return 1 while lips stay together, 0 where they are parted, smooth between; ``shapes (52,)``. Computed once
+        for the same array."""
         if self._seal is not None and shapes is not self._of:
             self._of, self._amount = shapes, self._at(shapes, self._seal)
         return self._amount

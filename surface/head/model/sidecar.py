@@ -22,7 +22,7 @@ DAMAGED = (ValueError, TypeError, ArithmeticError, LookupError)
 
 
 def sidecar_path(head: str | Path, file: str) -> Path:
-    """Path of ``file`` beside a head, which is given by its folder or its head.toml."""
+    """Return the path of ``file`` beside a head, which is given by its folder or its head.toml."""
     folder = Path(head)
     return (folder.parent if folder.suffix == ".toml" else folder) / file
 
@@ -57,7 +57,7 @@ def read_sidecar(path: Path, make: Callable[[Sidecar], Made], hint: str) -> Made
 
 
 def reason(error: Exception) -> str:
-    """What is wrong with arrays, in words for who has the file; those of the interpreter name nothing in it."""
+    """Return what is wrong with arrays, in words for who has the file; those of the interpreter name nothing in it."""
     if isinstance(error, KeyError):
         return f"has no array {error}"
     own = type(error) is ValueError

@@ -11,12 +11,13 @@ from surface.base.arrays import Floats
 SWAYS = ("swayYaw", "swayPitch", "swayRoll")
 """Groups of what sways, per radian by which it lies ahead of the head."""
 _AXES = np.eye(3)[[1, 0, 2]]  # yaw turns about y, pitch about x, roll about z
-_HZ, _DAMPING = 2.1, 0.38  # of hair at the length of a head, by eye; 1 would be without overshoot
-_MOST_RAD, _LONGEST_S = 0.16, 0.5
+_HZ, _DAMPING = 2.1, 0.38  # of hair as long as a head, chosen by eye; damping 1 has no overshoot
+_MAX_RAD, _MAX_S = 0.16, 0.5
 
 
 def sway_moves(points: Floats, share: Floats, pivot: tuple[float, float, float]) -> Floats:
-    """(3, n, 3) displacements of points (n, 3) for a radian about each axis through ``pivot``, by ``share (n,)``."""
+    """Return (3, n, 3): displacements of points (n, 3) for a radian about each axis through ``pivot``, by ``share
+    (n,)``."""
     return np.array([np.cross(axis, points - np.array(pivot)) * share[:, None] for axis in _AXES])
 
 
@@ -38,14 +39,14 @@ class Sway:
         step, first = time_s - self._time_s, self._time_s < 0.0
         lag = self.lag - (angles - self._angles)
         self._angles, self._time_s = np.array(angles, float), time_s
-        if first or not 0.0 <= step < _LONGEST_S:
+        if first or not 0.0 <= step < _MAX_S:
             self.lag, self._speed = np.zeros(3), np.zeros(3)
             return
         own = 2.0 * pi * _HZ
         turned = own * sqrt(1.0 - _DAMPING**2)
         fall, c, s = exp(-_DAMPING * own * step), cos(turned * step), sin(turned * step)
         pull = (self._speed + _DAMPING * own * lag) / turned
-        self.lag = np.clip(fall * (lag * c + pull * s), -_MOST_RAD, _MOST_RAD)
+        self.lag = np.clip(fall * (lag * c + pull * s), -_MAX_RAD, _MAX_RAD)
         self._speed = fall * (self._speed * c - (_DAMPING * own * pull + turned * lag) * s)
         if np.abs(self.lag).max() < 1e-4 and np.abs(self._speed).max() < 1e-3:  # at rest nothing is drawn again
             self.lag, self._speed = np.zeros(3), np.zeros(3)

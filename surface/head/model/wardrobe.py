@@ -36,7 +36,7 @@ STORED = ("points", "anchor", "degrees", "knots_u", "knots_v", "follow", "sway",
 BY_POINT = {"points": (3,), "anchor": (3,), "degrees": (2,), "follow": (), "sway": ()}  # shape of a row of each
 BY_VERTEX = {"mesh_uv": (2,), "strands": (4,), "tint": (), "shade": (), "mesh_side": ()}
 FIELDS = ("cover", "hidden", "shadow")
-MOST_NAMES, LONGEST_NAME = 64, 512  # names; bytes, four a character
+MAX_NAMES, MAX_NAME_BYTES = 64, 512  # names; bytes, four a character
 
 
 @dataclass(frozen=True)
@@ -64,7 +64,8 @@ class Garment:
 
 
 def outline(head: HeadData, anchors: Sequence[str]) -> int:
-    """CRC-32 over how parts lie in (u, v): their trim loops and slits. Identities and refinement leave it as it is."""
+    """Return CRC-32 over how parts lie in (u, v): their trim loops and slits. Identities and refinement leave it as it
+    is."""
     out = 0
     for part in (p for name in anchors for p in head.parts if p.name == name):
         for line in (*part.loops, part.slits):
@@ -98,10 +99,10 @@ def read_garment(worn: Worn) -> Garment:
 
 
 def _names(arrays: Mapping[str, Array], key: str) -> tuple[str, ...]:
-    """Names in an array of texts. Raises ValueError: it is another array, or too long."""
+    """Return names in an array of texts. Raises ValueError: it is another array, or too long."""
     names = arrays[key]
-    if names.ndim != 1 or names.dtype.kind != "U" or len(names) > MOST_NAMES or names.itemsize > LONGEST_NAME:
-        raise ValueError(f"{key} is no list of at most {MOST_NAMES} names")
+    if names.ndim != 1 or names.dtype.kind != "U" or len(names) > MAX_NAMES or names.itemsize > MAX_NAME_BYTES:
+        raise ValueError(f"{key} is no list of at most {MAX_NAMES} names")
     return tuple(str(name) for name in names)
 
 
@@ -121,7 +122,7 @@ def _check_rows(part: WornPart) -> None:
 
 
 def with_garments(head: HeadData, garments: tuple[Garment, ...], where: str) -> HeadData:
-    """The head with the parts of what is worn after its own.
+    """Return the head with the parts of what is worn after its own.
 
     Raises HeadFileError: a garment was made for a head of other parts, does not lie on this one, or its arrays do not
     belong together (names the file).
@@ -135,13 +136,13 @@ def with_garments(head: HeadData, garments: tuple[Garment, ...], where: str) -> 
         if garment.fit is not None and garment.fit != outline(head, garment.anchors):
             raise HeadFileError(f"{where}: {garment.worn.path.stem} was made for another head", hint=OTHER_HEAD)
         try:
-            parts += [_seated(worn, garment, head, where) for worn in garment.parts]
+            parts += [_seat(worn, garment, head, where) for worn in garment.parts]
         except DAMAGED as error:
             raise HeadFileError(f"{garment.worn.path}: is damaged: {reason(error)}", hint=HINT) from error
     return replace(head, parts=parts)
 
 
-def _seated(worn: WornPart, garment: Garment, head: HeadData, where: str) -> PartData:
+def _seat(worn: WornPart, garment: Garment, head: HeadData, where: str) -> PartData:
     a = worn.arrays
     anchor, follow = np.asarray(a["anchor"], float), np.asarray(a["follow"], float)
     n = len(anchor)

@@ -26,8 +26,8 @@ from surface.mesh.mesh import Mesh
 
 SHADE, DECIMATED = "occlusion.npz", "decimated.npz"
 LEVELS = ("full", "fast")
-STEPS = 1 << 14  # of u and v per unit
-OFFSET = 1 / 3  # of a step: halves, quarters and so on never lie between two steps, where a last bit would decide
+STEPS = 1 << 14  # per unit of u and v
+OFFSET = 1 / 3  # of a step, so that dyadic fractions never lie on the border of two steps, where rounding would decide
 Shares = Mapping[str, NDArray[np.floating]]
 Triangles = NDArray[np.int32]
 Unpacked = TypeVar("Unpacked")
@@ -45,22 +45,23 @@ class Meshed(Protocol):
 
 
 def checksum(triangles: NDArray[np.integer], uv: NDArray[np.floating]) -> int:
-    """CRC-32 of ``triangles (t, 3)`` and of ``uv (m, 2)`` in whole steps, so that it is the same on every machine."""
+    """Return CRC-32 of ``triangles (t, 3)`` and of ``uv (m, 2)`` in whole steps, so that it is the same on every
+    machine."""
     places = np.floor(np.asarray(uv, np.float64) * STEPS + OFFSET)
     check = zlib.crc32(np.ascontiguousarray(triangles, "<i4").tobytes())
     return zlib.crc32(np.ascontiguousarray(places, "<i4").tobytes(), check)
 
 
 def checksums(parts: Iterable[HeadPart]) -> dict[str, int]:
-    """Checksum of every part's tessellation, by the part's name."""
+    """Return checksum of every part's tessellation, by the part's name."""
     return {part.name: checksum(part.mesh.triangles, part.mesh.uv) for part in parts}
 
 
 def read_baked(
     head: str | Path, file: str, parts: Iterable[Meshed], unpack: Callable[[Array], Unpacked]
 ) -> dict[str, Unpacked]:  # fmt: skip
-    """The arrays of a file beside a head, unpacked, that belong to these parts as they are tessellated; empty where
-    there is no such file.
+    """Return the arrays of a file beside a head, unpacked, that belong to these parts as they are tessellated; empty
+    where there is no such file.
 
     Raises HeadFileError: the file is damaged, of a newer version, or was made for another mesh of a part.
     """
@@ -82,7 +83,7 @@ def read_baked(
 
 
 def read_shade(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Floats32]:
-    """Shares (m, k), 0..1, by the name they are stored under; empty where the head has no such file.
+    """Return shares (m, k), 0..1, by the name they are stored under; empty where the head has no such file.
 
     head : the head's folder or its head.toml.
     parts : what the shares are for; those of another tessellation are left out.
@@ -104,7 +105,7 @@ def write_shade(head: str | Path, shares: Shares, parts: Iterable[HeadPart] = ()
 
 
 def shade_path(head: str | Path) -> Path:
-    """Path of a head's shade."""
+    """Return the path of a head's shade."""
     return sidecar_path(head, SHADE)
 
 
@@ -124,7 +125,9 @@ def apply_shade(parts: Iterable[HeadPart], shares: Shares) -> None:
 
 
 def read_decimated(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Triangles]:
-    """Triangles (k, 3) by "PART/LEVEL", and :func:`tessellation_key` under "PART"; errors as :func:`read_shade`."""
+    """Return triangles (k, 3) by "PART/LEVEL", and :func:`tessellation_key` under "PART"; errors as
+    :func:`read_shade`.
+    """
     return read_baked(head, DECIMATED, parts, lambda stored: stored.astype(np.int32))
 
 
@@ -138,7 +141,9 @@ def write_decimated(head: str | Path, parts: Iterable[HeadPart], decimated: Mapp
 
 
 def tessellation_key(part: HeadPart) -> Triangles:
-    """(3,) that identifies a part's mesh with its seams: numbers of vertices and triangles, and a sum over these."""
+    """Return three integers that identify a part's mesh with its seams: numbers of vertices and triangles, and a sum
+    over these.
+    """
     check = zlib.crc32(np.ascontiguousarray(part.triangles, np.int32).tobytes()) & 0x7FFFFFFF
     return np.array([len(part.vertices), len(part.triangles), check], np.int32)
 
@@ -148,10 +153,12 @@ def apply_decimated(parts: Iterable[HeadPart], decimated: Mapping[str, Triangles
     for part in parts:
         if np.array_equal(decimated.get(part.name, ()), tessellation_key(part)):
             found = {level: decimated.get(f"{part.name}/{level}") for level in LEVELS}
-            part.decimated = {level: t for level, t in found.items() if t is not None and _valid(t, len(part.vertices))}
+            part.decimated = {
+                level: t for level, t in found.items() if t is not None and _is_valid(t, len(part.vertices))
+            }
 
 
-def _valid(triangles: Triangles, vertices: int) -> bool:
-    """Are there any, and are all indices in range?"""
+def _is_valid(triangles: Triangles, vertices: int) -> bool:
+    """Whether there are any triangles and all indices are in range."""
     shaped = triangles.ndim == 2 and triangles.shape[1] == 3 and len(triangles) > 0
     return bool(shaped and triangles.min() >= 0 and triangles.max() < vertices)

@@ -22,29 +22,30 @@ from surface.head.posing.contact_kernels import find_gaps, find_heights, follow_
 from surface.head.posing.contact_solve import clear_eyeball, gather_near, part_sides, place_all
 from surface.spline.kernels import fill_rows, row_capacity
 
-CONTACT_SHARE = 2 / 3  # of the rows at an opening can touch the other side; in the others the correction fades out
+CONTACT_SHARE = 2 / 3  # fraction of the rows at an opening that can touch the other side; in the rest corrections fade
 SOFT_MM = 0.1
 OVERLAP_MM = (0.28, 0.9)  # allowed overlap of lips and of lids: triangles cut about that off the edges of both sides
-NEARLY_MM, HIDDEN_MM = 1.2, 0.25  # lips nearer than the first at rest are closed; so far each hides the other then
+NEARLY_MM = 1.2  # lips nearer than this at rest count as closed
+HIDDEN_MM = 0.25  # by which each of two closed lips hides the other
 PASSES, TOLERANCE_MM = 3, 0.1  # corrections are repeated while bending leaves more than this
-LIFT_GAIN = 1.6  # of what a lid is off: least squares hold it back, because its neighbours need not move
-LID_MM = 1.2  # thickness of a lid: what rests nearer to the eyeball than that never sinks further
-TOUCH_MM = 0.05  # least distance of what rests on the eyeball
-HOLD_MM = (1.2, 2.4)  # what rests nearer to the eyeball than the first is held on it; further than the second, free
+LIFT_GAIN = 1.6  # corrections of lids are multiplied by it, because regularised least squares fall short
+LID_MM = 1.2  # thickness of a lid: skin that is nearer to the eyeball at rest never sinks further
+TOUCH_MM = 0.05  # minimum distance from the eyeball
+HOLD_MM = (1.2, 2.4)  # skin nearer to the eyeball at rest than the first is held on it, beyond the second it is free
 FORWARD = np.array([0.0, 0.0, 1.0])
-REGULARISATION = (0.02, 0.05)  # for lips and lids: weight of moving no control point, relative to a sample's
-LEAST_WEIGHT = 0.004  # of a control point in a sample: those with less are left out of it
-FAR_MM = 18.0  # from every sample: points with large spans so far away would move brow and chin
-LEAST_SHARE = 0.02  # of a sample: points with less everywhere are not moved
-_MOST_FOUND = 12  # tables that are kept: those of two heads
+REGULARISATION = (0.02, 0.05)  # for lips and lids: weight of zero moves of control points, relative to a sample's
+MIN_WEIGHT = 0.004  # of a control point in a sample: those with less are left out of it
+FAR_MM = 18.0  # points further than this from every sample stay, since they would move brow and chin
+MIN_SHARE = 0.02  # of a sample: points with less everywhere are not moved
+_MAX_CACHED = 12  # tables in the cache, those of two heads
 _FOUND: OrderedDict[bytes, tuple[Ints, Floats]] = OrderedDict()
 
 
 def height_limits(
     samples: Floats, radius: float, *, held: bool, cling: bool = True
 ) -> tuple[Floats, Floats, Floats]:  # fmt: skip
-    """How high samples of a lid shall lie above an eyeball: least and most, mm, and how firmly they are held down to
-    the most, 0..1; (s,) each.
+    """Return how high samples of a lid shall lie above an eyeball: least and most, mm, and how firmly they are held
+    down to the most, 0..1; (s,) each.
 
     samples : (s, 4) at rest, as :func:`.contact_kernels.place_samples` gives them, the eye looking ahead; radius : the
     eyeball's, 0 for none; held : do they rest on the eyeball, with their thickness? If not, they only keep out of it.
@@ -79,7 +80,7 @@ class EyeballClearance:
         start, ids, share = weights_at(surface, places)
         self.ids, self.table = _inverse(start, ids, share, surface.points, REGULARISATION[radius > 0])
         near, local = np.unique(ids, return_inverse=True)
-        self.sampling = near, *tiled(start, local, share), np.searchsorted(near, self.ids)
+        self.sampling = near, *tile_weights(start, local, share), np.searchsorted(near, self.ids)
         self.samples, (s, p) = np.empty((len(places), 4)), (len(places), len(near))
         self.work = (np.zeros((p, 3)), np.full((p, 3), np.nan), np.zeros((p, 3), np.float32),
                      np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(4))  # fmt: skip
@@ -118,7 +119,8 @@ class ContactSolver:
         self._press, self._rows = OVERLAP_MM[lids], rows
 
     def apply(self, axis: Floats, points: Floats, seal: float = 0.0) -> Floats:
-        """Correct control points (n, 3) in place; returns what :meth:`Follower.apply` takes, overwritten by each call.
+        """Correct control points (n, 3) in place; return what :meth:`Follower.apply` takes, overwritten by each
+        call.
 
         For lips that is the overlap (2 k,) in mm that was found in each column, for lids how far their samples (2 k m,)
         slid and how far they were lifted. ``axis (3,)`` is where the eye looks; ``seal``, 0..1, how
@@ -188,15 +190,15 @@ def close_nearly(gaps: Floats) -> None:
 
 
 def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:
-    """Centre (3,) and radius of a contact's eyeball; radius 0 for lips."""
+    """Return centre (3,) and radius of a contact's eyeball; radius 0 for lips."""
     if contact.eye < 0:
         return np.zeros(3), 0.0
     return np.ascontiguousarray(head.eyes[contact.eye], np.float64), head.eye_radius
 
 
 def weights_at(surface: DCPSurface, uv: Floats) -> tuple[Ints, Ints, Floats]:
-    """Rational weights of a surface's points at places (s, 2), without scipy: those of place k are ``share (m,)`` of
-    the points ``ids (m,)`` from ``start[k]`` to ``start[k + 1]``."""
+    """Return rational weights of a surface's points at places (s, 2), without scipy: those of place k are ``share
+    (m,)`` of the points ``ids (m,)`` from ``start[k]`` to ``start[k + 1]``."""
     samples, sides, _ = surface.sample(uv, None)
     arrays, bins = surface.arrays(), surface.bin_arrays()
     capacity = row_capacity(*bins[:3], samples)
@@ -205,15 +207,15 @@ def weights_at(surface: DCPSurface, uv: Floats) -> tuple[Ints, Ints, Floats]:
     used = fill_rows(*arrays[:4], arrays[5], *bins, samples, sides, data, ids, start)
     rows = np.repeat(np.arange(len(uv)), np.diff(start))
     share = data[:used, 0] / np.bincount(rows, data[:used, 0], len(uv))[rows]
-    counts = share > LEAST_WEIGHT
+    counts = share > MIN_WEIGHT
     rows, share, ids = rows[counts], share[counts], ids[:used][counts]
     start = np.searchsorted(rows, np.arange(len(uv) + 1))
     return start, ids.astype(np.int64) % surface.n, share / np.bincount(rows, share, len(uv))[rows]
 
 
-def tiled(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Floats32]:
-    """Weights as :func:`weights_at` gives them, for eight places at a time: tile t takes eight ``share (8 m,)`` each of
-    the points ``ids (m,)`` from ``start[t]`` to ``start[t + 1]``."""
+def tile_weights(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Floats32]:
+    """Return weights as :func:`weights_at` gives them, for eight places at a time: tile t takes eight ``share (8 m,)``
+    each of the points ``ids (m,)`` from ``start[t]`` to ``start[t + 1]``."""
     places, n = len(start) - 1, int(ids.max(initial=0)) + 1
     tile, lane = np.divmod(np.repeat(np.arange(places), np.diff(start)), LANES)
     keys, back = np.unique(tile * n + ids, return_inverse=True)
@@ -224,7 +226,8 @@ def tiled(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Floats32]:
 
 
 def by_lanes(table: Floats) -> Floats32:
-    """``table (s, k)`` for eight columns at a time, (8 b s,): of the first eight, row after row, then of the next."""
+    """Return ``table (s, k)`` for eight columns at a time, (8 b s,): of the first eight, row after row, then of the
+    next."""
     rows, columns = table.shape
     padded = np.zeros((rows, -(-columns // LANES) * LANES), np.float32)
     padded[:, :columns] = table
@@ -232,22 +235,23 @@ def by_lanes(table: Floats) -> Floats32:
 
 
 def _nearest(points: Floats, others: Floats) -> Floats:
-    """(n,) distance of each of points (n, 3) from the nearest of others (m, 3)."""
+    """Return (n,): distance of each of points (n, 3) from the nearest of others (m, 3)."""
     square = (points**2).sum(axis=1)[:, None] - 2.0 * points @ others.T + (others**2).sum(axis=1)
     distance: Floats = np.sqrt(np.maximum(square.min(axis=1), 0.0))
     return distance
 
 
 def _inverse(start: Ints, ids: Ints, share: Floats, points: Floats, regularisation: float) -> tuple[Ints, Floats]:
-    """Control points (k,) of ``points (n, 3)`` that reach the samples, and (s, k) how far each moves, in least squares,
-    per sample that is to move by 1; read-only. Points that mostly act elsewhere, or are far from every sample, are left
-    out. The same head loaded again, as with a control point added elsewhere, finds what was found before."""
+    """Return control points (k,) of ``points (n, 3)`` that reach the samples, and (s, k) how far each moves, in least
+    squares, per sample that is to move by 1; read-only. Points that mostly act elsewhere, or are far from every
+    sample, are left out. The same head loaded again, as with a control point added elsewhere, finds what was found
+    before."""
     reached = points[: int(ids.max()) + 1]
     key = blake2b(b"".join(np.ascontiguousarray(each).tobytes() for each in (start, ids, share, reached))).digest()
     known = key + str(regularisation).encode()
     found = _FOUND.pop(known, None) or _find_inverse(start, ids, share, reached, regularisation)
     _FOUND[known] = found
-    while len(_FOUND) > _MOST_FOUND:
+    while len(_FOUND) > _MAX_CACHED:
         _FOUND.popitem(last=False)
     return found
 
@@ -257,7 +261,7 @@ def _find_inverse(
 ) -> tuple[Ints, Floats]:  # fmt: skip
     dense = np.zeros((len(start) - 1, int(ids.max()) + 1))
     np.add.at(dense, (np.repeat(np.arange(len(dense)), np.diff(start)), ids), share)
-    used = np.flatnonzero(dense.max(axis=0) > LEAST_SHARE).astype(np.int64)
+    used = np.flatnonzero(dense.max(axis=0) > MIN_SHARE).astype(np.int64)
     used = used[_nearest(points[used], dense @ points[: dense.shape[1]]) < FAR_MM]
     dense = dense[:, used]
     normal = dense.T @ dense
@@ -274,7 +278,9 @@ def contact_rows(contact: Contact) -> int:
 
 
 def _column_moves(contact: Contact) -> Floats:
-    """(s, 2 k) how far each sample moves per push of each column: up by the contact's share, down by the rest."""
+    """Return (s, 2 k): how far each sample moves per push of each column: up by the contact's share, down by the
+    rest.
+    """
     _, columns, rows, _ = contact.places.shape
     touching = contact_rows(contact)
     row = np.ones(rows)

@@ -14,7 +14,7 @@ from surface.spline.lanes import add, fma_at, item, load, store3, zero
 # The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
-SIGHT = 0.7  # tangent of 35 degrees: so far from the front, lips that are closed still look closed
+MAX_SIGHT = 0.7  # tangent of 35 degrees: up to this far from the front, closed lips still look closed
 # coefficients of Taylor's series: of x**10 to 1, of the sine over x and of the cosine
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(5, -1, -1))
 COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(5, -1, -1))
@@ -22,7 +22,7 @@ COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(5, -1, -1))
 
 @inlined
 def sum_rows(table, base, picks, first, end, by_pick, rows):  # type: ignore[no-untyped-def]
-    """Sums of x, y and z of ``rows (k, 3)``, times eight weights each, over the entries ``first`` to ``end``.
+    """Return sums of x, y and z of ``rows (k, 3)``, times eight weights each, over the entries ``first`` to ``end``.
 
     Entry k takes row ``picks[k]`` and the weights at ``base + 8 k``, or, if ``by_pick``, row k and the weights at
     ``base + 8 picks[k]``. Four sums are kept of each, so that additions do not wait for each other.
@@ -78,7 +78,8 @@ def place_samples(
 
 @nonallocating
 def angle(y: float, z: float) -> float:
-    """The angle of (z, y) as np.arctan2(y, z), to 2e-8 rad, in a third of the time; Abramowitz and Stegun, 4.4.49."""
+    """Return the angle of (z, y) as np.arctan2(y, z), to 2e-8 rad, in a third of the time; Abramowitz and Stegun,
+    4.4.49."""
     a, b = abs(y), abs(z)
     t = min(a, b) / max(a, b, 1e-300)
     q, r = t * t, 0.0028662257
@@ -111,7 +112,9 @@ def trace_profiles(samples: Floats, rows: int, radius: float, out: Floats) -> No
 
 @nonallocating
 def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sign: float) -> float:
-    """How far a profile's line reaches beyond ``height`` at ``depth``, towards ``sign``; -1e9 where it has none."""
+    """Return how far a profile's line reaches beyond ``height`` at ``depth``, towards ``sign``; -1e9 where it has
+    none.
+    """
     worst = -1e9
     for j in range(len(heights) - 1):
         a, b = depths[j], depths[j + 1]
@@ -124,8 +127,8 @@ def overlap_at(height: float, depth: float, heights: Floats, depths: Floats, sig
 
 @nonallocating
 def deepest(heights: Floats, depths: Floats, others: Floats, at: Floats, sign: float, least: float) -> float:
-    """How far two profiles, ``heights`` at ``depths`` and ``others`` at ``at``, overlap; -1e9 where that is no more
-    than ``least`` at any depth."""
+    """Return how far two profiles, ``heights`` at ``depths`` and ``others`` at ``at``, overlap; -1e9 where that is no
+    more than ``least`` at any depth."""
     near, far = 1e9, -1e9
     for j in range(len(heights)):
         near, far = min(near, sign * heights[j]), max(far, sign * others[j])
@@ -186,9 +189,9 @@ def trace_edges(samples: Floats, edges: Floats) -> None:
 
 @nonallocating
 def hidden_to(across: Floats, edge: Floats, at: float, sign: float) -> float:
-    """The height up to which a line of :func:`trace_edges`, ``edge (k, 3)``, hides what lies behind it, or down to
-    which with a ``sign`` below 0, at the place ``at`` across the line of sight; that of its nearest point beyond its
-    ends.
+    """Return the height up to which a line of :func:`trace_edges`, ``edge (k, 3)``, hides what lies behind it, or down
+    to which with a ``sign`` below 0, at the place ``at`` across the line of sight; that of its nearest point beyond
+    its ends.
 
     across : (k,) places of its points. Seen aside, the line may run back at a corner of the mouth, so that several of
     its pieces lie at one place; the one that hides most counts.
@@ -209,10 +212,11 @@ def hidden_to(across: Floats, edge: Floats, at: float, sign: float) -> float:
 
 @kernel
 def find_gaps(samples: Floats, gaps: Floats) -> None:
-    """How far an opening stands open, ``gaps (2, k)``, as seen from the front and :data:`SIGHT` aside of it, where it
-    is widest, from ``samples (2, k, m, 3)`` as :func:`find_overlap` takes them: from the lowest of each column of the
-    upper side to the highest of the lower side in the same line of sight, below 0 where one hides behind the other;
-    and for each column of the lower side in turn."""
+    """How far an opening stands open, ``gaps (2, k)``, as seen from the front and :data:`MAX_SIGHT` aside of it,
+    where it is widest, from ``samples (2, k, m, 3)`` as :func:`find_overlap` takes them: from the lowest of each
+    column of the upper side to the highest of the lower side in the same line of sight, below 0 where one hides
+    behind the other; and for each column of the lower side in turn.
+    """
     columns = samples.shape[1]
     edges, across = np.empty((2, columns, 3)), np.empty((2, columns))
     trace_edges(samples, edges)
@@ -220,7 +224,7 @@ def find_gaps(samples: Floats, gaps: Floats) -> None:
     for way in range(-1, 2):
         for side in range(2):
             for k in range(columns):
-                across[side, k] = edges[side, k, 0] - way * SIGHT * edges[side, k, 2]
+                across[side, k] = edges[side, k, 0] - way * MAX_SIGHT * edges[side, k, 2]
         for side in range(2):
             sign = 1.0 - 2.0 * side
             for k in range(columns):
@@ -230,9 +234,9 @@ def find_gaps(samples: Floats, gaps: Floats) -> None:
 
 @kernel
 def find_closing(samples: Floats, seal: float, least: Floats, wanted: Floats, first: bool, push: Floats) -> float:
-    """How far the sides of an opening must come together, ``push (2, k)``, not above 0, so that ``seal`` of what it
-    stands open beyond ``least (2, k)`` closes; ``wanted (2, k)`` is where that ends, set at the ``first`` call. Returns
-    the farthest."""
+    """Return how far the sides of an opening must come together, ``push (2, k)``, not above 0, so that ``seal`` of what
+    it stands open beyond ``least (2, k)`` closes; ``wanted (2, k)`` is where that ends, set at the ``first`` call.
+    Returns the farthest."""
     most = 0.0
     find_gaps(samples, push)
     for side in range(2):
@@ -260,7 +264,7 @@ def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) ->
 
 @nonallocating
 def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, gain: float, lifts: Floats) -> float:
-    """How far samples at ``heights (s,)`` must be lifted or, below 0, laid down: ``lifts (s,)``.
+    """Return how far samples at ``heights (s,)`` must be lifted or, below 0, laid down: ``lifts (s,)``.
 
     The error is what is missing to ``least (s,)`` or, times ``hold (s,)``, exceeds ``most (s,)``; samples move by
     ``gain`` times it. Returns the largest error.
@@ -303,7 +307,8 @@ def lift_points(ids: Ints, lifts: Floats, samples: Floats, table: Floats32, room
 
 @nonallocating
 def turn_of(angle: float) -> tuple[float, float]:
-    """Sine and cosine of an angle in rad; by Taylor's series where it is small, to 2e-15, in a tenth of the time."""
+    """Return the sine and cosine of an angle in rad; by Taylor's series where it is small, to 2e-15, in a tenth of the
+    time."""
     if abs(angle) > 0.25:
         return np.sin(angle), np.cos(angle)
     q, s, c = angle * angle, SINE[0], COSINE[0]

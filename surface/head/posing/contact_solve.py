@@ -4,8 +4,8 @@ sides parted, as often as it takes.
 Everything happens on a copy of the control points near the opening, relative to the eyeball's centre. The tuples that
 the kernels take are made by :mod:`.contact`:
 
-``sampling`` : near (p,) control points of the samples; start, ids, share as :func:`.contact.tiled` gives them, with
-    indices into ``near``; own (k,) indices into ``near`` of the points that are moved
+``sampling`` : near (p,) control points of the samples; start, ids, share as :func:`.contact.tile_weights` gives them,
+    with indices into ``near``; own (k,) indices into ``near`` of the points that are moved
 ``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table of
     :func:`.contact_kernels.lift_points`
 ``work`` : local, found (p, 3) float64; single (p, 3), room (24,) float32; samples (s, 4), heights, lifts (s,) float64;
@@ -31,7 +31,7 @@ from .contact_kernels import (
     trace_profiles,
 )
 
-SEAL_PASSES = 2  # of bringing sides together: the second finds what bending left
+SEAL_PASSES = 2  # of bringing sides together: the second closes what bending left open
 
 
 @nonallocating
@@ -107,8 +107,9 @@ def put_back(points, near, own, eye, local):
 
 @kernel
 def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work):
-    """One pass of :func:`part_sides` over the placed samples; returns the largest error that it found. Samples are
-    placed again after it."""
+    """Run one pass of :func:`part_sides` over the placed samples; return the largest error found.
+
+    Samples are placed again after it."""
     own, radius, local = sampling[4], limits[3], work[0]
     _, profiles, overlap, _, _, _ = opening
     error, around = 0.0, radius > 0.0
@@ -145,9 +146,11 @@ def close_sides(seal, passes, tolerance, rows, apart, opening, push, sampling, w
 def part_sides(
     points, eye, axis, seal, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work
 ):  # fmt: skip
-    """Correct control points (n, 3) at an opening, of which ``seal``, 0..1, is closed first, until the remainder is
-    below ``tolerance``, mm, ``passes`` times at most; lids are moved onto the eyeball first, which opens them. Returns
-    how many passes there were, 0 where the last answer still holds.
+    """Correct the control points (n, 3) at an opening in place, until the error is below ``tolerance``, mm.
+
+    First lids are moved onto the eyeball, which opens them, and ``seal``, 0..1, of the opening is closed. Returns the
+    number of passes, at most ``passes``; 0 if the last answer still holds.
+
 
     press, soft : as in :func:`.contact_kernels.find_overlap`; rows : samples of a column.
     apart : (2 c, k) how far the moved points go up where the sides of a column part by 1.

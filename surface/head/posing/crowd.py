@@ -1,6 +1,6 @@
-"""A crowd: many heads of one surface, each with parameters of its own, posed in one batch.
+"""A crowd: many copies of one head, each with its own parameters, posed in one batch.
 
-They share weights, lists, triangles and colours; each has only its control points, vertices and normals.
+The copies share weights, lists, triangles and colours; each has its own control points, vertices and normals.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
 class CrowdPart:
     """One part of all heads.
 
-    part : of the head that all are like. vertices, normals : (h, m, 3) float32.
-    batch : its deformations; None for a part that does not deform.
+    part : of the template head. vertices, normals : (h, m, 3) float32 of h heads.
+    batch : the copies of its deformation; None for a part that does not deform.
     """
 
     part: HeadPart
@@ -37,16 +37,16 @@ class CrowdPart:
 
 
 class Crowd:
-    """``count`` heads like one, at rest at first; hair that sways does so as the one head's.
+    """``count`` copies of a template head, initially at rest; swaying hair follows the template's.
 
-    head : whose parts they share; nobody else poses it meanwhile, except by :meth:`show`.
+    head : the template, whose parts they share. It is posed by the crowd, so nothing else may pose it meanwhile.
 
     Attributes
     ----------
     parts : in the order of the head's parts.
-    values : (h, P) float64, parameters of the last :meth:`pose`, read-only.
+    values : (h, P) float64, parameters as given to the last :meth:`pose`, not clipped; read-only.
 
-    ValueError for fewer than one head.
+    Raises ValueError: fewer than one head.
     """
 
     def __init__(self, head: Head, count: int) -> None:
@@ -72,7 +72,8 @@ class Crowd:
         return sum(part.nbytes for part in self.parts)
 
     def pose(self, values: Floats) -> list[int]:
-        """Move every head to its parameter values (h, P); they are clipped. Returns which heads moved.
+        """Move every head to its parameter values (h, P), clipped to their ranges; return the heads whose values
+        changed.
 
         Raises ValueError: wrong shape or a value that is not a number; the heads keep their poses.
         """
@@ -97,13 +98,16 @@ class Crowd:
         return moved
 
     def show(self, k: int) -> None:
-        """Let the head that all are like have the vertices and normals of head k, until it is posed again."""
+        """Give the template head the vertices and normals of head k, until it is posed again."""
         for crowd in self.parts:
             crowd.part.show(crowd.vertices[k], crowd.normals[k])
 
     def _place(self, k: int, pose: Pose, moved: Mapping[str, Floats]) -> Callable[[], None]:
-        """Place the control points of head k, of which groups have ``moved`` those of deforming parts; returns
-        a function that turns it and closes its seams once the vertices are computed."""
+        """Place the control points of head k; return a function to call once its vertices are computed.
+
+        That function rotates the parts and closes the seams. ``moved`` : control points of the deforming parts, by
+        name, as moved by groups.
+        """
         rows, turn = self.head.place_pose(pose, moved)
         for crowd, points in zip(self.parts, rows, strict=True):
             if crowd.batch is not None:
@@ -113,10 +117,10 @@ class Crowd:
         return lambda: self._finish(k, turn)
 
     def _finish(self, k: int, turn: Turn) -> None:
-        """Turn the deforming parts of head k with the head, and close its seams."""
+        """Rotate the deforming parts of head k with the head, and close its seams."""
         for crowd in self.parts:
             if crowd.batch is not None:
-                source = _Member(crowd.batch.vertices[k], crowd.batch.normals[k])
+                source = _UnrotatedPart(crowd.batch.vertices[k], crowd.batch.normals[k])
                 rows = 0, len(source.vertices)
                 turn.rotate(source, crowd.part.share, rows, crowd.vertices[k], crowd.normals[k])
         for stitch, first, second in self._stitches:
@@ -126,15 +130,15 @@ class Crowd:
 
 
 @dataclass
-class _Member:
-    """One part of one head before it turns."""
+class _UnrotatedPart:
+    """Vertices and normals of one part of one head, before the head's rotation."""
 
     vertices: Floats32
     normals: Floats32
 
 
 def _make_part(part: HeadPart, count: int) -> CrowdPart:
-    """A part of ``count`` heads, as it is now."""
+    """Return a part of ``count`` heads, as it is now."""
     vertices, normals = (np.tile(array, (count, 1, 1)) for array in (part.vertices, part.normals))
     batch = DeformationBatch(part.deformation, count) if isinstance(part, SkinPart) else None
     return CrowdPart(part, vertices, normals, batch)

@@ -30,7 +30,7 @@ class DecimatedPart:
 
     part : the head's own.
     first, last : its vertices are those from ``first`` to before ``last``.
-    kept : (m,) int64, which vertices of the part they are, rising.
+    kept : (m,) int64, which vertices of the part they are, ascending.
     triangles : (t, 3) int32, of these.
     changed : ranges [start, stop) of these that the last pose touched.
     """
@@ -47,7 +47,8 @@ class DecimatedPart:
         return self.kept[: int(np.searchsorted(self.kept, len(self.part.mesh.uv)))]
 
     def rows(self, ids: NDArray[np.integer]) -> Ints:
-        """Rows among the decimated head's vertices of the part's vertices ``ids (k,)``; all of them must be kept."""
+        """Return rows among the decimated head's vertices of the part's vertices ``ids (k,)``; all of them must be
+        kept."""
         return self.first + np.searchsorted(self.kept, ids)
 
 
@@ -66,7 +67,7 @@ class DecimatedHead:
     def __init__(self, head: Head, parts: Sequence[HeadPart], level: str, wanted: Mapping[str, Ints]) -> None:
         self._pivot, self._read_pose = head.data.neck.pivot, head.read_pose
         triangles = {part.name: part.decimated.get(level, part.triangles) for part in parts}
-        kept, self.parts, first = _kept(head, triangles, wanted), [], 0
+        kept, self.parts, first = _kept_vertices(head, triangles, wanted), [], 0
         for part in parts:
             self.parts.append(DecimatedPart(part, triangles[part.name], kept[part.name], first))
             first = self.parts[-1].last
@@ -112,7 +113,7 @@ class JoinedRig(SkinRig):
 
     def __init__(self, parts: Sequence[SkinPart], head: HeadData) -> None:
         of = {part.name: part for part in head.parts}
-        super().__init__(_joined([of[part.name] for part in parts]), head)
+        super().__init__(_join([of[part.name] for part in parts]), head)
         ends = np.cumsum([0, *(len(part.rig.rest) for part in parts)]).tolist()
         self.rows = {part.name: slice(a, b) for part, a, b in zip(parts, ends, ends[1:], strict=False)}
         self._rigs = [(part.rig, self.rows[part.name]) for part in parts]
@@ -137,8 +138,8 @@ class JoinedRig(SkinRig):
             rig.apply_contacts(pose, self.points[rows])
 
 
-def _joined(parts: Sequence[PartData]) -> PartData:
-    """Points, groups, jaw and lids of several parts as those of one."""
+def _join(parts: Sequence[PartData]) -> PartData:
+    """Return points, groups, jaw and lids of several parts as those of one."""
     groups: dict[str, list[tuple[int, Group]]] = {}
     first = 0
     for part in parts:
@@ -202,7 +203,7 @@ class _Rigid:
 
 
 class _Seams:
-    """All seams of a head, closed in one go, one after the other."""
+    """All seams of a head, closed in one call."""
 
     def __init__(self, stitches: Sequence[SeamStitch], parts: Sequence[DecimatedPart]) -> None:
         by_name = {decimated.part.name: decimated for decimated in parts}
@@ -228,8 +229,10 @@ class _Seams:
             stitch_border(vertices, normals, vertices, normals, *self._rows)
 
 
-def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]) -> dict[str, Ints]:
-    """Which vertices are drawn or wanted, by part, with those that seams put them between."""
+def _kept_vertices(
+    head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapping[str, Ints]
+) -> dict[str, Ints]:
+    """Return which vertices are drawn or wanted, by part, with those that seams put them between."""
     kept = {name: np.union1d(own, wanted.get(name, ())).astype(np.int64) for name, own in triangles.items()}
     for stitch in reversed(head.stitches):  # a later seam may take what an earlier one moves
         drawn = np.isin(stitch.ids, kept[stitch.second.name])
@@ -239,7 +242,7 @@ def _kept(head: Head, triangles: Mapping[str, NDArray[np.integer]], wanted: Mapp
 
 
 def submesh(mesh: Mesh, ids: Ints) -> Mesh:
-    """Of a mesh only vertices ``ids (k,)``, rising, and the cells that have any; no triangles."""
+    """Return a mesh of only the vertices ``ids (k,)``, ascending, and the cells that have any; without triangles."""
     cells, cell = np.unique(mesh.cell[ids], return_inverse=True)
     lists = [mesh.points_of(c) for c in cells.tolist()]
     return Mesh(

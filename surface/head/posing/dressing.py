@@ -50,7 +50,7 @@ def _colour(part: HeadPart, worn: WornPart, look: Worn) -> None:
 
 
 def _directions(part: HeadPart) -> Floats32:
-    """(m, 3) unit vectors along the strands at rest: those of v."""
+    """Return (m, 3): unit vectors along the strands at rest: those of v."""
     _, _, along = part.surface.derivatives(part.mesh.uv, side=part.mesh.side)
     length = np.linalg.norm(along, axis=1, keepdims=True)
     return np.asarray(along / np.maximum(length, 1e-9), np.float32)
@@ -61,12 +61,12 @@ def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
     if albedo is None:
         return
     for garment in garments:
-        cover = sampled(garment, "cover", part)
+        cover = sample_picture(garment, "cover", part)
         if cover is not None:
             below = SCALP * np.asarray(garment.worn.colour, np.float32)
             darker = np.clip(1.0 - below.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 0.0, 1.0)
             albedo = albedo + cover * (1.0 - THROUGH * (1.0 - darker)) * (below - albedo)
-        shadow = sampled(garment, "shadow", part)
+        shadow = sample_picture(garment, "shadow", part)
         if shadow is not None and "occlusion" in part.attributes:
             part.attributes["occlusion"] = part.attributes["occlusion"] * (1.0 - shadow)
     part.attributes["albedo"] = albedo.astype(np.float32)
@@ -76,7 +76,7 @@ def _hide_below(part: HeadPart, garments: Sequence[Garment]) -> None:
     """Leave out triangles all of whose corners are covered: they cost time and might show through."""
     covered = np.zeros(len(part.vertices), bool)
     for garment in garments:
-        hidden = sampled(garment, "hidden", part)
+        hidden = sample_picture(garment, "hidden", part)
         if hidden is not None:
             covered |= hidden[:, 0] > COVERED
     if covered.any():
@@ -88,8 +88,8 @@ def _seen(triangles: NDArray[np.int32], covered: NDArray[np.bool_]) -> NDArray[n
     return triangles[~covered[triangles].all(axis=1)]
 
 
-def sampled(garment: Garment, kind: str, part: HeadPart) -> Floats32 | None:
-    """(m, 1) a garment's picture over a part at its vertices, linear between pixels; None where it has none."""
+def sample_picture(garment: Garment, kind: str, part: HeadPart) -> Floats32 | None:
+    """Return (m, 1): a garment's picture over a part at its vertices, linear between pixels; None where it has none."""
     picture = garment.fields.get(f"{kind}/{part.name}")
     if picture is None:
         return None

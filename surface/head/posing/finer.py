@@ -33,7 +33,7 @@ class Original:
 
 
 def coarser_of(path: str | Path, name: str, mesh: Mesh) -> Mapping[str, Ints]:
-    """The decimated triangles (t, 3) of a part of a head in a folder, by level; none without such a file."""
+    """Return the decimated triangles (t, 3) of a part of a head in a folder, by level; none without such a file."""
     found = read_decimated(path, [Original(name, mesh)])
     return {level: found[f"{name}/{level}"].astype(np.int64) for level in LEVELS if f"{name}/{level}" in found}
 

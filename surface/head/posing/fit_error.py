@@ -24,17 +24,17 @@ UNKNOWN = np.iinfo(np.uint16).max
 
 
 def read_fit_error(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Floats32]:
-    """Distances (m,) mm by part, NaN where none was measured; empty where the head has no such file.
+    """Return distances (m,) mm by part, NaN where none was measured; empty where the head has no such file.
 
     head : the head's folder or its head.toml. parts : what they are for; those of another tessellation are left out.
 
     Raises HeadFileError: the file is damaged, of a newer version, or was made for another mesh of a part.
     """
-    return read_baked(head, FIT_ERROR, parts, _unpacked)
+    return read_baked(head, FIT_ERROR, parts, _unpack)
 
 
-def _unpacked(stored: np.ndarray) -> Floats32:
-    """(m,) mm. Raises ValueError: an array that is not as it is written."""
+def _unpack(stored: np.ndarray) -> Floats32:
+    """Return the distances (m,), mm. Raises ValueError: the array is damaged."""
     if stored.ndim != 1 or stored.dtype != np.uint16:
         raise ValueError(f"holds an array of shape {stored.shape} and type {stored.dtype}, expected (any,) uint16")
     return np.where(stored == UNKNOWN, np.nan, STEP_MM * stored).astype(np.float32)

@@ -22,9 +22,9 @@ from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
 from surface.head.model.sway import Sway
 from surface.head.model.wardrobe import read_garment, with_garments
+from surface.head.posing.appearance import apply_look
 from surface.head.posing.dressing import dress
 from surface.head.posing.finer import apply_baked, coarser_of
-from surface.head.posing.looks import apply_look
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
 from surface.head.posing.seams import SeamStitch
@@ -110,7 +110,7 @@ class Head:
         return self.data.name
 
     def part(self, name: str) -> HeadPart:
-        """The part of that name; KeyError if there is none."""
+        """Return the part of that name; KeyError if there is none."""
         for p in self.parts:
             if p.name == name:
                 return p
@@ -128,7 +128,7 @@ class Head:
         return tuple(n for n in self.parameters if n in found)
 
     def group(self, name: str) -> dict[str, Group]:
-        """The group of that name: part name -> control points and their displacements per unit.
+        """Return the group of that name: part name -> control points and their displacements per unit.
 
         Raises KeyError: no group of that name.
         """
@@ -156,7 +156,7 @@ class Head:
         self._at = {name: i for i, name in enumerate(self.parameters)}
 
     def values(self, given: Mapping[str, float]) -> Floats:
-        """A parameter vector (P,) from names and values, 0 elsewhere; KeyError for an unknown name."""
+        """Return a parameter vector (P,) from names and values, 0 elsewhere; KeyError for an unknown name."""
         out = np.zeros(len(self.parameters))
         for name, value in given.items():
             out[self._at[name]] = value
@@ -168,14 +168,14 @@ class Head:
         Raises ValueError: wrong shape or a value that is not a number; the head keeps its pose.
         """
         pose = self.read_pose(values)
-        turn = self._turned(pose.head)
+        turn = self._make_turn(pose.head)
         for part in self.parts:
             part.pose(pose, turn)
         for stitch in self._stitches:
             stitch.close()
 
     def read_pose(self, values: Floats) -> Pose:
-        """Parameter values (P,) as a pose, with what sways where it is now; errors as :meth:`pose`."""
+        """Return parameter values (P,) as a pose, with what sways where it is now; errors as :meth:`pose`."""
         given = np.asarray(values, float)
         if given.shape != (len(self.parameters),):
             raise ValueError(f"values has shape {given.shape}, expected ({len(self.parameters)},)")
@@ -185,11 +185,12 @@ class Head:
         return pose
 
     def own_amounts(self, values: Floats) -> Floats:
-        """(g,) how much of each of :attr:`own_groups` parameter values (P,) show, -1 to 1; errors as :meth:`pose`."""
+        """Return (g,): how much of each of :attr:`own_groups` parameter values (P,) show, -1 to 1; errors as
+        :meth:`pose`."""
         return self._own(np.asarray(values, float))
 
     def place_points(self, values: Floats) -> tuple[list[Floats], Turn]:
-        """As :meth:`pose`, but only the points that vertices are summed from; vertices and normals stay.
+        """Do the same as :meth:`pose`, but only the points that vertices are summed from; vertices and normals stay.
 
         Returns (k, 3) float64 of every part, overwritten by the next call, and the head's rotation; see
         :class:`surface.head.posing.influence.Influence`.
@@ -197,12 +198,14 @@ class Head:
         return self.place_pose(self.read_pose(values), {})
 
     def place_pose(self, pose: Pose, moved: Mapping[str, Floats]) -> tuple[list[Floats], Turn]:
-        """:meth:`place_points` of a pose; ``moved`` : by part, what :meth:`.rig.SkinRig.move_all` found for it."""
+        """Do the same as :meth:`place_points` for a pose; ``moved`` : by part, what :meth:`.rig.SkinRig.move_all`
+        found for it.
+        """
         rows = [part.place_points(pose, moved.get(part.name)) for part in self.parts]
-        return rows, self._turned(pose.head)
+        return rows, self._make_turn(pose.head)
 
-    def _turned(self, angles: Floats) -> Turn:
-        """The rotation of a pose by its angles (3,); the last one, if they are the same."""
+    def _make_turn(self, angles: Floats) -> Turn:
+        """Return the rotation of a pose by its angles (3,); the last one, if they are the same."""
         key = angles.tobytes()
         if key != self._last_turn[0]:
             self._last_turn = key, Turn(rotation(*angles), self.data.neck.pivot)

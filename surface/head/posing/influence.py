@@ -55,7 +55,8 @@ class Influence:
 
 
 def _rows(part: HeadPart) -> tuple[list[Row], int]:
-    """Sums of one part's vertices over its own points, empty for those that a seam has added; and how many points."""
+    """Return sums of one part's vertices over its own points, empty for those that a seam has added; and how many
+    points."""
     if isinstance(part, SkinPart):
         lists = build_lists(part.surface, part.mesh, True)
         count = part.surface.n
@@ -68,7 +69,7 @@ def _rows(part: HeadPart) -> tuple[list[Row], int]:
 
 
 def _skin_rows(lists: Lists, sign: float) -> list[Row]:
-    """Sums from a mesh's blocks; ``sign`` -1 turns the normals round."""
+    """Return sums from a mesh's blocks; ``sign`` -1 turns the normals round."""
     rows: list[Row] = []
     for cell, (first, last) in enumerate(zip(lists.cell_start, lists.cell_start[1:], strict=False)):
         ids, block = _block(lists, cell, int(last - first))
@@ -83,7 +84,7 @@ def _skin_rows(lists: Lists, sign: float) -> list[Row]:
 
 
 def _block(lists: Lists, cell: int, count: int) -> tuple[Ints, Floats]:
-    """Points (r,) of a cell, and b w, b_u w and b_v w (count, r, 3) of its vertices."""
+    """Return points (r,) of a cell, and b w, b_u w and b_v w (count, r, 3) of its vertices."""
     tiles = int(lists.tile_start[cell + 1] - lists.tile_start[cell])
     rows, room, at = (int(x[cell]) for x in (lists.rows, lists.room, lists.at))
     value = lists.value[at : at + tiles * room * LANES].reshape(tiles, room, 1, LANES)
@@ -95,7 +96,8 @@ def _block(lists: Lists, cell: int, count: int) -> tuple[Ints, Floats]:
 
 
 def _rigid_rows(part: HeadPart) -> list[Row]:
-    """Sums over the columns of a rigid motion and its shift; derivatives are any two directions along the surface."""
+    """Return sums over the columns of a rigid motion and its shift; derivatives are any two directions along the
+    surface."""
     mesh = part.mesh
     vertices, normals = np.asarray(mesh.vertices, float), np.asarray(mesh.normals, float)
     sideways = np.where(np.abs(normals[:, :1]) < 0.7, [[1.0, 0.0, 0.0]], [[0.0, 1.0, 0.0]])
@@ -108,7 +110,7 @@ def _rigid_rows(part: HeadPart) -> list[Row]:
 
 
 def _share(part: HeadPart) -> Floats32:
-    """Share of the head's rotation of each of a part's vertices; 1 for those that a seam has added."""
+    """Return the share of the head's rotation of each of a part's vertices; 1 for those that a seam has added."""
     share = np.ones(len(part.vertices), np.float32)
     share[: len(part.share)] = part.share
     return share

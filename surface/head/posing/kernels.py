@@ -71,8 +71,8 @@ def mix_rows(amounts: Floats, rows: Floats32, rest: Floats, least: Floats, out: 
 
 
 @inlined
-def mapped(rows, at, linear, x0, y0, z0):  # type: ignore[no-untyped-def]
-    """``linear @ p`` plus a shift (x0, y0, z0) of the eight vectors p from ``rows[at]`` on."""
+def map_vectors(rows, at, linear, x0, y0, z0):  # type: ignore[no-untyped-def]
+    """Return ``linear @ p`` plus a shift (x0, y0, z0) of the eight vectors p from ``rows[at]`` on."""
     x, y, z = load_x(rows, at), load_y(rows, at), load_z(rows, at)
     return (
         fma(x, linear[0, 0], fma(y, linear[0, 1], fma(z, linear[0, 2], splat(x0)))),
@@ -89,9 +89,9 @@ def move_tile(
     """Eight vertices of :func:`move_rigid` from ``at`` on, to ``to``; all arrays but the matrices are flat, and
     ``turn (3, 3)`` is for normals."""
     none = np.float32(0.0)
-    x, y, z = mapped(rest, at, linear, shift[0], shift[1], shift[2])
+    x, y, z = map_vectors(rest, at, linear, shift[0], shift[1], shift[2])
     store3(vertices, to, x, y, z)
-    x, y, z = mapped(rest_normals, at, turn, none, none, none)
+    x, y, z = map_vectors(rest_normals, at, turn, none, none, none)
     square = add(mul(x, x), add(mul(y, y), mul(z, z)))
     scale = div(splat(ONE), root(add(square, splat(TINY))))
     store3(normals, to, mul(x, scale), mul(y, scale), mul(z, scale))

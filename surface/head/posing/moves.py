@@ -1,4 +1,4 @@
-"""Displacements of control points by groups, laid out so that a pose reads few bytes of them and in one go.
+"""Displacements of control points by groups, laid out so that a pose reads few bytes of them and in one pass.
 
 A group moves some control points of a part. Each displacement is needed once a pose, so time goes to reading them:
 eight points make a tile, and of every group only the tiles that it moves are kept, one after the other. Points are put
@@ -50,8 +50,8 @@ class Moves:
         add_moves(amounts, self._start, self._tile, self._rows, self._order, self._sums, points)
 
     def add_all(self, amounts: Floats, points: Floats) -> Floats:
-        """(h, n, 3) ``points (n, 3)`` with displacements by each of ``amounts (h, g)``: one product of matrices, which
-        reads the displacements once for all."""
+        """Return (h, n, 3): ``points (n, 3)`` with displacements by each of ``amounts (h, g)``: one product of
+        matrices, which reads the displacements once for all."""
         if self._dense is None:
             self._dense = self._table().astype(np.float64)
         moved: Floats = (amounts @ self._dense).reshape(len(amounts), self._n, 3)
@@ -59,7 +59,7 @@ class Moves:
         return moved
 
     def at(self, ids: Ints) -> Floats32:
-        """(g, k, 3) displacements of the points ``ids (k,)``."""
+        """Return (g, k, 3): displacements of the points ``ids (k,)``."""
         return self._table().reshape(len(self.used), self._n, 3)[:, ids]
 
     def _tiles_of(self, group: Group, place: Ints) -> tuple[np.ndarray, Floats32]:
@@ -73,7 +73,7 @@ class Moves:
         return tiles.astype(np.int32), rows.reshape(-1, LANES, 3)[tiles]
 
     def _table(self) -> Floats32:
-        """(g, 3 n) displacements of all points."""
+        """Return (g, 3 n): displacements of all points."""
         tiles = np.zeros((len(self.used), self._tiles, 3 * LANES), np.float32)
         group = np.repeat(np.arange(len(self.used)), np.diff(self._start))
         tiles[group, self._tile] = self._rows.reshape(-1, 3 * LANES)
@@ -83,7 +83,7 @@ class Moves:
 
 
 def gray_order(moved: Bools) -> Ints:
-    """(n,) an order of points in which neighbours are moved by nearly the same groups, from ``moved (g, n)``.
+    """Return (n,): an order of points in which neighbours are moved by nearly the same groups, from ``moved (g, n)``.
 
     It is that of the reflected Gray code of a point's column. Groups that move about half of the points come first:
     they cut the others into the fewest pieces.

@@ -39,7 +39,7 @@ HINT = "compare it with the other layers of paint"
 
 
 def paint_part(layers: list[dict[str, Any]], part: str, uv: Floats, where: str) -> dict[str, Floats32]:
-    """Attributes (m, k) of one part at its vertices ``uv (m, 2)``.
+    """Return attributes (m, k) of one part at its vertices ``uv (m, 2)``.
 
     Raises HeadFileError: a layer lacks a key or has a wrong one; names ``where``, the layer and the key.
     """
@@ -91,7 +91,7 @@ def _number(layer: dict[str, Any], key: str, default: float | None = None) -> fl
 
 
 def layer_field(layer: dict[str, Any], uv: Floats) -> Floats:
-    """(m,) how strongly a layer shows at each vertex."""
+    """Return (m,): how strongly a layer shows at each vertex."""
     kind = _word(layer, "kind", KINDS)
     if kind == "all":
         return np.ones(len(uv))
@@ -108,7 +108,7 @@ def layer_field(layer: dict[str, Any], uv: Floats) -> Floats:
 
 
 def _lines(layer: dict[str, Any]) -> list[Floats]:
-    """Each (k, 2), k >= 1."""
+    """Return each (k, 2), k >= 1."""
     lines = layer.get("lines")
     if not isinstance(lines, list) or not lines:
         raise ValueError("lines: must be a list with at least one line of points (u, v)")

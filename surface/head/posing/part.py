@@ -47,7 +47,7 @@ class Turn:
             turn_head(source.vertices, source.normals, share, self.vector, self.pivot, start, stop, vertices, normals)
 
     def after(self, linear: Floats, shift: Floats) -> tuple[Floats32, Floats32]:
-        """Linear part (3, 3) and shift (3,) of an affine motion followed by the whole rotation."""
+        """Return linear part (3, 3) and shift (3,) of an affine motion followed by the whole rotation."""
         turned = self.matrix @ (shift - self.pivot) + self.pivot
         return (self.matrix @ linear).astype(np.float32), turned.astype(np.float32)
 
@@ -92,8 +92,8 @@ class HeadPart:
         raise NotImplementedError
 
     def place_points(self, pose: Pose, moved: Floats | None = None) -> Floats:
-        """What :class:`surface.head.posing.influence.Influence` sums over, (k, 3), before the head turns; vertices and
-        normals are left as they are. ``moved`` : as :meth:`.rig.SkinRig.apply` takes it."""
+        """Return what :class:`surface.head.posing.influence.Influence` sums over, (k, 3), before the head turns;
+        vertices and normals are left as they are. ``moved`` : as :meth:`.rig.SkinRig.apply` takes it."""
         raise NotImplementedError
 
     @property
@@ -218,11 +218,11 @@ class RigidPart(HeadPart):
             return
         self._last_key, self.changed = key, [(0, len(self._rest))]
         self._motion = rigid_motion(self.follows, self._head, pose)
-        after = self._after(pose, turn)
+        after = self._turn_motion(pose, turn)
         move_rigid(self._rest, self._rest_normals, *after, self.vertices, self.normals)
 
-    def _after(self, pose: Pose, turn: Turn) -> tuple[Floats32, Floats32]:
-        """:meth:`Turn.after` of the part's motion in a pose, computed once for all parts that follow alike."""
+    def _turn_motion(self, pose: Pose, turn: Turn) -> tuple[Floats32, Floats32]:
+        """Return :meth:`Turn.after` of the part's motion in a pose, computed once for all parts that follow alike."""
         key = ("after", self.follows, id(self._head), id(turn))
         if key not in pose.found:
             pose.found[key] = turn.after(*self._motion)

@@ -19,7 +19,7 @@ from surface.head.posing.moves import Moves
 from surface.head.posing.tongue import tongue_rest
 
 CLEARANCE_GRID = (72, 36)  # samples of the part behind the lids, along u and v
-CLEARANCE_RADII = 1.4  # in eyeball radii: nearer points of the part behind the lids are kept outside the eyeball
+CLEARANCE_RADII = 1.4  # distance in eyeball radii below which points behind the lids are kept outside the eyeball
 UNDONE_MM = 20.0  # displacement by mouthClose that takes back the whole motion of the jaw
 _PLACE = {name: i for i, name in enumerate(SHAPES)}
 
@@ -67,7 +67,7 @@ class SkinRig:
         self.version = self.invalidations = 0
 
     def move_all(self, poses: Sequence[Pose]) -> Floats:
-        """(h, n, 3) control points as groups alone move them in each of the poses: what :meth:`apply` takes."""
+        """Return (h, n, 3): control points as groups alone move them in each of the poses: what :meth:`apply` takes."""
         amounts = np.array([self._drivers.amounts(pose.shapes)[self._moves.used] for pose in poses])
         moved = self._moves.add_all(amounts.reshape(len(poses), -1), self.rest)
         for pose, points in zip(poses, moved, strict=True):
@@ -75,9 +75,11 @@ class SkinRig:
         return moved
 
     def apply(self, pose: Pose, moved: Floats | None = None) -> Floats:
-        """Positions (n, 3) of all control points before the head turns, overwritten by the next call; corrections at
-        the part's own contacts are put into ``pose.pushes``. ``moved (n, 3)`` : where groups alone move them, if that
-        is known."""
+        """Return the positions (n, 3) of all control points before the head turns, overwritten by the next call.
+
+        Corrections at the part's own contacts are put into ``pose.pushes``, and those of lips into ``pose.lip``.
+        moved : (n, 3) positions as moved by groups alone, if known.
+        """
         np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
         key = self._pose_key(pose)
         if key != self._last_key:
@@ -112,7 +114,7 @@ class SkinRig:
             clearance.apply(_axis_of(pose, eye), points)
 
     def _pose_key(self, pose: Pose) -> tuple[object, ...]:
-        """Everything in a pose that the part's points depend on."""
+        """Return everything in a pose that the part's points depend on."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
         gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
         seals = (seal.amount(pose.shapes) for seal in self._seals)
@@ -172,12 +174,12 @@ class Lids:
 
 
 def optical_axis(gaze: Floats) -> Floats:
-    """(3,) unit vector along which an eye looks, from yaw and pitch (2,), rad."""
+    """Return (3,): unit vector along which an eye looks, from yaw and pitch (2,), rad."""
     return np.ascontiguousarray(rotation(*gaze)[:, 2])
 
 
 def _axis_of(pose: Pose, eye: int) -> Floats:
-    """The optical axis of an eye in a pose, computed once."""
+    """Return the optical axis of an eye in a pose, computed once."""
     key = ("axis", eye)
     if key not in pose.found:
         pose.found[key] = optical_axis(pose.gaze[eye])
@@ -186,7 +188,7 @@ def _axis_of(pose: Pose, eye: int) -> Floats:
 
 
 def _path_of(pose: Pose, jaw: Jaw) -> tuple[Floats, Floats]:
-    """The jaw's path in a pose, computed once."""
+    """Return the jaw's path in a pose, computed once."""
     key = ("path", id(jaw))
     if key not in pose.found:
         pose.found[key] = jaw_path(jaw, pose.jaw)
@@ -195,7 +197,7 @@ def _path_of(pose: Pose, jaw: Jaw) -> tuple[Floats, Floats]:
 
 
 def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballClearance]]:
-    """By eye, what keeps the part out of the eyeball; none unless it is sewn to lids from behind."""
+    """Return, by eye, what keeps the part out of the eyeball; empty unless the part is sewn to lids from behind."""
     lids = [c for c in head.contacts if c.eye >= 0 and part.name in c.followers]
     if not any(s.part_b == part.name and s.part_a == c.part for s in head.seams for c in lids):
         return []
@@ -214,7 +216,7 @@ def _clearances(part: PartData, head: HeadData) -> list[tuple[int, EyeballCleara
 
 
 def _undo_share(part: PartData) -> Floats:
-    """(n,) share of the jaw's motion that mouthClose takes back at each point, 0..1."""
+    """Return (n,): share of the jaw's motion that mouthClose takes back at each point, 0..1."""
     close = np.zeros_like(part.points)
     for g in part.groups:
         if g.name == "mouthClose":
@@ -223,7 +225,7 @@ def _undo_share(part: PartData) -> Floats:
 
 
 def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
-    """Rotation (3, 3) and shift (3,) of the lower jaw, opened by ``amount``: p -> turn @ p + shift.
+    """Return the rotation (3, 3) and shift (3,) of the lower jaw, opened by ``amount``: p -> turn @ p + shift.
 
     A rotation about the hinge plus a glide of the hinge, both growing with the amount.
     """
@@ -233,16 +235,18 @@ def jaw_path(jaw: Jaw, amount: float) -> tuple[Floats, Floats]:
 
 
 def motion_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
-    """Everything in a pose that :func:`rigid_motion` depends on, gathered once for all parts that follow alike."""
+    """Return everything in a pose that :func:`rigid_motion` depends on, computed once for all parts that follow
+    alike.
+    """
     key = ("key", follows, id(head))
     if key not in pose.found:
-        pose.found[key] = _key_of(follows, head, pose)
+        pose.found[key] = _make_key(follows, head, pose)
     found: tuple[float, ...] = pose.found[key]
     return found
 
 
-def _key_of(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
-    """What :func:`motion_key` returns."""
+def _make_key(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
+    """Compute the result of :func:`motion_key`."""
     if follows == "jaw":
         return (pose.jaw, *(float(pose.shapes[_PLACE[name]]) for name in head.jaw.tilts))
     if follows in ("left_eye", "right_eye"):
@@ -252,19 +256,19 @@ def _key_of(follows: str, head: HeadData, pose: Pose) -> tuple[float, ...]:
 
 
 def rigid_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
-    """Linear part (3, 3) and shift (3,) of a part that is fixed to skull, jaw or an eye, before the head turns.
+    """Return linear part (3, 3) and shift (3,) of a part that is fixed to skull, jaw or an eye, before the head turns.
 
     Control points of a rational surface may be moved by any affine map: the surface follows exactly.
     """
     key = ("motion", follows, id(head))
     if key not in pose.found:
-        pose.found[key] = _motion_of(follows, head, pose)
+        pose.found[key] = _make_motion(follows, head, pose)
     linear, shift = pose.found[key]
     return linear, shift
 
 
-def _motion_of(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
-    """What :func:`rigid_motion` returns."""
+def _make_motion(follows: str, head: HeadData, pose: Pose) -> tuple[Floats, Floats]:
+    """Compute the result of :func:`rigid_motion`."""
     linear, shift = np.eye(3), np.zeros(3)
     if follows == "jaw":
         linear, shift = _path_of(pose, head.jaw)

@@ -13,8 +13,8 @@ from surface.head.model.data import Seam
 from surface.head.posing.kernels import nearest_on_line, stitch_border
 from surface.head.posing.part import HeadPart
 
-NEAR = 2e-3  # in (u, v): a vertex nearer than this to the seam's polyline is on it
-SAME = 1e-4  # in points of the seam: vertices nearer than this are one
+NEAR = 2e-3  # in (u, v): vertices nearer than this to the seam's polyline are on it
+SAME = 1e-4  # along the seam, in points of its polyline: vertices nearer than this coincide
 
 
 class SeamStitch:
@@ -26,8 +26,8 @@ class SeamStitch:
 
     def __init__(self, seam: Seam, first: HeadPart, second: HeadPart) -> None:
         self.first, self.second = first, second
-        a_ids, a_at = _around(*_along(first, seam.uv_a), seam.uv_a)
-        b_ids, b_at = _along(second, seam.uv_b)
+        a_ids, a_at = _vertices_around(*_vertices_along(first, seam.uv_a), seam.uv_a)
+        b_ids, b_at = _vertices_along(second, seam.uv_b)
         inside = (b_at >= a_at.min(initial=np.inf) - SAME) & (b_at <= a_at.max(initial=-np.inf) + SAME)
         self.ids, at = b_ids[inside], b_at[inside]
         if len(a_ids) < 2 or not len(self.ids):  # of a closed line, as also two equal points are, one counts thrice
@@ -38,7 +38,7 @@ class SeamStitch:
         self.low, self.high = a_ids[after - 1], a_ids[after]
         gap = np.maximum(a_at[after] - a_at[after - 1], 1e-12)
         self.share = np.clip((at - a_at[after - 1]) / gap, 0.0, 1.0).astype(np.float32)
-        self._fill(a_ids, a_at, *_around(self.ids, at, seam.uv_a))
+        self._fill(a_ids, a_at, *_vertices_around(self.ids, at, seam.uv_a))
 
     def _fill(self, a_ids: Ints, a_at: Floats, ids: Ints, at: Floats) -> None:
         """Add slivers over the first part's vertices ``a_ids`` that lie between neighbours ``ids`` of the second's."""
@@ -75,8 +75,8 @@ class SeamStitch:
         stitch_border(vertices, normals, second_vertices, second_normals, self.ids, self.low, self.high, self.share)
 
 
-def _along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:
-    """Border vertices of a part on a polyline, and how far along it they lie, in its points; in order."""
+def _vertices_along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:
+    """Return border vertices of a part on a polyline, and how far along it they lie, in its points; in order."""
     ids = np.unique(part.borders)
     distance, at = np.empty(len(ids)), np.empty(len(ids))
     nearest_on_line(part.mesh.uv[ids], np.ascontiguousarray(line, np.float64), False, distance, at)
@@ -85,8 +85,9 @@ def _along(part: HeadPart, line: Floats) -> tuple[Ints, Floats]:
     return ids[on][order], at[on][order]
 
 
-def _around(ids: Ints, at: Floats, line: Floats) -> tuple[Ints, Floats]:
-    """Vertices along a polyline; on a closed one the last comes before the first, too, and the first after the last."""
+def _vertices_around(ids: Ints, at: Floats, line: Floats) -> tuple[Ints, Floats]:
+    """Return vertices along a polyline; on a closed one the last comes before the first, too, and the first after the
+    last."""
     if not len(ids) or not np.array_equal(line[0], line[-1]):
         return ids, at
     length = len(line) - 1.0

@@ -32,7 +32,7 @@ SIDEWAYS = 1.1  # how far the tongue follows the lower lip to a side: with less,
 PUT_OUT = (0.02, 0.3)  # tongueOut where the correction begins and where it is complete: inside the mouth there is none
 BEYOND = (0.3, 0.5)  # tongueOut over which it begins to move sideways: further in, it would cut the teeth beside it
 PASSES = 3
-LEAST_SAMPLES, LEAST_MM = 50, 5.0  # of a part that is a tongue, and its length
+MIN_SAMPLES, MIN_LENGTH_MM = 50, 5.0  # of a part that is a tongue, and its length
 
 
 @nonallocating
@@ -41,7 +41,7 @@ def find_rise(
 ) -> float:  # fmt: skip
     """Fill ``rise (s,)`` with how far stations ``under (s, 3)`` have to be lifted, and return the greatest of these.
 
-    below : (k, 3) points that the stations have to stay above, sorted by rising z. Those further away than ``reach``,
+    below : (k, 3) points that the stations have to stay above, sorted by z. Those further away than ``reach``,
         measured horizontally, do not count, and nearer ones count less the further away they are.
     clear, soft : distance to keep, and how much earlier lifting begins. All lengths are mm.
     again : stations have only been lifted since the last call, so those that were not too low are left out.
@@ -57,7 +57,7 @@ def find_rise(
 
 @nonallocating
 def rise_of(x: float, y: float, z: float, below: Floats, reach: float, soft: float) -> float:
-    """How far one station at (x, y, z) has to be lifted; see :func:`find_rise`."""
+    """Return how far one station at (x, y, z) has to be lifted; see :func:`find_rise`."""
     most, scale = 0.0, 1.0 / (reach * reach)
     for k in range(np.searchsorted(below[:, 2], z - reach), len(below)):
         if below[k, 2] >= z + reach:
@@ -115,7 +115,7 @@ def press(
 ) -> None:  # fmt: skip
     """Move control points (n, 3) of the tongue until its stations clear the points ``against (k, 3)``.
 
-    start, ids, weights, sign : as in :func:`place_stations`. against : sorted by rising z, y multiplied by ``sign``.
+    start, ids, weights, sign : as in :func:`place_stations`. against : sorted by z, y multiplied by ``sign``.
     fade, part, share : as in :func:`lift_sections`.
     """
     stations, rise, lift = np.zeros((len(start) - 1, 3)), np.zeros(len(start) - 1), np.zeros(len(points))
@@ -128,7 +128,7 @@ def press(
 
 @nonallocating
 def sort_by_depth(at: Floats, order: Ints, out: Floats) -> None:
-    """Copy points ``at (k, 3)`` to ``out (k, 3)`` by rising z; ``order (k,)`` becomes the row that each comes from.
+    """Copy points ``at (k, 3)`` to ``out (k, 3)`` sorted by z; ``order (k,)`` becomes the row that each comes from.
 
     The search starts from the order of the last call, which is nearly right from one frame of a motion to the next.
     """
@@ -196,10 +196,10 @@ def rest_tongue(  # type: ignore[no-untyped-def]
 
 
 def tongue_rest(part: PartData, head: HeadData) -> TongueRest | None:
-    """The correction of a tongue; None for a part without a surface, or too short to have a direction."""
+    """Return the correction of a tongue; None for a part without a surface, or too short to have a direction."""
     surface = make_surface(part)
     places, at = _samples(part, surface)
-    if len(at) < LEAST_SAMPLES or np.ptp(at[:, 2]) <= LEAST_MM:
+    if len(at) < MIN_SAMPLES or np.ptp(at[:, 2]) <= MIN_LENGTH_MM:
         return None
     return TongueRest(part, head, surface, places, at)
 
@@ -223,12 +223,12 @@ class TongueRest:
         low, high = _thickness(at, z)
         self._thick = np.clip((part.points[:, 1] - low) / np.maximum(high - low, 1e-6), 0.0, 1.0)
         self._lower, upper = (_edges(head, follows, sign) for follows, sign in (("jaw", 1.0), ("skull", -1.0)))
-        self._upper = _by_depth(upper, -1.0)
+        self._upper = _sort_by_depth(upper, -1.0)
         self._order = np.zeros(0, np.int64)  # of what lies below the tongue, by depth
 
     def share(self, pose: Pose) -> float:
-        """How much of the correction a pose takes, 0..1: none while the tongue is in the mouth."""
-        return _eased(float(pose.shapes[TONGUE]), *PUT_OUT)
+        """Return how much of the correction a pose takes, 0..1: none while the tongue is in the mouth."""
+        return _ease(float(pose.shapes[TONGUE]), *PUT_OUT)
 
     def apply(self, pose: Pose, lip: Floats, linear: Floats, shift: Floats, points: Floats) -> None:
         """Move control points (n, 3) in place; ``lip (k, 3)`` are samples of the lower lip, and the lower teeth are
@@ -239,25 +239,25 @@ class TongueRest:
         below = len(lip) + len(self._lower)
         if len(self._order) != below:
             self._order = np.arange(below)
-        aside = SIDEWAYS * _eased(float(pose.shapes[TONGUE]), *BEYOND)
+        aside = SIDEWAYS * _ease(float(pose.shapes[TONGUE]), *BEYOND)
         rest_tongue(*self._sides, lip, self._lower, self._upper, linear, shift, self._fade, self._sideways, self._thick,
                     share, aside, self._order, points)  # fmt: skip
 
 
-def _eased(x: float, low: float, high: float) -> float:
-    """0 up to ``low``, 1 from ``high`` on, and smooth between."""
+def _ease(x: float, low: float, high: float) -> float:
+    """Return 0 up to ``low``, 1 from ``high`` on, and smooth between."""
     t = min(max((x - low) / (high - low), 0.0), 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
-def _by_depth(at: Floats, sign: float) -> Floats:
-    """Points (k, 3) by rising z, with y times ``sign``."""
+def _sort_by_depth(at: Floats, sign: float) -> Floats:
+    """Return points (k, 3) sorted by z, with y times ``sign``."""
     rising: Floats = at[np.argsort(at[:, 2])] * (1.0, sign, 1.0)
     return rising
 
 
 def _grid(part: PartData) -> Floats:
-    """(k, 2) places all over a part, in (u, v)."""
+    """Return (k, 2): places all over a part, in (u, v)."""
     domain = domain_of(part)
     u0, u1, v0, v1 = domain.rect
     grid = np.stack(np.meshgrid(np.linspace(u0, u1, GRID), np.linspace(v0, v1, GRID)), axis=-1).reshape(-1, 2)
@@ -266,7 +266,8 @@ def _grid(part: PartData) -> Floats:
 
 
 def _samples(part: PartData, surface: DCPSurface) -> tuple[Floats, Floats]:
-    """(k, 2) places all over a part, in (u, v), and their positions (k, 3), mm; only where control points cover it."""
+    """Return (k, 2): places all over a part, in (u, v), and their positions (k, 3), mm; only where control points cover
+    it."""
     places = _grid(part)
     at = surface.evaluate(places)
     covered = np.isfinite(at).all(axis=1)
@@ -274,14 +275,14 @@ def _samples(part: PartData, surface: DCPSurface) -> tuple[Floats, Floats]:
 
 
 def _slice(at: Floats, z: float) -> Bools:
-    """(k,) whether each sample lies in the slice at z; the nearest one always does."""
+    """Return (k,): whether each sample lies in the slice at z; the nearest one always does."""
     away = np.abs(at[:, 2] - z)
     return away <= max(SLICE_MM, float(away.min()))
 
 
 def _stations(places: Floats, at: Floats, along: Floats, sign: float) -> Floats:
-    """(STATIONS * len(ACROSS), 2) stations in (u, v) on the tongue's upper side (``sign`` 1) or underside (-1), at each
-    z of ``along``, chosen from samples ``places (k, 2)`` with positions ``at (k, 3)``."""
+    """Return (STATIONS * len(ACROSS), 2): stations in (u, v) on the tongue's upper side (``sign`` 1) or underside (-1),
+    at each z of ``along``, chosen from samples ``places (k, 2)`` with positions ``at (k, 3)``."""
     out = []
     for z in along:
         here = at[_slice(at, z)]
@@ -294,14 +295,15 @@ def _stations(places: Floats, at: Floats, along: Floats, sign: float) -> Floats:
 
 
 def _thickness(at: Floats, z: Floats) -> tuple[Floats, Floats]:
-    """Lowest and highest y (n,) of the tongue, of which ``at (m, 3)`` are samples, at each of ``z (n,)``."""
+    """Return the lowest and highest y (n,) of the tongue, of which ``at (m, 3)`` are samples, at each of ``z (n,)``."""
     knots = np.linspace(at[:, 2].min(), max(at[:, 2].max() - SLICE_MM, at[:, 2].min()), 30)
     slices = [at[_slice(at, k), 1] for k in knots]
     return np.interp(z, knots, [s.min() for s in slices]), np.interp(z, knots, [s.max() for s in slices])
 
 
 def _edges(head: HeadData, follows: str, sign: float) -> Floats:
-    """(k, 3) the highest (1) or lowest (-1) sample of teeth at jaw or skull in each cell of BIN_MM, seen from above."""
+    """Return (k, 3): the highest (1) or lowest (-1) sample of teeth at jaw or skull in each cell of BIN_MM, seen from
+    above."""
     teeth = [p for p in head.parts if p.follows == follows and p.material == "teeth"]
     return np.concatenate([np.zeros((0, 3)), *(_edge(p, sign) for p in teeth)])
 

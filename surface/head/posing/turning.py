@@ -17,7 +17,9 @@ ONE, TWO = np.float32(1.0), np.float32(2.0)
 
 @inlined
 def sine_and_rest(share, half):  # type: ignore[no-untyped-def]
-    """Sine of twice ``share * half``, and one less its cosine, of eight shares; ``half`` is at most pi / 2."""
+    """Return the sine of twice ``share * half``, and one less its cosine, of eight shares; ``half`` is at most pi /
+    2.
+    """
     x = mul(share, splat(half))
     q = mul(x, x)
     s = add(mul(q, splat(SINE[0])), splat(SINE[1]))
@@ -36,8 +38,10 @@ def sine_and_rest(share, half):  # type: ignore[no-untyped-def]
 
 
 @inlined
-def turned(x, y, z, a, b, c, sine, rest):  # type: ignore[no-untyped-def]
-    """Eight vectors turned about the unit axis (a, b, c): Rodrigues' formula, with ``rest`` one less the cosine."""
+def turn_vectors(x, y, z, a, b, c, sine, rest):  # type: ignore[no-untyped-def]
+    """Return eight vectors turned about the unit axis (a, b, c): Rodrigues' formula, with ``rest`` one less the
+    cosine.
+    """
     along = mul(rest, fma(x, a, fma(y, b, mul(z, splat(c)))))
     return (
         add(sub(x, mul(rest, x)), add(mul(sine, fma(z, b, mul(y, splat(-c)))), mul(along, splat(a)))),
@@ -56,10 +60,10 @@ def turn_tile(
     px, py, pz = splat(pivot[0]), splat(pivot[1]), splat(pivot[2])
     sine, rest = sine_and_rest(load(share, at), np.float32(half))
     x, y, z = sub(load_x(vertices, 3 * at), px), sub(load_y(vertices, 3 * at), py), sub(load_z(vertices, 3 * at), pz)
-    x, y, z = turned(x, y, z, a, b, c, sine, rest)
+    x, y, z = turn_vectors(x, y, z, a, b, c, sine, rest)
     store3(out_vertices, 3 * to, add(x, px), add(y, py), add(z, pz))
     x, y, z = load_x(normals, 3 * at), load_y(normals, 3 * at), load_z(normals, 3 * at)
-    x, y, z = turned(x, y, z, a, b, c, sine, rest)
+    x, y, z = turn_vectors(x, y, z, a, b, c, sine, rest)
     store3(out_normals, 3 * to, x, y, z)
 
 

@@ -32,8 +32,8 @@ REFUSED = {
 }
 MESHOPT = ("EXT_meshopt_compression", "KHR_meshopt_compression")
 UNCOMPRESS = "uncompress it: npx gltfpack -noq -i IN.glb -o OUT.glb"
-MOST_ELEMENTS = 4_000_000  # of one accessor
-MOST_ITEMS = 10_000  # nodes, accessors and so on
+MAX_ELEMENTS = 4_000_000  # of one accessor
+MAX_ITEMS = 10_000  # nodes, accessors and so on
 
 
 class Gltf:
@@ -53,7 +53,7 @@ class Gltf:
         if not binary and raw.lstrip()[:1] != b"{":
             why = "is no glTF file: neither its binary form nor JSON" if raw else "is empty"
             raise FitError(f"{path}: {why}", hint="export the head as .glb")
-        text, self._chunk = self._chunks(raw) if binary else (raw, None)
+        text, self._chunk = self._split_chunks(raw) if binary else (raw, None)
         try:
             self.document = parse_json(decode(text))
         except ValueError as e:
@@ -69,11 +69,11 @@ class Gltf:
             raise self.error("extensionsRequired", f"{unread[0]!r} ({what}) is not read here", hint)
 
     def error(self, where: str, why: str, hint: str = "export the file again") -> FitError:
-        """The error for an element of the file."""
+        """Return the error for an element of the file."""
         return FitError(f"{self.path}: {where}: {why}", hint=hint)
 
-    def _chunks(self, raw: bytes) -> tuple[bytes, bytes | None]:
-        """JSON text and binary chunk of a .glb."""
+    def _split_chunks(self, raw: bytes) -> tuple[bytes, bytes | None]:
+        """Return JSON text and binary chunk of a .glb."""
         if len(raw) < 20:
             raise self.error("header", "the file is cut short")
         _, version, length = struct.unpack_from("<III", raw)
@@ -94,7 +94,7 @@ class Gltf:
         return found[JSON_CHUNK], found.get(BIN_CHUNK)
 
     def value(self, table: dict[str, Any], key: str, kind: type, where: str, default: Any = None) -> Any:
-        """``table[key]``, which must be of the kind; without a default it must be there."""
+        """Return ``table[key]``, which must be of the kind; without a default it must be there."""
         found = table.get(key, default)
         if not isinstance(found, kind) or (kind is int and isinstance(found, bool)):
             word = {dict: "object", list: "list", int: "number", str: "text"}[kind]
@@ -103,14 +103,14 @@ class Gltf:
         return found
 
     def items(self, key: str) -> list[Any]:
-        """A list of the document; empty if it is missing."""
+        """Return a list of the document; empty if it is missing."""
         found: list[Any] = self.value(self.document, key, list, "JSON", [])
-        if len(found) > MOST_ITEMS:
-            raise self.error(key, f"there are {len(found)}; {MOST_ITEMS} are the most", "export the head alone")
+        if len(found) > MAX_ITEMS:
+            raise self.error(key, f"there are {len(found)}; {MAX_ITEMS} are the most", "export the head alone")
         return found
 
     def item(self, key: str, index: Any, where: str) -> dict[str, Any]:
-        """``document[key][index]``, an object; ``where`` is the element that refers to it."""
+        """Return ``document[key][index]``, an object; ``where`` is the element that refers to it."""
         found = self.items(key)
         if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(found):
             raise self.error(where, f"points at {key}[{str(index)[:20]}], but there are {len(found)}")
@@ -119,7 +119,7 @@ class Gltf:
         return dict(found[index])
 
     def floats(self, index: Any, width: int, where: str) -> Floats:
-        """(n, width) float64 of an accessor, integers scaled where it is normalised; all finite."""
+        """Return (n, width) float64: of an accessor, integers scaled where it is normalised; all finite."""
         raw = self._accessor(index, width, where)
         out = raw.astype(np.float64)
         if raw.dtype.kind != "f" and self.item("accessors", index, where).get("normalized", False):
@@ -131,7 +131,7 @@ class Gltf:
         return out
 
     def integers(self, index: Any, where: str, width: int = 1) -> Ints:
-        """(n, width) int64 of an accessor of unsigned numbers."""
+        """Return (n, width) int64: of an accessor of unsigned numbers."""
         raw = self._accessor(index, width, where)
         if raw.dtype.kind != "u":
             raise self.error(where, f"holds {raw.dtype}, not unsigned numbers")
@@ -144,8 +144,8 @@ class Gltf:
             raise self.error(name, f"is of type {shape[:20]!r}, which has not {width} numbers")
         kind = self._component_type(accessor, name)
         count = self.value(accessor, "count", int, name)
-        if not 0 <= count <= MOST_ELEMENTS:
-            raise self.error(name, f"says {count} elements; {MOST_ELEMENTS} are the most", "take a smaller mesh")
+        if not 0 <= count <= MAX_ELEMENTS:
+            raise self.error(name, f"says {count} elements; {MAX_ELEMENTS} are the most", "take a smaller mesh")
         if "bufferView" in accessor:
             out = self._view(accessor, kind, count, width, name)
         else:
@@ -161,7 +161,7 @@ class Gltf:
         return np.dtype(TYPES[code]).newbyteorder("<")
 
     def _view(self, table: dict[str, Any], kind: np.dtype, count: int, width: int, name: str) -> Array:
-        """A copy (count, width) of elements in a buffer view, which may be interleaved."""
+        """Return a copy (count, width) of elements in a buffer view, which may be interleaved."""
         index = table["bufferView"]
         view = self.item("bufferViews", index, name)
         where = f"bufferViews[{index}]"
@@ -203,35 +203,35 @@ class Gltf:
         return self._buffers[index]
 
     def view_bytes(self, index: Any, where: str) -> bytes:
-        """The bytes of a buffer view."""
+        """Return the bytes of a buffer view."""
         data, start, size = self._span(self.item("bufferViews", index, where), index, f"bufferViews[{index}]")
         return data[start : start + size]
 
     def _span(self, view: dict[str, Any], index: int, where: str) -> tuple[bytes, int, int]:
-        """Bytes that hold a buffer view, where in them it starts, and its length."""
+        """Return bytes that hold a buffer view, where in them it starts, and its length."""
         extensions = self.value(view, "extensions", dict, where, {})
         for name in MESHOPT:
             if name in extensions:
-                data = self._decompressed(self.value(extensions, name, dict, where), index, f"{where}.{name}")
+                data = self._decompress(self.value(extensions, name, dict, where), index, f"{where}.{name}")
                 return data, 0, len(data)
-        return self._stored(view, where)
+        return self._locate_view(view, where)
 
-    def _stored(self, view: dict[str, Any], where: str) -> tuple[bytes, int, int]:
-        """The buffer that a view lies in, where in it the view starts, and its length."""
+    def _locate_view(self, view: dict[str, Any], where: str) -> tuple[bytes, int, int]:
+        """Return the buffer that a view lies in, where in it the view starts, and its length."""
         start, size = self._length(view, "byteOffset", where, 0), self._length(view, "byteLength", where)
         data = self._buffer(view.get("buffer"), where)
         if start + size > len(data):
             raise self.error(where, f"ends at byte {start + size}, but the buffer has {len(data)}: it is cut short")
         return data, start, size
 
-    def _decompressed(self, packed: dict[str, Any], index: int, where: str) -> bytes:
-        """The bytes of a buffer view that meshopt has compressed."""
+    def _decompress(self, packed: dict[str, Any], index: int, where: str) -> bytes:
+        """Return the bytes of a buffer view that meshopt has compressed."""
         if index in self._unpacked:
             return self._unpacked[index]
         count, stride = self._length(packed, "count", where), self._length(packed, "byteStride", where)
-        if count > MOST_ELEMENTS or count * stride + sum(map(len, self._unpacked.values())) > DATA_LIMIT:
+        if count > MAX_ELEMENTS or count * stride + sum(map(len, self._unpacked.values())) > DATA_LIMIT:
             raise self.error(where, f"holds {count} elements of {stride} bytes: too many", "export the head alone")
-        data, start, size = self._stored(packed, where)
+        data, start, size = self._locate_view(packed, where)
         mode = self.value(packed, "mode", str, where)
         filtered = self.value(packed, "filter", str, where, "NONE")
         from surface.readers.gltf.meshopt import decode_view  # most files need no numba to be read
@@ -243,7 +243,7 @@ class Gltf:
         return self._unpacked[index]
 
     def _load(self, uri: Any, where: str, index: int) -> bytes:
-        """The bytes of a buffer: the binary chunk, a data URI, or a file in the folder of this one."""
+        """Return the bytes of a buffer: the binary chunk, a data URI, or a file in the folder of this one."""
         if uri is None:
             if index != 0 or self._chunk is None:
                 raise self.error(where, "has neither a uri nor a binary chunk")
@@ -251,7 +251,7 @@ class Gltf:
         return self.uri_bytes(uri, where)
 
     def uri_bytes(self, uri: Any, where: str) -> bytes:
-        """The bytes behind a data URI, or of a file in the folder of this one."""
+        """Return the bytes behind a data URI, or of a file in the folder of this one."""
         if not isinstance(uri, str):
             raise self.error(f"{where}.uri", "is no text")
         if uri.startswith("data:"):

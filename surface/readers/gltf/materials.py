@@ -23,7 +23,7 @@ _Rows = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 
 def read_materials(file: Gltf) -> list[Material]:
-    """All materials of a file."""
+    """Return all materials of a file."""
     images = _Images(file)
     return [_material(file, images, k, _table(table)) for k, table in enumerate(file.items("materials"))]
 
@@ -35,7 +35,7 @@ class _Images:
         self._file, self._found, self._size = file, dict[tuple[str, Any], bytes](), 0
 
     def bytes_of(self, source: Any) -> bytes:
-        """The bytes of an image. Raises FitError."""
+        """Return the bytes of an image. Raises FitError."""
         image, where = self._file.item("images", source, "texture"), f"images[{source}]"
         place = "bufferView" if "bufferView" in image else "uri"
         value = image.get(place)
@@ -77,8 +77,8 @@ def _number(value: Any, default: float) -> float:
     return float(value) if good else default
 
 
-def _four(value: Any) -> tuple[float, float, float, float]:
-    """A colour; 1 for each part of it that is missing."""
+def _read_colour(value: Any) -> tuple[float, float, float, float]:
+    """Return a colour; 1 for each part of it that is missing."""
     every = value if isinstance(value, list) else []
     r, g, b, a = (_number(every[k] if k < len(every) else None, 1.0) for k in range(4))
     return r, g, b, a
@@ -88,27 +88,30 @@ def _colour_and_texture(table: dict[str, Any]) -> tuple[tuple[float, float, floa
     """Colour and reference of the texture, of metal and rough materials, or else of the older kind."""
     usual, old = _table(table.get("pbrMetallicRoughness")), _extension(table, _OLD)
     if old and not usual:
-        return _four(old.get("diffuseFactor")), _table(old.get("diffuseTexture"))
-    return _four(usual.get("baseColorFactor")), _table(usual.get("baseColorTexture"))
+        return _read_colour(old.get("diffuseFactor")), _table(old.get("diffuseTexture"))
+    return _read_colour(usual.get("baseColorFactor")), _table(usual.get("baseColorTexture"))
 
 
 def _vrm_colour_and_texture(file: Gltf, index: int) -> tuple[tuple[float, float, float, float], dict[str, Any]]:
-    """The same of a material of VRM 0, which says it in the terms of its own shader; white where there is none."""
+    """Return the same of a material of VRM 0, which says it in the terms of its own shader; white where there is
+    none.
+    """
     every = _extension(file.document, "VRM").get("materialProperties")
     own = _table(every[index]) if isinstance(every, list) and index < len(every) else {}
     texture = _table(own.get("textureProperties")).get("_MainTex")
-    r, g, b, a = _four(_table(own.get("vectorProperties")).get("_Color"))
-    colour = (_linear(r), _linear(g), _linear(b), a)
+    r, g, b, a = _read_colour(_table(own.get("vectorProperties")).get("_Color"))
+    colour = (_to_linear(r), _to_linear(g), _to_linear(b), a)
     return colour, {} if texture is None else {"index": texture}
 
 
-def _linear(srgb: float) -> float:
-    """Linear intensity of a part of an sRGB colour (IEC 61966-2-1)."""
+def _to_linear(srgb: float) -> float:
+    """Return linear intensity of a part of an sRGB colour (IEC 61966-2-1)."""
     return float(srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def _picture(file: Gltf, images: _Images, texture: dict[str, Any]) -> tuple[bytes | None, str]:
-    """The encoded texture and its kind. One over the second texture coordinates, which are not read, is left out."""
+    """Return the encoded texture and its kind. One over the second texture coordinates, which are not read, is left
+    out."""
     moved = _extension(texture, "KHR_texture_transform")
     if not texture or moved.get("texCoord", texture.get("texCoord", 0)) != 0:
         return None, ""
@@ -124,14 +127,15 @@ def _picture(file: Gltf, images: _Images, texture: dict[str, Any]) -> tuple[byte
 
 
 def _image(images: _Images, source: Any) -> tuple[bytes | None, str]:
-    """The bytes of a picture and its kind; None for a format that cannot be read."""
+    """Return the bytes of a picture and its kind; None for a format that cannot be read."""
     data = images.bytes_of(source)
     mime = kind_of_picture(data)
     return (data, mime) if mime else (None, "")
 
 
 def _image_of_uv(moved: dict[str, Any]) -> _Rows:
-    """From texture coordinates with v up to places in the picture, which ``KHR_texture_transform`` may move.
+    """Return the map from texture coordinates with v up to places in the picture, which ``KHR_texture_transform`` may
+    move.
 
     The extension's matrix is translation times rotation times scale, of coordinates whose v points down.
     """

@@ -37,7 +37,7 @@ class _Primitive:
 
 
 def read_gltf(path: Path) -> MeshData:
-    """All triangles of the file's scene as one mesh.
+    """Return all triangles of the file's scene as one mesh.
 
     Raises FitError: the file is damaged, cut short or too large, or has no triangles; names file and element.
     """
@@ -62,7 +62,7 @@ def _read(file: Gltf) -> MeshData:
 
 
 def _world_matrices(file: Gltf) -> dict[int, Floats]:
-    """World matrix (4, 4) by node of the scene, in the order of the scene's tree."""
+    """Return world matrix (4, 4) by node of the scene, in the order of the scene's tree."""
     out: dict[int, Floats] = {}
     stack = [(root, np.eye(4)) for root in reversed(_roots(file))]
     while stack:
@@ -85,7 +85,7 @@ def _roots(file: Gltf) -> list[Any]:
 
 
 def _local_matrix(file: Gltf, node: dict[str, Any], where: str) -> Floats:
-    """A node's own matrix (4, 4)."""
+    """Return a node's own matrix (4, 4)."""
     if "matrix" in node:
         return _numbers(file, node, "matrix", where, [None] * 16).reshape(4, 4).T
     out = np.eye(4)
@@ -101,7 +101,7 @@ def _local_matrix(file: Gltf, node: dict[str, Any], where: str) -> Floats:
 
 
 def _numbers(file: Gltf, table: dict[str, Any], key: str, where: str, default: list[Any]) -> Floats:
-    """As many finite numbers as the default has."""
+    """Return finite numbers of a key, as many as the default has."""
     try:
         out = np.array(file.value(table, key, list, where, default), float)
     except (TypeError, ValueError) as e:
@@ -112,7 +112,7 @@ def _numbers(file: Gltf, table: dict[str, Any], key: str, where: str, default: l
 
 
 def _primitives(file: Gltf, index: int, world: dict[int, Floats], names: TargetNames) -> list[_Primitive]:
-    """The primitives of a node's mesh that are made of triangles, in world space."""
+    """Return the primitives of a node's mesh that are made of triangles, in world space."""
     node = file.item("nodes", index, "scene")
     if "mesh" not in node:
         return []
@@ -158,8 +158,8 @@ def _primitive(
 
 
 def _colours(file: Gltf, attributes: dict[str, Any], count: int, where: str) -> Floats | None:
-    """(count, 3) linear RGB of vertices, 0..1 (glTF 2.0 specification, section 3.7.2.1); None where they are damaged,
-    for they do not change where a mesh lies."""
+    """Return (count, 3): linear RGB of vertices, 0..1 (glTF 2.0 specification, section 3.7.2.1); None where they are
+    damaged, for they do not change where a mesh lies."""
     index, name = attributes["COLOR_0"], f"{where}.COLOR_0"
     try:
         width = 4 if file.item("accessors", index, name).get("type") == "VEC4" else 3
@@ -170,13 +170,13 @@ def _colours(file: Gltf, attributes: dict[str, Any], count: int, where: str) -> 
 
 
 def _apply(matrices: Floats, rows: Floats) -> Floats:
-    """One matrix (3, 3), or one for each row (n, 3, 3), times vectors (n, 3)."""
+    """Return one matrix (3, 3), or one for each row (n, 3, 3), times vectors (n, 3)."""
     out: Floats = np.einsum("...ij,...j->...i", matrices, rows)
     return out
 
 
 def _joint_matrices(file: Gltf, node: dict[str, Any], index: int, world: dict[int, Floats]) -> Floats:
-    """(j, 4, 4) from bind space to the world, joints in the pose of the file."""
+    """Return (j, 4, 4): from bind space to the world, joints in the pose of the file."""
     where = f"nodes[{index}].skin"
     skin = file.item("skins", node["skin"], where)
     joints = file.value(skin, "joints", list, where)
@@ -192,7 +192,7 @@ def _joint_matrices(file: Gltf, node: dict[str, Any], index: int, world: dict[in
 
 
 def _skin_matrices(file: Gltf, attributes: dict[str, Any], joints: Floats, count: int, where: str) -> Floats:
-    """Linear blend skinning: a matrix for each vertex, (count, 4, 4)."""
+    """Return linear blend skinning: a matrix for each vertex, (count, 4, 4)."""
     for key in ("JOINTS_0", "WEIGHTS_0"):
         if key not in attributes:
             raise file.error(f"{where}.{key}", "is missing in a skinned mesh")
@@ -206,7 +206,7 @@ def _skin_matrices(file: Gltf, attributes: dict[str, Any], joints: Floats, count
 
 
 def _targets(file: Gltf, table: dict[str, Any], names: list[str], count: int, where: str) -> dict[str, Floats]:
-    """Displacements (count, 3) of the morph targets by name."""
+    """Return displacements (count, 3) of the morph targets by name."""
     out = {}
     for k, target in enumerate(file.value(table, "targets", list, where, [])):
         name = names[k]
@@ -221,7 +221,7 @@ def _targets(file: Gltf, table: dict[str, Any], names: list[str], count: int, wh
 
 
 def _triangles(file: Gltf, table: dict[str, Any], count: int, where: str) -> Ints:
-    """(t, 3) vertex ids of triangles, of a strip's or of a fan's."""
+    """Return (t, 3): vertex ids of triangles, of a strip's or of a fan's."""
     index = np.arange(count)
     if "indices" in table:
         index = file.integers(table["indices"], f"{where}.indices").ravel()
@@ -238,7 +238,7 @@ def _triangles(file: Gltf, table: dict[str, Any], count: int, where: str) -> Int
 
 
 def _join(found: list[_Primitive], materials: list[Material]) -> MeshData:
-    """All primitives as one mesh, nothing welded."""
+    """Return all primitives as one mesh, nothing welded."""
     names = tuple(dict.fromkeys(n for p in found for n in p.deltas))
     starts = np.cumsum([0, *(len(p.vertices) for p in found)]).tolist()
     deltas = np.zeros((len(names), starts[-1], 3))
@@ -287,7 +287,7 @@ def _has_area(triangles: Ints) -> np.ndarray:
 
 
 def _groups(mesh: MeshData) -> Ints:
-    """(n,) for every vertex the first one that it is welded with."""
+    """Return (n,): for every vertex the first one that it is welded with."""
     n = len(mesh.vertices)
     start, end, key = _edges(mesh.faces[:, :3], n)
     _, at, count = np.unique(key, return_index=True, return_counts=True)
@@ -310,7 +310,7 @@ def _edges(triangles: Ints, n: int) -> tuple[Ints, Ints, Ints]:
 
 
 def _non_manifold(triangles: Ints, n: int) -> Ints:
-    """Vertices at edges that more than two triangles share, or two in one direction."""
+    """Return vertices at edges that more than two triangles share, or two in one direction."""
     start, end, both = _edges(triangles[_has_area(triangles)], n)
     out = []
     for key, most in ((both, 2), (start * n + end, 1)):

@@ -15,7 +15,7 @@ from surface.base.jit import kernel
 
 GROUP = 16  # elements whose deltas of one byte are stored together
 ATTRIBUTES, TRIANGLES, INDICES = 0xA0, 0xE1, 0xD1  # first bytes of the three kinds of streams
-LEAST_TAIL = 32  # bytes at the end of a stream of attributes, the first element's base among them
+MIN_TAIL = 32  # bytes at the end of a stream of attributes, the first element's base among them
 TABLE = 16  # bytes at the end of a stream of triangles
 RESERVED = 4  # bytes at the end of a stream of indices
 RESTART, EXPLICIT, FREE = 0xFE, 0xFF, 15  # codes of triangles that are given by more bytes, and of such corners
@@ -23,7 +23,7 @@ MODES = {"ATTRIBUTES": ATTRIBUTES, "TRIANGLES": TRIANGLES, "INDICES": INDICES}
 
 
 def decode_view(data: bytes, mode: str, filtered: str, count: int, stride: int) -> bytes:
-    """The bytes of a buffer view, ``count * stride`` of them.
+    """Return the bytes of a buffer view, ``count * stride`` of them.
 
     data : the compressed stream. mode : ATTRIBUTES, TRIANGLES or INDICES. filtered : NONE, OCTAHEDRAL or EXPONENTIAL.
     count, stride : elements of the view, and the bytes of each.
@@ -66,7 +66,7 @@ def _attributes(stream: Array, filtered: str, count: int, stride: int) -> bytes:
 
 
 def _from_octahedron(packed: Array) -> Array:
-    """(n, 4) unit vectors as normalised integers, whose fourth number is kept, from points of an octahedron."""
+    """Return (n, 4): unit vectors as normalised integers, whose fourth number is kept, from points of an octahedron."""
     whole = float(np.iinfo(packed.dtype).max)
     with np.errstate(all="ignore"):
         x, y = (packed[:, k] / packed[:, 2].astype(np.float64) for k in (0, 1))
@@ -80,8 +80,8 @@ def _from_octahedron(packed: Array) -> Array:
 
 
 def _from_exponents(packed: Array) -> Array:
-    """float32 numbers from an exponent in the upper eight bits and a whole number in the lower 24; infinite where
-    float32 has none so great."""
+    """Return float32 numbers from an exponent in the upper eight bits and a whole number in the lower 24; infinite
+    where float32 has none so great."""
     with np.errstate(over="ignore", under="ignore"):
         out: Array = np.ldexp(((packed << 8) >> 8).astype(np.float32), packed >> 24).astype("<f4")
     return out
@@ -91,7 +91,7 @@ def _from_exponents(packed: Array) -> Array:
 def _read_attributes(stream, out):
     """Fill ``out (n, stride)`` uint8; False where the stream holds less or more than that."""
     count, stride = out.shape
-    end = len(stream) - max(LEAST_TAIL, stride)
+    end = len(stream) - max(MIN_TAIL, stride)
     if end < 1:
         return False
     before = stream[len(stream) - stride :].copy()
@@ -146,7 +146,8 @@ def _read_group(stream, at, kind, steps):
 
 @kernel
 def _number(stream, at, end):
-    """A number of seven bits a byte, the least first, and the place after it; a place beyond ``end`` if it is cut."""
+    """Return a number of seven bits a byte, the least first, and the place after it; a place beyond ``end`` if it is
+    cut."""
     total, shift = np.int64(0), 0
     while at < end and shift < 35:
         byte = np.int64(stream[at])
@@ -159,8 +160,8 @@ def _number(stream, at, end):
 
 
 @kernel
-def _signed(number):
-    """The difference that an unsigned number stands for: 0, -1, 1, -2 ..."""
+def _to_signed(number):
+    """Return the difference that an unsigned number stands for: 0, -1, 1, -2 ..."""
     return ~(number >> 1) if number & 1 else number >> 1
 
 
@@ -174,7 +175,7 @@ def _read_indices(stream, out):
         if at > end:
             return False
         base = number & 1
-        last[base] = (last[base] + _signed(number >> 1)) & 0xFFFFFFFF
+        last[base] = (last[base] + _to_signed(number >> 1)) & 0xFFFFFFFF
         out[k] = last[base]
     return at == end
 
@@ -210,12 +211,12 @@ def _beside_edge(stream, end, code, state, edges, corners, found):
         c = corners[(state[CORNER] - 1 - third) & 15]
     else:
         if third == 0:
-            c = _next(state)
+            c = _next_index(state)
         elif third < 15:
             state[LAST] += 2 * np.int64(third) - 27  # one less, or one more
             c = state[LAST]
         else:
-            c = _given(stream, end, state)
+            c = _read_index(stream, end, state)
         _remember_corner(corners, state, c)
     found[0], found[1], found[2] = a, b, c
     _remember_edge(edges, state, c, b)
@@ -239,9 +240,9 @@ def _anywhere(stream, end, code, state, edges, corners, found):
     for k in range(3):
         kind = (FREE if code == EXPLICIT else 0) if k == 0 else (kinds >> (8 - 4 * k)) & 15
         if kind == 0:
-            found[k] = _next(state)
+            found[k] = _next_index(state)
         elif kind == FREE:
-            found[k] = _given(stream, end, state)
+            found[k] = _read_index(stream, end, state)
         else:
             found[k] = corners[(known - kind) & 15]
             continue
@@ -251,17 +252,17 @@ def _anywhere(stream, end, code, state, edges, corners, found):
 
 
 @kernel
-def _next(state):
-    """The number that follows the greatest so far."""
+def _next_index(state):
+    """Return the number that follows the greatest so far."""
     state[NEXT] += 1
     return state[NEXT] - 1
 
 
 @kernel
-def _given(stream, end, state):
-    """A number that the stream gives, as a difference to the last that was given."""
+def _read_index(stream, end, state):
+    """Return a number that the stream gives, as a difference to the last that was given."""
     number, state[AT] = _number(stream, state[AT], end)
-    state[LAST] += _signed(number)
+    state[LAST] += _to_signed(number)
     return state[LAST]
 
 

@@ -23,26 +23,28 @@ class TargetNames:
 
     def __init__(self, file: Gltf) -> None:
         self._meshes = file.items("meshes")
-        self._several = _unnamed(self._meshes) > 1
+        self._several = _count_unnamed(self._meshes) > 1
         self._made: dict[int, list[str]] = {}
 
     def of(self, index: int) -> list[str]:
-        """As many names as any primitive of a mesh has targets, or more where the file names more."""
+        """Return the names of a mesh's targets, as many as any primitive has targets, or more if the file names
+        more.
+        """
         if index not in self._made:
             mesh = _table(self._meshes[index])
             primitives = [_table(p) for p in _list(mesh.get("primitives"))]
-            found = _named(mesh) or next((n for p in primitives if (n := _named(p))), [])
+            found = _target_names(mesh) or next((n for p in primitives if (n := _target_names(p))), [])
             count = max((len(_list(p.get("targets"))) for p in primitives), default=0)
             prefix = f"mesh{index}_" if self._several else ""
-            self._made[index] = _numbered([*found, *(f"{prefix}target{k}" for k in range(len(found), count))])
+            self._made[index] = _number_duplicates([*found, *(f"{prefix}target{k}" for k in range(len(found), count))])
         return self._made[index]
 
     def __len__(self) -> int:
         return len(self._meshes)
 
 
-def _numbered(names: list[str]) -> list[str]:
-    """The names, with a number behind each that occurred before."""
+def _number_duplicates(names: list[str]) -> list[str]:
+    """Return the names, with a number behind each that occurred before."""
     seen, numbers, out = set[str](), dict[str, int](), list[str]()
     for name in names:
         unique, number = name, numbers.get(name, 2)
@@ -54,22 +56,22 @@ def _numbered(names: list[str]) -> list[str]:
     return out
 
 
-def _named(table: dict[str, Any]) -> list[str]:
+def _target_names(table: dict[str, Any]) -> list[str]:
     return [str(n) for n in _list(_table(table.get("extras")).get("targetNames"))]
 
 
-def _unnamed(meshes: list[Any]) -> int:
-    """How many meshes have targets without names: two of them must not be taken for one another."""
+def _count_unnamed(meshes: list[Any]) -> int:
+    """Return how many meshes have targets without names: two of them must not be taken for one another."""
     out = 0
     for mesh in meshes:
         primitives = [_table(p) for p in _list(_table(mesh).get("primitives"))]
-        named = _named(_table(mesh)) or any(_named(p) for p in primitives)
+        named = _target_names(_table(mesh)) or any(_target_names(p) for p in primitives)
         out += not named and any(p.get("targets") for p in primitives)
     return out
 
 
 def read_expressions(file: Gltf, names: TargetNames) -> tuple[Expression, ...]:
-    """Every expression of a VRM file that moves something; presets go by the names of the specification."""
+    """Return every expression of a VRM file that moves something; presets go by the names of the specification."""
     return tuple(e for e in (*_of_vrm_0(file, names), *_of_vrm_1(file, names)) if e.binds)
 
 
@@ -98,7 +100,7 @@ def _of_vrm_1(file: Gltf, names: TargetNames) -> Iterator[Expression]:
 
 
 def _shapes(names: TargetNames, binds: list[tuple[Any, Any, float]]) -> tuple[tuple[str, float], ...]:
-    """Names of shapes and weights of (mesh, target, weight); a shape that several meshes share counts once."""
+    """Return names of shapes and weights of (mesh, target, weight); a shape that several meshes share counts once."""
     out: dict[str, float] = {}
     for mesh, index, weight in binds:
         if isinstance(mesh, int) and isinstance(index, int) and 0 <= mesh < len(names):

@@ -15,11 +15,11 @@ INDICES = ("vertex_indices", "vertex_index")
 COLOURS = (("red", "green", "blue"), ("diffuse_red", "diffuse_green", "diffuse_blue"), ("r", "g", "b"))
 PLACES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 TEXTURE = "TextureFile"
-MOST_INDEX = 2**31 - 1
+MAX_INDEX = 2**31 - 1
 
 
 def read_ply(path: Path) -> MeshData:
-    """A PLY file: elements vertex (x, y, z; colours; texture coordinates), face and tristrips.
+    """Return a PLY file: elements vertex (x, y, z; colours; texture coordinates), face and tristrips.
 
     Polygons of more than four corners become fans. Colours are taken for sRGB ones.
 
@@ -43,7 +43,7 @@ def read_ply(path: Path) -> MeshData:
 
 
 def _faces(file: PlyFile, vertex: Element) -> tuple[Ints, Floats, Ints]:
-    """Faces (f, 4), texture coordinates (t, 2) and faces of these (f, 4)."""
+    """Return faces (f, 4), texture coordinates (t, 2) and faces of these (f, 4)."""
     faces, origin, corner = np.zeros((0, 4), np.int64), np.zeros(0, np.int64), np.zeros((0, 4), np.int64)
     element = file.elements.get("face")
     rows = None if element is None else _first(element, INDICES)
@@ -57,7 +57,7 @@ def _faces(file: PlyFile, vertex: Element) -> tuple[Ints, Floats, Ints]:
     if rows is not None:
         more = _strips(_indices(file, "tristrips", rows[0]), rows[1])
         faces = np.vstack([faces, np.column_stack([more, np.full(len(more), -1)])])
-    uv, face_uv = _mapped(element, vertex, faces, origin, corner)
+    uv, face_uv = _map_texture(element, vertex, faces, origin, corner)
     return faces, uv, face_uv
 
 
@@ -66,15 +66,15 @@ def _first(element: Element, names: tuple[str, ...]) -> tuple[Array, Ints] | Non
 
 
 def _indices(file: PlyFile, name: str, flat: Array) -> Ints:
-    """Whole numbers that may point at vertices; which of them do is checked with the mesh."""
-    if len(flat) and not (np.abs(flat.astype(np.float64)) <= MOST_INDEX).all():
+    """Return the whole numbers that may point at vertices; which of them do is checked with the mesh."""
+    if len(flat) and not (np.abs(flat.astype(np.float64)) <= MAX_INDEX).all():
         raise file.error(f"element {name}", "points at a vertex that is not there")
     return flat.astype(np.int64)
 
 
 def _polygons(starts: Ints) -> tuple[Ints, Ints]:
-    """Places (f, 4) of the corners of every polygon in the flat list, -1 after a triangle's, and (f,) which polygon
-    each face was cut from: quads stay, larger ones become fans."""
+    """Return places (f, 4) of the corners of every polygon in the flat list, -1 after a triangle's, and (f,) which
+    polygon each face was cut from: quads stay, larger ones become fans."""
     length = np.diff(starts)
     fans = np.where(length == 4, 1, np.maximum(length - 2, 0))
     origin = np.repeat(np.arange(len(length)), fans)
@@ -85,7 +85,7 @@ def _polygons(starts: Ints) -> tuple[Ints, Ints]:
 
 
 def _strips(index: Ints, starts: Ints) -> Ints:
-    """(t, 3) triangles of strips, whose every second one runs the other way round; -1 ends a strip."""
+    """Return (t, 3): triangles of strips, whose every second one is oriented the other way; -1 ends a strip."""
     ends = np.zeros(len(index) + 1, bool)
     ends[starts] = True
     ends[1:] |= index < 0
@@ -100,10 +100,10 @@ def _strips(index: Ints, starts: Ints) -> Ints:
     return solid
 
 
-def _mapped(
+def _map_texture(
     element: Element | None, vertex: Element, faces: Ints, origin: Ints, corner: Ints
 ) -> tuple[Floats, Ints]:  # fmt: skip
-    """Texture coordinates (t, 2) and faces of them: of every corner of a face, or of vertices, or none."""
+    """Return texture coordinates (t, 2) and faces of them: of every corner of a face, or of vertices, or none."""
     none = np.full(faces.shape, -1, np.int64)
     found = next((uv for names in PLACES if (uv := vertex.columns(*names)) is not None), None)
     if found is not None and np.isfinite(found).all():
@@ -121,7 +121,9 @@ def _mapped(
 
 
 def _colours(vertex: Element) -> Floats | None:
-    """(n, 3) linear RGB of vertices: whole numbers are shares of their type's largest, others lie from 0 to 1."""
+    """Return (n, 3): linear RGB of vertices: whole numbers are shares of their type's largest, others lie from 0 to
+    1.
+    """
     for names in COLOURS:
         rgb = vertex.columns(*names)
         if rgb is not None:
@@ -133,7 +135,7 @@ def _colours(vertex: Element) -> Floats | None:
 
 
 def _material(file: PlyFile) -> Material | None:
-    """The texture that a comment names, where it lies beside the file."""
+    """Return the texture that a comment names, where it lies beside the file."""
     for line in file.comments:
         word, _, name = line.strip().partition(" ")
         if word == TEXTURE and name:

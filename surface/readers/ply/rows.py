@@ -21,8 +21,8 @@ TYPES = {
     "float32": "f4", "float64": "f8",
 }  # fmt: skip
 ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
-HEAD_LIMIT = 1 << 20  # bytes
-MOST_PROPERTIES = 64
+HEADER_LIMIT = 1 << 20  # bytes
+MAX_PROPERTIES = 64
 HINT = "save the mesh again as .ply or .obj"
 
 
@@ -47,7 +47,7 @@ class Element:
     lists: dict[str, tuple[Array, Ints]] = field(default_factory=dict)
 
     def columns(self, *names: str) -> Floats | None:
-        """(count, k) float64 of k properties; None where one is missing."""
+        """Return (count, k) float64: of k properties; None where one is missing."""
         if not all(name in self.numbers for name in names):
             return None
         return np.column_stack([self.numbers[name].astype(np.float64) for name in names])
@@ -71,14 +71,14 @@ class PlyFile:
             self._read_text(data[start:])
 
     def error(self, where: str, why: str) -> FitError:
-        """The error for an element of the file."""
+        """Return the error for an element of the file."""
         return FitError(f"{self.path}: {where}: {why}", hint=HINT)
 
     def _read_head(self, data: bytes) -> int:
         """Fill elements and comments; returns where the rows begin."""
         if not data.startswith(b"ply"):
             raise self.error("header", "is damaged or no PLY file: it does not begin with ply")
-        end = data.find(b"end_header", 0, HEAD_LIMIT)
+        end = data.find(b"end_header", 0, HEADER_LIMIT)
         stop = data.find(b"\n", end)
         if end < 0 or stop < 0:
             raise self.error("header", "is damaged: it has no end_header")
@@ -108,7 +108,7 @@ class PlyFile:
 
     def _add(self, one: Property) -> None:
         own = list(self.elements.values())
-        if not own or len(own[-1].properties) >= MOST_PROPERTIES or one.name in {p.name for p in own[-1].properties}:
+        if not own or len(own[-1].properties) >= MAX_PROPERTIES or one.name in {p.name for p in own[-1].properties}:
             raise self.error("header", f"is damaged: property {one.name[:40]!r} is out of place")
         own[-1].properties.append(one)
 

@@ -298,7 +298,7 @@ def test_adding_and_removing_are_undone(editor: PointEditor) -> None:
     commands.remove_point(0)
     commands.remove_point(0)
     assert commands.now.light == ()
-    commands.move(None)
+    commands.set_moves(None)
     assert commands.now.light == () and commands.now.moves is None
 
 

@@ -126,7 +126,7 @@ def test_nesting_is_a_fault_of_the_file(parse: object, text: str) -> None:
 def test_nesting_is_counted_through_tables_and_lists(wrap: Callable[[object], object]) -> None:
     value: object = 1
     depth = 1 if wrap(0) != {"a": [0, 0]} else 2
-    for _ in range(files.MOST_DEPTH // depth - 1):
+    for _ in range(files.MAX_DEPTH // depth - 1):
         value = wrap(value)
     assert files.parse_json(json.dumps(value)) == value
     for _ in range(2):

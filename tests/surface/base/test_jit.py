@@ -205,12 +205,12 @@ def test_a_process_that_was_stopped_while_it_compiled_holds_up_no_other_for_ever
 ) -> None:
     program = (
         "import sys; from surface.base import jit\n"
-        "with jit._held('name'):\n    print('held', flush=True)\n    sys.stdin.readline()\n"
+        "with jit._hold_lock('name'):\n    print('held', flush=True)\n    sys.stdin.readline()\n"
     )
     pipe = subprocess.PIPE
     with subprocess.Popen([sys.executable, "-c", program], cwd=ROOT, stdin=pipe, stdout=pipe, text=True) as other:
         assert other.stdout is not None and other.stdout.readline() == "held\n"
-        monkeypatch.setattr(jit, "LONGEST_WAIT_S", 0.1)
-        with jit._held("name"):
+        monkeypatch.setattr(jit, "MAX_WAIT_S", 0.1)
+        with jit._hold_lock("name"):
             assert other.poll() is None
         other.communicate("\n")

@@ -134,8 +134,8 @@ def test_ratios_are_against_the_row_that_they_name(clock: list[float]) -> None:
     for name, took in (("every point", 4.0), ("one point", 5.0)):
         row = by_name[f"{name} moved, with normals"]
         assert (row.ratio, row.against, row.reach) == (took / 2, full.name, "")
-    assert bench.SHARES == (0.02, 0.1)
-    for row, share in zip(rows[5:7], bench.SHARES, strict=True):
+    assert bench.GROUP_FRACTIONS == (0.02, 0.1)
+    for row, share in zip(rows[5:7], bench.GROUP_FRACTIONS, strict=True):
         ids, part = group(surface, mesh, share)
         assert row.name == f"group of {len(ids)} moved, which reaches {part:.1%}".replace("%", " %")
         assert row.ratio == pytest.approx(row.milliseconds / (part * 2.0))
@@ -260,7 +260,7 @@ def test_shares_count_the_copies_of_a_closed_surface() -> None:
     mesh = torus.tessellate(chord_error=0.5)
     for ids in ([0], [5, 60], [125]):
         weights = torus.basis_matrix(mesh.uv, side=mesh.side)[:, ids]
-        assert bench.share_reached(torus, mesh, np.array(ids)) == pytest.approx((weights.sum(axis=1) > 0).mean())
+        assert bench.fraction_reached(torus, mesh, np.array(ids)) == pytest.approx((weights.sum(axis=1) > 0).mean())
 
 
 def test_the_nearest_points_are_those_around_the_middle() -> None:

@@ -15,8 +15,8 @@ from surface.deform.lists import build_lists
 def test_calls_take_turns_until_time_is_up() -> None:
     calls: list[str] = []
     times = cold.cold_times([lambda: calls.append("a"), lambda: (calls.append("b"), sleep(0.001))], 0.0, 64)
-    assert calls == ["a", "b"] * (1 + cold.LEAST_ROUNDS)
-    assert times.shape == (cold.LEAST_ROUNDS, 2)
+    assert calls == ["a", "b"] * (1 + cold.MIN_ROUNDS)
+    assert times.shape == (cold.MIN_ROUNDS, 2)
     assert (times[:, 1] >= 1.0).all() and (times[:, 0] < times[:, 1]).all()  # milliseconds
 
 
@@ -24,9 +24,9 @@ def test_rounds_go_on_only_while_a_ratio_is_unsteady(monkeypatch: pytest.MonkeyP
     times = iter(np.cumsum(np.random.default_rng(0).exponential(size=10_000)).tolist())
     monkeypatch.setattr(cold.time, "perf_counter", lambda: next(times))
     steady = cold.cold_times([lambda: None], 1e9, 8)
-    assert len(steady) == cold.LEAST_ROUNDS
+    assert len(steady) == cold.MIN_ROUNDS
     unsteady = cold.cold_times([lambda: None, lambda: None], 500.0, 8, [(0, 1)])
-    assert len(unsteady) > cold.LEAST_ROUNDS
+    assert len(unsteady) > cold.MIN_ROUNDS
 
 
 def test_other_memory_is_written_between_calls() -> None:
@@ -62,8 +62,8 @@ def test_surfaces_of_other_kinds() -> None:
 
 def test_rows_of_a_surface() -> None:
     reported: list[str] = []
-    body = cold.scattered(100, 500)
-    rows = cold.cold_rows("some", [body, body], 0.0, "<= 1.0", 64, reported.append)
+    case = cold.scattered(100, 500)
+    rows = cold.cold_rows("some", [case, case], 0.0, "<= 1.0", 64, reported.append)
     assert reported == ["some"] and [row.name.partition(": ")[2] for row in rows] == [
         cold.READ, "all positions", "all positions and normals", "scipy CSR @ dense", "stencil table, row by row",
         "memory of weights and lists", "weights that are zero",
@@ -72,17 +72,17 @@ def test_rows_of_a_surface() -> None:
         assert row.ratio is not None and row.interval is not None
         assert row.interval[0] <= row.ratio <= row.interval[1] and row.milliseconds > 0
     assert [row.reach for row in rows] == ["", "<= 1.0", "", ">= 5", ">= 2", "", "<= 0.2"]
-    weights = build_lists(*body, False).value
-    deformation = body[0].deformation(body[1], normals=False)
+    weights = build_lists(*case, False).value
+    deformation = case[0].deformation(case[1], normals=False)
     assert rows[5].ratio == pytest.approx(deformation.nbytes / (4 * np.count_nonzero(weights)))
-    assert rows[6].ratio == cold.zeros([deformation])
+    assert rows[6].ratio == cold.zero_fraction([deformation])
 
 
 def test_the_share_of_zeros_is_that_of_all_weights_that_are_not_factors() -> None:
-    body = cold.scattered(100, 500)
-    weights, deformation = build_lists(*body, False).value, body[0].deformation(body[1], normals=False)
+    case = cold.scattered(100, 500)
+    weights, deformation = build_lists(*case, False).value, case[0].deformation(case[1], normals=False)
     assert not (deformation.storage.factors.rows_at >= 0).any()
     kept = len(deformation.storage.packed.packed) + deformation.lists.used
-    assert cold.zeros([deformation]) == pytest.approx(1.0 - np.count_nonzero(weights) / kept)
-    assert 0.0 < cold.zeros([deformation]) < 1.0 - np.count_nonzero(weights) / len(weights)
-    assert cold.zeros([]) == 0.0
+    assert cold.zero_fraction([deformation]) == pytest.approx(1.0 - np.count_nonzero(weights) / kept)
+    assert 0.0 < cold.zero_fraction([deformation]) < 1.0 - np.count_nonzero(weights) / len(weights)
+    assert cold.zero_fraction([]) == 0.0

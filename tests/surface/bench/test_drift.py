@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from surface.bench.drift import _errors, _jittered, drift
+from surface.bench.drift import _jitter_knots, _max_errors, drift
 from tests.surface import shapes
 
 
@@ -46,18 +46,18 @@ def test_updates_are_counted_and_reported_in_rounds_of_two_thousand() -> None:
 def test_errors_are_parts_of_the_size_and_lengths_of_differences() -> None:
     surface = shapes.hills(8)
     deformation = surface.deformation(surface.tessellate(chord_error=5.0))
-    assert max(_errors(deformation, 100.0)) < 1e-6
+    assert max(_max_errors(deformation, 100.0)) < 1e-6
     vertices, normals = deformation.vertices.copy(), deformation.normals.copy()
     vertices[3] += [3.0, 0.0, 4.0]
     normals[5] += [0.0, 0.6, 0.8]
     off = SimpleNamespace(mesh=deformation.mesh, surface=surface, vertices=vertices, normals=normals)
-    assert _errors(off, 100.0) == (pytest.approx(0.05, rel=1e-4), pytest.approx(1.0, rel=1e-4))
+    assert _max_errors(off, 100.0) == (pytest.approx(0.05, rel=1e-4), pytest.approx(1.0, rel=1e-4))
 
 
 def test_knots_are_moved_by_a_tenth_within_their_ends() -> None:
     rng, knots = np.random.default_rng(3), np.array([2.0, 2.0, 3.0, 4.0, 5.0, 5.0])
     for _ in range(50):
-        found = _jittered(knots, rng)
+        found = _jitter_knots(knots, rng)
         assert found[[0, 1, 4, 5]].tolist() == [2, 2, 5, 5] and (np.diff(found) >= 0).all()
         low, high = 0.9 * knots[2:4] + 0.2, 0.9 * knots[2:4] + 0.5
         assert (found[2:4] >= low).all() and (found[2:4] <= high).all() and (found[2:4] != knots[2:4]).any()

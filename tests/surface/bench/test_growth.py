@@ -20,7 +20,7 @@ from surface.bench.growth import (
     MOVE,
     READ,
     Series,
-    _amounts,
+    _measure_amounts,
     _spread,
     growth,
     plot,
@@ -153,7 +153,7 @@ def test_each_size_is_measured_with_cells_of_its_own(monkeypatch: pytest.MonkeyP
         asked.append((surface.n, leaves, seconds))
         return dict.fromkeys((READ, FULL, MOVE, LISTS, MEMORY), float(len(asked)))
 
-    monkeypatch.setattr(grow, "_amounts", amounts)
+    monkeypatch.setattr(grow, "_measure_amounts", amounts)
     reported: list[str] = []
     series = growth((1_000, 10_000), (64, 900, 2500), 0.25, reported.append)
     meshes = [sheet(count) for count in (1_000, 10_000)]
@@ -184,7 +184,7 @@ def test_a_surface_is_measured_with_as_many_equal_cells_as_said() -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(DCPSurface, "tessellate", record)
         for side in (8, 12, 9):
-            found = _amounts(surface, side * side, 0.0)
+            found = _measure_amounts(surface, side * side, 0.0)
             mesh = made.pop()
             assert mesh.leaves == side * side and len(mesh.vertices) == (side + 1) ** 2
             deformation = surface.deformation(mesh, normals=False)

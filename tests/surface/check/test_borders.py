@@ -36,13 +36,13 @@ def texts(head: Subject, mouth: Mouth | None = None) -> list[str]:
 def test_the_width_of_a_loop_is_the_diameter_of_a_circle_and_the_side_of_a_square(count: int, width: float) -> None:
     angle = np.linspace(0.0, 2.0 * np.pi, count + 1)
     ring = 10.0 * np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
-    assert borders._form(np.stack([ring[:-1], ring[1:]], axis=1))[1] == pytest.approx(width, rel=1e-3)
+    assert borders._measure_loop(np.stack([ring[:-1], ring[1:]], axis=1))[1] == pytest.approx(width, rel=1e-3)
 
 
 def test_the_width_of_a_slit_is_twice_its_height() -> None:
     corners = np.array([[0.0, 0, 0], [1000, 0, 0], [1000, 1, 0], [0, 1, 0]])
     slit = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-    assert borders._form(slit)[1] == pytest.approx(2.0, rel=2e-3)
+    assert borders._measure_loop(slit)[1] == pytest.approx(2.0, rel=2e-3)
 
 
 @pytest.mark.parametrize(("gap", "scale", "sewn"), [(0.3, 1, True), (0.5, 1, False), (0.7, 2, True), (0.9, 2, False)])
@@ -66,7 +66,7 @@ def test_vertices_in_one_place_are_one_and_slivers_are_none() -> None:
     rim = borders.find_borders(plain.subject(split))
     assert len(rim.part) == 40 and not rim.sewn.any()
     doubled = np.vstack([triangles, [[0, 0, 1], [5, 6, 6], [7, 3, 7]]])
-    assert len(borders._welded(plain.subject(plain.part("face", points, doubled)), 0)) == len(triangles)
+    assert len(borders._weld(plain.subject(plain.part("face", points, doubled)), 0)) == len(triangles)
 
 
 def test_only_sheets_that_deform_with_the_skin_have_borders() -> None:
@@ -105,10 +105,10 @@ def test_a_slit_narrower_than_a_hole_is_none(step: float, named: bool) -> None:
 
 def test_the_width_of_a_loop() -> None:
     corner = np.array([[0.0, 0, 0], [30, 0, 0], [30, 6, 0], [0, 6, 0]]) @ np.linalg.qr(np.eye(3) + 0.3)[0] + 7.0
-    middle, width = borders._form(np.stack([corner, np.roll(corner, -1, axis=0)], axis=1))
+    middle, width = borders._measure_loop(np.stack([corner, np.roll(corner, -1, axis=0)], axis=1))
     np.testing.assert_allclose(middle, corner.mean(axis=0))
     assert width == pytest.approx(4.0 * 180.0 / 72.0)
-    assert borders._form(np.ones((1, 2, 3)))[1] == 0.0
+    assert borders._measure_loop(np.ones((1, 2, 3)))[1] == 0.0
 
 
 @pytest.mark.parametrize(("x", "opening"), [(31.8, True), (31.8 + 20.0, True), (31.8 + 20.8, False), (-31.8, False)])
@@ -174,8 +174,8 @@ def test_components_are_those_of_scipy(seed: int) -> None:
 
 def test_chains_are_edges_that_share_ends() -> None:
     ids = np.array([[0, 1], [5, 6], [1, 2], [6, 7], [8, 9]])
-    assert [c.tolist() for c in borders._chains(ids)] == [[0, 2], [1, 3], [4]]
-    assert borders._chains(np.zeros((0, 2), np.int64)) == []
+    assert [c.tolist() for c in borders._find_chains(ids)] == [[0, 2], [1, 3], [4]]
+    assert borders._find_chains(np.zeros((0, 2), np.int64)) == []
 
 
 def test_ends_that_lie_together_are_one() -> None:
@@ -184,15 +184,15 @@ def test_ends_that_lie_together_are_one() -> None:
     found = borders.Borders(
         np.zeros(3, int), pairs, pairs, np.zeros(3, bool), np.full(3, -1), Network(pairs, np.zeros(3))
     )
-    joined = borders._joined(found, at, np.arange(3), 0.4)
+    joined = borders._join_ends(found, at, np.arange(3), 0.4)
     assert joined[0, 1] == joined[1, 0] and len(set(joined.ravel().tolist())) == 5
-    assert len(borders._joined(found, at, np.array([0, 2]), 0.4)) == 2
-    assert borders._joined(found, at, np.zeros(0, np.int64), 0.4).shape == (0, 2)
+    assert len(borders._join_ends(found, at, np.array([0, 2]), 0.4)) == 2
+    assert borders._join_ends(found, at, np.zeros(0, np.int64), 0.4).shape == (0, 2)
 
 
 def test_sheets_are_joined_by_triangles_and_by_seams() -> None:
     head = plain.subject(sheet("a", (0, 40)), sheet("b", (40, 80)), sheet("c", (100, 120)))
-    label = borders._sheets(head, borders.find_borders(head))
+    label = borders._find_sheets(head, borders.find_borders(head))
     first, second, third = np.split(label, np.cumsum([len(r) for r in head.rest])[:-1])
     assert set(first) == set(second) == {0} and set(third) == {len(first) + len(second)}
 
@@ -215,7 +215,7 @@ def test_a_border_of_very_short_edges_is_not_sewn_to_itself(length: float) -> No
     head = ragged(length)
     found = borders.find_borders(head)
     assert not found.sewn.any()
-    assert len(list(borders._loops(head, found))) == 0 and texts(head) == []
+    assert len(list(borders._find_loops(head, found))) == 0 and texts(head) == []
 
 
 def behind(part: str) -> Subject:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from surface.check.lids import STEP, eye_opening
+from surface.check.lids import STEP_MM, eye_opening
 from tests.surface.check import plain
 
 
@@ -18,10 +18,10 @@ def lids(height: float, **options: object) -> list:
 def test_an_eye_shows_as_much_as_the_lids_leave_open(height: float) -> None:
     head = plain.subject(*lids(height), plain.eyeball(0), plain.eyeball(1))
     for side in (0, 1):
-        assert eye_opening(head, side, head.rest) == pytest.approx(height, abs=1.5 * STEP)
+        assert eye_opening(head, side, head.rest) == pytest.approx(height, abs=1.5 * STEP_MM)
 
 
 def test_an_eye_shows_whole_behind_lashes_and_not_at_all_where_there_is_none() -> None:
     head = plain.subject(*lids(0.0, material="lash"), plain.eyeball(1))
-    assert eye_opening(head, 1, head.rest) == pytest.approx(2.0 * plain.RADIUS, abs=2.5 * STEP)
+    assert eye_opening(head, 1, head.rest) == pytest.approx(2.0 * plain.RADIUS, abs=2.5 * STEP_MM)
     assert eye_opening(head, 0, head.rest) == 0.0

@@ -86,7 +86,7 @@ def test_eyes_that_are_exchanged_are_named() -> None:
 
 
 def test_the_gaze_of_the_other_eye_is_swapped() -> None:
-    assert [motions._side(n) for n in ("leftEyeYaw", "rightEyePitch", "jawLeft", "browDownRight", "headYaw")] == [
+    assert [motions._side_of(n) for n in ("leftEyeYaw", "rightEyePitch", "jawLeft", "browDownRight", "headYaw")] == [
         1, -1, 1, -1, 0
     ]  # fmt: skip
 
@@ -94,8 +94,8 @@ def test_the_gaze_of_the_other_eye_is_swapped() -> None:
 def test_where_a_shape_moves_is_meant_over_all_parts_by_how_far_each_point_moves() -> None:
     other = plain.part("other", POINTS, TRIANGLES, moves={"cheekPuff": at_x(-10.0, (0.0, 3.0, 4.0))})
     head = plain.subject(plain.part("face", POINTS, TRIANGLES, moves={"cheekPuff": at_x(30.0)}), other)
-    assert motions._where(head, "cheekPuff", 2.0) == pytest.approx((30.0 * 1.0 - 10.0 * 5.0) / 6.0 - 2.0)
-    assert motions._where(head, "headYaw", 2.0) == 0.0
+    assert motions._mean_offset(head, "cheekPuff", 2.0) == pytest.approx((30.0 * 1.0 - 10.0 * 5.0) / 6.0 - 2.0)
+    assert motions._mean_offset(head, "headYaw", 2.0) == 0.0
 
 
 def test_the_middle_lies_between_the_eyes_or_in_the_middle_of_the_skin() -> None:

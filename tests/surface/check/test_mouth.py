@@ -111,17 +111,17 @@ def test_the_inside_of_the_mouth_lies_behind_the_lips_and_as_high_as_they_do() -
     mouth = plain.line_of_lips(LIPS_Y, 50.0, 9.0, 5.0)
     points = np.array([[24, 0, -10], [26, 0, -10], [-24, 0, -10], [-26, 0, -10], [0, 14, -10], [0, 16, -10],
                        [0, -14, -10], [0, -16, -10], [0, 0, -8], [0, 0, 10]], np.float32)  # fmt: skip
-    inside = mouth_module._inside(points + np.float32([0.0, LIPS_Y, 5.0]), mouth, 1.0)
+    inside = mouth_module._mark_inside(points + np.float32([0.0, LIPS_Y, 5.0]), mouth, 1.0)
     assert inside.tolist() == [1, 0, 1, 0, 1, 0, 1, 0, 0, 0]
-    twice = mouth_module._inside(points + np.float32([0.0, LIPS_Y, 5.0]), mouth, 2.0)
+    twice = mouth_module._mark_inside(points + np.float32([0.0, LIPS_Y, 5.0]), mouth, 2.0)
     assert twice.tolist() == [0] * 10  # 18 mm deep
-    twice = mouth_module._inside(points * np.float32(2.0) + np.float32([0.0, LIPS_Y, 5.0]), mouth, 2.0)
+    twice = mouth_module._mark_inside(points * np.float32(2.0) + np.float32([0.0, LIPS_Y, 5.0]), mouth, 2.0)
     assert twice.tolist() == [0, 0, 0, 0, 1, 0, 1, 0, 0, 0]
 
 
 def test_values_are_meant_over_the_triangle_at_each_pixel() -> None:
     head: Subject = plain.subject(*jaw())
-    picture = mouth_module._front(head)
+    picture = mouth_module._draw_front(head)
     values = mouth_module._values(head, picture, [p.rest[:, 1].astype(float) for p in head.parts])  # type: ignore[attr-defined]
     rows = LIPS_Y - 40.0 + 0.5 * np.arange(len(values))
     assert np.isfinite(values).all() and picture.view.step == 0.5

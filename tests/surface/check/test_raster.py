@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from surface.check.raster import NOTHING, View, enclosed, turned
+from surface.check.raster import NOTHING, View, enclosed, view_rotation
 
 CORNER = np.array([[0.0, 0.0, 1.0], [4.0, 0.0, 9.0], [0.0, 4.0, 13.0]], np.float32)  # z = 1 + 2 x + 3 y
 ONE = np.array([[0, 1, 2]], np.int32)
@@ -71,7 +71,7 @@ def test_a_picture_has_the_pixels_of_its_rectangle_and_two_at_least() -> None:
 
 @pytest.mark.parametrize(("yaw", "pitch"), [(0, 0), (38, 0), (-90, 0), (30, 50), (180, -20)])
 def test_a_turn_is_the_rotation_of_a_viewer_on_a_sphere(yaw: float, pitch: float) -> None:
-    turn, (a, b) = turned(yaw, pitch), np.radians([yaw, pitch])
+    turn, (a, b) = view_rotation(yaw, pitch), np.radians([yaw, pitch])
     viewer = [np.cos(b) * np.sin(a), np.sin(b), np.cos(b) * np.cos(a)]
     right = [np.cos(a), 0.0, -np.sin(a)]
     np.testing.assert_allclose(turn, [right, np.cross(viewer, right), viewer], atol=1e-12)
@@ -79,7 +79,7 @@ def test_a_turn_is_the_rotation_of_a_viewer_on_a_sphere(yaw: float, pitch: float
 
 def test_a_view_is_drawn_after_its_turn() -> None:
     side = np.array([[7.0, -0.5, 0.5], [7, -0.5, -5], [7, 5, 0.5]], np.float32)  # seen from greater x
-    picture = View((0.0, 4.0), (0.0, 4.0), 1.0, turned(90.0)).draw([(side, ONE)])
+    picture = View((0.0, 4.0), (0.0, 4.0), 1.0, view_rotation(90.0)).draw([(side, ONE)])
     assert (picture.parts == 0).sum() == 15 and np.allclose(picture.depth[picture.parts == 0], 7.0)
 
 

@@ -46,7 +46,7 @@ def test_a_height_is_the_least_along_the_mean_way_from_the_ring(
     points[-1] = [900.0, 0.0, 0.0]  # nothing is round it
     values[:9] *= 9.0
     if not listed:
-        monkeypatch.setattr(spikes, "MOST_LISTED", 0)
+        monkeypatch.setattr(spikes, "MAX_LISTED", 0)
     out = spikes.Rings(points, count, 6.0).heights(values)
     assert len(out) == count and {1, 2} <= set(around(points, 0))
     for i in range(count):
@@ -63,7 +63,7 @@ def test_rings_as_lists_and_searched_for_give_the_very_same_heights(monkeypatch:
     rng = np.random.default_rng(5)
     points, values = rng.uniform(-20.0, 20.0, (600, 3)), rng.normal(size=(600, 3))
     listed = spikes.Rings(points, 500, 6.0)
-    monkeypatch.setattr(spikes, "MOST_LISTED", 10)
+    monkeypatch.setattr(spikes, "MAX_LISTED", 10)
     searched = spikes.Rings(points, 500, 6.0)
     for enough in (0.0, 1.0):
         np.testing.assert_array_equal(searched.heights(values, enough), listed.heights(values, enough))
@@ -121,16 +121,16 @@ def test_samples_are_all_vertices_in_use_and_places_on_large_triangles() -> None
 
 def test_an_edge_is_filled_by_as_many_steps_as_it_needs_and_no_more_than_forty() -> None:
     at = np.array([[0.0, 0, 0], [6, 0, 0], [0, 3, 0], [900, 0, 0]])
-    assert len(spikes._filled(at, np.array([[0, 1, 2]]), 6.8)[0]) == 0  # its longest edge is 6.7 mm
-    assert len(spikes._filled(at, np.array([[0, 1, 2]]), 6.0)[0]) == 3
-    assert len(spikes._filled(at, np.array([[0, 3, 2]]), 1.0)[0]) == 41 * 42 // 2 - 3
+    assert len(spikes._sample_triangles(at, np.array([[0, 1, 2]]), 6.8)[0]) == 0  # its longest edge is 6.7 mm
+    assert len(spikes._sample_triangles(at, np.array([[0, 1, 2]]), 6.0)[0]) == 3
+    assert len(spikes._sample_triangles(at, np.array([[0, 3, 2]]), 1.0)[0]) == 41 * 42 // 2 - 3
 
 
 def test_the_corner_of_a_border_is_no_spike() -> None:
     points = np.array([[0.0, 0, 0], [9, 0, 0], [20, 0, 0]])
-    high = spikes.without_rims(points, np.array([[2.0, 0, 0], [50, 0, 0]]), np.array([5.0, 4.0, 1.0]), 3.0, 2.5)
+    high = spikes.drop_rims(points, np.array([[2.0, 0, 0], [50, 0, 0]]), np.array([5.0, 4.0, 1.0]), 3.0, 2.5)
     assert high.tolist() == [0.0, 4.0, 0.0]
-    assert spikes.without_rims(points, np.zeros((0, 3)), np.array([5.0, 4.0, 1.0]), 3.0, 2.5).tolist() == [
+    assert spikes.drop_rims(points, np.zeros((0, 3)), np.array([5.0, 4.0, 1.0]), 3.0, 2.5).tolist() == [
         5.0,
         4.0,
         0.0,
@@ -172,7 +172,7 @@ def test_what_has_its_like_on_the_other_side_is_no_spike() -> None:
 def test_a_nose_may_stick_out(x: float, y: float, z: float, usual: bool) -> None:
     """0.35 eye distances (22.3 mm) to each side, 0.3 (19.1 mm) up, and 0.9 of the way to the lips (60.7 mm) down."""
     head = plain.subject(cone(0.0, -30.0, 9.0))
-    found = spikes._allowed(head, np.array([[x, y, z]]), np.array([5.0]), Places(head, None))
+    found = spikes._may_stick_out(head, np.array([[x, y, z]]), np.array([5.0]), Places(head, None))
     assert found.tolist() == [usual]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surface.check import stance
-from surface.check.raster import View, turned
+from surface.check.raster import View, view_rotation
 from tests.surface.check import plain
 
 TURNED = {"triangles": lambda p: setattr(p, "triangles", np.ascontiguousarray(p.triangles[:, ::-1])),
@@ -53,12 +53,14 @@ def test_the_eyes_lie_in_the_front_cameras_picture(shift: tuple[float, float, fl
 def test_the_mouth_lies_in_the_picture_too_and_without_either_the_front_of_the_skin() -> None:
     eyes = plain.EYES + np.array([0.0, 0.0, 40.0])
     head = plain.subject(face(), eyes=eyes)
-    assert len(stance._marks(head, plain.line_of_lips())) == 3
+    assert len(stance._face_landmarks(head, plain.line_of_lips())) == 3
     assert list(stance.off_camera(head, plain.line_of_lips(-66.0))) == []
     assert list(stance.off_camera(head, plain.line_of_lips(-300.0)))
     z = np.arange(21.0)
     line = plain.part("face", np.column_stack([2.0 * z, 3.0 * z, z]), [[0, 1, 2]])
-    np.testing.assert_allclose(stance._marks(plain.subject(line, eyes=None), None), [[38.0, 57.0, 19.0]])  # 18 to 20
+    np.testing.assert_allclose(
+        stance._face_landmarks(plain.subject(line, eyes=None), None), [[38.0, 57.0, 19.0]]
+    )  # 18 to 20
 
 
 @pytest.mark.parametrize(("low", "high", "forward"), [(80, 100, True), (0, 20, False), (34, 40, True), (30, 35, False)])
@@ -161,7 +163,7 @@ def test_both_sides_of_a_sheet_are_counted_by_triangles_and_by_normals() -> None
     normals = [p.normals for p in head.parts]
     assert stance._sides_shown(head, front, head.rest, normals) == {0: (shown, 0, 0)}
     assert stance._sides_shown(head, front, head.rest, [-normals[0]]) == {0: (shown, 0, shown)}
-    back = View((-50.0, 50.0), (-50.0, 50.0), 1.0, turned(180.0))
+    back = View((-50.0, 50.0), (-50.0, 50.0), 1.0, view_rotation(180.0))
     seen = stance._sides_shown(head, back.draw(head.shapes(head.rest)), head.rest, normals)
     assert seen == {0: (101 * 101, 101 * 101, 101 * 101)}
 
@@ -173,6 +175,6 @@ def test_a_picture_of_a_head_in_any_unit_has_a_size_that_can_be_drawn() -> None:
 
 def test_only_what_is_looked_at_alone_is_drawn() -> None:
     head = plain.subject(ball("face", 50.0, "skin"), ball("tongue", 12.0, "tongue"))
-    shown, by_way, by_normal = stance._alone(head, 1)
+    shown, by_way, by_normal = stance._sides_shown_alone(head, 1)
     assert shown == pytest.approx(np.pi * 10.0**2, rel=0.05)  # in pixels of 1.2 mm
     assert by_way <= 2 and by_normal <= 2  # at its rim

@@ -11,7 +11,7 @@ from surface import DCPSurface
 from surface.bench.bench import sheet
 from surface.deform import denominators as module
 from surface.deform.deformation import Deformation
-from surface.deform.denominators import LEAST_SUM, MOST_SUM, farthest, unusable
+from surface.deform.denominators import MAX_SUM, MIN_SUM, farthest, first_unusable
 
 
 def along(knots: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -120,7 +120,7 @@ def test_the_first_vertex_without_a_usable_sum_is_found() -> None:
     )
 
     def found(inv_w: np.ndarray, dw: np.ndarray = none, cells: tuple[int, ...] = (0, 1, 2)) -> int:
-        return int(unusable(np.array(cells), cell_start, tile_start, inv_w, dw, order_at, order))
+        return int(first_unusable(np.array(cells), cell_start, tile_start, inv_w, dw, order_at, order))
 
     good, slopes = np.ones(32, np.float32), np.zeros(64, np.float32)
     assert found(good) == -1
@@ -149,7 +149,7 @@ def test_a_sum_that_float32_has_few_digits_for_is_no_sum() -> None:
     deformation = deformed("blocks", False)
     arrays, lists = deformation._arrays, deformation.lists
     sums = 1.0 / arrays["inv_w"].astype(np.float64)
-    small = np.float32(LEAST_SUM / np.median(sums))
+    small = np.float32(MIN_SUM / np.median(sums))
     lists.value *= small
     module.denominators(deformation._addresses, np.arange(len(lists.rows)))
     vertices = np.concatenate([
@@ -157,11 +157,11 @@ def test_a_sum_that_float32_has_few_digits_for_is_no_sum() -> None:
     ])  # fmt: skip
     near = np.abs(sums / np.median(sums) - 1.0) < 1e-5
     checked = vertices[~near[vertices]]
-    assert np.array_equal(np.isinf(arrays["inv_w"][checked]), sums[checked] * small < LEAST_SUM)
+    assert np.array_equal(np.isinf(arrays["inv_w"][checked]), sums[checked] * small < MIN_SUM)
     assert 0 < np.isinf(arrays["inv_w"]).sum() < len(checked)
 
 
 def test_how_far_points_may_be_away_depends_on_weights_above_one() -> None:
-    assert farthest(np.array([0.1, 0.5])) == MOST_SUM == farthest(np.zeros(0))
-    assert farthest(np.array([2.0, 8.0, 4.0])) == MOST_SUM / 8.0
-    assert 10.0 * MOST_SUM < float(np.finfo(np.float32).max) < 100.0 * MOST_SUM
+    assert farthest(np.array([0.1, 0.5])) == MAX_SUM == farthest(np.zeros(0))
+    assert farthest(np.array([2.0, 8.0, 4.0])) == MAX_SUM / 8.0
+    assert 10.0 * MAX_SUM < float(np.finfo(np.float32).max) < 100.0 * MAX_SUM

@@ -126,7 +126,9 @@ def test_vertices_that_only_one_point_covers_are_found() -> None:
     for i in range(10):
         found = np.zeros(len(mesh.uv), dtype=np.int64)
         entries = lists.entries_of(i)
-        count = edits._only_covering(*entries, lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found)
+        count = edits._list_only_covered(
+            *entries, lists.cell_start, lists.rows, lists.room, lists.at, lists.value, found
+        )
         wanted = np.flatnonzero(covering[:, i] & (covering.sum(axis=1) == 1))
         assert sorted(found[:count].tolist()) == wanted.tolist()
         assert edits._first_uncovered(lists, mesh, i, away) == (found[0] if count else -1)

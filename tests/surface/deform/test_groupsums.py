@@ -133,7 +133,7 @@ def test_weights_of_a_point_are_products_of_what_its_lanes_pick() -> None:
 
 @njit
 def run_wide(row, head, picks):
-    return groupsums.wide(row, head, picks)
+    return groupsums.factor_counts(row, head, picks)
 
 
 def test_a_cell_says_how_many_factors_its_rows_have_and_one_with_plain_weights_none() -> None:

@@ -31,7 +31,7 @@ def test_unpacked_blocks_are_the_blocks_that_were_packed(normals: bool) -> None:
     held = np.flatnonzero(made.packed_at >= 0)
     assert len(held) > 3 and (made.order_at[held] >= 0).any()
     for c in held:
-        blocks = packing.unpacked(lists, made, int(c))
+        blocks = packing.unpack_cell(lists, made, int(c))
         size = lists.rows[c] * (lists.tile_start[c + 1] - lists.tile_start[c]) * LANES
         assert np.array_equal(blocks[0].ravel(), lists.value[lists.at[c] :][:size])
         assert len(blocks) == 1 + normals

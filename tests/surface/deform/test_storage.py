@@ -9,7 +9,7 @@ import shapes
 from surface import DCPSurface
 from surface.deform.lists import LANES, Basis, Lists, build_lists
 from surface.deform.packing import PLAIN
-from surface.deform.storage import Storage, compress, expand, remember
+from surface.deform.storage import Storage, compress, expand, make_restore
 from surface.mesh.mesh import Mesh
 
 
@@ -87,7 +87,7 @@ def test_what_is_expanded_can_be_taken_back(body: tuple[DCPSurface, Mesh], norma
     before = [getattr(lists, name).copy() for name in names], [a.copy() for a in storage.arrays.values()
                                                                if isinstance(a, np.ndarray)]  # fmt: skip
     used = lists.used
-    restore = remember(lists, storage)
+    restore = make_restore(lists, storage)
     expand(lists, storage, np.arange(0, len(lists.rows), 2))
     assert lists.used > used
     restore()

@@ -9,7 +9,7 @@ import shapes
 from surface import DCPSurface
 from surface.deform import deformation as module
 from surface.deform import updates
-from surface.deform.deformation import LIMIT, MOST_MOVED, Deformation
+from surface.deform.deformation import LIMIT, RECOMPUTE_FRACTION, Deformation
 
 
 def moved(normals: bool = True) -> Deformation[DCPSurface]:
@@ -201,7 +201,7 @@ def test_rows_that_lead_beyond_float32_are_found(axis: int) -> None:
 def test_from_some_part_of_the_points_on_everything_is_computed_again() -> None:
     deformation = moved()
     n = deformation.basis.n
-    some = int(MOST_MOVED * n)
+    some = int(RECOMPUTE_FRACTION * n)
     deformation.move(np.arange(n), [0.0, 0.0, 0.5])  # a change of all leaves no numerators
     assert deformation.changed == [(0, len(deformation.vertices))]
     calls: list[int] = []

@@ -17,7 +17,7 @@ from surface.export import export_head
 from surface.export.glb_web import web_glb
 from surface.export.shapes import export_parts
 from surface.export.textures import eye_picture, png_bytes, strand_picture, strip_picture
-from surface.export.web_parts import LEAST_MM, web_parts
+from surface.export.web_parts import MIN_MOVE_MM, web_parts
 from surface.head import Head
 
 TYPES = {5126: "<f4", 5125: "<u4", 5123: "<u2", 5122: "<i2", 5121: "u1", 5120: "i1"}
@@ -72,7 +72,7 @@ def test_positions_and_moves_are_within_a_step_of_the_head(head):
     np.testing.assert_allclose(places, web_parts(head)[0].part.vertices, atol=1000 * bind[0, 0])
     (target,) = primitive["targets"]
     moves = 1000.0 * file.accessor(target["POSITION"]).astype(float) * bind[0, 0]
-    np.testing.assert_allclose(moves, web_parts(head)[0].part.displacements["mouthPucker"], atol=LEAST_MM)
+    np.testing.assert_allclose(moves, web_parts(head)[0].part.displacements["mouthPucker"], atol=MIN_MOVE_MM)
     normals = file.accessor(primitive["attributes"]["NORMAL"]) / 32767.0
     np.testing.assert_allclose(normals, web_parts(head)[0].part.normals, atol=3e-4)
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from small_head import all_points, part, sheet, small_head
 
-from surface.export.shapes import LEAST_MM, export_parts, unit
+from surface.export.shapes import MIN_MOVE_MM, export_parts, unit
 from surface.head import Head
-from surface.head.model.parameters import TONGUE_NEEDS
+from surface.head.model.parameters import TONGUE_JAW
 
 
 def one_part(**other) -> Head:
@@ -47,7 +47,7 @@ def test_shapes_are_differences_of_poses():
             head.pose(head.values(values))
             for got, own in zip(parts, head.parts, strict=True):
                 moved = got.vertices + got.displacements.get(name, 0) if sign > 0 else got.vertices
-                assert np.abs(moved - own.vertices).max() <= 1.01 * LEAST_MM
+                assert np.abs(moved - own.vertices).max() <= 1.01 * MIN_MOVE_MM
                 turned = got.normals + got.normal_changes.get(name, 0) if sign > 0 else got.normals
                 assert np.abs(turned - unit(own.normals)).max() <= 1.01e-4
         assert any(name in p.displacements for p in parts)
@@ -64,10 +64,10 @@ def test_vertices_that_hardly_move_are_zero_where_others_move():
     moved = only.displacements["mouthPucker"]
     length = np.abs(moved).max(axis=1)
     assert (length == 0).any() and length.max() > 1
-    assert length[length > 0].min() >= LEAST_MM
+    assert length[length > 0].min() >= MIN_MOVE_MM
 
 
-@pytest.mark.parametrize(("name", "opened"), [("mouthClose", 1.0), ("tongueOut", TONGUE_NEEDS)])
+@pytest.mark.parametrize(("name", "opened"), [("mouthClose", 1.0), ("tongueOut", TONGUE_JAW)])
 def test_shapes_over_an_open_jaw_are_what_they_add_to_it(name, opened):
     head = one_part(groups=[all_points(name, (1, 5, 0)), all_points("jawOpen", (0, -7, 0))])
     head.pose(head.values({"jawOpen": opened}))

@@ -12,7 +12,7 @@ from small_head import all_points, part, small_head
 from surface.export import web_parts as module
 from surface.export.shapes import ExportPart
 from surface.export.textures import EYE_RIM, materials
-from surface.export.web_parts import LEAST_MM, LEAST_NORMAL, web_parts
+from surface.export.web_parts import MIN_MOVE_MM, MIN_NORMAL, web_parts
 from surface.head import Head
 
 
@@ -33,16 +33,16 @@ def own_part(count: int, uv: Any = None, **attributes: Any) -> Any:
 def test_only_vertices_of_triangles_are_kept_and_only_shapes_that_move_them() -> None:
     moves = np.zeros((5, 3), np.float32)
     one, two, three, turn = moves.copy(), moves.copy(), moves.copy(), moves.copy()
-    one[3] = [0, -2 * LEAST_MM, 0]
-    one[4] = two[2] = [LEAST_MM, 0, 0]  # a vertex that is left out, and one that moves just enough
-    three[1] = [0.9 * LEAST_MM, 0, 0]
-    turn[1] = [0, 0, -LEAST_NORMAL]
+    one[3] = [0, -2 * MIN_MOVE_MM, 0]
+    one[4] = two[2] = [MIN_MOVE_MM, 0, 0]  # a vertex that is left out, and one that moves just enough
+    three[1] = [0.9 * MIN_MOVE_MM, 0, 0]
+    turn[1] = [0, 0, -MIN_NORMAL]
     whole = export_part(
         np.arange(15).reshape(5, 3), colours=np.arange(15, dtype=np.float32).reshape(5, 3),
         displacements={"one": one, "two": two, "three": three},
         normal_changes={"one": turn, "two": moves, "three": turn},
     )  # fmt: skip
-    kept, small = module._reduced(whole, np.array([[3, 1, 2], [1, 3, 0]]))
+    kept, small = module._reduce(whole, np.array([[3, 1, 2], [1, 3, 0]]))
     assert kept.tolist() == [0, 1, 2, 3] and small.triangles.tolist() == [[3, 1, 2], [1, 3, 0]]
     np.testing.assert_array_equal(small.vertices, whole.vertices[:4])
     assert small.colours is not None
@@ -51,7 +51,7 @@ def test_only_vertices_of_triangles_are_kept_and_only_shapes_that_move_them() ->
     np.testing.assert_array_equal(small.displacements["one"], one[:4])
     np.testing.assert_array_equal(small.normal_changes["one"], turn[:4])  # it turns a vertex that does not move
     np.testing.assert_array_equal(small.displacements["two"], two[:4])
-    apart = module._reduced(whole, np.array([[0, 2, 4]]))[1]
+    apart = module._reduce(whole, np.array([[0, 2, 4]]))[1]
     assert apart.triangles.tolist() == [[0, 1, 2]] and list(apart.displacements) == ["one", "two"]
 
 
@@ -66,7 +66,7 @@ def test_half_shapes_are_what_lies_between_arc_and_chord() -> None:
     head.pose(head.values({}))
     rest = head.part("b").vertices
     whole, half = tooth.part.displacements["jawOpen"], tooth.part.displacements["jawOpenHalf"]
-    np.testing.assert_allclose(rest + 0.5 * whole + half, at_half, atol=LEAST_MM)
+    np.testing.assert_allclose(rest + 0.5 * whole + half, at_half, atol=MIN_MOVE_MM)
     assert 0.1 < np.abs(half).max() < 0.1 * np.abs(whole).max()
 
 
@@ -108,7 +108,7 @@ def test_an_eyeball_is_mapped_as_seen_from_its_front() -> None:
 def test_a_mouths_inside_darkens_with_its_depth_behind_the_teeth(material: str) -> None:
     vertices = [[0, 0, 70.0], [0, 0, 60.0], [0, 0, 34.0]]
     own = own_part(3, occlusion=np.array([1.0, 0.25, 1.0]))
-    found = module._coloured(export_part(vertices, material), own, np.arange(3), 60.0)
+    found = module._add_material_data(export_part(vertices, material), own, np.arange(3), 60.0)
     share = np.array([1.0, 0.5, np.exp(-1.0)])  # 26 mm
     np.testing.assert_allclose(found.colours[:, :3], np.outer(share, materials()[material]["colour"]), rtol=1e-5)
     assert (found.colours[:, 3] == 1).all() and found.uv is None and not found.baked
@@ -119,11 +119,11 @@ def test_skin_has_its_light_gloss_and_thinness_baked() -> None:
         3, albedo=np.array([[0.4, 0.2, 0.1]] * 3), occlusion=np.array([1.0, 0.25, 0.0]),
         gloss=np.array([0.0, 0.2, 2.0]), thin=np.array([1.0, 0.4, 0.0]), visible=np.array([[1.0, 0.8, 0.6, 0.4]] * 3),
     )  # fmt: skip
-    found = module._coloured(export_part(np.eye(3)), own, np.array([2, 1]), 0.0)
+    found = module._add_material_data(export_part(np.eye(3)), own, np.array([2, 1]), 0.0)
     np.testing.assert_allclose(found.colours, [[0, 0, 0, 0], [0.2, 0.1, 0.05, 0.25]], atol=1e-6)
     assert found.baked["_SKIN"].tolist() == [[255, 0, 0, 0], [51, 102, 0, 0]]
     assert found.baked["_VISIBLE"].tolist() == [[255, 204, 153, 102]] * 2
-    bare = module._coloured(export_part(np.eye(3)), own_part(3), np.arange(3), 0.0)
+    bare = module._add_material_data(export_part(np.eye(3)), own_part(3), np.arange(3), 0.0)
     np.testing.assert_allclose(bare.colours, np.tile([*materials()["skin"]["colour"], 1.0], (3, 1)), atol=1e-6)
     assert bare.baked["_VISIBLE"].tolist() == [[191, 128, 128, 128]] * 3
     assert bare.baked["_SKIN"].tolist() == [[76, 0, 0, 0]] * 3
@@ -131,7 +131,7 @@ def test_skin_has_its_light_gloss_and_thinness_baked() -> None:
 
 def test_cloth_has_colours_alone() -> None:
     own = own_part(3, albedo=np.array([[0.4, 0.2, 0.1]] * 3))
-    found = module._coloured(export_part(np.eye(3), "cloth"), own, np.arange(3), 0.0)
+    found = module._add_material_data(export_part(np.eye(3), "cloth"), own, np.arange(3), 0.0)
     np.testing.assert_allclose(found.colours, [[0.4, 0.2, 0.1, 1.0]] * 3, atol=1e-6)
     assert found.uv is None and not found.baked
 
@@ -140,9 +140,9 @@ def test_brows_are_as_strong_as_they_are_painted_and_lashes_by_their_lid() -> No
     uv = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]])
     own = own_part(3, uv, strength=np.array([0.5, 1.0, 0.5]), albedo=np.array([[0.1, 0.2, 0.3]] * 3))
     vertices = [[0, 9, 0], [0, 9, 0], [0, 2, 0.0]]
-    brow = module._coloured(export_part(vertices, "brow"), own, np.arange(3), 0.0)
+    brow = module._add_material_data(export_part(vertices, "brow"), own, np.arange(3), 0.0)
     np.testing.assert_allclose(brow.colours, [[0.1, 0.2, 0.3, a] for a in (0.5, 1.0, 0.5)], atol=1e-6)
-    lash = module._coloured(export_part(vertices, "lash"), own, np.arange(3), 0.0)
+    lash = module._add_material_data(export_part(vertices, "lash"), own, np.arange(3), 0.0)
     np.testing.assert_allclose(lash.colours[:, 3], [0.5, 1.0, 0.21], atol=1e-6)
     np.testing.assert_allclose(lash.uv, [[0, 1], [1, 0], [0, 1]])
 
@@ -151,7 +151,7 @@ def test_brows_are_as_strong_as_they_are_painted_and_lashes_by_their_lid() -> No
 def test_locks_are_covered_by_their_strands_and_shaded_as_a_whole(material: str) -> None:
     strands = np.array([[0.1, 0.2, 0.3, 0.25], [0.5, 0.6, 0.7, 1.0]])
     own = own_part(2, strands=strands, albedo=np.array([[0.8, 0.4, 0.2]] * 2))
-    found = module._coloured(export_part([[10.0, 15, 0], [0, 15, 30.0]], material), own, np.arange(2), 0.0)
+    found = module._add_material_data(export_part([[10.0, 15, 0], [0, 15, 30.0]], material), own, np.arange(2), 0.0)
     np.testing.assert_allclose(found.colours, [[0.4, 0.2, 0.1, 0.3], [0.8, 0.4, 0.2, 0.7]], atol=1e-6)
     np.testing.assert_allclose(found.uv, strands[:, :2], atol=1e-6)
     slanted = np.array([1.1, 0, 1]) / np.hypot(1.1, 1)

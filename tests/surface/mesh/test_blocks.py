@@ -23,7 +23,7 @@ def test_lists_hold_every_point_with_weight(seed: int) -> None:
     assert mesh.cell_start[0] == 0
     assert mesh.cell_start[-1] == len(mesh.uv)
     assert (np.diff(mesh.cell_start) > 0).all()
-    assert np.diff(mesh.cell_start).max() <= blocks.MOST
+    assert np.diff(mesh.cell_start).max() <= blocks.MAX_VERTICES
     matrix = surface.basis_matrix(mesh.uv, side=mesh.side)
     for cell, (first, last) in enumerate(zip(mesh.cell_start, mesh.cell_start[1:], strict=False)):
         used = np.unique(matrix[int(first) : int(last)].indices)
@@ -56,7 +56,7 @@ def test_cells_are_as_large_as_one_list_is_cheaper_than_four_and_the_cache_allow
     square = shapes.hills(4).tessellate(roots=(1, 1), min_depth=7, max_depth=7)  # 16 points that all reach everywhere
     sizes = np.diff(square.cell_start)
     assert len(square.vertices) == 129**2
-    assert blocks.MOST == 4096
+    assert blocks.MAX_VERTICES == 4096
     assert sizes.max() <= 4096 and sizes.min() > 1000
     assert len(sizes) < 20
     spans = shapes.hills(19)  # 16 spans along a side: a cell of many spans would read points that reach little of it
@@ -142,7 +142,7 @@ def test_a_branch_is_cut_where_its_quarters_cost_less(
 def test_a_vertex_belongs_to_the_first_of_the_leaves_around_it() -> None:
     triangles = np.array([[0, 1, 2], [2, 1, 3], [3, 4, 2]])
     code = np.full(5, 99)
-    blocks.least_codes(triangles, np.array([1, 0, 2]), np.array([7, 5, 3]), code)
+    blocks.lower_codes(triangles, np.array([1, 0, 2]), np.array([7, 5, 3]), code)
     assert code.tolist() == [5, 5, 3, 3, 3]
 
 

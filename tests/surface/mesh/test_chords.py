@@ -110,7 +110,7 @@ def test_a_leaf_is_compared_with_the_triangles_it_is_drawn_with(pattern: int) ->
     """On a plane that is bent where the triangles of a pattern meet only other triangles are off."""
     saddle = DCPSurface.from_nurbs(1, 1, [0, 0, 1, 1], [0, 0, 1, 1], [[[0, 0, 0], [0, 1, 1]], [[1, 0, 1], [1, 1, 0]]])
     uv = chords.sample_places(np.array([[0.0, 1.0, 0.0, 1.0]]))
-    found = chords.measured_errors(saddle, uv, np.zeros((1, 25), np.int64), np.array([pattern]))[0]
+    found = chords.measure_errors(saddle, uv, np.zeros((1, 25), np.int64), np.array([pattern]))[0]
     nodes = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0.5, 0], [1, 0.5], [0.5, 1], [0, 0.5]])
     corners = [saddle.evaluate(nodes[t]) for t in quadtree.TEMPLATES[pattern] if t[0] >= 0]
     each = [

@@ -140,14 +140,14 @@ def test_a_triangle_may_turn_by_as_much_as_a_cosine_of_three_tenths(cosine: floa
     points = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1.0, 0], [1, 3 * cosine, 3 * sine], [1, -1, 0]])
     turn = np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     collapse = Collapse(points @ turn.T + 7.0, np.array([[0, 1, 2], [1, 0, 4]]), np.zeros(5, bool))
-    assert collapse._keep_facing({0}, 2, 3) == kept
-    assert collapse._keep_facing(set(), 2, 3)
+    assert collapse._keeps_orientation({0}, 2, 3) == kept
+    assert collapse._keeps_orientation(set(), 2, 3)
 
 
 def test_a_triangle_without_area_is_not_made() -> None:
     points = np.array([[0.0, 0, 0], [2, 0, 0], [1, 1, 0], [5, 0, 0]])
     collapse = Collapse(points, np.array([[0, 1, 2]]), np.zeros(4, bool))
-    assert not collapse._keep_facing({0}, 2, 3)
+    assert not collapse._keeps_orientation({0}, 2, 3)
 
 
 def test_normals_are_cross_products() -> None:

@@ -126,7 +126,7 @@ def test_points_on_a_slit_take_the_side_of_their_cell() -> None:
 
 
 def test_millions_of_cells_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(splitting, "MOST_CELLS", 16)
+    monkeypatch.setattr(splitting, "MAX_CELLS", 16)
     tests = splitter(shapes.hills(7), NONE)
     tests.split(0, grid(4))
     with pytest.raises(ValueError, match="max_depth: 17 cells at level 3; ask for a larger chord_error or max_points"):

@@ -264,14 +264,14 @@ def test_lengths_per_unit_are_means_over_what_is_drawn() -> None:
     """x = u^2 and y = 4 v^2: the mean slopes over an interval are the sum of its ends, and four times that."""
     net = np.array([[[x, y, 0.0] for y in (0.0, 0.0, 4.0)] for x in (0.0, 0.0, 1.0)])
     surface = DCPSurface.from_nurbs(2, 2, [0, 0, 0, 1, 1, 1], [0, 0, 0, 1, 1, 1], net)
-    assert tessellation._lengths(surface, Domain((0.2, 0.7, 0.5, 0.9))) == pytest.approx((0.9, 5.6))
+    assert tessellation._mean_scale(surface, Domain((0.2, 0.7, 0.5, 0.9))) == pytest.approx((0.9, 5.6))
     loop = [[0.0, 0.0], [0.5, 0.0], [0.5, 0.25], [0.0, 0.25]]
-    assert tessellation._lengths(surface, Domain((0, 1, 0, 1), [loop])) == pytest.approx((0.5, 1.0))
-    assert tessellation._lengths(surface, Domain((2, 3, 2, 3))) == (1.0, 1.0)  # nothing is covered
+    assert tessellation._mean_scale(surface, Domain((0, 1, 0, 1), [loop])) == pytest.approx((0.5, 1.0))
+    assert tessellation._mean_scale(surface, Domain((2, 3, 2, 3))) == (1.0, 1.0)  # nothing is covered
     flat = surface.with_points(surface.points * [1, 0, 0])
-    assert tessellation._lengths(flat, Domain((0, 1, 0, 1))) == pytest.approx((1.0, 1e-6), rel=1e-9)
+    assert tessellation._mean_scale(flat, Domain((0, 1, 0, 1))) == pytest.approx((1.0, 1e-6), rel=1e-9)
     flat = surface.with_points(surface.points * [0, 1, 0])
-    assert tessellation._lengths(flat, Domain((0, 1, 0, 1))) == pytest.approx((4e-6, 4.0), rel=1e-9)
+    assert tessellation._mean_scale(flat, Domain((0, 1, 0, 1))) == pytest.approx((4e-6, 4.0), rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -327,9 +327,9 @@ def test_progress_rises_from_stage_to_stage_up_to_the_end() -> None:
 
 
 def test_vertices_are_evaluated_in_parts_of_131072(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert tessellation.CHUNK == 131072
+    assert tessellation.CHUNK_VERTICES == 131072
     whole = shapes.hills().tessellate(chord_error=0.3)
-    monkeypatch.setattr(tessellation, "CHUNK", 100)
+    monkeypatch.setattr(tessellation, "CHUNK_VERTICES", 100)
     said: list[tuple[str, float]] = []
     parts = shapes.hills().tessellate(chord_error=0.3, progress=lambda *args: said.append(args))
     np.testing.assert_array_equal(parts.vertices, whole.vertices)
@@ -347,7 +347,7 @@ def test_leaves_are_numbered_root_by_root_in_morton_order() -> None:
     corners, owner = tessellation.quadtree.triangulate(lattice, leaves, inner)
     nodes, _, triangles = tessellation.keys.unique(corners)
     flat = trim.Flat(lattice.uv(*lattice.point(nodes)), triangles, owner)
-    code = tessellation._codes(flat, lattice, leaves)
+    code = tessellation._vertex_codes(flat, lattice, leaves)
 
     def number(u: float, v: float) -> int:
         i, j = int(u * 12 + 1e-9), int(v * 8 + 1e-9)  # leaves are quarters of roots; depth 3 is one level below
@@ -361,9 +361,9 @@ def test_leaves_are_numbered_root_by_root_in_morton_order() -> None:
         assert found in around
     assert surface.tessellate(roots=(3, 2), min_depth=2, max_depth=2).leaves == 96
     unused = trim.Flat(np.vstack([flat.uv, [9.0, 9.0]]), flat.triangles, flat.owner)
-    code = tessellation._codes(unused, lattice, leaves)
+    code = tessellation._vertex_codes(unused, lattice, leaves)
     assert code[-1] == np.iinfo(np.int64).max
-    order = tessellation._used_in_order(unused, code)
+    order = tessellation._sort_used(unused, code)
     assert len(order) == len(flat.uv) and (np.diff(code[order]) >= 0).all()
 
 

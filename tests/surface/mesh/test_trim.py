@@ -94,21 +94,21 @@ def test_nothing_inside_leaves_nothing() -> None:
 
 def test_a_triangle_without_area_holds_no_point() -> None:
     flat = Flat(np.array([[0.0, 0], [1, 0], [2, 0], [0, 1]]), np.array([[0, 1, 2], [0, 1, 3]]), np.zeros(2, np.int64))
-    shares = trim._weights_in(flat, np.array([0.25, 0.25]))
+    shares = trim._barycentric(flat, np.array([0.25, 0.25]))
     assert np.isneginf(shares[0]).all()
     assert np.allclose(shares[1], [0.5, 0.25, 0.25])
 
 
 def test_an_edge_without_length_becomes_one_vertex() -> None:
     uv = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1], [1, 0]])
-    flat = trim._merged(Flat(uv, np.array([[0, 1, 3], [1, 4, 3], [4, 2, 3]]), np.arange(3)))
+    flat = trim._merge_coincident(Flat(uv, np.array([[0, 1, 3], [1, 4, 3], [4, 2, 3]]), np.arange(3)))
     assert flat.triangles.tolist() == [[0, 1, 3], [1, 2, 3]]
     assert flat.owner.tolist() == [0, 2]
 
 
 def test_a_flat_triangle_at_the_border_is_dropped() -> None:
     uv = np.array([[0.0, 0], [1, 0], [2, 0], [1, 1]])
-    flat = trim._without_flat(Flat(uv, np.array([[0, 2, 3], [0, 1, 2]]), np.arange(2)))
+    flat = trim._drop_flat_border(Flat(uv, np.array([[0, 2, 3], [0, 1, 2]]), np.arange(2)))
     assert flat.triangles.tolist() == [[0, 2, 3]]
 
 
@@ -195,7 +195,7 @@ def test_a_point_moves_the_free_vertex_next_to_it_or_splits_its_triangle() -> No
         point = share * corners[0] + (1 - share) * 0.5 * (corners[1] + corners[2])
         lines, held = free.copy(), none.copy()
         lines[start.triangles[0, 0]], held[start.triangles[0, 0]] = line, fixed
-        flat, lines, held = trim._place(start, point, lines, held)
+        flat, lines, held = trim._place_vertex(start, point, lines, held)
         if moves:
             assert len(flat.uv) == 9 and np.allclose(flat.uv[start.triangles[0, 0]], point)
             assert held[start.triangles[0, 0]]
@@ -204,7 +204,7 @@ def test_a_point_moves_the_free_vertex_next_to_it_or_splits_its_triangle() -> No
             assert areas(flat).sum() == pytest.approx(1.0) and len(flat.triangles) in (10, 11)
         else:
             assert len(flat.uv) == 9 and not np.allclose(flat.uv[start.triangles[0, 0]], point)
-    outside = trim._place(grid(2), np.array([1.2, 0.5]), free, none)[0]
+    outside = trim._place_vertex(grid(2), np.array([1.2, 0.5]), free, none)[0]
     assert len(outside.uv) == 9
 
 
@@ -214,7 +214,7 @@ def test_a_split_near_an_edge_takes_both_its_triangles() -> None:
     for towards in (0.0, 0.14 * 3, 0.16 * 3):
         corners = start.uv[start.triangles[0]]
         point = diagonal + towards * (corners.mean(axis=0) - diagonal)
-        share = trim._weights_in(grid(2), point)[0]
+        share = trim._barycentric(grid(2), point)[0]
         flat = trim._insert(grid(2), point, 0, share)
         near = share.min() < 0.15
         assert len(flat.triangles) == 10
@@ -230,8 +230,8 @@ def test_vertices_know_the_line_that_they_may_slide_along() -> None:
     uv = np.array([[0.0, 0.5], [1.0, 0.5], [0.5, 0.0], [0.5, 1.0], [0.0, 0.0], [1.0, 1.0], [0.3, 0.3],
                    [0.25, 0.75], [0.75, 0.75], [0.6, 0.75], [0.6, 0.6]])  # fmt: skip
     domain = Domain((0, 1, 0, 1), slits=[Slit("u", 0.75, 0.25, 0.75), Slit("v", 0.6, 0.2, 0.9)])
-    assert trim._lines(uv, domain).tolist() == [0, 1, 2, 3, -2, -2, -1, -2, -2, -2, 5]
-    assert trim.lines_of_edges(uv, domain).tolist() == [0, 0, 0, 0, 0, 0, 0, 1, 1, 3, 2]
+    assert trim._sliding_lines(uv, domain).tolist() == [0, 1, 2, 3, -2, -2, -1, -2, -2, -2, 5]
+    assert trim.slit_masks(uv, domain).tolist() == [0, 0, 0, 0, 0, 0, 0, 1, 1, 3, 2]
 
 
 def test_vertices_that_none_uses_are_dropped() -> None:
@@ -244,10 +244,10 @@ def test_a_triangle_that_turns_no_way_is_kept_inside_the_mesh() -> None:
     """Without area, but with neighbours on two sides: to drop it would tear them apart."""
     uv = np.array([[0.0, 0], [1, 0], [2, 0], [1, 1], [1, -1]])
     triangles = np.array([[0, 2, 3], [0, 1, 2], [1, 0, 4], [2, 1, 4]])
-    flat = trim._without_flat(Flat(uv, triangles, np.arange(4)))
+    flat = trim._drop_flat_border(Flat(uv, triangles, np.arange(4)))
     assert flat.triangles.tolist() == triangles.tolist()
     chain = np.array([[0, 2, 3], [0, 1, 2]])
-    assert trim._without_flat(Flat(uv, chain, np.arange(2))).owner.tolist() == [0]
+    assert trim._drop_flat_border(Flat(uv, chain, np.arange(2))).owner.tolist() == [0]
 
 
 @pytest.mark.parametrize("across", [0.633, 0.62, 0.5001, 0.7])

@@ -149,12 +149,12 @@ def test_quarters_are_of_the_rectangle_and_none_is_empty() -> None:
 
 
 def test_the_nearest_sample_is_that_of_all_distances(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(inversion, "AT_ONCE", 100)
+    monkeypatch.setattr(inversion, "BATCH_DISTANCES", 100)
     rng = np.random.default_rng(3)
     samples, points = rng.normal(size=(30, 3)) + 50.0, rng.normal(size=(17, 3)) + 50.0
     wanted = np.linalg.norm(points[:, None] - samples, axis=2).argmin(axis=1)
     np.testing.assert_array_equal(inversion._nearest(samples, points), wanted)
-    monkeypatch.setattr(inversion, "AT_ONCE", 1)  # one at a time at least
+    monkeypatch.setattr(inversion, "BATCH_DISTANCES", 1)  # one at a time at least
     np.testing.assert_array_equal(inversion._nearest(samples, points), wanted)
     assert len(inversion._nearest(samples, points[:0])) == 0
 

@@ -6,20 +6,20 @@ import pytest
 
 from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT
-from surface.readers.meshdata import MOST_MOVES, MOST_VERTICES, check_size, read_bytes
+from surface.readers.meshdata import MAX_MOVES, MAX_VERTICES, check_size, read_bytes
 
 
 def test_limits_themselves_are_allowed():
-    check_size("m", MOST_VERTICES, MOST_MOVES // MOST_VERTICES)
+    check_size("m", MAX_VERTICES, MAX_MOVES // MAX_VERTICES)
     check_size("m", 0, 10**9)
 
 
 def test_one_more_is_refused():
     with pytest.raises(FitError, match="m: 400001 vertices; 400000 are the most") as caught:
-        check_size("m", MOST_VERTICES + 1, 0)
+        check_size("m", MAX_VERTICES + 1, 0)
     assert "decimate" in caught.value.hint
     with pytest.raises(FitError, match="m: 101 shapes of 400000 vertices are too many") as caught:
-        check_size("m", MOST_VERTICES, MOST_MOVES // MOST_VERTICES + 1)
+        check_size("m", MAX_VERTICES, MAX_MOVES // MAX_VERTICES + 1)
     assert "leave out shapes" in caught.value.hint
 
 

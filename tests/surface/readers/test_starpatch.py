@@ -11,10 +11,10 @@ from surface.readers.starpatch import (
     SPANS,
     Sampled,
     _basis,
-    _corrected,
-    _filled,
-    _on_limit,
-    _subdivided,
+    _correct_sides,
+    _fill,
+    _project_to_limit,
+    _subdivide,
     fit_patch,
 )
 
@@ -38,7 +38,7 @@ def places(count: int) -> np.ndarray:
 
 def test_a_step_of_the_cube_is_that_of_the_paper() -> None:
     """Corners at 5/9, edges at 3/4 and faces at 1, as the rules of 1978 give by hand."""
-    _, x, _ = _subdivided(CUBE, CORNERS, places(8))
+    _, x, _ = _subdivide(CUBE, CORNERS, places(8))
     assert_allclose(x[:8], CORNERS * 5 / 9)
     edges, faces = np.abs(x[8:20]), np.abs(x[20:])
     assert_allclose(np.sort(edges, axis=1), np.tile([0.0, 0.75, 0.75], (12, 1)))
@@ -46,11 +46,11 @@ def test_a_step_of_the_cube_is_that_of_the_paper() -> None:
 
 
 def test_the_limit_is_where_many_steps_lead() -> None:
-    at_once = _on_limit(CUBE, CORNERS)
+    at_once = _project_to_limit(CUBE, CORNERS)
     faces, x, where = CUBE, CORNERS, places(8)
     for _ in range(5):
-        faces, x, where = _subdivided(faces, x, where)
-    stepwise = _on_limit(faces, x)[:8]
+        faces, x, where = _subdivide(faces, x, where)
+    stepwise = _project_to_limit(faces, x)[:8]
     assert_allclose(at_once, stepwise, atol=1e-12)  # the limit of a vertex does not depend on when it is asked for
     assert_allclose(x[:8], at_once, atol=2e-3)
 
@@ -59,7 +59,7 @@ def test_on_a_lattice_the_limit_is_the_uniform_cubic_spline() -> None:
     faces, flat = grid(7)
     heights = np.random.default_rng(7).normal(size=49)
     x = np.column_stack([flat, heights])
-    limit = _on_limit(faces, x).reshape(7, 7, 3)
+    limit = _project_to_limit(faces, x).reshape(7, 7, 3)
     share = BSpline.basis_element(np.arange(5.0))([1.0, 2.0, 3.0])
     net = heights.reshape(7, 7)
     for i, j in ((2, 2), (3, 4), (4, 3)):
@@ -69,8 +69,8 @@ def test_on_a_lattice_the_limit_is_the_uniform_cubic_spline() -> None:
 def test_shares_of_every_place_add_up_to_one() -> None:
     faces, x, where = CUBE, np.eye(8), places(8)
     for _ in range(2):
-        faces, x, where = _subdivided(faces, x, where)
-    assert_allclose(_on_limit(faces, x).sum(axis=1), 1.0)
+        faces, x, where = _subdivide(faces, x, where)
+    assert_allclose(_project_to_limit(faces, x).sum(axis=1), 1.0)
 
 
 def test_places_without_samples_lie_on_the_lines_through_their_neighbours() -> None:
@@ -78,14 +78,14 @@ def test_places_without_samples_lie_on_the_lines_through_their_neighbours() -> N
     plane = (2.0 * t[:, None] - 3.0 * t[None] + 1.0)[..., None]
     gaps = plane.copy()
     gaps[4, 3] = gaps[0, 5] = np.nan
-    assert_allclose(_filled(gaps), plane)
+    assert_allclose(_fill(gaps), plane)
 
 
 def test_a_corner_without_a_sample_is_the_sample_next_to_it() -> None:
     lattice = np.ones((COUNT, COUNT, 1))
     lattice[-1, :] = lattice[:, -1] = np.nan
     lattice[-1, 0] = 3.0
-    filled = _filled(lattice)
+    filled = _fill(lattice)
     assert filled[-1, -1] == 1.0
     assert np.isfinite(filled).all() and (filled >= 1.0).all()
 
@@ -111,7 +111,7 @@ def test_sides_that_are_known_are_met_and_the_others_stay() -> None:
     limit = np.zeros((COUNT, COUNT, 1))
     t = np.linspace(0.0, 1.0, COUNT)
     below, right = np.sin(3 * t)[:, None], np.sin(3.0) * (1 - t)[:, None]
-    moved = _corrected(limit, [below, right, None, None])
+    moved = _correct_sides(limit, [below, right, None, None])
     assert_allclose(moved[:, 0], below, atol=1e-14)
     assert_allclose(moved[-1], right, atol=1e-14)
     assert_allclose(moved[:, -1], 0.0, atol=1e-14)

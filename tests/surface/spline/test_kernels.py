@@ -253,16 +253,16 @@ def test_a_blending_function_counts_where_its_value_or_slope_is_not_zero() -> No
     knots, work = np.array([[9.0, 9, 9, 9], [0.0, 1.0, 2.0, 2.0]]), np.zeros(12)
     values = np.array([[0.5, 0.0], [1.5, 0.0], [2.0, 1.0], [2.0, 0.0], [7.0, 0.0]])
     out = np.zeros((5, 2))
-    assert kernels.along(knots, 1, 1, values, 5, True, work, out)
+    assert kernels.blend_along(knots, 1, 1, values, 5, True, work, out)
     np.testing.assert_allclose(out, [[0.5, 1], [0.5, -1], [0, -1], [0, 0], [0, 0]])
     for k, expected in ((2, True), (3, False), (4, False)):
         out[:] = 0.0
-        assert kernels.along(knots, 1, 1, values[k : k + 1], 1, True, work, out) == expected
-        assert not kernels.along(knots, 1, 1, values[k : k + 1], 1, False, work, np.zeros((1, 2)))
+        assert kernels.blend_along(knots, 1, 1, values[k : k + 1], 1, True, work, out) == expected
+        assert not kernels.blend_along(knots, 1, 1, values[k : k + 1], 1, False, work, np.zeros((1, 2)))
     out[:] = 0.0
-    assert kernels.along(knots, 1, 1, values, 2, False, work, out)
+    assert kernels.blend_along(knots, 1, 1, values, 2, False, work, out)
     np.testing.assert_allclose(out, [[0.5, 0], [0.5, 0], [0, 0], [0, 0], [0, 0]])
-    assert not kernels.along(knots, 1, 1, values, 0, True, work, out)
+    assert not kernels.blend_along(knots, 1, 1, values, 0, True, work, out)
 
 
 @pytest.mark.parametrize("slopes", [False, True])

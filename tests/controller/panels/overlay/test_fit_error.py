@@ -46,16 +46,16 @@ def test_the_face_is_painted_while_it_is_on_and_another_head_too(
     places, own = Places(screen.imgui, monkeypatch), measured.part("face").attributes
     assert view.dress(measured, SKIN) is SKIN
     for _ in range(2):
-        screen.frame(view.draw_choice)
+        screen.frame(view.draw_checkboxes)
     assert not redrawn
-    screen.click(view.draw_choice, *places.at["fit error##overlay"])
+    screen.click(view.draw_checkboxes, *places.at["fit error##overlay"])
     assert view.on and redrawn == ["again"]
     assert view.dress(measured, SKIN) is not SKIN and measured.part("face").attributes is not own
-    screen.frame(view.draw_choice)
+    screen.frame(view.draw_checkboxes)
     assert places.texts[-1] == "face: RMS 0.50 mm, 99 % within 0.50 mm, most 0.50 mm"
     other = Head(small_head())
     assert view.dress(other, SKIN) is SKIN and measured.part("face").attributes is own
-    screen.frame(view.draw_choice)
+    screen.frame(view.draw_checkboxes)
     assert places.texts[-1] == NONE
     view.switch(on=False)
     assert redrawn == ["again"]  # nothing changes on a head that was not measured

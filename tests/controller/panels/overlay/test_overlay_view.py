@@ -92,7 +92,7 @@ def imgui(monkeypatch: pytest.MonkeyPatch) -> Imgui:
 def view(state: Any = None) -> tuple[OverlayView, FakeOverlays]:
     made = OverlayView(lambda: None, P.neutral, AREA, None, state=state)  # type: ignore[arg-type, return-value]
     fake = FakeOverlays()
-    made._take(fake)  # type: ignore[arg-type]
+    made._set_overlays(fake)  # type: ignore[arg-type]
     made._order = np.arange(len(P) + 1)
     return made, fake
 
@@ -164,11 +164,11 @@ def test_the_first_that_is_switched_on_loads_a_head_and_another_head_again() -> 
     made.switch("influence", on=True)
     made.switch("control points", on=True)
     assert jobs == ["preparing overlays"] and made.on == {"influence", "control points"}
-    made._take(FakeOverlays())  # type: ignore[arg-type]
+    made._set_overlays(FakeOverlays())  # type: ignore[arg-type]
     made.switch("control points", on=False)
     made.switch("control points", on=True)
     assert len(jobs) == 1
-    made.forget()
+    made.reload()
     assert len(jobs) == 2 and made.on == {"influence", "control points"}
     made.switch("influence", on=False)
     assert made.on == {"control points"} and len(jobs) == 2

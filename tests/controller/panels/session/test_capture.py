@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from controller.base.parameters import PARAMETERS
-from controller.panels.session.capture import LONGEST_S, Capture
+from controller.panels.session.capture import MAX_S, Capture
 from controller.takes.plain import plain_take
 from surface.view.docks import PictureArea
 
@@ -58,7 +58,7 @@ def test_a_recording_without_a_frame_writes_nothing(bench: Bench, tmp_path: Path
 
 def test_a_recording_ends_by_itself(bench: Bench, tmp_path: Path) -> None:
     bench.capture.toggle()
-    bench.frame(LONGEST_S - 1.0, 0.1)
+    bench.frame(MAX_S - 1.0, 0.1)
     assert bench.capture.recording
     bench.frame(2.0, 0.2)
     assert not bench.capture.recording and (tmp_path / "recording1.csv").is_file()

@@ -18,8 +18,8 @@ def test_what_is_set_is_sent_once() -> None:
     commands.hold({3: 0.25, 5: 0.5})
     commands.hold({3: 0.25, 5: None})
     commands.show("anger", 0.7)
-    commands.look((1.0, 2.0, 300.0))
-    commands.live(0.5)
+    commands.set_gaze((1.0, 2.0, 300.0))
+    commands.set_life(0.5)
     assert sent == [
         Hold(3, 0.25),
         Hold(5, 0.5),
@@ -36,10 +36,10 @@ def test_everything_is_undone_and_redone_to_the_bit() -> None:
     for change in (
         lambda: commands.hold({1: 0.1 + 0.2}),
         lambda: commands.show("fear", 1 / 3),
-        lambda: commands.look((0.0, 0.0, 500.0)),
-        lambda: commands.live(1.0),
-        lambda: commands.move(moves),
-        commands.neutral,
+        lambda: commands.set_gaze((0.0, 0.0, 500.0)),
+        lambda: commands.set_life(1.0),
+        lambda: commands.set_moves(moves),
+        commands.return_to_neutral,
     ):
         change()
         states.append(commands.now)

@@ -41,9 +41,9 @@ class Desk:
     def __init__(self, timeline: Timeline | None = None, take: Take | None = None) -> None:
         self.sent: list[object] = []
         self.commands = Commands(self.sent.append)  # type: ignore[arg-type]
-        self.commands.arrange(timeline or Timeline())
+        self.commands.set_timeline(timeline or Timeline())
         if take is not None:
-            self.commands.retake(take)
+            self.commands.set_take(take)
         self.now_s, self.sound = 100.0, Silent()
         self.face = PARAMETERS.neutral()
         self.play = Playback(
@@ -144,9 +144,9 @@ def test_a_sound_plays_from_the_line_on_and_may_be_longer_than_the_keys(tmp_path
     assert desk.sound.heard == [(path, 2.0)]
     desk.play.close()
     assert desk.sound.heard[-1] == "stop" and not desk.play.playing
-    desk.commands.arrange(keys(sound=sound(tmp_path / "b.wav", 2.0)))
+    desk.commands.set_timeline(keys(sound=sound(tmp_path / "b.wav", 2.0)))
     assert desk.play.length_s == 3.0
-    desk.commands.arrange(keys(sound=tmp_path / "lost.wav"))
+    desk.commands.set_timeline(keys(sound=tmp_path / "lost.wav"))
     assert desk.play.length_s == 3.0  # a lost sound has no length
 
 

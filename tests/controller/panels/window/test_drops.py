@@ -108,8 +108,8 @@ def test_a_mesh_that_is_none_and_other_files_are_told(window: Window, tmp_path: 
 
 def test_only_what_differs_is_loaded(window: Window) -> None:
     look = window.looks.first
-    window.commands.appear(type(look)("skin", "fast", "maple"))
-    window.commands.appear(type(look)("robot", "fast", "maple"))  # without hair
+    window.commands.set_look(type(look)("skin", "fast", "maple"))
+    window.commands.set_look(type(look)("robot", "fast", "maple"))  # without hair
     window.take()
     assert window.swapped[0][0] is None and window.swapped[1] == ("the head in ict", "robot", "maple")
     assert len(window.loaded) == 1
@@ -133,7 +133,7 @@ def test_whether_only_added_points_differ_is_told(window: Window, monkeypatch: p
     window.commands.show_light = window.looks.show_light
     window.commands.add_points(one, np.zeros((1, 3)), 10)
     assert wait() and window.looks.shown_light == (one,)
-    window.commands.appear(replace(window.looks.first, person="oak"))
+    window.commands.set_look(replace(window.looks.first, person="oak"))
     assert not wait()
     window.commands.add_points(two, np.zeros((1, 3)), 10)
     assert wait() and window.looks.shown_light == (one, two) and given == [1, 1, 2]

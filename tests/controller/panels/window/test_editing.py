@@ -354,7 +354,7 @@ def test_pins_and_added_points_are_drawn_in_the_picture(rig: Rig) -> None:
 def test_another_head_is_sampled_anew_and_the_same_with_other_points_is_not(rig: Rig) -> None:
     models = rig.editor.models
     moves = np.ones((OWN + 1, 3))
-    rig.commands.move(moves)
+    rig.commands.set_moves(moves)
     rig.mouse.change(rig.head, [ONE], same=True)
     assert rig.editor.models is models and rig.editor.light == (ONE,)
     assert rig.editor.named("prepare") == [("prepare",)] and rig.editor.named("set_moves")[0][1] is moves

@@ -32,7 +32,7 @@ def act(face):
         rest = editor._rig.rest.copy()
         moves = np.zeros_like(rest)
         moves[np.argsort(np.linalg.norm(rest - [45.0, -30.0, 85.0], axis=1))[:5]] = [1.0, 0.5, 5.0]
-        panel.commands.move(moves)
+        panel.commands.set_moves(moves)
         told["moved"] = bool((editor._rig.rest != rest).any())
         panel.commands.undo()
         told["to the bit"] = bool((editor._rig.rest == rest).all())

@@ -34,7 +34,7 @@ def sculpted(stage: Stage, panel: Panel) -> MouseEditing:
     near = np.argsort(np.linalg.norm(mouse.editor._rest - [45.0, -30.0, 85.0], axis=1))[:3]
     moves = np.zeros_like(mouse.editor._rest)
     moves[near] = [0.0, 0.0, 4.0]
-    panel.commands.move(moves)
+    panel.commands.set_moves(moves)
     panel.saving.editor = mouse.find_editor
     return mouse
 

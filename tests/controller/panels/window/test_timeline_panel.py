@@ -90,7 +90,7 @@ def test_every_edit_of_a_timeline_is_undone(desk: Desk) -> None:
     for _ in range(3):
         desk.commands.undo()
     assert desk.commands.now.timeline is two
-    desk.commands.neutral()
+    desk.commands.return_to_neutral()
     assert desk.commands.now.timeline is two
 
 
@@ -99,7 +99,7 @@ def test_a_recording_is_cut_smoothed_saved_and_taken_back(desk: Desk, tmp_path: 
     values[:, JAW] = np.linspace(0.0, 1.0, 101)
     take = Take("a", np.linspace(0.0, 10.0, 101), values, np.ones(len(PARAMETERS), bool),
                 PARAMETERS.low, PARAMETERS.high)  # fmt: skip
-    desk.commands.retake(take)
+    desk.commands.set_take(take)
     assert desk.playback.length_s == 10.0
     desk.playback.range_s = (2.0, 8.0)
     desk.playback.edit_take("keep")
@@ -195,7 +195,7 @@ def test_a_show_is_saved_with_its_sound_and_loaded_again(desk: Desk, tmp_path: P
     panel.save()
     kept = desk.commands.now.timeline
     assert load_script(str(tmp_path / "mine.toml"), PARAMETERS).sound == tmp_path / "hello.wav"
-    desk.commands.arrange(Timeline())
+    desk.commands.set_timeline(Timeline())
     panel.load()
     assert desk.commands.now.timeline == kept
     desk.commands.undo()
@@ -246,6 +246,6 @@ def test_a_timeline_without_keys_plays_nothing(desk: Desk) -> None:
     desk.playback.scrub(0.5)
     desk.playback.stop()
     assert desk.sent == [] and not desk.playback.playing
-    desk.commands.arrange(Timeline((Key(0.0, {}),)))
+    desk.commands.set_timeline(Timeline((Key(0.0, {}),)))
     desk.playback.scrub(0.5)
     assert desk.sent == []

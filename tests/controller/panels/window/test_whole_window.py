@@ -93,7 +93,7 @@ def wait(state):
 def look(state, **change):
     from dataclasses import replace
     now = state.commands.now.look or state.view.look._looks.first
-    state.commands.appear(replace(now, **change))
+    state.commands.set_look(replace(now, **change))
     wait(state)
     told.setdefault("heads", []).append(id(face._head))
 

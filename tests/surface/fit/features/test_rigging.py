@@ -16,7 +16,7 @@ from surface.fit.features.rigging import (
 )
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Jaw
-from surface.head.model.parameters import TONGUE_NEEDS
+from surface.head.model.parameters import TONGUE_JAW
 from surface.head.posing.rig import jaw_path
 
 RNG = np.random.default_rng(2)
@@ -74,7 +74,7 @@ PATH = np.array([[30.0, -41, -41, 30, 1, 1, 0], [60, -41, -40, 75, 0.5, 0.9, 0],
 
 def put_out(points: np.ndarray, amount: float) -> np.ndarray:
     """Where points stand at tongueOut ``amount``."""
-    turn, shift = jaw_path(JAW, TONGUE_NEEDS)
+    turn, shift = jaw_path(JAW, TONGUE_JAW)
     out, droop = tongue_groups(points, PATH, JAW)
     assert (out.name, droop.name) == ("tongueOut", DROOP_RULE.group)
     return points @ turn.T + shift + amount * out.moves + amount**DROOP_RULE.power * droop.moves

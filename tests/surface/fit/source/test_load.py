@@ -36,11 +36,11 @@ def test_a_guessed_unit_is_said(tmp_path):
 
 def test_meshes_beyond_memory_are_refused(tmp_path, monkeypatch):
     path = write_npz(tmp_path / "m.npz", slit_sheet())
-    monkeypatch.setattr(meshdata, "MOST_VERTICES", 600)
+    monkeypatch.setattr(meshdata, "MAX_VERTICES", 600)
     with pytest.raises(FitError, match="625 vertices; 600 are the most"):
         load_mesh(path)
-    monkeypatch.setattr(meshdata, "MOST_VERTICES", 1000)
-    monkeypatch.setattr(meshdata, "MOST_MOVES", 1000)
+    monkeypatch.setattr(meshdata, "MAX_VERTICES", 1000)
+    monkeypatch.setattr(meshdata, "MAX_MOVES", 1000)
     with pytest.raises(FitError, match="2 shapes of 625 vertices are too many"):
         load_mesh(path)
 

@@ -11,7 +11,7 @@ from surface.head.model.parameters import (
     LID_SHARE,
     NAMES,
     SHAPES,
-    TONGUE_NEEDS,
+    TONGUE_JAW,
     lid_down,
     read_pose,
     rotation,
@@ -77,7 +77,7 @@ def test_lips_close_over_an_open_jaw_only():
 
 
 def test_the_tongue_opens_the_jaw():
-    assert pose(tongueOut=1.0).jaw == TONGUE_NEEDS
+    assert pose(tongueOut=1.0).jaw == TONGUE_JAW
     assert pose(tongueOut=1.0, jawOpen=0.9).jaw == 0.9
 
 

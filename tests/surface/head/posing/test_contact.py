@@ -23,7 +23,7 @@ from surface.head.posing.contact import (
     by_lanes,
     contact_rows,
     height_limits,
-    tiled,
+    tile_weights,
     weights_at,
 )
 
@@ -194,7 +194,7 @@ def test_weights_are_those_of_the_surface_and_add_up() -> None:
     np.testing.assert_allclose(dense.sum(axis=1), 1.0)
     exact = surface.basis_matrix(uv).toarray()
     assert np.abs(dense - exact).max() < 0.02 and (dense[dense > 0] > 0.004).all()
-    tile_start, tile_ids, packed = tiled(start, ids, share)
+    tile_start, tile_ids, packed = tile_weights(start, ids, share)
     again = np.zeros((40, surface.n))
     for tile in range(5):
         rows = slice(tile_start[tile], tile_start[tile + 1])
@@ -424,4 +424,4 @@ def test_what_was_found_for_the_same_surface_is_used_again_and_for_another_found
     assert len(solved) == 3 and solved[-1] != solved[0]
     for overlap in np.linspace(1.0, 2.0, 20):
         EyeballClearance(lips(overlap), low_places(), np.zeros(3), 0.0)
-    assert len(contact_module._FOUND) == contact_module._MOST_FOUND
+    assert len(contact_module._FOUND) == contact_module._MAX_CACHED

@@ -7,7 +7,7 @@ from face_measures import eye_height
 from surface.fit.points.eyeball import surface_height
 from surface.head.posing.contact import LID_MM, LIFT_GAIN, TOUCH_MM, by_lanes, height_limits
 from surface.head.posing.contact_kernels import (
-    SIGHT,
+    MAX_SIGHT,
     angle,
     find_gaps,
     find_heights,
@@ -184,7 +184,7 @@ def test_an_opening_is_as_wide_as_where_one_sees_farthest_into_it(ahead):
     samples, gaps = opening(-2.0, columns=21, slant=0.5), np.zeros((2, 21))
     samples[1, :, :, 2] += ahead
     find_gaps(samples, gaps)
-    seen = 2.0 - 0.5 * np.arange(21) + 0.5 * SIGHT * abs(ahead)
+    seen = 2.0 - 0.5 * np.arange(21) + 0.5 * MAX_SIGHT * abs(ahead)
     np.testing.assert_allclose(gaps[0, 5:16], seen[5:16], atol=1e-9)
 
 

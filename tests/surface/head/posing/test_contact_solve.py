@@ -9,7 +9,7 @@ import pytest
 
 from surface.deform.lists import LANES
 from surface.head.posing import contact_solve as module
-from surface.head.posing.contact import by_lanes, tiled
+from surface.head.posing.contact import by_lanes, tile_weights
 
 AWAY = np.array([0.0, 0.0, -1.0])  # an eye that looks away: no cornea at samples before it
 RADIUS = 12.0
@@ -30,7 +30,7 @@ class Samples:
         self.points[self.near] = places + self.eye
         self.own = np.arange(s) if own is None else own
         identity = np.eye(s)[:, self.own]
-        self.sampling = self.near, *tiled(np.arange(s + 1), np.arange(s), np.ones(s)), self.own
+        self.sampling = self.near, *tile_weights(np.arange(s + 1), np.arange(s), np.ones(s)), self.own
         self.limits = (*(np.full(s, x) for x in (least, most, hold)), radius, gain, by_lanes(identity))
         single, room = np.zeros((s, 3), np.float32), np.zeros(3 * LANES, np.float32)
         self.work = (np.zeros((s, 3)), np.full((s, 3), np.nan), single, room, np.zeros((s, 4)), np.zeros(s),

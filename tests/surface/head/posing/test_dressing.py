@@ -11,7 +11,7 @@ from small_head import small_head
 
 from surface.base.errors import HeadFileError
 from surface.head import Head
-from surface.head.posing.dressing import SCALP, THROUGH, dress, sampled
+from surface.head.posing.dressing import SCALP, THROUGH, dress, sample_picture
 
 
 @pytest.fixture
@@ -97,9 +97,9 @@ def test_triangles_that_lie_all_below_are_left_out_of_every_mesh(head: Head) -> 
 def test_pictures_are_linear_between_their_pixels(head: Head) -> None:
     picture = np.random.default_rng(3).uniform(size=(4, 5))
     skin = SimpleNamespace(name="a", uv=np.array([[0, 0], [1, 1], [1 / 3, 0.25], [0.5, 0.625], [-2, 0.5], [3, -1]]))
-    found = sampled(garment(head, {"cover/a": picture}), "cover", skin)  # type: ignore[arg-type]
+    found = sample_picture(garment(head, {"cover/a": picture}), "cover", skin)  # type: ignore[arg-type]
     assert found is not None and found.shape == (6, 1) and found.dtype == np.float32
     middle = 0.25 * (picture[1, 2] + picture[1, 3] + picture[2, 2] + picture[2, 3])
     wanted = [picture[0, 0], picture[3, 4], picture[1, 1], middle, picture[0, 2], picture[3, 0]]
     np.testing.assert_allclose(found[:, 0], wanted, atol=1e-6)
-    assert sampled(garment(head), "cover", skin) is None  # type: ignore[arg-type]
+    assert sample_picture(garment(head), "cover", skin) is None  # type: ignore[arg-type]

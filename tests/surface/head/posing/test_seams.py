@@ -10,7 +10,7 @@ from small_head import all_points, part, small_head
 from surface.head import Head
 from surface.head.model.data import Seam
 from surface.head.posing.part import border_edges
-from surface.head.posing.seams import SeamStitch, _around
+from surface.head.posing.seams import SeamStitch, _vertices_around
 
 
 def border_points(p, x: float) -> np.ndarray:
@@ -75,11 +75,11 @@ def test_a_seam_off_the_border_is_none():
 def test_a_closed_line_goes_on_at_both_ends_and_an_open_one_does_not() -> None:
     ids, at = np.array([7, 3, 9]), np.array([0.5, 1.5, 2.5])
     closed, opened = np.array([[0, 0], [1, 0], [1, 1], [0, 0.0]]), np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
-    around_ids, around_at = _around(ids, at, closed)
+    around_ids, around_at = _vertices_around(ids, at, closed)
     assert around_ids.tolist() == [9, 7, 3, 9, 7] and around_at.tolist() == [-0.5, 0.5, 1.5, 2.5, 3.5]
-    same_ids, same_at = _around(ids, at, opened)
+    same_ids, same_at = _vertices_around(ids, at, opened)
     assert same_ids.tolist() == [7, 3, 9] and same_at.tolist() == [0.5, 1.5, 2.5]
-    assert len(_around(ids[:0], at[:0], closed)[0]) == 0
+    assert len(_vertices_around(ids[:0], at[:0], closed)[0]) == 0
 
 
 class Patch:

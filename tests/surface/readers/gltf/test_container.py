@@ -9,7 +9,7 @@ import pytest
 from meshfiles import FLOAT, GlbBuilder
 
 from surface.base.errors import FitError
-from surface.readers.gltf.container import MOST_ELEMENTS, Gltf
+from surface.readers.gltf.container import MAX_ELEMENTS, Gltf
 
 
 def opened(tmp_path, builder: GlbBuilder) -> Gltf:
@@ -228,7 +228,7 @@ def test_buffers_inside_and_beside_the_text(tmp_path):
 
 def test_the_number_of_elements_is_limited(tmp_path):
     entry = {"componentType": FLOAT, "type": "SCALAR"}
-    file = text_file(tmp_path, accessors=[{**entry, "count": MOST_ELEMENTS + 1}, {**entry, "count": 0}])
+    file = text_file(tmp_path, accessors=[{**entry, "count": MAX_ELEMENTS + 1}, {**entry, "count": 0}])
     with pytest.raises(FitError, match="4000001 elements; 4000000 are the most"):
         file.floats(0, 1, "x")
     assert file.floats(1, 1, "x").shape == (0, 1)

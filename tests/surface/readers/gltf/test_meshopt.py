@@ -11,7 +11,7 @@ from meshfiles import GlbBuilder, glb, meshopt_compressed, meshopt_stream
 from slit_sheet import slit_sheet
 
 from surface.base.errors import FitError
-from surface.readers.gltf.container import MOST_ELEMENTS, Gltf
+from surface.readers.gltf.container import MAX_ELEMENTS, Gltf
 from surface.readers.gltf.mesh import read_gltf
 from surface.readers.gltf.meshopt import decode_view
 
@@ -162,7 +162,7 @@ def test_accessors_of_a_compressed_view_are_read_as_of_any_other(tmp_path) -> No
     [
         ({"count": 400}, "is damaged or cut short"),
         ({"count": 20}, "is damaged or cut short"),
-        ({"count": MOST_ELEMENTS + 1}, "too many"),
+        ({"count": MAX_ELEMENTS + 1}, "too many"),
         ({"byteStride": -8}, "byteStride: is -8"),
         ({"byteLength": 10**6}, "it is cut short"),
         ({"mode": 3}, "'3' is no text"),

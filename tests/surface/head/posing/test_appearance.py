@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from surface.head.model.look import Look, skin_tone
-from surface.head.posing.looks import apply_look
+from surface.head.posing.appearance import apply_look
 
 EYES = np.array([[30.0, 30, 80], [-30, 30, 80]])
 
