@@ -21,7 +21,7 @@ import numpy as np
 from controller.base.parameters import PARAMETERS as P
 from controller.layers.commands import CommandState
 from controller.links.websocket.conversation import Conversation
-from controller.links.websocket.messages import MAX_VALUE
+from controller.links.websocket.messages import MAX_MESSAGE_BYTES
 from tests.fuzz.messages import LONGEST_S, Findings, damage
 
 GOOD: tuple[dict[str, Any], ...] = (
@@ -47,12 +47,12 @@ def damaged(draw: random.Random) -> Iterator[bytes]:
     texts = [json.dumps(each).encode() for each in GOOD]
     while True:
         if draw.random() < 0.5:
-            yield json.dumps(_other_values(draw.choice(GOOD), draw)).encode()[:MAX_VALUE]
+            yield json.dumps(_other_values(draw.choice(GOOD), draw)).encode()[:MAX_MESSAGE_BYTES]
             continue
         message = bytearray(draw.choice(texts))
         for _ in range(draw.choice((1, 1, 2, 5))):
             damage(message, draw.choice(texts), draw)
-        yield bytes(message[:MAX_VALUE])
+        yield bytes(message[:MAX_MESSAGE_BYTES])
 
 
 def _other_values(request: dict[str, Any], draw: random.Random) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from drivers import open_bus
 from drivers.base.bus import BusState, ServoSpec
 from drivers.base.errors import DriverError, PortLost
 from drivers.core.limits import BURST_S
-from drivers.dynamixel.bus import MAP_TRIES, DynamixelBus
+from drivers.dynamixel.bus import MAX_POINTER_RESTORES, DynamixelBus
 from drivers.sim.serving.virtual import VirtualClock, VirtualLink
 from drivers.sim.servos.chain import Chain
 from drivers.sim.servos.device import SimulatedServo
@@ -270,7 +270,7 @@ def test_8_a_servo_that_restarts_is_not_believed_until_it_is_mapped_again(rig: R
 
 
 def test_8_a_servo_that_does_not_keep_its_pointers_is_read_without_in_the_end(rig: Rig) -> None:
-    for _ in range(MAP_TRIES + 1):
+    for _ in range(MAX_POINTER_RESTORES + 1):
         assert set(rig.bus._mapped) == set(IDS)
         rig.bus._telemetry.unmapped.add(SICK)
         state = rig.run(0.1)

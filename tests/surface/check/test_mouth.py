@@ -39,7 +39,7 @@ def test_the_line_of_the_lips_is_where_the_jaw_tears_the_skin(scale: float) -> N
 
 
 def test_pixels_grow_with_the_head() -> None:
-    assert mouth_module._front(plain.subject(*jaw(), eyes=1.5 * plain.EYES)).view.step == pytest.approx(0.75)
+    assert mouth_module._draw_front(plain.subject(*jaw(), eyes=1.5 * plain.EYES)).view.step == pytest.approx(0.75)
 
 
 def test_the_middle_of_a_mouth_lies_between_its_corners_at_its_foremost_depth() -> None:

@@ -12,8 +12,8 @@ import pytest
 from surface.export.textures import (
     EYE_RIM,
     STRAND_CUTOFF,
-    decoded,
-    encoded,
+    decode_srgb,
+    encode_srgb,
     eye_column,
     eye_picture,
     eye_rings,
@@ -31,7 +31,7 @@ def test_strands_have_heights_about_a_half_and_few_stand_above_full_cover() -> N
     assert 0.002 < np.mean(height > 1.0) < 0.06 and height.max() <= 2.0
     grey = picture[..., 0].astype(float)
     assert (picture[..., 1] == grey).all() and (picture[..., 2] == grey).all()
-    bright = decoded(grey / 255.0)
+    bright = decode_srgb(grey / 255.0)
     assert bright.mean() == pytest.approx(0.62, abs=0.03) and bright.std() == pytest.approx(0.17, abs=0.04)
     inner = np.abs(np.diff(grey, axis=0)).mean()
     assert np.abs(grey[0] - grey[-1]).mean() < 1.5 * inner  # it tiles
@@ -63,12 +63,12 @@ def test_a_png_of_one_or_four_channels_is_grey_or_has_alpha(channels: int, mode:
 
 
 def test_colours_are_encoded_as_srgb_and_come_back() -> None:
-    assert encoded(np.array([-1.0, 0.0, 0.002, 0.0031, 0.0032, 0.2140, 0.5, 1.0, 2.0])).tolist() == [
+    assert encode_srgb(np.array([-1.0, 0.0, 0.002, 0.0031, 0.0032, 0.2140, 0.5, 1.0, 2.0])).tolist() == [
         0, 0, 7, 10, 11, 127, 188, 255, 255
     ]  # fmt: skip
     linear = np.linspace(0.0, 1.0, 500)
-    np.testing.assert_allclose(decoded(encoded(linear) / 255.0), linear, atol=0.0045)
-    assert decoded(np.array([0.04, 0.5])) == pytest.approx([0.04 / 12.92, 0.21404], rel=1e-4)
+    np.testing.assert_allclose(decode_srgb(encode_srgb(linear) / 255.0), linear, atol=0.0045)
+    assert decode_srgb(np.array([0.04, 0.5])) == pytest.approx([0.04 / 12.92, 0.21404], rel=1e-4)
 
 
 def eye(**painted: object) -> Any:
@@ -79,7 +79,7 @@ IRIS, WHITE = np.array([0.1, 0.3, 0.6]), np.array([0.8, 0.7, 0.9])
 
 
 def test_an_eye_is_dark_in_its_pupil_coloured_in_its_iris_and_redder_at_the_rim_of_its_white() -> None:
-    colour = decoded(eye_picture(eye(iris=IRIS, sclera=WHITE, iris_radius=[0.5]), 256) / 255.0)
+    colour = decode_srgb(eye_picture(eye(iris=IRIS, sclera=WHITE, iris_radius=[0.5]), 256) / 255.0)
     y, x = ((np.arange(256) + 0.5) / 256 - 0.5) / EYE_RIM, ((np.arange(256) + 0.5) / 256 - 0.5) / EYE_RIM
     r = np.hypot(y[:, None], x[None])
 
