@@ -1,4 +1,4 @@
-"""tests/equivalent_mutants.txt lists only lines that are in the code: others would hide nothing, and mislead readers."""
+"""tests/equivalent_mutants.txt lists only lines that are in the code: others would mislead readers."""
 
 from __future__ import annotations
 
