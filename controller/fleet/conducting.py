@@ -16,6 +16,7 @@ from controller.fleet.payload import MAX_NUMBER, Header, Payloads
 from controller.fleet.sending import FaceSender
 from controller.fleet.wire import ALL, Wire, header_of
 from controller.layers.commands import CommandState
+from controller.links.line.protocol import is_stop
 from controller.links.line.session import LineSession
 
 if TYPE_CHECKING:
@@ -27,7 +28,8 @@ _HEARTBEATS_PER_LEASE = 5
 class Conducting:
     """The lease, faces and commands of a process that conducts, or is a standby.
 
-    heads : the layers by name. events : counts, by head, the commands that were received from another conductor.
+    heads : the command state of each head, by its name. events : how many commands of another conductor were
+    received, by head.
     """
 
     def __init__(
@@ -105,11 +107,11 @@ class Conducting:
         return act
 
     def _do(self, lines: LineSession, data: bytes) -> bytes:
-        """Carry out a command line for a head and return the answer. Unless this process conducts, only STOP works."""
-        line = data[:4096].rstrip(b"\r\n") + b"\n"
-        if not self._lease.active and b"STOP" not in line.upper():
-            return b""
-        return lines.feed(line, time.monotonic_ns())
+        """Carry out command lines for a head and return the answers. Unless this process conducts, only STOP works."""
+        text = data[:4096].rstrip(b"\r\n") + b"\n"
+        if not self._lease.active:
+            text = b"".join(line for line in text.splitlines(keepends=True) if is_stop(line))
+        return lines.feed(text, time.monotonic_ns()) if text else b""
 
     def _question_of(self, head: str) -> Callable[[zenoh.Query], None]:
         lines = self._lines_of(head)

@@ -41,9 +41,10 @@ class BusFindings:
 
 @dataclass
 class ChannelFindings:
-    """Findings of one servo; NaN where nothing was measured.
+    """Findings of one servo; NaN, an empty text or None where nothing was measured.
 
-    position_deg : position before it moved. own_limit_deg : limits in its own registers.
+    position_deg : position before it moved. limit_deg : limits in the robot's file. own_limit_deg : limits in its own
+    registers.
     wanted_deg, moved_deg : range of the goals and of the shaft. lag_ms : delay of the shaft behind the goals.
     peak_current_a, peak_load : greatest current, and fraction of the stall torque, while it moved.
     least_voltage_v : lowest supply voltage while it moved.
@@ -56,13 +57,13 @@ class ChannelFindings:
     id: int
     model: str
     found_model: str = ""
-    firmware: int = -1
+    firmware: int | None = None
     voltage_v: float = math.nan
     temperature_c: float = math.nan
     position_deg: float = math.nan
     limit_deg: tuple[float, float] = (math.nan, math.nan)
     own_limit_deg: tuple[float, float] = (math.nan, math.nan)
-    homing_offset_ticks: int = 0
+    homing_offset_ticks: int | None = None
     wanted_deg: float = math.nan
     moved_deg: float = math.nan
     lag_ms: float = math.nan
@@ -125,11 +126,11 @@ def _versions() -> dict[str, str]:
 
 
 def _known(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the known values, rounded to the precision of the measurement."""
+    """Return the known values, floats rounded to three decimals."""
     plain: dict[str, Any] = {}
     for key, value in row.items():
         values = value if isinstance(value, tuple) else (value,)
-        if any(isinstance(each, float) and not math.isfinite(each) for each in values) or value in ("", -1):
+        if any(isinstance(each, float) and not math.isfinite(each) for each in values) or value in ("", None):
             continue
         rounded = [round(each, 3) if isinstance(each, float) else each for each in values]
         plain[key] = rounded if isinstance(value, tuple) else rounded[0]

@@ -61,7 +61,12 @@ def write_service(what: str, folder: Path, user: str, name: str = "") -> tuple[l
     short = _plain(name or title)
     if not re.fullmatch(r"[a-z_][a-z0-9_-]{0,31}", user):
         raise ControllerError(f"{user!r} is no user name", hint="--user omote")
-    adapters = [_adapter(robot, bus, short) for robot in robots for bus in robot.buses if bus.kind != SIMULATED]
+    adapters = [
+        _adapter(robot, bus, short)
+        for robot in robots
+        for bus in robot.buses
+        if bus.kind != SIMULATED and "://" not in bus.port
+    ]
     files: dict[Path, str] = {}
     if stage is None:
         stage = (folder / f"{short}.stage.toml").resolve()
@@ -124,18 +129,21 @@ def _serial_of(port: str) -> str:
 
 
 def rules_text(title: str, adapters: Sequence[Adapter]) -> str:
-    """udev rules that give each adapter a permanent name, a group that may use it and a short latency timer."""
+    """Return udev rules that give adapters a group that may use them, a short latency timer and, where the serial
+    number is known, a permanent name."""
     lines = [f"# Adapters of {title}, for omote. Into /etc/udev/rules.d; read by: sudo udevadm control --reload"]
     for adapter in adapters:
         lines += ["", f"# bus {adapter.bus} of {adapter.robot}"]
+        rules = []
         if adapter.serial_number:
             match = f'SUBSYSTEM=="tty", ATTRS{{serial}}=="{adapter.serial_number}"'
-            lines.append(f'{match}, SYMLINK+="{adapter.link}", GROUP="{GROUP}", MODE="0660", TAG+="systemd"')
+            rules.append(f'{match}, SYMLINK+="{adapter.link}", GROUP="{GROUP}", MODE="0660", TAG+="systemd"')
         else:
             lines.append(f"# {adapter.port}: its serial number is not known, so it has no name of its own.")
-            lines.append(f'SUBSYSTEM=="tty", SUBSYSTEMS=="usb", GROUP="{GROUP}", MODE="0660"')
-        lines.append(latency_rule(adapter.serial_number))
-    return "\n".join(dict.fromkeys(lines) if len(adapters) == 1 else lines) + "\n"
+            rules.append(f'SUBSYSTEM=="tty", SUBSYSTEMS=="usb", GROUP="{GROUP}", MODE="0660"')
+        rules.append(latency_rule(adapter.serial_number))
+        lines += [rule for rule in rules if rule not in lines]  # adapters without a number share theirs
+    return "\n".join(lines) + "\n"
 
 
 # ---------------------------------------------------------------------- systemd
@@ -167,12 +175,12 @@ WatchdogSignal=SIGTERM
 
 User={user}
 SupplementaryGroups={group}
-# Compiled code and settings of omote; real-time scheduling for the servos.
+# Compiled code that omote keeps; real-time scheduling for the servos.
 CacheDirectory=omote
 Environment=XDG_CACHE_HOME=%C/omote NUMBA_CACHE_DIR=%C/omote/numba
 LimitRTPRIO=20
 
-# Serial ports and pseudo-terminals, and nothing else of the machine. MemoryDenyWriteExecute would forbid compiled code.
+# Of devices only serial ports and pseudo-terminals. MemoryDenyWriteExecute would forbid compiled code.
 DevicePolicy=closed
 DeviceAllow=char-ttyUSB rw
 DeviceAllow=char-ttyACM rw
@@ -216,7 +224,7 @@ def unit_text(title: str, stage: Path, user: str, adapters: Sequence[Adapter]) -
 
 
 def _omote() -> tuple[str, ...]:
-    """Command that started this program, with its absolute path."""
+    """Return the command that runs omote: beside the interpreter, else on PATH, else through the interpreter."""
     beside = Path(sys.executable).with_name("omote")
     found = str(beside) if beside.is_file() else shutil.which("omote")
     return (found,) if found else (sys.executable, "-c", "from controller.cli.app import main; main()")
@@ -246,7 +254,7 @@ def _commands(rules: Path | None, unit: Path, user: str, adapters: Sequence[Adap
     for adapter in adapters:
         if adapter.serial_number and adapter.port != f"/dev/{adapter.link}":
             lines.append(f'# in the file of {adapter.robot}, bus {adapter.bus}: port = "/dev/{adapter.link}"')
-        elif not adapter.serial_number and "://" not in adapter.port:
+        elif not adapter.serial_number:
             lines.append(f"# plug in the adapter of {adapter.bus} ({adapter.port}) and write these files again")
     lines.append(f"sudo cp {unit} /etc/systemd/system/ && sudo systemctl daemon-reload")
     lines.append(f"sudo systemctl enable --now {unit.name}")

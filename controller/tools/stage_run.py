@@ -38,11 +38,11 @@ from surface.base.extras import require
 
 if TYPE_CHECKING:
     from controller.face.wall import WallFace  # imported lazily: the body starts first
-    from controller.panels.session.next_run import NextRun  # imported lazily: the body starts first
+    from controller.panels.session.next_run import NextRun
     from controller.panels.window.face import WindowFace  # imported lazily: the body starts first
     from controller.panels.window.heads import HeadSource  # imported lazily: as above
     from controller.panels.window.panel import PanelOptions  # imported lazily: as above
-    from surface.head import Head  # imported lazily: as above
+    from surface.head import Head
 
 REPORT_FORMAT = 1
 """Version of a report's keys, raised when a key changes its meaning or is removed. Old reports state no version."""
@@ -231,7 +231,7 @@ class StageRun:
 
     def _end(self, body: BodyProcess, face: dict[str, object] | None, failed: Part | None = None) -> dict[str, Any]:
         self._manager.stopping()
-        self._status("stopping" if self._options.mirror else "bringing the servos to rest")
+        self._status("stopping" if self._options.mirror or not self.stage.robots else "bringing the servos to rest")
         body.stop()
         report: dict[str, Any] = {"stage": self.stage.settings.name, "face": face, **body.report, "written": []}
         if failed is not None:

@@ -10,7 +10,9 @@ from surface.base.arrays import Ints
 from .jit import kernel
 
 FIRST_SIZE = 1 << 10  # of the hash table, which grows from there
-HASH_FACTOR = np.uint64(0x9E3779B97F4A7C15)  # 2**64 / golden ratio separates neighbouring keys (Knuth, 6.4)
+HASH_FACTOR = np.uint64(
+    0x9E3779B97F4A7C15
+)  # 2**64 / golden ratio spreads blocks of eight neighbouring keys (Knuth, 6.4)
 
 
 def unique(keys: Ints) -> tuple[Ints, Ints, Ints]:
@@ -24,8 +26,8 @@ def unique(keys: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def number(keys: Ints) -> tuple[Ints, Ints]:
-    """Do the same as :func:`unique` in order of appearance: ``first (k,)``, ascending, and ``back`` in the shape
-    of ``keys``."""
+    """Number equal keys alike, in order of appearance: ``first (k,)``, where each appears first, ascending, and
+    ``back``, the number of each key, in the shape of ``keys``."""
     flat = np.ascontiguousarray(keys).reshape(-1)
     first, back = np.zeros(len(flat), dtype=np.int64), np.zeros(len(flat), dtype=np.int64)
     count = _number_keys(flat, first, back)

@@ -62,8 +62,9 @@ class Deformation(Generic[Table]):
     ``ValueError`` for no thread at all, a mesh of a surface with other control points or other knots, or weights so
     small, or weights, derivatives or places so large, at a vertex that 32-bit numbers cannot hold them.
 
-    One object belongs to one thread at a time. Nothing is allocated by :meth:`move` and :meth:`set_positions`
-    but the copy of arguments that are not already int64 and float64 arrays.
+    One object belongs to one thread at a time. Updates of parts, by :meth:`move` and :meth:`set_positions`,
+    allocate nothing but copies of arguments: those that are not int64 and float64 arrays already, and those of periodic
+    surfaces.
     """
 
     def __init__(
@@ -156,7 +157,7 @@ class Deformation(Generic[Table]):
 
     @property
     def weights_of_cells(self) -> Ints:
-        """(c,) how many weights each cell has, however they are kept."""
+        """(c,) how many weights each cell had when the deformation was made, however they are kept."""
         return self._work
 
     def set_weights(self, ids: ArrayLike, weights: ArrayLike) -> None:

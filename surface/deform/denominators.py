@@ -96,8 +96,8 @@ def denominators(table, cells):
 
 @kernel
 def first_unusable(cells, cell_start, tile_start, inv_w, dw, order_at, order):
-    """Return the first vertex of ``cells`` whose weights add up to less than ``MIN_SUM`` or to more than float32 has,
-    or whose derivative weights do; -1 if there is none."""
+    """Return the first vertex of ``cells`` whose weights add up to less than ``MIN_SUM`` or to so much that one over
+    it is 0 in float32, or whose derivative weights do; -1 if there is none."""
     for q in range(cells.shape[0]):
         c = cells[q]
         for vertex in range(cell_start[c], cell_start[c + 1]):

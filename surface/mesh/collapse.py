@@ -18,7 +18,7 @@ from surface.mesh.mesh import border_edges
 Ids = NDArray[np.integer]
 _MIN_COS = 0.3  # between a triangle's normals before and after; less counts as flipped
 _BORDER_WEIGHT = 4.0  # relative to that of a triangle's plane
-_CHUNK_EDGES = 4096  # whose costs are computed at a time
+_CHUNK_EDGES = 4096  # edges, or triangles, that are computed at a time
 
 
 class Collapse:
@@ -60,7 +60,7 @@ class Collapse:
     def _add_flats(self, corners: Ids, scale: float) -> None:
         """Add to each corner's quadric the squared distance from the lines or planes through ``corners (k, 2 or 3)``.
 
-        They are weighted by length or area, and ``scale``.
+        They are weighted by the square of the length or by the area, and by ``scale``.
         """
         points = self._places[corners]
         axes, size = _orthonormal_axes(points[:, 1:] - points[:, :1])

@@ -86,7 +86,8 @@ def text_scale(size: tuple[float, float], system: float, docks: Sequence[Dock] =
     """Factor on the size of text, for a window of ``size`` points; ``system`` : the desktop's own factor.
 
     Text grows with the height of the window. Where that, or the desktop's factor, made it too large for the columns
-    beside the picture, it is smaller, so that nothing in them is cut; never smaller than without a factor.
+    beside the picture, it is smaller, so that nothing in one column, or in two of usual
+    width, is cut; never smaller than without a factor.
     """
     system = max(system, 1.0)
     wanted = max(1.0, size[1] / 1080.0 / system)

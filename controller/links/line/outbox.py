@@ -20,7 +20,8 @@ class Outbox:
         return bool(self._lines)
 
     def add(self, line: bytes, *, answer: bool) -> bool:
-        """Append a line with its line end; return False if there is no room for it."""
+        """Append a line with its line end; return False if there is no room for it, or, for a
+        streamed line, if anything waits."""
         if self._size + len(line) > MAX_BYTES or (self._lines and not answer):
             return False
         self._lines.append((line, answer))

@@ -106,7 +106,7 @@ class OverlayView:
 
     def _measured(self) -> Floats | None:
         """Return the head's parameters (h,) as the servos measure them, as wanted where none measures; None if
-        disabled.
+        disabled or without servos.
         """
         if "measured" not in self.on or self._state is None:
             return None

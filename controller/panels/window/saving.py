@@ -42,7 +42,7 @@ ABOUT: dict[Kind, str] = {
 class Words:
     """The user's vocabulary.
 
-    vocabulary : of the stage; what is saved is added. own : the file that everything is saved to.
+    vocabulary : of the stage; what is saved is added. own : the file that is saved to; servo anchors go beside it.
     earlier : the vocabularies before it. parameters : of the stage.
     """
 
@@ -165,7 +165,7 @@ class Saving:
         return self.editor()
 
     def _open_again(self, name: str, held: Mapping[str, float]) -> str:
-        """Open the window with the new parameter in place of the moved control points, and hold it."""
+        """Open the window, where it can be, with the new parameter in place of moved control points; hold ``held``."""
         history = self._commands.history
         if self.reopen is not None:
             now = replace(history.now, moves=None, light=())

@@ -28,7 +28,7 @@ class Profile:
 
 
 class Trajectory:
-    """Motion from `start_s` on: pieces of constant acceleration, then the last velocity for ever.
+    """Motion from `start_s` on: pieces of constant acceleration, then rest at the goal, or the last velocity for ever.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Trajectory:
         return now_s - self.start_s < self.duration
 
     def at(self, now_s: float) -> Motion:
-        """Motion at a time; before the start it is the start's."""
+        """Motion at a time; before the start it is that at the beginning of the first piece."""
         t = now_s - self.start_s
         if t < 0.0:
             t = 0.0

@@ -19,7 +19,7 @@ GRID = (19, 31)  # samples along u and v
 RAYS = (41, 91)  # that they are found with
 U_RANGE = (np.radians(7.0), np.radians(173.0))
 V_RANGE = (np.radians(165.0), np.radians(-165.0))
-TALL_MM = 10.0  # of a tooth, only this much below its tip is a crown
+CROWN_MM = 10.0  # height of a crown, from its tip towards the gum
 
 
 def crown_chart(mesh: FitMesh, teeth: list[Ints], upper: bool) -> tuple[Chart, FitMesh]:
@@ -57,10 +57,10 @@ def _box_centre(points: Floats) -> Floats:
 
 
 def _sample(mesh: FitMesh, faces: Ints, upper: bool, middle: Floats) -> Floats:
-    """(grid, 3) points of one crown, u fastest last."""
+    """(19 * 31, 3) points of one crown on an even grid, v changing fastest."""
     tri = mesh.vertices[triangles(mesh.faces[faces])]
     down = np.array([0.0, -1.0 if upper else 1.0, 0.0])
-    gum = (tri @ down).max() - TALL_MM
+    gum = (tri @ down).max() - CROWN_MM
     crown = tri.reshape(-1, 3)[(tri @ down).ravel() > gum]
     centre = _box_centre(crown)
     outward = (centre - middle) * [1.0, 0.0, 1.0]

@@ -1,4 +1,4 @@
-"""Fit uniform cubic NURBS nets to a chart, to compare how many points they need with discretized control points.
+"""Fit uniform cubic B-spline nets to a chart, to compare how many points they need with discretized control points.
 
 Such a net gets the same samples with the same weights, only points that reach a sample count, and it has the same
 slits: where a slit cuts the whole of a point's reach, the net is split there, and the point becomes one above and one
@@ -19,7 +19,7 @@ from surface.fit.source.chart import FIRST_TILE, Chart, Cut
 
 STEP = 1.1  # of sizes, in points
 STEPS = (-12, 24)  # the least and the largest that is tried: a third and ten times the points of the head's own net
-FAIR = 1e-5  # weight of every point's distance from its neighbours' middle, relative to a sample's
+FAIR = 1e-5  # weight of the differences between points and their neighbours, relative to the samples' of a point
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ from surface.fit.source.mesh import FitMesh, directed_edges, renumbered
 
 NEAR_MM = 0.15  # on a head of average size: greatest distance at rest, and greatest difference of what shapes move
 JOINED_MATERIALS = ("skin", "mouth", "tongue")  # hair, lashes and teeth rest on the skin and are not joined to it
-SEARCH_DIAMETER = 20.0  # of the balls along an edge in which vertices are sought, in units of the tolerance
+SEARCH_SPACING = 20.0  # of the balls along an edge in which vertices are sought, in units of the tolerance
 MAX_BALLS = 128  # along one edge
 NEIGHBOURS = 33  # nearest points that each is compared with, itself included: a mesh may have thousands in one place
 _EDGES_PER_BATCH = 4096
@@ -143,7 +143,7 @@ def _pieces(mesh: FitMesh, border: _Border) -> tuple[Ints, Ints]:
 
 
 def _vertices_on_edges(mesh: FitMesh, border: _Border, near: float) -> SplitVertices:
-    """For every border edge the vertices of other borders that lie on it, at rest and in what every shape moves."""
+    """For every border edge the vertices of other faces that lie on it, at rest and in what every shape moves."""
     ids, out = border.vertices(), SplitVertices()
     tree = cKDTree(mesh.vertices[ids])
     length = np.linalg.norm(mesh.vertices[border.stop] - mesh.vertices[border.start], axis=1)
@@ -159,7 +159,7 @@ def _candidate_pairs(at: Floats, border: _Border, rows: Ints, tree: cKDTree, nea
     each other, and more. Each edge is covered by overlapping search balls."""
     start, along = at[border.start[rows]], at[border.stop[rows]] - at[border.start[rows]]
     length = np.linalg.norm(along, axis=1)
-    count = np.clip(np.ceil(length / max(SEARCH_DIAMETER * near, 1e-9)), 1, MAX_BALLS).astype(np.int64)
+    count = np.clip(np.ceil(length / max(SEARCH_SPACING * near, 1e-9)), 1, MAX_BALLS).astype(np.int64)
     edge = np.repeat(np.arange(len(rows)), count)
     fraction = (np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[edge]
     found = tree.query_ball_point(start[edge] + fraction[:, None] * along[edge], 0.5 * (length / count)[edge] + near)

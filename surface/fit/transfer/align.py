@@ -39,7 +39,7 @@ class NoFaceFound(FitError):
 
 @dataclass(frozen=True)
 class Similarity:
-    """The map p -> scale * turn @ p + shift. ``score`` : mean distance both ways, in heights of the face."""
+    """The map p -> scale * turn @ p + shift. ``score`` : mean distances both ways, added, in heights of the face."""
 
     turn: Floats
     scale: float
@@ -97,11 +97,11 @@ class Aligner:
 
     def search(self, up: Floats | None, forward: Floats | None) -> Similarity | None:
         """The best similarity from the scan to the template; ``up`` and ``forward`` are directions, if known. None
-        where the scan has no height in any of them."""
+        where no rotation that is tried agrees with them, or the scan has no height in any."""
         found: list[Similarity] = []
         turns = list(axis_turns(up, forward))
         others = [t for t in tilted_turns() if _agrees(t, up, forward)]
-        for more in (turns[:1], turns[1:], others):  # y up and z forward first, as in most files
+        for more in (turns[:1], turns[1:], others):  # first y up and z forward, as in most files, if that agrees
             if more and all(s.score > GOOD for s in found) and (best := self._best(more)) is not None:
                 found.append(best)
         return min(found, key=lambda s: s.score, default=None)
@@ -146,7 +146,7 @@ class Aligner:
         return Similarity(now.turn, now.scale, now.shift, self.score(now, chosen))
 
     def score(self, found: Similarity, chosen: Floats) -> float:
-        """Mean distance from the template's face to the scan and back, normals included, in heights of the face."""
+        """Mean distances from the template's face to the scan and back, with normals, added; in heights of the face."""
         p, n, h = self._template.points[chosen], self._template.normals[chosen], self._height
         at, out = found.points(self._at), self._out @ found.turn.T
         own = np.hstack([p, NORMAL * h * n])
@@ -188,7 +188,7 @@ def axis_turns(up: Floats | None, forward: Floats | None) -> Iterator[Floats]:
 
 
 def tilted_turns() -> Iterator[Floats]:
-    """Further rotations (3, 3), about 40 degrees apart, for scans that stand at an angle to the axes."""
+    """Further rotations (3, 3) for scans that stand at an angle to the axes: random ones, about 30 degrees apart."""
     for q in Rotation.random(96, rng=np.random.default_rng(0)):
         yield q.as_matrix()
 

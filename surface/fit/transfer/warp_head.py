@@ -1,4 +1,6 @@
-"""Give a head the form of a scan: its parts, groups, contacts and pivots are moved by the registration's map."""
+"""Give a head the form of a scan: skin, groups and pivots are moved by the registration's map, eyes with the eyeballs,
+teeth as rigid bodies; contacts reach as far as the eyeballs' size says.
+"""
 
 from __future__ import annotations
 
@@ -83,7 +85,8 @@ def _skins(head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball) -> di
 
 
 def stretches(warp: Warp, points: Floats) -> Floats:
-    """(n, 3, 3) matrices that rotate and stretch displacements: the map's derivatives, without reflections."""
+    """(n, 3, 3) matrices that rotate and stretch displacements: the map's derivatives, without reflections
+    and with stretches limited to STRETCH."""
     u, size, vt = np.linalg.svd(warp.jacobians(points, REACH_MM))
     sign = np.linalg.det(u @ vt)
     u[sign < 0, :, 2] *= -1.0

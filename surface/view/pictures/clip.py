@@ -30,7 +30,7 @@ _MESSAGE_BYTES = 400  # of ffmpeg's output, its end
 def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 25.0, sound: Path | None = None) -> int:
     """Write frames as a clip; the suffix chooses the format (.webp, .gif, .mp4).
 
-    frames : (height, width, 3) uint8 each, all of one size; taken one by one.
+    frames : (height, width, 3) uint8 each, all of one size; taken one by one for .mp4, kept until the end for others.
     fps : frames per second, 0.01 to 1000; a GIF shows 50 at most and leaves out what is more.
     sound : file whose sound the clip has (.mp4), from its beginning, cut or silent at the end.
 

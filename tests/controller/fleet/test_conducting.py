@@ -65,6 +65,17 @@ def test_a_state_with_a_fence_that_no_header_holds_is_refused(fence: str) -> Non
     assert lease.token.fence == 1
 
 
+def test_a_standby_obeys_nothing_but_stop() -> None:
+    state, wire = CommandState(P, seed=1), FakeWire()
+    conducting({"maple": state}, wire, Lease(1, 0.2, 0.0, 0.0))
+    hear = wire.heard["maple/commands"]
+    hear(message(b"SET jawOpen 0.5 STOP", []))
+    hear(message(b"EXPR stop", []))
+    assert state.stop_latch.stopped is None and not state.held()
+    hear(message(b"SET jawOpen 0.5\n#3 STOP\nSET jawOpen 0.7\n", []))
+    assert state.stop_latch.stopped is not None and not state.held()
+
+
 def test_a_stop_that_comes_in_the_middle_of_a_question_stops(monkeypatch: pytest.MonkeyPatch) -> None:
     """Commands and questions of a head come in two threads: here one comes while the other's line is taken apart."""
     state, wire, replies = CommandState(P, seed=1), FakeWire(), list[bytes]()

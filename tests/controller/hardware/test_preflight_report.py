@@ -65,9 +65,16 @@ def test_a_report_has_what_is_known_rounded_and_whose_files_it_was_about(
     assert {"omote", "python", "system", "numpy"} <= set(table["versions"])
     jaw, neck = table["channels"]
     assert jaw["position_deg"] == 1.235 and jaw["limit_deg"] == [-30.0, 30.0] and jaw["firmware"] == 52
-    assert neck == {"name": "neck", "bus": "head", "id": 5, "model": "xl330-m288", "homing_offset_ticks": 0,
-                    "seen": "not asked", "faults": []}  # fmt: skip
+    assert neck == {"name": "neck", "bus": "head", "id": 5, "model": "xl330-m288", "seen": "not asked",
+                    "faults": []}  # fmt: skip
     assert table["buses"] == [{"name": "head", "family": "dynamixel", "port": "/dev/x", "baud": 1000000, "faults": []}]
+
+
+def test_measured_values_below_zero_are_in_the_report_too() -> None:
+    row = ChannelFindings("jaw", "head", 1, "xl330-m288", position_deg=-1.0, homing_offset_ticks=-1)
+    known = Preflight("r", Path("r.toml"), (), channels=[row]).as_dict()["channels"][0]
+    assert (known["position_deg"], known["homing_offset_ticks"]) == (-1.0, -1)
+    assert "firmware" not in known
 
 
 def test_only_files_of_two_kinds_are_reports(tmp_path: Path) -> None:

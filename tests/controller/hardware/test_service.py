@@ -98,6 +98,12 @@ def test_the_rules_have_the_form_of_the_manual_page() -> None:
     assert 'GROUP="dialout"' in text
 
 
+def test_adapters_without_a_known_number_share_one_rule() -> None:
+    unknown = [Adapter("head", name, f"/dev/{name}", "", f"omote-{name}") for name in ("a", "b")]
+    text = rules_text("head", unknown)
+    assert text.count('SUBSYSTEM=="tty"') == 1 and "# bus a of head" in text and "# bus b of head" in text
+
+
 def test_the_unit_runs_the_stage_watches_it_and_waits_for_the_adapter(tmp_path: Path) -> None:
     text = unit_text("my head", tmp_path / "a b%.toml", "omote", ADAPTERS)
     (command,) = re.findall(r"^ExecStart=(.*)$", text, re.M)
