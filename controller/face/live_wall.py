@@ -16,16 +16,21 @@ from surface.head.model.parameters import head_angles
 from surface.view.draw.placing import Box, Placing
 from surface.view.draw.renderer import Renderer
 from surface.view.live import LiveDrawing
+from surface.view.scene.camera import Camera
 
 if TYPE_CHECKING:
     import moderngl
+
+
+FRAME_S = 0.05
+"""Time after which a frame draws no further head: the window, which draws them, also has to see clicks and keys."""
 
 
 class LiveWall:
     """The heads of a stage, each in a tile of one picture.
 
     A renderer takes some tenths of a second to make, so one is made in each frame: heads appear one after the other,
-    and the window goes on.
+    and the window goes on. Where all heads take longer than ``FRAME_S`` to draw, they take turns.
 
     loaded : from :func:`controller.face.wall.load_heads`. mailboxes : of all heads, in the order of the stage.
     quality : "full" or "fast".
@@ -35,6 +40,7 @@ class LiveWall:
         self, loaded: Sequence[LoadedHead], parameters: Parameters, mailboxes: Sequence[Mailbox], quality: str
     ) -> None:
         self._waiting, self._groups = list(loaded), list[_Group]()
+        self._turns: list[tuple[_Group, int]] = []  # a head and its number in the stage, the next to be drawn first
         self._mailboxes, self._quality = mailboxes, quality
         self._rows = np.zeros((len(mailboxes), len(parameters) + 1))  # with a 0 for parameters that omote does not know
         self._size = 0, 0
@@ -44,7 +50,7 @@ class LiveWall:
     def boxes(self, size: tuple[float, float]) -> list[tuple[float, float, float, float]]:
         """Left, top, width and height of each head's tile in a picture of a size, from its top left corner."""
         columns, rows = grid(len(self._mailboxes), (int(size[0]), int(size[1])))
-        width, height = size[0] // columns, size[1] // rows
+        width, height = max(1.0, size[0] // columns), max(1.0, size[1] // rows)
         left, top = (size[0] - columns * width) // 2, (size[1] - rows * height) // 2
         return [
             (left + i % columns * width, top + i // columns * height, width, height)
@@ -54,7 +60,7 @@ class LiveWall:
     def draw(self, ctx: moderngl.Context, size: tuple[int, int]) -> moderngl.Framebuffer:
         """The next picture of all heads, of ``size``, pixels."""
         if self._waiting:
-            self._groups.append(_Group(ctx, self._waiting.pop(0), self._quality))
+            self._add_group(_Group(ctx, self._waiting.pop(0), self._quality))
         if self._picture is None or size != self._size:
             self._make_picture(ctx, size)
         assert self._picture is not None and self._placing is not None
@@ -62,8 +68,19 @@ class LiveWall:
             mailbox.read(row[:-1])
         boxes = [_from_below(box, size) for box in self.boxes(size)]
         for group in self._groups:
-            group.draw(self._rows, boxes, self._picture, self._placing)
+            group.posed = False
+        ends_s = time.perf_counter() + FRAME_S
+        for drawn, (group, place) in enumerate(self._turns, start=1):
+            group.draw(self._rows, place, boxes[place][2:])
+            self._placing.copy(self._picture, group.drawing.target.picture, boxes[place])
+            if time.perf_counter() >= ends_s:
+                self._turns = self._turns[drawn:] + self._turns[:drawn]
+                break
         return self._picture
+
+    def _add_group(self, group: _Group) -> None:
+        self._groups.append(group)
+        self._turns = [(group, place) for place in group.places] + self._turns
 
     def _make_picture(self, ctx: moderngl.Context, size: tuple[int, int]) -> None:
         self._release_picture()
@@ -85,7 +102,7 @@ class LiveWall:
             group.drawing.release()
         if self._placing is not None:
             self._placing.release()
-        self._groups, self._placing = [], None
+        self._groups, self._turns, self._placing = [], [], None
 
 
 class _Group:
@@ -93,27 +110,33 @@ class _Group:
 
     def __init__(self, ctx: moderngl.Context, loaded: LoadedHead, quality: str) -> None:
         face, alone = loaded.stage.settings.face, len(loaded.places) == 1
-        self._loaded = loaded
+        self.places, self._head, self._loaded = loaded.places, loaded.head, loaded
         self._crowd = None if alone else Crowd(loaded.head, len(loaded.places))
         evaluator = face.evaluator if alone else "cpu"
         renderer = Renderer(ctx, loaded.head, quality=quality, theme=face.make_theme(), evaluator=evaluator)
         self.drawing = LiveDrawing(renderer, posed_elsewhere=not alone)
 
-    def draw(self, rows: Floats, boxes: Sequence[Box], picture: moderngl.Framebuffer, placing: Placing) -> None:
-        """Draw the heads in the poses of ``rows (n, P + 1)`` into their ``boxes`` of a picture."""
-        places, head = self._loaded.places, self._loaded.head
-        self.drawing.size = boxes[places[0]][2:]
-        values, camera = rows[places][:, self._loaded.order], self._loaded.camera(self.drawing.size)
+        self.posed = False
+        self._tile, self._camera = (0, 0), Camera.front()
+
+    def draw(self, rows: Floats, place: int, tile: tuple[int, int]) -> None:
+        """Draw head ``place`` of the stage in the pose of its row of ``rows (n, P + 1)``, as large as a tile, pixels.
+
+        Heads that are posed in one batch are so once for all, until ``posed`` is set to False.
+        """
+        if tile != self._tile:
+            self._tile, self._camera = tile, self._loaded.camera(tile)
+        self.drawing.size = tile
         if self._crowd is None:
-            head.sway.advance(head_angles(values[0]), time.monotonic())
-            self.drawing.draw(values[0], camera)
-            placing.copy(picture, self.drawing.target.picture, boxes[places[0]])
+            values = rows[place, self._loaded.order]
+            self._head.sway.advance(head_angles(values), time.monotonic())
+            self.drawing.draw(values, self._camera)
             return
-        self._crowd.pose(values)
-        for k, place in enumerate(places):
-            self._crowd.show(k)
-            self.drawing.draw_present(camera)
-            placing.copy(picture, self.drawing.target.picture, boxes[place])
+        if not self.posed:
+            self.posed = True
+            self._crowd.pose(rows[self.places][:, self._loaded.order])
+        self._crowd.show(self.places.index(place))
+        self.drawing.draw_present(self._camera)
 
 
 def _from_below(box: tuple[float, float, float, float], size: tuple[int, int]) -> Box:

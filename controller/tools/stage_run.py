@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from controller.face.wall import WallFace  # imported lazily: the body starts first
     from controller.panels.session.next_run import NextRun
     from controller.panels.window.face import WindowFace  # imported lazily: the body starts first
-    from controller.panels.window.heads import HeadSource  # imported lazily: as above
+    from controller.panels.window.head_source import HeadSource  # imported lazily: as above
     from controller.panels.window.panel import PanelOptions  # imported lazily: as above
     from surface.head import Head
 
@@ -152,7 +152,7 @@ class StageRun:
 
     def _head_sources(self, body: BodyProcess) -> list[HeadSource]:
         """Return the heads among which the window can choose; none for a stage with one head."""
-        from controller.panels.window.heads import HeadSource  # imported lazily: the body starts first
+        from controller.panels.window.head_source import HeadSource  # imported lazily: the body starts first
 
         boxes = zip(self.stage.heads, body.mailboxes, body.panel_states, strict=True) if self.stage.heads else ()
         return [HeadSource(head.name, head.stage, mailbox, state) for head, mailbox, state in boxes]

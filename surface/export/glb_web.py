@@ -39,11 +39,26 @@ from surface.head import Head
 METRES = 0.001
 _FORMAT = 1
 """Version of what ``extras.omote`` of the document holds."""
+_CLOSED_MM = 1.2  # lips that are nowhere further apart than this at rest are closed
 _MAX_STEPS = 32_700  # steps from the middle of the head
 _COARSE_MM, _COARSE_NORMAL = 0.03, 8  # moves are whole multiples of these: mm, and steps of a 16-bit normal
 _FADES = {"brow": ((0.72, 0.50, 0.30, 2.4), True), "lash": ((0.85, 0.15, 0.0, 0.0), False)}
 _HAIR = ("strand", "tress")
 _LINEAR, _MIPMAPS, _REPEAT, _CLAMP = 9729, 9987, 10497, 33071
+
+
+def lips_open_at_rest(head: Head) -> bool:
+    """Whether one sees into the mouth of a head at rest: its lips are apart, or it has none that are known to meet."""
+    for contact in head.contacts:
+        if contact.eye < 0:
+            surface, columns = head.part(contact.part).surface, contact.places.swapaxes(0, 1)
+            return any(_nearest_mm(*(surface.evaluate(side) for side in column)) > _CLOSED_MM for column in columns)
+    return True
+
+
+def _nearest_mm(one: Floats, other: Floats) -> float:
+    """The least distance between two rows of points (n, 3), (m, 3)."""
+    return float(np.linalg.norm(one[:, None] - other, axis=2).min())
 
 
 def web_glb(head: Head) -> bytes:
@@ -64,6 +79,7 @@ class _WebDocument(GlbBuffers):
         bound = [one for one in parts if not one.part.pivot.any()]
         self._middle, self._step_mm = _grid([one.part.vertices for one in bound])
         self._neck = head.data.neck
+        self._lips_open = lips_open_at_rest(head)
         self._own = {group.name: list(group.times) for group in head.own_groups}
         self._nodes: list[dict[str, Any]] = []
         self._roots = [0]  # and every part that is bound to joints: what is above it would not move it
@@ -85,7 +101,7 @@ class _WebDocument(GlbBuffers):
         names = {name for mesh in self._meshes for name in mesh.get("extras", {}).get("targetNames", [])}
         return {
             "format": _FORMAT, "half": sorted(names & {name + HALF for name in HALVES}), "own": self._own,
-            "neck": {"pivot": (METRES * np.array(neck.pivot)).tolist()},
+            "lips_open": self._lips_open, "neck": {"pivot": (METRES * np.array(neck.pivot)).tolist()},
         }  # fmt: skip
 
     def _add_nodes(self, head: Head, parts: list[WebPart]) -> None:

@@ -338,7 +338,7 @@ class _Window:
                 viewpoint.shift(moved.x, moved.y, int(self.area.height))
             if io.mouse_wheel:
                 viewpoint.zoom(io.mouse_wheel)
-        if not io.want_text_input:
+        if not io.want_text_input and self.area.instead is None:
             for digit in range(6):
                 if imgui.is_key_pressed(getattr(imgui.Key, f"_{digit}"), repeat=False):
                     viewpoint.press(str(digit))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -55,6 +55,7 @@ class Commands:
 
     send : sends requests to the body. life : initial amount of idle motion, 0..1.
     show_moves : draws the control points displaced by (n, 3) mm, or undisplaced for None.
+    head_switches : grows with every :meth:`switch_head`.
     show_light : draws a face with added control points. show_look : draws a look, or the initial one for None. Both do
         nothing until the window replaces them.
     """
@@ -73,6 +74,7 @@ class Commands:
         self._future: list[Settings] = []
         self._step: Hashable = None
         self._others: dict[str, History] = {}
+        self.head_switches = 0
 
     @property
     def undoable(self) -> bool:
@@ -101,6 +103,7 @@ class Commands:
         life : amount of idle motion of a head of which nothing was set yet.
         """
         self._others[before] = self.history
+        self.head_switches += 1
         history = self._others.get(name, History(Settings(life=life)))
         self._past, self._future, self.now = list(history.past), list(history.future), history.now
         self.end_step()
@@ -118,10 +121,15 @@ class Commands:
         held = {**self.now.held, **values}
         self.change(replace(self.now, held={i: x for i, x in held.items() if x is not None}), step)
 
-    def forget(self, indices: Iterable[int]) -> None:
-        """Others have released what was held here: nothing is sent, and nothing of it can be taken back."""
-        gone = set(indices)
-        self.now = replace(self.now, held={i: x for i, x in self.now.held.items() if i not in gone})
+    def adopt(self, changes: Mapping[int, float | None]) -> None:
+        """Take over values at which others hold what was held here, None for what they have released; nothing is sent.
+
+        Undo and redo do not bring back what others have released, and not the value here that others have changed.
+        """
+        before = self.now.held
+        self.now = _adopted(self.now, before, changes)
+        for row in (self._past, self._future):
+            row[:] = [_adopted(settings, before, changes) for settings in row]
 
     def show(self, name: str, intensity: float, step: Hashable = None) -> None:
         """Show an expression."""
@@ -223,6 +231,17 @@ class Commands:
             self.show_moves(to.moves)
         if before.look != to.look:
             self.show_look(to.look)
+
+
+def _adopted(settings: Settings, before: Mapping[int, float], changes: Mapping[int, float | None]) -> Settings:
+    """Return settings without what ``changes`` release, and with their values in place of those ``before``."""
+    held = dict(settings.held)
+    for index, value in changes.items():
+        if value is None:
+            held.pop(index, None)
+        elif index in held and held[index] == before.get(index):
+            held[index] = value
+    return replace(settings, held=held)
 
 
 def _differences(before: Settings, after: Settings) -> Iterator[PanelRequest]:

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass
 
 from controller.base.parts import describe
+
+log = logging.getLogger(__name__)
 
 _MAX_PROBLEMS = 100
 
@@ -32,6 +35,12 @@ class Problems:
                 return
         self.unread.append(Problem(text))
         del self.unread[:-_MAX_PROBLEMS]
+
+    def log_all(self) -> None:
+        """Log all as errors and dismiss them, where no panel shows them."""
+        for problem in self.unread:
+            log.error("%s", problem.text)
+        self.dismiss_all()
 
     def dismiss(self) -> None:
         """The newest was read."""

@@ -22,7 +22,8 @@ from controller.panels.overlay.overlay_view import OverlayView
 from controller.panels.session.commands import History
 from controller.panels.session.next_run import NextRun, carried_to
 from controller.panels.window.editing import MouseEditing
-from controller.panels.window.heads import HeadChoice, HeadSource
+from controller.panels.window.head_source import HeadSource
+from controller.panels.window.heads import HeadChoice
 from controller.panels.window.looks import Looks
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.panels.window.sculpting import SculptPanel
@@ -224,6 +225,7 @@ class WindowFace:
             self._panel()
         elif self._wall is not None:
             self._panel.jobs()
+            self._panel.problems.log_all()  # a kiosk has no panel to show them on
         if self._devices is not None:
             self._devices()
         if self._wall is not None and self._wall.shown:

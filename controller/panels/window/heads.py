@@ -4,28 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from controller.base.mailboxes import Mailbox
 from controller.body.messages import PanelRequest, StartServos, StopServos, ToHead
 from controller.body.panel_state import PanelState
 from controller.face.face import HeadValues
 from controller.panels.session.commands import Commands
+from controller.panels.window.head_source import HeadSource
+from controller.panels.window.wall_view import WallView
 from controller.stage.stage import Stage
-
-if TYPE_CHECKING:
-    from controller.panels.window.wall_view import WallView
-
-
-@dataclass(frozen=True)
-class HeadSource:
-    """One head of a stage. stage : the stage reduced to this head. mailbox : its parameters. state : its state."""
-
-    name: str
-    stage: Stage
-    mailbox: Mailbox
-    state: PanelState
 
 
 class HeadChoice:
@@ -88,3 +74,5 @@ class HeadChoice:
             imgui.set_item_tooltip("Show all heads side by side. Click one to move it, double-click to see it alone.")
             if changed:
                 self.wall.switch(on)
+            if self.wall.shown:
+                imgui.text_wrapped("looks, camera, overlays and pulling are seen on a head that is shown alone")

@@ -12,13 +12,12 @@ from controller.base.parameters import PARAMETERS, Floats, Parameters, fold
 from controller.body.panel_state import PanelState
 from controller.panels.overlay.colours import layer_colour, packed
 from controller.panels.session.commands import Commands
+from controller.panels.session.held_values import HeldValues
 
 _ASIDE = ("mouthLeft", "mouthRight", "jawLeft", "jawRight")
 _OTHERS = "expressions, idle motion, speech and live faces"
 _TICK = f"tick: hold it by hand, and {_OTHERS} do not move it"
 _UNTICK = f"held by hand, or by a command\nuntick: release it, and {_OTHERS} move it again"
-_PATIENCE_S = 1.0
-"""For so long after something was set here, what the body tells of it may still be older."""
 
 
 class Sliders:
@@ -36,8 +35,7 @@ class Sliders:
         self._newest, self._commands, self._state = newest, commands, state
         self._search, self._linked = "", True
         self._mirror = self._parameters.mirror()
-        self._clock, self._own, self._set_s = clock, commands.now.held, -np.inf
-        self._heard: dict[int, float] | None = None
+        self._held = HeldValues(commands, state, clock)
 
     def __call__(self) -> None:
         """Draw; called once per frame."""
@@ -66,22 +64,11 @@ class Sliders:
 
     def held(self, index: int) -> float | None:
         """The value at which a parameter is held by hand, here or by another panel or link; None where it is not."""
-        own = self._commands.now.held
-        return (own if self._heard is None or own is not self._own else self._heard).get(index)
+        return self._held.get(index)
 
     def listen(self) -> None:
-        """Hear what is held; called once a frame, also where the sliders are not drawn.
-
-        What was set here just now, which the body may not know yet, counts first. What was set here and others have
-        released is forgotten.
-        """
-        if self._commands.now.held is not self._own:
-            self._own, self._set_s = self._commands.now.held, self._clock()
-        new = self._clock() - self._set_s < _PATIENCE_S
-        self._heard = None if new or self._state is None else self._state.held()
-        if self._heard is not None and (gone := self._own.keys() - self._heard.keys()):
-            self._commands.forget(gone)
-            self._own = self._commands.now.held
+        """Hear what is held; called once a frame, also where the sliders are not drawn."""
+        self._held.update()
 
     def _all_held(self, imgui: Any) -> None:
         """How many are held, and a button that releases all of them."""

@@ -10,7 +10,7 @@ from controller.face.live_wall import LiveWall
 from controller.face.wall import LoadedHead, load_heads
 from controller.panels.session.jobs import Job, Jobs
 from controller.panels.session.problems import Problems
-from controller.panels.window.heads import HeadSource
+from controller.panels.window.head_source import HeadSource
 from surface.view.docks import PictureArea
 
 if TYPE_CHECKING:
@@ -87,7 +87,8 @@ class WallView:
             return None
 
     def release(self) -> None:
-        """Release the graphics memory."""
+        """Release the graphics memory, and load no further head."""
+        self._jobs.drop(_LOADING)
         self._end()
 
     def __call__(self, imgui: Any) -> None:

@@ -26,7 +26,7 @@ from surface.base.extras import importing
 _RATE_HZ, _FPS = 16_000, 30.0
 _PIECE_S, _MAX_SOUND_S = 20.0, 3600.0
 _TAPS = 32  # of the low-pass filter, on each side, in samples of the slower rate
-_HINT = "docs/expression.md says what a network that makes faces from voices must be like"
+_HINT = "the page on expression in the docs of omote says what a network that makes faces of voices must be like"
 
 
 def network_take(path: Path, model: Path, parameters: Parameters) -> Take:

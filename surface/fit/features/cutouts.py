@@ -18,11 +18,13 @@ from surface.fit.source.textures import opacity_at
 from surface.head.model.data import PartData
 from surface.readers.meshdata import Material
 
+FaceNumbers = dict[tuple[int, ...], int]  # index of each face of a mesh, by its sorted corners
+
 MATERIALS = "brow", "lash"
 SIDE = 200  # places along the longer side of an island at which its opacity is looked up
 HALF = 0.5  # of BLEND: opacity from which on a place is drawn
-LEAST, MOST = 0.02, 0.98  # opaque share of an island: with less, or more, it is drawn whole
-SPECK = 12  # places: an outline around fewer is left out
+MIN_OPAQUE, MAX_OPAQUE = 0.02, 0.98  # opaque fraction of an island; outside of this range it is drawn whole
+MIN_AREA = 12  # places that an outline must enclose
 
 
 def cut_out(part: PartData, mesh: FitMesh, islands: list[Island]) -> PartData:
@@ -32,16 +34,17 @@ def cut_out(part: PartData, mesh: FitMesh, islands: list[Island]) -> PartData:
     """
     if part.material not in MATERIALS:
         return part
-    found = [_outlines(mesh, island) for island in islands]
+    face_of = {tuple(sorted(face)): k for k, face in enumerate(mesh.faces.tolist())}
+    found = [_outlines(mesh, island, face_of) for island in islands]
     if all(f is None for f in found) or len(part.loops) != len(islands):  # a card with holes keeps them
         return part
     loops = [x for f, loop in zip(found, part.loops, strict=True) for x in ([loop] if f is None else f)]
     return replace(part, loops=loops)
 
 
-def _outlines(mesh: FitMesh, island: Island) -> list[Floats] | None:
+def _outlines(mesh: FitMesh, island: Island, face_of: FaceNumbers) -> list[Floats] | None:
     """Closed lines (k, 2) around what is opaque of an island; None where that is all of it, hardly any, or unknown."""
-    faces = _faces_of(mesh, island)
+    faces = _faces_of(island, face_of)
     material = mesh.material_of(int(faces[0])) if len(faces) and (faces >= 0).all() else None
     if material is None or material.texture is None or material.alpha == "OPAQUE":
         return None
@@ -50,10 +53,10 @@ def _outlines(mesh: FitMesh, island: Island) -> list[Floats] | None:
     opacity, within = _raster(mesh, island, faces, material, low, step, np.ceil((high - low) / step).astype(int) + 1)
     level = material.cutoff if material.alpha == "MASK" else HALF
     share = float((opacity[within] >= level).mean()) if within.any() else 0.0
-    if not LEAST < share < MOST:
+    if not MIN_OPAQUE < share < MAX_OPAQUE:
         return None
     lines = contours(np.pad(np.where(within, opacity, 0.0), 1), min(max(level, 1e-3), 1.0 - 1e-3))
-    return [low + step * (line - 1.0) for line in lines if _area(line) > SPECK] or None
+    return [low + step * (line - 1.0) for line in lines if _area(line) > MIN_AREA] or None
 
 
 def _raster(
@@ -85,11 +88,10 @@ def _shares(tri: Floats, at: Floats) -> Floats:
     return np.column_stack([1.0 - rest.sum(axis=1), rest])
 
 
-def _faces_of(mesh: FitMesh, island: Island) -> Ints:
+def _faces_of(island: Island, face_of: FaceNumbers) -> Ints:
     """(f,) the mesh's face of each face of an island, -1 where it has none."""
-    rows = {tuple(sorted(face)): k for k, face in enumerate(mesh.faces.tolist())}
     own = np.where(island.faces >= 0, island.vertex[island.faces], -1)
-    return np.array([rows.get(tuple(sorted(face)), -1) for face in own.tolist()], np.int64)
+    return np.array([face_of.get(tuple(sorted(face)), -1) for face in own.tolist()], np.int64)
 
 
 def _texture_corners(mesh: FitMesh, island: Island, faces: Ints) -> Ints:

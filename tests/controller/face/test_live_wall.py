@@ -11,6 +11,7 @@ import pytest
 
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
+from controller.face import live_wall
 from controller.face.live_wall import LiveWall
 from controller.face.wall import load_heads
 from controller.stage.stage import heads_of
@@ -32,7 +33,10 @@ def wall_of(tmp_path: Path, *heads: str) -> Iterator[tuple[LiveWall, list[Mailbo
 
 
 @pytest.mark.slow
-def test_heads_appear_one_look_after_the_other_and_each_shows_its_own_face(tmp_path: Path) -> None:
+def test_heads_appear_one_look_after_the_other_and_each_shows_its_own_face(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(live_wall, "FRAME_S", 1000.0)
     with wall_of(tmp_path, "", 'person = "oak"', "") as (wall, boxes), open_context() as ctx:
 
         def tiles(size: tuple[int, int] = (195, 80)) -> list[np.ndarray]:
@@ -58,6 +62,24 @@ def test_heads_appear_one_look_after_the_other_and_each_shows_its_own_face(tmp_p
         assert [tile.shape for tile in tiles((100, 300))] == [(100, 100, 3)] * 3
         wall.release()
         wall.release()  # nothing is released twice
+
+
+@pytest.mark.slow
+def test_heads_take_turns_where_all_take_too_long(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(live_wall, "FRAME_S", 0.0)
+    with wall_of(tmp_path, "", 'person = "oak"', "") as (wall, _), open_context() as ctx:
+        drawn = []
+        for _ in range(5):
+            picture = read_pixels(wall.draw(ctx, (195, 80)))
+            drawn.append([bool(picture[:, x : x + 65].any()) for x in (0, 65, 130)])
+        wall.release()
+    assert [sum(row) for row in drawn] == [1, 2, 3, 3, 3]  # one more in each frame
+
+
+def test_a_picture_too_small_for_its_tiles_is_drawn_all_the_same(tmp_path: Path) -> None:
+    with wall_of(tmp_path, "", "", "") as (wall, _), open_context() as ctx:
+        assert wall.draw(ctx, (2, 1)).size == (2, 1)
+        wall.release()
 
 
 def test_tiles_share_the_picture_and_what_is_left_is_beside_them(tmp_path: Path) -> None:

@@ -271,8 +271,8 @@ def test_8_a_servo_that_restarts_is_not_believed_until_it_is_mapped_again(rig: R
 
 def test_8_a_servo_that_does_not_keep_its_pointers_is_read_without_in_the_end(rig: Rig) -> None:
     for _ in range(MAX_POINTER_RESTORES + 1):
-        assert set(rig.bus._mapped) == set(IDS)
+        assert set(rig.bus._indirect_blocks) == set(IDS)
         rig.bus._telemetry.unmapped.add(SICK)
         state = rig.run(0.1)
         assert state.fresh.all()
-    assert set(rig.bus._mapped) == set(IDS) - {SICK}
+    assert set(rig.bus._indirect_blocks) == set(IDS) - {SICK}

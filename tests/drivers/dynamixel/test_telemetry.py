@@ -275,13 +275,13 @@ def test_fast_reads_are_tried_again_after_twice_the_time_each_time_until_one_is_
         reads: Any = bus._telemetry
         for pause_s in (5.0, 10.0, 20.0, 40.0, 80.0, 160.0, 320.0, 320.0):
             while reads._fast:
-                reads._note_joint(lost, 1000.0)
-            assert reads._fast_again_s == 1000.0 + pause_s
+                reads._count_fast_failures(lost, 1000.0)
+            assert reads._next_fast_s == 1000.0 + pause_s
             reads._try_fast_again()
-        reads._note_joint(answered, 1000.0)
+        reads._count_fast_failures(answered, 1000.0)
         while reads._fast:
-            reads._note_joint(lost, 1000.0)
-        assert reads._fast_again_s == 1005.0
+            reads._count_fast_failures(lost, 1000.0)
+        assert reads._next_fast_s == 1005.0
 
 
 def test_mixed_models_share_a_wire() -> None:

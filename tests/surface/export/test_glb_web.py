@@ -7,6 +7,8 @@ import json
 import shutil
 import struct
 import subprocess
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +16,7 @@ from small_head import all_points, part, small_head
 
 from surface.base.errors import ExportError
 from surface.export import export_head
-from surface.export.glb_web import web_glb
+from surface.export.glb_web import lips_open_at_rest, web_glb
 from surface.export.shapes import export_parts
 from surface.export.textures import eye_picture, png_bytes, strand_picture, strip_picture
 from surface.export.web_parts import MIN_MOVE_MM, web_parts
@@ -134,3 +136,13 @@ def test_the_validator_of_khronos_finds_no_fault_in_it(tmp_path, head):
     )
     said = subprocess.run([node, "-e", program, str(path)], capture_output=True, text=True, check=True)
     assert said.stdout.split() == ["0", "0"]
+
+
+def test_the_document_says_whether_one_sees_into_the_mouth_at_rest() -> None:
+    head = Head.load(Path(__file__).parents[3] / "configs/heads/ict")
+    assert not lips_open_at_rest(head)
+    (lips,) = (contact for contact in head.contacts if contact.eye < 0)
+    apart = lips.places + np.array([[[[0.0, 0.02]]], [[[0.0, -0.02]]]])  # upper further up, lower further down
+    others = [contact for contact in head.contacts if contact.eye >= 0]
+    assert lips_open_at_rest(Head(replace(head.data, contacts=[*others, replace(lips, places=apart)])))
+    assert lips_open_at_rest(Head(replace(head.data, contacts=others)))

@@ -49,6 +49,7 @@ export class Face {
     gltf.scene.traverse((node) => { if (node.isMesh) meshes.push(node); });
     this.half = omote.half ?? [];
     this.own = omote.own ?? {};
+    this.lipsOpen = omote.lips_open ?? true;
     this.head = new THREE.Object3D();
     this.head.position.fromArray(omote.neck?.pivot ?? [0, 0, 0]);
     shared.pivot.value.copy(this.head.position);
@@ -98,7 +99,7 @@ export class Face {
     Object.assign(weights, ownAmounts(names, values, this.own));
     for (const name of this.half) { const w = weights[name.slice(0, -HALF.length)]; weights[name] = 4 * w * (1 - w); }
     for (const part of this.#parts) part.show(weights);
-    shared.between_lips.value = Math.min(lipsApart(weights) / LIT_APART, 1);
+    shared.between_lips.value = this.lipsOpen ? 1 : Math.min(lipsApart(weights) / LIT_APART, 1);
     this.head.rotation.set(head[1], head[0], head[2], "YXZ");
     eyes.forEach(([yaw, pitch], i) => this.#eyes[i]?.rotation.set(pitch, yaw, 0, "YXZ"));
     this.head.updateMatrixWorld(true);

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pytest
+
 from controller.base.errors import ConfigError
 from controller.panels.session.problems import Problem, Problems
 
@@ -39,3 +41,12 @@ def test_only_the_newest_hundred_are_kept() -> None:
     for number in range(103):
         problems.add(f"{number}")
     assert [problem.text for problem in problems.unread] == [f"{number}" for number in range(3, 103)]
+
+
+def test_where_no_panel_shows_them_problems_are_logged_once(caplog: pytest.LogCaptureFixture) -> None:
+    problems = Problems()
+    problems.add(ConfigError("no head 'icy'", hint="see configs/heads"))
+    problems.log_all()
+    problems.log_all()
+    (record,) = caplog.records
+    assert record.levelname == "ERROR" and "see configs/heads" in record.getMessage()

@@ -62,7 +62,7 @@ class Editor:
     def light_pixels(self, screen: Screen, values: Any) -> list[tuple[float, float]]:
         return self.lights
 
-    def fitted(self, moves: Any, light: Any) -> Any:
+    def convert_moves(self, moves: Any, light: Any) -> Any:
         return moves
 
     def set_moves(self, moves: Any) -> None:
@@ -368,7 +368,7 @@ def test_another_head_is_sampled_anew_and_the_same_with_other_points_is_not(rig:
 
 def test_points_of_the_shown_head_are_kept_where_a_change_is_cancelled(rig: Rig) -> None:
     rig.commands.add_points(ONE, np.ones((1, 3)), OWN)
-    rig.editor.fitted = lambda moves, light: moves[:OWN]
+    rig.editor.convert_moves = lambda moves, light: moves[:OWN]
     rig.mouse.keep_points()
     assert rig.commands.now.light == () and rig.commands.now.moves is not None
     assert rig.commands.now.moves.shape == (OWN, 3)

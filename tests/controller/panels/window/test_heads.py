@@ -15,7 +15,8 @@ from controller.body.messages import Hold, StopServos, ToHead
 from controller.body.panel_state import PanelState
 from controller.face.face import HeadValues
 from controller.layers.commands import CommandState
-from controller.panels.window.heads import HeadChoice, HeadSource
+from controller.panels.window.head_source import HeadSource
+from controller.panels.window.heads import HeadChoice
 from controller.panels.window.panel import Panel
 from controller.stage.stage import Stage, load_stage
 from tests.controller.panels.window.screen import Screen, drawn

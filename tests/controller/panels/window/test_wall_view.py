@@ -14,7 +14,7 @@ from controller.base.parameters import PARAMETERS
 from controller.panels.session.jobs import Jobs
 from controller.panels.session.problems import Problems
 from controller.panels.window import wall_view
-from controller.panels.window.heads import HeadSource
+from controller.panels.window.head_source import HeadSource
 from controller.panels.window.wall_view import WallView, tile_at
 from surface.view.docks import PictureArea
 from tests.controller.panels.window.screen import Screen
