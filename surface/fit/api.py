@@ -35,7 +35,7 @@ from surface.fit.points.importance import with_importance
 from surface.fit.points.lid_seating import close_lips, seat_lids
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart
-from surface.fit.points.report import RMS_MM, FitReport, FitResult, FittedPart, PartReport, measure
+from surface.fit.points.report import RMS_MM, Errors, FitReport, FitResult, FittedPart, PartReport, measure
 from surface.fit.points.strength import strengthen
 from surface.fit.points.strokes import make_paint
 from surface.fit.reportfile import write_report
@@ -63,7 +63,9 @@ from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
 
 OTHER_MESH_MM = 1.0  # RMS distance at rest that only a head fitted to another mesh has
-LOOSE_MM = 3.0  # RMS of a head of usual size: a part beside the face that is further off, as hair, is left out
+# Errors on an average head from which on a part beside the face, such as hair, is left out.
+LOOSE_MM = 3.0  # RMS
+LOOSE_99_MM = 5.0  # 99 of 100 samples
 # pose that decides how finely a part is cut into triangles
 SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
 
@@ -228,8 +230,9 @@ def _fit_parts(
         fitted = fit_chart(mesh if part.follows == "skin" else still, chart, request, partial(step, part.name))
         fine = facet_sag(mesh, chart) <= RMS_MM * scale
         report = measure(part.name, chart, fitted, mesh.names, fine)
-        if parts and not recipe.parts and report.neutral.rms > LOOSE_MM * scale:
-            plan.notes.append(f"{part.name}: left out: it cannot be fitted, {report.neutral.rms:.1f} mm RMS")
+        if parts and not recipe.parts and _is_loose(report.neutral, scale):
+            off = f"{report.neutral.rms:.1f} mm RMS, 99 % within {report.neutral.p99:.1f} mm"
+            plan.notes.append(f"{part.name}: left out: it cannot be fitted, {off}")
             continue
         parts.append(skin_part(part, chart, fitted, rig))
         if comb and part.material == "lash" and not recipe.parts and rig.radius > 0:
@@ -305,3 +308,8 @@ def _neck(mesh: FitMesh, recipe: Recipe, marks: Landmarks = Landmarks()) -> Neck
 def _provenance(recipe: Recipe) -> dict[str, str]:
     made = "fitted by least squares with omote fit; control points and displacements, not the source mesh"
     return {"made": made, **{f"source_{k}": v for k, v in recipe.source.items()}}
+
+
+def _is_loose(errors: Errors, scale: float) -> bool:
+    """Whether a part beside the face is so far off its mesh that it would look like something else."""
+    return errors.rms > LOOSE_MM * scale or errors.p99 > LOOSE_99_MM * scale

@@ -31,7 +31,7 @@ from surface.mesh.tessellate import MAX_ROOTS
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.3  # in spacings of the mesh: the largest around a place count, and a coarse mesh has corners and creases
-BEND = 0.05  # weight of what bends within faces of the mesh: shading shows waves that distances do not
+BEND = 0.12  # weight of what bends within faces of the mesh: shading shows waves that distances do not
 ASTRAY_MM = 1.8  # of a head of usual size: where the surface is further off, it is mended
 SPARE = 60  # points of the face that are kept for mending
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few

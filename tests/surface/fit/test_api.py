@@ -231,8 +231,10 @@ def test_a_part_that_cannot_be_fitted_is_left_out_by_name_and_the_face_never_is(
     mesh = joined([("Face", small), ("Hair", hair)])
     monkeypatch.setattr("surface.fit.features.generic.FINEST", 2.0)  # few points: their place does not matter here
     monkeypatch.setattr("surface.fit.features.generic.POINTS", 300)
-    for most, parts in ((1e3, ["face", "brow_1"]), (0.0, ["face"])):
-        monkeypatch.setattr(api, "LOOSE_MM", most)
+    for rms, p99, parts in ((1e3, 1e3, ["face", "brow_1"]), (0.0, 1e3, ["face"]), (1e3, 0.0, ["face"])):
+        monkeypatch.setattr(api, "LOOSE_MM", rms)
+        monkeypatch.setattr(api, "LOOSE_99_MM", p99)
+        most = min(rms, p99)
         loaded = Loaded(
             mesh, map_names(mesh.names), pieces={"Face": "skin", "Hair": "hair", "Shirt": "clothes, left out"}
         )
