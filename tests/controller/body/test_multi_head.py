@@ -89,6 +89,16 @@ def test_every_head_moves_as_it_would_alone(tmp_path: Path) -> None:
     assert (found[-1, 0] != found[-1, 1]).any()
 
 
+def test_turns_between_heads_are_taken_in_every_tick(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stage = stage_of(tmp_path, TWO.replace("[[heads]]", 'turns = "auto"\n[[heads]]', 1))
+    with running_heads(stage) as (several, boxes):
+        assert several.heads.turns is not None
+        ticks: list[int] = []
+        monkeypatch.setattr(several.heads.turns, "tick", ticks.append)
+        ticked(several, boxes, 3)
+    assert ticks == [10**9 + k * 10**7 for k in (1, 2, 3)]
+
+
 def test_servos_links_and_reports_belong_to_their_heads(tmp_path: Path) -> None:
     more = '[[heads.links]]\nkind = "json"\nlisten = "udp:127.0.0.1:0"\n'
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:

@@ -29,6 +29,7 @@ def test_other_names_are_refused(name: str) -> None:
 def test_heads_stand_in_a_row_from_the_viewers_left_or_where_they_say() -> None:
     row = [HeadSettings(name="a").placement(index, 3) for index in range(3)]
     assert [place.position_mm for place in row] == [(-450.0, 0, 0), (0.0, 0, 0), (450.0, 0, 0)]
+    assert [place.yaw_deg for place in row] == [0.0, 0.0, 0.0]
     assert [HeadSettings(name="a").placement(i, 2).position_mm[0] for i in (0, 1)] == [-225.0, 225.0]
     own = HeadSettings(name="a", position_mm=(0.0, 20.0, -30.0), yaw_deg=90.0).placement(1, 3)
     assert own.position_mm == (0.0, 20.0, -30.0) and own.yaw_deg == 90.0

@@ -91,3 +91,8 @@ def test_a_knot_that_falls_is_named_with_the_one_before(axis: str, row: list[flo
     knots = {"u": [0.0, 0, 0.5, 1, 1], "v": [0.0, 0, 0.5, 1, 1], axis: row}
     with pytest.raises(ValueError, match=told):
         nurbs_arrays(1, 1, knots["u"], knots["v"], np.zeros((3, 3, 3)))
+
+
+def test_a_knot_vector_of_another_length_is_refused_with_the_right_one() -> None:
+    with pytest.raises(ValueError, match=r"knots_u: shape \(3,\), expected \(4,\): 2 points of degree 1"):
+        nurbs_arrays(1, 2, [0, 0, 1], [0, 0, 0, 1, 1, 1], np.zeros((2, 3, 3)))
