@@ -20,8 +20,6 @@ NEWER_FIRMWARE = {"Startup Configuration", "Backup Ready"}
 """Registers of firmware 45 and later, which older versions of a page lack."""
 NO_SPECIFICATION = {"xw540-h260"}
 """Models whose motor no stored version of the manual describes: its Velocity Limit is taken for its no-load speed."""
-MISPRINTS = {("ym", "Min Voltage Limit"): 4}
-"""Sizes that pages print and that would overlap the next register: beginning of the model's name, register -> size."""
 SHORTENED = {f"Error Code History {k}" for k in range(1, 17)}
 """Rows that pages leave out behind "...", in part."""
 MODELS = [model for model in known_models().values() if not model.startswith(NOT_DESCRIBED)]
@@ -61,9 +59,7 @@ def test_the_registers_of_a_page_are_those_of_the_table(model: str) -> None:
     assert page is not None
     for name, (address, size, access, *_) in page.rows.items():
         item = table[name]
-        misprint = MISPRINTS.get((model[:2], name)) == size
-        assert misprint != (item.size == size), name
-        assert (item.address, item.writable) == (address, access == "RW"), name
+        assert (item.address, item.size, item.writable) == (address, size, access == "RW"), name
     extra = {name for name in table if not name.startswith("Indirect ")} - set(page.rows)
     assert extra <= NEWER_FIRMWARE | SHORTENED
 
@@ -159,7 +155,7 @@ def test_models_differ_as_their_pages_do(
 
 
 def test_y_models_have_the_gains_and_the_current_of_their_motor() -> None:
-    """The newest pages: YM070-210-B001-RH, A051; YM080-230-B001-RH, R099. The current limit is the motor's most."""
+    """Those of a size of motor are the same on all pages; the current limit is the motor's most."""
     y_models = [model for model in DYNAMIXEL if model.startswith("ym")]
     assert len(y_models) == 12
     for model in y_models:
