@@ -131,16 +131,18 @@ def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     gc.unfreeze()
 
 
+@pytest.mark.parametrize(("robots", "ends"), [("", "stopping"), ('robots = ["head24"]', "bringing the servos to rest")])
 def test_a_run_without_a_face_goes_on_while_the_body_plays(
-    stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch
+    stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch, robots: str, ends: str
 ) -> None:
+    Path(stage).write_text(f"{robots}\n{Path(stage).read_text()}")
     body = FakeBody(told, 2)
     monkeypatch.setattr(module, "BodyProcess", body)
     preloaded: Any = object()
     gc.disable()
     report = StageRun(stage, RunOptions(), status=told.append, preloaded=preloaded).run_without_face(60.0)
     assert told == [
-        "starting", "ready", "begin", "running for 60 s", "sleep 0.05", "sleep 0.05", "bringing the servos to rest",
+        "starting", "ready", "begin", "running for 60 s", "sleep 0.05", "sleep 0.05", ends,
         "stop", "left",
     ]  # fmt: skip
     assert gc.isenabled()
