@@ -48,7 +48,7 @@ class LiveWall:
         self._placing: Placing | None = None
 
     def boxes(self, size: tuple[float, float]) -> list[tuple[float, float, float, float]]:
-        """Left, top, width and height of each head's tile in a picture of a size, from its top left corner."""
+        """Left, top, width, height of each head's tile in a picture of a size, in its unit, from its top left."""
         columns, rows = grid(len(self._mailboxes), (int(size[0]), int(size[1])))
         width, height = max(1.0, size[0] // columns), max(1.0, size[1] // rows)
         left, top = (size[0] - columns * width) // 2, (size[1] - rows * height) // 2
@@ -106,7 +106,11 @@ class LiveWall:
 
 
 class _Group:
-    """Heads that look alike: one that is posed by its renderer, or several that are posed in one batch."""
+    """Heads that look alike: one that is posed by its renderer, or several that are posed in one batch.
+
+    places : their numbers in the stage. drawing : draws one of them at a time. posed : whether a batch is posed as it
+    shall be drawn in this frame.
+    """
 
     def __init__(self, ctx: moderngl.Context, loaded: LoadedHead, quality: str) -> None:
         face, alone = loaded.stage.settings.face, len(loaded.places) == 1
@@ -115,7 +119,6 @@ class _Group:
         evaluator = face.evaluator if alone else "cpu"
         renderer = Renderer(ctx, loaded.head, quality=quality, theme=face.make_theme(), evaluator=evaluator)
         self.drawing = LiveDrawing(renderer, posed_elsewhere=not alone)
-
         self.posed = False
         self._tile, self._camera = (0, 0), Camera.front()
 

@@ -92,7 +92,7 @@ class _Alike:
 
 @dataclass
 class LoadedHead:
-    """A head of a wall. stage : of the first head that looks so. order : its parameters' indices in full vectors.
+    """A head of a wall. stage : of the first head that looks so. order : (h,) its parameters' indices in full vectors.
     places : numbers in the stage of all heads that look like it."""
 
     head: Head

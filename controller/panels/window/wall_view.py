@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     import moderngl
 
 _LOADING = "loading all heads"
-_NAME, _CHOSEN = (0.85, 0.87, 0.9, 0.8), (1.0, 0.8, 0.3, 1.0)
-"""Colours of a head's name, and of the one that the panels move."""
+_NAME_COLOUR, _CHOSEN_COLOUR = (0.85, 0.87, 0.9, 0.8), (1.0, 0.8, 0.3, 1.0)
+"""RGBA, 0..1, of a head's name, and of the name of the head that the panels move."""
 
 
 class WallView:
@@ -99,7 +99,7 @@ class WallView:
         boxes = self._wall.boxes((area.width, area.height))
         sheet = imgui.get_background_draw_list()
         for i, (source, (left, top, width, height)) in enumerate(zip(self._sources, boxes, strict=True)):
-            colour = imgui.get_color_u32(imgui.ImVec4(*(_CHOSEN if i == self.chosen() else _NAME)))
+            colour = imgui.get_color_u32(imgui.ImVec4(*(_CHOSEN_COLOUR if i == self.chosen() else _NAME_COLOUR)))
             middle = area.left + left + 0.5 * (width - imgui.calc_text_size(source.name).x)
             sheet.add_text(imgui.ImVec2(middle, area.top + top + height - 1.5 * line), colour, source.name)
         if not imgui.get_io().want_capture_mouse and imgui.is_mouse_clicked(imgui.MouseButton_.left):

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -204,12 +205,12 @@ class Hands:
         self.cursor = cursor
 
 
-def steered(hands: Hands, *, kiosk: bool = False) -> tuple[Camera, bool]:
+def steered(hands: Hands, *, kiosk: bool = False, instead: Any = None) -> tuple[Camera, bool]:
     """The camera after a frame, and whether the window closes."""
     viewpoint = Viewpoint()
     window = _Window(hands, lambda: values(), viewpoint, Renderer, "fast")
     window.params, window.kiosk = SimpleNamespace(app_shall_exit=False), kiosk
-    window.area.height = 240.0
+    window.area.height, window.area.instead = 240.0, instead
     window.panels()
     return viewpoint.camera, window.params.app_shall_exit
 
@@ -224,7 +225,9 @@ def test_mouse_and_keys_move_the_camera_unless_a_panel_has_them() -> None:
     for name, options in moved.items():
         assert steered(Hands(**options)) == (wanted[name].camera, False)
         assert steered(Hands(**options, captured=True)) == (Viewpoint().camera, False)
+        assert steered(Hands(**options), instead=object()) == (Viewpoint().camera, False)  # no head would show it
     assert steered(Hands("5")) == (wanted["press"].camera, False)
+    assert steered(Hands("5"), instead=object()) == (Camera.front(), False)
     assert steered(Hands("5", captured=True)) == steered(Hands("6")) == steered(Hands("esc")) == (Camera.front(), False)
 
 

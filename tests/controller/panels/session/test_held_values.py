@@ -97,7 +97,8 @@ def test_another_head_s_settings_are_not_new_to_the_body(desk: Desk) -> None:
     desk.commands.hold({A: 0.5})
     desk.after(0.0)
     desk.commands.switch_head("maple", "oak", 0.0)
-    assert desk.after(0.1) == {A: None, B: None}
+    desk.reported = {A: 0.3}
+    assert desk.after(0.1) == {A: 0.3, B: None}
     desk.commands.switch_head("oak", "maple", 0.0)
     desk.reported = {A: 0.8}
     assert desk.after(0.1) == {A: 0.8, B: None} and desk.commands.now.held == {A: 0.8}
