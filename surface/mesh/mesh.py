@@ -67,4 +67,6 @@ def border_edges(triangles: NDArray[np.int32]) -> Ints:
     """Return (k, 2): edges that only one triangle has, in the direction of that triangle."""
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     key, back = edges[:, 0] << 32 | edges[:, 1], edges[:, 1] << 32 | edges[:, 0]
-    return edges[~np.isin(key, back)]
+    ordered = np.sort(key)  # np.isin takes three times as long
+    at = np.searchsorted(ordered, back)
+    return edges[ordered[np.minimum(at, len(ordered) - 1)] != back]
