@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 
 import llvmlite.binding as llvm
-from numba.core.runtime import rtsys
+from numba.core.runtime import rtsys  # type: ignore[attr-defined]
 
 
 def hasten_loading(kept: Any) -> None:
@@ -49,7 +49,7 @@ def _parse_when_linked(library: Any, bitcode: bytes) -> None:
 
     @cache
     def module_for_linking() -> Any:
-        return llvm.parse_bitcode(bitcode)  # type: ignore[no-untyped-call]
+        return llvm.parse_bitcode(bitcode)
 
     library._shared_module = None
     library._get_module_for_linking = module_for_linking
@@ -58,4 +58,4 @@ def _parse_when_linked(library: Any, bitcode: bytes) -> None:
 @cache
 def _empty_bitcode() -> bytes:
     """Return the bitcode of a module without functions."""
-    return bytes(llvm.parse_assembly("").as_bitcode())  # type: ignore[no-untyped-call]
+    return bytes(llvm.parse_assembly("").as_bitcode())

@@ -69,4 +69,5 @@ def border_edges(triangles: NDArray[np.int32]) -> Ints:
     key, back = edges[:, 0] << 32 | edges[:, 1], edges[:, 1] << 32 | edges[:, 0]
     ordered = np.sort(key)  # np.isin takes three times as long
     at = np.searchsorted(ordered, back)
-    return edges[ordered[np.minimum(at, len(ordered) - 1)] != back]
+    alone: Ints = edges[ordered[np.minimum(at, len(ordered) - 1)] != back]
+    return alone

@@ -113,7 +113,7 @@ def run_window(
         geometry.full_screen_mode = hello_imgui.FullScreenMode.full_screen_desktop_resolution
         geometry.monitor_idx = monitor
     try:
-        hello_imgui.run(params)
+        _run(hello_imgui.manual_render, params)
     except Exception as error:
         raise window.failure or _no_window(error) from error
     if window.failure is not None:
@@ -121,6 +121,19 @@ def run_window(
     if window.frames == 0:
         raise ViewError("the window closed before it drew anything", hint=HEADLESS_HINT)
     return WindowReport(window.frames, window.last - window.first)
+
+
+def _run(runner: Any, params: Any) -> None:
+    """Draw frames until the window is to close.
+
+    imgui-bundle's own `run` first searches the source of its caller, which takes 0.1 s.
+    """
+    runner.setup_from_runner_params(params)
+    try:
+        while not params.app_shall_exit:
+            runner.render()
+    finally:
+        runner.tear_down()
 
 
 def has_display() -> bool:

@@ -117,15 +117,17 @@ class WindowFace:
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
-        began, stamp = time.monotonic_ns(), 0
+        began, stamp = 0, 0
+        drawn: NDArray[np.float64] | None = None
 
         def source() -> NDArray[np.float64]:
-            nonlocal began, stamp
+            nonlocal began, stamp, drawn
             values = self._values()
             now = time.monotonic_ns()
             self._head.sway.advance(head_angles(values), now / 1e9)
-            self._log.add(values, began, now, stamp)  # the frame before has been drawn by now
-            began, stamp = now, self._values.stamp_ns
+            if drawn is not None:
+                self._log.add(drawn, began, now, stamp)  # the frame before has been drawn by now
+            began, stamp, drawn = now, self._values.stamp_ns, values
             return values
 
         kiosk = self._settings.kiosk
