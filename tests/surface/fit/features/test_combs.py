@@ -8,6 +8,7 @@ from lash_strip import LONG, mesh, strip
 
 from surface.fit.features import combs
 from surface.fit.features.combs import HAIR_MM, combed
+from surface.head.model.meshes import make_surface
 from surface.mesh.loops import inside
 from surface.readers.meshdata import Material
 
@@ -39,7 +40,7 @@ def _edges(loop: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("length", "scale", "count"), [
-    (26.0, 1.0, 20), (26.0, 2.0, 10), (5.0, 1.0, 8), (200.0, 1.0, 40), (26.0, 0.25, 40),
+    (26.5, 1.0, 20), (26.5, 2.0, 10), (5.0, 1.0, 8), (200.0, 1.0, 40), (26.5, 0.25, 40),
 ])  # fmt: skip
 @pytest.mark.parametrize("below", [True, False])
 def test_hairs_are_1_3_mm_apart_and_8_to_40_in_a_strip(
@@ -53,7 +54,8 @@ def test_hairs_are_1_3_mm_apart_and_8_to_40_in_a_strip(
 
     monkeypatch.setattr(combs, "comb", comb)
     part, eyes = strip(below)
-    part = replace(part, points=part.points * [length / (0.96 * LONG), 1.0, 1.0])  # the ends are left out
+    ends = make_surface(part).evaluate(np.array([[0.02, 0.5], [0.98, 0.5]]))  # what lies beyond is left out
+    part = replace(part, points=part.points * [length / np.ptp(ends[:, 0]), 1.0, 1.0])
     (loop,) = combed(part, *mesh(), eyes, scale).loops
     assert asked == [(count, 0.015, 0.45)]
     v = np.array([0.02, 0.5, 0.98, 0.02])
@@ -70,9 +72,8 @@ def test_the_ends_of_a_strip_where_it_is_low_are_left_out() -> None:
     thin = np.array([[0.0, 0.5], [2.0, 0.481], [2.0, 0.0], [4.0, 0.0], [4.0, 1.0], [2.0, 1.0], [2.0, 0.519]])
     u, low, high = combs._ends(thin)
     assert u.min() >= 2.0 and np.allclose(high - low, 1.0)
-    thick = np.array(
-        [[0.0, 0.45], [2.0, 0.45], [2.0, 0.0], [4.0, 0.0], [4.0, 1.0], [2.0, 1.0], [2.0, 0.55], [0.0, 0.55]]
-    )
+    end = [[2.0, 0.0], [4.0, 0.0], [4.0, 1.0], [2.0, 1.0]]
+    thick = np.array([[0.0, 0.45], [2.0, 0.45], *end, [2.0, 0.55], [0.0, 0.55]])
     assert combs._ends(thick)[0].min() == pytest.approx(0.08)
 
 
