@@ -17,6 +17,7 @@ from small_head import all_points, part, small_head
 
 from surface.base.errors import ExportError
 from surface.export import export_head, glb_web
+from surface.export.glb_buffers import GlbBuffers
 from surface.export.glb_web import lips_open_at_rest, web_glb
 from surface.export.shapes import export_parts
 from surface.export.textures import eye_picture, png_bytes, strand_picture, strip_picture
@@ -190,3 +191,17 @@ def test_what_is_drawn_as_strips_or_strands_says_so() -> None:
     assert glb_web._blending("lash", {})["alphaMode"] == "BLEND"
     for kind in ("strand", "tress"):
         assert glb_web._blending(kind, {}) == {"doubleSided": False, "alphaMode": "MASK", "alphaCutoff": 0.3}
+
+
+def test_moves_are_whole_coarse_steps_and_turns_of_normals_at_most_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    document, kept = object.__new__(glb_web._WebDocument), []
+    GlbBuffers.__init__(document)
+    monkeypatch.setattr(document, "_sparse", lambda rows, ids, *_, **more: kept.append((rows, ids)), raising=False)
+    moves = np.array([[0.0, 0, 0], [0, 4.4, 0], [1.4, 0, -7.0], [0, 0, 0]])
+    turns = np.array([[0.0, 0, 0], [0, 0, 0], [-1.7, 1.6, 0.5], [0, 0, 0.003]])
+    document._target(moves, turns, 3)
+    (steps, ids), (bent, same) = kept
+    assert steps.tolist() == [[0, 0, 0], [0, 3, 0], [0, 0, -6], [0, 0, 0]] and ids.tolist() == same.tolist() == [1, 2]
+    assert bent.dtype == np.int8 and bent.tolist() == [[0, 0, 0], [0, 0, 0], [-127, 127, 64], [0, 0, 0]]
+    document._target(0.0 * moves, 0.0 * turns, 3)
+    assert kept[2][1].tolist() == [0]  # an empty list would be no list

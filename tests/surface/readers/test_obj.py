@@ -116,7 +116,7 @@ def test_corners_are_counted_from_the_last_vertex_up_to_the_first(tmp_path):
     mesh = read_obj(written(tmp_path, CUBE_FACE + "f -4/-4 -3/-3 -1/-1\nf 4/4 3/-4 1/1\n"))
     assert mesh.faces[:, :3].tolist() == [[0, 1, 3], [3, 2, 0]]
     assert mesh.face_uv[:, :3].tolist() == [[0, 1, 3], [3, 0, 0]]
-    for corner in ("-5", "1/-6", "0"):
+    for corner in ("-5", "1/-5", "1/-6", "0"):
         with pytest.raises(FitError, match=f"corner {corner} points before the first vertex"):
             read_obj(written(tmp_path, CUBE_FACE + f"f {corner} 2 3\n"))
     with pytest.raises(FitError, match="line 9: a face needs three corners, not 2"):
