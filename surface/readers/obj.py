@@ -154,7 +154,7 @@ class _Parser:
         t = texture - 1 if texture >= 0 else len(self._textures) + texture
         if max(v, t) > MAX_INDEX:
             raise self._error(number, f"corner {text[:40].decode('utf-8', 'replace')} points beyond the last vertex")
-        if vertex == 0 or v < 0 or t < -1:
+        if vertex == 0 or v < 0 or (texture != 0 and t < 0):
             raise self._error(number, f"corner {text.decode('utf-8', 'replace')} points before the first vertex")
         return v, t
 

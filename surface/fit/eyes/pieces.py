@@ -112,12 +112,12 @@ def _halves(mesh: FitMesh, piece: Piece, middle: float) -> list[Piece]:
 def _side(pieces: list[Piece]) -> Side:
     """One eye: its sphere is the largest round piece's, or else that of all of it."""
     solid = [p for p in pieces if not is_cover(p.name)] or pieces
-    round_ones = [p for p in solid if p.ball is not None and is_round(p.ball)]
+    round_ones = [(p, p.ball) for p in solid if p.ball is not None and is_round(p.ball)]
     points, weight = (np.concatenate([getattr(p, k) for p in solid]) for k in ("points", "weight"))
     ball: Ball | None
     if round_ones:
-        best = max(round_ones, key=lambda p: p.ball.radius if p.ball else 0.0)
-        points, weight, ball = best.points, best.weight, best.ball
+        best, ball = max(round_ones, key=lambda pair: pair[1].radius)
+        points, weight = best.points, best.weight
     else:
         whole = fit_ball(points, weight)
         ball = whole if whole is not None and whole.spread > MIN_SPREAD and whole.off < 2 * MAX_FIT_ERROR else None

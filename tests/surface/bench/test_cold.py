@@ -86,3 +86,29 @@ def test_the_share_of_zeros_is_that_of_all_weights_that_are_not_factors() -> Non
     assert cold.zero_fraction([deformation]) == pytest.approx(1.0 - np.count_nonzero(weights) / kept)
     assert 0.0 < cold.zero_fraction([deformation]) < 1.0 - np.count_nonzero(weights) / len(weights)
     assert cold.zero_fraction([]) == 0.0
+
+
+@pytest.mark.parametrize("size", [0.001, 1.0, 1000.0])
+@pytest.mark.parametrize(("width", "steady"), [(0.059, True), (0.061, False)])
+def test_a_ratio_is_steady_where_its_interval_is_6_per_cent_wide_at_most(
+    size: float, width: float, steady: bool
+) -> None:
+    ratios = size * np.array([1.0 - 0.5 * width, 1.0 + 0.5 * width])  # of two values the interval spans both
+    times = np.column_stack([3.0 * ratios, [3.0, 3.0], [5.0, 5.0]])
+    assert cold._are_steady(times, [(0, 1)]) == steady
+    assert cold._are_steady(times, [(1, 2), (0, 1)]) == cold._are_steady(times, [(0, 1), (1, 2)]) == steady
+    assert cold._are_steady(times, [(1, 2)]) and cold._are_steady(times, [])
+
+
+def test_surfaces_have_the_points_of_their_levels_on_a_bumpy_square() -> None:
+    assert cold._hill(0.3, 0.7) == pytest.approx((60.0, 140.0, 20 * np.sin(3.0) * np.cos(5.6)))
+    levels, _ = cold.hierarchical(64)
+    counts = [19**2 - 5**2, 13**2 - 5**2, 13**2]  # each without what lies in the next one's region
+    assert levels.n == sum(counts)
+    rows = levels.arrays()[0][:, :5]
+    spacing = np.diff(rows, axis=1).max(axis=1)
+    assert [int(np.isclose(spacing, 1 / n).sum()) for n in (16, 32, 64)] == counts
+    np.testing.assert_allclose(levels.points[:, 0] / 200, rows[:, 1:4].mean(axis=1))
+    scattered, _ = cold.scattered(100, 64)
+    assert scattered.n == 144 and len(cold.scattered(1, 64)[0].points) == 36
+    assert len(cold._tessellate(levels, 1000).vertices) == 33**2 and len(cold._tessellate(levels, 2).vertices) == 9

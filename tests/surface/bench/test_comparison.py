@@ -275,3 +275,24 @@ def test_faces_are_lit_from_the_right_above_and_the_nearest_hide_the_others(tmp_
             with image.open(tmp_path / "tilted.png") as picture:
                 at = picture.convert("RGB").getpixel((25, 170))
             assert at == (grey, grey, grey), (slope, axis)
+
+
+def test_captions_tell_what_is_saved_or_needed_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("PIL.Image")
+    from PIL import ImageDraw
+
+    said: list[tuple[tuple[float, float], str, Any, float]] = []
+
+    def write(pen: Any, at: tuple[float, float], text: str, *, fill: Any, font_size: float) -> None:
+        said.append((at, text, fill, font_size))
+
+    monkeypatch.setattr(ImageDraw.ImageDraw, "multiline_text", write)
+    mesh = card(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]))
+    savings = {"uniform": 0.0, "by points": -0.123, "by error": 0.4567}
+    draw([Variant(name, mesh, 0.0, saving) for name, saving in savings.items()], tmp_path / "three.png", height=400)
+    assert [text for _, text, *_ in said] == [
+        "uniform\n3 vertices", "by points\n3 vertices, 12.3 % more", "by error\n3 vertices, 45.7 % saved",
+    ]  # fmt: skip
+    wide = int(2 * 0.86 * 400 + 40)  # of twice the size; halved at the end
+    np.testing.assert_allclose([at for at, *_ in said], [(k * wide + 20.0, 4.0) for k in range(3)])
+    assert {(fill, size) for *_, fill, size in said} == {("black", 18.0)}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.sparse import coo_array
@@ -239,3 +241,27 @@ def test_where_the_skin_of_a_mesh_ends_is_a_warning() -> None:
         head = plain.subject(plain.part("face", points, faces), lobe, eyes=ABOVE)
         found = list(borders.holes(head, None, Places(head, None), borders.find_borders(head)))
         assert [f.warning for f in found] == [warned] * len(found) and len(found) == 1 + warned
+
+
+def test_a_hole_is_looked_at_from_eight_sides(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[tuple[float, float]] = []
+    turned = borders.view_rotation
+
+    def look(yaw: float, pitch: float) -> np.ndarray:
+        asked.append((yaw, pitch))
+        return turned(yaw, pitch)
+
+    class Blind:
+        def __init__(self, *_: object) -> None:
+            pass
+
+        def draw(self, shapes: list[object]) -> SimpleNamespace:
+            return SimpleNamespace(parts=np.zeros((3, 3), int))
+
+    monkeypatch.setattr(borders, "view_rotation", look)
+    monkeypatch.setattr(borders, "View", Blind)
+    at = np.array([[0.0, 0, 0], [9, 0, 0], [9, 9, 0]])
+    ends = np.stack([at, np.roll(at, -1, axis=0)], axis=1)
+    subject = SimpleNamespace(rest=None, shapes=lambda rest: [None])
+    assert not borders.is_seen(subject, SimpleNamespace(material="skin"), ends)  # type: ignore[arg-type]
+    assert asked == [(0, 0), (60, 0), (-60, 0), (120, 0), (-120, 0), (180, 0), (0, -60), (0, 60)]

@@ -132,3 +132,16 @@ def test_a_refused_change_leaves_packed_cells() -> None:
     assert deformation.lists.used == used
     deformation.move([0, 1], [0.0, 0.0, 1.0])
     assert np.abs(deformation.vertices - deformation.surface.evaluate(mesh.uv)).max() < 2e-5
+
+
+def test_a_tile_of_eight_vertices_starts_with_the_first_one_left() -> None:
+    """The first eight share a point; of the others, the second would fit them, but starts no tile."""
+    masks = np.array([[1]] * 8 + [[2], [1], [2]], np.uint64)
+    order, left, union = np.zeros(11, np.int64), np.zeros(11, np.int64), np.zeros(1, np.uint64)
+    packing._arrange(11, masks, 5, union, left, order)
+    assert order.tolist() == [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 9]
+    mixed = np.array([[1], [2], [1], [2], [4]], np.uint64)
+    packing._arrange(5, mixed, 5, union, left, order)
+    assert order[:5].tolist() == [0, 2, 1, 3, 4]
+    packing._arrange(5, mixed, 1, union, left, order)  # only the next one is looked at
+    assert order[:5].tolist() == [0, 1, 2, 3, 4]

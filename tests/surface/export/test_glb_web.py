@@ -9,13 +9,15 @@ import struct
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from small_head import all_points, part, small_head
 
 from surface.base.errors import ExportError
-from surface.export import export_head
+from surface.export import export_head, glb_web
+from surface.export.glb_buffers import GlbBuffers
 from surface.export.glb_web import lips_open_at_rest, web_glb
 from surface.export.shapes import export_parts
 from surface.export.textures import eye_picture, png_bytes, strand_picture, strip_picture
@@ -146,3 +148,60 @@ def test_the_document_says_whether_one_sees_into_the_mouth_at_rest() -> None:
     others = [contact for contact in head.contacts if contact.eye >= 0]
     assert lips_open_at_rest(Head(replace(head.data, contacts=[*others, replace(lips, places=apart)])))
     assert lips_open_at_rest(Head(replace(head.data, contacts=others)))
+
+
+def test_steps_reach_all_vertices_and_a_quarter_beyond() -> None:
+    rows = [np.array([[0.0, 0, 0], [10, 0, 0]], np.float32), np.array([[4.0, -6.0, 2.0]], np.float32)]
+    middle, step = glb_web._grid(rows)
+    assert middle.tolist() == [5.0, -3.0, 1.0] and step == pytest.approx(1.25 * 5.0 / 32_700)
+    middle, step = glb_web._grid(rows, np.array([0.0, 1.0, 0.0]))
+    assert middle.tolist() == [0.0, 1.0, 0.0] and step == pytest.approx(1.25 * 10.0 / 32_700)
+    assert glb_web._grid([np.zeros((2, 3), np.float32)])[1] == pytest.approx(1.25 / 32_700)  # 1 mm at least
+    middle, step = glb_web._grid([])
+    assert middle.tolist() == [0.0] * 3 and step == 1.0
+
+
+def test_normals_and_colours_are_coarse_enough_to_compress() -> None:
+    normals = glb_web._normal_steps(np.array([[0.0, 1.0, -1.0], [1e-4, 1.3e-4, -0.5]], np.float32))
+    assert normals.dtype == np.int16 and normals.tolist() == [[0, 32_767, -32_767], [0, 8, -16_384]]
+    colours = glb_web._colour_steps(np.array([[0.0, 1.0, 0.25], [0.25 + 2e-3, 1e-5, 1e-6]], np.float32))
+    half = round((128 / 255) ** 2 * 65_535)
+    assert colours.dtype == np.uint16 and colours.tolist() == [[0, 65_535, half], [half, 1, 0]]
+
+
+@pytest.mark.parametrize(("apart", "sees"), [(1.19, False), (1.21, True)])
+def test_lips_further_than_1_2_mm_apart_in_any_column_are_open(apart: float, sees: bool) -> None:
+    above, beyond = np.array([[0.0, 0.0], [0.0, 9.0]]), np.array([[5.0, 0.0], [5.0, apart]])
+
+    def evaluate(side: np.ndarray) -> np.ndarray:
+        return np.column_stack([side, np.zeros(len(side))])
+
+    places = np.stack([np.stack([above, above]), np.stack([np.add(above, [0.0, 0.5]), np.add(above, [0.0, apart])])])
+    surface = SimpleNamespace(surface=SimpleNamespace(evaluate=evaluate))
+    lids, lips = (SimpleNamespace(eye=eye, part="face", places=places) for eye in (0, -1))
+    asked = SimpleNamespace(contacts=[lids, lips], part=lambda name: surface)
+    assert lips_open_at_rest(asked) == sees  # type: ignore[arg-type]
+    assert lips_open_at_rest(SimpleNamespace(contacts=[lids]))  # type: ignore[arg-type]
+    assert glb_web._nearest_mm(np.zeros((1, 3)), np.column_stack([beyond, [1.0, 2.0]])) == pytest.approx(np.sqrt(26.0))
+
+
+def test_what_is_drawn_as_strips_or_strands_says_so() -> None:
+    assert glb_web._blending("skin", {}) == {"doubleSided": False}
+    assert glb_web._blending("brow", {"two_sided": True}) == {"doubleSided": True, "alphaMode": "BLEND"}
+    assert glb_web._blending("lash", {})["alphaMode"] == "BLEND"
+    for kind in ("strand", "tress"):
+        assert glb_web._blending(kind, {}) == {"doubleSided": False, "alphaMode": "MASK", "alphaCutoff": 0.3}
+
+
+def test_moves_are_whole_coarse_steps_and_turns_of_normals_at_most_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    document, kept = object.__new__(glb_web._WebDocument), []
+    GlbBuffers.__init__(document)
+    monkeypatch.setattr(document, "_sparse", lambda rows, ids, *_, **more: kept.append((rows, ids)), raising=False)
+    moves = np.array([[0.0, 0, 0], [0, 4.4, 0], [1.4, 0, -7.0], [0, 0, 0]])
+    turns = np.array([[0.0, 0, 0], [0, 0, 0], [-1.7, 1.6, 0.5], [0, 0, 0.003]])
+    document._target(moves, turns, 3)
+    (steps, ids), (bent, same) = kept
+    assert steps.tolist() == [[0, 0, 0], [0, 3, 0], [0, 0, -6], [0, 0, 0]] and ids.tolist() == same.tolist() == [1, 2]
+    assert bent.dtype == np.int8 and bent.tolist() == [[0, 0, 0], [0, 0, 0], [-127, 127, 64], [0, 0, 0]]
+    document._target(0.0 * moves, 0.0 * turns, 3)
+    assert kept[2][1].tolist() == [0]  # an empty list would be no list

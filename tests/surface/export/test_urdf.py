@@ -5,14 +5,18 @@ from __future__ import annotations
 import os
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from surface.export import urdf
+from surface.export.shapes import ExportPart
 from surface.export.urdf import write_urdf
 from surface.head import Head
-from surface.head.model.joints import JointLimit, joints_of
+from surface.head.model.joints import Joint, JointLimit, joints_of
 from surface.head.model.parameters import EYE_RAD, HEAD_RAD
+from surface.head.posing.rig import jaw_path
 
 trimesh = pytest.importorskip("trimesh", reason="pip install trimesh")
 
@@ -129,3 +133,84 @@ def test_a_link_stays_a_link(head: Head, tmp_path: Path) -> None:
     (tmp_path / "head.urdf").symlink_to(real)
     write_urdf(head, tmp_path / "head.urdf", {})
     assert (tmp_path / "head.urdf").is_symlink() and ET.parse(real).getroot().tag == "robot"
+
+
+def piece(material: str, vertices: np.ndarray, triangles: list[list[int]], **other: object) -> ExportPart:
+    rows = np.asarray(vertices, np.float32)
+    own = {"pivot": np.zeros(3), "colours": None, **other}
+    return ExportPart("own", material, rows, rows, rows[:, :2], np.array(triangles, np.int32), **own)  # type: ignore[arg-type]
+
+
+def test_a_binary_stl_has_a_header_of_80_bytes_and_50_for_each_triangle() -> None:
+    corners = np.array([[[0.0, 0, 0], [2, 0, 0], [0, 3, 0]], [[0, 0, 0], [0, 0, 1], [0, 1, 0]]], np.float32)
+    data = urdf._stl(corners)
+    assert len(data) == 80 + 4 + 2 * 50 and data[80:84] == b"\x02\0\0\0" and data[:15] == b"written by omot"
+    for k, normal in enumerate(([0.0, 0, 1], [-1.0, 0, 0])):
+        row = np.frombuffer(data[84 + 50 * k : 84 + 50 * k + 48], "<f4").reshape(4, 3)
+        np.testing.assert_allclose(row[0], normal)
+        np.testing.assert_array_equal(row[1:], corners[k])
+
+
+def test_triangles_of_an_eye_are_parted_by_how_far_they_are_from_its_axis() -> None:
+    pivot, radius = np.array([30.0, 40.0, 50.0]), 12.0
+    angles = np.array([0.05, 0.15, 0.2, 0.45, 0.55, 1.4, 1.7])
+    middles = pivot + radius * np.column_stack([np.sin(angles), 0 * angles, np.cos(angles)])
+    part = piece("eye", np.repeat(middles, 3, axis=0), np.arange(21).reshape(7, 3).tolist(), pivot=pivot)
+    distance = urdf._off_axis(part, part.triangles)
+    np.testing.assert_allclose(distance, [*np.sin(angles[:6]), 2.0], atol=1e-5)
+    found = {each.name: len(each.triangles) for each in urdf._split_by_colour("link", part, part.triangles)}
+    assert found == {"own_pupil": 2, "own_iris": 2, "own": 3}
+    front = urdf._split_by_colour("link", part, part.triangles[:1])
+    assert [(each.name, each.material, each.file) for each in front] == [
+        ("own_pupil", "own_pupil", "link-own_pupil.stl")
+    ]
+
+
+@pytest.mark.parametrize(("material", "sides"), [("brow", 2), ("lash", 2), ("hair", 2), ("skin", 1), ("teeth", 1)])
+def test_strips_are_written_with_both_their_sides(material: str, sides: int) -> None:
+    part = piece(material, np.eye(3), [[0, 1, 2]])
+    (only,) = urdf._split_by_colour("link", part, part.triangles)
+    corners = only.corners()
+    assert len(corners) == sides
+    np.testing.assert_array_equal(corners[0], np.eye(3))
+    np.testing.assert_array_equal(corners[-1], np.eye(3)[:: -1 if sides == 2 else 1])
+
+
+def test_the_whole_jaw_turns_about_its_axis_and_glides(head: Head) -> None:
+    jaw = head.data.jaw
+    points = np.array([[1.0, 2.0, 90.0], list(jaw.centre), [5.0, -60.0, 40.0]], np.float32)
+    turn, shift = jaw_path(jaw, 1.0)
+    np.testing.assert_allclose(urdf._jaw_swing(head, points), points @ turn.T + shift - points, atol=1e-4)
+
+
+def test_skin_belongs_to_what_moves_it_most(head: Head) -> None:
+    neck = head.data.neck
+    rest = np.array([[0.0, -30.0, 100.0], [0.0, -30.0, 100.0], [0.0, -400.0, 0.0]], np.float32)
+    assert neck.share(rest.astype(float)).tolist() == [1.0, 1.0, 0.0]
+    swing = urdf._jaw_swing(head, rest)
+    skin = SimpleNamespace(follows="skin")
+    opened = (rest + swing * np.array([[0.51], [0.49], [1.0]])).astype(np.float32)
+    assert urdf._carriers(head, skin, rest, opened).tolist() == [2, 1, 0]  # type: ignore[arg-type]
+    for follows, link in (("jaw", 2), ("skull", 1), ("left_eye", 3), ("right_eye", 4)):
+        own = SimpleNamespace(follows=follows)
+        assert urdf._carriers(head, own, rest, opened).tolist() == [link] * 3  # type: ignore[arg-type]
+
+
+def test_a_document_names_colours_links_and_joints_in_metres() -> None:
+    limit = JointLimit(-0.5, 0.25, 1.5)
+    joints = [Joint("headYaw", "base_link", np.array([10.0, 20.0, 30.0]), limit),
+              Joint("headPitch", "headYaw", np.array([10.0, 50.0, 30.0]), limit)]  # fmt: skip
+    part = piece("skin", np.eye(3), [[0, 1, 2]])
+    own = urdf.Piece("headYaw", "own", part, part.triangles, "skin", np.array([0.0, 0.25, 1.0]))
+    robot = ET.fromstring(urdf._document("me", joints, [own], "me_meshes"))
+    assert robot.get("name") == "me"
+    colour = robot.find("material/color")
+    assert colour is not None and colour.get("rgba") == f"0.0000 {0.25 ** (1 / 2.2):.4f} 1.0000 1"
+    assert [link.get("name") for link in robot.findall("link")] == ["base_link", "headYaw", "headPitch"]
+    assert [mesh.get("filename") for mesh in robot.iter("mesh")] == ["me_meshes/headYaw-own.stl"]
+    origins = [str(each.get("xyz")) for each in robot.findall("joint/origin")]
+    assert origins == ["0.030000 0.010000 0.020000", "0.000000 0.000000 0.030000"]  # forward, left, up
+    first = robot.find("joint/limit")
+    assert first is not None and first.attrib == {
+        "lower": "-0.500000", "upper": "0.250000", "velocity": "1.5000", "effort": "1",
+    }  # fmt: skip

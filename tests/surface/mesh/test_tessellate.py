@@ -409,3 +409,31 @@ def test_a_slit_through_a_seam_stays_open_there() -> None:
     assert not (mesh.uv[:, 0] == 1.0).any()
     rim = mesh.uv[shapes.border(mesh)].reshape(-1, 2)
     assert (rim[:, 1] == 0.5).all()
+
+
+@pytest.mark.parametrize(("off", "third", "kept"), [
+    (0.0, 1.0, [1]), (0.0, 1.5e-9, [1]), (1.0, 1.0, [0, 1]), (0.0, 0.0, [0, 1]), (0.0, "near", [0, 1]),
+    ("near", 1.0, [1]), ("farther", 1.0, [0, 1]),
+])  # fmt: skip
+@pytest.mark.parametrize("number", [0, 1, 2, 3])
+def test_a_border_is_a_pole_where_its_points_lie_within_a_thousand_millionth_of_the_size(
+    number: int, off: float | str, third: float | str, kept: list[int]
+) -> None:
+    """One triangle with two corners on the border, one with a single one; the first goes where only it lies beyond."""
+    axis, at_end = divmod(number, 2)
+    net = np.array([[[0.0, 0, 0], [0, 0, 0]], [[0, 0, 0], [0, 0, 0]]])
+    ends = [slice(None), slice(None)]
+    ends[axis] = slice(1 - at_end, 2 - at_end)  # type: ignore[call-overload]
+    net[tuple(ends)] = [1.0, 0.0, 0.0]
+    surface = DCPSurface.from_nurbs(1, 1, [0, 0, 1, 1], [0, 0, 1, 1], net)
+    near = 1e-9 * tessellation.diagonal_of(surface)
+    distances = {"near": near, "farther": 1.5 * near}
+    uv = np.array([[0.0, 0.0], [0.0, 0.5], [0.5, 0.5], [0.5, 0.7]])
+    uv = uv if axis == 0 else uv[:, ::-1].copy()
+    uv[:, axis] = 1.0 - uv[:, axis] if at_end else uv[:, axis]
+    points = np.zeros((4, 3))
+    points[1, 0] = distances.get(off, off)  # type: ignore[arg-type]
+    points[2, 1] = points[3, 1] = distances.get(third, third)  # type: ignore[arg-type]
+    flat = trim.Flat(uv, np.array([[0, 1, 2], [1, 2, 3]]), np.array([5, 6]))
+    found = tessellation._drop_poles(surface, flat, points, Domain((0, 1, 0, 1)))
+    assert found.triangles.tolist() == flat.triangles[kept].tolist() and found.owner.tolist() == [5 + k for k in kept]

@@ -258,3 +258,29 @@ def test_the_border_runs_through_marks_on_straight_sides(across: float) -> None:
         border = flat.uv[np.unique(border_edges(flat.triangles))]
         assert (border[:, None] == marks).all(axis=2).any(axis=0).all()
         assert areas(flat).sum() == pytest.approx(0.8 * (across - 0.1))
+
+
+def test_the_first_flat_triangle_with_the_vertex_on_its_longest_edge_is_found() -> None:
+    uv = np.array([[0.0, 0], [1, 0], [2, 0], [1, 1], [1, -1], [1.0, 5.0]])
+    sharp, turned = [0, 1, 3], [2, 0, 1]  # one with area; one that has the vertex as its last corner
+    upright = [3, 1, 4]
+    for triangles, wanted in (
+        ([sharp, turned, upright], 1), ([sharp, upright, turned], 1), ([sharp, upright], 1), ([sharp], None),
+        ([[1, 3, 5], sharp], None),  # without area, but the vertex is an end
+        ([[0, 2, 4], sharp], None),
+    ):  # fmt: skip
+        flat = Flat(uv, np.array(triangles), np.arange(len(triangles)))
+        assert trim._find_flat(flat, 1) == wanted
+
+
+@pytest.mark.parametrize(("off", "found"), [(1.9e-9, 0), (2.1e-9, None)])
+def test_a_triangle_is_flat_below_a_thousand_millionth_of_its_squared_sides(off: float, found: int | None) -> None:
+    uv = np.array([[-1.0, 0.0], [0.0, 0.0], [1.0, off]])  # the cross product is off, the squared sides are 2
+    assert trim._find_flat(Flat(uv, np.array([[0, 1, 2]]), np.arange(1)), 1) == found
+
+
+def test_the_triangle_across_an_edge_runs_along_it_the_other_way() -> None:
+    triangles = np.array([[0, 1, 2], [4, 5, 3], [2, 1, 3], [0, 2, 3]])
+    wanted = {(1, 2): 2, (2, 1): 0, (3, 0): None, (2, 0): 3, (1, 0): 0, (3, 4): None, (4, 3): 1, (5, 4): 1}
+    assert {edge: trim._find_across(triangles, *edge) for edge in wanted} == wanted
+    assert trim._find_across(np.vstack([triangles, triangles]), 1, 2) == 2  # of two the first

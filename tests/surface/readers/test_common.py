@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surface import DCPSurface, Domain, Slit, SurfaceFileError
-from surface.readers.common import Location, NamedSurface, read_bytes, read_text, summary
+from surface.readers.common import Location, NamedSurface, Ties, read_bytes, read_text, summary
 
 SQUARE = [[0.2, 0.2], [0.8, 0.2], [0.8, 0.8], [0.2, 0.8]]
 
@@ -67,3 +67,29 @@ def test_a_missing_file_is_named_with_its_cause(tmp_path: Path) -> None:
     with pytest.raises(SurfaceFileError, match=r"none\.xml: cannot be read: No such file") as caught:
         read_bytes(tmp_path / "none.xml")
     assert caught.value.hint == f"look at: ls -l {tmp_path / 'none.xml'}"
+
+
+def test_ties_give_control_points_their_shares_of_the_files_points() -> None:
+    points = {7: np.array([0.0, 0, 0]), 3: np.array([2.0, 0, 0]), 5: np.array([0.0, 4, 0])}
+    ties = Ties.of([{3: 1.0}, {7: 0.25, 5: 0.75}, {5: -1.0, 3: 2.0}], points)
+    assert ties.count == 3 and ties.points.tolist() == [[2, 0, 0], [0, 4, 0], [0, 0, 0]]  # in the order of numbers
+    np.testing.assert_allclose(ties.apply(ties.points), [[2, 0, 0], [0, 3, 0], [4, -4, 0]])
+    assert ties.apply(np.ones((3, 2))).tolist() == [[1, 1]] * 3
+    none = Ties(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(0), 2, np.zeros((0, 3)))
+    assert none.apply(np.zeros((0, 1))).tolist() == [[0.0], [0.0]]
+
+
+@pytest.mark.parametrize(("deviation", "said"), [(0.0, ""), (0.01234, ", fitted near star points within 0.0123")])
+def test_a_summary_tells_what_is_fitted(deviation: float, said: str) -> None:
+    assert summary(NamedSurface("a", sheet(), deviation=deviation)).partition("v 0 to 1")[2] == said
+    two = Domain((0.0, 1.0, 0.0, 1.0), slits=[Slit("u", 0.5, 0.2, 0.8), Slit("v", 0.5, 0.2, 0.8)])
+    assert summary(NamedSurface("a", sheet(), two)).endswith(", 2 slits")
+
+
+def test_text_may_begin_with_a_byte_order_mark_and_is_limited(tmp_path: Path) -> None:
+    path = tmp_path / "a.tsm"
+    path.write_bytes(b"\xef\xbb\xbfab")
+    assert read_text(path) == read_text(path, errors="replace") == "ab"
+    assert read_bytes(path, 5) == b"\xef\xbb\xbfab"
+    with pytest.raises(SurfaceFileError, match="is larger than"):
+        read_bytes(path, 4)

@@ -2,11 +2,20 @@
 
 import os
 
+import numpy as np
 import pytest
 
 from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT
-from surface.readers.meshdata import MAX_MOVES, MAX_VERTICES, check_size, read_bytes
+from surface.readers.meshdata import (
+    MAX_MOVES,
+    MAX_VERTICES,
+    Material,
+    check_size,
+    kind_of_picture,
+    linear,
+    read_bytes,
+)
 
 
 def test_limits_themselves_are_allowed():
@@ -43,3 +52,26 @@ def test_missing_files_and_folders_say_what_to_do(tmp_path):
         with pytest.raises(FitError, match=why) as caught:
             read_bytes(path)
         assert hint in caught.value.hint
+
+
+def test_shades_of_srgb_become_linear():
+    srgb = np.array([0.0, 0.02, 0.04045, 0.0405, 0.5, 1.0])
+    wanted = [0.0, 0.02 / 12.92, 0.04045 / 12.92, (0.0955 / 1.055) ** 2.4, (0.555 / 1.055) ** 2.4, 1.0]
+    np.testing.assert_allclose(linear(srgb), wanted, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("data", "kind"),
+    [(b"\x89PNG\r\n", "image/png"), (b"\xff\xd8\xff\xe0", "image/jpeg"), (b"RIFF1234WEBP", "image/webp"),
+     (b"GIF89", ""), (b"", ""), (b" \x89PNG", "")],
+)  # fmt: skip
+def test_pictures_are_told_by_their_first_bytes(data, kind):
+    assert kind_of_picture(data) == kind
+
+
+def test_places_in_a_picture_run_down():
+    uv = np.array([[0.0, 0.0], [1.0, 1.0], [0.25, 0.75]])
+    np.testing.assert_allclose(Material().in_picture(uv), [[0, 1], [1, 0], [0.25, 0.25]])
+    turned = Material(image_of_uv=((0.0, 2.0, 3.0), (-4.0, 0.0, 5.0)))
+    np.testing.assert_allclose(turned.in_picture(uv), [[3, 5], [5, 1], [4.5, 4]])
+    assert (Material().alpha, Material().cutoff, Material().colour) == ("OPAQUE", 0.5, (1.0, 1.0, 1.0, 1.0))

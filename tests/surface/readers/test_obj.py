@@ -99,3 +99,36 @@ def test_folders_without_what_is_needed(tmp_path):
     (tmp_path / "empty").mkdir()
     with pytest.raises(FitError, match=r"holds no \.obj shape"):
         load_mesh(path, LoadOptions(shapes=tmp_path / "empty"))
+
+
+def test_vertices_have_colours_where_all_of_them_do(tmp_path):
+    rows = ["v 0 0 0 0 0.5 1\n", "v 2 0 0 1 0.02 0\n", "v 2 2 0 0.5 0.5 0.5 9\n"]
+    tail = "f 1 2 3\n"
+    srgb = np.array([[0, 0.5, 1], [1, 0.02, 0], [0.5, 0.5, 0.5]])
+    wanted = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+    np.testing.assert_allclose(read_obj(written(tmp_path, "".join(rows) + tail)).colours, wanted)
+    for row in ("v 2 2 0\n", "v 2 2 0 1 1\n", "v 2 2 0 1 1 1.01\n", "v 2 2 0 -0.01 1 1\n", "v 2 2 0 nan 1 1\n",
+                "v 2 2 0 1 1 x\n", "v 2 2 0 1 1 1 1 1\n"):  # fmt: skip
+        assert read_obj(written(tmp_path, "".join(rows[:2]) + row + tail)).colours is None, row
+
+
+def test_corners_are_counted_from_the_last_vertex_up_to_the_first(tmp_path):
+    mesh = read_obj(written(tmp_path, CUBE_FACE + "f -4/-4 -3/-3 -1/-1\nf 4/4 3/-4 1/1\n"))
+    assert mesh.faces[:, :3].tolist() == [[0, 1, 3], [3, 2, 0]]
+    assert mesh.face_uv[:, :3].tolist() == [[0, 1, 3], [3, 0, 0]]
+    for corner in ("-5", "1/-5", "1/-6", "0"):
+        with pytest.raises(FitError, match=f"corner {corner} points before the first vertex"):
+            read_obj(written(tmp_path, CUBE_FACE + f"f {corner} 2 3\n"))
+    with pytest.raises(FitError, match="line 9: a face needs three corners, not 2"):
+        read_obj(written(tmp_path, CUBE_FACE + "f 1 2\n"))
+    largest = read_obj(written(tmp_path, CUBE_FACE + f"f {2**31} 2 3\n"))
+    assert largest.faces[0, 0] == 2**31 - 1
+    with pytest.raises(FitError, match="points beyond the last vertex"):
+        read_obj(written(tmp_path, CUBE_FACE + f"f {2**31 + 1} 2 3\n"))
+
+
+def test_a_line_that_goes_on_counts_once_and_names_may_hold_spaces(tmp_path):
+    text = CUBE_FACE + "g  the cheek \nusemtl skin 1\nf 1 2 \\\n3\no lip\nf 1 2 3\n"
+    assert read_obj(written(tmp_path, text)).pieces == ("the cheek/skin 1", "lip/skin 1")
+    assert read_obj(written(tmp_path, CUBE_FACE + "usemtl a\nf 1 2 3\n")).pieces == ("a",)
+    assert read_obj(written(tmp_path, CUBE_FACE + "f 1 2 3\n")).pieces == ("",)

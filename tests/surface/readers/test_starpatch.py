@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 from numpy.testing import assert_allclose
 from scipy.interpolate import BSpline
@@ -11,9 +13,13 @@ from surface.readers.starpatch import (
     SPANS,
     Sampled,
     _basis,
+    _corner,
     _correct_sides,
     _fill,
     _project_to_limit,
+    _rows,
+    _side,
+    _sides,
     _subdivide,
     fit_patch,
 )
@@ -116,3 +122,102 @@ def test_sides_that_are_known_are_met_and_the_others_stay() -> None:
     assert_allclose(moved[-1], right, atol=1e-14)
     assert_allclose(moved[:, -1], 0.0, atol=1e-14)
     assert_allclose(moved[0], 0.0, atol=1e-14)
+
+
+def test_a_step_at_the_outline_is_that_of_a_cubic_curve_and_corners_stay() -> None:
+    faces, flat = grid(3)
+    heights = np.random.default_rng(2).normal(size=9)
+    x = np.column_stack([flat, heights])
+    _, fine, where = _subdivide(faces, x, flat)
+    assert_allclose(fine[[0, 2, 6, 8]], x[[0, 2, 6, 8]])  # in one face only
+    assert_allclose(fine[1], 0.75 * x[1] + 0.125 * (x[0] + x[2]))
+    assert_allclose(fine[3], 0.75 * x[3] + 0.125 * (x[0] + x[6]))
+    centres = [x[face].mean(axis=0) for face in faces]
+    middle = np.mean(centres, axis=0)  # (F + 2 R + (n - 3) P) / n with four faces
+    ends = np.mean([0.5 * (x[4] + x[k]) for k in (1, 3, 5, 7)], axis=0)
+    assert_allclose(fine[4], (middle + 2 * ends + x[4]) / 4)
+    assert_allclose(where[:9], flat)
+    first = fine[9 : 9 + 12]  # middles of the edges
+    assert np.abs(first - 0.5 * (x[0] + x[1])).max(axis=1).min() < 1e-12  # on the outline
+    inner = 0.25 * (x[4] + x[1]) + 0.25 * (centres[0] + centres[1])
+    assert np.abs(first - inner).max(axis=1).min() < 1e-12
+    assert_allclose(fine[21:], centres)
+    limit = _project_to_limit(faces, x)
+    assert_allclose(limit[[0, 2, 6, 8]], x[[0, 2, 6, 8]])
+    assert_allclose(limit[1], (4 * x[1] + x[0] + x[2]) / 6)
+    quad = 16 * x[4] + 4 * (x[1] + x[3] + x[5] + x[7]) + x[0] + x[2] + x[6] + x[8]
+    assert_allclose(limit[4], quad / 36)
+
+
+def test_every_quad_of_a_step_runs_as_its_face_does() -> None:
+    faces, flat = grid(3)
+    quads, _, where = _subdivide(faces, flat, flat)
+    assert len(quads) == 16
+    corner = where[np.array(quads)]
+    x, y = corner[..., 0], corner[..., 1]
+    areas = 0.5 * (x * np.roll(y, -1, axis=1) - np.roll(x, -1, axis=1) * y).sum(axis=1)
+    assert_allclose(areas, 0.25)
+    five = [[0, 1, 2, 3, 4]]
+    _, _, where = _subdivide(five, np.eye(5), np.zeros((5, 2)))
+    assert np.isnan(where[-1]).all() and (where[:-1] == 0).all()  # only the middle of a quad is a place
+
+
+def test_the_missing_part_at_a_corner_is_the_mean_of_what_both_sides_lack() -> None:
+    after, before = np.array([[2.0], [9.0]]), np.array([[9.0], [4.0]])
+    assert [_corner(*pair).tolist() for pair in ((after, before), (after, None), (None, before), (None, None))] == [
+        [3.0], [2.0], [4.0], [0.0],
+    ]  # fmt: skip
+
+
+def test_all_four_sides_are_met_in_their_order_round_the_face() -> None:
+    rng = np.random.default_rng(5)
+    limit = rng.normal(size=(COUNT, COUNT, 2))
+    corners = rng.normal(size=(4, 2))
+    t = np.linspace(0.0, 1.0, COUNT)[:, None]
+    sides = [(1 - t) * corners[k] + t * corners[(k + 1) % 4] + t * (1 - t) * rng.normal(size=2) for k in range(4)]
+    moved = _correct_sides(limit, sides)
+    assert_allclose(moved[:, 0], sides[0], atol=1e-12)
+    assert_allclose(moved[-1], sides[1], atol=1e-12)
+    assert_allclose(moved[::-1, -1], sides[2], atol=1e-12)
+    assert_allclose(moved[0, ::-1], sides[3], atol=1e-12)
+    flat = _correct_sides(np.zeros((COUNT, COUNT, 2)), [None] * 4)
+    assert not flat.any()
+    raised = _correct_sides(np.zeros((COUNT, COUNT, 1)), [np.ones((COUNT, 1))] * 4)
+    assert_allclose(raised, 1.0)
+
+
+def star_mesh(lengths: list[float]) -> SimpleNamespace:
+    """As much of a mesh as its sides are sampled by: link k lies on edge k, and its opposite has the number 100 + k."""
+    links = {k: SimpleNamespace(edge=k, opposite=100 + k, turn=0) for k in range(len(lengths))}
+    return SimpleNamespace(file=SimpleNamespace(links=links, edges=dict(enumerate(lengths))))
+
+
+def test_a_side_of_several_links_is_sampled_by_their_lengths_against_their_opposites() -> None:
+    mesh = star_mesh([1.0, 3.0])
+    asked: list[tuple[int, int]] = []
+
+    def along(link: int, count: int) -> list[dict[int, float]]:
+        asked.append((link, count))
+        return [{link: k / (count - 1)} for k in range(count)]
+
+    found = _side(mesh, [0, 1], along)  # type: ignore[arg-type]
+    assert asked == [(100, 129), (101, 129)] and found is not None
+    t = np.linspace(0.0, 4.0, COUNT)
+    wanted = [(100, 1.0 - x) if x < 1.0 else (101, 1.0 - (x - 1.0) / 3.0) for x in t]
+    assert [next(iter(row)) for row in found] == [link for link, _ in wanted]
+    assert_allclose([next(iter(row.values())) for row in found], [share for _, share in wanted], atol=0.5 / 128)
+    assert _side(mesh, [0, 1], lambda link, count: None if link == 101 else along(link, count)) is None  # type: ignore[arg-type]
+
+
+def test_shares_of_a_side_stand_in_the_columns_of_their_grips() -> None:
+    found = _rows([{7: 0.25, 3: 0.75}, {3: 1.0}], {3: 0, 5: 1, 7: 2})
+    assert found is not None and found.tolist() == [[0.75, 0.0, 0.25], [1.0, 0.0, 0.0]]
+    assert _rows(None, {3: 0}) is None
+
+
+def test_sides_begin_at_the_links_that_turn() -> None:
+    mesh = star_mesh([1.0] * 5)
+    mesh.file.links[2].turn = 1  # a T-junction within the second side
+    mesh.loops = {9: [0, 1, 2, 3, 4]}
+    found = _sides(mesh, 9, lambda link, count: [{link: 1.0}] * count)  # type: ignore[arg-type]
+    assert [{grip for row in side or [] for grip in row} for side in found] == [{100}, {101, 102}, {103}, {104}]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from relief import CELLS, bulge, cube_grips, cube_tsm
 from scipy.spatial import cKDTree
 
 from surface import SurfaceFileError
-from surface.readers import NamedSurface, read_surface, summary
+from surface.readers import NamedSurface, read_surface, summary, tcharts
 from surface.readers.inversion import invert
+from surface.readers.starpatch import COUNT, Sampled
 from surface.readers.tcharts import outlines
 
 
@@ -160,3 +162,21 @@ def test_short_knot_intervals_are_scaled_and_the_form_stays(tmp_path: Path) -> N
         found += read_surface(tmp_path / "cube.tsm")
     assert found[0].domain.rect == pytest.approx(found[1].domain.rect)
     np.testing.assert_allclose(found[0].surface.points, found[1].surface.points, atol=1e-9)
+
+
+def test_a_patch_is_clamped_over_its_own_width_and_height() -> None:
+    link = SimpleNamespace(edge=0)
+    sheet = tcharts._Sheet(SimpleNamespace(file=SimpleNamespace(edges={0: 1.0, 1: 3.0}, links={0: link})))  # type: ignore[arg-type]
+    sheet._add_sides = lambda *_: None  # type: ignore[method-assign]
+    sheet._next = 10.0
+    samples = np.ones((COUNT, COUNT, 1))
+    off = sheet.add_patch(7, Sampled([5], (2.0, 8.0), samples, samples), {5: np.array([1.0, 2.0, 3.0])})
+    assert off == pytest.approx(0.0, abs=1e-12) and sheet._count == 1
+    assert sheet._ties == [{5: pytest.approx(1.0)}] * 49 and sheet._weights == [1.0] * 49
+    for axis, size, low in ((0, 2.0, 10.0), (1, 8.0, 0.0)):
+        line = [0.0, 0, 0, 0, 0.25 * size, 0.5 * size, 0.75 * size, size, size, size, size]
+        windows = np.array([line[k : k + 5] for k in range(7)]) + low
+        own = np.repeat(windows, 7, axis=0) if axis == 0 else np.tile(windows, (7, 1))
+        np.testing.assert_allclose(sheet._knots[axis], own)
+    np.testing.assert_allclose(sheet._loops[0], [[10, 0], [12, 0], [12, 8], [10, 8]])
+    assert sheet._next == pytest.approx(12.0 + tcharts.GAP * 2.0)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from relief import cube_tsm
 
+from surface.readers import tlayout
 from surface.readers.common import Location
 from surface.readers.tlayout import Complex, Copy, Layout, Ray, directions, nearest, overlap
 from surface.readers.tsmfile import parse
@@ -103,3 +104,53 @@ def test_grips_that_act_in_a_face_are_the_b_splines_of_the_net() -> None:
         along_u = [knots for knots in windows(us) if knots[0] < b and knots[-1] > a]
         along_v = [knots for knots in windows(vs) if knots[0] < d and knots[-1] > c]
         assert len(copies) == 16 and found == sorted((u, v) for u in along_u for v in along_v)
+
+
+@pytest.mark.parametrize(
+    ("counts", "wanted"),
+    [
+        ([2, 0, 0, 0], [(1,), (1,)]), ([0, 1, 0, 0], [(2,)]), ([0, 0, 1, 0], [(3,)]),
+        ([0, 0, 2, 1], [(3,), (3,), (3, 0), (3, 0), (0,)]), ([1, 0, 0, 2], [(1,), (0,), (0,), (0, 1), (0, 1)]),
+    ],
+)  # fmt: skip
+def test_grips_are_counted_side_by_side_in_the_order_of_the_file(counts: list[int], wanted: list[tuple]) -> None:
+    assert directions(counts) == wanted
+
+
+def test_rectangles_overlap_by_more_than_what_is_near() -> None:
+    one = (0.0, 1.0, 0.0, 1.0)
+    for share, over in ((0.5, False), (2.0, True)):
+        off = share * 0.01
+        for other in ((1 - off, 2, 0, 1), (-1, off, 0, 1), (0, 1, 1 - off, 2), (0, 1, -1, off)):
+            assert overlap(one, other, 0.01) == over and overlap(other, one, 0.01) == over
+
+
+def test_values_that_are_near_each_other_are_one() -> None:
+    assert tlayout._merge_values([0.0, 0.4, 1.5, 1.6, 2.7], 1.0) == [0.0, 1.5, 2.7]
+    assert tlayout._merge_values([0.0, 1.0], 1.0) == [0.0] and tlayout._merge_values([], 1.0) == []
+
+
+def test_a_layout_that_ends_goes_on_by_its_last_interval_on_either_side() -> None:
+    inf = np.inf
+    assert tlayout._extend([1.0, 2.0, 5.0], 2.0, 0.0, 9.0) == [1.0, 2.0, 5.0]
+    assert tlayout._extend([1.0, 2.0, 5.0], 2.0, -inf, inf) == [-2.0, -1.0, 0.0, 1.0, 2.0, 5.0, 8.0, 11.0, 14.0]
+    assert tlayout._extend([1.0, 2.0, 5.0], 2.0, -2.0, inf) == [1.0, 2.0, 5.0, 8.0, 11.0, 14.0]
+    assert tlayout._extend([1.0, 2.0, 5.0], 2.0, -inf, 9.0) == [-2.0, -1.0, 0.0, 1.0, 2.0, 5.0]
+    assert tlayout._extend([], 4.0, -inf, 6.0) == [-2.0, 0.0, 2.0]  # from x back, as far as x is from the end
+    assert tlayout._extend([], 4.0, 1.0, inf) == [7.0, 10.0, 13.0]
+    assert tlayout._extend([], 4.0, -inf, inf) == [1.0, 2.0, 3.0, 5.0, 6.0, 7.0]
+
+
+def test_a_ray_takes_places_within_what_is_near_for_one() -> None:
+    ray = Ray(lines((0.0, 1), (1.0, 0), (1.05, 0), (2.0, 2)), 0.1)
+    whole = ([0.0] * 4 + [1.0] + [2.0] * 4, 0.0, 2.0)
+    for x in (-0.05, 0.0, 0.5, 2.0, 2.05):
+        assert ray.row(x) == whole
+    assert ray.row(-0.2)[1:] == (-np.inf, 2.0) and ray.row(2.2)[1:] == (0.0, np.inf)
+
+
+def test_a_whole_turn_of_knots_is_none_and_they_are_moved_last() -> None:
+    assert KNOTS.moved(1.0, 2.0, 4) == KNOTS.moved(1.0, 2.0, 0)
+    assert KNOTS.moved(0.0, 0.0, 1).knots_u == (-7.0, -3.0, 0.0, 1.0, 2.0)
+    assert KNOTS.moved(0.5, 0.0, 1).knots_u[0] == -6.5 and KNOTS.moved(0.0, 0.5, 1).knots_v[0] == 0.5
+    assert KNOTS.rect == (0.0, 5.0, -2.0, 7.0)

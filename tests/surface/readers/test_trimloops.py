@@ -11,6 +11,7 @@ import pytest
 
 from surface import DCPSurface
 from surface.mesh.domain import Domain
+from surface.readers import trimloops
 from surface.readers.trimloops import TrimEdge, loop_over, polyline
 from tests.surface.readers.test_inversion import cylinder
 
@@ -135,3 +136,109 @@ def test_an_edge_away_from_its_face_is_refused() -> None:
 def test_a_loop_of_poles_alone_has_no_edge() -> None:
     with pytest.raises(ValueError, match="no edge in space"):
         loops_of_cylinder([POLE])
+
+
+def bilinear(corners: list[list[float]]) -> DCPSurface:
+    """A patch over the unit square; ``corners`` at (0, 0), (0, 1), (1, 0) and (1, 1)."""
+    knots = [0.0, 0.0, 1.0, 1.0]
+    return DCPSurface.from_nurbs(1, 1, knots, knots, np.array(corners).reshape(2, 2, 3))
+
+
+UNIT = (0.0, 1.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(("apart", "one"), [(0.9e-6, True), (1.1e-6, False)])
+def test_a_border_within_a_millionth_of_the_size_is_a_pole_and_two_so_near_are_a_seam(apart: float, one: bool) -> None:
+    off = [apart * 10.0, 0.0, 0.0]
+    for corners, pole, seam in (
+        ([[0, 0, 0], off, [1, 0, 1], [1, 5, 1]], (0, 0.0), None),
+        ([[1, 0, 1], [1, 5, 1], [0, 0, 0], off], (0, 1.0), None),
+        ([[0, 0, 0], [1, 0, 1], off, [1, 5, 1]], (1, 0.0), None),
+        ([[1, 0, 1], [0, 0, 0], [1, 5, 1], off], (1, 1.0), None),
+        ([[0, 0, 0], [0, 3, 0], off, [apart * 10.0, 3, 0]], None, (True, False)),
+        ([[0, 0, 0], off, [0, 3, 0], [apart * 10.0, 3, 0]], None, (False, True)),
+    ):
+        surface = bilinear(corners)  # type: ignore[arg-type]
+        poles = trimloops._poles(surface, UNIT, 10.0)
+        if pole is not None:
+            assert poles == ([pole] if one else [])
+        if seam is not None:
+            assert trimloops._closes(surface, UNIT, 10.0) == (seam if one else (False, False))
+
+
+def test_a_point_at_a_pole_takes_the_other_coordinate_of_the_nearest_along_the_edge() -> None:
+    for axis in range(2):
+        rect = (2.0, 4.0, 10.0, 14.0)
+        low, extent = rect[2 * axis], rect[2 * axis + 1] - rect[2 * axis]
+        uv = np.array([[low + 0.0009 * extent, 7.0], [low + 0.0011 * extent, 8.0], [low + 0.5, 9.0], [low, 5.0]])
+        uv = uv if axis == 0 else uv[:, ::-1].copy()
+        before = uv.copy()
+        trimloops._leave_poles(uv, rect, [(axis, low)])
+        assert uv[:, 1 - axis].tolist() == [8.0, 8.0, 9.0, 9.0]
+        np.testing.assert_array_equal(uv[:, axis], before[:, axis])
+    only = np.full((2, 2), [0.0, 3.0])
+    trimloops._leave_poles(only, UNIT, [(0, 0.0)])  # no point off the pole tells more
+    assert only[:, 1].tolist() == [3.0, 3.0]
+
+
+def test_edges_along_a_seam_are_free_and_the_ends_of_others_go_to_their_side() -> None:
+    rect = (0.0, 4.0, 0.0, 1.0)
+    seam = np.array([[0.003, 0.1], [3.997, 0.5], [0.0, 0.9]])
+    right = np.array([[0.001, 0.2], [3.0, 0.2], [2.5, 0.2]])
+    left = np.array([[1.0, 0.2], [1.5, 0.2], [3.999, 0.2]])
+    off = np.array([[0.005, 0.2], [3.995, 0.2]])
+    parts = [seam.copy(), right.copy(), left.copy(), off.copy()]
+    assert trimloops._seams(parts, rect, (True, False)) == [(0, 0)]
+    np.testing.assert_array_equal(parts[0], seam)
+    assert parts[1][:, 0].tolist() == [4.0, 3.0, 2.5] and parts[2][:, 0].tolist() == [1.0, 1.5, 0.0]
+    np.testing.assert_array_equal(parts[3], off)
+    again = [right.copy()]
+    assert trimloops._seams(again, rect, (False, False)) == []
+    np.testing.assert_array_equal(again[0], right)
+    across = [np.array([[1.0, 0.9991], [2.0, 0.0005], [3.0, 0.5]])]
+    assert trimloops._seams(across, rect, (False, True)) == [] and across[0][:, 1].tolist() == [0.9991, 1.0, 0.5]
+    near = [np.array([[1.0, 0.9995], [2.0, 0.0005]])]
+    assert trimloops._seams(near, rect, (True, True)) == [(0, 1)]
+
+
+def test_whether_edges_follow_each_other_without_a_pole_between() -> None:
+    curve = TrimEdge(np.zeros((2, 3)))
+    for edges, wanted in (
+        ([curve, curve, curve], [True, True, True]), ([curve, POLE, curve], [False, True]),
+        ([POLE, curve, curve], [True, False]), ([curve, curve, POLE], [True, False]), ([curve], [True]),
+        ([POLE, curve, POLE, curve], [False, False]),
+    ):  # fmt: skip
+        assert trimloops._follow_directly(edges).tolist() == wanted
+
+
+@pytest.mark.parametrize(("gap", "closes"), [(0.019, True), (0.021, False)])
+def test_ends_a_fiftieth_of_the_rectangle_apart_close(gap: float, closes: bool) -> None:
+    rect = (0.0, 4.0, 0.0, 10.0)
+    for off in ([4.0 * gap, 0.0], [0.0, 10.0 * gap]):
+        sides = [[[1.0, 1.0], [2.0, 1.0]], [[2.0, 1.0], [2.0, 5.0]], [[2.0, 5.0], [1.0, 1.0]]]
+        parts = [np.array(side) for side in sides]
+        parts[1] += off
+        joined = np.array([True, False, True])
+        if closes:
+            assert len(trimloops._chain(parts, [], rect, joined)) >= 4
+        else:
+            with pytest.raises(ValueError, match="does not close"):
+                trimloops._chain(parts, [], rect, joined)
+        parts[1] = parts[1] - off
+        assert len(trimloops._chain(parts, [], rect, joined)) == 3
+
+
+def test_an_edge_along_a_seam_lies_at_the_end_that_closes_the_loop_anticlockwise() -> None:
+    rect = (0.0, 4.0, 0.0, 1.0)
+    low, high = np.array([[0.0, 0.0], [4.0, 0.0]]), np.array([[4.0, 1.0], [0.0, 1.0]])
+    up, down = np.array([[0.0, 0.0], [0.0, 1.0]]), np.array([[0.0, 1.0], [0.0, 0.0]])
+    loop = trimloops._chain([low, up, high, down], [(1, 0), (3, 0)], rect, np.ones(4, bool))
+    assert sorted(loop.tolist()) == [[0, 0], [0, 1], [4, 0], [4, 1]]
+    assert trimloops._area(loop) == pytest.approx(4.0) and trimloops._area(loop[::-1]) == pytest.approx(-4.0)
+    free = trimloops._chain([up.copy(), down.copy()], [(0, 0), (1, 0)], rect, np.zeros(2, bool))
+    assert trimloops._area(free) == pytest.approx(4.0)
+
+
+def test_points_that_repeat_the_one_before_are_dropped() -> None:
+    loop = np.array([[0.0, 0.0], [0.0, 0.0], [5.0, 0.0], [5.0, 4e-12], [5.0, 1e-11], [0.0, 3.0], [0.0, 0.0]])
+    assert trimloops._drop_repeats(loop).tolist() == [[5.0, 0.0], [5.0, 1e-11], [0.0, 3.0], [0.0, 0.0]]

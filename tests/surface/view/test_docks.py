@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
-from surface.view.docks import LINE, Dock, add_docks, show_docks, text_scale
+from surface.view.docks import LINE, MAIN, Dock, PictureArea, add_docks, find_area, show_docks, text_scale
 
 
 @pytest.mark.parametrize(
@@ -72,3 +74,36 @@ def test_panels_are_hidden_and_shown_again() -> None:
     for shown in (False, True):
         show_docks(found, shown=shown)
         assert all(window.is_visible is shown for window in docking.dockable_windows)
+
+
+def test_a_row_at_the_bottom_is_thirteen_lines_high_and_takes_no_width() -> None:
+    bottom = Dock("takes", "bottom", nothing)
+    splits = params([bottom, DOCKS[2]], (2000.0, 1000.0)).docking_params.docking_splits  # type: ignore[attr-defined]
+    assert [split.ratio for split in splits] == [pytest.approx(0.26), pytest.approx(0.225)]
+    (only,) = params([bottom], (2000.0, 300.0)).docking_params.docking_splits  # type: ignore[attr-defined]
+    assert only.ratio == pytest.approx(0.6)
+
+
+@pytest.mark.parametrize(
+    ("docks", "size", "scale"),
+    [
+        (DOCKS[:2], (900.0, 4320.0), 1.5), (DOCKS, (900.0, 4320.0), 1.0), (DOCKS, (1800.0, 4320.0), 2.0),
+        (DOCKS[:2], (9000.0, 4320.0), 4.0), ([Dock("a", "bottom", nothing)], (10.0, 4320.0), 4.0),
+        (DOCKS[:2], (10.0, 4320.0), 1.0),
+    ],
+)  # fmt: skip
+def test_text_is_as_large_as_the_columns_hold(docks: list[Dock], size: tuple[float, float], scale: float) -> None:
+    """22.5 lines of 16 points in 0.6 of the width, or in 0.4 for each of two columns."""
+    assert text_scale(size, 1.0, docks) == pytest.approx(scale)
+
+
+def test_where_nothing_is_docked_the_picture_stays_where_it_is() -> None:
+    area = PictureArea(1.0, 2.0, 3.0, 4.0)
+    node = SimpleNamespace(pos=SimpleNamespace(x=5.0, y=6.0), size=SimpleNamespace(x=7.0, y=8.0))
+    imgui = SimpleNamespace(
+        internal=SimpleNamespace(dock_builder_get_central_node=lambda space: node if space else None)
+    )
+    for space, wanted in ((None, (1.0, 2.0, 3.0, 4.0)), (0, (1.0, 2.0, 3.0, 4.0)), (9, (5.0, 6.0, 7.0, 8.0))):
+        docking = SimpleNamespace(dock_space_id_from_name=lambda name, space=space: space if name == MAIN else 1)
+        find_area(imgui, docking, area)
+        assert (area.left, area.top, area.width, area.height) == wanted

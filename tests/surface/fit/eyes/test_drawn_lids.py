@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 from eye_face import CENTRES
 from face_measures import Window
+from scipy.sparse import csr_matrix
 
+from surface.fit.eyes import drawn_lids
 from surface.fit.eyes.drawn_lids import BLINKS, MAX_CORRECTIONS, DrawnLids, seat_drawn_lids
+from surface.fit.points.eyeball import surface_height
 from surface.head import Group, Head, HeadData
 
 AHEAD = 40.0 + 6.0  # z of what lies before the middle of an eyeball
@@ -120,3 +123,77 @@ def test_what_a_head_takes_only_in_part_is_corrected_again(share, left, asked) -
     lids = Part(share)
     assert lids.shut(4.0) == (left, 4.0, left)
     assert lids.asked == asked
+
+
+def bare_lids(at: np.ndarray, radius: float = 12.0) -> DrawnLids:
+    """Lids whose samples are their control points, of an eye at the origin."""
+    lids = object.__new__(DrawnLids)
+    lids._eye, lids._radius = np.zeros(3), radius
+    lids._samples = csr_matrix(np.eye(len(at)))
+    lids._dense = np.eye(len(at))
+    lids._square = lids._dense.T @ lids._dense
+    lids._ids = np.arange(len(at))
+    return lids
+
+
+def test_samples_lack_the_height_that_they_are_less_than_asked_above_the_eyeball() -> None:
+    side = np.array([0.8, 0.0, 0.6])  # off the cornea, 7.2 mm in front of the centre
+    at = np.array([12.0 * side, 13.0 * side, 11.0 * side, [0.0, 0.0, 12.0], [12.0, 0.0, 0.0]])
+    unit, lacks = bare_lids(at)._sampled(at, drawn_lids.FORWARD, 0.045)
+    np.testing.assert_allclose(unit[:3], np.tile(side, (3, 1)))
+    np.testing.assert_allclose(lacks[:3], [0.54, 0.0, 1.54])
+    assert lacks[3] == pytest.approx(12.0 * (0.045 + surface_height(unit[3:4], drawn_lids.FORWARD)[0]) - 12.0)
+    assert lacks[3] > 1.0 and lacks[4] == 0.0  # the cornea stands out; beside the eyeball lids may lie as they do
+    for depth, share in ((0.05, 0.0), (0.2, 0.5), (0.35, 1.0), (0.125, 0.15625)):
+        low = 10.0 * np.array([[np.sqrt(1 - (1.2 * depth) ** 2), 0.0, 1.2 * depth]])
+        assert bare_lids(low)._sampled(low, drawn_lids.FORWARD, 0.0)[1][0] == pytest.approx(2.0 * share)
+
+
+def test_what_lacks_height_is_lifted_a_fifth_further_and_the_rest_held() -> None:
+    side = np.array([0.8, 0.0, 0.6])
+    at = np.array([11.0 * side, 20.0 * side])
+    lids = bare_lids(at)
+    moves = lids._lift(at, drawn_lids.FORWARD, 0.0)
+    # of the first: (0.05 + 0.95 + 0.02) x = 1.2 times the missing 1 mm
+    np.testing.assert_allclose(moves, [1.2 / 1.02 * side, [0.0, 0.0, 0.0]], atol=1e-12)
+    for lacking, lifted in ((0.0024, False), (0.0026, True)):
+        near = np.array([(1.0 - lacking) * 12.0 * side, 20.0 * side])
+        assert len(lids._lift(near, drawn_lids.FORWARD, 0.0)) == (2 if lifted else 0)
+
+
+def test_triangles_are_sampled_at_ten_places() -> None:
+    found = drawn_lids._shares(np.array([[0, 1, 2], [2, 1, 3]]), 4).toarray()
+    wanted = {(3 - i - j, i, j) for i in range(4) for j in range(4 - i)}
+    assert found.shape == (20, 4)
+    for rows, columns in ((found[:10], [0, 1, 2]), (found[10:], [2, 1, 3])):
+        assert {tuple(row) for row in np.rint(3 * rows[:, columns]).astype(int).tolist()} == wanted
+        np.testing.assert_allclose(rows.sum(axis=1), 1.0)
+
+
+def test_displacements_are_added_to_a_group_and_rounded() -> None:
+    group = Group("eyeBlinkLeft", np.array([1, 3], np.int32), np.array([[1.0, 2, 3], [4, 5, 6]], np.float32))
+    more = np.zeros((5, 3))
+    more[0], more[1], more[4] = (0.12345678, 0, 0), (-1.0, -2.0, -3.0), (0, 0, -0.5)
+    found = drawn_lids._with_more(group, more)
+    assert found.name == "eyeBlinkLeft" and found.ids.tolist() == [0, 3, 4] and found.ids.dtype == np.int32
+    np.testing.assert_allclose(found.moves, [[0.1235, 0, 0], [4, 5, 6], [0, 0, -0.5]], atol=1e-7)
+    assert more[1, 0] == -1.0
+
+
+def test_gaps_are_closed_a_fiftieth_of_a_radius_further_in_every_column_beside_them() -> None:
+    lids = bare_lids(np.zeros((1, 3)))
+    columns = np.array([[-4.0, 0.0, 4.0], [-4.0, 1.0, 4.0]])
+    lids._columns = lambda points: columns  # type: ignore[method-assign]
+    x = np.arange(-6.0, 6.5, 0.5)
+    seen = np.where(x == 2.0, 1.5, 0.0)
+    found = lids._needs(np.zeros((1, 3)), x, seen)
+    # columns are 4 mm apart, 8 steps: the gap at 2 counts from -2 to 6
+    np.testing.assert_allclose(found, [[0.0, 1.74, 1.74], [0.0, 1.74, 1.74]])
+    assert not lids._needs(np.zeros((1, 3)), x, 0.0 * seen).any()
+    far = lids._needs(np.zeros((1, 3)), x, np.where(x == 5.0, 1.5, 0.0))
+    np.testing.assert_allclose(far[:, 1], [0.0, 1.74])  # 4.5 is beyond, 1 to 5 is not
+
+
+def test_a_shape_alone_is_a_pose() -> None:
+    pose = drawn_lids._pose("jawOpen")
+    assert pose.jaw == 1.0 and np.count_nonzero(pose.shapes) == 1 and not pose.head.any()

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from eye_face import CENTRES, RADIUS, face, joined, pair, shell, with_margins
 
+from surface.fit.eyes import margins as margins_module
 from surface.fit.eyes.lids import fit_lids
 from surface.fit.eyes.margins import _without_teeth, margins
 from surface.fit.eyes.search import Eyes, find_eyes
@@ -61,3 +62,53 @@ def test_a_triangle_that_stands_out_alone_is_one_between_faces_that_are_gone() -
     beside = np.array([True, False, False, False])
     again = FitMesh(mesh.vertices[:4], faces[:2], mesh.uv, mesh.face_uv[:2], (), np.zeros((0, 4, 3)))
     assert _without_teeth(again, kept[:2], beside[:2]).tolist() == [False, True], "only one of its edges is beside one"
+
+
+def eye(local: list[list[float]], radius: float = 10.0) -> margins_module._Eye:
+    return margins_module._Eye(np.array(local, float), radius)
+
+
+def test_the_rim_before_an_eye_is_an_upper_and_a_lower_lid() -> None:
+    """By the line between its corners, within 1.4 radii in front of the centre."""
+    at = [[-8.0, -1.0, 5.0], [8.0, 1.0, 5.0], [0.0, 3.0, 9.0], [0.0, -3.0, 9.0], [4.0, 0.6, 9.0], [4.0, 0.4, 9.0]]
+    beyond = [[0.0, 13.9, 2.0], [0.0, 13.7, 2.0], [0.0, 5.0, -1.0], [0.0, 5.0, 0.0], [0.0, 4.0, 9.0]]
+    many = [[x, 4.0, 8.0] for x in np.linspace(-5, 5, 30)]
+    local = at + beyond + many
+    rim = np.ones(len(local), bool)
+    rim[10] = False
+    upper, lower = eye(local).lids(rim)
+    assert sorted(upper.tolist()) == [2, 4, 7, *range(11, 41)] and sorted(lower.tolist()) == [0, 1, 3, 5]
+    assert (np.diff(np.array(local)[upper, 0]) >= 0).all()
+    few = np.arange(len(local)) < 3
+    assert [len(ids) for ids in eye(local).lids(few)] == [0, 0]
+
+
+def test_corners_are_six_per_cent_of_the_width() -> None:
+    local = [[-10.0, 0, 5], [10.0, 0, 5], [-8.79, 1, 5], [-8.81, 1, 5], [8.79, 1, 5], [8.81, 1, 5], [0.0, 1, 5]]
+    found = eye(local).between_corners(np.arange(2, 7), np.arange(7))
+    assert found.tolist() == [True, False, True, False, True]
+
+
+@pytest.mark.parametrize(("lift", "rise", "crushed"), [
+    (0.36, 0.61, True), (0.34, 0.61, False), (0.36, 0.59, False),
+])  # fmt: skip
+@pytest.mark.parametrize("forwards", [True, False])
+def test_a_rim_is_crushed_that_is_lifted_as_high_as_the_next_ring(
+    lift: float, rise: float, crushed: bool, forwards: bool
+) -> None:
+    """An edge of 2 mm from the rim, of which so much leads away from the centre."""
+    towards = np.array([0.0, 0.8, 0.6])
+    probe = eye([[0.0, 8.0, 6.0]])
+    height = float(probe._lift[0] + probe._away[0])
+    start = (height - 2.0 * lift) * towards
+    reach = np.linalg.norm(start) + 2.0 * rise
+    # the place at that distance whose edge is 2 mm long, off to the side
+    along = (reach**2 - 4.0 + np.linalg.norm(start) ** 2) / (2.0 * np.linalg.norm(start))
+    end = along * towards + np.sqrt(reach**2 - along**2) * np.array([1.0, 0.0, 0.0])
+    a, b = np.array([0, 1]), np.array([1, 2])
+    if not forwards:
+        a, b = b, a
+    found = eye([start.tolist(), end.tolist(), [0.0, 30.0, 0.0]]).crushed(a, b, np.array([True, False, False]))
+    assert found.tolist() == [crushed, False, False]
+    both = eye([start.tolist(), end.tolist()]).crushed(np.array([0]), np.array([1]), np.array([True, True]))
+    assert not both.any()  # along the rim

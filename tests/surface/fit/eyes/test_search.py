@@ -9,8 +9,10 @@ from eye_face import CENTRES, RADIUS, disc, face, joined, looking, pair, shell, 
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.eyes import search
+from surface.fit.eyes.pieces import Side
 from surface.fit.eyes.search import ADDED, MISSING
 from surface.fit.features.generic import make_plan
+from surface.fit.points.ballfit import Ball
 from surface.fit.source.mesh import FitMesh, check_manifold
 
 pytestmark = pytest.mark.usefixtures("given_charts")
@@ -244,3 +246,48 @@ def test_what_lies_within_a_ball_goes_with_it_unless_its_name_is_of_skin_or_hair
     plan = make_plan(joined([("Head", face()), *pair(shell, ("a", "b")), (name, inside)]))
     assert plan.eyes[1] == pytest.approx(RADIUS, rel=0.01)
     assert (len(plan.parts) == 1) == gone
+
+
+def bare(vertices: Floats, **shapes: Floats) -> FitMesh:
+    none: Ints = np.zeros((0, 4), np.int64)
+    deltas = np.array([*shapes.values()]).reshape(len(shapes), len(vertices), 3)
+    return FitMesh(vertices, none, np.zeros((0, 2)), none, tuple(shapes), deltas)
+
+
+def test_what_blinks_has_its_middle_by_the_square_of_its_motion() -> None:
+    at = np.array([[30.0, 0, 0], [36.0, 0, 6], [-30.0, 3, 0], [-40.0, 0, 0]])
+    left, right = np.zeros((4, 3)), np.zeros((4, 3))
+    left[:2, 1], right[2, 2] = (-1.0, -2.0), 0.5
+    wanted = [[34.8, 0.0, 4.8], [-30.0, 3.0, 0.0]]
+    for one, two in ((left, right), (right, left)):  # named by the viewer, too
+        np.testing.assert_allclose(search.blink_middles(bare(at, eyeBlinkLeft=one, eyeBlinkRight=two)), wanted)
+    assert search.blink_middles(bare(at, eyeBlinkLeft=left)) is None
+    assert search.blink_middles(bare(at, eyeBlinkLeft=left, eyeBlinkRight=0 * left)) is None
+    assert search.blink_middles(bare(at, eyeBlinkLeft=left, eyeBlinkRight=left)) is None
+    assert search.middle_x(bare(at)) == -2.0
+
+
+@pytest.mark.parametrize(("off", "turned"), [(0.039, False), (0.041, True), (0.399, True), (0.401, False)])
+def test_a_pivot_near_the_spheres_centre_or_far_from_it_is_not_taken(
+    monkeypatch: pytest.MonkeyPatch, off: float, turned: bool
+) -> None:
+    radius, centre = 10.0, np.array([1.0, 2.0, 3.0])
+    pivot = np.add(centre, [0.0, off * radius, 0.0])
+    points = pivot + np.array([[0.0, 0.0, 9.0], [0.0, 8.0, 5.1], [0.0, 0.0, 11.0], [50.0, 0.0, 4.9], [0.0, 0.0, -9.0]])
+    side = Side(np.arange(3), Ball(centre, radius, 0.0, 1.0), points, np.ones(5))
+    monkeypatch.setattr(search, "turns", lambda mesh, faces, names: names)
+    monkeypatch.setattr(search, "turning_centre", lambda names: pivot if names else None)
+    mesh = bare(np.zeros((1, 3)), eyeLookInLeft=np.zeros((1, 3)))
+    found = search._turned(mesh, side, 0)
+    assert (found is side.ball) != turned
+    if turned:
+        np.testing.assert_array_equal(found.centre, pivot)
+        assert found.radius == pytest.approx(np.hypot(8.0, 5.1))  # the median of what lies half a radius in front
+    assert search._turned(mesh, side, 1) is side.ball  # no shape turns the right eye
+
+
+def test_flat_eyes_in_a_whole_face_get_balls_as_large_as_peoples_behind_them() -> None:
+    sides = [Side(np.arange(1), None, np.array([[x, 5.0, 70.0]]), np.ones(1)) for x in (32.0, -32.0)]
+    for side, ball in zip(sides, search._behind_flat(sides), strict=True):
+        assert ball.radius == pytest.approx(0.19 * 64)
+        np.testing.assert_allclose(ball.centre, side.middle - [0.0, 0.0, 0.19 * 64])

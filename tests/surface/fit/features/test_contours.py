@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from surface.fit.features.contours import SIMPLE, contours, simplified
+from surface.fit.features.contours import SIMPLE, _away, _crossings, contours, simplified
 from surface.mesh.loops import inside
 
 
@@ -55,3 +55,31 @@ def test_a_simplified_line_stays_near(seed: int = 3) -> None:
 def drawn(lines: list[np.ndarray], at: np.ndarray) -> np.ndarray:
     segments = np.concatenate([np.hstack([line, np.roll(line, -1, axis=0)]) for line in lines])
     return inside(segments, at)
+
+
+def test_lines_cross_edges_where_the_level_lies_between_their_ends() -> None:
+    picture = np.array([[0.0, 0, 0], [0, 1.0, 0], [0, 0, 0]])
+    edges = np.array([[0, 1, 0], [1, 1, 0], [1, 0, 1], [1, 1, 1]])
+    for level, share in ((0.25, 0.25), (0.75, 0.75), (0.01, 0.05), (0.99, 0.95)):
+        found = _crossings(picture, level, edges)
+        wanted = [[share, 1], [2 - share, 1], [1, share], [1, 2 - share]]
+        np.testing.assert_allclose(found, wanted)
+    assert _crossings(np.zeros((2, 2)), 0.0, np.array([[0, 0, 1]])).tolist() == [[0.0, 0.05]]
+
+
+def test_a_single_place_is_a_diamond_with_the_inside_on_its_left() -> None:
+    picture = np.zeros((5, 5))
+    picture[2, 2] = 1.0
+    (line,) = contours(picture, 0.5)
+    assert sorted(line.tolist()) == [[1.5, 2], [2, 1.5], [2, 2.5], [2.5, 2]]
+    x, y = line.T
+    assert 0.5 * (x * np.roll(y, -1) - np.roll(x, -1) * y).sum() == pytest.approx(0.5)
+    assert contours(np.zeros((5, 5)), 0.5) == []
+
+
+@pytest.mark.parametrize(("bulge", "corners"), [(0.34, 4), (0.36, 5)])
+def test_a_corner_further_than_0_35_off_the_line_is_kept(bulge: float, corners: int) -> None:
+    square = np.array([[0.0, 0], [5, -bulge], [10, 0], [10, 10], [0, 10]])
+    assert len(simplified(square)) == corners
+    ends = _away(np.array([[-3.0, 4.0], [13.0, 4.0], [5.0, -2.0]]), np.zeros(2), np.array([10.0, 0.0]))
+    np.testing.assert_allclose(ends, [5.0, 5.0, 2.0])

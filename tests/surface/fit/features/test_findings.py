@@ -3,10 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from small_head import all_points, part, small_head
 
 from surface.fit.features.findings import findings
 from surface.fit.source.placing.anatomy import Eyes, Landmarks
+from surface.head.model.parameters import rotation
 from surface.head.model.placement import Placement
 
 EYES = Landmarks(Eyes(np.array([[30.0, 30, 0], [-30, 30, 0]]), True, True, "two balls"))
@@ -42,3 +44,25 @@ def test_what_the_mesh_has_but_the_head_has_not_is_told_from_what_the_mesh_lacks
         "in the mesh, but left out and not drawn: tongue, brows or hair",
         "not in the mesh, and not drawn: teeth, lashes",
     ]
+
+
+@pytest.mark.parametrize(("shift", "said"), [
+    ([0.5, -0.5, 0.0], "it stands where it belongs"), ([0.51, 0.0, 0.0], "moved by 1, 0, 0 mm"),
+    ([0.0, 0.0, -0.51], "moved by 0, 0, -1 mm"), ([-0.4, 2.0, 0.0], "moved by 0, 2, 0 mm"),
+])  # fmt: skip
+def test_a_shift_of_more_than_half_a_millimetre_is_said(shift, said):
+    line = findings(small_head(placement=Placement(shift=np.array(shift), unit="mm")), EYES)[0]
+    assert line == f"placed: the file's unit is mm, up is y, forward is z; {said}"
+
+
+def test_a_head_that_stands_askew_is_said_to():
+    askew = Placement(rotation(0.1, 0.0), 1.0, np.zeros(3), "mm")
+    assert "it stands askew; it stands where it belongs" in findings(small_head(placement=askew), EYES)[0]
+    assert not any(line.startswith("placed") for line in findings(small_head(), EYES))
+
+
+def test_a_lid_without_a_shape_is_named_alone():
+    head = small_head(parts=[part("a", -40, groups=BLINKS[:1])], seams=[], paint=[])
+    lines = findings(head, EYES)
+    assert any("no shape closes eyeBlinkRight; " in line for line in lines)
+    assert "found: eyes 60 mm apart, of 24 mm" in lines

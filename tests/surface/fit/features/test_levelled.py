@@ -7,6 +7,7 @@ import pytest
 from small_head import small_head
 
 from surface import DCPSurface
+from surface.fit.features import levelled
 from surface.fit.features.levelled import CREASE_DEG, crease_deg, level_seam, level_seams
 from surface.head.model.data import PartData, Seam
 from surface.head.model.file import load_data
@@ -70,3 +71,43 @@ def test_the_shipped_heads_chest_has_no_crease(root):
     seam = next(s for s in head.seams if s.part_a == s.part_b == "back")
     part = next(p for p in head.parts if p.name == "back")
     assert crease_deg(part, seam.uv_a, seam.uv_b).max() < 12.0  # 60 before its points were moved
+
+
+def test_places_along_a_seam_are_six_to_a_piece():
+    found = levelled._between(np.array([[0.0, 0.0], [6.0, 3.0], [6.0, 9.0]]))
+    wanted = [[k, 0.5 * k] for k in range(6)] + [[6.0, 3.0 + k] for k in range(7)]
+    np.testing.assert_allclose(found, wanted)
+
+
+def test_a_seam_lies_as_the_skin_within_15_mm_of_it_does():
+    seam = np.array([[0.0, 0.0, 0.0]])
+    places = np.array([[14.9, 0.0, 0.0], [0.0, -14.9, 0.0], [15.1, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    normals = np.array([[0.0, 0, 2], [0, 2, 0], [9, 0, 0], [0, 0, -9]])
+    found = levelled._as_around(seam, places, normals, np.array([True, True, True, False]))
+    np.testing.assert_allclose(found, [[0.0, np.sqrt(0.5), np.sqrt(0.5)]])
+
+
+def test_only_the_skin_from_4_to_11_mm_away_tells_how_a_seam_lies(monkeypatch):
+    part, asked = tube(6.0), []
+    as_around = levelled._as_around
+    monkeypatch.setattr(levelled, "_as_around", lambda *given: asked.append(given) or as_around(*given))
+    level_seam(part, SEAM)
+    seam, places, normals, ring = asked[0]
+    one, two = (make_surface(part).evaluate(levelled._between(uv)) for uv in BORDERS)
+    np.testing.assert_allclose(seam, 0.5 * (one + two))
+    away = np.linalg.norm(places[:, None] - seam[None, ::4], axis=2).min(axis=1)  # about
+    assert 3.9 < away[ring].min() < 4.6 and 10.4 < away[ring].max() <= 11.6
+    assert not ring[away < 3.9].any() and not ring[away > 11.6].any()
+    assert len(places) == 259 * 259 and (np.einsum("ij,ij->i", normals, places * [1, 0, 1]) > 0).all()
+    turned = levelled._placed(replace(part, flip=True), BORDERS[0])[1]
+    np.testing.assert_allclose(turned, -levelled._placed(part, BORDERS[0])[1])
+
+
+@pytest.mark.parametrize(("most", "rounds"), [(5.9, 0), (6.0, 6), (90.0, 6)])
+def test_a_crease_of_6_degrees_is_levelled_in_six_rounds_at_most(monkeypatch, most, rounds):
+    made = []
+    monkeypatch.setattr(levelled, "crease_deg", lambda *_: np.array([0.0, most]))
+    monkeypatch.setattr(levelled, "_moves", lambda part, _: made.append(1) or np.ones_like(part.points))
+    part = tube(0.0)
+    np.testing.assert_allclose(level_seam(part, SEAM).points, part.points + rounds)
+    assert len(made) == rounds

@@ -11,9 +11,11 @@ from surface.fit.points.report import (
     P99_MM,
     RMS_MM,
     SHAPES_MM,
+    DenseErrors,
     Errors,
     FitReport,
     PartReport,
+    Spot,
     face_bounds,
     kinds_line,
     measure,
@@ -119,3 +121,43 @@ def test_errors_are_also_measured_where_samples_are_fine():
         pytest.approx(np.sqrt(5.0)), pytest.approx(2.98), 3.0
     )
     assert report.share == pytest.approx(2 / 3)
+
+
+def spot(mm: float, shape: str = "jawOpen", *, to_mesh: bool = True) -> Spot:
+    return Spot(mm, shape, "face", "at the chin", to_mesh)
+
+
+def test_the_greatest_error_is_said_with_its_way():
+    assert str(spot(1.234)) == "1.23 mm: shape jawOpen, at the chin (face, surface to mesh)"
+    assert str(spot(0.5, "neutral", to_mesh=False)) == "0.50 mm: the neutral face, at the chin (face, mesh to surface)"
+
+
+def test_errors_are_told_line_by_line():
+    dense = DenseErrors({}, spot(2.0), None, (), (), 1)
+    assert dense.lines() == [f"greatest error {spot(2.0)}"]
+    assert DenseErrors({}, None, None, (), (), 1, apart=spot(1.0)).lines() == []
+    for apart, said in ((1.9, 2), (2.0, 1), (2.1, 1)):
+        assert len(replace(dense, apart=spot(apart)).lines()) == said
+    full = DenseErrors({}, spot(2.0), spot(3.0), ("a", "b"), ("c", "d"), 1, corrected=("e", "f"), apart=spot(1.0))
+    assert full.lines() == [
+        f"greatest error {spot(2.0)}",
+        f"without contacts, which keep lips, lids and tongue from passing through: {spot(1.0)}",
+        f"in folds (nostrils, ear canals, corners), which are held only loosely: {spot(3.0)}",
+        "changed on purpose by correctives, and measured without them: e, f",
+        "not in the mesh, so not measured: a, b",
+        "faces of the mesh that no fitted part holds: c, d",
+    ]
+
+
+def test_figures_have_three_digits():
+    assert Errors(0.12345, 1.0, 22.7).figures() == ["0.123", "1.000", "22.700"]
+
+
+def test_detail_is_measured_on_the_samples_that_are_fine():
+    error, folded = np.array([3.0, 4.0, 100.0, 0.0]), np.array([False, False, True, False])
+    fine = np.array([True, False, True, False])
+    report = measure("face", chart(folded), fitted(error, np.zeros((0, 4))), (), fine)
+    assert report.detailed == Errors(3.0, 3.0, 3.0) and report.share == pytest.approx(1 / 3)
+    assert measure("face", chart(folded), fitted(error, np.zeros((0, 4))), ()).share == 1.0
+    nothing = measure("face", chart(folded | True), fitted(error, np.zeros((0, 4))), (), fine)
+    assert not nothing.detailed.measured and nothing.share == 0.0

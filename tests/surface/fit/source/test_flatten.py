@@ -208,3 +208,18 @@ def test_one_to_one_maps_run_anticlockwise_throughout() -> None:
     flat = UV.copy()
     flat[:, 1] = 0.0
     assert not module._one_to_one(flat, TRI, rim)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_weights_are_the_same_in_any_unit_and_a_thousand_times_the_usual_at_most(
+    size: float,
+) -> None:
+    at = lifted(UV)
+    np.testing.assert_allclose(module._mean_value(size * at, TRI).toarray(), module._mean_value(at, TRI).toarray())
+    # a fan about the first point, one of whose neighbours is far too near: its weight is a thousand times the usual
+    fan = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
+    for near, least in ((1e-2, 30.0), (1e-7, 300.0)):
+        fan[1, 0] = near
+        tri = np.array([[0, k, k % 4 + 1] for k in (1, 2, 3, 4)])
+        row = module._mean_value(size * fan, tri).toarray()[0]
+        assert least < row[1] / row[3] <= 1010.0

@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 from slit_sheet import slit_sheet
 
-from surface.fit.source.kinds import is_known, kind_name, kind_of, kinds, listed, material_of, without_clothes
+from surface.fit.source.kinds import (
+    is_known,
+    kind_name,
+    kind_of,
+    kinds,
+    listed,
+    material_of,
+    piece_kinds,
+    skin_and_eyes,
+    without_clothes,
+)
 from surface.fit.source.mesh import FitMesh
 
 NAMES = {
@@ -95,3 +105,51 @@ def test_names_are_not_believed_against_what_shapes_do():
 
 def test_meshes_without_pieces_are_kept():
     assert without_clothes(slit_sheet())[0].all()
+
+
+def test_only_skin_and_eyes_are_left_where_there_are_any():
+    mesh = slit_sheet()
+    piece = np.arange(len(mesh.faces)) % 4
+    every = np.ones(len(mesh.faces), bool)
+    mesh = replace(mesh, piece=piece, pieces=("Head", "EyeLeft", "Hair", "Shirt"))
+    own, notes = skin_and_eyes(mesh, every)
+    np.testing.assert_array_equal(own, piece < 2)
+    assert notes == ["hair left out: 'Hair'", "clothes left out: 'Shirt'"]
+    own, notes = skin_and_eyes(mesh, piece != 2)
+    np.testing.assert_array_equal(own, piece < 2)
+    assert notes == ["clothes left out: 'Shirt'"]  # nothing is said of what was left out before
+    bald = replace(mesh, pieces=("Beard", "Tongue", "Hair", "Shirt"))
+    own, notes = skin_and_eyes(bald, piece < 3)
+    np.testing.assert_array_equal(own, piece < 3)
+    assert notes == []
+    assert every.all()
+
+
+def test_objects_are_told_by_kind_and_whether_they_are_left_out():
+    mesh = slit_sheet()
+    piece = np.arange(len(mesh.faces)) % 3
+    mesh = replace(mesh, piece=piece, pieces=("Head", "Sclera", "Shirt", "Boots"))
+    told = {"Head": "skin", "Sclera": "eye white", "Shirt": "clothes, left out"}
+    assert piece_kinds(mesh, piece < 2) == told  # no face is of boots
+    some = (piece == 0) | (np.arange(len(piece)) == 4)
+    assert piece_kinds(mesh, some) == told
+
+
+@pytest.mark.parametrize(("moves", "kept"), [(5.0, True), (4.99, False), (12.0, True)])
+def test_a_piece_that_moves_half_as_far_as_the_face_belongs_to_it(moves, kept):
+    assert without_clothes(two_pieces("Shirt", moves))[0].all() == kept
+
+
+def test_of_five_names_or_more_four_are_listed():
+    assert listed(list("abcd")) == "'a', 'b', 'c', 'd'"
+    assert listed(list("abcde")) == "'a', 'b', 'c', 'd' and 1 more"
+    assert listed(["a"]) == "'a'"
+
+
+@pytest.mark.parametrize(("name", "kind"), [
+    ("xxteethxx", "skin"), ("xxteeth", "teeth"), ("teethxx", "teeth"), ("gumsxx", "skin"), ("xxhair", "hair"),
+    ("hairxx", "skin"), ("xxlash", "lash"), ("Skin Teeth", "teeth"), ("Teeth Joint", "prop"), ("Hair Teeth", "teeth"),
+    ("Gums Hair", "hair"), ("Hair Gums", "gums"),
+])  # fmt: skip
+def test_words_count_by_their_length_and_place(name, kind):
+    assert kind_name(name) == kind

@@ -9,6 +9,7 @@ from slit_sheet import slit_sheet
 
 from surface.fit.points.refine import FitRequest, fit_chart
 from surface.fit.points.solve import basis
+from surface.fit.source import owncharts
 from surface.fit.source.chart import make_chart
 from surface.fit.source.flatten import crosses_itself
 from surface.fit.source.islands import Island, boundary_loops, signed_areas
@@ -137,3 +138,48 @@ def test_a_face_whose_texture_is_squeezed_in_places_gets_evener_charts():
     assert unevenness(strong, [made]) < 0.7 * before
     assert one_to_one(made) and len(boundary_loops(made)) == 2
     assert len(notes) == 1 and "squeezed" in notes[0] and "omote made its own" in notes[0]
+
+
+def test_a_face_is_charted_again_above_an_unevenness_of_2_2_where_that_saves_15_per_cent(monkeypatch):
+    mesh = slit_sheet()
+    given, made = ([Island(np.arange(len(mesh.uv)), mesh.uv + shift, mesh.faces)] for shift in (0.0, 1.0))
+    measured: dict[int, float] = {}
+    monkeypatch.setattr(owncharts, "unevenness", lambda _, islands: measured[id(islands)])
+    monkeypatch.setattr(owncharts, "own_islands", lambda *_, **__: charts)
+    for before, after, charts, again in (
+        (2.2, 0.1, made, False), (2.3, 0.1, made, True), (4.0, 3.4, made, True), (4.0, 3.41, made, False),
+        (4.0, 9.0, [], False),
+    ):  # fmt: skip
+        measured.update({id(given): before, id(charts): after})
+        notes: list[str] = []
+        found = owncharts._evener(mesh, every(mesh), 1.0, notes, given, owncharts.NO_FACES)
+        assert found is (made if again else given), (before, after)
+        told = f"face: its texture coordinates are squeezed {before:.1f} times in places: omote made its own"
+        assert notes == ([told] if again else [])
+
+
+def test_islands_without_width_or_area_are_dropped():
+    mesh = slit_sheet()
+    for width, count in ((2e-6, 1), (0.5e-6, 0)):
+        narrow = replace(mesh, uv=(mesh.uv - mesh.uv.min(axis=0)) / np.ptp(mesh.uv, axis=0) * [1.0, width])
+        assert len(owncharts._as_given(narrow, every(narrow))) == count
+        assert len(owncharts._as_given(replace(narrow, uv=narrow.uv[:, ::-1]), every(narrow))) == count
+    assert owncharts._as_given(mesh, owncharts.NO_FACES) == []
+
+
+@pytest.mark.parametrize(("count", "share", "cut"), [(24, 0.5, False), (25, 0.06, False), (25, 0.07, True)])
+def test_a_region_is_cut_where_more_than_6_per_cent_of_over_24_faces_are_squeezed(monkeypatch, count, share, cut):
+    faces, asked = np.arange(count), []
+    monkeypatch.setattr(owncharts, "squeezed_share", lambda _, flat: share if len(flat.faces) == count else 0.0)
+    in_two = owncharts.in_two
+    monkeypatch.setattr(owncharts, "in_two", lambda mesh, part: asked.append(len(part)) or in_two(mesh, part))
+    found = owncharts._unwrapped(slit_sheet(), faces)
+    assert sum(len(island.faces) for island in found) == count
+    assert asked[:1] == ([count] if cut else []) and (len(found) > 1) == cut
+
+
+def test_a_face_without_area_gets_no_chart():
+    mesh = slit_sheet()
+    flat = replace(mesh, vertices=mesh.vertices * [1.0, 0.0, 0.0])
+    assert owncharts._unwrapped(flat, np.array([7])) == []
+    assert len(owncharts._unwrapped(mesh, np.array([7]))) == 1

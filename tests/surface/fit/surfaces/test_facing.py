@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from surface.base.arrays import Floats, Ints
+from surface.fit.surfaces import facing
 from surface.fit.surfaces.facing import seen
 
 
@@ -53,3 +54,34 @@ def test_a_piece_that_is_hidden_is_looked_at_alone(over: bool) -> None:
     inner = turned_over(ball(20.0)) if over else ball(20.0)
     area, inside_out = seen([ball(60.0), inner])
     assert inside_out.tolist() == [False, over] and area[1] == 0.0
+
+
+def test_pictures_are_taken_from_eight_sides_and_count_by_where_they_look_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    """One picture shows only the outside of a piece, another one more of its back: the heavier one decides."""
+    views = ((0.0, 0.0), (40.0, 0.0), (-40.0, 0.0), (0.0, 50.0), (0.0, -50.0), (90.0, 0.0), (-90.0, 0.0), (180.0, 0.0))
+    turns = [facing.view_rotation(yaw, pitch) for yaw, pitch in views]
+    weights = [1.0, 1.0, 1.0, 0.5, 0.5, 0.5, 0.5, 0.1]
+    pieces, asked = [ball(10.0), ball(10.0, (5.0, 0.0, 0.0))], []
+    for k, weight in enumerate(weights):
+        for other, outside in ((weight * 0.99, True), (weight * 1.01, False)):
+
+            def counts(_: object, every: Floats, turn: Floats, step: float, k: int = k, other: float = other):
+                asked.append((turn, step, len(every)))
+                own = np.allclose(turn, turns[k])
+                shown = 10.0 * own
+                first = np.allclose(turn, turns[0 if k else 1])
+                return np.array([shown + 10.0 * other * first, 0.0]), np.array([10.0 * other * first, 0.0])
+
+            monkeypatch.setattr(facing, "_counts", counts)
+            _, over = facing.seen(pieces)
+            assert over[0] == (not outside), k
+    step = 25.0 / 240
+    np.testing.assert_allclose([turn for turn, *_ in asked[:8]], turns)
+    assert all(given == pytest.approx(step, rel=0.01) and count == 3000 for _, given, count in asked[:8])
+
+
+def test_the_back_counts_what_runs_the_other_way_round() -> None:
+    piece = ball(10.0)
+    for turned, share in ((piece, 0.0), (turned_over(piece), 1.0)):
+        shown, back = facing._counts([turned], turned[0], facing.view_rotation(30.0, 20.0), 0.1)
+        assert shown[0] == pytest.approx(np.pi * 100**2, rel=0.03) and back[0] == share * shown[0]

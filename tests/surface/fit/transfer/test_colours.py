@@ -1,11 +1,14 @@
 """A scan's colours on the head that is made in its form."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from surface.fit.source.textures import Samples
+from surface.fit.transfer import colours
 from surface.fit.transfer.colours import moved, scan_colours, with_colours
 from surface.head import Head
 from surface.readers.meshdata import Material, MeshData
@@ -113,3 +116,47 @@ def test_open_eyes_keep_their_colours_and_closed_ones_tell_none(data):
         assert len(eyes) == 2 and len(painted) == count and told[0].count("iris") == count
         for layer in painted:
             np.testing.assert_allclose(layer["value"], IRIS, atol=0.01)
+
+
+def test_a_colour_is_the_mean_of_roots_of_six_samples_within_2_mm():
+    points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1.9, 0], [0, 0, 2.1], [50, 0, 0]])
+    rgb = np.sqrt(np.array([[0.04, 0.0, 0.0], [0.16, 0.0, 0.0], [0.64, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 0.0]]))
+    tree = cKDTree(points)
+    seen, known = colours._looked_up(np.array([[0.0, 0, 0], [20, 0, 0], [50, 0, 1.9], [50, 0, 2.1]]), tree, rgb)
+    weight = 1.0 / (0.2 + np.array([0.0, 1.0, 1.9]))
+    assert seen[0, 0] == pytest.approx(((weight * [0.2, 0.4, 0.8]).sum() / weight.sum()) ** 2) and seen[0, 1] == 0.0
+    assert known.tolist() == [True, False, True, False]
+    np.testing.assert_allclose(seen[2], [0.0, 1.0, 0.0])
+    many = cKDTree(0.01 * np.arange(8)[:, None] * [1.0, 0, 0])
+    seen, _ = colours._looked_up(np.zeros((1, 3)), many, np.repeat([[0.5], [1.0]], [6, 2], axis=0) * np.ones(3))
+    np.testing.assert_allclose(seen, 0.25)
+
+
+@pytest.mark.parametrize(("forward", "count", "told"), [(0.31, 20, True), (0.29, 20, False), (0.31, 19, False)])
+def test_the_skins_colour_is_the_median_of_twenty_places_that_look_forward(forward, count, told):
+    normals = np.tile([0.0, 0.0, forward], (count + 5, 1))
+    seen = np.tile([0.3, 0.001, 0.95], (count + 5, 1))
+    seen[: count // 3] = 0.0
+    known = np.arange(count + 5) < count
+    found = colours._front_colour(SimpleNamespace(normals=normals), seen, known)
+    assert (found is not None) == told
+    if told:
+        np.testing.assert_allclose(found, [0.3, 0.015, 0.85])  # as bright as skin can be
+
+
+def test_saturation_is_that_of_what_the_eye_sees():
+    assert colours._saturation(np.array([0.25, 0.04, 0.09])) == pytest.approx(0.6)
+    assert colours._saturation(np.full(3, 0.3)) == 0.0 and colours._saturation(np.zeros(3)) == 1.0
+    assert colours._words(np.array([0.123, 0.5, 1.0])) == "0.12 0.50 1.00"
+    layer = colours._all_over("a", "iris", np.array([0.123456, 0.5, 1.0]))
+    assert layer == {"part": "a", "attribute": "iris", "kind": "all", "value": [0.1235, 0.5, 1.0]}
+    assert colours._is_base({"part": "a", "attribute": "albedo", "kind": "all"}, "a")
+    for key, value in (("part", "b"), ("attribute", "gloss"), ("kind", "band")):
+        assert not colours._is_base({"part": "a", "attribute": "albedo", "kind": "all", key: value}, "a")
+
+
+@pytest.mark.parametrize(("low", "high", "told"), [(0.5, 0.529, False), (0.45, 0.56, True)])
+def test_colours_that_hardly_differ_say_nothing(low, high, told):
+    rows = np.repeat(np.linspace(low, high, 3), 3)[:, None] * np.ones(3)
+    assert (scan_colours(quads(rows)) is not None) == told
+    assert scan_colours(quads(rows * [1.0, 0.95, 0.95])) is not None  # but for a tint

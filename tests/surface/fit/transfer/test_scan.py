@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from surface.base.errors import FitError
-from surface.fit.transfer.scan import borders_of, make_scan, read_scan, sample
+from surface.fit.transfer.scan import _border_line, borders_of, make_scan, read_scan, sample, spread, vertex_normals
 
 SQUARE = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
 TWO = np.array([[0, 1, 2], [0, 2, 3]])
@@ -102,3 +102,70 @@ def test_what_a_person_wears_and_what_grows_on_the_skin_is_no_scan_and_is_said(t
     assert len(every.triangles) == 1 and not every.notes  # a name alone leaves nothing: it is not believed
     named = read_scan(tmp_path / "a.obj", ("body",))
     assert len(named.triangles) == 1
+
+
+@pytest.mark.parametrize(("height", "kept"), [(1.5e-12, 2), (0.5e-12, 1)])
+def test_triangles_without_area_are_left_out(height, kept):
+    """Of a mesh of size 1: less than a millionth of it, squared."""
+    at = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1.0, 0, height * 1e6], [1e-6, 0, 0]])
+    base = make_scan(np.vstack([at[:3], [[0.0, 0, 0.5], [2e-6, 0, 0.5], [0, height / 2e-6, 0.5]]]),
+                     np.array([[0, 1, 2], [3, 4, 5]]), "x")  # fmt: skip
+    assert len(base.triangles) == kept
+
+
+@pytest.mark.parametrize(("apart", "count"), [(0.4e-6, 3), (1.6e-6, 4)])
+def test_vertices_a_millionth_of_the_size_apart_are_one(apart, count):
+    at = 100.0 * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1.0 + apart, 0, 0]])
+    scan = make_scan(at, np.array([[0, 1, 2], [0, 3, 2]]), "x")
+    assert len(scan.vertices) == count and len(scan.original) == 4
+    assert (scan.original[1] == scan.original[3]) == (count == 3)
+
+
+def test_places_are_spread_by_area_one_in_each_equal_share():
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]])
+    at = np.vstack([SQUARE * [3.0, 1.0, 1.0], SQUARE[:3]])  # areas of 1.5, 1.5 and 0.5
+    face, share = spread(at, faces, 70)
+    assert np.bincount(face).tolist() == [30, 30, 10]
+    assert (np.diff(face) >= 0).all() and (share >= 0).all()
+    np.testing.assert_allclose(share.sum(axis=1), 1.0)
+    np.testing.assert_allclose(share.mean(axis=0), 1 / 3, atol=0.1)
+    again = spread(at, faces, 70)
+    np.testing.assert_array_equal(again[1], share)
+
+
+def test_the_border_is_walked_in_equal_steps():
+    scan = make_scan(10 * SQUARE, TWO, "x")
+    line = _border_line(scan, 2.5)
+    assert len(line) == 16 and len(_border_line(scan, 2.6)) == 16 and len(_border_line(scan, 2.4)) == 20
+    on_side = np.isclose(line[:, :2], 0.0) | np.isclose(line[:, :2], 10.0)
+    assert on_side.any(axis=1).all()
+    assert len(np.unique(np.round(line, 6), axis=0)) == 16 and set(np.unique(line[:, :2])) == {0.0, 2.5, 5.0, 7.5, 10.0}
+
+
+def test_samples_within_one_and_a_half_spacings_lie_at_the_border():
+    found = sample(make_scan(10 * SQUARE, TWO, "x"), 400)  # half a unit apart
+    inside = 5.0 - np.abs(found.points[:, :2] - 5.0).max(axis=1)
+    assert not found.border[inside > 0.75].any()
+    assert found.border[inside < np.sqrt(0.75**2 - 0.375**2)].all()  # between two places of the line
+
+
+def test_normals_are_means_by_area_and_a_scan_is_turned_with_its_vertices():
+    at = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 4]])
+    scan = make_scan(at, np.array([[0, 1, 2], [0, 2, 3]]), "x")
+    order = [int(np.flatnonzero((scan.vertices == row).all(axis=1))[0]) for row in at]
+    normals = vertex_normals(scan)[order]
+    slant = np.array([8.0, 0, 4]) / np.sqrt(80)
+    np.testing.assert_allclose(normals, [slant, [0, 0, 1], slant, [1, 0, 0]])
+    turn = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
+    np.testing.assert_allclose(scan.turned(turn, 3.0, np.ones(3)).vertices, 3.0 * scan.vertices @ turn.T + 1.0)
+    assert scan.kept(np.array([True, False])).triangles.tolist() == scan.triangles[:1].tolist()
+
+
+def test_too_many_vertices_are_refused(monkeypatch):
+    monkeypatch.setattr("surface.fit.transfer.scan.MAX_VERTICES", 4)
+    assert len(make_scan(SQUARE, TWO, "x").triangles) == 2
+    with pytest.raises(FitError, match="x: 5 vertices; 4 are the most"):
+        make_scan(np.vstack([SQUARE, SQUARE[:1]]), TWO, "x")
+    for faces in (TWO - 1, TWO + 1):
+        with pytest.raises(FitError, match="a vertex that is not there"):
+            make_scan(SQUARE, faces, "x")

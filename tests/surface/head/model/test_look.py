@@ -35,3 +35,30 @@ def test_age_sinks_wrinkles_at_rest_and_nothing_else(group, moves):
     old = with_age(head, 0.5).parts[0].points - head.parts[0].points
     assert (old[:, 2] < -0.1).all() if moves else not old.any()
     np.testing.assert_array_equal(with_age(head, 0.0).parts[0].points, head.parts[0].points)
+
+
+def test_tones_lie_between_those_of_the_table_in_density():
+    for k in range(5):
+        np.testing.assert_allclose(skin_tone(0.2 * k + 0.1), np.sqrt(TONES[k] * TONES[k + 1]))
+    np.testing.assert_allclose(skin_tone(0.2), TONES[1])
+    np.testing.assert_allclose(skin_tone(0.2, 0.5), TONES[1] * np.exp([-0.025, -0.17, -0.13]))
+
+
+@pytest.mark.parametrize(("melanin", "redness"), [(0.0, 1.0), (0.6, 0.5), (1.0, 2.0)])
+def test_paint_is_covered_by_melanin_up_to_45_per_cent(melanin, redness):
+    painted = np.array([[0.5, 0.3, 0.2], [0.0, 0.3, 1e-4]])
+    ratio = np.maximum(painted, 1e-4) / TONES[1]
+    wanted = skin_tone(melanin, 0.3) * ratio ** (redness * (1.0 - 0.45 * melanin))
+    np.testing.assert_allclose(skin_albedo(painted, melanin, 0.3, np.full((2, 1), redness)), wanted)
+
+
+@pytest.mark.parametrize(
+    ("name", "share"),
+    [("wrinkleForehead", 0.75), ("wrinkleFrownLeft", 0.5), ("wrinkleEyeRight", 0.8), ("wrinkleCheekLeft", 0.9)],
+)
+def test_wrinkles_stand_at_rest_by_their_share_of_the_age(name, share):
+    head = small_head(parts=[part("a", -40, groups=[all_points(name, (0, 1, -2))])], seams=[])
+    for age in (0.5, 1.0):
+        moved = with_age(head, age).parts[0].points - head.parts[0].points
+        np.testing.assert_allclose(moved, np.tile([0, age * share, -2 * age * share], (25, 1)))
+    np.testing.assert_array_equal(with_age(head, -1.0).parts[0].points, head.parts[0].points)

@@ -4,7 +4,9 @@ import tomllib
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from surface.head.model import parameters
 from surface.head.model.parameters import (
     EYE_RAD,
     HEAD_RAD,
@@ -12,10 +14,12 @@ from surface.head.model.parameters import (
     NAMES,
     SHAPES,
     TONGUE_JAW,
+    head_angles,
     lid_down,
     read_pose,
     rotation,
     rotation_vector,
+    smoothstep,
 )
 
 
@@ -113,3 +117,50 @@ def test_a_lid_goes_as_far_as_the_greater_of_blink_and_look_down():
         greater = np.maximum(amounts, LID_SHARE * look)
         assert (lids >= greater - 1e-12).all() and (lids - greater).max() < 0.0626
         assert (np.diff(lids) >= -1e-12).all()  # a growing blink never lifts the lid
+
+
+def test_a_rotation_rolls_first_then_pitches_then_yaws():
+    def about(axis: int, angle: float) -> np.ndarray:
+        turn, (i, j) = np.eye(3), ((axis + 1) % 3, (axis + 2) % 3)
+        turn[[i, i, j, j], [i, j, i, j]] = np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)
+        return turn
+
+    for yaw, pitch, roll in ((0.5, -0.3, 0.2), (-1.2, 0.9, 2.0)):
+        np.testing.assert_allclose(rotation(yaw, pitch, roll), about(1, yaw) @ about(0, pitch) @ about(2, roll))
+    vector = np.array([0.3, -0.2, 0.1])
+    turn = Rotation.from_rotvec(vector).as_matrix()
+    np.testing.assert_allclose(rotation_vector(turn), vector)
+    np.testing.assert_allclose(rotation_vector(Rotation.from_rotvec(8 * vector).as_matrix()), 8 * vector)
+
+
+def test_a_step_is_smooth_between_its_ends():
+    found = smoothstep(np.array([1.0, 2.0, 2.5, 3.0, 3.5, 4.0, 9.0]), 2.0, 4.0)
+    np.testing.assert_allclose(found, [0.0, 0.0, 0.15625, 0.5, 0.84375, 1.0, 1.0])
+    np.testing.assert_allclose(smoothstep(np.array([0.25])), [0.15625])
+
+
+@pytest.mark.parametrize("side", ["Left", "Right"])
+def test_a_blink_takes_back_what_opens_the_eye(side):
+    openers = [n for n in SHAPES if n.startswith("eye") and n.endswith(side) and ("Wide" in n or "LookUp" in n)]
+    assert openers
+    p = pose(**dict.fromkeys(openers, 0.8), **{f"eyeBlink{side}": 0.25})
+    assert [shape(p, n) for n in openers] == pytest.approx([0.6] * len(openers))
+    other = "Right" if side == "Left" else "Left"
+    p = pose(**dict.fromkeys(openers, 0.8), **{f"eyeBlink{other}": 0.25})
+    assert [shape(p, n) for n in openers] == pytest.approx([0.8] * len(openers))
+
+
+def test_head_angles_are_clipped_and_in_radians():
+    values = np.array([{"headYaw": 0.5, "headPitch": -3.0, "headRoll": 1.5}.get(n, 0.0) for n in NAMES])
+    np.testing.assert_allclose(head_angles(values), [0.5 * HEAD_RAD[0], -HEAD_RAD[1], HEAD_RAD[2]])
+
+
+@pytest.mark.parametrize("tongue", [0.0, 0.1, 0.3, 0.7, 1.0])
+def test_the_tongue_keeps_the_lips_off_it(tongue):
+    needed = 0.33 * min(1.0, 1.7 * tongue)
+    given = 1.0 - 0.75 * min(1.0, tongue / 0.5)
+    below = [SHAPES[i] for i in parameters._BELOW]
+    p = pose(tongueOut=tongue, jawOpen=0.05, mouthClose=1.0, **dict.fromkeys(below, 0.5))
+    assert p.jaw == pytest.approx(max(0.05, needed))
+    assert [shape(p, n) for n in below] == pytest.approx([0.5 * given] * len(below))
+    assert shape(p, "mouthClose") == pytest.approx(max(0.05, needed) - needed)

@@ -98,3 +98,15 @@ def test_a_further_head_costs_no_more_than_three_times_its_vertices(crowd: Crowd
 def test_no_heads_are_no_crowd(crowd: Crowd) -> None:
     with pytest.raises(ValueError, match="at least 1"):
         Crowd(crowd.head, 0)
+
+
+def test_the_bytes_of_a_crowd_are_those_of_all_its_arrays(crowd: Crowd) -> None:
+    assert len(crowd) == 3
+    for part in crowd.parts:
+        own = part.vertices.nbytes + part.normals.nbytes
+        assert part.vertices.shape == (3, *part.part.vertices.shape) and part.normals.shape == part.vertices.shape
+        assert part.nbytes == own + (0 if part.batch is None else part.batch.nbytes)
+    assert crowd.nbytes == sum(part.nbytes for part in crowd.parts)
+    assert any(part.batch is None for part in crowd.parts) and any(part.batch is not None for part in crowd.parts)
+    with pytest.raises(ValueError, match="read-only"):
+        crowd.values[0, 0] = 1.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from surface.head.posing.kernels import (
     add_moves,
@@ -11,6 +12,7 @@ from surface.head.posing.kernels import (
     mix_rows,
     move_rigid,
     nearest_on_line,
+    place_vertices,
     stitch_border,
     swing_jaw,
 )
@@ -104,3 +106,15 @@ def test_a_border_is_put_between_vertices_with_unit_normals() -> None:
     np.testing.assert_allclose(to, [[1, 0, 2], [7, 7, 7], [0.5, 0.5, 0.5]])
     np.testing.assert_allclose(to_normals[0], np.array([3.0, 1.0, 0.0]) / np.sqrt(10.0), atol=1e-6)
     np.testing.assert_array_equal(to_normals[2], 0.0)  # opposite ones cancel
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.7, 3.0])
+def test_vertices_are_sums_of_points_turned_by_their_share(rng: np.random.Generator, angle: float) -> None:
+    points, weights = rng.normal(size=(6, 4)).astype(np.float32), rng.normal(size=7)
+    start, ids = np.array([0, 3, 3, 7]), np.array([0, 5, 2, 1, 1, 4, 3])
+    share, pivot = np.array([1.0, 0.5, 0.25], np.float32), np.array([1.0, -2.0, 3.0])
+    turn, out = angle * np.array([0.48, -0.8, 0.36]), np.full((3, 3), 9.0)
+    place_vertices(start, ids, weights, points, share, turn, pivot, out)
+    sums = [(weights[a:b, None] * points[ids[a:b], :3]).sum(axis=0) for a, b in ((0, 3), (3, 3), (3, 7))]
+    want = Rotation.from_rotvec(share[:, None] * turn).apply(np.array(sums) - pivot) + pivot
+    np.testing.assert_allclose(out, want, atol=1e-6)

@@ -1,6 +1,7 @@
 """Poses become control points."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -191,3 +192,27 @@ def test_what_rigid_parts_depend_on_is_named():
     linear, shift = rigid_motion("right_eye", head, p)
     np.testing.assert_allclose(linear @ head.eyes[1] + shift, head.eyes[1])
     np.testing.assert_allclose(linear[:, 2], rig_module.optical_axis(p.gaze[1]))
+
+
+@pytest.mark.parametrize(
+    ("lips", "name", "group", "wanted"),
+    [
+        (True, "tongue", "tongueOut", True), (True, "tongue", "jawOpen", False), (False, "tongue", "tongueOut", False),
+        (True, "", "tongueOut", False), (False, "tongue", "jawOpen", False),
+    ],
+)  # fmt: skip
+def test_a_tongue_rests_on_lips_of_another_part(monkeypatch, lips, name, group, wanted):
+    asked: list[str] = []
+    monkeypatch.setattr(rig_module, "tongue_rest", lambda part, head: asked.append(part.name))
+    p = part(name, 0, groups=[all_points(group, (0, 0, 6))])
+    for other, eye, counts in (("face", -1, True), ("face", 0, False), (name, -1, False)):
+        asked.clear()
+        contact = SimpleNamespace(eye=eye, part=other, followers=(), seal=None)
+        head = replace(HEAD, contacts=[contact] if lips else [])
+        if other == name:
+            monkeypatch.setattr(rig_module, "ContactSolver", lambda *_: None)
+            monkeypatch.setattr(rig_module, "SealDriver", lambda _: None)
+            head = replace(head, parts=[p])
+        monkeypatch.setattr(rig_module, "_clearances", lambda *_: [])
+        SkinRig(p, head)
+        assert asked == ([name] if wanted and counts else [])

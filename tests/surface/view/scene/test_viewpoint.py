@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from surface.view.scene.camera import Camera
+from surface.view.scene.framing import Framing
 from surface.view.scene.viewpoint import KEYS, Viewpoint
 
 
@@ -46,3 +48,35 @@ def test_keys() -> None:
     assert view.camera == Camera.three_quarter()
     assert not view.press("9")
     assert list(KEYS) == ["1", "2", "3", "4", "5"]
+
+
+def test_a_notch_of_the_wheel_is_an_eighth_nearer() -> None:
+    view = Viewpoint()
+    for notches in (1.0, -2.0, 0.5):
+        before = view.camera.distance
+        view.zoom(notches)
+        assert view.camera.distance == pytest.approx(before / 1.12**notches)
+
+
+def test_a_hand_moves_what_is_in_focus_in_windows_of_any_height() -> None:
+    for height in (360, 1):
+        view = Viewpoint()
+        before = view.camera
+        view.shift(36, -18, height)
+        span = 2.0 * before.distance * np.tan(np.radians(before.fov_deg / 2)) / height
+        up = before.view().astype(float)[:2, :3]
+        moved = np.subtract(view.camera.target, before.target)
+        np.testing.assert_allclose(moved, span * (-36 * up[0] - 18 * up[1]), rtol=1e-5, atol=1e-9)
+        np.testing.assert_allclose(np.subtract(view.camera.eye, before.eye), moved, atol=1e-9)
+    view.shift(1, 1, 0)  # a window without height moves nothing into nowhere
+    assert np.isfinite(view.camera.target).all()
+
+
+def test_another_head_is_looked_at_from_the_front_and_by_its_own_presets() -> None:
+    view, small = Viewpoint(), Framing((1.0, 2.0, 3.0), 0.5)
+    view.turn(50, 0)
+    view.reframe(small)
+    assert view.camera == view.home == small.camera(Camera.front()) != Camera.front()
+    assert view.press("4") and view.camera == small.camera(Camera.profile())
+    assert view.press("0") and view.camera == view.home
+    assert Viewpoint(framing=small).home == small.camera(Camera.front())

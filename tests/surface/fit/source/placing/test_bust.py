@@ -1,10 +1,13 @@
 """A head is cut from its body."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from traps import _tube, good_head, grid, joined, on_body, transformed
 
 from surface.fit.source.mesh import FitMesh, check_manifold, check_mesh, triangles
+from surface.fit.source.placing import bust
 from surface.fit.source.placing.bust import cut, cut_bust, outline
 from surface.fit.source.placing.frame import EYES_AT
 
@@ -117,3 +120,85 @@ def test_the_outline_is_a_bust():
     assert (outline(at, EYES_AT, 1.0) > 0).tolist() == [False, False, False, True, False, True]
     large = EYES_AT + 2.0 * (at - EYES_AT)
     np.testing.assert_allclose(outline(large, EYES_AT, 2.0), 2.0 * outline(at, EYES_AT, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("off", "outside"),
+    [
+        ((500.0, -78.0, 0.0), -150.0),  # hair and ears may be as wide as they are
+        ((140.0, -79.0, 0.0), -10.0), ((-160.0, -130.0, 0.0), 10.0),
+        ((0.0, -180.0, 50.0), -49.0), ((0.0, -229.0, 50.0), 0.0), ((0.0, -278.0, 0.0), 49.0),
+        ((75.0, -180.0, 0.0), (2**0.25 * 0.5 - 1.0) * 98.0),
+    ],
+)  # fmt: skip
+def test_the_outline_is_a_superellipse_below_the_shoulders(off, outside):
+    at = EYES_AT + np.array([off])
+    assert outline(at, EYES_AT, 1.0)[0] == pytest.approx(outside)
+    assert outline(EYES_AT + 0.5 * np.array([off]), EYES_AT, 0.5)[0] == pytest.approx(0.5 * outside)
+
+
+@pytest.mark.parametrize(("low", "has_body"), [(-299.0, False), (-300.0, True), (-301.0, True)])
+def test_a_mesh_300_mm_below_the_eyes_has_a_body(low, has_body):
+    mesh = quad()
+    whole = replace(mesh, vertices=EYES_AT + np.array([[0, low, 0]]) * (mesh.vertices[:, :1] == 2),
+                    deltas=5.0 + mesh.deltas)  # fmt: skip
+    found, notes = cut_bust(whole, EYES_AT, 1.0)
+    assert (found is not whole) == has_body and len(notes) == has_body
+    assert (cut_bust(whole, EYES_AT, 1.02)[0] is whole) == (low > -306.0)
+
+
+def test_zeros_near_a_vertex_are_put_onto_it():
+    mesh = quad()
+    for share, settled in ((0.11, True), (0.13, False)):
+        value = np.array([share - 1.0, 5.0, 5.0, share, 5.0, 5.0])  # between the first and the fourth vertex
+        found = bust._settled(mesh, value)
+        assert (found[3] == 0.0) == settled and found[0] == value[0]
+        other = np.array([-share, -1.0, -1.0, 1.0 - share, -1.0, -1.0])
+        assert (bust._settled(mesh, other)[0] == 0.0) == settled
+    inside = np.full(6, -1.0)
+    np.testing.assert_array_equal(bust._settled(mesh, inside), inside)
+
+
+@pytest.mark.parametrize(("inside", "moves", "gone"), [(0.49, 0.9, True), (0.51, 0.9, False), (0.49, 1.0, False)])
+def test_an_object_belongs_to_the_body_with_less_than_half_of_its_area_inside(monkeypatch, inside, moves, gone):
+    mesh = replace(quad(), faces=np.array([[0, 1, 4, -1], [1, 2, 5, -1], [3, 4, 0, -1]]), piece=np.array([0, 1, 1]))
+    deltas = np.zeros((1, 6, 3))
+    deltas[0, 1, 1] = -moves
+    mesh = replace(mesh, deltas=deltas)
+    monkeypatch.setattr(bust, "face_areas", lambda *_: np.array([7.0, inside, 1.0 - inside]))
+    outside = np.array([-1.0, -1, -1, 1, 1, 1])
+    assert bust._body_objects(mesh, outside).tolist() == [False, gone]
+    every = [False, False] if moves < 1.0 else [True, False]  # never all of them
+    assert bust._body_objects(mesh, np.ones(6)).tolist() == every
+    assert bust._body_objects(replace(mesh, pieces=("a",)), outside).tolist() == [False]
+
+
+def test_skin_that_reaches_above_a_height_inside_the_outline_holds_the_neck():
+    mesh = replace(quad(), pieces=("Body_SKIN", "Body_SKIN"), faces=np.array([[3, 0, 1, -1], [1, 2, 5, -1]]))
+    outside = np.array([-1.0, -1, -1, -1, -1, -1])
+    assert bust._necks(mesh, outside, 0.99).tolist() == [True, False]
+    assert bust._necks(mesh, outside, 1.0).tolist() == [False, False]
+    assert bust._necks(mesh, -outside, -9.0).tolist() == [False, False]
+    assert bust._necks(replace(mesh, pieces=("Shirt", "abc")), outside, -9.0).tolist() == [False, False]
+    assert bust._named_skin(replace(mesh, pieces=("Body_SKIN", "abc"))).tolist() == [True, False]
+
+
+def test_borders_of_skin_below_the_chin_that_touch_no_other_are_told():
+    low = EYES_AT[1] - 95.0
+    mesh = replace(quad(), pieces=("Body_SKIN", "Shirt"))
+    for height, told in ((-1.1, {0, 1, 3, 4}), (-0.5, {0, 1}), (0.1, set())):
+        at = np.add(mesh.vertices, [0.0, low + height, 0.0])
+        assert set(bust._skin_borders(replace(mesh, vertices=at), EYES_AT, 1.0).tolist()) == told
+    for apart, alone in ((0.29, False), (0.31, True)):
+        beside = np.array([[0.0, -9.0, 0.0], [5, -9, 0], [0, -5, 0], [-apart, -9, 0], [-5, -9, 0], [0, -3, 0]])
+        two = replace(mesh, vertices=np.add(beside, [0.0, low, 0.0]), faces=np.array([[0, 1, 2, -1], [3, 4, 5, -1]]))
+        two = replace(two, pieces=("Body_SKIN", "Body_SKIN"))
+        assert (0 in bust._skin_borders(two, EYES_AT, 1.0)) == alone
+    assert len(bust._skin_borders(replace(mesh, piece=mesh.piece[:0]), EYES_AT, 1.0)) == 0
+
+
+def test_a_body_is_said_with_what_went_with_it():
+    mesh = replace(quad(), pieces=("a", "b", "b"))
+    note = "a body, 1234 mm below the eyes: the head is cut from it below the neck"
+    assert bust._notes(mesh, np.array([False, True, True]), 1234.4) == [f"{note}; left out with it: 'b'"]
+    assert bust._notes(mesh, np.zeros(3, bool), 1234.4) == [note]

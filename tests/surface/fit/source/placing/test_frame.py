@@ -227,3 +227,55 @@ def test_what_little_is_known_decides_between_rotations_of_axes():
 def test_what_was_found_is_taken_where_it_differs_from_the_usual():
     for upright, turn, differ in ((True, np.eye(3), False), (False, np.eye(3), True), (True, TURNS["blender"], True)):
         assert frame._differ(Orientation(turn, upright), np.eye(3)) == differ
+
+
+def test_a_rotation_agrees_with_the_sides_above_0_7_and_with_the_jaw_above_0_6():
+    points = np.random.default_rng(0).normal(size=(300, 3)) * [75, 100, 90]
+
+    def partly(marks=Landmarks(), **shapes):
+        return frame._partly(points, shapes, marks, np.eye(3), sure=False)
+
+    for share, first in ((0.7, [0, 1, 0]), (0.71, [1, 0, 0])):
+        left = np.array([share, 0.705, 0.0])
+        np.testing.assert_array_equal(partly(Landmarks(left=left))[0], first)
+    away = np.array([0.5, 0.5, 0.7071])
+    np.testing.assert_array_equal(partly(Landmarks(left=away))[0], [0, 0, 1])
+    np.testing.assert_array_equal(partly(Landmarks(left=np.full(3, 0.577))), np.eye(3))  # along none: as usual
+    for down, up in (([-0.8, -0.6, 0.0], [1, 0, 0]), ([-0.79, -0.61, 0.0], [0, 1, 0]), ([0.8, -0.6, 0.0], [-1, 0, 0])):
+        moves = np.tile(np.array(down), (300, 1))
+        np.testing.assert_array_equal(partly(jawOpen=moves)[1], up)
+
+
+def test_a_rotation_agrees_with_eyes_that_lie_along_an_axis_up_to_a_tenth():
+    points = np.array([[-1.0, -1, -1], [1, 1, 1]]) * 200
+    for along, first in ((0.899, [1, 0, 0]), (0.901, [0, 1, 0])):
+        across = np.sqrt(1 - along**2)
+        half = 30.0 * np.array([0.0, along, across])
+        eyes = Eyes(np.stack([half, -half]), True, True, "")
+        turn = frame._partly(points, {}, Landmarks(eyes), np.eye(3), sure=False)
+        np.testing.assert_array_equal(np.abs(turn[0]), first)
+
+
+def test_eyes_by_the_form_replace_those_of_shapes_that_lie_half_their_distance_away(monkeypatch):
+    class Face:
+        def at(self, points):
+            return 2.0 * points
+
+    monkeypatch.setattr(frame, "match_face", lambda *_: Face())
+    middle, half = 2.0 * frame.EYES_AT, 2.0 * frame.HALF_APART
+    apart = 4 * 31.8
+    for off, kept in ((0.49, True), (0.51, False), (None, False)):
+        notes: list[str] = []
+        found = None
+        if off is not None:
+            place = middle + np.array([0.0, off * apart, 0.0])
+            found = Eyes(place - half, False, False, "lids")  # named the other way round
+        marks = frame._by_form(np.zeros((3, 3)), np.zeros((0, 4), np.int64), Landmarks(found), notes)
+        assert notes == ["the face was found by its form: no shapes of lids and lips show where it is"]
+        np.testing.assert_allclose(marks.mouth, 2.0 * frame.MOUTH_AT)
+        assert marks.eyes.sided and marks.eyes.balls != kept
+        assert marks.eyes.by == ("lids" if kept else "the form of the face")
+        np.testing.assert_allclose(marks.eyes.centres, (place if kept else middle) + half)
+    monkeypatch.setattr(frame, "match_face", lambda *_: None)
+    marks, notes = Landmarks(), []
+    assert frame._by_form(np.zeros((3, 3)), np.zeros((0, 4), np.int64), marks, notes) is marks and notes == []

@@ -135,3 +135,13 @@ def test_shapes_are_given_whole_where_they_would_be_cut_into_sides() -> None:
     np.testing.assert_array_equal(found["browInnerUp"], deltas[1] + deltas[2])
     np.testing.assert_array_equal(found["eyeBlink"], deltas[3])
     np.testing.assert_array_equal(found["mouthSmileLeft"], deltas[2])
+
+
+@pytest.mark.parametrize(
+    ("kind", "balls", "tilt"),
+    [("mouth", True, -13.9), ("mouth", False, -6.0), ("jaw", True, -3.2), ("jaw", False, 3.7)],
+)
+def test_a_head_is_levelled_by_the_lean_of_its_landmarks(kind: str, balls: bool, tilt: float) -> None:
+    turn = Rotation.from_euler("z", 20, degrees=True).as_matrix()
+    marks = Landmarks(Eyes(CENTRES @ turn, True, balls, ""), **{kind: low(tilt) @ turn})
+    np.testing.assert_allclose(orient(HEAD @ turn, marks).turn, turn, atol=1e-9)

@@ -7,11 +7,15 @@ import numpy as np
 import pytest
 from traps import EYE_X, good_head, on_body, placed, transformed
 
+from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
+from surface.fit.source.names import map_names
+from surface.fit.source.placing import place as place_module
+from surface.fit.source.placing.anatomy import Eyes, Landmarks
 from surface.fit.source.placing.conventions import GLTF, VRM0
 from surface.fit.source.placing.frame import EYES_AT, EYES_MM, UNITS, find_frame
 from surface.fit.source.placing.orient import SQUARE
-from surface.fit.source.placing.place import find_neck, head_size
+from surface.fit.source.placing.place import HeadSize, eye_middle, find_neck, head_size, neck_of, place
 
 HEAD = good_head()
 BODY = on_body(HEAD)
@@ -155,3 +159,81 @@ def test_the_real_head_comes_to_the_same_place(k, unit):
     assert got.placement.unit == unit
     np.testing.assert_allclose(got.mesh.vertices, wanted, atol=0.02)
     assert np.linalg.norm(wanted - 10 * mesh.vertices, axis=1).max() < 6.0  # it stands nearly where it stood
+
+
+def marks(apart: float = EYES_MM, mouth_below: float | None = 72.0, *, balls: bool = True) -> Landmarks:
+    """Landmarks with eyes so far apart and a mouth so far below them, mm."""
+    eyes = Eyes(np.array([[apart / 2, 10.0, 5.0], [-apart / 2, 10.0, 5.0]]), True, balls, "")
+    return Landmarks(eyes, None if mouth_below is None else np.array([0.0, 10.0 - mouth_below, 9.0]))
+
+
+@pytest.mark.parametrize(
+    ("given", "size"),
+    [
+        (Landmarks(), (1.0, 1.0)), (marks(), (1.0, 1.0)), (marks(2 * EYES_MM, 72.0), (2.0, 1.0)),
+        (marks(mouth_below=108.0), (1.0, 1.5)), (marks(mouth_below=200.0), (1.0, 2.0)),
+        (marks(mouth_below=9.0), (1.0, 0.5)),
+        (marks(3 * EYES_MM, None), (3.0, 3.0)), (marks(0.5 * EYES_MM, 300.0), (0.5, 1.0)),
+    ],
+)  # fmt: skip
+def test_a_heads_size_is_that_of_its_face_against_the_shipped_one(given, size):
+    found = head_size(given)
+    assert (found.across, found.along) == pytest.approx(size)
+
+
+def test_eyeballs_lie_behind_and_below_the_lids():
+    np.testing.assert_allclose(eye_middle(marks().eyes, HeadSize(2.0, 3.0)), [0.0, 10.0, 5.0])
+    np.testing.assert_allclose(eye_middle(marks(balls=False).eyes, HeadSize(2.0, 3.0)), [0.0, 0.8, -15.8])
+
+
+def cloud(points) -> FitMesh:
+    points = np.array(points, float)
+    none = np.zeros((0, 4), np.int64)
+    return FitMesh(points, none, np.zeros((0, 2)), none, (), np.zeros((0, len(points), 3)))
+
+
+def test_the_neck_of_a_head_without_eyes_is_in_its_lower_quarter():
+    neck = neck_of(cloud([[-5.0, -100.0, -20.0], [7.0, 100.0, 60.0]]), Landmarks())
+    assert neck.pivot == pytest.approx((0.0, -40.0, 20.0))
+    assert (neck.slope, neck.still, neck.whole) == pytest.approx((0.0, -96.0, -60.0))
+    with_eyes = cloud([[0.0, 0.0, 0.0]])
+    assert neck_of(with_eyes, marks()) == find_neck(with_eyes, EYES_AT, HeadSize())
+
+
+@pytest.mark.parametrize("along", [1.0, 0.5])
+@pytest.mark.parametrize("across", [1.0, 2.0])
+def test_the_neck_turns_about_the_middle_of_what_there_is_at_its_height(along, across):
+    eyes = np.array([3.0, 20.0, 40.0])
+    height = 20.0 - 155.0 * along
+    ring = [[3.0, height, 10.0], [40.0, height, -60.0], [-40.0, height, -20.0], [0.0, height, 0.0]]
+    beyond = [[0.0, height + 15.1 * along, 300.0], [0.0, height - 15.1 * along, 300.0],
+              [70.1 * across + 3.0, height, 300.0], [3.0 - 70.1 * across, height, 300.0]]  # fmt: skip
+    neck = find_neck(cloud(ring + beyond), eyes, HeadSize(across, along))
+    assert neck.pivot == pytest.approx((3.0, 20.0 - 91.1 * along, -25.0))
+    base = 20.0 + 0.35 * 40.0
+    assert (neck.slope, neck.still, neck.whole) == pytest.approx((0.35, base - 217.6 * along, base - 143.6 * along))
+    near = [[69.9 * across + 3.0, height + 14.9 * along, 30.0], [3.0 - 69.9 * across, height - 14.9 * along, 0.0]]
+    assert find_neck(cloud(ring + near), eyes, HeadSize(across, along)).pivot[2] == pytest.approx(-15.0)
+    usual = 40.0 - 89.2 * along
+    assert find_neck(cloud(ring[:3]), eyes, HeadSize(across, along)).pivot[2] == pytest.approx(usual)  # too few
+    for far, limit in ((500.0, 60.0), (-900.0, -60.0)):
+        shifted = np.add(ring, [0.0, 0.0, far])
+        assert find_neck(cloud(shifted), eyes, HeadSize(across, along)).pivot[2] == pytest.approx(usual + limit * along)
+
+
+@pytest.mark.parametrize(("off", "shifted"), [(0.04, False), (0.05, False), (0.06, True)])
+def test_a_head_0_05_mm_from_its_place_stays(monkeypatch, off, shifted):
+    monkeypatch.setattr(place_module, "cut_bust", lambda mesh, at, size: (mesh, (f"cut at {size:.1f}",)))
+    mesh = cloud([[1.0, 2.0, 3.0]])
+    centres = EYES_AT + np.array([[EYES_MM, off, 0.0], [-EYES_MM, off, 0.0]])
+    found = Landmarks(Eyes(centres, True, True, ""), centres.mean(axis=0) - [0.0, 72.0, 0.0], np.array([1.0, 1.0, 1.0]))
+    got = place(Loaded(mesh, map_names(()), marks=found, notes=("first",)))
+    shift = np.array([0.0, -off, 0.0]) if shifted else np.zeros(3)
+    np.testing.assert_allclose(got.mesh.vertices, mesh.vertices + shift)
+    np.testing.assert_allclose(got.marks.eyes.centres, centres + shift)
+    np.testing.assert_allclose(got.marks.mouth, found.mouth + shift)
+    np.testing.assert_allclose(got.marks.jaw, found.jaw + shift)
+    np.testing.assert_allclose(got.placement.shift, shift)
+    assert got.notes == ("first", "cut at 2.0")  # the greater of both sizes
+    bare = Loaded(mesh, map_names(()))
+    assert place(bare) is bare
