@@ -316,14 +316,16 @@ def test_the_panel_reads_a_pose_as_omote_does(root: Path, tmp_path: Path) -> Non
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
 @pytest.mark.parametrize(("shown", "apart"), [
-    ({}, 0.0), ({"mouthSmileLeft": 1.0}, 0.0), ({"jawOpen": 0.5, "mouthClose": 0.5}, 0.0), ({"jawOpen": 0.4}, 0.4),
-    ({"mouthUpperUpLeft": 1.0, "mouthUpperUpRight": 1.0}, 0.5), ({"jawOpen": 1.0, "mouthFunnel": 1.0}, 1.0),
+    ({}, 0.0), ({"mouthSmileLeft": 1.0}, 0.0), ({"jawOpen": 0.5, "mouthClose": 0.5}, 0.0), ({"jawOpen": 0.4}, 16.0),
+    ({"upLeft": 1.0, "upRight": 1.0}, 6.0), ({"upLeft": 1.0}, 4.0), ({"own": 0.5}, 3.0), ({"own": -1.0}, 2.0),
 ])  # fmt: skip
-def test_light_enters_a_mouth_only_between_lips_that_are_apart(
+def test_lips_are_apart_by_what_shapes_do_to_them(
     root: Path, tmp_path: Path, shown: dict[str, float], apart: float
 ) -> None:
+    lips = {"jawOpen": [20, 40, 20], "mouthClose": [-20, -40, -20], "upLeft": [0, 2, 4], "upRight": [4, 4, 0]}
+    own = {"own": [0, 6, 0], "-own": [2, -6, 0]}
     (tmp_path / "pose.mjs").write_bytes((root / "controller/links/web/static/pose.js").read_bytes())
-    program = f"import {{ lipsApart }} from './pose.mjs'; console.log(lipsApart({json.dumps(shown)}));"
-    (tmp_path / "run.mjs").write_text(program)
+    given = f"{json.dumps(shown)}, {json.dumps({**lips, **own})}"
+    (tmp_path / "run.mjs").write_text(f"import {{ lipsApart }} from './pose.mjs'; console.log(lipsApart({given}));")
     done = subprocess.run(["node", "run.mjs"], capture_output=True, text=True, cwd=tmp_path, check=True)
     assert float(done.stdout) == pytest.approx(apart)

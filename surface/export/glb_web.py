@@ -7,6 +7,7 @@ own centres. Positions are whole steps, which the inverse bind matrices (of an e
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from surface.export.glb_buffers import (
     GlbBuffers,
 )
 from surface.export.glb_document import asset
+from surface.export.shapes import shapes_of
 from surface.export.textures import (
     STRAND_CUTOFF,
     Picture,
@@ -40,6 +42,7 @@ METRES = 0.001
 _FORMAT = 1
 """Version of what ``extras.omote`` of the document holds."""
 _CLOSED_MM = 1.2  # lips that are nowhere further apart than this at rest are closed
+_LIP_COLUMNS, _PARTED_MM = 7, 0.3  # where lips are measured; a shape that moves them apart by less does not count
 _MAX_STEPS = 32_700  # steps from the middle of the head
 _COARSE_MM, _COARSE_NORMAL = 0.03, 8  # moves are whole multiples of these: mm, and steps of a 16-bit normal
 _FADES = {"brow": ((0.72, 0.50, 0.30, 2.4), True), "lash": ((0.85, 0.15, 0.0, 0.0), False)}
@@ -61,6 +64,36 @@ def _nearest_mm(one: Floats, other: Floats) -> float:
     return float(np.linalg.norm(one[:, None] - other, axis=2).min())
 
 
+def lip_gaps(head: Head) -> dict[str, list[float]]:
+    """Return how far each shape, the user's own groups among them, parts the lips.
+
+    By shape: mm of height in each of some columns from one corner of the mouth to the other, at weight 1, negative
+    where it closes what another shape opens. ``-NAME`` is that of an own group at weight -1. Shapes that part no lips
+    are left out.
+    """
+    lips = next((contact for contact in head.contacts if contact.eye < 0), None)
+    if lips is None:
+        return {}
+    part, columns = head.part(lips.part), lips.places[:, :: max(1, lips.places.shape[1] // _LIP_COLUMNS)]
+    rows = [[part.surface.basis_rows(side) for side in column] for column in columns.swapaxes(0, 1)]
+
+    def gaps(pose: Mapping[str, float]) -> Floats:
+        head.pose(head.values(pose))
+        points = part.control_points
+        return np.array([(up @ points)[:, 1].min() - (low @ points)[:, 1].max() for up, low in rows])
+
+    found: dict[str, list[float]] = {}
+    own = {group.name for group in head.own_groups}
+    for name, base in shapes_of(head).items():
+        before = gaps(base)
+        for key, amount in ((name, 1.0), (f"-{name}", -1.0))[: 2 if name in own else 1]:
+            mm = gaps({**base, name: amount}) - before
+            if np.abs(mm).max() > _PARTED_MM:
+                found[key] = [round(float(x), 2) for x in mm]
+    head.pose(head.values({}))
+    return found
+
+
 def web_glb(head: Head) -> bytes:
     """Return a head as a small .glb (glTF 2.0 with KHR_mesh_quantization), of which gzip takes away another half."""
     return _WebDocument(head, web_parts(head)).bytes()
@@ -79,7 +112,7 @@ class _WebDocument(GlbBuffers):
         bound = [one for one in parts if not one.part.pivot.any()]
         self._middle, self._step_mm = _grid([one.part.vertices for one in bound])
         self._neck = head.data.neck
-        self._lips_open = lips_open_at_rest(head)
+        self._lips_open, self._lips = lips_open_at_rest(head), lip_gaps(head)
         self._own = {group.name: list(group.times) for group in head.own_groups}
         self._nodes: list[dict[str, Any]] = []
         self._roots = [0]  # and every part that is bound to joints: what is above it would not move it
@@ -101,7 +134,8 @@ class _WebDocument(GlbBuffers):
         names = {name for mesh in self._meshes for name in mesh.get("extras", {}).get("targetNames", [])}
         return {
             "format": _FORMAT, "half": sorted(names & {name + HALF for name in HALVES}), "own": self._own,
-            "lips_open": self._lips_open, "neck": {"pivot": (METRES * np.array(neck.pivot)).tolist()},
+            "lips_open": self._lips_open, "lips": self._lips,
+            "neck": {"pivot": (METRES * np.array(neck.pivot)).tolist()},
         }  # fmt: skip
 
     def _add_nodes(self, head: Head, parts: list[WebPart]) -> None:

@@ -68,7 +68,7 @@ def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes:
                 painted={key: part.attributes[key][0] for key in _PAINTED if key in part.attributes},
             )
         )
-    for name, base in _shapes(head).items() if shapes else ():
+    for name, base in shapes_of(head).items() if shapes else ():
         _add_shape(head, name, base, out)
     head.pose(head.values({}))
     return out
@@ -80,7 +80,7 @@ def is_posed(head: Head, pose: Mapping[str, float]) -> bool:
     return any(value and name not in own for name, value in pose.items())
 
 
-def _shapes(head: Head) -> dict[str, Mapping[str, float]]:
+def shapes_of(head: Head) -> dict[str, Mapping[str, float]]:
     """Return shapes that move anything, each with the face that it is added to: those of groups, of turning eyes and
     jaw, and a user's own behind them."""
     follow = {part.follows for part in head.parts}

@@ -10,6 +10,7 @@ from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.features.crowns import crown_chart, split_teeth
 from surface.fit.features.rigging import lid_share, make_groups, tongue_groups
+from surface.fit.features.tooth_rows import closed_row
 from surface.fit.points.eyeball import eyeball_surface
 from surface.fit.points.recipe import PartRecipe
 from surface.fit.points.refine import Fitted, fit_chart
@@ -176,14 +177,16 @@ def _lid_share(part: PartRecipe, fitted: Fitted, rig: HeadRig) -> Floats:
 
 
 def teeth_part(mesh: FitMesh, part: PartRecipe, rig: HeadRig) -> tuple[PartData, PartReport]:
-    """One patch per tooth, all in one part."""
+    """One patch per tooth, all in one part; neighbours touch, which those of the mesh need not. The report is of how
+    the patches follow the mesh, before that."""
     first = mesh.faces[:, 0]
     low, high = part.vertices[0]
     teeth = split_teeth(mesh, np.flatnonzero((first >= low) & (first < high)))
     chart, crowns = crown_chart(mesh, teeth, part.follows != "jaw")
     request = replace(part.request, points=part.request.points * len(teeth), coarse=0.4, deepest=2, neutral_mm=0.08)
     fitted = fit_chart(crowns, chart, request)
-    return skin_part(part, chart, fitted, rig), measure(part.name, chart, fitted, ())
+    data, upper = skin_part(part, chart, fitted, rig), part.follows != "jaw"
+    return replace(data, points=closed_row(data, upper=upper)), measure(part.name, chart, fitted, ())
 
 
 def eyeball_part(side: str, centre: Floats, radius: float) -> PartData:

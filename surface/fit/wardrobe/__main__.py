@@ -32,7 +32,7 @@ def main(head: str, out: str, *names: str) -> None:
             parts = {"hair": ("strand", style.patches)}
             if style.hanging:
                 parts["tresses"] = "tress", list(style.hanging)
-            write_garment(path, skin, parts, hair_fields(skin, style.hairline))
+            write_garment(path, skin, parts, hair_fields(skin, style.hairline, style.fade))
     for name, neck in NECKS.items():
         if not names or name in names:
             parts = {"clothes": ("cloth", garment(skin, neck))}

@@ -22,7 +22,7 @@ LAYERS = (
 # The inner one so dense that it is closed up to its tip: nothing lies below it
 BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 6.6, 0.82, 0.2))
 UNDER_MM = 8.0  # from the middle of the bun's base: there strands of the skull end, well below the coil
-NAPE_RAD = 0.06  # how much higher than the line hair begins there, seen from the skull's middle
+FADE_MM = -7.0, 3.0  # short hairs that the tie does not reach: without them the line is cut as with a saw
 _TURNS = 0.62  # of a strand about the bun, from its base to its tip
 
 
@@ -31,8 +31,7 @@ def bun(skin: Skin) -> Style:
     line = Hairline(skin, TIED)
     base = BUN - 14.0 * _OUT
     round_it = np.linspace(np.pi, -np.pi, GUIDES)
-    nape = step(np.abs(round_it), 2.3, 2.9)
-    toward = directions(line.down(round_it) + 0.012 - NAPE_RAD * nape, round_it)
+    toward = directions(line.down(round_it) + 0.012, round_it)
     roots = CENTRE + toward * skin.reach(toward)[:, None]
 
     def thickness(at: Floats) -> Floats:
@@ -49,7 +48,7 @@ def bun(skin: Skin) -> Style:
 
     comb = Comb(roots[::-1], np.full(GUIDES, 330.0), thickness, flow, cut, 0.0, 0.5, 0.0, steps=66, slack=0.4)
     made = sheets(skin, comb, LAYERS, Weave((73, 12), (97, 15), (49, 9), -0.35), seed=31, closed=True)
-    return Style([*_coil(), *made], line)
+    return Style([*_coil(), *made], line, fade=FADE_MM)
 
 
 def _frame() -> Floats:

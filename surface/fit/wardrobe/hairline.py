@@ -22,10 +22,10 @@ POINTS = np.array(
 RECEDED = np.vstack(
     [[(0, 122, 76), (14, 124, 71), (28, 129, 50), (42, 124, 38), (54, 108, 40), (63, 86, 45), (68, 64, 47)], POINTS[6:]]
 )
-#: The same where hair is drawn back over the ears: it ends above their roots, which it would lie over otherwise.
+#: The same where hair is drawn back: close above the ears' roots and behind them, and higher at the nape.
 TIED = np.vstack(
-    [POINTS[:5], [(66, 62, 56), (72, 49, 46), (76, 41, 37), (79, 40, 26), (81, 44, 14), (82, 46, 2), (82, 42, -12)],
-     POINTS[12:]]
+    [POINTS[:5], [(66, 62, 56), (72, 49, 46), (77, 37, 36), (80, 33, 26), (81, 37, 14), (81, 38, 2), (80, 35, -8),
+                  (76, 20, -15), (68, -6, -22), (56, -34, -33), (24, -51, -58), (0, -52, -63)]]
 )  # fmt: skip
 
 

@@ -13,6 +13,8 @@ from surface.fit.wardrobe.skin import CENTRE, Skin, unit
 from surface.fit.wardrobe.styles import Style, cap, step, tangent
 
 PART_X = 14.0  # of the parting, mm
+AT_PARTING = 0.22  # share of the hair's thickness at the parting: roots lie in a shallow valley, not beside a slot
+APART_MM = 0.05  # of either side's roots from the parting's middle: more would be a slot with the cap's edge in it
 ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
 TIPS_Y = -124.0  # mm
 OVER_EAR_MM = 11.0
@@ -29,7 +31,7 @@ def long(skin: Skin) -> Style:
     line = Hairline(skin)
 
     def thickness(at: Floats) -> Floats:
-        return np.asarray(3.0 + _full(line, at))
+        return np.asarray(1.4 + _full(line, at))
 
     hanging = [patch for side in (1.0, -1.0) for patch in _curtain(skin, line, side)]
     return Style([cap(skin, line, thickness, share=0.5, openness=0.7)], line, tuple(_inner_last(hanging)))
@@ -38,7 +40,9 @@ def long(skin: Skin) -> Style:
 def _full(line: Hairline, at: Floats) -> Floats:
     """(n,) mm that hair adds over places (n, 3): less at the line, and at the parting."""
     beside = step(np.abs(at[:, 0] - PART_X), 0.0, 30.0) + step(-at[:, 2], 30.0, 60.0)
-    return np.asarray(9.5 * step(line.inside(at), -8.0, 34.0) * (0.45 + 0.55 * np.minimum(beside, 1.0)))
+    return np.asarray(
+        9.5 * step(line.inside(at), -8.0, 34.0) * (AT_PARTING + (1.0 - AT_PARTING) * np.minimum(beside, 1.0))
+    )
 
 
 def _inner_last(hanging: list[Patches]) -> list[Patches]:
@@ -81,7 +85,7 @@ def _inside(a: Floats, b: Floats, c: Floats) -> bool:
 def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
     """Sheets of the hair that falls to one side of the parting, from the face to the middle of the back."""
     roots = _parting(skin, line)
-    roots[:, 0] += 0.4 * side
+    roots[:, 0] += APART_MM * side
     fan = np.concatenate([np.zeros(ALONG_PART), np.linspace(0.0, 1.0, FANNED + 1)[1:]])
     back = np.concatenate([np.linspace(0.0, 1.0, ALONG_PART), np.ones(FANNED)])
 

@@ -21,6 +21,8 @@ from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, step
 
 _CLOSER = 0.45  # how much less light reaches cropped hairs, which lie on the skin
 _CROPPED = 20.0  # how many times shorter the pieces are that one sees of cropped hairs
+_UNEVEN = 0.35  # by how much the length that is roots differs along a hairline: an even one looks cut as with a saw
+_EDGE_BARE = 0.2  # how far below nothing cover is at a frayed edge: single strands there look like threads of a web
 Drape = Callable[[Floats], Floats]
 """Guides (g, k, 3), hung."""
 Depth = Callable[[Floats], Floats]
@@ -191,8 +193,10 @@ def sheet(
     cover = layer.cover * (1.0 + 0.10 * locks) - (layer.cover + BARE) * np.clip((t - 1.0 + fray) / fray, 0.0, 1.0)
     for width, away in zip(frayed, (u, 1.0 - u), strict=True):
         if width > 0.0:
-            cover = cover - (layer.cover - 0.1) * (1.0 - np.clip(away / width, 0.0, 1.0))
-    cover = cover - layer.roots * (1.0 - step(t * own, 0.0, layer.roots_mm))
+            cover = cover - (layer.cover + _EDGE_BARE) * (1.0 - np.clip(away / width, 0.0, 1.0))
+    if layer.roots > 0.0:
+        uneven = 1.0 + _UNEVEN * _waves(gu, random, closed)[:, None]
+        cover = cover - layer.roots * (1.0 - step(t * own / uneven, 0.0, layer.roots_mm))
     opened = layer.openness * (0.86 + 0.14 * step(t, 0.0, 0.4)) * (1.0 + 0.05 * locks)
     ends = np.exp(-(1.0 - t) * own / max(layer.cropped_mm, 1e-9))
     opened = opened * (1.0 - _CLOSER * ends) if layer.cropped_mm > 0.0 else opened

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from surface.base.arrays import Array, Floats
+from surface.base.arrays import Array, Bools, Floats
 from surface.fit.wardrobe.beards import Beard
 from surface.fit.wardrobe.beards import field as beard_field
 from surface.fit.wardrobe.clothes import Neck, hidden_below
 from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.patches import Patches, arrays
-from surface.fit.wardrobe.skin import ANCHORS, Skin
+from surface.fit.wardrobe.skin import ANCHORS, CENTRE, Skin, unit
 from surface.fit.wardrobe.styles import step
 from surface.head.model.sidecar import write_sidecar
 from surface.head.model.wardrobe import outline
@@ -22,6 +22,7 @@ from surface.head.model.wardrobe import outline
 SIZE = 192  # pixels of a picture along u and v
 FADE_MM = (-6.0, 8.0)  # inside the hairline: where the skin begins to have hair's colour, and where it has it
 HIDDEN_MM = 26.0
+EAR_MM = 4.0  # from the skull's skin: what stands out further is an ear
 
 
 def write_garment(
@@ -49,12 +50,19 @@ def hair_fields(skin: Skin, line: Hairline, fade: tuple[float, float] = FADE_MM)
     """Pictures of hair: skin between roots has its colour, and deep inside nobody sees it."""
     inside = line.inside(skin.points)
     inside = np.where((skin.normals * (skin.points - (0, 40, 0))).sum(axis=1) > -20.0, inside, -50.0)
+    inside = np.where(_stands_out(skin), -50.0, inside)
     cover, hidden = step(inside, *fade), step(inside, HIDDEN_MM - 0.5, HIDDEN_MM + 0.5)
     out = {}
     for k, name in enumerate(ANCHORS):
         out[f"cover/{name}"] = picture(skin, k, cover)
         out[f"hidden/{name}"] = picture(skin, k, hidden)
     return out
+
+
+def _stands_out(skin: Skin) -> Bools:
+    """Which samples (s,) stand out from the skull, as ears do: nothing grows there."""
+    away = skin.points - CENTRE
+    return np.asarray(np.linalg.norm(away, axis=1) - skin.reach(unit(away)) > EAR_MM)
 
 
 def cloth_fields(skin: Skin, neck: Neck) -> dict[str, Floats]:

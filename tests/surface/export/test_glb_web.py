@@ -18,11 +18,12 @@ from small_head import all_points, part, small_head
 from surface.base.errors import ExportError
 from surface.export import export_head, glb_web
 from surface.export.glb_buffers import GlbBuffers
-from surface.export.glb_web import lips_open_at_rest, web_glb
+from surface.export.glb_web import lip_gaps, lips_open_at_rest, web_glb
 from surface.export.shapes import export_parts
 from surface.export.textures import eye_picture, png_bytes, strand_picture, strip_picture
 from surface.export.web_parts import MIN_MOVE_MM, web_parts
 from surface.head import Head
+from surface.head.model.own_groups import OwnGroup
 
 TYPES = {5126: "<f4", 5125: "<u4", 5123: "<u2", 5122: "<i2", 5121: "u1", 5120: "i1"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
@@ -205,3 +206,32 @@ def test_moves_are_whole_coarse_steps_and_turns_of_normals_at_most_one(monkeypat
     assert bent.dtype == np.int8 and bent.tolist() == [[0, 0, 0], [0, 0, 0], [-127, 127, 64], [0, 0, 0]]
     document._target(0.0 * moves, 0.0 * turns, 3)
     assert kept[2][1].tolist() == [0]  # an empty list would be no list
+
+
+def test_how_far_shapes_part_the_lips_is_measured_on_them() -> None:
+    gaps = lip_gaps(Head.load(Path(__file__).parents[3] / "configs/heads/ict"))
+    assert max(gaps["jawOpen"]) > 25.0
+    np.testing.assert_allclose(np.add(gaps["mouthClose"], gaps["jawOpen"]), 0.0, atol=2.0)
+    assert max(gaps["mouthUpperUpLeft"]) > 2.0
+    assert max(gaps.get("mouthSmileLeft", [0.0])) < 1.5 and max(gaps.get("jawForward", [0.0])) < 1.5
+    assert not {"eyeBlinkLeft", "browInnerUp"} & set(gaps)
+
+
+def test_groups_of_the_user_that_part_the_lips_are_among_them() -> None:
+    head = Head.load(Path(__file__).parents[3] / "configs/heads/ict")
+    down = head.group("mouthLowerDownLeft")["face"]
+    moves = down.moves.astype(float)
+    groups = [
+        OwnGroup("gape", "face", down.ids, moves), OwnGroup("shut", "face", down.ids, -moves),
+        OwnGroup("wider", "face", down.ids, moves, ("jawOpen",)),
+    ]  # fmt: skip
+    head.add_groups(groups)
+    sealed = lip_gaps(head)
+    assert max(sealed["wider"]) > 2.0, "it adds to what the jaw opens"
+    assert "gape" not in sealed, "the seal of this head keeps lips together in shapes that it does not name"
+    free = Head(replace(head.data, contacts=[replace(contact, seal=None) for contact in head.contacts]))
+    free.add_groups(groups)
+    gaps = lip_gaps(free)
+    assert max(gaps["gape"]) > 2.0 and max(gaps["-shut"]) > 2.0, "one opens them up to 1, the other down to -1"
+    assert max(gaps.get("shut", [0.0])) < 1.0
+    assert Decoded(web_glb(free)).document["extras"]["omote"]["lips"] == gaps

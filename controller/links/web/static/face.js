@@ -5,7 +5,7 @@ import { lipsApart, ownAmounts, readPose } from "/pose.js";
 import { material, shared } from "/shaders.js";
 
 const EYES = ["eye_left", "eye_right"], HALF = "Half";
-const LIT_APART = 0.12;  // how far lips are apart where light enters between them as it does into an open mouth
+const LIT_MM = [0.8, 5];  // how far lips are apart where light begins to enter, and where it does as into an open mouth
 
 // Whether pictures are computed without a graphics processor: smooth edges would cost a third of the time then.
 function isSoftware() {
@@ -49,6 +49,7 @@ export class Face {
     gltf.scene.traverse((node) => { if (node.isMesh) meshes.push(node); });
     this.half = omote.half ?? [];
     this.own = omote.own ?? {};
+    this.lips = omote.lips ?? {};
     this.lipsOpen = omote.lips_open ?? true;
     this.head = new THREE.Object3D();
     this.head.position.fromArray(omote.neck?.pivot ?? [0, 0, 0]);
@@ -99,7 +100,7 @@ export class Face {
     Object.assign(weights, ownAmounts(names, values, this.own));
     for (const name of this.half) { const w = weights[name.slice(0, -HALF.length)]; weights[name] = 4 * w * (1 - w); }
     for (const part of this.#parts) part.show(weights);
-    shared.between_lips.value = this.lipsOpen ? 1 : Math.min(lipsApart(weights) / LIT_APART, 1);
+    shared.between_lips.value = this.lipsOpen ? 1 : Math.min(Math.max((lipsApart(weights, this.lips) - LIT_MM[0]) / (LIT_MM[1] - LIT_MM[0]), 0), 1);
     this.head.rotation.set(head[1], head[0], head[2], "YXZ");
     eyes.forEach(([yaw, pitch], i) => this.#eyes[i]?.rotation.set(pitch, yaw, 0, "YXZ"));
     this.head.updateMatrixWorld(true);

@@ -47,9 +47,13 @@ export function readPose(names, values) {
   return { weights: at, eyes, head };
 }
 
-// How far lips are apart, 0 to 1, by the weights of shapes that part them.
-export function lipsApart(weights) {
-  const of = (name) => weights[name] ?? 0, both = (name) => (of(`${name}Left`) + of(`${name}Right`)) / 2;
-  const parted = 0.5 * both("mouthLowerDown") + 0.5 * both("mouthUpperUp") + 0.35 * of("mouthFunnel");
-  return clamp(of("jawOpen") - of("mouthClose") + parted, 0, 1);
+// How far lips are apart, mm, where they are furthest apart. weights: of shapes. lips: { shape: mm in each of some columns
+// at weight 1 }, those of an own group at weight -1 under "-shape".
+export function lipsApart(weights, lips) {
+  const apart = [];
+  for (const [name, mm] of Object.entries(lips)) {
+    const weight = name.startsWith("-") ? -(weights[name.slice(1)] ?? 0) : weights[name] ?? 0;
+    if (weight > 0) mm.forEach((each, i) => { apart[i] = (apart[i] ?? 0) + weight * each; });
+  }
+  return Math.max(0, ...apart);
 }

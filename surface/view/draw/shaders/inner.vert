@@ -46,7 +46,7 @@ void main() {
     vec3 away = position - opening_centre;
     vec3 outwards = normalize(dot(away, side) * side + (past + ARCH_MM) * out_of);
     float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
-    vec3 own = mix(albedo, WALLS, inwards);
+    vec3 own = mix(albedo, WALLS, 0.45 * inwards);
     n = normalize(mix(n, out_of, 0.55 * deep));
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)

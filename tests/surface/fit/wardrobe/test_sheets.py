@@ -55,12 +55,14 @@ def test_roots_and_edges_are_sparse_where_they_shall_be() -> None:
     full = made().strands[0, ..., 2]
     rooted = made(Layer(1.0, 0.8, 0.9, 20.0, roots=0.5)).strands[0, ..., 2]
     np.testing.assert_allclose(full[:, 0] - rooted[:, 0], 0.5)
-    np.testing.assert_allclose(rooted[:, 2:], full[:, 2:])
+    np.testing.assert_allclose(rooted[:, 4:], full[:, 4:])
+    sparse = full[:, 1] - rooted[:, 1]
+    assert np.ptp(sparse) > 0.05, "a hairline is uneven"
     edged = made(frayed=(0.25, 0.0)).strands[0, ..., 2]
-    np.testing.assert_allclose(full[0] - edged[0], PLAIN.cover - 0.1)
+    np.testing.assert_allclose(full[0] - edged[0], PLAIN.cover + 0.2)
     np.testing.assert_allclose(edged[5:], full[5:])
     other = made(frayed=(0.0, 0.25)).strands[0, ..., 2]
-    np.testing.assert_allclose(full[-1] - other[-1], PLAIN.cover - 0.1)
+    np.testing.assert_allclose(full[-1] - other[-1], PLAIN.cover + 0.2)
     np.testing.assert_allclose(other[:-5], full[:-5])
 
 

@@ -59,3 +59,33 @@ def test_beards_lie_close_to_the_skin_at_the_ears(root: Path) -> None:
     beard = Dressed(root, "beard-full")
     side = (np.degrees(np.arctan2(np.abs(beard.at[:, 0]), beard.at[:, 2] - 20.0)) > 84.0) & (beard.cover > -0.25)
     assert side.any() and beard.away[side].max() < 3.0
+
+
+def test_tied_hair_begins_close_to_the_ear(root: Path) -> None:
+    """A strip of bare skin lay above and behind it."""
+    hair = Dressed(root, "hair-bun")
+    beside = np.array([(80, 42, 10), (80, 42, 0), (79, 38, -10), (76, 26, -20), (72, 10, -26)], float)
+    for side in (1.0, -1.0):
+        assert cKDTree(hair.at[hair.cover > 0.0]).query(beside * [side, 1.0, 1.0])[0].max() < 5.0
+
+
+def test_hair_of_both_sides_meets_at_the_parting(root: Path) -> None:
+    """Else there is a slot between them, in which one sees steps of what lies below."""
+    look = Look(worn=(Worn(root / "configs/wardrobe/hair-long.npz", (0.1, 0.1, 0.1)),))
+    part = Head.load(root / "configs/heads/ict", look=look).part("tresses")
+    u, v = part.uv.T
+    every = [part.vertices[(v < 1e-6) & (np.abs(u - 2.0 * k - 0.5) < 0.6)].astype(float) for k in range(6)]
+    for one, other in zip(every[::2], every[1::2], strict=True):
+        assert len(one) == len(other) > 40
+        assert cKDTree(other).query(one)[0].max() < 0.3
+
+
+def test_ears_do_not_have_the_colour_of_hair(root: Path) -> None:
+    """Pictures of what hair does to the skin are made by directions from the skull's middle, in which ears lie, too."""
+    worn = Worn(root / "configs/wardrobe/hair-bun.npz", (0.9, 0.0, 0.9))
+    plain, dressed = (Head.load(root / "configs/heads/ict", look=look) for look in (None, Look(worn=(worn,))))
+    x, y, _ = plain.part("face").vertices.T
+    ear = (np.abs(x) > 87.0) & (y > -20.0) & (y < 40.0)
+    assert ear.sum() > 50
+    before, after = (head.part("face").attributes["albedo"][ear] for head in (plain, dressed))
+    assert np.abs(after - before).max() < 0.02
