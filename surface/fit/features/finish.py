@@ -18,12 +18,18 @@ from surface.fit.points.recipe import Recipe
 from surface.fit.points.strokes import arc_length
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
+from surface.fit.source.placing.frame import head_scale
 from surface.head.model.data import Contact, Group, HeadData, PartData, Rule, Seal
 from surface.head.model.meshes import make_surface
-from surface.head.model.parameters import read_pose
+from surface.head.model.parameters import NAMES as PARAMETERS
+from surface.head.model.parameters import SHAPES, read_pose
+from surface.head.posing.contact import FORWARD, ContactSolver
 from surface.head.posing.rig import SkinRig
 
 LIPS = Path(__file__).with_name("lips.toml")  # what parts the lips of a fitted head
+PARTED_MM = 4.0  # on a usual head: lips that a shape of a mesh parts further than that are to be open
+PARTED = 1.4  # share of such a shape in what opens lips, that of mouthFunnel
+CLOSES = "mouthClose"  # takes back what the jaw opens, and parts nothing
 SETTLINGS = 4  # each halves what contacts still move at rest
 PRODUCT = "*"  # between the two shapes in the name of a corrective's group
 COLUMNS, ROWS, FADE_ROWS = 21, 10, 5
@@ -44,7 +50,10 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
     names = tuple(p.name for p in head.parts)
     contacts = find_contacts(wrinkled, head.eyes, head.eye_radius, names, cling=bool(recipe.parts))
     parts = [wrinkled if p is face else p for p in head.parts]
-    head = lower_tongue(replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts), recipe)
+    head = replace(head, parts=parts, rules=[*rules, *folds], contacts=contacts)
+    if not recipe.parts:
+        head = part_lips(head, head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True))))
+    head = lower_tongue(head, recipe)
     head = add_correctives(head, recipe.correctives)
     head = draw_back_tongue(head, recipe)  # after the correctives: of a lip's roll, the lip alone has some
     rest = read_pose(np.zeros(59))
@@ -52,6 +61,38 @@ def finish_head(head: HeadData, mesh: FitMesh, charts: dict[str, Chart], recipe:
         points = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
         head = replace(head, parts=[replace(p, points=at) for p, at in zip(head.parts, points, strict=True)])
     return head
+
+
+def part_lips(head: HeadData, scale: float) -> HeadData:
+    """The head whose lips may part in shapes that open them by more than :data:`PARTED_MM`: so the mesh's maker wanted
+    it, as in the round open mouth that drawn characters make of mouthPucker.
+
+    scale : size of the head relative to a usual one.
+    """
+    contacts = []
+    for contact in head.contacts:
+        seal = contact.seal
+        if seal is not None:
+            wide = [n for n, gap in lip_gaps(head, contact).items() if gap > PARTED_MM * scale]
+            opens = {n: PARTED for n in wide if seal.opens.get(n, 0.0) <= 0.0 and n != CLOSES}
+            contact = replace(contact, seal=replace(seal, opens={**seal.opens, **opens}))
+        contacts.append(contact)
+    return replace(head, contacts=contacts)
+
+
+def lip_gaps(head: HeadData, contact: Contact) -> dict[str, float]:
+    """By shape at 1, how much further than at rest the lips of a contact stand open where nothing keeps them together,
+    mm."""
+    part = next(p for p in head.parts if p.name == contact.part)
+    rig = SkinRig(part, replace(head, contacts=[]))
+    solver = ContactSolver(replace(contact, seal=None), make_surface(part), head)
+
+    def widest(name: str) -> float:
+        solver.apply(FORWARD, rig.apply(read_pose(np.array([float(n == name) for n in PARAMETERS]))).copy())
+        return float(solver.gaps().max())
+
+    rest = max(widest(""), 0.0)
+    return {g.name: widest(g.name) - rest for g in part.groups if g.name in SHAPES}
 
 
 def lower_tongue(head: HeadData, recipe: Recipe) -> HeadData:

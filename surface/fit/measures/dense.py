@@ -33,7 +33,7 @@ class _Pair:
     """
 
     def __init__(self, part: FittedPart, data: PartData, number: int, subject: Subject, mesh: FitMesh) -> None:
-        self.name, self.number = part.name, number
+        self.name, self.number, self.material = part.name, number, subject.parts[number].material
         self._uv = np.asarray(subject.parts[number].uv, np.float64)
         faces = mesh.faces[faces_of(mesh, part.chart)]
         self.turned = InsideOutFaces(part, subject.parts[number])
@@ -86,11 +86,36 @@ class _Pair:
             out[1][rows[1]] = tree.distances(self._samples(1, mesh)[rows[1]], near[rows[1]])
         return [(out[0], fold), (out[1], fold_at)]
 
+    def furthest(self, before: Floats, after: Floats, shape: str, places: Places) -> Spot:
+        """The vertex that moves furthest between two poses (m, 3)."""
+        moved = np.linalg.norm(after - before, axis=1)[self._used[0]]
+        row = int(moved.argmax())
+        return Spot(float(moved[row]), shape, self.name, places.name(self.rest[0][row], self.material), True)
+
     def sticking(self, to_mesh: Floats, fold: Bools, limit: float) -> Floats:
         """(k, 2) in (u, v): the surface's vertices that are further from the mesh than ``limit``, outside folds."""
         used = self._used[0]
         rows = used[(to_mesh[: len(used)] > limit) & ~fold[: len(used)]]
         return self._uv[rows[rows < len(self._uv)]]
+
+
+class _Free:
+    """A head without its contacts, and how far these move its vertices on purpose.
+
+    most : the vertices that are moved furthest, to keep them out of each other, and to keep lips together.
+    """
+
+    def __init__(self, head: HeadData) -> None:
+        self._without = Subject(Head(replace(head, contacts=[])))
+        self._unsealed = Subject(Head(replace(head, contacts=[replace(c, seal=None) for c in head.contacts])))
+        self.most: list[Spot | None] = [None, None]
+
+    def compare(self, pair: _Pair, surface: Floats, shape: str, places: Places) -> Floats:
+        """Return vertices (m, 3) of one part without contacts; ``surface (m, 3)`` are those with contacts."""
+        alone, parted = (_posed(s, shape, pair.number) for s in (self._without, self._unsealed))
+        for k, (before, after) in enumerate(((alone, parted), (parted, surface))):
+            self.most[k] = _greater(self.most[k], pair.furthest(before, after, shape, places))
+        return alone
 
 
 def measure_dense(
@@ -107,7 +132,7 @@ def measure_dense(
     """
     head, changed = without_correctives(head)
     subject = Subject(Head(head))
-    free = Subject(Head(replace(head, contacts=[]))) if fit_alone and head.contacts else None
+    free = _Free(head) if fit_alone and head.contacts else None
     places = Places(subject, find_mouth(subject))
     numbers = {p.name: k for k, p in enumerate(subject.parts)}
     owned = [faces_of(mesh, p.chart) for p in parts]
@@ -131,20 +156,19 @@ def measure_dense(
                 turned[pair.name, shape] = over
             in_folds = np.concatenate([d[fold] for d, fold in both])
             found[pair.name][shape] = Both(*_outside_folds(both), errors_of(in_folds))
-            material = subject.parts[pair.number].material
-            for spot, fold in _greatest(pair, both, shape, places, material):
+            for spot, fold in _greatest(pair, both, shape, places, pair.material):
                 worst[fold] = _greater(worst.get(fold), spot)
             if free is not None:
-                alone = _posed(free, shape, pair.number)
+                alone = free.compare(pair, surface, shape, places)
                 greater = pair.greater_elsewhere(alone, moved, surface, both, apart.mm if apart else 0.0)
-                for spot, fold in _greatest(pair, greater, shape, places, material):
+                for spot, fold in _greatest(pair, greater, shape, places, pair.material):
                     apart = apart if fold else _greater(apart, spot)
     rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
     added = tuple(p.name for p in subject.parts if p.name not in found)
     samples = sum(len(r) for p in pairs for r in p.rest)
     return DenseErrors(
         found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned,
-        tuple(n for n in changed if n in sources), apart,
+        tuple(n for n in changed if n in sources), apart, *(free.most if free is not None else ()),
     )  # fmt: skip
 
 

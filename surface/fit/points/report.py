@@ -15,6 +15,7 @@ from surface.head.model.data import HeadData
 
 MOST_NAMES = 4  # of one kind that a line names
 NEUTRAL = "neutral"
+TOLD_MM = 0.05  # moves by contacts below this are not told
 RMS_MM, P99_MM, SHAPES_MM = 0.25, 0.8, 0.08  # bounds for a face on a head of usual size
 FINE, MOST, ALL = "where the mesh has the detail", 0.5, 0.99  # said of at least so much of a face, and not of all of it
 
@@ -76,8 +77,12 @@ class Spot:
 
     def __str__(self) -> str:
         way = "surface to mesh" if self.to_mesh else "mesh to surface"
-        shape = "the neutral face" if self.shape == NEUTRAL else f"shape {self.shape}"
-        return f"{self.mm:.2f} mm: {shape}, {self.place} ({self.part}, {way})"
+        return f"{self.mm:.2f} mm: {self.shown}, {self.place} ({self.part}, {way})"
+
+    @property
+    def shown(self) -> str:
+        """The shape in words."""
+        return "the neutral face" if self.shape == NEUTRAL else f"shape {self.shape}"
 
 
 @dataclass(frozen=True)
@@ -110,6 +115,8 @@ class DenseErrors:
     corrected : shapes that correctives of the head change on purpose; they were measured without these.
     apart : the greatest outside folds without contacts, which move lips, lids and tongue on purpose where the mesh's
         pass through each other or an eyeball.
+    parted, sealed : the vertices that contacts move furthest on purpose: those that they keep out of each other or of
+        an eyeball, and those of lips that they keep together.
     """
 
     parts: dict[str, dict[str, Both]]
@@ -122,12 +129,18 @@ class DenseErrors:
     turned: dict[tuple[str, str], Turned] = field(default_factory=dict)
     corrected: tuple[str, ...] = ()
     apart: Spot | None = None
+    parted: Spot | None = None
+    sealed: Spot | None = None
 
     def lines(self) -> list[str]:
         """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
         out = [f"greatest error {self.worst}"] if self.worst else []
         if self.worst and self.apart and self.apart.mm < self.worst.mm:
             out.append(f"without contacts, which keep lips, lids and tongue from passing through: {self.apart}")
+        for what, spot in (("what would pass through itself", self.parted), ("lips that stay together", self.sealed)):
+            if spot and spot.mm >= TOLD_MM:
+                at = f"{spot.shown}, {spot.place} ({spot.part})"
+                out.append(f"contacts move {what} on purpose by {spot.mm:.2f} mm at most: {at}")
         if self.worst_fold:
             out.append(f"in folds (nostrils, ear canals, corners), which are held only loosely: {self.worst_fold}")
         if self.corrected:

@@ -26,7 +26,7 @@ UNFOLDINGS, STILL = 4, 0.1  # attempts of a pass to remove folds; weight that ke
 RIM_MM = (1.5, 4.0)  # distance from the rim of an opening where detail of the scan begins to count, and counts fully
 CLOSINGS = 12  # iterations, because each one leaves a share of the gap
 LIP_FADE_MM = (3.0, 16.0)  # distance from the line of the lips up to which skin moves with them, and where it is still
-FAIR = 1e-3  # weight of fairness in the fit of control points
+FAIR = 1e-4  # weight of fairness in the fit of control points
 NEAR, NEAR_MM = 6, 12.0  # nearest points of the skin that another part follows, and distance at which it no longer does
 
 

@@ -134,6 +134,15 @@ class ContactSolver:
         )  # fmt: skip
         return self.push
 
+    def gaps(self) -> Floats:
+        """Return (2, k): how far each column of both sides stands open, mm, as the last call of :meth:`apply` left it,
+        seen as :func:`.contact_kernels.find_gaps` sees it; for lips."""
+        profiles = np.zeros_like(self._opening[0])
+        gaps: Floats = np.zeros(profiles.shape[:2])
+        trace_profiles(self._sides.samples, self._rows, self._sides.radius, profiles)
+        find_gaps(profiles, gaps)
+        return gaps
+
     @property
     def lower(self) -> Floats:
         """(k, 3) samples of the lower side that can touch the upper one, as the last call of :meth:`apply` left them;

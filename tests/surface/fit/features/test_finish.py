@@ -14,6 +14,8 @@ from surface.fit.features.finish import (
     add_correctives,
     find_contacts,
     finish_head,
+    lip_gaps,
+    part_lips,
     sample_places,
 )
 from surface.fit.points.recipe import Recipe
@@ -81,6 +83,28 @@ def test_rolled_lips_stay_together(root):
 @pytest.fixture(scope="module")
 def data(root):
     return load_data(root / "configs" / "heads" / "ict")
+
+
+@pytest.fixture(scope="module")
+def lips(data):
+    return next(c for c in data.contacts if c.name == "lips")
+
+
+@pytest.mark.slow
+def test_it_is_measured_how_far_shapes_part_lips_that_nothing_keeps_together(data, lips):
+    """That shipped head's sneer alone would lift the upper lip off the lower one; its smile would not."""
+    gaps = lip_gaps(data, lips)
+    assert set(gaps) == {g.name for p in data.parts if p.name == lips.part for g in p.groups} & set(SHAPES)
+    assert gaps["noseSneerLeft"] > 4.5 and gaps["mouthFunnel"] > 10.0 and gaps["mouthSmileLeft"] < 1.0
+
+
+@pytest.mark.slow
+def test_only_shapes_that_part_lips_widely_may_open_those_of_a_mesh(data, lips):
+    before = lips.seal.opens
+    found = next(c for c in part_lips(data, 1.0).contacts if c.name == "lips").seal.opens
+    wide = {"noseSneerLeft", "noseSneerRight", "mouthShrugUpper"}
+    assert found == {**before, **dict.fromkeys(wide, 1.4)}
+    assert next(c for c in part_lips(data, 3.0).contacts if c.name == "lips").seal.opens == before
 
 
 @pytest.fixture(scope="module")

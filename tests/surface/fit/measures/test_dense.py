@@ -133,6 +133,26 @@ def test_what_contacts_move_on_purpose_is_told_from_errors_of_the_fit(mesh: FitM
     assert dense.worst.shape == "mouthShrugLower" and dense.worst.mm > 3.0
     assert dense.apart.mm < 0.4 * dense.worst.mm
     assert dense.lines()[1] == f"without contacts, which keep lips, lids and tongue from passing through: {dense.apart}"
+    assert dense.parted.shape == "mouthShrugLower" and dense.parted.mm > 0.6 * dense.worst.mm
+    assert dense.lines()[2].startswith(
+        f"contacts move what would pass through itself on purpose by {dense.parted.mm:.2f} mm at most: "
+        f"shape mouthShrugLower, {dense.parted.place} ({dense.parted.part})"
+    )
+
+
+@pytest.mark.slow
+def test_lips_that_a_mesh_opens_wide_are_not_kept_closed(mesh: FitMesh) -> None:
+    """A drawn character's round mouth in mouthPucker, and a shape that parts its lips by little."""
+    shapes = mesh.deltas[:1], 0.1 * mesh.deltas[:1]
+    wide = replace(
+        mesh, names=(*mesh.names, "mouthPucker", "mouthPressLeft"), deltas=np.concatenate([mesh.deltas, *shapes])
+    )
+    made = fit_mesh(Loaded(wide, map_names(wide.names)), "sheet", lambda part, done: None)
+    opens = made.head.contacts[0].seal.opens
+    assert opens["mouthPucker"] == 1.4 and opens["mouthPressLeft"] == -0.4
+    dense = made.report.dense
+    assert dense.sealed.shape == "mouthPressLeft" and 0.1 < dense.sealed.mm < 2.0
+    assert any(line.startswith("contacts move lips that stay together on purpose by") for line in dense.lines())
 
 
 @pytest.mark.slow
@@ -146,7 +166,7 @@ def test_what_was_fitted_alone_is_measured_as_a_head_without_contacts_is(mesh: F
     other = replace(made.head, contacts=[])
     alone = measure_dense(other, *given)
     assert both.apart == alone.worst and both.apart.mm < both.worst.mm
-    assert replace(both, apart=None, sticking={}, turned={}) == replace(
+    assert replace(both, apart=None, parted=None, sealed=None, sticking={}, turned={}) == replace(
         measure_dense(made.head, *given), sticking={}, turned={}
     )
     assert measure_dense(other, *given, fit_alone=True).apart is None

@@ -1,5 +1,6 @@
 """Skin on a scan: normals, smoothing, detail, seats of lids, closed lips, and what follows the skin."""
 
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ from surface.fit.transfer import skin as module
 from surface.fit.transfer.register import Matcher, Matches
 from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.skin import Ball, Skin, follow_skin, rims_of, seat_on_eyeballs
-from surface.head import Contact
+from surface.head import Contact, Head
 
 OLD = Ball(np.array([[30.0, 0, 0], [-30.0, 0, 0]]), 12.0)
 RIM = np.array([[1e3, 0.0, 0.0]])
@@ -102,6 +103,17 @@ def test_the_surface_is_put_where_the_skin_lies() -> None:
     made.solve()
     np.testing.assert_allclose(made.points, goal, atol=0.3)
     np.testing.assert_allclose(made.at, part.surface.with_points(made.points).evaluate(part.mesh.uv), atol=1e-9)
+
+
+def test_control_points_follow_waves_that_their_net_is_fine_enough_for(root: Path) -> None:
+    """Of 1 mm height and 48 mm length, all over the shipped head's face."""
+    head = Head.load(root / "configs" / "heads" / "ict")
+    made = Skin(head.part("face"), np.zeros((0, 3)), lambda p: p, Ball(head.data.eyes, head.data.eye_radius))
+    x, y = 2 * np.pi / 48.0 * made.rest[:, :2].T
+    made.at = made.rest + np.column_stack([0 * x, 0 * x, np.sin(x) * np.sin(y)])
+    wanted = made.at.copy()
+    made.solve()
+    assert np.sqrt(((made.at - wanted) ** 2).sum(axis=1).mean()) < 0.022
 
 
 def test_a_part_with_copies_at_seams_counts_each_place_once() -> None:
