@@ -25,7 +25,7 @@ from controller.panels.window.panel import Panel, PanelOptions
 from controller.panels.window.timeline_panel import TimelinePanel, label_left, tick_s
 from controller.takes.livelink import Take
 from controller.takes.plain import plain_take, write_plain
-from controller.takes.timeline import Key, Timeline, load_timeline, save_show
+from controller.takes.timeline import EASES, Key, Timeline, load_timeline, save_show
 from tests.controller.panels.window.drawn import LINE, Drawn, at
 from tests.controller.panels.window.screen import Places, Screen, drawn
 
@@ -378,3 +378,19 @@ def test_a_tick_is_the_least_round_time_that_is_long_enough(least_s: float, tick
 @pytest.mark.parametrize(("right", "left"), [(100.0, 50.0 + 2.0), (82.0, 52.0), (81.9, 50.0 - 2.0 - 30.0)])
 def test_a_label_stands_left_of_its_tick_where_it_would_be_cut(right: float, left: float) -> None:
     assert label_left(50.0, 30.0, right) == left
+
+
+@pytest.mark.parametrize(("changed", "selected", "told"), [(True, 0, True), (True, None, False), (False, 0, False)])
+def test_the_easing_of_the_chosen_key_is_changed(changed: bool, selected: int | None, told: bool) -> None:
+    track, drawn, set_ = Track4(), Track(), list[Any]()
+    track.playback.selected, track.panel._ease, track.panel._mark = selected, 1, ""
+    track.panel._capture, track.now.expression = SimpleNamespace(last=None), Show("neutral", 1.0)
+    track.now.timeline.with_ease = lambda key, ease: (key, ease)
+    track.panel._commands.set_timeline = set_.append
+    drawn.combo = lambda *given: (changed, 2 if changed else 1)  # type: ignore[attr-defined]
+    drawn.input_text_with_hint = lambda *given: (False, "")  # type: ignore[attr-defined]
+    track.panel._key_buttons(drawn)
+    assert set_ == ([(0, EASES[2])] if told else [])
+    wanted = ["key: present face", "key: neutral", *(["delete key"] if selected is not None else []), "mark"]
+    assert [label for (label,) in drawn.named("button")] == wanted
+    assert drawn.named("set_next_item_width") == [(7 * LINE,)] * 2
