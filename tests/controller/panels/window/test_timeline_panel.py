@@ -394,3 +394,16 @@ def test_the_easing_of_the_chosen_key_is_changed(changed: bool, selected: int | 
     wanted = ["key: present face", "key: neutral", *(["delete key"] if selected is not None else []), "mark"]
     assert [label for (label,) in drawn.named("button")] == wanted
     assert drawn.named("set_next_item_width") == [(7 * LINE,)] * 2
+
+
+@pytest.mark.parametrize(("take", "label", "loops"), [(False, "save show", 1), (True, "save take", 0)])
+def test_a_show_may_repeat_and_have_a_sound_and_a_recording_may_not(take: bool, label: str, loops: int) -> None:
+    track, drawn = Track4(take=take), Track()
+    track.panel._name, track.panel._loop, track.panel._sound, track.panel._message = "a", False, "", ""
+    track.now.timeline.sound = None
+    drawn.input_text = lambda *given: (False, "a")  # type: ignore[attr-defined]
+    drawn.input_text_with_hint = lambda *given: (False, "")  # type: ignore[attr-defined]
+    drawn.checkbox = lambda *given: drawn.calls.append(("checkbox", *given)) or (False, False)  # type: ignore[attr-defined, func-returns-value]
+    track.panel._saving(drawn)
+    assert [each for (each,) in drawn.named("button")] == [label, "load", *["play with it"] * loops]
+    assert drawn.named("checkbox") == [("loop", False)] * loops
