@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import socket
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from typing import Any
 import pytest
 
 from controller.base.parameters import PARAMETERS as P
-from controller.client import AsyncFace, Face, FaceError
+from controller.client import AsyncFace, Face, FaceError, _Dialogue
 from controller.layers.commands import CommandState
 from tests.controller.links.websocket.far import served, tick
 
@@ -184,3 +185,10 @@ def test_it_loads_nothing_heavy() -> None:
     root = Path(__file__).resolve().parents[2]
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=root).stdout
     assert not HEAVY & set(found.split())
+
+
+def test_every_request_has_its_own_number() -> None:
+    dialogue = _Dialogue()
+    asked = [dialogue.request("get", {"parameters": None, "what": "x"}) for _ in range(3)]
+    assert [number for number, _ in asked] == [1, 2, 3]
+    assert [json.loads(text) for _, text in asked] == [{"type": "get", "id": k, "what": "x"} for k in (1, 2, 3)]

@@ -50,3 +50,30 @@ def test_nothing_happens_outside_of_a_service(environment: dict[str, str]) -> No
     manager.ready()
     manager.alive(1)
     manager.stopping()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="abstract addresses are of Linux")
+def test_an_address_with_an_at_sign_is_an_abstract_one() -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
+        systemd.bind("")  # Linux gives an abstract address
+        systemd.settimeout(1.0)
+        ServiceManager({"NOTIFY_SOCKET": "@" + systemd.getsockname()[1:].decode()}).ready()
+        assert systemd.recv(64) == b"READY=1"
+
+
+@pytest.mark.parametrize(
+    "given", [{"NOTIFY_SOCKET": "/a"}, {"WATCHDOG_USEC": "1"}, {"NOTIFY_SOCKET": "/a", "WATCHDOG_USEC": "soon"}]
+)
+def test_no_sign_of_life_is_sent_that_nobody_waits_for(given: dict[str, str]) -> None:
+    assert not ServiceManager(given).watches
+
+
+@pytest.mark.parametrize(("now_s", "pings"), [(2.9, 1), (3.0, 2), (3.1, 2)])
+def test_a_ping_is_due_after_a_third_of_the_time(monkeypatch: pytest.MonkeyPatch, now_s: float, pings: int) -> None:
+    now, told = [0.0], list[str]()
+    manager = ServiceManager({"NOTIFY_SOCKET": "/a", "WATCHDOG_USEC": "9000000"}, lambda: now[0])
+    monkeypatch.setattr(manager, "_send", told.append)
+    manager.alive(0)  # the first one at once, whatever the number
+    now[0] = now_s
+    manager.alive(1)
+    assert told == ["WATCHDOG=1"] * pings

@@ -19,7 +19,7 @@ from controller.base.errors import TakeError
 from controller.base.mailboxes import Mailbox
 from controller.base.parameters import PARAMETERS as P
 from controller.body.body import Body
-from controller.body.sources import PipeStream, Sources, Voice, pump
+from controller.body.sources import PipeStream, Sources, Voice, pump, standard_input
 from controller.layers.commands import CommandState
 from controller.links.line.script import Script
 from controller.links.line.session import LineSession
@@ -241,3 +241,13 @@ def test_a_voice_on_a_pipe_is_opened_again_and_one_in_a_file_is_not(
     assert until(lambda: other.voice_ended)
     assert other.error is None and not other.finished
     assert caplog.messages[2].endswith("it plays again when omote is started again")
+
+
+def test_without_standard_input_no_voice_can_come_from_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    stream = io.StringIO("")
+    monkeypatch.setattr("sys.stdin", stream)
+    assert standard_input() is stream
+    monkeypatch.setattr("sys.stdin", None)
+    with pytest.raises(TakeError, match="standard input is closed") as caught:
+        standard_input()
+    assert "ffmpeg" in caught.value.hint

@@ -247,6 +247,23 @@ def test_added_points_on_both_sides_move_as_mirror_images(editor: PointEditor, f
     moved = np.array(found.light_pixels(FRONT, values)) - [(x, y), (other_x, other_y)]
     np.testing.assert_allclose(moved, [[7.0, -5.0], [-7.0, -5.0]], atol=1.0)
     assert len(found.group().light_moves) == 2
+    assert found.take_light((x, y), FRONT, values) == 0  # alone, where both sides are not asked for
+    found.drag((x + 20, y), FRONT, values)
+    found.release()
+    alone = np.array(found.light_pixels(FRONT, values)) - [(x, y), (other_x, other_y)] - moved
+    np.testing.assert_allclose(alone, [[20.0, 0.0], [0.0, 0.0]], atol=0.1)
+
+
+def test_what_is_added_on_one_side_has_no_counterpart_unless_it_is_asked_for(editor: PointEditor) -> None:
+    values, line = P.neutral(), [tuple(p) for p in FRONT.project(dense(LINE))[:, :2]]
+    lengths = []
+    for tied in (False, True):
+        added = editor.point_at(pixel(CHEEK), FRONT, values, 9.0, tied=tied)
+        made = editor.wrinkle(line, FRONT, values, 1.0, 3.0, tied=tied)
+        assert added is not None and made is not None and len(made[0]) == len(made[1])
+        lengths.append((len(added), len(made[0])))
+    assert lengths[0][0] == 1 and lengths[0][1] > 3
+    assert lengths[1] == (2, 2 * lengths[0][1])
 
 
 def skin(editor: PointEditor) -> np.ndarray:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -60,3 +62,13 @@ def test_the_limit_counts_requests_and_replies_alone() -> None:
 def test_a_port_without_servos_is_one_message() -> None:
     with SimulatedBus([1], baud=57_600) as bus, pytest.raises(NoReply, match="no servo to measure"):
         bench_real_bus(bus.path, 1_000_000, 0.1, lambda text: None, (2,))
+
+
+def test_the_time_of_describing_a_servo_is_in_milliseconds(monkeypatch: pytest.MonkeyPatch) -> None:
+    ticks, asked = iter(range(10_000)), list[list[int]]()
+    monkeypatch.setattr(module.time, "perf_counter", lambda: 0.002 * next(ticks))
+    bus: Any = SimpleNamespace(ids=(4, 7), discover=asked.append)
+    median, most = module._round_trips(bus)[:2]
+    assert (median.unit, most.unit) == ("ms", "ms")
+    assert (median.value, most.value) == (pytest.approx(2.0), pytest.approx(2.0))
+    assert asked[:3] == [[4], [7], [4]] and len(asked) == module.PINGS

@@ -65,3 +65,10 @@ def test_times_rise_and_the_loop_holds_them(tmp_path: Path) -> None:
     path.write_text("timeline = [" + '"1 clear", ' * 10_001 + "]")
     with pytest.raises(ConfigError, match="at most 10000"):
         load_fault_script(path)
+
+
+def test_of_a_long_entry_its_first_eighty_letters_are_told(tmp_path: Path) -> None:
+    (tmp_path / "faults.toml").write_text(f'name = "a"\ntimeline = ["{"abcdefghij" * 9}"]\n')
+    with pytest.raises(ConfigError) as caught:
+        load_fault_script(tmp_path / "faults.toml")
+    assert f"(is '{'abcdefghij' * 8}')" in str(caught.value)

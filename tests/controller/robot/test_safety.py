@@ -11,8 +11,8 @@ from controller.base.parameters import PARAMETERS as P
 from controller.base.paths import find_config
 from controller.robot.channels import ChannelTable, build_table
 from controller.robot.robot import load_robot
-from controller.robot.rules import AllowedRange, RuleCounter
-from controller.robot.safety import DeadBandAndSlack, Guard
+from controller.robot.rules import AllowedRange, RuleCounter, RuleInput
+from controller.robot.safety import DeadBandAndSlack, Guard, TimingRules
 from controller.robot.settings import ChannelSettings, LoadRule, PreventRule, RuleSettings, TimingRule
 from drivers.base.bus import BusState
 
@@ -73,6 +73,30 @@ def test_a_jaw_held_open_falls_to_its_extreme_rests_and_may_open_again() -> None
     assert at(5.0) == pytest.approx(30.0, abs=0.1)
     assert at(6.6) == pytest.approx(50.0, abs=0.5)
     assert at(9.5) == pytest.approx(30.0, abs=0.1)  # and so on, for as long as it is asked for
+
+
+@pytest.mark.parametrize(
+    ("extreme", "seconds", "share"),
+    [
+        (0.6, 1.0, 1.0),
+        (0.6, 1.5, 0.8),  # half of the fall, which takes one second
+        (0.6, 2.0, 0.6),
+        (0.6, 4.0, 0.6),
+        (0.6, 5.0, 0.7),  # a quarter of the way back, which takes four seconds
+        (0.6, 7.0, 0.9),
+        (0.6, 8.1, 1.0),
+        (0.0, 1.5, 0.5),
+    ],
+)
+def test_a_limit_falls_rests_and_comes_back_each_in_its_own_time(extreme: float, seconds: float, share: float) -> None:
+    given = JAW.model_dump() | {"extreme": extreme, "rest_s": 2.0, "recover_s": 4.0}
+    table = table_of("a")
+    rule, high = TimingRules([TimingRule(**given)], table, table.neutral_rad), table.high_rad
+    for _ in range(round(seconds / DT) + 1):
+        allowed = AllowedRange(table.low_rad.copy(), high.copy())
+        rule.narrow(RuleInput(high, high, high, None, DT), allowed)
+    assert allowed.high[0] / high[0] == pytest.approx(share, abs=0.03 / (1.0 if seconds < 2.0 else 4.0))
+    assert allowed.low[0] == table.low_rad[0]
 
 
 def test_leaving_before_the_time_keeps_the_whole_travel_and_flicker_does_not() -> None:

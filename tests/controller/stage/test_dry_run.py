@@ -302,3 +302,36 @@ def test_the_stages_own_take_and_voice_are_played_too(tmp_path: Path) -> None:
     report = dry_run(stage, None, None, PARAMETERS).buses
     jaw = sent_of(report, "jawOpen")
     assert len(jaw) == pytest.approx(2.15 * HZ, abs=10) and max(jaw) > 10.0
+
+
+@pytest.mark.parametrize(("seconds", "control_hz", "cycles"), [(0.0, 100.0, 1), (0.05, 100.0, 6), (0.1, 50.0, 11)])
+def test_every_cycle_of_a_bus_has_a_row_of_angles_to_a_thousandth_of_a_degree(
+    root: Path, seconds: float, control_hz: float, cycles: int
+) -> None:
+    robot = load_robot(root / "configs/robots/head24.toml", PARAMETERS)
+    offline = OfflineRun(robot, CommandState(PARAMETERS), lambda now_ns: None, control_hz)
+    offline.run(seconds)
+    (bus,) = offline.report()
+    assert (bus["bus"], bus["period_s"]) == ("head", 1 / HZ) and len(bus["sent_deg"]) == cycles  # type: ignore[arg-type]
+    offline.sent_rad["head"] = np.radians(np.full((3, 24), 12.34567))
+    offline.sent_rad["head"][1] = np.radians(12.39567)
+    offline.sent_rad["head"][2] = np.radians(11.34567)
+    (bus,) = offline.report()
+    assert bus["sent_deg"] == [[12.346] * 24, [12.396] * 24, [11.346] * 24]
+    row = next(iter(offline.rows()))
+    assert row["sent (deg)"] == "11.3 to 12.4"
+    assert row["fastest (deg/s)"].startswith("105 of ")  # 1.05 degrees in one cycle
+
+
+def test_a_source_ends_a_moment_after_its_last_step_or_where_it_begins_again(tmp_path: Path) -> None:
+    for text, length_s in (
+        ('steps = ["0 SET jawOpen 1", "9 NEUTRAL"]', 10.5),
+        ('loop_s = 2.0\nsteps = ["0 SET jawOpen 1"]', 2.0),
+    ):
+        (tmp_path / "act.toml").write_text(f'name = "act"\n{text}\n')
+        stage = load_stage(str(stage_file(tmp_path, 'show = "act.toml"\n')), PARAMETERS)
+        found = dry_run(stage, None, 0.1, PARAMETERS)
+        assert (found.seconds, found.length_s) == (0.1, length_s)
+    stage = load_stage(str(stage_file(tmp_path)), PARAMETERS)
+    found = dry_run(stage, None, 0.0, PARAMETERS)
+    assert found.length_s == 1.5 * (len(stage.vocabulary.names) + 1)  # each expression, then neutral

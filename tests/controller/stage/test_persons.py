@@ -10,7 +10,15 @@ from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import config_dir
 from controller.face.still import Still
-from controller.stage.persons import PersonSettings, linear, mixed_identity, mixed_look, parse_person, read_persons
+from controller.stage.persons import (
+    PersonSettings,
+    find_style,
+    linear,
+    mixed_identity,
+    mixed_look,
+    parse_person,
+    read_persons,
+)
 from controller.stage.stage import load_stage
 from controller.tools.check import check_anything
 
@@ -93,3 +101,20 @@ def test_a_person_of_whom_nothing_is_said_has_a_usual_skin_and_wears_nothing() -
     look = PersonSettings(name="anybody").look()
     assert (look.melanin, look.blood, look.redness, look.freckles, look.age) == (0.2, 0.0, 1.0, 0.0, 0.0)
     assert (look.lips, look.iris, look.brow, look.brow_strength, look.worn) == (None, None, None, 1.0, ())
+
+
+def test_a_style_beside_the_file_comes_before_one_of_the_working_folder_and_that_before_a_shipped_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    assert find_style("hair", "short") == config_dir() / "wardrobe" / "hair-short.npz"
+    (tmp_path / "here" / "short").touch()
+    assert find_style("hair", "short", tmp_path / "me.toml") == Path("short")
+    (tmp_path / "short").touch()
+    assert find_style("hair", "short", tmp_path / "me.toml") == tmp_path / "short"
+    assert find_style("hair", "short") == Path("short")
+    with pytest.raises(ConfigError, match=r"hair\.style: no hair 'shrot', did you mean 'short'\?$"):
+        find_style("hair", "shrot")
+    with pytest.raises(ConfigError, match=r"hair\.style: no hair 'qqqqqq'$"):
+        find_style("hair", "qqqqqq")

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
-from controller.takes.aligned import sounds_of
+from controller.takes import aligned
+from controller.takes.aligned import Interval, sounds_of
 from controller.takes.reader import load_take
 from controller.vocabulary.visemes import Visemes
 
@@ -158,6 +160,25 @@ def test_a_gap_between_sounds_is_silent_and_one_by_rounding_is_none(tmp_path: Pa
     np.testing.assert_allclose(whole[:, JAW], rounded[:, JAW], atol=1e-3)
     gap = read(tmp_path / "c.TextGrid", tier((0.3, 0.5, "AA1"), (0.8, 1.0, "AA1")))
     assert gap[65, JAW] < 0.05 and gap[5, JAW] < 0.05 < 0.4 < gap[45, JAW]
+
+
+@pytest.mark.parametrize(("begin_s", "gaps"), [(0.4, 0), (0.5, 0), (0.5009, 0), (0.5011, 1), (0.8, 1), (1.2, 1)])
+@pytest.mark.parametrize(
+    ("make", "label"), [(aligned._cues_of_sounds, "AA1"), (aligned._cues_of_words, "a")], ids=["sounds", "words"]
+)
+def test_a_gap_of_more_than_a_thousandth_of_a_second_is_a_pause(
+    make: Any, label: str, begin_s: float, gaps: int
+) -> None:
+    tier = [Interval(0.0, 0.5, label), Interval(begin_s, 1.5, label)]
+    visemes = Visemes.load(P)
+    cues, end_s = make(tier, visemes)
+    assert [cue.start_s for cue in cues] == pytest.approx([0.0] + [0.5] * gaps + [begin_s]) and end_s == 1.5
+    silence = visemes.weights(visemes.names[0])
+    assert [bool((cue.weights == silence).all()) for cue in cues] == [False] + [True] * gaps + [False]
+    assert make(tier[::-1], visemes)[1] == 1.5  # in whatever order they are written
+    late, _ = make([Interval(0.0011, 0.5, label)], visemes)
+    soon, _ = make([Interval(0.0009, 0.5, label)], visemes)
+    assert (len(late), len(soon)) == (2, 1)
 
 
 def test_times_that_rounding_made_a_little_less_than_nothing_are_nothing(tmp_path: Path) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import subprocess
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import pytest
 
 from controller.base.errors import TakeError
 from controller.base.parameters import PARAMETERS as P
+from controller.takes import compressed
 from controller.takes.reader import load_take
 from controller.takes.voice import wav_take
 from surface.base import ffmpeg
@@ -51,3 +53,27 @@ def test_what_holds_no_sound_is_one_message(tmp_path: Path, data: bytes) -> None
     with pytest.raises(TakeError, match="ffmpeg finds no sound in it") as caught:
         load_take(tmp_path / "a.mp3", P)
     assert caught.value.hint
+
+
+@pytest.mark.parametrize(("size", "said"), [(4096, "x"), (4097, None)])
+def test_the_last_line_of_the_first_messages_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, size: int, said: str | None
+) -> None:
+    def decode(command: list[str], path: Path, parameters: object, messages: IO[bytes]) -> object:
+        messages.write(b"-" * (size - 2) + b"\nx")
+        raise TakeError("no sound")
+
+    monkeypatch.setattr(ffmpeg, "find_ffmpeg", lambda: "ffmpeg")
+    monkeypatch.setattr(compressed, "_decode", decode)
+    (tmp_path / "a.mp3").write_bytes(b"ID3")
+    with pytest.raises(TakeError) as caught:
+        load_take(tmp_path / "a.mp3", P)
+    ends = f"ffmpeg finds no sound in it: {said or '-' * 4095}"
+    assert str(caught.value).endswith(ends) and caught.value.hint == "look at: ffmpeg -i a.mp3"
+
+
+def test_the_first_hour_is_asked_for_in_one_channel_at_sixteen_kilohertz(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ffmpeg, "find_ffmpeg", lambda: "ffmpeg")
+    command = compressed._command(Path("a.mp3"))
+    assert command[0] == "ffmpeg" and command[command.index("-t") + 1] == "3600"
+    assert command[-7:] == ["-f", "s16le", "-ac", "1", "-ar", "16000", "pipe:1"]

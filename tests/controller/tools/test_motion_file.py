@@ -14,7 +14,7 @@ from controller.links.line.script import load_script
 from controller.links.line.show import Show
 from controller.takes.reader import load_take
 from controller.takes.recording import recorded
-from controller.tools.motion_file import convert, load_motion
+from controller.tools.motion_file import Motion, convert, load_motion
 
 JAW = P.index("jawOpen")
 TAKE = "Timecode,BlendShapeCount,JawOpen,EyeBlinkLeft,HeadYaw\n" + "".join(
@@ -88,3 +88,9 @@ def test_what_cannot_be_converted_is_named(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text("steps = [")
     with pytest.raises(ConfigError):
         load_motion(tmp_path / "s.toml", P)
+
+
+def test_motions_are_told_apart_by_themselves_since_arrays_have_no_one_answer() -> None:
+    one, two = (Motion("a", np.arange(3.0), np.ones((3, 2)), np.ones(2, bool)) for _ in range(2))
+    assert one == one and one != two and len({one, two}) == 2
+    assert one.with_rest().tolist() == [[1.0, 1.0, 0.0]] * 3

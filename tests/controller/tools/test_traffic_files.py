@@ -105,3 +105,17 @@ def test_a_disk_that_fills_ends_the_record_and_nothing_else(tmp_path: Path, capl
     assert [record.message for record in caplog.records] == [
         f"{tmp_path / 'bus.log'}: No space left on device; what passes from now on is not recorded"
     ]
+
+
+@pytest.mark.parametrize(("limit", "size", "read"), [(3 << 20, 3 << 20, True), (3 << 20, (3 << 20) + 1, False)])
+def test_a_text_may_be_as_long_as_others(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit: int, size: int, read: bool
+) -> None:
+    monkeypatch.setattr(files, "TEXT_LIMIT", limit)
+    text = WIRE.head()
+    (tmp_path / "a.log").write_text(text + "#" * (size - len(text)))
+    if read:
+        assert read_traffic(tmp_path / "a.log").pieces == ()
+    else:
+        with pytest.raises(ConfigError, match="is larger than 3 MB"):
+            read_traffic(tmp_path / "a.log")

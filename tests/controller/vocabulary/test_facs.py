@@ -210,3 +210,28 @@ def test_one_fault_is_named_with_its_place(tmp_path: Path, text: str, fault: str
     with pytest.raises(ConfigError) as caught:
         own(tmp_path, text)
     assert fault in str(caught.value) and ": 1 fault" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("unit", "faults"),
+    [
+        ("weights = { jawOpen = 1 }", []),
+        ("left = { jawLeft = 1 }", []),
+        ("right = { jawRight = 1 }", []),
+        ("", ["weights: missing"]),
+        ("weights = { jawOpen = 1 }\nleft = { jawLeft = 1 }", ["weights: the unit has left or right, too"]),
+        ("weights = { jawOpen = 1 }\nright = { jawRight = 1 }", ["weights: the unit has left or right, too"]),
+        ("left = { jawLeft = 9 }", ["left.jawLeft"]),  # what is wrong with one side is no lack of weights
+        ("right = { jawRight = 9 }", ["right.jawRight"]),
+    ],
+)
+def test_a_unit_has_weights_or_sides(tmp_path: Path, unit: str, faults: list[str]) -> None:
+    (tmp_path / "facs.toml").write_text(f"[units.1]\n{unit}\n")
+    if not faults:
+        assert Facs.load(P, tmp_path / "facs.toml").expand("1").any()
+        return
+    with pytest.raises(ConfigError) as caught:
+        Facs.load(P, tmp_path / "facs.toml")
+    lines = str(caught.value).splitlines()
+    assert [fault in line for fault, line in zip(faults, lines[-len(faults) :], strict=True)] == [True] * len(faults)
+    assert str(caught.value).count("units.") == len(faults)

@@ -9,7 +9,8 @@ import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.formats.frame import Frame
-from controller.formats.kinds.au_json_format import UNITS, AuJsonDecoder, AuJsonEncoder
+from controller.formats.kinds.au_json_format import UNITS, AuJsonDecoder, AuJsonEncoder, unit_columns
+from controller.vocabulary.facs import Facs
 
 SENT = (
     '{"AU1":0,"AU2":0,"AU4":0,"AU5":0,"AU6":0,"AU7":5,"AU9":0,"AU10":0,"AU12":0,"AU14":3,"AU15":0,"AU17":0,"AU20":0,'
@@ -76,3 +77,10 @@ def test_a_face_is_sent_as_the_units_it_was_made_of() -> None:
 
 def test_nothing_is_sent_without_a_face() -> None:
     assert AuJsonEncoder(P).encode(Frame(P.neutral(), np.zeros(len(P), dtype=bool), face=False)) == []
+
+
+@pytest.mark.parametrize(
+    ("name", "known"), [("AUL12", True), ("AU12:0.50000", True), ("AU12:0.500000", False), ("AU1+2", False)]
+)
+def test_a_name_has_twelve_letters_at_most(name: str, known: bool) -> None:
+    assert (unit_columns(Facs.load(P), name) is not None) == known

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from controller.layers.idle.attention import Attention, Shift
+from controller.layers.idle.attention import _VERTICAL_FACTOR, Attention, Shift
 from controller.layers.idle.draws import generator, mean_of
 from controller.layers.idle.settings import GazeSettings, IdleSettings, Manner, PointSettings
 
@@ -97,3 +97,28 @@ def test_it_is_turned_away_and_back_at_once_and_only_once(settings: IdleSettings
 def test_the_step_of_time_changes_nothing(settings: IdleSettings, manner: Manner) -> None:
     fine, coarse = (watched(settings, manner, 300.0, step_s=step_s) for step_s in (0.01, 1.0))
     assert [s for s, _ in coarse] == [s for s, _ in fine][: len(coarse)] and len(coarse) > 200
+
+
+@pytest.mark.parametrize(
+    ("weights", "share"), [((0.1, 0.3), 0.75), ((0.0, 0.5), 1.0), ((0.0, 0.0), 0.5), ((3.0, 1.0), 0.25)]
+)
+def test_a_choice_follows_its_weights_however_small_and_is_even_without(
+    settings: IdleSettings, weights: tuple[float, float], share: float
+) -> None:
+    attention = Attention(settings.gaze, generator(1, "x"))
+    chosen = [attention._choose((0, 1), weights) for _ in range(2000)]
+    assert np.mean(chosen) == pytest.approx(share, abs=0.05)
+
+
+@pytest.mark.parametrize(("farthest_deg", "most_deg"), [(12.0, 12.0), (0.5, None)])
+def test_a_glance_is_no_smaller_than_the_least_and_no_larger_than_the_farthest(
+    settings: IdleSettings, farthest_deg: float, most_deg: float | None
+) -> None:
+    attention, least_deg = Attention(settings.gaze, generator(1, "x")), settings.gaze.wander.least_deg
+    most_deg = least_deg if most_deg is None else most_deg  # where even the least is farther than allowed
+    found = np.array([attention._wander(farthest_deg) for _ in range(2000)])
+    size = np.hypot(found[:, 0], found[:, 1] / _VERTICAL_FACTOR)
+    assert size.min() >= least_deg - 1e-9 and size.max() == pytest.approx(most_deg, abs=1e-9)
+    sector = np.round(np.arctan2(-found[:, 1] / _VERTICAL_FACTOR, found[:, 0]) / (np.pi / 4)).astype(int) % 8
+    directions = np.array(settings.gaze.wander.directions)
+    np.testing.assert_allclose(np.bincount(sector, minlength=8) / 2000, directions / directions.sum(), atol=0.04)

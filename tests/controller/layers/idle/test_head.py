@@ -102,3 +102,41 @@ def test_only_a_listener_nods_by_itself(settings: IdleSettings) -> None:
         )
     nods.nod(3600.0, 0.05, 0.4)
     assert nods.at(3600.2) == pytest.approx((0.0, 0.05, 0.0))
+
+
+def test_the_last_half_second_can_still_be_asked_for_and_what_ended_before_is_dropped(settings: IdleSettings) -> None:
+    turn, sway, nods = (
+        Turn(settings.turn),
+        Sway(settings.head, settings.breath, generator(1, "x")),
+        Nods(settings.nod, generator(1, "x")),
+    )
+    posture = Posture(
+        settings.posture.model_copy(update={"interval_s": (100.0, 100.0), "length_s": (1.0, 1.0)}), generator(1, "x")
+    )
+    posture.begin(0.0)  # the first change is after half an interval
+    posture.advance(50.0)
+    turn.follow(Shift(0.0, 22.0, 0.0))
+    ((start_s, length_s, _),) = turn._steps._steps
+    sway.set_gain(1.5, 10.0)
+    nods.nod(0.0, 0.05, 0.4)
+    for end_s, advance, kept, made in (
+        (start_s + length_s, turn.drop_finished, lambda: turn._steps._steps, turn),
+        (51.0, posture.advance, lambda: posture._steps._steps, posture),
+        (10.8, lambda now_s: sway.set_gain(1.5, now_s), lambda: sway._gain._steps, sway),
+        (0.4, lambda now_s: nods.advance(now_s, listening=False), lambda: nods.nods, nods),
+    ):
+        before = made.at(end_s - 0.1)
+        advance(end_s + 0.49)
+        assert len(kept()) == 1 and made.at(end_s - 0.1) == before
+        advance(end_s + 0.51)
+        assert not kept(), made
+
+
+@pytest.mark.parametrize(("gain", "changes"), [(1.0, 0), (1.0 + 1e-10, 0), (1.0 + 1e-8, 1), (0.5, 1)])
+def test_the_sway_changes_in_eight_tenths_of_a_second_where_its_gain_changes(
+    settings: IdleSettings, gain: float, changes: int
+) -> None:
+    sway = Sway(settings.head, settings.breath, generator(1, "x"))
+    for _ in range(2):
+        sway.set_gain(gain, 10.0)
+        assert [step[:2] for step in sway._gain._steps] == [(10.0, 0.8)] * changes

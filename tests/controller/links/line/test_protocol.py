@@ -263,3 +263,18 @@ def test_records_cannot_be_changed() -> None:
     for record in (Words, Reply):
         with pytest.raises(FrozenInstanceError):
             object.__new__(record).anything = 1
+
+
+@pytest.mark.parametrize(
+    ("line", "checked"),
+    [(b"PING*00", True), (b"PING*", True), (b"PING*G1", True), (b"#12", False), (b"\x80PING", False)],
+)
+def test_a_refusal_of_a_line_with_a_checksum_has_one(line: bytes, checked: bool) -> None:
+    with pytest.raises(LineError) as caught:
+        parse_words(line)
+    assert caught.value.checked == checked
+    for damaged in (b"#x PING", b"#12", b""):
+        if damaged:
+            with pytest.raises(LineError) as caught:
+                parse_words(damaged + b"*%02X" % checksum(damaged))
+            assert caught.value.checked

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 
+import pytest
+
 from controller.base.parameters import PARAMETERS as P
 from controller.formats.format import FORMATS
-from controller.links.net.decoding import MAX_SENDERS, MAX_WAITING, MAX_WAITING_BYTES, Decoding
+from controller.links.net.decoding import MAX_SENDERS, MAX_WAITING, MAX_WAITING_BYTES, Decoding, _count_stale
 from tests.controller.formats.faces import face
 
 JAW = P.index("jawOpen")
@@ -56,3 +58,19 @@ def test_strangers_do_not_displace_a_sender_that_goes_on() -> None:
 def test_a_datagram_that_is_too_long_is_refused() -> None:
     decoding = Decoding(FORMATS.get("binary"), P, streams=False)
     assert decoding.feed([("a", b"x" * 5000)]) == [] and decoding.refused == Counter({"message too long": 1})
+
+
+@pytest.mark.parametrize(
+    ("messages", "stale"),
+    [
+        ([b"x" * 1024] * 64, 0),  # as much as may wait
+        ([b"x" * 1024] * 65, 1),  # the last bytes above that, and 64 messages
+        ([b"x" * 10] * 1000, 0),  # small ones are read all
+        ([b"x" * 70_000] * 64, 0),  # few ones too
+        ([b"x" * 70_000] * 66, 2),
+        ([b"x" * (65_536 - 64)] + [b"x"] * 64, 0),
+        ([b"x" * (65_537 - 64)] + [b"x"] * 64, 1),
+    ],
+)
+def test_what_is_stale_is_what_neither_number_nor_size_allows(messages: list[bytes], stale: int) -> None:
+    assert _count_stale(messages) == stale

@@ -113,6 +113,19 @@ def test_points_are_squares_within_the_picture_and_some_have_a_name(imgui: Imgui
     assert len(fake.posed) == 1 and len(fake.posed[0][0]) == len(P) + 1 and fake.posed[0][1] is None
 
 
+@pytest.mark.parametrize(("area", "used"), [((640.0, 480.0), (640.0, 480.0)), ((0.0, 0.5), (1.0, 1.0))])
+def test_a_picture_without_room_counts_as_one_pixel(
+    imgui: Imgui, monkeypatch: pytest.MonkeyPatch, area: tuple[float, float], used: tuple[float, float]
+) -> None:
+    seen: list[tuple[float, float]] = []
+    monkeypatch.setattr(overlay_view, "Screen", lambda camera, size: seen.append(size) or FakeScreen(camera, size))
+    made, _ = view()
+    made._area = SimpleNamespace(left=100, top=20, width=area[0], height=area[1])  # type: ignore[assignment]
+    made.switch("control points", on=True)
+    made(None)  # type: ignore[arg-type]
+    assert seen == [used]
+
+
 def test_lines_run_between_their_ends(imgui: Imgui) -> None:
     made, _ = view()
     made.switch(next(kind for kind in KINDS if kind != "control points"), on=True)

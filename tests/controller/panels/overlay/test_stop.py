@@ -6,12 +6,15 @@ import json
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from controller.panels.overlay.stop import LABEL, Box, StopButton
+from controller.panels.overlay.colours import RED, packed
+from controller.panels.overlay.stop import LABEL, Box, StopButton, _corner, _min_width
+from tests.controller.panels.window import drawn as drawn_by_hand
 from tests.controller.panels.window.screen import Screen
 from tests.controller.panels.window.test_face import on_a_display, scaled
 from tests.hands import Hands, Steps, run_script
@@ -187,3 +190,70 @@ def test_one_click_stops_whatever_lies_over_the_button(
     told = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
     assert told["menu open"] and told["in view"]
     assert all(told[name] for name in ("alone", "help", "menu", "bare"))
+
+
+class Pictured(drawn_by_hand.Drawn):
+    """A window of 640 x 480 with the mouse somewhere, whose button is down or not."""
+
+    def __init__(self, x: float, y: float, *, down: bool) -> None:
+        super().__init__()
+        at = drawn_by_hand.at
+        self._io = SimpleNamespace(mouse_pos=at(x, y), mouse_down=[down], display_size=at(640.0, 480.0))
+
+    def get_io(self) -> Any:
+        return self._io
+
+    def get_style(self) -> Any:
+        return SimpleNamespace(frame_rounding=5.0)
+
+    def get_foreground_draw_list(self) -> Pictured:
+        return self
+
+    def color_convert_float4_to_u32(self, rgba: tuple[float, ...]) -> int:
+        return sum(round(100 * part) << 8 * i for i, part in enumerate(rgba))
+
+
+@pytest.mark.parametrize(
+    ("over", "down", "light"), [(False, False, 1.0), (True, False, 1.2), (True, True, 0.75), (False, True, 1.0)]
+)
+def test_it_is_brighter_under_the_mouse_and_darker_while_it_is_pressed(over: bool, down: bool, light: float) -> None:
+    window, button = Pictured(0.0, 0.0, down=down), StopButton(lambda: None)
+    button.box = Box(10.0, 20.0, 210.0, 60.0)
+    button._draw(window, over=over)
+    ((low, high, colour, rounding),) = window.named("add_rect_filled")
+    assert (low.x, low.y, high.x, high.y, rounding) == (*button.box, 5.0)
+    assert colour == packed(window, (light * RED[0], light * RED[1], light * RED[2], 1.0))
+    ((_, _, rim, around),) = window.named("add_rect")
+    assert (rim, around) == (packed(window, (1.0, 1.0, 1.0, 0.35)), 5.0)
+    ((place, white, words),) = window.named("add_text")
+    wide, line = drawn_by_hand.LETTER * len(LABEL), drawn_by_hand.LINE
+    assert (place.x, place.y) == (110.0 - wide / 2, 40.0 - line / 2)
+    assert (white, words) == (packed(window, (1.0, 1.0, 1.0, 1.0)), LABEL)
+
+
+def test_the_corner_is_a_line_from_the_edges_of_the_window() -> None:
+    line = drawn_by_hand.LINE
+    assert _corner(Pictured(0.0, 0.0, down=False)) == (640 - 10 * line, 480 - 3 * line, 640 - line, 480 - line)
+    assert _min_width(Pictured(0.0, 0.0, down=False)) == drawn_by_hand.LETTER * len(LABEL) + line
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "inside"),
+    [(1, 2, True), (3, 4, True), (2, 3, True), (0.9, 3, False), (3.1, 3, False), (2, 1.9, False), (2, 4.1, False)],
+)
+def test_a_box_holds_its_edges(x: float, y: float, inside: bool) -> None:
+    assert Box(1, 2, 3, 4).holds(drawn_by_hand.at(x, y)) == inside
+
+
+@pytest.mark.parametrize(
+    ("outer", "within"),
+    [
+        ((1, 2, 3, 4), True),
+        ((1.1, 2, 3, 4), False),
+        ((1, 2.1, 3, 4), False),
+        ((1, 2, 2.9, 4), False),
+        ((1, 2, 3, 3.9), False),
+    ],
+)
+def test_a_box_lies_within_one_of_its_size_and_no_smaller_one(outer: tuple[float, ...], within: bool) -> None:
+    assert Box(1, 2, 3, 4).within(Box(*outer)) == within

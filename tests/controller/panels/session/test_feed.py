@@ -7,7 +7,7 @@ import pytest
 
 from controller.base.errors import ConfigError
 from controller.body.messages import AskDetails, Details
-from controller.panels.session.feed import KEPT_S, PERIOD_S, Feed
+from controller.panels.session.feed import KEPT_S, PERIOD_S, Feed, History
 from controller.panels.session.problems import Problems
 
 SERVO = {"bus": "head", "id": 7, "name": "jawOpen", "wanted_deg": 3.0, "measured_deg": None, "low_deg": 0.0}
@@ -78,3 +78,40 @@ def test_a_servo_of_the_same_name_on_another_bus_is_another(key: str) -> None:
     body.answer = Details(servos=[{**SERVO, key: 1.0}, {**SERVO, "bus": "neck", key: 2.0}])
     body.frame(PERIOD_S)
     assert len(body.feed.histories) == 2
+
+
+@pytest.mark.parametrize(
+    ("answered", "after_s", "asked"), [(True, 0.199, 1), (True, 0.201, 2), (False, 1.999, 1), (False, 2.001, 2)]
+)
+def test_it_is_asked_again_after_a_fifth_of_a_second_or_two_without_an_answer(
+    answered: bool, after_s: float, asked: int
+) -> None:
+    body = Body()
+    body.frame(0.0)
+    if answered:
+        body.answer = Details(buses=[{"name": "head"}])
+        body.frame(0.0)
+        assert not body.feed.waiting
+    body.frame(after_s)
+    assert len(body.sent) == asked
+
+
+def test_a_history_of_few_rows_has_no_more() -> None:
+    history = History(("a", "b"))
+    assert [part.shape for part in history.series()] == [(0,), (2, 0)]
+    for k in range(3):
+        history.add(10.0 + k, {"a": k, "b": None if k == 1 else 2 * k, "c": 9.0})
+    times, values = history.series()
+    assert times.tolist() == [10.0, 11.0, 12.0] and values[0].tolist() == [0.0, 1.0, 2.0]
+    np.testing.assert_array_equal(values[1], [0.0, np.nan, 4.0])
+    assert Feed.COLUMNS == ("wanted_deg", "measured_deg", "temperature_c")
+
+
+@pytest.mark.parametrize("found", [{"servos": [SERVO]}, {"links": [{}]}, {"buses": [{}]}])
+def test_anything_that_is_answered_ends_the_waiting(found: dict[str, list[dict[str, object]]]) -> None:
+    body = Body()
+    body.frame(0.0)
+    assert body.feed.waiting
+    body.answer = Details(**found)  # type: ignore[arg-type]
+    body.frame(0.0)
+    assert not body.feed.waiting

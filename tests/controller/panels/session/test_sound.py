@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from controller.base.errors import ControllerError
-from controller.panels.session.sound import SoundPlayer, sound_length_s
+from controller.panels.session.sound import SoundPlayer, find_player, sound_length_s
 
 RATE = 8000
 COPY = "import shutil, sys; shutil.copy(sys.argv[2], sys.argv[1])"
@@ -113,3 +113,27 @@ def test_a_player_that_went_and_a_full_disk_are_errors_with_a_next_step(
     with pytest.raises(ControllerError, match="no room in") as caught:
         player.start(path)
     assert caught.value.hint
+
+
+def test_a_moment_far_into_a_sound_is_found_block_by_block(tmp_path: Path) -> None:
+    samples = (np.arange(200_000) % 30_000).astype("<i2")  # a block has 65536
+    path = write_wav(tmp_path / "a.wav", samples.tobytes())
+    assert sound_length_s(path) == 25.0
+    for begin in (65_536, 150_000):
+        found = heard(path, begin / RATE, tmp_path / "kept.wav")[:, 0]
+        assert len(found) == 200_000 - begin and np.abs(found - samples[begin:]).max() <= 1
+    assert len(heard(path, -3.0, tmp_path / "kept.wav")) == 200_000
+
+
+def test_of_the_programs_that_are_there_the_likeliest_plays(monkeypatch: pytest.MonkeyPatch) -> None:
+    there = {"ffplay", "play"}
+    monkeypatch.setattr("shutil.which", lambda name: name if name in there else None)
+    monkeypatch.setattr(sys, "platform", "linux")
+    assert find_player() == ("ffplay", "-nodisp", "-autoexit", "-loglevel", "error")
+    there.add("aplay")
+    assert find_player() == ("aplay", "-q")
+    there.clear()
+    assert find_player() is None
+    monkeypatch.setattr(sys, "platform", "win32")
+    command = find_player()
+    assert command is not None and command[:2] == (sys.executable, "-c") and "winsound" in command[2]

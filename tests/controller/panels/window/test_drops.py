@@ -16,7 +16,7 @@ from controller.body.messages import PlayTake
 from controller.panels.session.commands import Commands
 from controller.panels.session.jobs import Jobs
 from controller.panels.session.problems import Problems
-from controller.panels.window.drops import Drops
+from controller.panels.window.drops import Drops, free_folder
 from controller.panels.window.looks import Looks
 from controller.stage.stage import FaceSettings, load_stage
 from surface.head import Head
@@ -139,3 +139,11 @@ def test_whether_only_added_points_differ_is_told(window: Window, monkeypatch: p
     assert wait() and window.looks.shown_light == (one, two) and given == [1, 1, 2]
     window.looks.load_plain()
     assert given[-1] == 0
+
+
+def test_a_head_of_a_mesh_has_the_first_number_that_is_free(tmp_path: Path) -> None:
+    for number in (1, 2, 3):
+        folder = free_folder(tmp_path, "mask")
+        assert folder == tmp_path / f"mask-head{number}"
+        folder.mkdir()
+    assert free_folder(tmp_path, "other") == tmp_path / "other-head1"

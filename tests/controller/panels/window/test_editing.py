@@ -160,6 +160,19 @@ def rig(monkeypatch: pytest.MonkeyPatch) -> Rig:
     return Rig(monkeypatch)
 
 
+@pytest.mark.parametrize(
+    ("size", "used"), [((400.0, 300.0), (400.0, 300.0)), ((0.0, 0.5), (1.0, 1.0)), ((1.5, 1.2), (1.5, 1.2))]
+)
+def test_a_picture_without_room_counts_as_one_pixel(
+    rig: Rig, monkeypatch: pytest.MonkeyPatch, size: tuple[float, float], used: tuple[float, float]
+) -> None:
+    seen, made = list[Any](), module.Screen
+    monkeypatch.setattr(module, "Screen", lambda camera, size: seen.append(size) or made(camera, size))
+    rig.mouse._area.width, rig.mouse._area.height = size
+    rig.frame(0.0, 0.0, keys="")
+    assert seen == [used]
+
+
 def test_tools_are_those_of_the_panel() -> None:
     assert TOOLS == ("pull the face", "pull the skin", "wrinkle", "add points", "remove points")
 
@@ -314,7 +327,9 @@ def test_a_line_that_the_mouse_draws_is_a_wrinkle(rig: Rig) -> None:
     rig.frame(20.0, 30.0, click=True)
     for x in (20.5, 21.5, 25.0):  # the first is less than a pixel on
         rig.frame(x, 30.0, down=True, keys="")
-    assert [name for name, *_ in rig.imgui.drawn].count("add_line") == 1 + 2
+    lines = [each for each in rig.imgui.drawn if each[0] == "add_line"]
+    assert len(lines) == 1 + 2 and all(each[3:] == (0xFFFFFFFF, 2.0) for each in lines)
+    assert [(at.x, at.y) for at in lines[-1][1:3]] == [(121.5, 80.0), (125.0, 80.0)]
     assert rig.imgui.captured == 4
     rig.frame(70.0, 30.0, down=False, keys="")
     ((_, stroke, depth, width, how),) = rig.editor.named("wrinkle")
@@ -343,7 +358,10 @@ def test_pins_and_added_points_are_drawn_in_the_picture(rig: Rig) -> None:
     def places() -> list[tuple[float, float]]:
         rig.imgui.drawn.clear()
         rig.frame(0.0, 0.0, keys="")
-        return [(at.x, at.y) for name, at, *_ in rig.imgui.drawn if name == "add_circle_filled"]
+        circles = [each for each in rig.imgui.drawn if each[0] in ("add_circle", "add_circle_filled")]
+        assert [each[2:] for each in circles[:2]] == [(4.0, 0xFF3C78E6), (4.0, 0xFFFFFFFF)]  # a pin with its rim
+        assert all(each[2:] == (3.0, 0xFF50D2F0) for each in circles[2:])
+        return [(at.x, at.y) for name, at, *_ in circles if name == "add_circle_filled"]
 
     assert places() == [(105.0, 56.0)]
     for tool in ("add points", "remove points"):

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -100,3 +103,60 @@ def test_the_shown_expression_has_the_colour_of_its_layer_and_a_pressed_one_is_s
              if call[0] in ("button", "push_style_color", "pop_style_color")]  # fmt: skip
     assert order == ["push_style_color", "anger", "pop_style_color", "joy", "fear"]
     assert commands.now.expression.name == "joy" and commands.now.expression.intensity == 1.0
+
+
+class Pad(Drawn):
+    """A window in which the mouse presses on the pad, whose corner is at (10, 20) and which is ``room`` wide."""
+
+    def __init__(self, x: float, y: float, room: float, *, active: bool = True) -> None:
+        super().__init__()
+        self._mouse, self._room, self._active = at(x, y), room, active
+
+    def get_cursor_screen_pos(self) -> SimpleNamespace:
+        return at(10.0, 20.0)
+
+    def get_content_region_avail(self) -> SimpleNamespace:
+        return at(self._room, 1e4)
+
+    def get_io(self) -> SimpleNamespace:
+        return SimpleNamespace(mouse_pos=self._mouse)
+
+    def is_item_active(self) -> bool:
+        return self._active
+
+
+@pytest.mark.parametrize(("room", "side"), [(1e4, 16 * LINE), (100.0, 100.0)])
+@pytest.mark.parametrize(
+    ("across", "down", "name"), [(0.5, 0.5, "VA:0,0"), (0.9, 0.2, "VA:0.8,0.6"), (0.3, 0.6, "VA:-0.4,-0.2")]
+)
+def test_the_mouse_on_the_pad_chooses_a_mood_pleasant_to_the_right_and_excited_upwards(
+    buttons: ExpressionButtons, room: float, side: float, across: float, down: float, name: str
+) -> None:
+    pad = Pad(10.0 + across * side, 20.0 + down * side, room, active=False)
+    buttons._pad(pad)
+    assert buttons._commands.now.expression.name == "neutral"
+    buttons._pad(Pad(10.0 + across * side, 20.0 + down * side, room))
+    assert buttons._commands.now.expression.name == name
+    (((label, size),),) = (pad.named("invisible_button"),)
+    assert label == "pad" and (size.x, size.y) == (side, side)
+
+
+@pytest.mark.parametrize(
+    ("shown", "moved", "told"), [("anger", True, ["anger"]), ("neutral", True, []), ("anger", False, [])]
+)
+def test_the_slider_changes_how_strong_the_shown_expression_is(
+    monkeypatch: pytest.MonkeyPatch, shown: str, moved: bool, told: list[str]
+) -> None:
+    commands, asked, saved = Commands(lambda request: None), list[tuple[str, float, str]](), list[bool]()
+    made = ExpressionButtons(VOCABULARY, commands, lambda: saved.append(True))  # type: ignore[arg-type]
+    commands.show(shown, 1.0)
+    monkeypatch.setattr(commands, "show", lambda *given: asked.append(given))
+    pad = Pad(0.0, 0.0, 1e4, active=False)
+    sliders = list[tuple[object, ...]]()
+    pad.slider_float = lambda *given: sliders.append(given) or (moved, 0.25)  # type: ignore[attr-defined, func-returns-value]
+    monkeypatch.setitem(sys.modules, "imgui_bundle", SimpleNamespace(imgui=pad))
+    made()
+    assert sliders == [("intensity", 1.0, 0.0, 1.0)] and saved == [True]
+    assert pad.named("set_next_item_width")[0] == (-9 * LETTER - LINE,)
+    assert asked == [(name, 0.25, "intensity") for name in told]
+    assert pad.named("separator_text") == [("emotions",), ("gestures",), ("the present face",), ("mood",)]

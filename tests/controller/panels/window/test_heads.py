@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -19,6 +21,7 @@ from controller.panels.window.head_source import HeadSource
 from controller.panels.window.heads import HeadChoice
 from controller.panels.window.panel import Panel
 from controller.stage.stage import Stage, load_stage
+from tests.controller.panels.window.drawn import Drawn
 from tests.controller.panels.window.screen import Screen, drawn
 from tests.controller.panels.window.test_face import on_a_display, shown
 
@@ -149,3 +152,13 @@ print(json.dumps({"heads": len(told["heads"]), "jaw": told["second"], "problems"
 def test_another_head_is_shown_and_moved_in_a_window(tmp_path: Path) -> None:
     told = json.loads(shown(PROGRAM).splitlines()[-1])
     assert told["heads"] == 2 and told["jaw"] > 0.9 and told["problems"] == []
+
+
+def test_a_stage_of_one_head_has_no_list_of_heads(stage: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    for count, lists in ((0, 0), (1, 0), (2, 1)):
+        window: Any = Drawn()
+        window.combo = lambda *given, window=window: window.calls.append(("combo", *given)) or (False, 0)
+        monkeypatch.setitem(sys.modules, "imgui_bundle", SimpleNamespace(imgui=window))
+        sources = [HeadSource(h.name, h.stage, None, None) for h in stage.heads[:count]]  # type: ignore[arg-type]
+        HeadChoice(sources, None, None, lambda request: None).draw(None)  # type: ignore[arg-type]
+        assert window.named("combo") == [("head", 0, [h.name for h in stage.heads[:2]])] * lists

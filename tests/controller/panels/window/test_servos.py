@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -11,10 +12,12 @@ import pytest
 from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.body.messages import AskDetails, Details, Jog, StopServos
+from controller.panels.overlay.colours import AMBER, BRIGHT_GREEN, GREY, LAYERS, packed
 from controller.panels.window.link_list import figures, state_of
 from controller.panels.window.panel import Panel, PanelOptions
-from controller.panels.window.servos import share, tooltip
+from controller.panels.window.servos import ServoBars, share, tooltip
 from controller.robot.robot import load_robot
+from tests.controller.panels.window.drawn import LETTER, LINE, Drawn, at
 from tests.controller.panels.window.screen import Places, Screen, drawn
 
 SERVO = {
@@ -125,3 +128,93 @@ def test_the_face_alone_keeps_its_stop(screen: Screen) -> None:
     box = panel.stop.box
     screen.click(panel, (box.left + box.right) / 2, (box.top + box.bottom) / 2)
     assert sent == [StopServos()]
+
+
+class Row(Drawn):
+    """A window with room for a bar of 200 points from (10, 20) on."""
+
+    def get_cursor_screen_pos(self) -> Any:
+        return at(10.0, 20.0)
+
+    def get_content_region_avail(self) -> Any:
+        return at(200.0, 1e4)
+
+    def color_convert_float4_to_u32(self, rgba: Any) -> int:
+        return sum(round(100 * part) << 8 * i for i, part in enumerate(rgba))
+
+
+@pytest.mark.parametrize(
+    ("servo", "wanted_x", "measured_x"),
+    [(SERVO, 110.0, 105.0), (SICK, 110.0, None), ({**SERVO, "wanted_deg": 30.0}, 210.0, 105.0)],
+)
+def test_a_bar_has_a_mark_where_the_servo_shall_be_and_a_line_where_it_is(
+    servo: dict[str, Any], wanted_x: float, measured_x: float | None
+) -> None:
+    row = Row()
+    ServoBars(SimpleNamespace())._bar(row, servo)  # type: ignore[arg-type]
+    (low, high, ground, _), (left, right, colour, _) = row.named("add_rect_filled")
+    assert (low.x, low.y, high.x, high.y) == (10.0, 20.0, 210.0, 20.0 + LINE) and ground == packed(
+        row, (0.5, 0.5, 0.5, 0.25)
+    )
+    quarter = LINE / 4
+    assert (left.x, left.y) == (wanted_x - quarter, 20.0 + quarter) and colour == packed(row, LAYERS["expression"])
+    assert (right.x, right.y) == (wanted_x + quarter, 20.0 + 3 * quarter)
+    lines = [(a.x, a.y, b.x, b.y, *rest) for a, b, *rest in row.named("add_line")]
+    white = packed(row, (1.0, 1.0, 1.0, 1.0))
+    assert lines == ([] if measured_x is None else [(measured_x, 20.0, measured_x, 20.0 + LINE, white, 2.0)])
+    (((size,),),) = (row.named("dummy"),)
+    assert (size.x, size.y) == (200.0, LINE)
+
+
+@pytest.mark.parametrize(
+    ("changes", "texts", "warnings", "muted"),
+    [
+        ({"temperature_c": 59.9}, ["   9.0 deg"], [], ["60 C"]),
+        ({"temperature_c": 60.0}, ["   9.0 deg"], ["60 C"], []),
+        ({"temperature_c": None}, ["   9.0 deg"], [], []),
+        ({"measured_deg": None, "temperature_c": 20.0}, [""], [], ["20 C"]),
+        ({"error": "does not answer"}, [], ["does not answer"], []),
+    ],
+)
+def test_a_servo_is_warm_from_sixty_degrees_on(
+    changes: dict[str, Any], texts: list[str], warnings: list[str], muted: list[str]
+) -> None:
+    row = Row()
+    ServoBars(SimpleNamespace())._state(row, {**SERVO, **changes})  # type: ignore[arg-type]
+    assert [text for (text,) in row.named("text")] == texts
+    assert row.named("text_colored") == [(AMBER, words) for words in warnings]
+    assert [text for (text,) in row.named("text_disabled")] == muted
+
+
+@pytest.mark.parametrize(
+    ("running", "fault", "colour", "words"),
+    [(True, "", BRIGHT_GREEN, "torque on"), (False, "", GREY, "torque off"), (True, "no power", AMBER, "")],
+)
+def test_a_bus_tells_whether_it_drives_and_why_not(running: bool, fault: str, colour: Any, words: str) -> None:
+    row = Row()
+    ServoBars(SimpleNamespace())._bus(row, {"name": "head", "running": running, "fault": fault})  # type: ignore[arg-type]
+    assert row.named("text_colored") == [(colour, f"bus head: {words}")]
+    assert row.named("text_wrapped") == ([(fault,)] if fault else [])
+
+
+def test_columns_are_as_wide_as_the_longest_name_and_state() -> None:
+    row = Row()
+    ServoBars(SimpleNamespace())._columns(row, ["jaw", "browLeft"])  # type: ignore[arg-type]
+    assert row.named("table_setup_column") == [
+        ("name", 1, 8 * LETTER + LINE), ("bar", 2), ("state", 1, 16 * LETTER)
+    ]  # fmt: skip
+
+
+def test_a_click_plots_and_another_one_ends_it() -> None:
+    bars = ServoBars(SimpleNamespace())  # type: ignore[arg-type]
+    for key, plotted in (("a", ["a"]), ("b", ["a", "b"]), ("a", ["b"]), ("b", [])):
+        bars.toggle(key)
+        assert bars.plotted == plotted
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "angle", "part"),
+    [(0.0, 0.0, 0.0, None), (0.0, 1.0, 0.25, 0.25), (5.0, 4.0, 4.5, None), (-4.0, 4.0, -9.0, 0.0)],
+)
+def test_a_share_lies_between_the_limits(low: float, high: float, angle: float, part: float | None) -> None:
+    assert share({"low_deg": low, "high_deg": high}, angle) == part

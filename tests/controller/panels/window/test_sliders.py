@@ -249,3 +249,13 @@ def test_an_open_region_has_a_row_for_each_and_a_search_opens_it() -> None:
     before = len(drawn.calls)
     sliders._region(drawn, "jaw")
     assert len(drawn.calls) == before
+
+
+@pytest.mark.parametrize(("shown", "x"), [(-0.5, 150.0), (0.0, 200.0), (0.5, 250.0), (-1.0, 100.0), (1.2, 300.0)])
+def test_a_mark_of_what_goes_both_ways_is_in_the_middle_at_rest(shown: float, x: float) -> None:
+    sliders, *_ = made({YAW: shown})
+    drawn: Any = Widgets()
+    sliders._measured(drawn, (YAW,), -1.0, 1.0)
+    ((top, bottom, _, width),) = drawn.named("add_line")
+    assert (top.x, top.y, bottom.x, bottom.y) == (pytest.approx(x), 50.0, pytest.approx(x), 70.0) and width == 1.5
+    assert not drawn.named("set_tooltip")

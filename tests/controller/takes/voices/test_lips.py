@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.takes.voice import VoiceEnvelope
+from controller.takes.voices import lips
 from controller.takes.voices.lips import AHEAD, BANDS, BEFORE, INPUTS, band_levels, features, lip_model, loudness_db
 from controller.vocabulary.visemes import Visemes
 from tests.controller.takes.voices.synthesis import MEN, RATE, WOMEN, noise, resampled, resonate, vowel
@@ -90,3 +93,18 @@ def test_shares_sum_to_one_whatever_is_heard() -> None:
     assert found.shape == (100 - BEFORE - AHEAD, INPUTS) and found.min() >= 0.0 and found.max() <= 1.2
     np.testing.assert_allclose(shares.sum(axis=1), 1.0)
     assert shares.min() >= 0.0 and set(lip_model().visemes) == set(Visemes.load(P).names)
+
+
+def test_stored_weights_are_256ths_and_are_read_once() -> None:
+    stored, model = np.load(Path(lips.__file__).with_name("lips.npz")), lip_model()
+    np.testing.assert_array_equal(256.0 * model.hidden, stored["hidden"])
+    np.testing.assert_array_equal(256.0 * model.out, stored["out"])
+    assert model.visemes == tuple(stored["visemes"]) and lip_model() is model
+
+
+@pytest.mark.parametrize(("amplitude", "db"), [(1.0, 0.0), (0.1, -20.0), (0.0, -140.0)])
+def test_a_sine_of_amplitude_one_has_no_db_in_its_band(amplitude: float, db: float) -> None:
+    frame = amplitude * np.sin(2 * np.pi * 1000.0 * np.arange(round(0.025 * RATE)) / RATE)
+    levels = band_levels(frame, RATE)
+    assert levels.shape == (BANDS,) and levels.max() == pytest.approx(db, abs=1.5)
+    assert band_levels(np.zeros((3, 200)), 8000).shape == (3, BANDS)

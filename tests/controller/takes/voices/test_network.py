@@ -119,6 +119,15 @@ def test_tones_keep_their_pitch_and_those_too_high_vanish(rate: int, wanted: int
         assert np.abs(high[200:-200]).max() < 0.02
 
 
+def test_a_long_sound_is_resampled_block_by_block_without_a_gap() -> None:
+    ramp = np.linspace(-1.0, 1.0, 20_000)
+    found = resample(ramp, 8_000, 16_000)
+    assert len(found) == 40_000  # more than two blocks of 16384
+    np.testing.assert_allclose(
+        found[100:-100], np.interp(np.arange(40_000) / 2, np.arange(20_000), ramp)[100:-100], atol=2e-3
+    )
+
+
 @pytest.mark.parametrize(
     ("said", "told"),
     [
