@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
@@ -26,7 +27,7 @@ def fields_of(options: type) -> dict[str, tuple[Any, Any]]:
 
 def to_options(table: BaseModel, options: type) -> Any:
     """An instance of a dataclass of options, from the keys given in a table made by :func:`fields_of`."""
-    names = table.model_fields_set & {entry.name for entry in entries(options)}
+    names = table.model_fields_set & {field.name for field in fields(options)}  # reading their types would be slow
     return options(**{name: getattr(table, name) for name in names})
 
 
