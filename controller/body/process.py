@@ -31,7 +31,8 @@ class BodyProcess:
     Attributes
     ----------
     mailboxes, panel_states : of each head, in the order of the stage. mailbox, panel_state : of the first one.
-    details : the newest answer to :class:`controller.body.messages.AskDetails`. finished : whether all sources ended.
+    details : the newest answer to :class:`controller.body.messages.AskDetails`. ready : whether the servos are started.
+    finished : whether all sources ended.
     report : the final measurements, empty before the end.
     """
 
@@ -53,13 +54,15 @@ class BodyProcess:
             for mailbox, each in zip(self._panel_mailboxes, stages, strict=True)
         ]
         self.mailbox, self.panel_state = self.mailboxes[0], self.panel_states[0]
-        self.finished = False
+        self.ready = self.finished = False
         self.details: messages.Details | None = None
         self.report: dict[str, object] = {}
         self._pipe, self._process = preloaded.pipe, preloaded.process
         pairs = zip(self.mailboxes, self._panel_mailboxes, strict=True)
         boxes = [mailbox for pair in pairs for mailbox in pair]
         preloaded.send(messages.BodyOrders(str(stage.path), options), *boxes)
+        self._in_time = deadline(_START_TIMEOUT_S)
+        self._in_time()  # the time runs from now on
 
     @staticmethod
     def _forward_standard_input(
@@ -87,16 +90,22 @@ class BodyProcess:
         message = self._receive(_START_TIMEOUT_S)
         if not isinstance(message, messages.Ready):
             raise ControllerError(f"the body sent {message!r} before it was ready")
+        self._handle(message)
         return message
 
     def begin(self) -> None:
-        """Tell the body to open the links, or to start the take."""
+        """Tell the body to open the links, or to start the take, as soon as it is ready."""
         self.send(messages.Begin())
 
     def alive(self) -> bool:
-        """Receive the body's messages; return whether the run is to continue. Raises ControllerError if it failed."""
+        """Receive the body's messages; return whether the run is to continue.
+
+        Raises ControllerError if it failed, or is not ready long after it got its orders.
+        """
         while self._pipe.poll():
             self._handle(self._receive(0.0))
+        if not self.ready and not self._in_time():
+            raise _no_answer(_START_TIMEOUT_S)
         return not self.finished
 
     def send(self, request: messages.Begin | messages.PanelRequest | messages.ToHead) -> None:
@@ -117,7 +126,9 @@ class BodyProcess:
             self._end_process()
 
     def _handle(self, message: object) -> None:
-        if isinstance(message, messages.Report):
+        if isinstance(message, messages.Ready):
+            self.ready = True
+        elif isinstance(message, messages.Report):
             self.report = message.content
         elif isinstance(message, messages.Details):
             self.details = message
@@ -131,7 +142,7 @@ class BodyProcess:
             self._process.join(1.0)
             message = messages.Failed(f"the body process ended unexpectedly (exit code {self._process.exitcode})")
         if message is None:
-            raise ControllerError(f"the body did not answer within {timeout_s:g} s")
+            raise _no_answer(timeout_s)
         if isinstance(message, messages.Failed):
             self.report = self.report or {**message.measured, "failed": message.message}
             raise ControllerError(message.message, hint=message.hint)
@@ -162,6 +173,10 @@ class BodyProcess:
             self._pipe.close()
             for mailbox in (*self.mailboxes, *self._panel_mailboxes):
                 mailbox.close()
+
+
+def _no_answer(timeout_s: float) -> ControllerError:
+    return ControllerError(f"the body did not answer within {timeout_s:g} s")
 
 
 def deadline(seconds: float | None) -> Callable[[], bool]:

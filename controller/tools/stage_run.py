@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -146,7 +147,7 @@ class StageRun:
             )  # fmt: skip
             if self._options.take is None:
                 remember(stage.path, self._options.vocabularies)
-            failed = self._show(face, self._begin(body, flag, seconds))
+            failed = self._show(face, self._begin(body, flag, seconds, wait=False))
             self.next_run = face.next_run
             return self._end(body, None if failed else face.report(), failed)
 
@@ -194,22 +195,44 @@ class StageRun:
         head = self.stage.load_head()
         return HeadValues(body.mailbox, self.stage.parameters, head.parameters), head
 
-    def _begin(self, body: BodyProcess, flag: threading.Event, seconds: float | None) -> Callable[[], bool]:
-        """Wait for the servos and accept commands; return a function that is true while the run is to continue."""
+    def _begin(
+        self, body: BodyProcess, flag: threading.Event, seconds: float | None, *, wait: bool = True
+    ) -> Callable[[], bool]:
+        """Accept commands as soon as the servos are started; return a function that is true while the run continues.
+
+        The function is to be called often. ``wait`` : whether to wait for the servos here; if not, the face is shown
+        meanwhile, and the function raises an error of their start. ``seconds`` count once they are started.
+        """
         gc.enable()
         gc.freeze()  # objects that are loaded by now stay, so no collection has to check them while pictures are drawn
-        body.wait_ready()
+        if wait:
+            body.wait_ready()
         body.begin()
-        self._status("running" + (f" for {seconds:g} s" if seconds else ""))
         in_time = deadline(seconds)
-        self._manager.ready()
+        started = self._start_notice(seconds)
 
         def keep_going() -> bool:
+            going = not flag.is_set() and body.alive()
+            if not body.ready:
+                return going
+            started()
             if self._manager.watches:
                 self._manager.alive(body.mailbox.sequence)
-            return not flag.is_set() and in_time() and body.alive()
+            return going and in_time()
 
+        if wait:
+            started()
         return keep_going
+
+    def _start_notice(self, seconds: float | None) -> Callable[[], object]:
+        """Return a function whose first call says that the servos are started."""
+
+        @cache
+        def started() -> None:
+            self._status("running" + (f" for {seconds:g} s" if seconds else ""))
+            self._manager.ready()
+
+        return started
 
     def _show(self, face: HeadlessFace | WallFace | WindowFace, keep_going: Callable[[], bool]) -> Part | None:
         """Show the face while the run continues. If it fails and there are robots, run on and return it as a part.

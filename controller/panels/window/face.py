@@ -117,17 +117,16 @@ class WindowFace:
 
     def run(self, keep_going: Callable[[], bool]) -> None:
         """Show the window until it is closed or ``keep_going()`` is false; raises ViewError when none can be opened."""
-        began, stamp = 0, 0
-        drawn: NDArray[np.float64] | None = None
+        began = stamp = 0
 
         def source() -> NDArray[np.float64]:
-            nonlocal began, stamp, drawn
+            nonlocal began, stamp
             values = self._values()
             now = time.monotonic_ns()
             self._head.sway.advance(head_angles(values), now / 1e9)
-            if drawn is not None:
-                self._log.add(drawn, began, now, stamp)  # the frame before has been drawn by now
-            began, stamp, drawn = now, self._values.stamp_ns, values
+            if began:
+                self._log.add(values, began, now, stamp)  # the frame before has been drawn by now
+            began, stamp = now, self._values.stamp_ns
             return values
 
         kiosk = self._settings.kiosk

@@ -247,7 +247,8 @@ class Ended:
 
 def body_of(end: Ended) -> BodyProcess:
     body = BodyProcess.__new__(BodyProcess)
-    body.report, body.finished = {}, False
+    body.report, body.ready, body.finished = {}, False, False
+    body._in_time = lambda: True
     body._pipe = body._process = cast(Any, end)
     body.mailboxes = body._panel_mailboxes = [cast(Any, end)]
     return body
@@ -299,6 +300,23 @@ def test_messages_that_come_too_late_or_out_of_order_are_errors() -> None:
     body = body_of(last)
     body.stop()
     assert body.report == {"b": 2} and last.asked == [messages.Stop(), ("join", 30.0)]
+
+
+def test_who_does_not_wait_for_the_servos_sees_when_they_are_started_or_that_they_never_are() -> None:
+    body = body_of(Ended(1))
+    assert body.alive() and not body.ready
+    body = body_of(Ended(1, messages.Ready()))
+    assert body.alive() and body.ready
+    late = body_of(Ended(1))
+    late._in_time = lambda: False
+    with pytest.raises(ControllerError, match=r"the body did not answer within 60 s"):
+        late.alive()
+    late.ready = True  # then there is nothing to wait for
+    assert late.alive()
+    assert body_of(Ended(1, messages.Ready())).wait_ready() == messages.Ready()
+    body = body_of(Ended(1, messages.Failed("servo 7 does not answer", "a hint")))
+    with pytest.raises(ControllerError, match="servo 7 does not answer"):
+        body.alive()
 
 
 def test_a_deadline_counts_from_the_first_question(monkeypatch: pytest.MonkeyPatch) -> None:

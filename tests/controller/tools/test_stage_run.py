@@ -10,7 +10,7 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from typer.testing import CliRunner
@@ -92,7 +92,7 @@ class FakeBody:
 
     def __init__(self, told: list[str], lives: int) -> None:
         self.told, self.lives, self.report = told, lives, {"control": {"ticks": 3}}
-        self.flag = threading.Event()
+        self.flag, self.ready, self.ready_at = threading.Event(), False, 0
 
     def __call__(self, stage: Any, parameters: Any, options: RunOptions, *, preloaded: object) -> FakeBody:
         self.options, self.preloaded = options, preloaded
@@ -105,6 +105,7 @@ class FakeBody:
         self.told.append("left")
 
     def wait_ready(self) -> None:
+        self.ready = True
         self.told.append("ready")
 
     def begin(self) -> None:
@@ -112,6 +113,7 @@ class FakeBody:
 
     def alive(self) -> bool:
         self.lives -= 1
+        self.ready = self.ready or self.lives < self.ready_at
         return self.lives >= 0
 
     def stop(self) -> None:
@@ -216,8 +218,8 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
         def report(self) -> dict[str, object]:
             return {"frames": 2}
 
-    body: Any = FakeBody(told, 2)
-    body.details = object()
+    body: Any = FakeBody(told, 3)
+    body.details, body.ready_at = object(), 2
     body.send, body.panel_state, body.mailbox = object(), object(), object()
     monkeypatch.setattr(module, "BodyProcess", body)
     monkeypatch.setattr(module, "HeadValues", lambda mailbox, parameters, names: (mailbox, len(names)))
@@ -232,8 +234,46 @@ def test_a_window_is_given_the_head_and_what_the_body_shows(
     assert options.vocabulary is session.stage.vocabulary and "tour" in options.shows
     assert settings is session.stage.settings.face and (send, panel_state) == (body.send, body.panel_state)
     assert values == (body.mailbox, len(head.parameters)) and copy == session.stage.load_head
-    assert report["face"] == {"frames": 2} and told.count("frame") == 2
-    assert told.index("lower") < told.index("ready")  # servos start while the head loads
+    assert report["face"] == {"frames": 2}
+    # servos start while the head loads and the first frames are drawn
+    assert told == ["starting", "lower", "begin", "frame", "running", "frame", "frame", "stopping", "stop", "left"]
+
+
+def test_seconds_of_a_window_count_once_the_servos_are_started(
+    stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body: Any = FakeBody(told, 10**9)
+    now = [100.0]
+    monkeypatch.setattr("controller.body.process.time", SimpleNamespace(monotonic=lambda: now[0]))
+    run = StageRun(stage)
+    keep_going = run._begin(body, threading.Event(), 2.0, wait=False)
+    now[0] = 150.0
+    assert keep_going(), "servos may take long"
+    body.ready = True
+    assert keep_going()
+    now[0] = 151.9
+    assert keep_going()
+    now[0] = 152.0
+    assert not keep_going()
+
+
+def test_a_service_manager_hears_of_the_servos_once_they_are_started(
+    stage: str, told: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, body = StageRun(stage), cast(Any, FakeBody(told, 10**9))
+    body.mailbox = SimpleNamespace(sequence=7)
+    heard: list[object] = []
+    run._manager = cast(
+        Any,
+        SimpleNamespace(watches=True, ready=lambda: heard.append("ready"), alive=lambda number: heard.append(number)),
+    )
+    keep_going = run._begin(body, threading.Event(), None, wait=False)
+    assert keep_going() and heard == []
+    body.ready = True
+    assert keep_going() and keep_going() and heard == ["ready", 7, 7]
+    heard.clear()
+    run._begin(body, threading.Event(), None)
+    assert heard == ["ready"], "who waits for them says so at once"
 
 
 def test_pictures_are_kept_only_where_a_folder_is_given(

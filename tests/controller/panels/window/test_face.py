@@ -71,6 +71,20 @@ def test_a_run_with_a_window_draws_and_reports(tmp_path: Path) -> None:
     assert measured["buses"][0]["bus"]["writes"] > 0
 
 
+@pytest.mark.slow
+@on_a_display
+def test_servos_that_cannot_be_started_close_the_window_with_their_error(tmp_path: Path) -> None:
+    robot, stage = tmp_path / "absent.toml", tmp_path / "small.toml"
+    shipped = (Path(__file__).parents[4] / "configs/robots/head24.toml").read_text()
+    robot.write_text(shipped.replace('kind = "simulated"', 'kind = "dynamixel"\nport = "/dev/absent"', 1))
+    stage.write_text(STAGE.replace("head24", "absent.toml"))
+    program = "from controller.cli.app import main; main()"
+    command = ["xvfb-run", "-a", sys.executable, "-c", program, "run", str(stage)]
+    ended = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    assert ended.returncode == 1
+    assert "no port /dev/absent" in ended.stderr and "Traceback" not in ended.stderr
+
+
 DRAG = """
 import json
 
