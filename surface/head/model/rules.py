@@ -52,18 +52,21 @@ class SealDriver:
     def __init__(self, seal: Seal | None) -> None:
         self._seal, self._amount = seal, 0.0
         self._of: Floats | None = None
+        self._own = 0.0
         shares = seal.opens if seal else {}
         self._rows = np.array([[0.0 if n.endswith(other) else shares.get(n, 0.0) for n in SHAPES]
                                for other in reversed(SIDES)])  # fmt: skip
 
-    def amount(self, shapes: Floats) -> float:
-        """Return 1 while lips stay together, 0 where they are parted, smooth between; ``shapes (52,)``. Computed once
-        for the same array."""
-        if self._seal is not None and shapes is not self._of:
-            self._of, self._amount = shapes, self._at(shapes, self._seal)
+    def amount(self, shapes: Floats, own: float = 0.0) -> float:
+        """Return 1 while lips stay together, 0 where they are parted, smooth between; ``shapes (52,)``.
+
+        own : what a user's own changes add to what opens them. Computed once for the same array and the same ``own``.
+        """
+        if self._seal is not None and (shapes is not self._of or own != self._own):
+            self._of, self._own, self._amount = shapes, own, self._at(shapes, own, self._seal)
         return self._amount
 
-    def _at(self, shapes: Floats, seal: Seal) -> float:
+    def _at(self, shapes: Floats, own: float, seal: Seal) -> float:
         low, high = seal.closed, seal.parted
-        t = min(max((float((self._rows @ shapes).max()) - low) / (high - low), 0.0), 1.0)
+        t = min(max((float((self._rows @ shapes).max()) + own - low) / (high - low), 0.0), 1.0)
         return 1.0 - t * t * (3.0 - 2.0 * t)

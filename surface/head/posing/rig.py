@@ -16,6 +16,7 @@ from surface.head.model.sway import SWAYS
 from surface.head.posing.contact import LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import keep_on_eyeball, mix_rows, swing_jaw
 from surface.head.posing.moves import Moves
+from surface.head.posing.own_openings import OwnOpenings
 from surface.head.posing.tongue import tongue_rest
 
 CLEARANCE_GRID = (72, 36)  # samples of the part behind the lids, along u and v
@@ -43,6 +44,8 @@ class SkinRig:
 
     def __init__(self, part: PartData, head: HeadData, drivers: Drivers | None = None) -> None:
         self.rest = np.ascontiguousarray(part.points, np.float64)
+        self._before = self.rest.copy()
+        self._openings: list[OwnOpenings | None] = []  # of each contact; measured when they are needed
         self._drivers = drivers or Drivers(head.rules)
         self._moves, self._sways = Moves(part, self._drivers.names), Moves(part, SWAYS)
         self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
@@ -94,15 +97,15 @@ class SkinRig:
 
     def invalidate(self) -> None:
         """Compute everything again at the next pose: the points at rest have been changed."""
-        self._last_key = ()
+        self._last_key, self._openings = (), []
         self.invalidations += 1
 
     def apply_contacts(self, pose: Pose, points: Floats) -> None:
         """Correct control points (n, 3), moved by everything else, at the part's own contacts and at those it follows;
         corrections at its own are put into ``pose.pushes``."""
-        for solver, seal in zip(self._solvers, self._seals, strict=True):
+        for solver, seal in zip(self._solvers, self._seal_amounts(pose), strict=True):
             axis = _axis_of(pose, max(solver.contact.eye, 0))
-            pose.pushes[solver.contact.name] = solver.apply(axis, points, seal.amount(pose.shapes))
+            pose.pushes[solver.contact.name] = solver.apply(axis, points, seal)
             if solver.contact.eye < 0:
                 pose.lip = solver.lower
         for name, follower in self._followers:
@@ -117,13 +120,23 @@ class SkinRig:
         """Return everything in a pose that the part's points depend on."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
         gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
-        seals = (seal.amount(pose.shapes) for seal in self._seals)
+        seals = self._seal_amounts(pose)
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
         rests = self._rest is not None and self._rest.share(pose) > 0.0
         rest = (pose.lip.tobytes(), motion_key("jaw", self._head, pose)) if rests else ()
         lag = pose.lag.tobytes() if len(self._sways.used) else b""
         own = pose.own.tobytes() if self.own else b""
         return self._amounts.tobytes(), *rest, jaw, gaze, lag, own, *seals, *pushes
+
+    def _seal_amounts(self, pose: Pose) -> list[float]:
+        """Return how firmly each contact of the part keeps its sides together in a pose."""
+        if not self._openings:
+            self._openings = [
+                OwnOpenings(solver, self._before, self.rest, self.own) if solver.contact.seal else None
+                for solver in self._solvers
+            ]
+        pairs = zip(self._seals, self._openings, strict=True)
+        return [seal.amount(pose.shapes, own.amount(pose) if own else 0.0) for seal, own in pairs]
 
     def _add_own(self, pose: Pose, points: Floats) -> None:
         """Add what a user's groups move to ``points`` (n, 3)."""
