@@ -238,3 +238,22 @@ def test_a_stage_names_groups_that_are_missing(tmp_path: Path) -> None:
 def test_a_record_cannot_be_changed() -> None:
     with pytest.raises(FrozenInstanceError):
         object.__new__(Screen).anything = 1
+
+
+def test_the_last_pull_is_that_of_the_point_that_was_held_last(head: Head, handles: PointEditor) -> None:
+    fresh = PointEditor(head, handles._models)
+    values = P.neutral()
+    assert not np.any(fresh.last_pull(values)), "its points are not ready"
+    fresh._model = handles._model
+    assert not np.any(fresh.last_pull(values)), "none was held"
+    assert handles._model is not None
+    fresh._last = 7
+    place, moved = fresh.last_pull(values)
+    assert place.tolist() == handles._model.skin.rest[7].tolist()
+    assert np.linalg.norm(moved) < 1.0
+    jaw = values.copy()
+    jaw[P.index("jawOpen")] = 1.0
+    shown = handles._model.local(jaw, fresh._moves) - handles._model.local(values, fresh._moves)
+    fresh._last = int(np.argmax(np.linalg.norm(shown, axis=1)))
+    moved = fresh.last_pull(jaw)[1]
+    assert moved[1] < -20.0, "the chin goes down with the jaw"

@@ -95,3 +95,13 @@ def test_a_stop_that_comes_in_the_middle_of_a_question_stops(monkeypatch: pytest
     assert state.stop_latch.stopped is not None
     assert len(replies) == 1
     assert replies[0].startswith(b"OK"), "the question is answered as well"
+
+
+def test_a_heartbeat_is_sent_five_times_a_lease_and_not_in_every_tick() -> None:
+    wire, lease, sent = FakeWire(), Lease(1, 0.2, 0.0, 0.0), list[str]()
+    wire.session = SimpleNamespace(put=lambda key, *_, **__: sent.append(key))
+    conductor = conducting({}, wire, lease)
+    ticks = [k * 5_000_000 for k in range(2_000, 2_200)]  # a second in steps of 5 ms, long after the start
+    conducts = [conductor.tick(now_ns) for now_ns in ticks]
+    heartbeats = [key for key in sent if key.endswith("lease")]
+    assert any(conducts) and 10 <= len(heartbeats) <= 60

@@ -314,3 +314,19 @@ def test_where_a_growing_angle_leads() -> None:
     assert shown(map={"at": [0, 1], "deg": [0, -5]}) == "jawOpen falls"
     assert shown(mix={"jawOpen": 0.1, "headYaw": -1.0}) == "headYaw falls"
     assert shown(mix={"jawLeft": -1.0}) == ""
+
+
+@pytest.mark.parametrize(("own_deg_s", "asked_deg_s"), [(200, 80.0), (50, 50.0)])
+def test_a_servo_may_be_twice_as_fast_as_it_is_moved_but_no_faster_than_its_file_says(
+    head: Head, monkeypatch: pytest.MonkeyPatch, own_deg_s: int, asked_deg_s: float
+) -> None:
+    speeds: list[float] = []
+
+    def noted(spec: ServoSpec, **changes: Any) -> ServoSpec:
+        speeds.extend(changes[name] for name in changes if name == "max_speed_rad_s")
+        return replace(spec, **changes)
+
+    monkeypatch.setattr("controller.hardware.preflight.replace", noted)
+    head.channels = [channel("jaw", 1, max_speed_deg_s=own_deg_s)]
+    head.check()
+    assert speeds == [pytest.approx(math.radians(asked_deg_s))]

@@ -72,3 +72,12 @@ def test_of_a_long_entry_its_first_eighty_letters_are_told(tmp_path: Path) -> No
     with pytest.raises(ConfigError) as caught:
         load_fault_script(tmp_path / "faults.toml")
     assert f"(is '{'abcdefghij' * 8}')" in str(caught.value)
+
+
+def test_the_last_entry_counts_for_the_length_of_the_loop(tmp_path: Path) -> None:
+    path = tmp_path / "script.toml"
+    path.write_text('loop_s = 2\ntimeline = ["1 clear", "3 clear"]')
+    with pytest.raises(ConfigError, match=r"loop_s: 2 is before the last entry at 3"):
+        load_fault_script(path)
+    path.write_text('loop_s = 3\ntimeline = ["1 clear", "3 clear"]')
+    assert load_fault_script(path).loop_s == 3

@@ -34,3 +34,9 @@ def test_a_servo_that_ends_early_or_is_slow_limits_the_joint(root: Path, tmp_pat
     yaw = joint_limits(load_robot(path, P), P, JOINTS)["headYaw"]
     assert yaw.low_rad == pytest.approx(-0.5 * FULL, abs=0.01) and yaw.high_rad == pytest.approx(0.25 * FULL, abs=0.01)
     assert yaw.speed_rad_s == pytest.approx(math.radians(30.0))
+
+
+def test_a_joint_that_no_servo_follows_keeps_its_own_limits(root: Path) -> None:
+    robot = load_robot(root / "configs/robots/head24.toml", P)
+    joint = Joint("tongueOut", "base_link", np.zeros(3), JointLimit(-FULL, FULL))
+    assert joint_limits(robot, P, [joint]) == {}

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS as P
-from controller.layers.idle.motion import IdleMotion
+from controller.layers.idle.motion import IdleMotion, _lag_s
 from controller.layers.idle.settings import IdleSettings, Manner
 
 Live = Callable[..., np.ndarray]
@@ -237,3 +239,21 @@ def test_a_commanded_shift_of_the_gaze_often_brings_a_blink(settings: IdleSettin
 
     assert 0.2 < np.mean([blinked(0.5, seed) for seed in range(100)]) < 0.6
     assert not any(blinked(0.1, seed) for seed in range(30))
+
+
+@pytest.mark.parametrize(
+    ("head_s", "eye_s", "acceleration", "jerk", "lag_s"),
+    [
+        (0.25, 0.1, 4.0, 40.0, 0.2),  # 0.15 s slower, and 0.05 s of smoothing by the limit of jerk
+        (0.1, 0.3, 4.0, 40.0, 0.0),  # a head is never ahead of the eyes
+        (0.9, 0.1, 4.0, 40.0, 0.4),
+    ],
+)
+def test_the_head_lags_the_eyes_by_how_much_slower_its_motion_limits_let_it_be(
+    head_s: float, eye_s: float, acceleration: float, jerk: float, lag_s: float
+) -> None:
+    parameters: Any = SimpleNamespace(
+        index=["headYaw", "leftEyeYaw"].index, response_s=[head_s, eye_s],
+        max_acceleration=[acceleration, 1.0], max_jerk=[jerk, 1.0],
+    )  # fmt: skip
+    assert _lag_s(parameters) == pytest.approx(lag_s)

@@ -10,7 +10,7 @@ import pytest
 from controller.base.parameters import PARAMETERS
 from controller.body.messages import Hold
 from controller.panels.session.commands import Commands
-from controller.panels.window.sliders import Sliders, same_sense
+from controller.panels.window.sliders import Sliders, _label, same_sense
 from tests.controller.panels.window.drawn import LETTER, Drawn, at
 
 JAW = PARAMETERS.index("jawOpen")
@@ -259,3 +259,9 @@ def test_a_mark_of_what_goes_both_ways_is_in_the_middle_at_rest(shown: float, x:
     ((top, bottom, _, width),) = drawn.named("add_line")
     assert (top.x, top.y, bottom.x, bottom.y) == (pytest.approx(x), 50.0, pytest.approx(x), 70.0) and width == 1.5
     assert not drawn.named("set_tooltip")
+
+
+def test_a_row_of_both_sides_is_named_without_one() -> None:
+    left, right, jaw = (PARAMETERS.index(name) for name in ("mouthSmileLeft", "mouthSmileRight", "jawOpen"))
+    assert _label([left, right], PARAMETERS) == "mouthSmile"
+    assert _label([left], PARAMETERS) == "mouthSmileLeft" and _label([jaw], PARAMETERS) == "jawOpen"
