@@ -41,6 +41,7 @@ def test_every_channel_has_a_row_with_its_mix(root: Path) -> None:
     assert list(rows) == [channel.name for channel in robot.channels]
     assert rows["jawOpen"]["servo"] == "head id 4, xl330-m288"
     assert rows["jawOpen"]["mix"] == "1 jawOpen -0.4 mouthClose"
+    assert {row["fastest (deg/s)"].partition(" of ")[0] for row in rows.values()} == {"0"}, "nothing moved"
 
 
 def test_without_anything_to_play_every_expression_is_shown(tmp_path: Path) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 import struct
 
+import numpy as np
 import pytest
 
 from controller.base.parameters import PARAMETERS as P
 from controller.formats.frame import Frame
-from controller.formats.kinds.openseeface_format import SIZES, OpenSeeFaceDecoder, OpenSeeFaceEncoder
+from controller.formats.kinds.openseeface_format import FORMAT, SIZES, OpenSeeFaceDecoder, OpenSeeFaceEncoder
 from tests.controller.formats.faces import face
 
 FEATURES = (
@@ -108,3 +109,10 @@ def test_of_a_smile_and_a_frown_the_difference_comes_back() -> None:
         assert found[name] == pytest.approx(sent.values[P.index(name)], abs=1e-5), name
     nobody = Frame(sent.values, sent.mask, face=False)
     assert OpenSeeFaceEncoder(P).encode(nobody) == []
+
+
+def test_the_format_says_what_it_carries_and_what_only_about() -> None:
+    carries, about = (np.flatnonzero(flags(P)) for flags in (FORMAT.carries, FORMAT.about))
+    assert {P.names[i] for i in carries} >= {"jawOpen", "eyeBlinkLeft", "headYaw"}
+    assert {P.names[i] for i in about} >= {"mouthSmileLeft", "mouthFrownLeft"}
+    assert not {*carries} & {*about} and len(carries) + len(about) < len(P.names)
