@@ -44,8 +44,6 @@ class SkinRig:
 
     def __init__(self, part: PartData, head: HeadData, drivers: Drivers | None = None) -> None:
         self.rest = np.ascontiguousarray(part.points, np.float64)
-        self._before = self.rest.copy()
-        self._openings: list[OwnOpenings | None] = []  # of each contact; measured when they are needed
         self._drivers = drivers or Drivers(head.rules)
         self._moves, self._sways = Moves(part, self._drivers.names), Moves(part, SWAYS)
         self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
@@ -56,6 +54,10 @@ class SkinRig:
         surfaces = {p.name: make_surface(p) for p in head.parts if p.name in {c.part for c in (*own, *others)}}
         self._solvers = [ContactSolver(c, surfaces[c.part], head) for c in own]
         self._seals = [SealDriver(c.seal) for c in own]
+        before = self.rest.copy()
+        pairs = zip(self._solvers, own, strict=True)
+        self._openings = [OwnOpenings(solver, before) if contact.seal else None for solver, contact in pairs]
+        self._measured = False  # are these those of the present points at rest?
         self._followers = [(c.name, Follower(c, part.points, surfaces[c.part], head)) for c in others]
         self._clearances = _clearances(part, head)
         lips = any(c.eye < 0 and c.part != part.name for c in head.contacts)
@@ -97,7 +99,7 @@ class SkinRig:
 
     def invalidate(self) -> None:
         """Compute everything again at the next pose: the points at rest have been changed."""
-        self._last_key, self._openings = (), []
+        self._last_key, self._measured = (), False
         self.invalidations += 1
 
     def apply_contacts(self, pose: Pose, points: Floats) -> None:
@@ -130,11 +132,10 @@ class SkinRig:
 
     def _seal_amounts(self, pose: Pose) -> list[float]:
         """Return how firmly each contact of the part keeps its sides together in a pose."""
-        if not self._openings:
-            self._openings = [
-                OwnOpenings(solver, self._before, self.rest, self.own) if solver.contact.seal else None
-                for solver in self._solvers
-            ]
+        if not self._measured:
+            self._measured = True
+            for opening in filter(None, self._openings):
+                opening.measure(self.rest, self.own)
         pairs = zip(self._seals, self._openings, strict=True)
         return [seal.amount(pose.shapes, own.amount(pose) if own else 0.0) for seal, own in pairs]
 
