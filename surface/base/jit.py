@@ -30,7 +30,7 @@ from numba.core import event
 from numba.core.caching import FunctionCache
 from numba.core.compiler_lock import global_compiler_lock
 
-from surface.base.kept_code import hasten_loading
+from surface.base.kept_code import speed_up_loading
 
 try:
     import fcntl
@@ -110,7 +110,7 @@ def _compile(function: Callable[..., Any], signatures: Sequence[Any] = (), **opt
         )
     else:
         _tolerate_full_disks(dispatcher._cache)
-        hasten_loading(dispatcher._cache)
+        speed_up_loading(dispatcher._cache)
         _watch_imports(dispatcher)
         _compile_in_one_process(dispatcher)
     for signature in signatures:

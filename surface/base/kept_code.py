@@ -12,7 +12,7 @@ import llvmlite.binding as llvm
 from numba.core.runtime import rtsys  # type: ignore[attr-defined]
 
 
-def hasten_loading(kept: Any) -> None:
+def speed_up_loading(kept: Any) -> None:
     """Let a cache of numba load compiled code without what only compilations need, which takes half of the time.
 
     A compilation loads the registries of types and functions itself, and gets the intermediate code of a kernel that

@@ -102,16 +102,10 @@ def run_window(
     window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk
     params = window.params = _parameters(hello_imgui, window, size, title)
     window.area = area or PictureArea()
-    if docks and not kiosk:
-        safe = [replace(dock, draw=window.as_callback(dock.draw)) for dock in docks]
-        desktop = desktop_scale()
-        opened = opened_size(size, desktop)
-        add_docks(hello_imgui, params, safe, opened, LINE * desktop * text_scale(opened, desktop, safe))
-        window.docks = safe
     if kiosk:
-        geometry = params.app_window_params.window_geometry
-        geometry.full_screen_mode = hello_imgui.FullScreenMode.full_screen_desktop_resolution
-        geometry.monitor_idx = monitor
+        _cover_monitor(hello_imgui, params, monitor)
+    elif docks:
+        window.add_docks(hello_imgui, docks, size)
     try:
         _run(hello_imgui.manual_render, params)
     except Exception as error:
@@ -121,6 +115,13 @@ def run_window(
     if window.frames == 0:
         raise ViewError("the window closed before it drew anything", hint=HEADLESS_HINT)
     return WindowReport(window.frames, window.last - window.first)
+
+
+def _cover_monitor(hello_imgui: Any, params: Any, monitor: int) -> None:
+    """Let the window cover a whole monitor; ``monitor`` : from 0."""
+    geometry = params.app_window_params.window_geometry
+    geometry.full_screen_mode = hello_imgui.FullScreenMode.full_screen_desktop_resolution
+    geometry.monitor_idx = monitor
 
 
 def _run(runner: Any, params: Any) -> None:
@@ -190,6 +191,15 @@ class _Window:
                 self.close()
 
         return call
+
+    def add_docks(self, hello_imgui: Any, docks: Sequence[Dock], size: tuple[int, int]) -> None:
+        """Put panels beside the picture, for a window that was asked for in ``size`` points."""
+        self.docks = [replace(dock, draw=self.as_callback(dock.draw)) for dock in docks]
+        desktop = desktop_scale()
+        opened = opened_size(size, desktop)
+        add_docks(
+            hello_imgui, self.params, self.docks, opened, LINE * desktop * text_scale(opened, desktop, self.docks)
+        )
 
     def close(self) -> None:
         """Make the runner stop after this frame."""

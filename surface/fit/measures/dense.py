@@ -99,10 +99,10 @@ class _Pair:
         return self._uv[rows[rows < len(self._uv)]]
 
 
-class _Free:
-    """A head without its contacts, and how far these move its vertices on purpose.
+class _ContactMoves:
+    """How far the contacts of a head move its vertices on purpose, by the same head without them.
 
-    most : the vertices that are moved furthest, to keep them out of each other, and to keep lips together.
+    most : the vertices that are moved furthest, mm: to keep sides out of each other, and to keep lips together.
     """
 
     def __init__(self, head: HeadData) -> None:
@@ -132,7 +132,7 @@ def measure_dense(
     """
     head, changed = without_correctives(head)
     subject = Subject(Head(head))
-    free = _Free(head) if fit_alone and head.contacts else None
+    free = _ContactMoves(head) if fit_alone and head.contacts else None
     places = Places(subject, find_mouth(subject))
     numbers = {p.name: k for k, p in enumerate(subject.parts)}
     owned = [faces_of(mesh, p.chart) for p in parts]

@@ -15,7 +15,7 @@ from surface.head.model.data import HeadData
 
 MOST_NAMES = 4  # of one kind that a line names
 NEUTRAL = "neutral"
-TOLD_MM = 0.05  # moves by contacts below this are not told
+REPORTED_MM = 0.05  # moves by contacts below this are left out of the report
 RMS_MM, P99_MM, SHAPES_MM = 0.25, 0.8, 0.08  # bounds for a face on a head of usual size
 FINE, MOST, ALL = "where the mesh has the detail", 0.5, 0.99  # said of at least so much of a face, and not of all of it
 
@@ -77,11 +77,11 @@ class Spot:
 
     def __str__(self) -> str:
         way = "surface to mesh" if self.to_mesh else "mesh to surface"
-        return f"{self.mm:.2f} mm: {self.shown}, {self.place} ({self.part}, {way})"
+        return f"{self.mm:.2f} mm: {self.shape_in_words}, {self.place} ({self.part}, {way})"
 
     @property
-    def shown(self) -> str:
-        """The shape in words."""
+    def shape_in_words(self) -> str:
+        """The shape as a report names it."""
         return "the neutral face" if self.shape == NEUTRAL else f"shape {self.shape}"
 
 
@@ -138,8 +138,8 @@ class DenseErrors:
         if self.worst and self.apart and self.apart.mm < self.worst.mm:
             out.append(f"without contacts, which keep lips, lids and tongue from passing through: {self.apart}")
         for what, spot in (("what would pass through itself", self.parted), ("lips that stay together", self.sealed)):
-            if spot and spot.mm >= TOLD_MM:
-                at = f"{spot.shown}, {spot.place} ({spot.part})"
+            if spot and spot.mm >= REPORTED_MM:
+                at = f"{spot.shape_in_words}, {spot.place} ({spot.part})"
                 out.append(f"contacts move {what} on purpose by {spot.mm:.2f} mm at most: {at}")
         if self.worst_fold:
             out.append(f"in folds (nostrils, ear canals, corners), which are held only loosely: {self.worst_fold}")

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 import pytest
 
 from surface.base import jit
-from surface.base.kept_code import hasten_loading
+from surface.base.kept_code import speed_up_loading
 
 FILES = {
     "inner.py": (
@@ -76,7 +76,7 @@ def test_a_kernel_that_is_compiled_later_calls_one_that_was_loaded(copy: Path) -
 
 def test_a_version_of_numba_with_other_parts_loads_as_it_is() -> None:
     kept = SimpleNamespace(_load_overload=len)
-    hasten_loading(kept)
+    speed_up_loading(kept)
     assert vars(kept) == {"_load_overload": len}
 
 
@@ -84,7 +84,7 @@ def test_data_of_another_form_is_rebuilt_by_numba() -> None:
     given: list[tuple[object, object]] = []
     impl = SimpleNamespace(rebuild=lambda context, data: given.append((context, data)))
     kept = SimpleNamespace(_load_overload=len, _guard_against_spurious_io_errors=len, _impl=impl)
-    hasten_loading(kept)
+    speed_up_loading(kept)
     engine = SimpleNamespace(_defined_symbols=set())
     context = SimpleNamespace(codegen=lambda: SimpleNamespace(_engine=engine))
     data = (("name", "bitcode", b"..."), "described", "signature")

@@ -100,7 +100,8 @@ export class Face {
     Object.assign(weights, ownAmounts(names, values, this.own));
     for (const name of this.half) { const w = weights[name.slice(0, -HALF.length)]; weights[name] = 4 * w * (1 - w); }
     for (const part of this.#parts) part.show(weights);
-    shared.between_lips.value = this.lipsOpen ? 1 : Math.min(Math.max((lipsApart(weights, this.lips) - LIT_MM[0]) / (LIT_MM[1] - LIT_MM[0]), 0), 1);
+    const lit = (lipsApart(weights, this.lips) - LIT_MM[0]) / (LIT_MM[1] - LIT_MM[0]);
+    shared.between_lips.value = this.lipsOpen ? 1 : Math.min(Math.max(lit, 0), 1);
     this.head.rotation.set(head[1], head[0], head[2], "YXZ");
     eyes.forEach(([yaw, pitch], i) => this.#eyes[i]?.rotation.set(pitch, yaw, 0, "YXZ"));
     this.head.updateMatrixWorld(true);
