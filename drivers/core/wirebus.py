@@ -270,7 +270,7 @@ class WireBus(Bus):
             self._try_to_start_one(np.flatnonzero(self._presence.left_out & ~state.silent).tolist())
 
     def _resume_driving(self, index: int, angle_rad: float) -> None:
-        """Drive a servo that answers again, from its position; start it anew where that is far from its last goal.
+        """Drive a servo that answers again, from its position; start it again where that is far from its last goal.
 
         A servo that kept its torque stands near its last goal. If it reads a position far from there, it has lost its
         torque and its settings, or two servos answer at once and the position is wrong. A new start reads and sets all

@@ -145,7 +145,7 @@ class DynamixelBus(ServoBus):
         return state
 
     def _set_indirect_blocks(self, blocks: dict[int, Block]) -> None:
-        """Group the servos anew if ``blocks``, read through indirect addresses, by servo id, differ from before."""
+        """Group the servos again if ``blocks``, read through indirect addresses, by servo id, differ from before."""
         if blocks != self._indirect_blocks:
             self._group_reads(blocks)
 

@@ -93,7 +93,7 @@ class Telemetry(telemetry.Telemetry):
         return None if compiled is None else compiled.state
 
     def _compiled_read(self, scale: Scale) -> CompiledRead | None:
-        """Return the prepared read of the feedback of all servos, built anew after a change."""
+        """Return the prepared read of the feedback of all servos, built again after a change."""
         compiled = self._compiled
         if compiled is None or compiled.axes is not scale.axes or compiled.read.fast != self._fast:
             read = group_read(_runs(self._feedbacks), self._fast)
