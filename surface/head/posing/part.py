@@ -163,7 +163,7 @@ class SkinPart(HeadPart):
                 turn.rotate(self.deformation, self._share, rows, self.vertices, self.normals)
 
     def _forget_rounding(self) -> None:
-        """Sum again where the points at rest have changed, so that who puts them back gets the very same vertices: their
+        """Sum again where the points at rest have changed, so that who puts them back gets the same vertices: their
         differences, added one after the other, leave some rounding."""
         if self._at_rest != self.rig.invalidations:
             self._at_rest = self.rig.invalidations
