@@ -20,6 +20,7 @@ from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.colours import with_colours
 from surface.fit.transfer.faults import HINT, faults_of_transfer
 from surface.fit.transfer.lids import close_lids
+from surface.fit.transfer.lining import keep_lining_behind
 from surface.fit.transfer.place_parts import scaled
 from surface.fit.transfer.register import STAGES, Matcher, register
 from surface.fit.transfer.reports.errors import face_reports, skin_errors
@@ -112,10 +113,11 @@ def transfer(
     warped = warp_head(head, template, done.warp, done.smooth, matcher, provenance, name)
     progress("lids", 0.75)
     data, lid_notes = seat_drawn_lids(close_lids(warped, head.data))
+    data, lining_notes = keep_lining_behind(data)
     changed = reseated(warped, data)
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
-    notes += [*scan.notes, *lid_notes]
+    notes += [*scan.notes, *lid_notes, *lining_notes]
     notes += ["the face is symmetric, and was fitted symmetrically"] if mirrored else []
     if scan.colours is not None:
         data, colour_notes = with_colours(data, scan.colours)
