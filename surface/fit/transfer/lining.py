@@ -1,4 +1,4 @@
-"""Keep what lines the mouth behind the skin of lips and chin, also where the jaw is open and the lips are closed over it.
+"""Keep what lines the mouth behind the skin of lips and chin, also where lips are closed over an open jaw.
 
 A scan may have a flatter chin than the head that the expressions come from. The lining follows the jaw, and the skin
 before it is drawn up by mouthClose: so what lies some millimetres behind the skin at rest may come out through it.
