@@ -19,7 +19,7 @@ GUIDES = 73
 CLOSE_MM = 0.9, 0.4  # over the skin, where hair ends at the line: at the sides and over the forehead
 _SPREADS, _EVEN = 3, 0.75  # how often guides are spread, and how evenly each time
 WEAVE = Weave((73, 12), (97, 15), (49, 9), 0.35)
-FRINGED = (Layer(1.08, 0.42, 1.0, 40.0), Layer(1.0, 0.66, 0.92, 30.0), Layer(0.90, 1.8, 0.80, 24.0))
+FRINGED = (Layer(1.08, 0.42, 1.0, 40.0), Layer(1.0, 0.66, 0.92, 24.0), Layer(0.90, 1.8, 0.80, 13.0))
 SWEPT = (
     Layer(1.10, 0.44, 1.0, 30.0, cropped_mm=7.0), Layer(1.0, 0.70, 0.92, 24.0, cropped_mm=7.0),
     Layer(0.88, 1.8, 0.80, 14.0, cropped_mm=7.0),
