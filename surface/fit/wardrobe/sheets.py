@@ -23,6 +23,7 @@ _CLOSER = 0.45  # how much less light reaches cropped hairs, which lie on the sk
 _CROPPED = 20.0  # how many times shorter the pieces are that one sees of cropped hairs
 _UNEVEN = 0.35  # by how much the length that is roots differs along a hairline: an even one looks cut as with a saw
 _EDGE_BARE = 0.2  # how far below nothing cover is at a frayed edge: single strands there look like threads of a web
+_BACKED = 0.6  # how much less of the innermost sheet frays: skin between the strands of an edge is a dotted line
 Drape = Callable[[Floats], Floats]
 """Guides (g, k, 3), hung."""
 Depth = Callable[[Floats], Floats]
@@ -105,7 +106,8 @@ def sheets(
         random = np.random.default_rng(seed + 7 * k + 1)
         paths = _guides(skin, comb, layer, comb.ragged_mm * _waves(len(bulges), random, closed), bulges)
         points = _control_points(paths, weave)
-        out.append(sheet(points, layer, weave, random, closed, sway, frayed))
+        backed = 1.0 - _BACKED * k / max(len(layers) - 1, 1)
+        out.append(sheet(points, layer, weave, random, closed, sway, (backed * frayed[0], backed * frayed[1])))
     return out
 
 

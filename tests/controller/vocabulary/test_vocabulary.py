@@ -29,6 +29,32 @@ def test_the_basic_emotions_are_there_and_differ(vocabulary: Vocabulary) -> None
     assert alike.max() < 0.75  # cosine; the read-out by template needs them apart
 
 
+@pytest.mark.parametrize(
+    ("name", "shown", "hidden"),
+    [
+        ("sadness", (1, 4, 15, 17), (2, 5, 10, 12, 20)),
+        ("fear", (1, 4, 5, 20, 16), (9, 12, 15, 17)),
+        ("anger", (4, 5, 7, 24), (1, 2, 10, 12, 15, 17)),
+        ("disgust", (9, 10, 15, 17), (1, 2, 4, 5, 12)),
+    ],
+)
+def test_emotions_show_the_units_of_their_prototype(
+    vocabulary: Vocabulary, name: str, shown: tuple[int, ...], hidden: tuple[int, ...]
+) -> None:
+    """Prototypes of EMFACS; hidden units are those of the emotions that each is taken for."""
+    facs, weights = Facs.load(P), vocabulary[name].weights
+    main = {unit: facs.matrix[:, facs.columns_of(str(unit))[0]].argmax() for unit in (*shown, *hidden)}
+    assert [unit for unit in shown if weights[main[unit]] < 0.5] == []
+    assert [unit for unit in hidden if weights[main[unit]] > 0.2] == []
+
+
+def test_brows_of_fear_are_drawn_together_more_than_arched(vocabulary: Vocabulary) -> None:
+    """Arched brows over a hanging jaw are surprise."""
+    fear = vocabulary["fear"].weights
+    assert fear[P.index("browDownLeft")] > 2 * fear[P.index("browOuterUpLeft")] > 0.0
+    assert fear[P.index("jawOpen")] < 0.5 * vocabulary["surprise"].weights[P.index("jawOpen")]
+
+
 def test_neutral_is_all_zero(vocabulary: Vocabulary) -> None:
     assert not vocabulary["neutral"].weights.any()
     assert vocabulary.expand("neutral") == {}

@@ -19,8 +19,10 @@ void main() {
     float height = 0.5 + 1.25 * (noise.w - 0.5) + 0.75 * (noise.x - 0.5);
 #else
     vec4 noise = texture(detail, v_strand.xy * vec2(1.0, STEADY));
-    vec4 fine = texture(detail, v_strand.xy * vec2(2.6, 1.0));
-    float height = 0.5 + 1.0 * (noise.w - 0.5) + 0.6 * (noise.x - 0.5) + 0.5 * (fine.w - 0.5);
+    vec4 fine = texture(detail, v_strand.xy * vec2(2.6, 0.5));
+    float single = 1.0 - smoothstep(0.1, 0.9, v_strand.z);  // where strands end they are hairs, not teeth of a saw
+    float height = 0.5 + (1.0 - 0.55 * single) * (noise.w - 0.5) + (0.6 - 0.3 * single) * (noise.x - 0.5)
+        + (0.5 + 0.5 * single) * (fine.w - 0.5);
     noise = mix(noise, fine, 0.6);
 #endif
     float over = v_strand.z - height;

@@ -129,8 +129,8 @@ def test_roots_are_sparse_along_their_length_in_millimetres_and_tips_fade_to_not
     assert cover[-1] == pytest.approx(-BARE, abs=0.1)
 
 
-def test_sheets_lie_over_each_other_in_the_order_of_their_layers(skin: Skin) -> None:
-    """Guides that fall over the forehead, cut at a height; the outer sheet lies further out."""
+def falling(skin: Skin) -> Comb:
+    """Nine guides that fall over the forehead, cut at a height."""
     side = np.linspace(-30.0, 30.0, 9)
     roots = np.column_stack([side, np.full(9, 110.0), np.zeros(9)])
     toward = roots - [0.0, 40.0, 0.0]
@@ -140,7 +140,20 @@ def test_sheets_lie_over_each_other_in_the_order_of_their_layers(skin: Skin) -> 
     def flow(at: np.ndarray, normals: np.ndarray, share: float) -> np.ndarray:
         return tangent(np.tile([0.0, -0.3, 1.0], (len(at), 1)), normals)
 
-    comb = Comb(roots, np.full(9, 120.0), lambda at: np.full(len(at), 10.0), flow, lambda at: at[:, 1] - 95.0, 0.0, 0.0)
+    return Comb(roots, np.full(9, 120.0), lambda at: np.full(len(at), 10.0), flow, lambda at: at[:, 1] - 95.0, 0.0, 0.0)
+
+
+def test_inner_sheets_back_the_frayed_edges_of_outer_ones(skin: Skin) -> None:
+    """Through the gaps between strands of an edge one sees hair, not a dotted line of skin."""
+    layers = tuple(Layer(share, 0.8, 1.0) for share in (1.0, 0.9, 0.8))
+    found = sheets(skin, falling(skin), layers, WEAVE, seed=1, frayed=(0.4, 0.0))
+    bare = [float((patch.strands[0, :, 1, 2] < 0.3).mean()) for patch in found]
+    assert bare[0] > bare[1] > bare[2] > 0.0
+
+
+def test_sheets_lie_over_each_other_in_the_order_of_their_layers(skin: Skin) -> None:
+    """The outer sheet lies further out."""
+    comb = falling(skin)
     outer, inner = sheets(skin, comb, (Layer(1.0, 0.5, 1.0), Layer(0.3, 1.0, 0.7)), WEAVE, seed=7)
     check_patches([outer, inner])
     out, low = (skin.nearest(patch.points[0, :, 2:].reshape(-1, 3))[1] for patch in (outer, inner))
