@@ -26,8 +26,8 @@ CREASE_DEG = 55.0  # faces that meet at a sharper angle do not share their norma
 MOST_PAIRS = 20_000_000  # of corners of faces at one vertex; a mesh with more gets smooth normals
 ROUND = 1.6  # of hair: weight of directions from the middle of the head beside its cards' own normals
 SKULL = np.array([0.0, -15.0, -75.0])  # from the middle of the eyes to that of the hair, mm, on a head of usual size
-DEEP_MM, DARKEST = 30.0, 0.35  # of a head of usual size: how deep in hair it is darkest; how dark, linear
-ROUND_ABOUT, OUTERMOST = 0.12, 90.0  # radians around a direction; percentile of distances that counts as outermost
+DEEP_MM, DARKEST = 30.0, 0.5  # of a head of usual size: how deep in hair it is darkest; how dark, linear
+DIRECTIONS, OUTERMOST = 500, 90.0  # around the middle; percentile of distances in each that counts as outermost
 INSIDE = 0.5  # of an accessory's area, which must be on head and shoulders: what is worn elsewhere is left out
 KEPT = "kept as they are"
 
@@ -114,13 +114,24 @@ def _accessory(worn: FitMesh, k: int, placed: Floats, middle: Floats, scale: flo
 def _shade(points: Floats, middle: Floats, deep_mm: float) -> Floats:
     """(m,) light that reaches hair: less of it, the deeper a vertex lies below the outermost hair in its direction."""
     away = points - middle
-    far = np.linalg.norm(away, axis=1)
-    out, tree = np.zeros(len(points)), cKDTree(_unit(away))
-    for k, near in enumerate(tree.query_ball_point(_unit(away), ROUND_ABOUT)):
-        out[k] = np.percentile(far[near], OUTERMOST)
+    far, ways = np.linalg.norm(away, axis=1), _directions(DIRECTIONS)
+    own = cKDTree(ways).query(_unit(away))[1]
+    seen = np.unique(own)
+    most = np.array([np.percentile(far[own == k], OUTERMOST) for k in seen])
+    distance, near = cKDTree(ways[seen]).query(_unit(away), k=min(4, len(seen)))
+    share = 1.0 / np.maximum(np.atleast_2d(distance.reshape(len(points), -1)), 1e-6)
+    out = (most[near.reshape(len(points), -1)] * share).sum(axis=1) / share.sum(axis=1)
     depth = np.clip((out - far) / deep_mm, 0.0, 1.0)
     light: Floats = 1.0 - (1.0 - DARKEST) * depth
     return light
+
+
+def _directions(count: int) -> Floats:
+    """(count, 3) unit vectors, evenly all around (a Fibonacci sphere)."""
+    k = np.arange(count) + 0.5
+    up, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + 5.0**0.5) * k
+    level = np.sqrt(1.0 - up**2)
+    return np.column_stack([level * np.cos(turn), up, level * np.sin(turn)])
 
 
 def _lowered(uv: Floats) -> Floats:

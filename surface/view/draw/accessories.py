@@ -29,7 +29,7 @@ PROGRAM = "accessory"
 _ALPHA_TO_COVERAGE = 0x809E  # GL_SAMPLE_ALPHA_TO_COVERAGE, which moderngl does not name
 _SOFT = {"hair": 1.0}
 #: How strong a highlight is and how sharp, by kind.
-_GLOSS = {"hair": (0.05, 14.0), "hat": (0.02, 12.0), "glasses": (0.28, 90.0), "jewellery": (0.6, 120.0)}
+_GLOSS = {"hair": (0.045, 9.0), "hat": (0.02, 12.0), "glasses": (0.28, 90.0), "jewellery": (0.6, 120.0)}
 _MASK, _BLEND = ALPHA.index("MASK"), ALPHA.index("BLEND")
 _REST = _BLEND + 1  # of what blends: all that is not nearly solid
 _UNIT = 3

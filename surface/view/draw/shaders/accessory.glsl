@@ -11,6 +11,10 @@ vec3 lit(vec3 n, vec3 v) {
     return light + ambient(n);
 }
 
+// Highlights of key and rim, and the sky as matter mirrors it: what is black is seen by these alone.
 vec3 shine(vec3 n, vec3 v) {
-    return gloss.x * key_colour * lobe(dot(n, normalize(v + key_direction)), gloss.y);
+    vec3 mirrored = key_colour * lobe(dot(n, normalize(v + key_direction)), gloss.y);
+    mirrored += rim_colour * lobe(dot(n, normalize(v + rim_direction)), gloss.y);
+    float edge = 1.0 - clamp(abs(dot(n, v)), 0.0, 1.0);
+    return gloss.x * (mirrored + (0.5 + edge * edge * edge) * ambient(n));
 }
