@@ -13,7 +13,9 @@ from surface.base.arrays import Array, Floats32
 from surface.export.glb_buffers import ARRAY_BUFFER, ELEMENT_BUFFER, FLOAT, UINT, GlbBuffers
 from surface.export.shapes import ExportPart
 from surface.export.textures import eye_column, materials, png_bytes
+from surface.export.worn import SAMPLER, material_of
 from surface.head import Head
+from surface.head.model.accessories import Accessory
 
 METRES = np.float32(0.001)
 NEAREST, REPEAT, CLAMP_TO_EDGE = 9729, 10497, 33071
@@ -31,7 +33,8 @@ class Document(GlbBuffers):
         super().__init__()
         self._materials: dict[str, dict[str, Any]] = {}
         self._images: list[dict[str, Any]] = []
-        self._eyes: list[bytes] = []
+        self._textures: list[dict[str, Any]] = []
+        self._pictures: dict[bytes, int] = {}
         amounts = head.own_amounts(head.values(pose)) if head.own_groups else ()
         self._pose = {**pose, **{group.name: float(x) for group, x in zip(head.own_groups, amounts, strict=True)}}
         meshes = [self._mesh(part) for part in parts]
@@ -52,8 +55,9 @@ class Document(GlbBuffers):
                 "wrapS": REPEAT,
                 "wrapT": CLAMP_TO_EDGE,
             }
-            textures = [{"source": k, "sampler": 0} for k in range(len(self._images))]
-            self.content |= {"images": self._images, "textures": textures, "samplers": [sampler]}
+            worn = any(texture["sampler"] for texture in self._textures)
+            samplers = [sampler, *([SAMPLER] if worn else [])]
+            self.content |= {"images": self._images, "textures": self._textures, "samplers": samplers}
 
     def _mesh(self, part: ExportPart) -> dict[str, Any]:
         local = METRES * (part.vertices - part.pivot.astype(np.float32))
@@ -83,6 +87,8 @@ class Document(GlbBuffers):
         return mesh
 
     def _material(self, part: ExportPart) -> int:
+        if part.worn is not None:
+            return self._worn_material(part.worn)
         table = materials().get(part.material, materials()["skin"])
         painted = part.colours is not None
         name = f"{part.material}_painted" if painted else part.material
@@ -100,14 +106,27 @@ class Document(GlbBuffers):
             self._materials[name] = {"name": name, "pbrMetallicRoughness": surface, "doubleSided": two_sided}
         return list(self._materials).index(name)
 
+    def _worn_material(self, worn: Accessory) -> int:
+        """Return the index of an accessory's own material."""
+        material, key = material_of(worn), f"accessory {worn.name} {len(self._materials)}"
+        if worn.texture:
+            texture = self._texture(worn.texture, worn.mime, worn.kind, 1)
+            material["pbrMetallicRoughness"]["baseColorTexture"] = {"index": texture}
+        self._materials[key] = material
+        return len(self._materials) - 1
+
     def _eye_texture(self, picture: NDArray[np.uint8]) -> int:
-        """Return the index of a texture of eyes; the same picture is kept once."""
-        png = png_bytes(picture)
-        if png not in self._eyes:
-            self._eyes.append(png)
-            view = self.view(np.frombuffer(png, np.uint8))
-            self._images.append({"name": "eye", "mimeType": "image/png", "bufferView": view})
-        return self._eyes.index(png)
+        """Return the index of a texture of eyes."""
+        return self._texture(png_bytes(picture), "image/png", "eye", 0)
+
+    def _texture(self, picture: bytes, mime: str, name: str, sampler: int) -> int:
+        """Return the index of a texture; the same picture is kept once."""
+        if picture not in self._pictures:
+            self._pictures[picture] = len(self._textures)
+            view = self.view(np.frombuffer(picture, np.uint8))
+            self._images.append({"name": name, "mimeType": mime, "bufferView": view})
+            self._textures.append({"source": len(self._images) - 1, "sampler": sampler})
+        return self._pictures[picture]
 
     def _target(self, rows: Floats32, *, bounds: bool = False) -> int:
         """Return an accessor of displacements, sparse where most of them are zero."""

@@ -160,8 +160,8 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     notes += overlap_notes(head)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
-        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, {**loaded.pieces, **worn.pieces}, dense,
-        tuple(faults_of(dense, fitted_parts, scale)),
+        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets,
+        {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)),
     )  # fmt: skip
     return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts), worn.accessories)
 

@@ -5,13 +5,13 @@ What they are is said by :mod:`surface.fit.source.kinds`. They are placed as the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from surface.base.arrays import Bools, Floats, Floats32, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.kinds import kind_of, listed
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh, face_areas, triangles
@@ -89,26 +89,30 @@ def _middle(loaded: Loaded, placed: Floats) -> Floats:
 
 
 def _accessory(worn: FitMesh, k: int, placed: Floats, middle: Floats, scale: float) -> Accessory:
-    """One piece, with vertices for each of their texture coordinates and normals."""
-    own = worn.piece == k
-    faces, face_uv = worn.faces[own], worn.face_uv[own]
-    tri, material, kind = triangles(faces), worn.materials[k] if worn.materials else None, kind_of(worn.pieces[k]).name
-    material = material or Material()
+    """One piece, with a vertex for each of its texture coordinates and normals."""
+    own, hair = worn.piece == k, kind_of(worn.pieces[k]).name == "hair"
+    tri, rows = triangles(worn.faces[own]), triangles(worn.face_uv[own])
+    material = (worn.materials[k] if worn.materials else None) or Material()
     normals = corner_normals(placed, tri)
-    if kind == "hair":
-        normals = _rounded(normals, placed[tri], middle)
-    mapped = bool((face_uv[:, :3] >= 0).all())
-    rows = triangles(face_uv) if mapped else np.zeros_like(tri)
+    normals = _rounded(normals, placed[tri], middle) if hair else normals
+    mapped = bool((rows >= 0).all())
     uv = material.in_picture(worn.uv)[rows] if mapped else np.zeros((*tri.shape, 2))
     at, corner = _unique_corners(tri, rows, normals)
-    picture = reduced_picture(material) if mapped and material.texture is not None else b""
     points = placed[tri.ravel()[at]]
-    shade = _shade(points, middle, DEEP_MM * scale) if kind == "hair" else np.ones(len(points))
-    return Accessory(
-        worn.pieces[k], kind, points.astype(np.float32), normals.reshape(-1, 3)[at].astype(np.float32),
-        _lowered(uv).reshape(-1, 2)[at].astype(np.float32), corner.astype(np.int32), shade.astype(np.float32), material.colour, picture, material.alpha, material.cutoff,
-        material.two_sided or kind == "hair",
+    made = Accessory(
+        worn.pieces[k], kind_of(worn.pieces[k]).name, points.astype(np.float32),
+        normals.reshape(-1, 3)[at].astype(np.float32), _lowered(uv).reshape(-1, 2)[at].astype(np.float32),
+        corner.astype(np.int32), (_shade(points, middle, DEEP_MM * scale) if hair else np.ones(len(at))).astype("f4"),
+        two_sided=material.two_sided or hair,
     )  # fmt: skip
+    return _coloured(made, material, mapped=mapped)
+
+
+def _coloured(made: Accessory, material: Material, *, mapped: bool) -> Accessory:
+    """An accessory with the colours of its material; one of which nothing is clear is solid, whatever that says."""
+    picture, clear = reduced_picture(material) if mapped and material.texture is not None else (b"", False)
+    alpha = material.alpha if clear or material.colour[3] < 1.0 else "OPAQUE"
+    return replace(made, colour=material.colour, texture=picture, alpha=alpha, cutoff=material.cutoff)
 
 
 def _shade(points: Floats, middle: Floats, deep_mm: float) -> Floats:

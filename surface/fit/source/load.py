@@ -53,8 +53,8 @@ class Loaded:
     """A mesh in head space, which of its shapes make ARKit's, and what was guessed.
 
     placement : from the file's coordinates; marks : landmarks in head space.
-    pieces : the file's objects and what kind each is. worn : hair, glasses and the like that a head keeps as they are,
-    in the file's coordinates; None where there is nothing. exported : omote wrote the file, with outlines as they are drawn.
+    pieces : the file's objects and what kind each is. exported : omote wrote the file, with outlines as they are drawn.
+    worn : hair, glasses and the like that a head keeps as they are, in the file's coordinates; None without any.
     """
 
     mesh: FitMesh

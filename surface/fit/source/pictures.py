@@ -17,31 +17,32 @@ CLEAR = 0.5  # opacity below which a texel's colour is not to be trusted: painte
 PLAIN = ("image/png", "image/jpeg")
 
 
-def reduced_picture(material: Material) -> bytes:
-    """The texture of a material as a PNG or JPEG file; empty where it cannot be read.
+def reduced_picture(material: Material) -> tuple[bytes, bool]:
+    """The texture of a material as a PNG or JPEG file, empty where it cannot be read; and whether its material leaves
+    some of it clear.
 
-    One that has nothing clear and is small enough stays as it is. Without Pillow, PNG and JPEG stay as they are, and others
-    are left out.
+    One that has nothing clear and is small enough stays as it is. Without Pillow, PNG and JPEG stay as they are, and
+    others are left out.
     """
     data = material.texture or b""
     try:
         from PIL import Image  # optional: the extra view
     except ImportError:
-        return data if material.mime in PLAIN else b""
+        return data if material.mime in PLAIN else b"", True
     try:
         with Image.open(io.BytesIO(data)) as image:
             if image.width * image.height > MOST_PIXELS:
-                return b""
+                return b"", True
             clear = material.alpha != "OPAQUE" and _has_clear(image)
             if not clear and material.mime in PLAIN and max(image.size) <= LARGEST:
-                return data
+                return data, clear
             small = image.convert("RGBA" if clear else "RGB")
             small.thumbnail((LARGEST, LARGEST))
             if clear:
                 small = Image.fromarray(bled(np.asarray(small)))
-            return _encoded(small, "PNG" if clear else "JPEG")
+            return _encoded(small, "PNG" if clear else "JPEG"), clear
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
-        return b""
+        return b"", True
 
 
 def _has_clear(image: Any) -> bool:

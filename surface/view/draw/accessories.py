@@ -117,7 +117,9 @@ class AccessoryBuffers:
 
 def _buffers(ctx: moderngl.Context, mesh: WornMesh, program: moderngl.Program) -> _Drawn:
     accessory = mesh.accessory
-    rows = np.hstack([accessory.vertices, accessory.normals, accessory.uv, mesh.share[:, None], accessory.shade[:, None]])
+    rows = np.hstack(
+        [accessory.vertices, accessory.normals, accessory.uv, mesh.share[:, None], accessory.shade[:, None]]
+    )
     vertices = ctx.buffer(np.ascontiguousarray(rows, np.float32).tobytes())
     index = ctx.buffer(np.ascontiguousarray(accessory.triangles, np.int32).tobytes())
     content: Any = [(vertices, "3f 3f 2f 1f 1f", "position", "normal", "uv", "share", "shade")]

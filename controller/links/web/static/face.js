@@ -64,10 +64,10 @@ export class Face {
   // A part of the file as it is drawn here: positions in metres, shapes by the vertices that they move.
   #add(mesh) {
     const inverse = mesh.skeleton?.boneInverses[0].elements, bends = Boolean(inverse), eye = EYES.indexOf(mesh.name);
-    const { map, side, name } = mesh.material;
+    const { map, side, name, alphaTest, transparent } = mesh.material;
     if (map) map.colorSpace = THREE.NoColorSpace;
     const part = new Part(mesh, bends ? inverse[0] : mesh.scale.x, bends ? inverse.slice(12, 15) : [0, 0, 0]);
-    const drawn = new THREE.Mesh(part.geometry, material(name, { map, side }, bends));
+    const drawn = new THREE.Mesh(part.geometry, material(name, { map, side, alphaTest, transparent }, bends));
     drawn.frustumCulled = false;
     if (bends) this.scene.add(drawn);
     else { drawn.position.copy(mesh.position); this.head.add(drawn); }
