@@ -213,7 +213,7 @@ void main() {
   if (cover < alpha_test) discard;
   gl_FragColor = vec4(encode(decoded(texel.rgb) * v_colour * v_light + v_shine), blended ? cover : 1.0);
 }`];
-const GLOSS = { hair: [0.045, 9], hat: [0.02, 12], glasses: [0.28, 90], jewellery: [0.6, 120] };
+export const GLOSS = { hair: [0.045, 9], hat: [0.02, 12], glasses: [0.28, 90], jewellery: [0.6, 120] };
 
 const KINDS = { skin: SKIN, strand: STRAND, tress: STRAND, cloth: CLOTH, brow: HAIR, lash: HAIR, eye: EYE, teeth: INNER, gums: INNER, tongue: INNER, mouth: INNER };
 
