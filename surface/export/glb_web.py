@@ -36,7 +36,7 @@ from surface.export.textures import (
     strip_picture,
 )
 from surface.export.web_parts import HALF, HALVES, WebPart, web_parts, worn_web_parts
-from surface.export.worn import material_of, web_texture
+from surface.export.worn import material_of, web_texture, wrap_of
 from surface.head import Head
 from surface.head.model.accessories import Accessory
 
@@ -260,7 +260,7 @@ class _WebDocument(GlbBuffers):
         """Return the index of an accessory's own material; its colour is that of its vertices."""
         material, (picture, mime) = material_of(worn, (1.0, 1.0, 1.0, 1.0)), web_texture(worn)
         if picture:
-            texture = self._texture(worn.kind, picture, mime, _REPEAT)
+            texture = self._texture(worn.kind, picture, mime, wrap_of(worn))
             material["pbrMetallicRoughness"]["baseColorTexture"] = {"index": texture}
         self._materials.append(material)
         return len(self._materials) - 1

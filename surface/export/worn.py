@@ -14,9 +14,7 @@ from surface.head import Head
 from surface.head.model.accessories import Accessory
 from surface.head.model.parameters import read_pose, rotation
 
-LINEAR, MIPMAPS, REPEAT = 9729, 9987, 10497
-SAMPLER = {"magFilter": LINEAR, "minFilter": MIPMAPS, "wrapS": REPEAT, "wrapT": REPEAT}
-"""Of their textures, in glTF's numbers."""
+LINEAR, MIPMAPS, REPEAT, CLAMP = 9729, 9987, 10497, 33071  # glTF's numbers
 ROUGHNESS = {"hair": 0.6, "hat": 0.9, "glasses": 0.35, "jewellery": 0.25}
 WEB_PIXELS, WEB_QUALITY = 512, 80  # of a side of a texture, and of a JPEG, in files for pages
 
@@ -51,6 +49,17 @@ def material_of(accessory: Accessory, colour: tuple[float, ...] | None = None) -
     if accessory.alpha != "OPAQUE":
         table["alphaMode"] = accessory.alpha
     return table | ({"alphaCutoff": accessory.cutoff} if accessory.alpha == "MASK" else {})
+
+
+def wrap_of(accessory: Accessory) -> int:
+    """Return glTF's number for how an accessory's texture goes on beyond its edges."""
+    return REPEAT if accessory.repeats else CLAMP
+
+
+def sampler_of(accessory: Accessory) -> dict[str, int]:
+    """Return the glTF sampler of an accessory's texture."""
+    wrap = wrap_of(accessory)
+    return {"magFilter": LINEAR, "minFilter": MIPMAPS, "wrapS": wrap, "wrapT": wrap}
 
 
 def web_texture(accessory: Accessory) -> tuple[bytes, str]:

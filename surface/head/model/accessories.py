@@ -55,6 +55,11 @@ class Accessory:
     two_sided: bool = True
 
     @property
+    def repeats(self) -> bool:
+        """Whether the texture repeats on it: one that does not must not show its left edge at its right."""
+        return bool((self.uv < 0.0).any() or (self.uv > 1.0).any())
+
+    @property
     def mime(self) -> str:
         """The texture's kind, as ``image/png``; "" without one."""
         return next((kind for start, kind in PICTURES.items() if self.texture.startswith(start)), "")

@@ -139,6 +139,7 @@ def _texture(ctx: moderngl.Context, accessory: Accessory) -> moderngl.Texture:
     texture = ctx.texture(size, 4, pixels)
     texture.build_mipmaps()
     texture.filter = (ctx.LINEAR_MIPMAP_LINEAR, ctx.LINEAR)
+    texture.repeat_x = texture.repeat_y = accessory.repeats
     return texture
 
 
