@@ -20,6 +20,7 @@ from surface.fit.source.placing.bust import outline
 from surface.fit.source.placing.frame import EYES_AT
 from surface.fit.source.placing.place import HeadSize, head_size
 from surface.head.model.accessories import Accessory
+from surface.head.model.placement import Placement
 from surface.readers.meshdata import Material
 
 CREASE_DEG = 55.0  # faces that meet at a sharper angle do not share their normals
@@ -43,11 +44,21 @@ class Kept:
 
 def make_accessories(loaded: Loaded) -> Kept:
     """The accessories of a mesh that is in its place, in head space."""
-    worn = loaded.worn
+    known = loaded.marks.eyes is not None
+    return keep_accessories(loaded.worn, loaded.placement, EYES_AT if known else None, head_size(loaded.marks))
+
+
+def keep_accessories(
+    worn: FitMesh | None, placement: Placement, eyes: Floats | None, size: HeadSize
+) -> Kept:  # fmt: skip
+    """The accessories of a head whose mesh was placed so.
+
+    worn : what is kept as it is, in the file's coordinates. eyes : (3,) their middle, mm; None where it is not known.
+    """
     if worn is None:
         return Kept((), [], {})
-    placed = loaded.placement.points(worn.vertices)
-    near, middle, size = _near(placed, worn, loaded), _middle(loaded, placed), head_size(loaded.marks)
+    placed = placement.points(worn.vertices)
+    near, middle = _near(placed, worn, eyes, size), _middle(placed, eyes, size)
     found, pieces, kept, gone = list[Accessory](), dict[str, str](), dict[str, list[str]](), list[str]()
     for k, name in enumerate(worn.pieces):
         if not (worn.piece == k).any():
@@ -65,26 +76,24 @@ def make_accessories(loaded: Loaded) -> Kept:
     return Kept(tuple(found), notes * bool(kept) + left * bool(gone), pieces)
 
 
-def _near(placed: Floats, worn: FitMesh, loaded: Loaded) -> Bools:
+def _near(placed: Floats, worn: FitMesh, eyes: Floats | None, size: HeadSize) -> Bools:
     """(pieces,) whether each is worn on the head or the shoulders; hair always is."""
-    size = head_size(loaded.marks)
     hair = np.array([kind_of(name).name == "hair" for name in worn.pieces])
-    if loaded.marks.eyes is None:
+    if eyes is None:
         return np.ones(len(worn.pieces), bool)
     areas = face_areas(placed, worn.faces)
-    within = outline(placed, EYES_AT, max(size.across, size.along))[worn.faces[:, 0]] < 0
+    within = outline(placed, eyes, max(size.across, size.along))[worn.faces[:, 0]] < 0
     inside, whole = (np.bincount(worn.piece, a, len(worn.pieces)) for a in (areas * within, areas))
     near: Bools = hair | (inside >= INSIDE * whole)
     return near
 
 
-def _middle(loaded: Loaded, placed: Floats) -> Floats:
+def _middle(placed: Floats, eyes: Floats | None, size: HeadSize) -> Floats:
     """(3,) mm the middle of the skull, or of what is worn where the eyes are not known."""
-    if loaded.marks.eyes is None:
+    if eyes is None:
         middle: Floats = 0.5 * (placed.min(axis=0) + placed.max(axis=0))
         return middle
-    size: HeadSize = head_size(loaded.marks)
-    skull: Floats = EYES_AT + size.across * SKULL
+    skull: Floats = eyes + size.across * SKULL
     return skull
 
 

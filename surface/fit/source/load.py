@@ -75,12 +75,12 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     """
     path = Path(path)
     raw = _read(path, options.shapes)
-    mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)} | {"materials": tinted(raw)})
+    mesh = fit_mesh_of(raw)
     if options.without:
         mesh = keep_faces(mesh, wanted_faces(mesh, options.without, str(path)))
     aside = worn_faces(mesh)
     kept, notes = without_clothes(mesh, aside)
-    worn = _worn(mesh, aside, str(path)) if aside.any() else None
+    worn = worn_mesh(mesh, aside, str(path)) if aside.any() else None
     pieces = piece_kinds(mesh, kept)
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
     mesh = bare_where_damaged(mesh)
@@ -96,8 +96,13 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces, is_export(path), worn)
 
 
-def _worn(mesh: FitMesh, faces: Bools, where: str) -> FitMesh:
-    """What is kept as it is, without shapes. Raises FitError: it is damaged."""
+def fit_mesh_of(raw: MeshData) -> FitMesh:
+    """The mesh of a file, with colours of its vertices in its materials."""
+    return FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)} | {"materials": tinted(raw)})
+
+
+def worn_mesh(mesh: FitMesh, faces: Bools, where: str) -> FitMesh:
+    """What is kept as it is of a mesh, faces (f,), without shapes. Raises FitError: it is damaged."""
     worn = bare_where_damaged(keep_faces(replace(mesh, names=(), deltas=mesh.deltas[:0]), faces))
     check_mesh(worn, f"{where}: hair, glasses and what else is worn")
     return worn
