@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -22,13 +22,23 @@ WEB_PIXELS, WEB_QUALITY = 512, 80  # of a side of a texture, and of a JPEG, in f
 def accessory_parts(head: Head, pose: Mapping[str, float] | None = None) -> list[ExportPart]:
     """Return the accessories of a head as parts, turned as its head is in a pose; their material is their kind."""
     turn = rotation(*read_pose(head.values(pose or {})[: len(Head.parameters)]).head)
-    found = []
-    for one in head.accessories:
+    found, names = list[ExportPart](), _names(one.accessory for one in head.accessories)
+    for one, name in zip(head.accessories, names, strict=True):
         own, (vertices, normals) = one.accessory, one.turned(turn)
         found.append(ExportPart(
-            own.name.split("/")[0], own.kind, vertices.copy(), unit(normals), own.uv * [1, -1] + [0, 1],
+            name, own.kind, vertices.copy(), unit(normals), own.uv * [1, -1] + [0, 1],
             own.triangles, np.zeros(3), _colours(own), worn=own,
         ))  # fmt: skip
+    return found
+
+
+def _names(accessories: Iterable[Accessory]) -> list[str]:
+    """Return a name for each, of the object that it was in its file: on one line, and none twice."""
+    found = list[str]()
+    for one in accessories:
+        name = " ".join(c for c in one.name.split("/")[0].split() if c.isprintable()) or one.kind
+        count = sum(other == name or other.startswith(f"{name} ") for other in found)
+        found.append(f"{name} {count + 1}" if count else name)
     return found
 
 

@@ -14,6 +14,7 @@ from cards import RED, card, picture
 from small_head import small_head
 
 from surface.export import export_head
+from surface.export.urdf import SKULL
 from surface.export.worn import WEB_PIXELS
 from surface.fit.features.accessories import make_accessories
 from surface.fit.source.load import LoadOptions, load_mesh
@@ -111,3 +112,18 @@ def test_an_obj_has_their_geometry_and_turns_them_with_the_head(tmp_path: Path) 
     assert own[1][:, 0].mean() > own[0][:, 0].mean() + 20
     text = (tmp_path / "h.obj").read_text()
     assert "o Card\nusemtl hat\n" in text and "newmtl hat" in (tmp_path / "h.mtl").read_text()
+
+
+def test_a_urdf_puts_them_on_the_skull(tmp_path: Path) -> None:
+    written = export_head(wearing(card(z=70.0), LENS), tmp_path / "h.urdf")
+    names = {path.name for path in written if path.suffix == ".stl"}
+    assert {f"{SKULL}-hat_1.stl", f"{SKULL}-glasses_2.stl"} <= names
+    mesh = trimesh.load(next(path for path in written if path.name.endswith("hat_1.stl")))
+    np.testing.assert_allclose(mesh.extents, [0.0, 0.04, 0.04], atol=1e-6)
+
+
+def test_names_are_on_one_line_and_none_is_there_twice(tmp_path: Path) -> None:
+    twice = [replace(card(), name=name) for name in ("Hair/a", "Hair/b", "x\ny/c", "\n/d")]
+    export_head(wearing(*twice), tmp_path / "h.glb")
+    names = [node["name"] for node in document(tmp_path / "h.glb")["nodes"]]
+    assert names[-4:] == ["Hair", "Hair 2", "x y", "hat"]
