@@ -106,7 +106,9 @@ def _worn(head: Head) -> list[Piece]:
     """Return a piece of each accessory, which the skull carries, in the colour of its kind."""
     colours = {name: np.asarray(table["colour"], float) for name, table in materials().items() if "colour" in table}
     return [
-        Piece(SKULL, f"{part.material}_{k}", part, part.triangles, part.material, colours[part.material])
+        Piece(
+            SKULL, f"{part.material}_{k}", part, part.triangles.astype(np.int64), part.material, colours[part.material]
+        )
         for k, part in enumerate(accessory_parts(head), 1)
     ]
 

@@ -26,7 +26,7 @@ def accessory_parts(head: Head, pose: Mapping[str, float] | None = None) -> list
     for one, name in zip(head.accessories, names, strict=True):
         own, (vertices, normals) = one.accessory, one.turned(turn)
         found.append(ExportPart(
-            name, own.kind, vertices.copy(), unit(normals), own.uv * [1, -1] + [0, 1],
+            name, own.kind, vertices.copy(), unit(normals), (own.uv * [1, -1] + [0, 1]).astype(np.float32),
             own.triangles, np.zeros(3), _colours(own), worn=own,
         ))  # fmt: skip
     return found

@@ -156,7 +156,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
     notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), *mended]
-    notes += findings(head, loaded.marks, _kinds(loaded))
+    notes += findings(head, loaded.marks, _kinds(loaded), {one.kind for one in worn.accessories})
     notes += overlap_notes(head)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,

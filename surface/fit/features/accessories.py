@@ -149,7 +149,8 @@ def _directions(count: int) -> Floats:
 
 def _lowered(uv: Floats) -> Floats:
     """Texture coordinates less whole repeats, so that small floats hold them exactly."""
-    return uv - np.floor(uv.reshape(-1, 2).min(axis=0))
+    lowered: Floats = uv - np.floor(uv.reshape(-1, 2).min(axis=0))
+    return lowered
 
 
 def corner_normals(points: Floats, tri: Ints) -> Floats:

@@ -24,8 +24,10 @@ from surface.mesh.mesh import Mesh, border_edges
 class Posed(Protocol):
     """Vertices and normals (m, 3) float32 before the head turns, as a deformation has them."""
 
-    vertices: Any
-    normals: Any
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def normals(self) -> Any: ...
 
 
 class Turn:

@@ -111,8 +111,10 @@ class AccessoryBuffers:
     def release(self) -> None:
         """Release the graphics memory."""
         for one in self._drawn:
-            for thing in (one.array, one.texture, *one.buffers):
-                thing.release()
+            one.array.release()
+            one.texture.release()
+            for buffer in one.buffers:
+                buffer.release()
 
 
 def _buffers(ctx: moderngl.Context, mesh: WornMesh, program: moderngl.Program) -> _Drawn:
