@@ -217,11 +217,13 @@ export const GLOSS = { hair: [0.045, 9], hat: [0.02, 12], glasses: [0.28, 90], j
 
 const KINDS = { skin: SKIN, strand: STRAND, tress: STRAND, cloth: CLOTH, brow: HAIR, lash: HAIR, eye: EYE, teeth: INNER, gums: INNER, tongue: INNER, mouth: INNER };
 
-function accessory(kind, { map, side, alphaTest, transparent }, bends) {
+// Hair that blends is cut: blended without an order, locks behind would be drawn over those in front.
+function accessory(kind, { map, side, alphaTest, transparent: blends }, bends) {
+  const transparent = blends && kind !== "hair", cut = blends ? (transparent ? 0.004 : 0.4) : alphaTest;
   const [vertex, fragment] = ACCESSORY, own = "uniform float soft; uniform vec2 gloss; uniform sampler2D map;";
   return new THREE.ShaderMaterial({
     uniforms: { ...shared, map: { value: map }, soft: { value: kind === "hair" ? 1 : 0 }, gloss: { value: GLOSS[kind] },
-      alpha_test: { value: transparent ? 0.004 : alphaTest }, blended: { value: transparent } },
+      alpha_test: { value: cut }, blended: { value: transparent } },
     side, transparent, depthWrite: !transparent, defines: { ...(bends ? { BENDS: 1 } : {}), ...(map ? { MAPPED: 1 } : {}) },
     vertexShader: LIGHT + PLACE + own + vertex, fragmentShader: LIGHT + own + fragment,
   });
