@@ -7,7 +7,7 @@ they hide; the rest is blended over the finished picture.
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,7 +25,9 @@ from surface.view.draw.vertex_sums import set_turn
 if TYPE_CHECKING:
     import moderngl
 
-PROGRAM = "accessory"
+SOLID, CLEAR = "accessory_solid", "accessory"
+PROGRAMS: dict[str, dict[str, int | str]] = {SOLID: {"SOLID": 1}, CLEAR: {}}
+"""Programs by name, and their macros: of solid accessories, and of those that are clear in places."""
 _ALPHA_TO_COVERAGE = 0x809E  # GL_SAMPLE_ALPHA_TO_COVERAGE, which moderngl does not name
 _SOFT = {"hair": 1.0}
 #: How strong a highlight is and how sharp, by kind.
@@ -41,29 +43,38 @@ class _Drawn:
     """Buffers of one accessory."""
 
     mesh: WornMesh
+    program: moderngl.Program
     array: moderngl.VertexArray
     texture: moderngl.Texture
     buffers: tuple[moderngl.Buffer, ...]
 
 
-def accessory_program(ctx: moderngl.Context, quality: str) -> moderngl.Program:
-    """The program of accessories; "fast" lights them per vertex."""
+def accessory_programs(ctx: moderngl.Context, quality: str) -> dict[str, moderngl.Program]:
+    """The programs of accessories by name, of solid ones and of others; "fast" lights them per vertex."""
     shared = ("light.glsl", "accessory.glsl")
-    defines: dict[str, int | str] = {} if quality == "full" else {"PER_VERTEX": 1}
-    return build(ctx, (*shared, "rotate.glsl", "accessory.vert"), (*shared, "accessory.frag"), defines=defines)
+    vertex, fragment = (*shared, "rotate.glsl", "accessory.vert"), (*shared, "accessory.frag")
+    lit: dict[str, int | str] = {} if quality == "full" else {"PER_VERTEX": 1}
+    return {name: build(ctx, vertex, fragment, defines=lit | more) for name, more in PROGRAMS.items()}
 
 
 class AccessoryBuffers:
     """Accessories of a head on an OpenGL context.
 
-    program : of :func:`accessory_program`, whose lights and camera its owner sets.
+    programs : those of :func:`accessory_programs`, whose lights and camera its owner sets.
+    simplified : textures are not mixed between their sizes, for pictures drawn in software.
 
     Raises ViewError: a texture cannot be read, or is larger than the driver draws.
     """
 
-    def __init__(self, ctx: moderngl.Context, meshes: Sequence[WornMesh], program: moderngl.Program) -> None:
-        self._ctx, self._program = ctx, program
-        self._drawn = [_buffers(ctx, mesh, program) for mesh in meshes]
+    def __init__(
+        self, ctx: moderngl.Context, meshes: Sequence[WornMesh], programs: Mapping[str, moderngl.Program], *,
+        simplified: bool = False,
+    ) -> None:  # fmt: skip
+        self._ctx = ctx
+        self._drawn = [_buffers(ctx, mesh, programs[SOLID if _is_solid(mesh) else CLEAR]) for mesh in meshes]
+        if simplified:
+            for one in self._drawn:
+                one.texture.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
         self._matrix: Floats = np.eye(3)
 
     def outlines(self) -> list[tuple[np.ndarray, np.ndarray]]:
@@ -94,8 +105,8 @@ class AccessoryBuffers:
     def _draw(self, one: _Drawn, alpha: int, *, multisampled: bool) -> None:
         ctx, accessory = self._ctx, one.mesh.accessory
         covering = alpha == _MASK and multisampled
-        set_turn(self._program, Turn(self._matrix, one.mesh.pivot))
-        set_uniforms(self._program, {
+        set_turn(one.program, Turn(self._matrix, one.mesh.pivot))
+        set_uniforms(one.program, {
             "picture": _UNIT, "tint": accessory.colour, "cutoff": accessory.cutoff, "alpha": alpha,
             "multisampled": int(covering), "soft": _SOFT.get(accessory.kind, 0.0), "gloss": _GLOSS[accessory.kind],
         })  # fmt: skip
@@ -117,6 +128,10 @@ class AccessoryBuffers:
                 buffer.release()
 
 
+def _is_solid(mesh: WornMesh) -> bool:
+    return mesh.accessory.alpha == "OPAQUE"
+
+
 def _buffers(ctx: moderngl.Context, mesh: WornMesh, program: moderngl.Program) -> _Drawn:
     accessory = mesh.accessory
     rows = np.hstack(
@@ -126,7 +141,7 @@ def _buffers(ctx: moderngl.Context, mesh: WornMesh, program: moderngl.Program) -
     index = ctx.buffer(np.ascontiguousarray(accessory.triangles, np.int32).tobytes())
     content: Any = [(vertices, "3f 3f 2f 1f 1f", "position", "normal", "uv", "share", "shade")]
     array = ctx.vertex_array(program, content, index_buffer=index, index_element_size=4)
-    return _Drawn(mesh, array, _texture(ctx, accessory), (vertices, index))
+    return _Drawn(mesh, program, array, _texture(ctx, accessory), (vertices, index))
 
 
 def _texture(ctx: moderngl.Context, accessory: Accessory) -> moderngl.Texture:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from surface.view.draw import materials
-from surface.view.draw.accessories import PROGRAM, AccessoryBuffers, accessory_program
+from surface.view.draw.accessories import PROGRAMS, AccessoryBuffers, accessory_programs
 from surface.view.draw.evaluator import Evaluator, choose
 from surface.view.draw.programs import set_uniforms
 from surface.view.scene.bounds import Bands, Silhouette, corners
@@ -94,13 +94,20 @@ class Renderer:
         on_gpu = self.evaluator.name == "gpu"
         return PartBuffers(self.ctx, part, program, self._static[part.name], on_gpu=on_gpu)
 
-    def _accessory_buffers(self) -> AccessoryBuffers | None:
-        """The head's accessories; none of a mask or a robot, which show the face alone."""
+    def _accessory_buffers(self, *, simplified: bool = False) -> AccessoryBuffers | None:
+        """The head's accessories, ``simplified`` for live pictures drawn in software; none of a mask or a robot, which
+        show the face alone."""
         meshes = getattr(self.head, "accessories", ())
         if not meshes or not self.theme.use_painted:
             return None
-        self._programs[PROGRAM] = accessory_program(self.ctx, self.quality)
-        return AccessoryBuffers(self.ctx, meshes, self._programs[PROGRAM])
+        self._programs |= accessory_programs(self.ctx, "fast" if simplified else self.quality)
+        return AccessoryBuffers(self.ctx, meshes, self._programs, simplified=simplified)
+
+    def _release_accessories(self) -> None:
+        if self._accessories is not None:
+            self._accessories.release()
+            for name in PROGRAMS:
+                self._programs[name].release()
 
     def hurry(self) -> None:
         """Switch to decimated triangles and simpler shading, for live pictures drawn in software.
@@ -117,6 +124,8 @@ class Renderer:
             self._programs[name] = materials.worn_program(self.ctx, name, self.quality, simplified=True)
         for thing in (*self._parts, *old):
             thing.release()
+        self._release_accessories()
+        self._accessories = self._accessory_buffers(simplified=True)
         self._parts = self._decimated_parts() or [self._buffers(buffers.part) for buffers in self._parts]
         self._camera = None
         self._apply_theme()

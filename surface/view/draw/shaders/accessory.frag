@@ -2,7 +2,7 @@
 uniform sampler2D picture;
 uniform vec4 tint;              // by which the texture is multiplied
 uniform float cutoff;           // opacity below which nothing is drawn
-uniform int alpha;              // 0 solid, 1 with holes, 2 blended: what is nearly solid, 3 blended: the rest
+uniform int alpha;              // 1 with holes, 2 blended: what is nearly solid, 3 blended: the rest
 uniform bool multisampled;      // alpha then decides how many samples of a pixel are covered
 
 const float NEARLY = 0.85;
@@ -35,10 +35,11 @@ float kept(float opacity) {
 
 void main() {
     vec4 texel = texture(picture, v_uv);
+#ifdef SOLID
+    float cover = 1.0;  // nothing is discarded, so that depth is tested before pixels are shaded
+#else
     float cover = texel.a * tint.a;
-    if (alpha == 0) {
-        cover = 1.0;
-    } else if (alpha == 1) {
+    if (alpha == 1) {
         cover = kept(cover);
         cover = multisampled ? clamp((cover - cutoff) / max(fwidth(cover), 0.02) + 0.5, 0.0, 1.0) : step(cutoff, cover);
     } else if (alpha == 2) {
@@ -49,6 +50,7 @@ void main() {
     if (cover <= 0.004) {
         discard;
     }
+#endif
 #ifdef PER_VERTEX
     vec3 light = v_light;
     vec3 shines = v_shine;

@@ -19,8 +19,12 @@ out vec3 v_view;
 #endif
 
 void main() {
-    vec3 at = pivot + turned(position - pivot);
-    vec3 n = turned(normal);
+    vec3 at = position;
+    vec3 n = normal;
+    if (angle != 0.0) {
+        at = pivot + turned(position - pivot);
+        n = turned(normal);
+    }
     gl_Position = view_projection * vec4(at, 1.0);
     // Compared as if it stood nearer: a fitted scalp is a little off its mesh, and must not come through tight hair.
     vec3 away = vec3(view_projection[0][3], view_projection[1][3], view_projection[2][3]);
