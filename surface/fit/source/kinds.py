@@ -93,10 +93,14 @@ def worn_faces(mesh: FitMesh) -> Bools:
     """Which faces (f,) belong to hair, hats, glasses and jewellery that a head keeps as they are: no shapes move them.
     None do where nothing would be left."""
     worn = np.zeros(len(mesh.faces), bool)
-    for k, name in enumerate(mesh.pieces):
-        kind, own = kind_of(name), mesh.piece == k
-        least = HAIR_MOTION if kind.rule == "part" else FACE_MOTION
-        if kind.worn and own.any() and not _moves(mesh, own, least):
+    named = [k for k, name in enumerate(mesh.pieces) if kind_of(name).worn]
+    far = np.abs(mesh.deltas).max(axis=(0, 2), initial=0.0) if named else np.zeros(0)  # how far each vertex moves
+    for k in named:
+        own = mesh.piece == k
+        used = np.unique(mesh.faces[own])
+        least = HAIR_MOTION if kind_of(mesh.pieces[k]).rule == "part" else FACE_MOTION
+        moved = far[used[used >= 0]].max(initial=0.0)
+        if not moved or moved < least * far.max():
             worn |= own
     return worn if not worn.all() else np.zeros(len(mesh.faces), bool)
 
@@ -153,11 +157,11 @@ def piece_kinds(mesh: FitMesh, kept: Bools) -> dict[str, str]:
     return out
 
 
-def _moves(mesh: FitMesh, own: Bools, least: float = FACE_MOTION) -> bool:
-    """Whether shapes move some faces (f,) by so much of how far they move anything."""
+def _moves(mesh: FitMesh, own: Bools) -> bool:
+    """Whether shapes move some faces (f,) nearly as far as they move anything."""
     used = np.unique(mesh.faces[own])
     most = np.abs(mesh.deltas).max(initial=0.0)
-    return bool(most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= least * most)
+    return bool(most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= FACE_MOTION * most)
 
 
 @cache
