@@ -137,7 +137,15 @@ class KeptSums:
             for text in (assemble(("sum.glsl",), DEFINES) + _TEXEL + _SUM, assemble((), DEFINES) + _TEXEL + _DIFFERENCE)
         )
         finish = ctx.program(
-            vertex_shader=assemble(("turn.glsl",), DEFINES) + _KEPT, varyings=("out_position", "out_normal")
+            vertex_shader=assemble(
+                (
+                    "rotate.glsl",
+                    "turn.glsl",
+                ),
+                DEFINES,
+            )
+            + _KEPT,
+            varyings=("out_position", "out_normal"),
         )
         ctx.clear_errors()  # moderngl queries every program for features that OpenGL 3.1 does not have
         lines = self._textures[0].height

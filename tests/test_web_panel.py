@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 
@@ -27,8 +28,10 @@ from controller.stage.stage import load_stage
 from surface.export.glb_web import web_glb
 from surface.head import Head
 from surface.head.model.parameters import NAMES, SHAPES, read_pose
+from surface.head.posing.dressing import WornMesh
 from tests.browser import Page, find_chromium, page
 from tests.controller.links.net.sockets import wait_for
+from tests.surface.cards import card, picture
 from tests.surface.small_head import small_head
 
 CHROMIUM = find_chromium()
@@ -136,6 +139,23 @@ def test_nothing_is_cut_or_needs_scrolling_sideways(tmp_path: Path, width: int, 
             "[...document.querySelectorAll('#link-list :is(th, td)')].filter(each => each.clientHeight > 40).length"
         )
         assert broken == 0  # an address on two lines
+
+
+@needs_chromium
+def test_accessories_are_drawn_with_their_texture_and_blended_with_their_opacity(tmp_path: Path) -> None:
+    green, glass = card((-20.0, 0.0), (20.0, 20.0), z=80.0, kind="hair", texture=picture((20, 160, 20))), card(
+        (-20.0, -30.0), (20.0, -10.0), z=80.0, kind="glasses", texture=b"", colour=(0.0, 0.0, 1.0, 0.5), alpha="BLEND",
+    )  # fmt: skip
+    head = Head(small_head())
+    head.accessories = tuple(WornMesh(one, head.data.neck) for one in (green, glass))
+    with robot(tmp_path, head) as (_, _, where), page(CHROMIUM or "") as browser:
+        open_panel(browser, where, 1280, 720)
+        browser.screenshot(tmp_path / "seen.png")
+        assert browser.errors == []
+    with Image.open(tmp_path / "seen.png") as image:
+        red, green_light, blue = np.moveaxis(np.asarray(image.convert("RGB")).astype(int)[60:620, :700], 2, 0)
+    assert ((green_light > 80) & (np.maximum(red, blue) < 0.6 * green_light)).sum() > 500
+    assert ((blue > red + 30) & (blue > green_light + 20) & (red > 20)).sum() > 500  # some of what is behind it
 
 
 @needs_chromium

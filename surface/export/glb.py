@@ -13,7 +13,8 @@ from surface.export.frames import in_file, placement_of
 from surface.export.glb_document import METRES, Document
 from surface.export.glb_motion import add_motion
 from surface.export.glb_web import web_glb
-from surface.export.shapes import export_parts, is_posed
+from surface.export.shapes import ExportPart, export_parts, is_posed
+from surface.export.worn import accessory_parts
 from surface.head import Head
 from surface.head.model.parameters import ANGLES
 
@@ -21,7 +22,7 @@ from surface.head.model.parameters import ANGLES
 def write_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """See :func:`surface.export.export_head`."""
     _refuse_angles(pose)
-    _replace(path, Document(head, export_parts(head), pose).bytes())
+    _replace(path, Document(head, _parts(head), pose).bytes())
     return [path]
 
 
@@ -29,7 +30,7 @@ def write_glb_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list
     """Do the same as :func:`write_glb`, in axes, origin and unit of the file that the head was fitted to."""
     _refuse_angles(pose)
     placement = placement_of(head)
-    parts = in_file(export_parts(head), placement, 1.0 / float(METRES))
+    parts = in_file(_parts(head), placement, 1.0 / float(METRES))
     _replace(path, Document(head, parts, pose, {"frame": "file"}).bytes())
     return [path]
 
@@ -38,7 +39,7 @@ def write_animated_glb(head: Head, animation: Animation, path: Path, pose: Mappi
     """Do the same as :func:`write_glb`, with an animation: weights of shapes over time, and a joint that turns the
     head."""
     _refuse_angles(pose)
-    parts = export_parts(head)
+    parts = _parts(head)
     document = Document(head, parts, pose)
     add_motion(document, head, parts, animation)
     _replace(path, document.bytes())
@@ -51,6 +52,11 @@ def write_web_glb(head: Head, path: Path, pose: Mapping[str, float]) -> list[Pat
         raise ExportError("a file for the web is written at rest", hint="leave out --set and --expression, or --web")
     _replace(path, web_glb(head))
     return [path]
+
+
+def _parts(head: Head) -> list[ExportPart]:
+    """Return the parts of a head at rest and, behind them, its accessories."""
+    return export_parts(head) + accessory_parts(head)
 
 
 def _refuse_angles(pose: Mapping[str, float]) -> None:

@@ -13,10 +13,13 @@ from surface.base.arrays import Array, Floats32
 from surface.export.glb_buffers import ARRAY_BUFFER, ELEMENT_BUFFER, FLOAT, UINT, GlbBuffers
 from surface.export.shapes import ExportPart
 from surface.export.textures import eye_column, materials, png_bytes
+from surface.export.worn import material_of, sampler_of
 from surface.head import Head
+from surface.head.model.accessories import Accessory
 
 METRES = np.float32(0.001)
 NEAREST, REPEAT, CLAMP_TO_EDGE = 9729, 10497, 33071
+EYE_SAMPLER = {"magFilter": NEAREST, "minFilter": NEAREST, "wrapS": REPEAT, "wrapT": CLAMP_TO_EDGE}
 SPARSE = 0.5  # targets that move less than this share of a part's vertices are kept as sparse accessors
 
 
@@ -31,7 +34,9 @@ class Document(GlbBuffers):
         super().__init__()
         self._materials: dict[str, dict[str, Any]] = {}
         self._images: list[dict[str, Any]] = []
-        self._eyes: list[bytes] = []
+        self._textures: list[dict[str, Any]] = []
+        self._samplers: list[dict[str, int]] = []
+        self._pictures: dict[tuple[bytes, int], int] = {}
         amounts = head.own_amounts(head.values(pose)) if head.own_groups else ()
         self._pose = {**pose, **{group.name: float(x) for group, x in zip(head.own_groups, amounts, strict=True)}}
         meshes = [self._mesh(part) for part in parts]
@@ -46,14 +51,7 @@ class Document(GlbBuffers):
             "bufferViews": self.views,
         }  # fmt: skip
         if self._images:
-            sampler = {
-                "magFilter": NEAREST,
-                "minFilter": NEAREST,
-                "wrapS": REPEAT,
-                "wrapT": CLAMP_TO_EDGE,
-            }
-            textures = [{"source": k, "sampler": 0} for k in range(len(self._images))]
-            self.content |= {"images": self._images, "textures": textures, "samplers": [sampler]}
+            self.content |= {"images": self._images, "textures": self._textures, "samplers": self._samplers}
 
     def _mesh(self, part: ExportPart) -> dict[str, Any]:
         local = METRES * (part.vertices - part.pivot.astype(np.float32))
@@ -83,6 +81,8 @@ class Document(GlbBuffers):
         return mesh
 
     def _material(self, part: ExportPart) -> int:
+        if part.worn is not None:
+            return self._worn_material(part.worn)
         table = materials().get(part.material, materials()["skin"])
         painted = part.colours is not None
         name = f"{part.material}_painted" if painted else part.material
@@ -100,14 +100,30 @@ class Document(GlbBuffers):
             self._materials[name] = {"name": name, "pbrMetallicRoughness": surface, "doubleSided": two_sided}
         return list(self._materials).index(name)
 
+    def _worn_material(self, worn: Accessory) -> int:
+        """Return the index of an accessory's own material."""
+        material, key = material_of(worn), f"accessory {worn.name} {len(self._materials)}"
+        if worn.texture:
+            texture = self._texture(worn.texture, worn.mime, worn.kind, sampler_of(worn))
+            material["pbrMetallicRoughness"]["baseColorTexture"] = {"index": texture}
+        self._materials[key] = material
+        return len(self._materials) - 1
+
     def _eye_texture(self, picture: NDArray[np.uint8]) -> int:
-        """Return the index of a texture of eyes; the same picture is kept once."""
-        png = png_bytes(picture)
-        if png not in self._eyes:
-            self._eyes.append(png)
-            view = self.view(np.frombuffer(png, np.uint8))
-            self._images.append({"name": "eye", "mimeType": "image/png", "bufferView": view})
-        return self._eyes.index(png)
+        """Return the index of a texture of eyes."""
+        return self._texture(png_bytes(picture), "image/png", "eye", EYE_SAMPLER)
+
+    def _texture(self, picture: bytes, mime: str, name: str, sampler: dict[str, int]) -> int:
+        """Return the index of a texture; the same one is kept once."""
+        if sampler not in self._samplers:
+            self._samplers.append(sampler)
+        key = picture, self._samplers.index(sampler)
+        if key not in self._pictures:
+            self._pictures[key] = len(self._textures)
+            view = self.view(np.frombuffer(picture, np.uint8))
+            self._images.append({"name": name, "mimeType": mime, "bufferView": view})
+            self._textures.append({"source": len(self._images) - 1, "sampler": key[1]})
+        return self._pictures[key]
 
     def _target(self, rows: Floats32, *, bounds: bool = False) -> int:
         """Return an accessor of displacements, sparse where most of them are zero."""

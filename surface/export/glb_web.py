@@ -35,8 +35,10 @@ from surface.export.textures import (
     strand_picture,
     strip_picture,
 )
-from surface.export.web_parts import HALF, HALVES, WebPart, web_parts
+from surface.export.web_parts import HALF, HALVES, WebPart, web_parts, worn_web_parts
+from surface.export.worn import material_of, web_texture, wrap_of
 from surface.head import Head
+from surface.head.model.accessories import Accessory
 
 METRES = 0.001
 _FORMAT = 1
@@ -96,7 +98,7 @@ def lip_gaps(head: Head) -> dict[str, list[float]]:
 
 def web_glb(head: Head) -> bytes:
     """Return a head as a small .glb (glTF 2.0 with KHR_mesh_quantization), of which gzip takes away another half."""
-    return _WebDocument(head, web_parts(head)).bytes()
+    return _WebDocument(head, web_parts(head) + worn_web_parts(head)).bytes()
 
 
 class _WebDocument(GlbBuffers):
@@ -241,6 +243,8 @@ class _WebDocument(GlbBuffers):
 
     def _material(self, one: WebPart) -> int:
         """Return the index of a part's material; the same one is kept once."""
+        if one.part.worn is not None:
+            return self._worn_material(one.part.worn)
         kind, picture = one.part.material, _picture(one)
         key = kind, b"" if picture is None else png_bytes(picture)
         if key not in self._known:
@@ -252,13 +256,22 @@ class _WebDocument(GlbBuffers):
             self._materials.append({"name": kind, "pbrMetallicRoughness": surface, **_blending(kind, table)})
         return self._known[key]
 
-    def _texture(self, kind: str, png: bytes) -> int:
-        wrap = _REPEAT if kind in _HAIR else _CLAMP
+    def _worn_material(self, worn: Accessory) -> int:
+        """Return the index of an accessory's own material; its colour is that of its vertices."""
+        material, (picture, mime) = material_of(worn, (1.0, 1.0, 1.0, 1.0)), web_texture(worn)
+        if picture:
+            texture = self._texture(worn.kind, picture, mime, wrap_of(worn))
+            material["pbrMetallicRoughness"]["baseColorTexture"] = {"index": texture}
+        self._materials.append(material)
+        return len(self._materials) - 1
+
+    def _texture(self, kind: str, picture: bytes, mime: str = "image/png", wrap: int = 0) -> int:
+        wrap = wrap or (_REPEAT if kind in _HAIR else _CLAMP)
         sampler = {"magFilter": _LINEAR, "minFilter": _MIPMAPS, "wrapS": wrap, "wrapT": wrap}
         if sampler not in self._samplers:
             self._samplers.append(sampler)
-        view = self.view(np.frombuffer(png, np.uint8))
-        self._images.append({"name": kind, "mimeType": "image/png", "bufferView": view})
+        view = self.view(np.frombuffer(picture, np.uint8))
+        self._images.append({"name": kind, "mimeType": mime, "bufferView": view})
         self._textures.append({"source": len(self._images) - 1, "sampler": self._samplers.index(sampler)})
         return len(self._textures) - 1
 

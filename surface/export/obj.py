@@ -16,6 +16,7 @@ from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
 from surface.export.shapes import ExportPart, export_parts, is_posed
 from surface.export.textures import materials
+from surface.export.worn import accessory_parts
 from surface.head import Head
 
 _OWN = ", written by omote;"
@@ -26,15 +27,20 @@ _TITLE_BYTES = 1000
 def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """See :func:`surface.export.export_head`."""
     title = f"# {head.name}{_OWN} millimetres, y up, z forward"
-    return _write_parts(export_parts(head, pose, shapes=not is_posed(head, pose)), path, title)
+    return _write_parts(_parts(head, pose), path, title)
 
 
 def write_obj_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """Do the same as :func:`write_obj`, but in the axes, origin and unit of the file that the head was fitted to."""
     placement = placement_of(head)
     title = f"# {head.name}{_OWN} in the frame of its source"
-    parts = export_parts(head, pose, shapes=not is_posed(head, pose))
+    parts = _parts(head, pose)
     return _write_parts(in_file(parts, placement), path, title)
+
+
+def _parts(head: Head, pose: Mapping[str, float]) -> list[ExportPart]:
+    """Return the parts of a head in a pose and, behind them, its accessories."""
+    return export_parts(head, pose, shapes=not is_posed(head, pose)) + accessory_parts(head, pose)
 
 
 def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:

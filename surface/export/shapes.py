@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.head import Head
+from surface.head.model.accessories import Accessory
 from surface.head.model.parameters import SHAPES, TONGUE_JAW
 
 MIN_MOVE_MM = 0.002  # smaller displacements are zero
@@ -29,6 +30,7 @@ class ExportPart:
     colours : (m, 3) float32 linear RGB, or None for a part that is not painted.
     painted : what is painted all over an eyeball, by name: "iris" and "sclera", linear RGB, and "iris_radius".
     displacements, normal_changes : by shape, (m, 3) float32: what it adds to vertices and normals.
+    worn : the accessory that this is; None for a part of the head.
     """
 
     name: str
@@ -42,6 +44,7 @@ class ExportPart:
     displacements: dict[str, Floats32] = field(default_factory=dict)
     normal_changes: dict[str, Floats32] = field(default_factory=dict)
     painted: dict[str, Floats32] = field(default_factory=dict)
+    worn: Accessory | None = None
 
 
 def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes: bool = True) -> list[ExportPart]:

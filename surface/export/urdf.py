@@ -23,6 +23,7 @@ from surface.base.writing import replacing
 from surface.export.exporter import Exporter
 from surface.export.shapes import ExportPart, export_parts, unit
 from surface.export.textures import eye_rings, materials
+from surface.export.worn import accessory_parts
 from surface.head import Head
 from surface.head.model.joints import BASE, JAW, ROS_AXES, SKULL, Joint, JointLimit, joints_of
 from surface.head.posing.part import HeadPart
@@ -98,7 +99,18 @@ def _pieces(head: Head, pose: Mapping[str, float]) -> list[Piece]:
         for number in np.unique(of_triangle).tolist():
             found += _split_by_colour(links[number], part, part.triangles[of_triangle == number])
     head.pose(head.values({}))
-    return found
+    return found + _worn(head)
+
+
+def _worn(head: Head) -> list[Piece]:
+    """Return a piece of each accessory, which the skull carries, in the colour of its kind."""
+    colours = {name: np.asarray(table["colour"], float) for name, table in materials().items() if "colour" in table}
+    return [
+        Piece(
+            SKULL, f"{part.material}_{k}", part, part.triangles.astype(np.int64), part.material, colours[part.material]
+        )
+        for k, part in enumerate(accessory_parts(head), 1)
+    ]
 
 
 def _split_by_colour(link: str, part: ExportPart, triangles: Ints) -> list[Piece]:

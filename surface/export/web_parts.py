@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.export.shapes import ExportPart, export_parts, unit
 from surface.export.textures import EYE_RIM, materials
+from surface.export.worn import accessory_parts
 from surface.head import Head
 from surface.head.posing.part import HeadPart
 
@@ -55,6 +56,15 @@ def web_parts(head: Head, level: str = "full") -> list[WebPart]:
         kept, small = _reduce(part, part.triangles if triangles is None else triangles)
         found.append(_add_material_data(small, own, kept, front))
     return found
+
+
+def worn_web_parts(head: Head) -> list[WebPart]:
+    """Return the accessories of a head, with their own colour and shade at every vertex."""
+    return [
+        WebPart(part, _rgba(worn.shade[:, None] * np.array(worn.colour[:3]), worn.colour[3], len(worn.shade)), worn.uv)
+        for part in accessory_parts(head)
+        if (worn := part.worn) is not None
+    ]
 
 
 def _add_half(head: Head, name: str, parts: list[ExportPart]) -> None:

@@ -15,6 +15,7 @@ from surface.check.overlaps import overlap_notes
 from surface.fit.eyes.colours import paint_layers
 from surface.fit.eyes.drawn_lids import seat_drawn_lids
 from surface.fit.eyes.lids import fit_lids, gazes_of
+from surface.fit.features.accessories import make_accessories
 from surface.fit.features.blink_squints import cancel_squints_in_blinks
 from surface.fit.features.combs import combed
 from surface.fit.features.cutouts import cut_out
@@ -94,7 +95,7 @@ def fit_head(
     result = fit_mesh(loaded, name, report, str(mesh_path))
     if report_dir is not None:
         write_report(result, report_dir, report)
-    save_or_refuse(out_dir, result.head, result.report.faults, result.errors, force=force)
+    save_or_refuse(out_dir, result.head, result.report.faults, result.errors, result.accessories, force=force)
     return result.report
 
 
@@ -132,7 +133,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     """Fit all parts of a mesh in memory; ``where`` names it in messages."""
     planned = _planned(loaded, where)
     loaded, recipe, mesh, plan = planned.loaded, planned.recipe, planned.mesh, planned.plan
-    sources = sources_of(mesh.names)
+    worn, sources = make_accessories(loaded), sources_of(mesh.names)
     rig = HeadRig(sources, find_jaw(mesh, sources, plan.jaw, plan.hinge), *plan.eyes, np.array(recipe.tongue))
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress, comb=not loaded.exported)
     charts = {p.name: p.chart for p in fitted_parts}
@@ -154,19 +155,21 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
-    notes = [*loaded.notes, *plan.notes, *turned_faces(mesh), *mended, *findings(head, loaded.marks, _kinds(loaded))]
+    notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), *mended]
+    notes += findings(head, loaded.marks, _kinds(loaded), {one.kind for one in worn.accessories})
     notes += overlap_notes(head)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
-        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets, loaded.pieces, dense,
-        tuple(faults_of(dense, fitted_parts, scale)),
+        loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets,
+        {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)),
     )  # fmt: skip
-    return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts))
+    return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts), worn.accessories)
 
 
 def _kinds(loaded: Loaded) -> set[str]:
-    """Of the mesh's pieces, those that were left out, too."""
-    return {kind.split(",")[0] for kind in loaded.pieces.values()}
+    """Of the mesh's pieces, those that were left out, too, but not those that are worn as they are."""
+    worn = loaded.worn.pieces if loaded.worn is not None else ()
+    return {kind.split(",")[0] for name, kind in loaded.pieces.items() if name not in worn}
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ class Material:
     texture : a whole PNG, JPEG or WebP file of sRGB colours; None without one. mime : its kind, for example
         ``image/png``; "" where the file does not say.
     alpha : ``OPAQUE``, ``MASK`` (nothing below ``cutoff`` is drawn) or ``BLEND``.
+    two_sided : whether backs of faces are drawn, too; so they are where the file does not say.
     image_of_uv : (2, 3) from (u, v, 1) of the mesh, v up, to x to the right and y down in pictures of size 1; pictures
         repeat beyond that. See :meth:`in_picture`.
     """
@@ -37,6 +38,7 @@ class Material:
     alpha: str = "OPAQUE"
     cutoff: float = 0.5
     image_of_uv: tuple[tuple[float, float, float], tuple[float, float, float]] = ((1.0, 0.0, 0.0), (0.0, -1.0, 1.0))
+    two_sided: bool = True
 
     def in_picture(self, uv: Floats) -> Floats:
         """Return places (t, 2) of texture coordinates (t, 2) in the texture: 0..1 to the right, 0..1 down."""

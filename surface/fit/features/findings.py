@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 import numpy as np
 
@@ -28,20 +28,23 @@ NO_LIDS = (
 )
 
 
-def findings(head: HeadData, marks: Landmarks, kinds: Collection[str] = ()) -> list[str]:
+def findings(
+    head: HeadData, marks: Landmarks, kinds: Collection[str] = (), worn: Collection[str] = ()
+) -> list[str]:  # fmt: skip
     """Lines on the unit, the axes and the place of a fitted head, and on the features it has and has not.
 
-    kinds : of the pieces that the mesh has, those that were left out, too.
+    kinds : of the pieces that the mesh has, those that were left out, too. worn : of those that are kept as they are.
     """
     lines = [] if head.placement is None else [_placed(head.placement)]
-    there, absent = _features(head)
+    words = INSIDE | ({"brow": "brows"} if "hair" in worn else {})
+    there, absent = _features(head, words)
     lines += [f"found: {', '.join(there)}"] if there else []
     lines += [NO_PLACE] if marks.eyes is None and head.eye_radius <= 0 else []
     lines += [NO_EYES] if head.eye_radius <= 0 else []
     open_eyes = [name for name in CLOSING if name not in _groups(head)]
     lines += [NO_LIDS.format(" or ".join(open_eyes))] if open_eyes else []
-    left_out = [INSIDE[material] for material in absent if not set(KINDS[material]).isdisjoint(kinds)]
-    absent_words = [word for word in map(INSIDE.__getitem__, absent) if word not in left_out]
+    left_out = [words[material] for material in absent if not set(KINDS[material]).isdisjoint(kinds)]
+    absent_words = [word for word in map(words.__getitem__, absent) if word not in left_out]
     lines += [f"in the mesh, but left out and not drawn: {', '.join(left_out)}"] if left_out else []
     lines += [f"not in the mesh, and not drawn: {', '.join(absent_words)}"] if absent_words else []
     return lines
@@ -58,8 +61,8 @@ def _placed(placement: Placement) -> str:
     return f"placed: the file's unit is {unit}, {axes}; {moved}"
 
 
-def _features(head: HeadData) -> tuple[list[str], list[str]]:
-    """What the head has, in words, and the materials of usual parts that it has not."""
+def _features(head: HeadData, words: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """What the head has, in words, and the materials of usual parts that it has not; ``words`` of these materials."""
     materials = {p.material for p in head.parts}
     there = []
     if head.eye_radius > 0:
@@ -69,8 +72,8 @@ def _features(head: HeadData) -> tuple[list[str], list[str]]:
         there.append("lids that close")
     if "jawOpen" in _groups(head):
         there.append("a jaw that opens")
-    there += [word for material, word in INSIDE.items() if material in materials]
-    return there, [material for material in INSIDE if material not in materials]
+    there += [word for material, word in words.items() if material in materials]
+    return there, [material for material in words if material not in materials]
 
 
 def _groups(head: HeadData) -> set[str]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
 from surface.head import Head
+from surface.head.model.accessories import Accessory, write_accessories
 from surface.head.model.data import HeadData
 from surface.head.model.file import save_data
 from surface.head.posing.fit_error import drop_fit_error, write_fit_error
@@ -23,12 +24,13 @@ def refused_folder(out_dir: str | Path) -> Path:
 
 
 def save_or_refuse(
-    out_dir: str | Path, head: HeadData, faults: Sequence[str], errors: Mapping[str, Floats], *, force: bool = False,
-    hint: str = HINT,
+    out_dir: str | Path, head: HeadData, faults: Sequence[str], errors: Mapping[str, Floats],
+    accessories: Sequence[Accessory] = (), *, force: bool = False, hint: str = HINT,
 ) -> None:  # fmt: skip
     """Write a head to ``out_dir``; one with faults to the folder :func:`refused_folder` instead, unless forced.
 
-    errors : by part, (m,) mm from each vertex at rest to the mesh, NaN where there is none; kept beside the head.
+    errors : by part, (m,) mm from each vertex at rest to the mesh, NaN where there is none; kept beside the head, as
+    ``accessories`` are.
     hint : what to do about faults, in words.
 
     Raises FitError: the head has faults; what is in ``out_dir`` stays as it was. HeadFileError: a folder cannot be
@@ -39,6 +41,7 @@ def save_or_refuse(
     drop_fit_error(folder)  # of the head that was there
     save_data(folder, head)
     write_fit_error(folder, errors, Head(head).parts)
+    write_accessories(folder, accessories)
     if refused:
         what = f"the head is refused: {'; '.join(faults)}; it was written to {folder} instead"
         look = f"look at it (omote render --head {folder} -o out.png), {hint}"

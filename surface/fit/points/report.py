@@ -11,6 +11,7 @@ import numpy as np
 from surface.base.arrays import Bools, Floats
 from surface.fit.points.refine import Fitted
 from surface.fit.source.chart import Chart
+from surface.head.model.accessories import Accessory
 from surface.head.model.data import HeadData
 
 MOST_NAMES = 4  # of one kind that a line names
@@ -200,12 +201,14 @@ class FitResult:
     """A fitted head: its data, the report, and the charts it was fitted in.
 
     errors : by part, (m,) mm from each vertex at rest to the mesh; NaN where it has none.
+    accessories : meshes that it wears as they are.
     """
 
     head: HeadData
     report: FitReport
     parts: list[FittedPart]
     errors: dict[str, Floats] = field(default_factory=dict)
+    accessories: tuple[Accessory, ...] = ()
 
 
 def face_bounds(report: FitReport) -> str:

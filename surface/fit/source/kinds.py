@@ -31,6 +31,7 @@ SHORT_ENDINGS = (
 SKIN, PROP = "skin", "prop"
 MAX_NAMES = 4  # of pieces of one kind that a note lists
 FACE_MOTION = 0.5  # of the largest motion: a piece that shapes move this far belongs to the face, whatever its name
+HAIR_MOTION = 0.05  # of the largest motion: hair that shapes move this far is fitted, so that it moves
 
 
 @dataclass(frozen=True)
@@ -39,17 +40,22 @@ class Kind:
 
     name : "skin", "iris", "hair" and so on. rule : "skin", "part", "eye" or "out", as the table explains.
     material : by which a head draws it; "skin" for what is drawn as no part of its own.
+    worn : whether a head keeps it as it is, unless shapes move it.
     """
 
     name: str
     rule: str
     material: str
+    worn: bool = False
 
 
 @cache
 def kinds() -> dict[str, Kind]:
     """All kinds by name."""
-    return {name: Kind(name, row["rule"], row.get("material", SKIN)) for name, row in _table().items()}
+    return {
+        name: Kind(name, row["rule"], row.get("material", SKIN), row.get("worn", False))
+        for name, row in _table().items()
+    }
 
 
 def kind_of(name: str) -> Kind:
@@ -83,15 +89,33 @@ def is_known(name: str) -> bool:
     return any(_said(part) is not None for part in name.split("/"))
 
 
-def without_clothes(mesh: FitMesh) -> tuple[Bools, list[str]]:
+def worn_faces(mesh: FitMesh) -> Bools:
+    """Which faces (f,) belong to hair, hats, glasses and jewellery that a head keeps as they are: no shapes move them.
+    None do where nothing would be left."""
+    worn = np.zeros(len(mesh.faces), bool)
+    named = [k for k, name in enumerate(mesh.pieces) if kind_of(name).worn]
+    far = np.abs(mesh.deltas).max(axis=(0, 2), initial=0.0) if named else np.zeros(0)  # how far each vertex moves
+    for k in named:
+        own = mesh.piece == k
+        used = np.unique(mesh.faces[own])
+        least = HAIR_MOTION if kind_of(mesh.pieces[k]).rule == "part" else FACE_MOTION
+        moved = far[used[used >= 0]].max(initial=0.0)
+        if not moved or moved < least * far.max():
+            worn |= own
+    return worn if not worn.all() else np.zeros(len(mesh.faces), bool)
+
+
+def without_clothes(mesh: FitMesh, worn: Bools | None = None) -> tuple[Bools, list[str]]:
     """Which faces (f,) belong to the person and not to clothes, hats or glasses; and notes on what was left out.
 
-    Names do not count where shapes move the piece as they move the face, or where nothing would be left.
+    Names do not count where shapes move the piece as they move the face, or where nothing would be left. Faces that are
+    ``worn`` (f,) are not the person's either, and are kept elsewhere: no note says that they are left out.
     """
-    kept, notes = np.ones(len(mesh.faces), bool), []
+    apart = np.zeros(len(mesh.faces), bool) if worn is None else worn
+    kept, notes = ~apart, []
     out: dict[str, list[str]] = {}
     for k, name in enumerate(mesh.pieces):
-        kind, own = kind_of(name), mesh.piece == k
+        kind, own = kind_of(name), (mesh.piece == k) & ~apart
         if kind.rule != "out" or not own.any():
             continue
         if _moves(mesh, own):
@@ -100,7 +124,7 @@ def without_clothes(mesh: FitMesh) -> tuple[Bools, list[str]]:
             kept &= ~own
             out.setdefault(kind.name, []).append(name)
     if not kept.any():
-        return np.ones(len(mesh.faces), bool), []
+        return ~apart, []
     return kept, notes + [f"{kind} left out: {listed(names)}" for kind, names in out.items()]
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats
 from surface.base.errors import FitError
-from surface.fit.source.kinds import piece_kinds, without_clothes
+from surface.fit.source.kinds import piece_kinds, without_clothes, worn_faces
 from surface.fit.source.mesh import FitMesh, bare_where_damaged, check_mesh, renumbered
 from surface.fit.source.names import NameMap, map_names, read_names
 from surface.fit.source.naming.expressions import with_expressions
@@ -54,6 +54,7 @@ class Loaded:
 
     placement : from the file's coordinates; marks : landmarks in head space.
     pieces : the file's objects and what kind each is. exported : omote wrote the file, with outlines as they are drawn.
+    worn : hair, glasses and the like that a head keeps as they are, in the file's coordinates; None without any.
     """
 
     mesh: FitMesh
@@ -63,6 +64,7 @@ class Loaded:
     marks: Landmarks = field(default_factory=Landmarks)
     pieces: dict[str, str] = field(default_factory=dict)
     exported: bool = False
+    worn: FitMesh | None = None
 
 
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
@@ -73,10 +75,12 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     """
     path = Path(path)
     raw = _read(path, options.shapes)
-    mesh = FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)} | {"materials": tinted(raw)})
+    mesh = fit_mesh_of(raw)
     if options.without:
         mesh = keep_faces(mesh, wanted_faces(mesh, options.without, str(path)))
-    kept, notes = without_clothes(mesh)
+    aside = worn_faces(mesh)
+    kept, notes = without_clothes(mesh, aside)
+    worn = worn_mesh(mesh, aside, str(path)) if aside.any() else None
     pieces = piece_kinds(mesh, kept)
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
     mesh = bare_where_damaged(mesh)
@@ -89,7 +93,19 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     )  # fmt: skip
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
     every = (*frame.notes, *notes, *name_notes(mesh.names, named, other))
-    return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces, is_export(path))
+    return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces, is_export(path), worn)
+
+
+def fit_mesh_of(raw: MeshData) -> FitMesh:
+    """The mesh of a file, with colours of its vertices in its materials."""
+    return FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)} | {"materials": tinted(raw)})
+
+
+def worn_mesh(mesh: FitMesh, faces: Bools, where: str) -> FitMesh:
+    """What is kept as it is of a mesh, faces (f,), without shapes. Raises FitError: it is damaged."""
+    worn = bare_where_damaged(keep_faces(replace(mesh, names=(), deltas=mesh.deltas[:0]), faces))
+    check_mesh(worn, f"{where}: hair, glasses and what else is worn")
+    return worn
 
 
 def _shapes(mesh: FitMesh, named: NameMap) -> dict[str, Floats]:

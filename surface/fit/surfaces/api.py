@@ -25,6 +25,7 @@ from surface.fit.transfer.api import transfer
 from surface.fit.transfer.reports.landmarkfile import read_landmarks
 from surface.fit.transfer.scan import make_scan
 from surface.head import Head
+from surface.head.model.accessories import write_accessories
 from surface.head.model.data import HeadData, Jaw, Seam
 from surface.head.model.file import check_writable, save_data
 from surface.head.model.parameters import SHAPES
@@ -77,7 +78,8 @@ def fit_surfaces(
     head, report = _make(pieces, name, options, progress, str(path), notes)
     if report_dir is not None:
         write_report(report, report_dir)
-    drop_fit_error(out_dir)  # of a mesh that the head before was fitted to
+    drop_fit_error(out_dir)  # of a mesh that the head before was fitted to, as its accessories were
+    write_accessories(out_dir, ())
     save_data(out_dir, head)
     return report
 

@@ -12,10 +12,12 @@ from surface.base.errors import FitError
 from surface.base.progress import Progress, no_progress
 from surface.check.overlaps import overlap_notes
 from surface.fit.eyes.drawn_lids import seat_drawn_lids
+from surface.fit.features.accessories import Kept, keep_accessories
 from surface.fit.measures.refusal import save_or_refuse
 from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
-from surface.fit.source.placing.frame import AXES, UNITS
+from surface.fit.source.placing.frame import AXES, EYES_MM, UNITS
+from surface.fit.source.placing.place import HeadSize
 from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.colours import with_colours
 from surface.fit.transfer.faults import HINT, faults_of_transfer
@@ -39,6 +41,7 @@ from surface.fit.transfer.symmetry import levelled, mirror_plane, symmetrised
 from surface.fit.transfer.template import Template, make_template
 from surface.fit.transfer.warp_head import warp_head
 from surface.head import Head, HeadData
+from surface.head.model.accessories import Accessory
 from surface.head.model.file import check_writable
 from surface.head.model.placement import Placement
 
@@ -57,12 +60,14 @@ class Transferred:
     frame in which the scan was registered.
 
     errors : by part, (m,) mm from each vertex of the skin at rest to the scan; NaN where the scan has nothing there.
+    accessories : meshes that it wears as they are.
     """
 
     head: HeadData
     report: TransferReport
     found: Similarity
     errors: dict[str, Floats] = field(default_factory=dict)
+    accessories: tuple[Accessory, ...] = ()
 
 
 def transfer_head(
@@ -91,7 +96,8 @@ def transfer_head(
     made = transfer(scan, Head.load(source), name, picked, options, progress or no_progress, str(mesh_path))
     if report_dir is not None:
         write_transfer_report(made.report, scan, made.head, made.found, report_dir)
-    save_or_refuse(out_dir, made.head, made.report.fit.faults, made.errors, force=force, hint=HINT)
+    faults = made.report.fit.faults
+    save_or_refuse(out_dir, made.head, faults, made.errors, made.accessories, force=force, hint=HINT)
     return made.report
 
 
@@ -130,13 +136,21 @@ def transfer(
     middle = data.eyes.mean(axis=0)
     errors = {part: factor * mm for part, mm in skin_errors(face, scan).items()}
     data = replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, options.unit or ""))
+    worn = _worn(scan, data)
+    notes += worn.notes
     moving = [n for n in head.parameters if any(g.name == n for p in data.parts for g in p.groups)]
     notes += overlap_notes(data)
     gaps = measure_gaps(data)
     notes += [str(gap) for gap in gaps]
     fit = FitReport(name, parts, moving, notes=notes, scale=1.0, faults=faults)
     report = TransferReport(fit, head.name, *registered, landmarks, openings, changed, gaps)
-    return Transferred(data, report, found, errors)
+    return Transferred(data, report, found, errors, worn.accessories)
+
+
+def _worn(scan: Scan, head: HeadData) -> Kept:
+    """What the scan wears, where the head is now."""
+    apart = float(np.linalg.norm(head.eyes[0] - head.eyes[1])) / EYES_MM
+    return keep_accessories(scan.worn, head.placement or Placement(), head.eyes.mean(axis=0), HeadSize(apart, apart))
 
 
 def find_face(

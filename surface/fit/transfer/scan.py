@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.base.extras import require
-from surface.fit.source.kinds import skin_and_eyes
-from surface.fit.source.load import wanted_faces
-from surface.fit.source.mesh import LARGE, SMALL, directed_edges, triangles
+from surface.fit.source.kinds import skin_and_eyes, worn_faces
+from surface.fit.source.load import fit_mesh_of, wanted_faces, worn_mesh
+from surface.fit.source.mesh import LARGE, SMALL, FitMesh, directed_edges, triangles
 from surface.fit.source.textures import Samples as Colours
 from surface.fit.transfer.colours import moved, scan_colours
 from surface.readers.gltf.mesh import read_gltf
@@ -37,6 +37,7 @@ class Scan:
 
     vertices : (n, 3). triangles : (t, 3). original : (m,) int64, for each vertex of the file its row in ``vertices``.
     colours : samples of its colours; None where it has none. notes : messages on what was left out of the file.
+    worn : hair, hats and glasses that a head keeps as they are, in the file's coordinates; None without any.
     """
 
     vertices: Floats
@@ -44,6 +45,7 @@ class Scan:
     original: Ints
     colours: Colours | None = None
     notes: tuple[str, ...] = ()
+    worn: FitMesh | None = None
 
     def turned(self, turn: Floats, scale: float, shift: Floats) -> Scan:
         """The scan with every vertex p moved to scale * turn @ p + shift."""
@@ -75,9 +77,15 @@ def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
     kind = path.suffix.lower()
     if kind in OWN:
         raw = OWN[kind](path)
-        kept, notes = skin_and_eyes(raw, wanted_faces(raw, without, str(path)))
+        wanted = wanted_faces(raw, without, str(path))
+        still = fit_mesh_of(replace(raw, names=(), deltas=raw.deltas[:0]))
+        aside = worn_faces(still) & wanted
+        if not (wanted & ~aside).any():
+            aside[:] = False
+        kept, notes = skin_and_eyes(raw, wanted & ~aside)
         scan = make_scan(raw.vertices, triangles(raw.faces[kept]), str(path))
-        return replace(scan, colours=scan_colours(raw, kept), notes=tuple(notes))
+        worn = worn_mesh(still, aside, str(path)) if aside.any() else None
+        return replace(scan, colours=scan_colours(raw, kept), notes=tuple(notes), worn=worn)
     if kind not in OTHERS:
         raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
                        hint=f"export it as {', '.join([*OWN, *OTHERS])}")  # fmt: skip

@@ -58,6 +58,7 @@ class Crowd:
         self.parts = tuple(_make_part(part, count) for part in head.parts)
         at = {id(part): i for i, part in enumerate(head.parts)}
         self._stitches = [(stitch, at[id(stitch.first)], at[id(stitch.second)]) for stitch in head.stitches]
+        self._turns: list[Turn] = [Turn(np.eye(3), head.data.neck.pivot)] * count
         self._values = np.tile(neutral, (count, 1))
         self.values = self._values.view()
         self.values.flags.writeable = False
@@ -100,7 +101,7 @@ class Crowd:
     def show(self, k: int) -> None:
         """Give the template head the vertices and normals of head k, until it is posed again."""
         for crowd in self.parts:
-            crowd.part.show(crowd.vertices[k], crowd.normals[k])
+            crowd.part.show(crowd.vertices[k], crowd.normals[k], self._turns[k])
 
     def _place(self, k: int, pose: Pose, moved: Mapping[str, Floats]) -> Callable[[], None]:
         """Place the control points of head k; return a function to call once its vertices are computed.
@@ -118,6 +119,7 @@ class Crowd:
 
     def _finish(self, k: int, turn: Turn) -> None:
         """Rotate the deforming parts of head k with the head, and close its seams."""
+        self._turns[k] = turn
         for crowd in self.parts:
             if crowd.batch is not None:
                 source = _UnrotatedPart(crowd.batch.vertices[k], crowd.batch.normals[k])

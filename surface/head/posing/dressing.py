@@ -1,4 +1,5 @@
-"""What is worn, on the parts of a head: colours and strands of its own parts, and what it does to the skin below."""
+"""What is worn, on the parts of a head: colours and strands of its own parts, and what it does to the skin below; and
+accessories, which turn with the head."""
 
 from __future__ import annotations
 
@@ -9,9 +10,11 @@ from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Floats32
 from surface.base.errors import HeadFileError
+from surface.head.model.accessories import Accessory
+from surface.head.model.data import Neck
 from surface.head.model.look import Worn
 from surface.head.model.wardrobe import HINT, Garment, WornPart
-from surface.head.posing.part import HeadPart
+from surface.head.posing.part import HeadPart, Turn
 
 COVERED = 0.5  # of the picture of hidden skin: more is not drawn
 SCALP = 0.6  # of hair's colour on the skin between its roots, where little light reaches
@@ -98,3 +101,26 @@ def sample_picture(garment: Garment, kind: str, part: HeadPart) -> Floats32 | No
     (i, j), (s, t) = low.T, (at - low).T
     rows = picture[i, j] * (1 - t) + picture[i, j + 1] * t, picture[i + 1, j] * (1 - t) + picture[i + 1, j + 1] * t
     return np.asarray(rows[0] * (1 - s) + rows[1] * s, np.float32)[:, None]
+
+
+class WornMesh:
+    """An accessory of a head: it turns with the head, and what hangs over the neck by the neck's share.
+
+    accessory : at rest. share : (m,) float32, of the head's rotation that each vertex takes, 0..1. pivot : (3,) mm.
+    """
+
+    def __init__(self, accessory: Accessory, neck: Neck) -> None:
+        self.accessory, self.pivot = accessory, neck.pivot
+        self.share = neck.share(accessory.vertices.astype(np.float64)).astype(np.float32)
+        self._last: tuple[bytes, Floats32, Floats32] = b"", accessory.vertices, accessory.normals
+
+    def turned(self, matrix: Floats) -> tuple[Floats32, Floats32]:
+        """Return vertices and normals (m, 3) with the head turned by ``matrix`` (3, 3); read-only."""
+        turn = Turn(np.asarray(matrix, np.float64), self.pivot)
+        if turn.none:
+            return self.accessory.vertices, self.accessory.normals
+        if turn.key != self._last[0]:
+            vertices, normals = np.empty_like(self.accessory.vertices), np.empty_like(self.accessory.normals)
+            turn.rotate(self.accessory, self.share, (0, len(self.share)), vertices, normals)
+            self._last = turn.key, vertices, normals
+        return self._last[1:]

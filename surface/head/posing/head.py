@@ -10,6 +10,7 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.base.errors import HeadFileError
+from surface.head.model.accessories import read_accessories
 from surface.head.model.data import Contact, Group, HeadData, PartData
 from surface.head.model.file import load_data
 from surface.head.model.identity import load_identities, with_identities
@@ -23,7 +24,7 @@ from surface.head.model.sidecar import DAMAGED, reason
 from surface.head.model.sway import Sway
 from surface.head.model.wardrobe import read_garment, with_garments
 from surface.head.posing.appearance import apply_look
-from surface.head.posing.dressing import dress
+from surface.head.posing.dressing import WornMesh, dress
 from surface.head.posing.finer import apply_baked, coarser_of
 from surface.head.posing.paint import paint_part
 from surface.head.posing.part import HeadPart, RigidPart, SkinPart, Turn
@@ -40,6 +41,7 @@ class Head:
     data : everything a head file holds; where : its path, for messages.
     sway : of its hair; a program that draws a moving picture gives it the time.
     own_groups : what :meth:`add_groups` added.
+    accessories : meshes that it wears as they are, such as glasses; no parts, because no control points move them.
     """
 
     parameters: tuple[str, ...] = NAMES
@@ -56,6 +58,7 @@ class Head:
         self._own, self.own_groups = OwnAmounts(()), tuple[OwnGroup, ...]()
         self._at = {name: i for i, name in enumerate(self.parameters)}
         self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
+        self.accessories: tuple[WornMesh, ...] = ()
 
     @property
     def contacts(self) -> Sequence[Contact]:
@@ -93,8 +96,10 @@ class Head:
         refined: Mapping[str, Refined] = {}
         if light:
             data, refined = with_light(data, light, partial(coarser_of, path))
+        accessories = read_accessories(path)
         try:
             head = cls(data, str(path))
+            head.accessories = tuple(WornMesh(one, data.neck) for one in accessories)
             apply_baked(path, head.parts, refined)
             if look is not None:
                 apply_look(head.parts, look, data.eyes)

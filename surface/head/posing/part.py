@@ -24,8 +24,10 @@ from surface.mesh.mesh import Mesh, border_edges
 class Posed(Protocol):
     """Vertices and normals (m, 3) float32 before the head turns, as a deformation has them."""
 
-    vertices: Any
-    normals: Any
+    @property
+    def vertices(self) -> Any: ...
+    @property
+    def normals(self) -> Any: ...
 
 
 class Turn:
@@ -119,9 +121,10 @@ class HeadPart:
         """Report every vertex as changed: a seam has written into the part."""
         self.changed = [(0, len(self.vertices))]
 
-    def show(self, vertices: Floats32, normals: Floats32) -> None:
-        """Take vertices and normals (m, 3) that were posed elsewhere, until the next :meth:`pose`."""
-        self.vertices[:], self.normals[:] = vertices, normals
+    def show(self, vertices: Floats32, normals: Floats32, turn: Turn | None = None) -> None:
+        """Take vertices and normals (m, 3) that were posed elsewhere, and the head's rotation there, until the next
+        :meth:`pose`."""
+        self.vertices[:], self.normals[:], self._turn = vertices, normals, turn or self._turn
         self.touch()
 
 
@@ -141,8 +144,8 @@ class SkinPart(HeadPart):
         self._share[:] = head.neck.share(self.vertices.astype(np.float64))
         self._shown = False  # are the vertices from elsewhere?
 
-    def show(self, vertices: Floats32, normals: Floats32) -> None:
-        super().show(vertices, normals)
+    def show(self, vertices: Floats32, normals: Floats32, turn: Turn | None = None) -> None:
+        super().show(vertices, normals, turn)
         self._shown = True
 
     def pose(self, pose: Pose, turn: Turn) -> None:
@@ -207,8 +210,8 @@ class RigidPart(HeadPart):
         self._motion = np.eye(3), np.zeros(3)
         self._last_key: tuple[object, ...] = ()
 
-    def show(self, vertices: Floats32, normals: Floats32) -> None:
-        super().show(vertices, normals)
+    def show(self, vertices: Floats32, normals: Floats32, turn: Turn | None = None) -> None:
+        super().show(vertices, normals, turn)
         self._last_key = ()
 
     def pose(self, pose: Pose, turn: Turn) -> None:

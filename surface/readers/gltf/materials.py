@@ -60,7 +60,7 @@ def _material(file: Gltf, images: _Images, index: int, table: dict[str, Any]) ->
     name = table.get("name")
     return Material(
         name if isinstance(name, str) else "", colour, data, mime, alpha if alpha in ALPHA else "OPAQUE", cutoff,
-        _image_of_uv(_extension(texture, "KHR_texture_transform")),
+        _image_of_uv(_extension(texture, "KHR_texture_transform")), table.get("doubleSided") is True,
     )  # fmt: skip
 
 

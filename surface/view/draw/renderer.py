@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from surface.view.draw import materials
+from surface.view.draw.accessories import PROGRAMS, AccessoryBuffers, accessory_programs
 from surface.view.draw.evaluator import Evaluator, choose
 from surface.view.draw.programs import set_uniforms
 from surface.view.scene.bounds import Bands, Silhouette, corners
@@ -70,6 +71,7 @@ class Renderer:
         used = {materials.material_of(part.material).program for part in head.parts}
         self._worn = [name for name in materials.WORN if name in used]
         self._programs = materials.programs(ctx, quality, self.theme, fine=self._fine, worn=self._worn)
+        self._accessories = self._accessory_buffers()
         self._detail = materials.detail_texture(ctx)
         self._background = Rectangles(ctx, self._programs["background"])
         parts = sorted(head.parts, key=lambda part: materials.material_of(part.material).order)
@@ -92,6 +94,21 @@ class Renderer:
         on_gpu = self.evaluator.name == "gpu"
         return PartBuffers(self.ctx, part, program, self._static[part.name], on_gpu=on_gpu)
 
+    def _accessory_buffers(self, *, simplified: bool = False) -> AccessoryBuffers | None:
+        """The head's accessories, ``simplified`` for live pictures drawn in software; none of a mask or a robot, which
+        show the face alone."""
+        meshes = getattr(self.head, "accessories", ())
+        if not meshes or not self.theme.use_painted:
+            return None
+        self._programs |= accessory_programs(self.ctx, "fast" if simplified else self.quality)
+        return AccessoryBuffers(self.ctx, meshes, self._programs, simplified=simplified)
+
+    def _release_accessories(self) -> None:
+        if self._accessories is not None:
+            self._accessories.release()
+            for name in PROGRAMS:
+                self._programs[name].release()
+
     def hurry(self) -> None:
         """Switch to decimated triangles and simpler shading, for live pictures drawn in software.
 
@@ -107,6 +124,8 @@ class Renderer:
             self._programs[name] = materials.worn_program(self.ctx, name, self.quality, simplified=True)
         for thing in (*self._parts, *old):
             thing.release()
+        self._release_accessories()
+        self._accessories = self._accessory_buffers(simplified=True)
         self._parts = self._decimated_parts() or [self._buffers(buffers.part) for buffers in self._parts]
         self._camera = None
         self._apply_theme()
@@ -154,18 +173,27 @@ class Renderer:
         self.ctx.blend_func = self.ctx.SRC_ALPHA, self.ctx.ONE_MINUS_SRC_ALPHA
         self._aim(camera, width / max(height, 1))
         self._detail.use(0)
+        if self._accessories is not None:
+            self._accessories.turn(self.evaluator.rotation())
+            self._accessories.draw_solid(multisampled=target.samples > 1)
         for buffers in self._parts:
             self._draw_part(buffers, multisampled=target.samples > 1)
         self.ctx.enable_only(self.ctx.DEPTH_TEST)
         theme = self.theme
         set_uniforms(self._programs["background"], {"top": theme.background_top, "bottom": theme.background_bottom})
         self._background.render(corners((bands or Bands.whole(target.size)).boxes(), target.size))
+        if self._accessories is not None:
+            self._accessories.draw_blended(target)
 
     def region(self, camera: Camera, size: tuple[int, int]) -> Bands:
         """The pixels of a picture of `size` that the head, as posed now, can cover."""
         found = Silhouette(size, camera.matrix(size[0] / size[1]), camera.near)
         outer = [p for p in self._parts if p.part.material not in materials.INSIDE] or self._parts
-        for outline in (buffers.outline() for buffers in outer):
+        worn: list[tuple[np.ndarray, np.ndarray]] = []
+        if self._accessories is not None:
+            self._accessories.turn(self.evaluator.rotation())
+            worn = self._accessories.outlines()
+        for outline in (*(buffers.outline() for buffers in outer), *worn):
             if outline is None or not found.add(*outline):
                 return Bands.whole(size)
         return found.bands()
@@ -219,6 +247,8 @@ class Renderer:
         """Release every buffer and program."""
         for thing in (*self._parts, self.evaluator, self._background, self._detail, *self._programs.values()):
             thing.release()
+        if self._accessories is not None:
+            self._accessories.release()
 
 
 class Rectangles:

@@ -41,7 +41,7 @@ class VertexSums:
         self._packed = padded(np.zeros((sums.points, 4), np.float32), self._points.height)
         # A context without a window has no framebuffer of its own, and without one transform feedback does nothing.
         self._frame = ctx.framebuffer([ctx.renderbuffer((1, 1), 4)])
-        shaders, outputs = ("sum.glsl", "turn.glsl", "place.vert"), ("out_position", "out_normal")
+        shaders, outputs = ("sum.glsl", "rotate.glsl", "turn.glsl", "place.vert"), ("out_position", "out_normal")
         self._program = build(ctx, shaders, (), outputs=outputs, defines=DEFINES)
         set_uniforms(self._program, {"points": 0, "weights": 1})
         self._attributes = ctx.buffer(vertex_rows(sums).tobytes())

@@ -14,7 +14,9 @@ import numpy as np
 
 from surface.base.extras import require
 from surface.head import Head, load_data
+from surface.head.model.accessories import Accessory, read_accessories
 from surface.head.posing.baked import shade_path, write_shade
+from surface.head.posing.dressing import WornMesh
 from surface.view.draw.programs import build, set_uniforms
 from surface.view.pictures.offscreen import open_context
 from surface.view.scene.parts import ViewHead, ViewPart
@@ -25,6 +27,10 @@ if TYPE_CHECKING:
 #: Materials that occlude each other: the mouth's inside is occluded by itself alone, since the light that enters
 #: between the lips is computed each frame.
 _OCCLUDERS = (("skin", "eye"), ("teeth", "gums", "tongue"))
+#: Kinds of accessories that shade the skin below them.
+_SHADING = ("hair", "hat")
+#: How much of the light below them they take: some comes through hair, and is reflected by it.
+_WORN_SHADE = 0.75
 #: Coefficients of the sky lie between minus and plus this.
 SKY_RANGE = 2.0
 #: Skin whose other side is further away lets no light through, mm.
@@ -41,6 +47,7 @@ def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str
     left at rest. Options as for :func:`bake`. Skin also gets the direction of the sky, by "NAME/visible" (see
     :func:`fit_sky`), and its thinness, by "NAME/thin".
     """
+    options = {"worn": _shading(head), **options}
     head.pose(np.asarray(open_pose, np.float64))
     opened = bake(head.parts, **options)
     head.pose(np.zeros(len(head.parameters)))
@@ -54,6 +61,12 @@ def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str
             result[f"{part.name}/visible"] = best[:, 1:] / (2.0 * SKY_RANGE) + 0.5
             result[f"{part.name}/thin"] = thinness(part)
     return result
+
+
+def _shading(head: ViewHead) -> list[Accessory]:
+    """The accessories that shade a face: hair and hats that one does not see through."""
+    every = [one.accessory for one in getattr(head, "accessories", ())]
+    return [one for one in every if one.kind in _SHADING and one.alpha != "BLEND"]
 
 
 def smoothed(values: np.ndarray, triangles: np.ndarray, passes: int = 2) -> np.ndarray:
@@ -92,13 +105,15 @@ def thinness(part: ViewPart) -> np.ndarray:
 
 
 def bake(
-    parts: Sequence[ViewPart], *, directions: int = 96, resolution: int = 512, bias_mm: float = 1.2
-) -> dict[str, np.ndarray]:
+    parts: Sequence[ViewPart], *, directions: int = 96, resolution: int = 512, bias_mm: float = 1.2,
+    worn: Sequence[Accessory] = (),
+) -> dict[str, np.ndarray]:  # fmt: skip
     """Cosine-weighted share of the sky that each vertex sees, as the parts are posed now.
 
     directions : number of views from all around.
     resolution : pixels along the side of each depth picture.
     bias_mm : how far behind the depth picture a vertex still counts as seen.
+    worn : what shades the skin, too, as if nothing of it were clear.
 
     Returns part name -> (m, 5) float32: the share, 1 = open, 0 = buried, and the coefficients of :func:`fit_sky`; parts
     of other materials have 1, 1, 0, 0, 0 throughout.
@@ -111,7 +126,8 @@ def bake(
         for materials in _OCCLUDERS:
             members = [part for part in parts if part.material in materials]
             if members:
-                result |= _bake(ctx, members, directions, resolution, bias_mm)
+                over = worn if "skin" in materials else ()
+                result |= _bake(ctx, members, directions, resolution, bias_mm, over)
     finally:
         ctx.release()
     return result
@@ -128,28 +144,30 @@ def fit_sky(normal: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def _bake(
-    ctx: moderngl.Context, parts: Sequence[ViewPart], directions: int, resolution: int, bias_mm: float
-) -> dict[str, np.ndarray]:
+    ctx: moderngl.Context, parts: Sequence[ViewPart], directions: int, resolution: int, bias_mm: float,
+    worn: Sequence[Accessory] = (),
+) -> dict[str, np.ndarray]:  # fmt: skip
     """As :func:`bake`, for parts that occlude each other."""
     points = np.concatenate([np.asarray(part.vertices, np.float64) for part in parts])
     normals = np.concatenate([np.asarray(part.normals, np.float64) for part in parts])
     program = build(ctx, ("depth.vert",), ("depth.frag",))
-    arrays = [_vertex_array(ctx, program, part) for part in parts]
+    arrays, over = ([_vertex_array(ctx, program, part) for part in each] for each in (parts, worn))
+    every = np.concatenate([points, *(one.vertices for one in worn)])
     depth = ctx.depth_texture((resolution, resolution))
     target = ctx.framebuffer([], depth)
     seen, total = np.zeros(len(points)), np.zeros(len(points))
     normal, right = np.zeros((len(points), 4, 4)), np.zeros((len(points), 4))
     for direction in sphere_directions(directions):
         weight = np.clip(normals @ direction, 0.0, None)
-        box, matrix, span = orthographic(points, direction)
+        box, matrix, span = orthographic(every, direction)
         set_uniforms(program, {"view_projection": matrix})
         target.use()
         ctx.enable_only(ctx.DEPTH_TEST)
         target.clear(depth=1.0)
-        for array in arrays:
-            array.render()
-        picture = np.frombuffer(depth.read(), np.float32).reshape(resolution, resolution)
-        visible = visibility(box, picture, bias_mm / span)
+        visible = _drawn_visibility(arrays, depth, box[: len(points)], bias_mm / span)
+        if over:
+            shaded = _drawn_visibility(over, depth, box[: len(points)], bias_mm / span)
+            visible += _WORN_SHADE * (shaded - visible)
         seen += weight * visible
         total += weight
         one = np.append(1.0, direction)
@@ -160,7 +178,17 @@ def _bake(
     return dict(zip([part.name for part in parts], np.split(share, ends), strict=True))
 
 
-def _vertex_array(ctx: moderngl.Context, program: moderngl.Program, part: ViewPart) -> moderngl.VertexArray:
+def _drawn_visibility(
+    arrays: Sequence[moderngl.VertexArray], depth: moderngl.Texture, box: np.ndarray, bias: float
+) -> np.ndarray:
+    """As :func:`visibility`, in the depth picture with these arrays drawn into it, too."""
+    for array in arrays:
+        array.render()
+    picture = np.frombuffer(depth.read(), np.float32).reshape(depth.height, depth.width)
+    return visibility(box, picture, bias)
+
+
+def _vertex_array(ctx: moderngl.Context, program: moderngl.Program, part: ViewPart | Accessory) -> moderngl.VertexArray:
     """Positions and triangles of a part."""
     positions = ctx.buffer(np.ascontiguousarray(part.vertices, np.float32).tobytes())
     index = ctx.buffer(np.ascontiguousarray(part.triangles, np.int32).tobytes())
@@ -214,5 +242,6 @@ def shade_head(folder: str | Path) -> Path:
     """
     shade_path(folder).unlink(missing_ok=True)
     head = Head(load_data(folder), str(folder))  # without the files beside it, which may belong to another head
+    head.accessories = tuple(WornMesh(one, head.data.neck) for one in read_accessories(folder))
     open_pose = np.array([_OPEN.get(name, 0.0) for name in head.parameters])
     return write_shade(folder, bake_head(head, open_pose), head.parts)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,6 +17,9 @@ EYES, CROWN, LIPS, HALF_WIDTH = np.array([0.0, 36.1, 84.2]), 108.7, 68.0, 92.1
 LIDS = np.array([0.0, 36.6, 93.6])
 NEAR_MM, NEAR_SIZE = 12.0, 0.15  # a head that differs from it by less is shown from the same places
 LIPS_SHAPES = ("mouthPucker", "mouthFunnel", "mouthClose", "mouthRollLower", "mouthRollUpper", "jawOpen")
+WORN_UP, WORN_ASIDE, WORN_BACK = 126.0, 155.0, 230.0  # mm from the middle of its eyes that its pictures show
+MOST_UP = 55.0  # mm on the shipped head: so far up a camera looks for what is worn before it steps back
+MOST_WORN = 1.4  # times a head's size: what is worn is shown by that much smaller at most
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
 SKIN, SAMPLES = "skin", 400  # places of a part that its outline is measured at
 
@@ -54,8 +58,9 @@ def framing_of(head: ViewHead) -> Framing:
         return Framing()
     at, known = _eyes(data, skin)
     size = _size(data, skin, at) if known else _height(skin)
-    near = np.abs(at - EYES).max() < NEAR_MM and abs(np.log(size)) < np.log1p(NEAR_SIZE)
-    return Framing() if near else Framing((float(at[0]), float(at[1]), float(at[2])), size)
+    wanted, up = _room(getattr(head, "accessories", ()), at, size)
+    near = np.abs(at - EYES).max() < NEAR_MM and abs(np.log(size)) < np.log1p(NEAR_SIZE) and wanted <= 1.0 and up <= 0.0
+    return Framing() if near else Framing((float(at[0]), float(at[1]) + up, float(at[2])), max(size, wanted))
 
 
 def framed(camera: Camera, head: ViewHead) -> Camera:
@@ -109,6 +114,20 @@ def _size(data: Any, skin: np.ndarray, at: np.ndarray) -> float:
     wide = float(np.abs(level[:, 0] - at[0]).max()) / HALF_WIDTH if len(level) else 0.0
     outline = max(crown, wide)
     return float(max(min(max(outline, 0.7 * face), 2.5 * face) if face > 0 else outline, 1e-3))
+
+
+def _room(accessories: Sequence[Any], at: np.ndarray, size: float) -> tuple[float, float]:
+    """Size at which cameras show the hats and hair around a head of ``size``, and how far up they look for it, mm; of
+    what lies above its lips, for hair may hang down out of a picture."""
+    found = [one.accessory.vertices for one in accessories]
+    points = np.concatenate([np.zeros((0, 3)), *found]) - at
+    points = points[points[:, 1] > -size * LIPS]
+    if not len(points):
+        return 0.0, 0.0
+    top, wide, back = points[:, 1].max(), np.abs(points[:, 0]).max(), -points[:, 2].min()
+    wanted = min(max(wide / WORN_ASIDE, back / WORN_BACK, top / (WORN_UP + MOST_UP)), MOST_WORN * size)
+    shown = max(size, wanted)
+    return float(wanted), float(np.clip(top - WORN_UP * shown, 0.0, MOST_UP * shown))
 
 
 def _moved(data: Any, names: tuple[str, ...]) -> np.ndarray | None:

@@ -2,7 +2,7 @@
 import * as THREE from "/three.min.js";
 import { Part } from "/morph.js";
 import { lipsApart, ownAmounts, readPose } from "/pose.js";
-import { material, shared } from "/shaders.js";
+import { GLOSS, material, shared } from "/shaders.js";
 
 const EYES = ["eye_left", "eye_right"], HALF = "Half";
 const LIT_MM = [0.8, 5];  // how far lips are apart where light begins to enter, and where it does as into an open mouth
@@ -16,7 +16,7 @@ function isSoftware() {
 }
 
 export class Face {
-  #eyes = []; #parts = []; #values = null; #names = []; #drag = null;
+  #eyes = []; #parts = []; #worn = []; #values = null; #names = []; #drag = null;
 
   constructor(canvas) {
     this.canvas = canvas;
@@ -64,11 +64,12 @@ export class Face {
   // A part of the file as it is drawn here: positions in metres, shapes by the vertices that they move.
   #add(mesh) {
     const inverse = mesh.skeleton?.boneInverses[0].elements, bends = Boolean(inverse), eye = EYES.indexOf(mesh.name);
-    const { map, side, name } = mesh.material;
+    const { map, side, name, alphaTest, transparent } = mesh.material;
     if (map) map.colorSpace = THREE.NoColorSpace;
     const part = new Part(mesh, bends ? inverse[0] : mesh.scale.x, bends ? inverse.slice(12, 15) : [0, 0, 0]);
-    const drawn = new THREE.Mesh(part.geometry, material(name, { map, side }, bends));
+    const drawn = new THREE.Mesh(part.geometry, material(name, { map, side, alphaTest, transparent }, bends));
     drawn.frustumCulled = false;
+    if (GLOSS[name]) this.#worn.push(part.rest);
     if (bends) this.scene.add(drawn);
     else { drawn.position.copy(mesh.position); this.head.add(drawn); }
     if (eye < 0) { this.#parts.push(part); return; }
@@ -82,8 +83,22 @@ export class Face {
     this.scene.updateMatrixWorld(true);
     for (const eye of this.#eyes) sum.add(eye.getWorldPosition(at));
     const apart = this.#eyes.length > 1 ? this.#eyes[0].getWorldPosition(at).distanceTo(this.#eyes[1].getWorldPosition(new THREE.Vector3())) : 0.063;
-    this.target = sum.divideScalar(Math.max(this.#eyes.length, 1)).add(new THREE.Vector3(0, -0.55 * apart, -0.9 * apart));
-    this.size = apart * 4.6;
+    this.target = sum.divideScalar(Math.max(this.#eyes.length, 1));
+    const [up, aside] = this.#room(this.target, apart), top = Math.max(1.75 * apart, 1.05 * up);
+    const below = (up > 1.75 * apart ? 2.5 : 2.85) * apart;
+    this.target.add(new THREE.Vector3(0, (top - below) / 2, -0.9 * apart));
+    this.size = Math.min(Math.max(top + below, 2.7 * aside), 7 * apart);
+  }
+
+  // How far hair and hats reach, up and to a side of the eyes; what hangs below the lips may hang out of the picture.
+  #room(eyes, apart) {
+    let up = 0, aside = 0;
+    for (const rest of this.#worn) for (let i = 0; i < rest.length; i += 3) {
+      if (rest[i + 1] < eyes.y - 1.1 * apart) continue;
+      up = Math.max(up, rest[i + 1] - eyes.y);
+      aside = Math.max(aside, Math.abs(rest[i] - eyes.x));
+    }
+    return [up, aside];
   }
 
   pose(names, values) {

@@ -181,10 +181,58 @@ void main() {
   gl_FragColor = vec4(encode(lit), 1.0);
 }`];
 
+// Hair, hats, glasses as the meshes they are: their own texture; hair is lit softly from all around it.
+const ACCESSORY = [`
+attribute vec4 color;
+varying vec3 v_light, v_colour, v_shine; varying vec3 v_uv;
+void main() {
+  place();
+  vec4 nearer = projectionMatrix * viewMatrix * vec4(world + 0.0008 * v, 1.0);  // a fitted scalp must not come through
+  gl_Position.z = nearer.z / nearer.w * gl_Position.w;
+  if (soft < 0.5 && dot(n, v) < -0.35) n = -n;
+  float spread = mix(0.15, 0.38, soft);
+  v_light = key_colour * clamp(mix(dot(n, key_direction), 1.0, spread), 0.0, 1.0);
+  v_light += fill_colour * clamp(mix(dot(n, fill_direction), 1.0, spread), 0.0, 1.0);
+  v_light += rim_colour * clamp(mix(dot(n, rim_direction), 1.0, 0.5 * spread), 0.0, 1.0) + ambient(n);
+  float edge = 1.0 - clamp(abs(dot(n, v)), 0.0, 1.0);
+  vec3 mirrored = key_colour * lobe(dot(n, normalize(v + key_direction)), gloss.y);
+  mirrored += rim_colour * lobe(dot(n, normalize(v + rim_direction)), gloss.y);
+  v_shine = gloss.x * (mirrored + (0.5 + edge * edge * edge) * ambient(n));
+  v_colour = color.rgb;
+  v_uv = vec3(uv, color.a);
+}`, `
+uniform float alpha_test; uniform bool blended;
+varying vec3 v_light, v_colour, v_shine; varying vec3 v_uv;
+vec3 decoded(vec3 c) { return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878); }
+void main() {
+  vec4 texel = vec4(1.0);
+  #ifdef MAPPED
+  texel = texture2D(map, v_uv.xy);
+  #endif
+  float cover = texel.a * v_uv.z;
+  if (cover < alpha_test) discard;
+  gl_FragColor = vec4(encode(decoded(texel.rgb) * v_colour * v_light + v_shine), blended ? cover : 1.0);
+}`];
+export const GLOSS = { hair: [0.045, 9], hat: [0.02, 12], glasses: [0.28, 90], jewellery: [0.6, 120] };
+
 const KINDS = { skin: SKIN, strand: STRAND, tress: STRAND, cloth: CLOTH, brow: HAIR, lash: HAIR, eye: EYE, teeth: INNER, gums: INNER, tongue: INNER, mouth: INNER };
 
-// The material of a kind of part; `map` and `side` are those of the file, `bends` says whether the neck moves it.
-export function material(kind, { map, side }, bends) {
+// Hair that blends is cut: blended without an order, locks behind would be drawn over those in front.
+function accessory(kind, { map, side, alphaTest, transparent: blends }, bends) {
+  const transparent = blends && kind !== "hair", cut = blends ? (transparent ? 0.004 : 0.4) : alphaTest;
+  const [vertex, fragment] = ACCESSORY, own = "uniform float soft; uniform vec2 gloss; uniform sampler2D map;";
+  return new THREE.ShaderMaterial({
+    uniforms: { ...shared, map: { value: map }, soft: { value: kind === "hair" ? 1 : 0 }, gloss: { value: GLOSS[kind] },
+      alpha_test: { value: cut }, blended: { value: transparent } },
+    side, transparent, depthWrite: !transparent, defines: { ...(bends ? { BENDS: 1 } : {}), ...(map ? { MAPPED: 1 } : {}) },
+    vertexShader: LIGHT + PLACE + own + vertex, fragmentShader: LIGHT + own + fragment,
+  });
+}
+
+// The material of a kind of part; what the second argument holds is the file's, `bends` says whether the neck moves it.
+export function material(kind, given, bends) {
+  if (GLOSS[kind]) return accessory(kind, given, bends);
+  const { map, side } = given;
   const [vertex, fragment] = KINDS[kind] ?? CLOTH;
   const blended = vertex === HAIR[0];
   return new THREE.ShaderMaterial({

@@ -66,3 +66,10 @@ def test_a_lid_without_a_shape_is_named_alone():
     lines = findings(head, EYES)
     assert any("no shape closes eyeBlinkRight; " in line for line in lines)
     assert "found: eyes 60 mm apart, of 24 mm" in lines
+
+
+def test_hair_that_is_kept_as_it_is_is_not_said_to_be_missing():
+    bare = small_head(eye_radius=0.0)
+    assert "in the mesh, but left out and not drawn: brows" in findings(bare, EYES, {"brow"}, {"hair", "hat"})
+    assert not any("hair" in line for line in findings(bare, EYES, (), {"hair"}))
+    assert any("brows or hair" in line for line in findings(bare, EYES, (), {"hat"}))

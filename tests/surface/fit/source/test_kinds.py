@@ -16,6 +16,7 @@ from surface.fit.source.kinds import (
     piece_kinds,
     skin_and_eyes,
     without_clothes,
+    worn_faces,
 )
 from surface.fit.source.mesh import FitMesh
 
@@ -153,3 +154,25 @@ def test_of_five_names_or_more_four_are_listed():
 ])  # fmt: skip
 def test_words_count_by_their_length_and_place(name, kind):
     assert kind_name(name) == kind
+
+
+def test_hair_hats_glasses_and_jewellery_are_kept_as_they_are_unless_shapes_move_them():
+    for name in ("Hair", "Hat", "Glasses", "Necklace"):
+        mesh = two_pieces(name, 0.2)
+        np.testing.assert_array_equal(worn_faces(mesh), mesh.piece == 1)
+        kept, notes = without_clothes(mesh, worn_faces(mesh))
+        np.testing.assert_array_equal(kept, mesh.piece == 0)
+        assert notes == []
+        assert not worn_faces(two_pieces(name, 6.0)).any()
+    assert not worn_faces(two_pieces("Hair", 1.0)).any()  # a tenth of the motion is enough: it would stay behind
+    assert worn_faces(two_pieces("Hat", 1.0)).any()
+    for name in ("Beard", "Boots", "Shirt", "helper-hair", "Brow"):
+        assert not worn_faces(two_pieces(name, 0.0)).any()
+
+
+def test_a_mesh_of_nothing_else_is_not_worn():
+    mesh = replace(two_pieces("Hair", 0.0), names=(), deltas=np.zeros((0, 625, 3)))
+    assert not worn_faces(replace(mesh, pieces=("Hat", "Hair"))).any()
+    boots = replace(mesh, pieces=("Boots", "Hair"))
+    kept, _ = without_clothes(boots, worn_faces(boots))
+    np.testing.assert_array_equal(kept, boots.piece == 0)

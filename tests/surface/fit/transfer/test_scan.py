@@ -97,9 +97,14 @@ def test_what_a_person_wears_and_what_grows_on_the_skin_is_no_scan_and_is_said(t
     scan = read_scan(write_obj(tmp_path / "a.obj", at, faces, names))
     assert sorted(scan.vertices[scan.triangles][:, 0, 2]) == [0, 7]  # skin and eye
     told = " ".join(scan.notes)
-    assert all(f"'{n}'" in told for n in names[1:-1]) and "hat left out: 'Wolf3D_Headwear'" in scan.notes
+    worn = ("Wolf3D_Headwear", "Glasses", "Hair_cards")
+    assert [f"'{n}'" in told for n in names[1:-1]] == [n not in worn for n in names[1:-1]]
+    assert scan.worn is not None and {scan.worn.pieces[k] for k in scan.worn.piece} == set(worn)
+    assert "prop left out: 'helper-hair', 'joint-neck'" in scan.notes
     every = read_scan(write_obj(tmp_path / "b.obj", at[:3], faces[:1], ["Hat"]))
-    assert len(every.triangles) == 1 and not every.notes  # a name alone leaves nothing: it is not believed
+    assert (
+        len(every.triangles) == 1 and not every.notes and every.worn is None
+    )  # a name alone leaves nothing: it is not believed
     named = read_scan(tmp_path / "a.obj", ("body",))
     assert len(named.triangles) == 1
 

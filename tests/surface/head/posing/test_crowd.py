@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_head import small_head
 
 from surface.head import Head
 from surface.head.posing.crowd import Crowd
@@ -110,3 +111,14 @@ def test_the_bytes_of_a_crowd_are_those_of_all_its_arrays(crowd: Crowd) -> None:
     assert any(part.batch is None for part in crowd.parts) and any(part.batch is not None for part in crowd.parts)
     with pytest.raises(ValueError, match="read-only"):
         crowd.values[0, 0] = 1.0
+
+
+def test_a_head_that_is_shown_says_how_it_is_turned() -> None:
+    crowd = Crowd(Head(small_head()), 2)
+    crowd.pose(np.stack([crowd.head.values({}), crowd.head.values({"headYaw": 1.0})]))
+    alone = Head(small_head())
+    alone.pose(crowd.values[1])
+    for k, wanted in ((1, alone.parts[0].turn), (0, np.eye(3)), (1, alone.parts[0].turn)):
+        crowd.show(k)
+        for part in crowd.head.parts:
+            np.testing.assert_allclose(part.turn, wanted, atol=1e-12)

@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from cards import card
 from small_head import small_head
 
 from surface.base.errors import HeadFileError
 from surface.head import Head
-from surface.head.posing.dressing import SCALP, THROUGH, dress, sample_picture
+from surface.head.model.data import Neck
+from surface.head.model.parameters import rotation
+from surface.head.posing.dressing import SCALP, THROUGH, WornMesh, dress, sample_picture
 
 
 @pytest.fixture
@@ -103,3 +106,19 @@ def test_pictures_are_linear_between_their_pixels(head: Head) -> None:
     wanted = [picture[0, 0], picture[3, 4], picture[1, 1], middle, picture[0, 2], picture[3, 0]]
     np.testing.assert_allclose(found[:, 0], wanted, atol=1e-6)
     assert sample_picture(garment(head), "cover", skin) is None  # type: ignore[arg-type]
+
+
+def test_an_accessory_turns_with_the_head_and_over_the_neck_by_its_share() -> None:
+    neck = Neck((0.0, -50.0, 0.0), slope=0.0, still=-40.0, whole=0.0)
+    worn = WornMesh(card((-10.0, -40.0), (10.0, 20.0), z=30.0), neck)
+    assert worn.share.tolist() == [0.0, 0.0, 1.0, 1.0]
+    rest = worn.accessory.vertices.copy()
+    same, _ = worn.turned(np.eye(3))
+    assert same is worn.accessory.vertices  # a head that does not turn costs nothing
+    quarter = rotation(1.0, 0.0, 0.0)
+    vertices, normals = worn.turned(quarter)
+    np.testing.assert_allclose(vertices[:2], rest[:2], atol=1e-4)
+    pivot = np.array(neck.pivot)
+    np.testing.assert_allclose(vertices[2:], (rest[2:] - pivot) @ quarter.T + pivot, atol=1e-3)
+    np.testing.assert_allclose(normals[2], quarter @ [0.0, 0.0, 1.0], atol=1e-5)
+    assert worn.turned(quarter)[0] is vertices and (worn.accessory.vertices == rest).all()

@@ -35,9 +35,10 @@ def test_every_piece_has_what_its_material_says(tmp_path):
     usual = {"baseColorFactor": [0.5, 0.25, 1, 0.75], "baseColorTexture": {"index": 0}}
     table = {"name": "Iris", "pbrMetallicRoughness": usual, "alphaMode": "MASK", "alphaCutoff": 0.3}
     assert read(tmp_path, coloured(table, PNG)) == Material(
-        "Iris", (0.5, 0.25, 1.0, 0.75), PNG, "image/png", "MASK", 0.3
+        "Iris", (0.5, 0.25, 1.0, 0.75), PNG, "image/png", "MASK", 0.3, two_sided=False
     )
-    assert read(tmp_path, coloured({})) == Material()
+    assert read(tmp_path, coloured({})) == Material(two_sided=False)
+    assert read(tmp_path, coloured({"doubleSided": True})) == Material()
     assert read(tmp_path, glb(slit_sheet())) is None
 
 

@@ -89,7 +89,7 @@ def test_a_program_without_fragments_fills_a_buffer(gl: None) -> None:
     try:
         made = build(
             ctx,
-            ("sum.glsl", "turn.glsl", "place.vert"),
+            ("sum.glsl", "rotate.glsl", "turn.glsl", "place.vert"),
             (),
             outputs=("out_position", "out_normal"),
             defines={"WIDTH": 64},

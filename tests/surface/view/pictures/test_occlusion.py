@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from ball_head import BallHead, BallPart, ball, grid, values
+from cards import card
 from small_head import small_head
 
-from surface.head import Head
+from surface.head import Head, save_data
+from surface.head.model.accessories import write_accessories
+from surface.head.model.data import Neck
+from surface.head.posing.dressing import WornMesh
 from surface.view.pictures.occlusion import (
     bake,
     bake_head,
@@ -244,4 +249,27 @@ def test_pictures_are_96_of_512_pixels_where_nothing_else_is_asked_for(monkeypat
         "surface.view.pictures.occlusion._bake", lambda ctx, members, *how: given.append((len(members), *how)) or {}
     )
     bake(BallHead().parts)
-    assert given == [(3, 96, 512, 1.2), (1, 96, 512, 1.2)] and ended == [1]
+    assert given == [(3, 96, 512, 1.2, ()), (1, 96, 512, 1.2, ())] and ended == [1]
+
+
+@pytest.mark.parametrize(("kind", "alpha", "least", "most"), [
+    ("hat", "OPAQUE", 0.2, 0.35), ("hair", "MASK", 0.2, 0.35), ("hat", "BLEND", 0.95, 1.0),
+    ("glasses", "OPAQUE", 0.95, 1.0),
+])  # fmt: skip
+def test_hair_and_hats_shade_what_lies_below_them(gl: None, kind: str, alpha: str, least: float, most: float) -> None:
+    lying = card(kind=kind, alpha=alpha, texture=b"")
+    over = replace(lying, vertices=np.float32([[-100, 8, 100], [100, 8, 100], [100, 8, -100], [-100, 8, -100]]))
+    head = SimpleNamespace(
+        parts=[plate("floor", 0.0, 100.0)], parameters=(), pose=lambda _: None,
+        accessories=(WornMesh(over, Neck((0.0, 0.0, 0.0))),),
+    )  # fmt: skip
+    share = bake_head(head, np.zeros(0), directions=60, resolution=320)["floor"]  # type: ignore[arg-type]
+    middle = share[:, 0].reshape(15, 15)[5:10, 5:10]
+    assert least < middle.min() and middle.max() < most + 0.01
+
+
+def test_the_accessories_beside_a_head_shade_it(gl: None, tmp_path: Path) -> None:
+    save_data(tmp_path, small_head())
+    bare = np.load(shade_head(tmp_path))["a"].astype(float)
+    write_accessories(tmp_path, [card((-60.0, -60.0), (60.0, 60.0), z=40.0)])
+    assert np.load(shade_head(tmp_path))["a"].astype(float).mean() < 0.75 * bare.mean()

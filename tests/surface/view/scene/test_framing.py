@@ -7,10 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from ball_head import BallHead
+from cards import card
 
 from surface.head import Head
 from surface.head.model.data import Group, HeadData, PartData
 from surface.head.model.file import load_data
+from surface.head.posing.dressing import WornMesh
 from surface.view.scene import framing as framing_module
 from surface.view.scene.camera import PRESETS, Camera
 from surface.view.scene.framing import EYES, Framing, framed, framing_of
@@ -165,3 +167,25 @@ def test_a_head_that_hardly_differs_is_seen_from_the_same_places(size: float, sh
     data.eyes = data.eyes + shift
     part = SimpleNamespace(material="skin", surface=surface, uv=np.zeros((900, 2)))
     assert (framing_of(SimpleNamespace(parts=[part], data=data)) == Framing()) == same
+
+
+def wearing(data: HeadData, *heights: float, wide: float = 60.0) -> Head:
+    """The head with a card above it, of so much height over the middle of the eyes, mm, and so wide to each side."""
+    head = Head(data)
+    cards = [card((-wide, 0.0), (wide, EYES[1] + up), z=0.0) for up in heights]
+    head.accessories = tuple(WornMesh(one, data.neck) for one in cards)
+    return head
+
+
+def test_hats_and_hair_are_in_the_picture_and_the_face_stays_large(shipped):
+    data = few(shipped)
+    assert framing_of(wearing(data, 110.0)) == Framing()
+    for up, wide in ((180.0, 60.0), (120.0, 190.0), (240.0, 90.0)):
+        camera = framed(Camera.front(), wearing(data, up, wide=wide))
+        for x, y in ((0.0, EYES[1] + up), (wide, EYES[1] + min(up, 100.0))):
+            place = camera.matrix(1.0) @ [x, y, 0.0, 1.0]
+            assert np.abs(place[:2] / place[3]).max() < 1.0
+        chin = camera.matrix(1.0) @ [0.0, EYES[1] - 115.0, 80.0, 1.0]
+        assert chin[1] / chin[3] > -0.95
+    huge = framing_of(wearing(data, 900.0, wide=900.0))
+    assert huge.size == pytest.approx(1.4, rel=0.1)

@@ -1,0 +1,85 @@
+"""Textures of accessories as a head keeps them: PNG or JPEG of at most 1024 pixels, without fringes."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.arrays import Floats
+from surface.fit.source.textures import LARGEST, MOST_PIXELS
+from surface.readers.meshdata import Material
+
+QUALITY = 90  # of a JPEG
+CLEAR = 0.5  # opacity below which a texel's colour is not to be trusted: painters leave anything there
+PLAIN = ("image/png", "image/jpeg")
+
+
+def reduced_picture(material: Material) -> tuple[bytes, bool]:
+    """The texture of a material as a PNG or JPEG file, empty where it cannot be read; and whether its material leaves
+    some of it clear.
+
+    One that has nothing clear and is small enough stays as it is. Without Pillow, PNG and JPEG stay as they are, and
+    others are left out.
+    """
+    data = material.texture or b""
+    try:
+        from PIL import Image  # optional: the extra view
+    except ImportError:
+        return data if material.mime in PLAIN else b"", True
+    try:
+        with Image.open(io.BytesIO(data)) as image:
+            if image.width * image.height > MOST_PIXELS:
+                return b"", True
+            clear = material.alpha != "OPAQUE" and _has_clear(image)
+            if not clear and material.mime in PLAIN and max(image.size) <= LARGEST:
+                return data, clear
+            small = image.convert("RGBA" if clear else "RGB")
+            small.thumbnail((LARGEST, LARGEST))
+            if clear:
+                small = Image.fromarray(bled(np.asarray(small)))
+            return _encoded(small, "PNG" if clear else "JPEG"), clear
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        return b"", True
+
+
+def _has_clear(image: Any) -> bool:
+    """Whether any texel is not opaque."""
+    return bool(image.convert("RGBA").getchannel("A").getextrema()[0] < 255)
+
+
+def _encoded(image: Any, kind: str) -> bytes:
+    out = io.BytesIO()
+    image.save(out, kind, **({"quality": QUALITY} if kind == "JPEG" else {"optimize": True}))
+    return out.getvalue()
+
+
+def bled(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """(h, w, 4) a picture whose clear texels have the colour of the opaque ones nearby.
+
+    Filtered textures mix the colour of clear texels into edges: white there would be a white fringe. Colours are
+    averaged in ever larger blocks, weighted by opacity, and taken from the finest that has any.
+    """
+    weight = np.where(pixels[..., 3] >= CLEAR * 255.0, pixels[..., 3] / 255.0, 0.0)
+    filled = _filled(pixels[..., :3].astype(float) * weight[..., None], weight)
+    out = pixels.copy()
+    keep = (pixels[..., 3:] / 255.0 / CLEAR).clip(0.0, 1.0) ** 2
+    out[..., :3] = np.rint(keep * pixels[..., :3] + (1.0 - keep) * filled).astype(np.uint8)
+    return out
+
+
+def _filled(colour: Floats, weight: Floats) -> Floats:
+    """(h, w, 3) mean colours of a picture of colours times weights (h, w); from coarser ones where a place has none."""
+    height, width = weight.shape
+    own = colour / np.maximum(weight, 1e-6)[..., None]
+    if max(height, width) == 1 or (weight > 0.0).all():
+        return own
+    h, w = height + height % 2, width + width % 2
+    padded = np.zeros((h, w, 4))
+    padded[:height, :width, :3], padded[:height, :width, 3] = colour, weight
+    half = padded.reshape(h // 2, 2, w // 2, 2, 4).sum(axis=(1, 3)) / 4.0
+    coarse = _filled(half[..., :3], half[..., 3])
+    spread = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[:height, :width]
+    return np.where(weight[..., None] > 1e-4, own, spread)

@@ -1,0 +1,162 @@
+"""Accessories of a head: hair, hats, glasses and jewellery that are drawn as the meshes they are (``accessories.npz``).
+
+They are no surfaces of control points: triangles with a texture, which turn with the head and move with nothing else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from surface.base.arrays import Array, Floats32
+from surface.head.model.sidecar import Sidecar, read_sidecar, sidecar_path, write_sidecar
+
+FILE = "accessories.npz"
+KINDS = ("hair", "hat", "glasses", "jewellery")
+ALPHA = ("OPAQUE", "MASK", "BLEND")
+PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
+"""Kinds of pictures that may be a texture, by their first bytes: those that every reader of glTF knows."""
+MOST, MAX_NAME_BYTES = 256, 1024
+MAX_VERTICES = 400_000
+LARGE_MM = 1e5  # no vertex lies further out
+TABLES = ("names", "kinds", "alphas", "colours", "cutoffs", "two_sided")
+"""Arrays with a row for each accessory."""
+HINT = "restore the file or make the head again: omote fit"
+
+
+@dataclass(frozen=True)
+class Accessory:
+    """One mesh that is drawn as it is.
+
+    name : of the piece of the mesh that it was. kind : one of :data:`KINDS`.
+    vertices, normals : (m, 3) float32, mm in head space, at rest. uv : (m, 2) float32, places in the texture, 0..1 to
+        the right and down; it repeats beyond that. triangles : (t, 3) int32, counter-clockwise from outside.
+    colour : linear RGB and opacity, by which the texture's are multiplied. texture : a whole PNG or JPEG file of sRGB
+        colours; empty without one.
+    shade : (m,) float32, how open to light each vertex lies, 0..1.
+    alpha : ``OPAQUE``, ``MASK`` (nothing below ``cutoff`` is drawn) or ``BLEND``. two_sided : are backs drawn?
+    """
+
+    name: str
+    kind: str
+    vertices: Floats32
+    normals: Floats32
+    uv: Floats32
+    triangles: NDArray[np.int32]
+    shade: Floats32
+    colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    texture: bytes = b""
+    alpha: str = "OPAQUE"
+    cutoff: float = 0.5
+    two_sided: bool = True
+
+    @property
+    def repeats(self) -> bool:
+        """Whether the texture repeats on it: one that does not must not show its left edge at its right."""
+        return bool((self.uv < 0.0).any() or (self.uv > 1.0).any())
+
+    @property
+    def mime(self) -> str:
+        """The texture's kind, as ``image/png``; "" without one."""
+        return next((kind for start, kind in PICTURES.items() if self.texture.startswith(start)), "")
+
+
+def read_accessories(head: str | Path) -> tuple[Accessory, ...]:
+    """Return the accessories of a head, given by its folder or its head.toml; none where it has no such file.
+
+    Raises HeadFileError: the file is damaged or of a newer version.
+    """
+    return read_sidecar(sidecar_path(head, FILE), _unpack, HINT) or ()
+
+
+def write_accessories(head: str | Path, accessories: Sequence[Accessory]) -> Path | None:
+    """Write accessories to a head's folder, or remove those of the head that it held before; returns the file's path,
+    None where there is nothing to write.
+
+    Raises HeadFileError: it cannot be written.
+    """
+    path = sidecar_path(head, FILE)
+    if not accessories:
+        path.unlink(missing_ok=True)
+        return None
+    rows: dict[str, Array] = {
+        "names": np.array([a.name for a in accessories]), "kinds": np.array([a.kind for a in accessories]),
+        "alphas": np.array([a.alpha for a in accessories]),
+        "colours": np.array([a.colour for a in accessories], np.float32),
+        "cutoffs": np.array([a.cutoff for a in accessories], np.float32),
+        "two_sided": np.array([a.two_sided for a in accessories], np.uint8),
+    }  # fmt: skip
+    for k, one in enumerate(accessories):
+        rows |= {f"{k}/{key}": getattr(one, key) for key in ("vertices", "normals", "uv", "triangles", "shade")}
+        rows[f"{k}/texture"] = np.frombuffer(one.texture, np.uint8)
+    return write_sidecar(path, rows)
+
+
+def _unpack(file: Sidecar) -> tuple[Accessory, ...]:
+    """Return the accessories of a file. Raises ValueError or KeyError: it is damaged."""
+    z = file.arrays
+    names, kinds, alphas = (_words(z, key) for key in TABLES[:3])
+    count = len(names)
+    colours, cutoffs = (_numbers(z, key, shape) for key, shape in (("colours", (count, 4)), ("cutoffs", (count,))))
+    two_sided = _numbers(z, "two_sided", (count,))
+    for key, words, known in (("kinds", kinds, KINDS), ("alphas", alphas, ALPHA)):
+        if len(words) != count or not set(words) <= set(known):
+            raise ValueError(f"{key} is no list of {count} of {', '.join(known)}")
+    return tuple(
+        Accessory(
+            names[k], kinds[k], *_mesh(z, k), _colour(colours[k]), _texture(z, k), alphas[k], float(cutoffs[k]),
+            bool(two_sided[k]),
+        )
+        for k in range(count)
+    )  # fmt: skip
+
+
+def _colour(row: Floats32) -> tuple[float, float, float, float]:
+    r, g, b, a = row.tolist()
+    return r, g, b, a
+
+
+def _words(arrays: Mapping[str, Array], key: str) -> list[str]:
+    words = arrays[key]
+    if words.ndim != 1 or words.dtype.kind != "U" or len(words) > MOST or words.itemsize > MAX_NAME_BYTES:
+        raise ValueError(f"{key} is no list of at most {MOST} words")
+    return [str(word) for word in words]
+
+
+def _numbers(arrays: Mapping[str, Array], key: str, shape: tuple[int, ...]) -> Floats32:
+    """Return finite numbers; -1 in the shape is any length."""
+    found = arrays[key]
+    if found.ndim != len(shape) or any(w not in (-1, g) for g, w in zip(found.shape, shape, strict=True)):
+        raise ValueError(f"{key} has shape {found.shape}, expected {shape}".replace("-1", "any"))
+    if found.dtype.kind not in "fiu" or not (np.abs(found) < LARGE_MM).all():
+        raise ValueError(f"{key} holds what is no number of usable size")
+    return np.ascontiguousarray(found, np.float32)
+
+
+def _mesh(arrays: Mapping[str, Array], k: int) -> tuple[Floats32, Floats32, Floats32, NDArray[np.int32], Floats32]:
+    """Return vertices, normals, texture coordinates, triangles and shade of one accessory."""
+    vertices = _numbers(arrays, f"{k}/vertices", (-1, 3))
+    m = len(vertices)
+    if m > MAX_VERTICES:
+        raise ValueError(f"{k}/vertices holds {m} vertices, {MAX_VERTICES} are the most")
+    normals, uv = _numbers(arrays, f"{k}/normals", (m, 3)), _numbers(arrays, f"{k}/uv", (m, 2))
+    triangles = arrays[f"{k}/triangles"]
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu" or not len(triangles):
+        raise ValueError(f"{k}/triangles is no table of triangles")
+    if triangles.min() < 0 or triangles.max() >= m:
+        raise ValueError(f"{k}/triangles names vertices beyond the {m} there are")
+    return vertices, normals, uv, np.ascontiguousarray(triangles, np.int32), _numbers(arrays, f"{k}/shade", (m,))
+
+
+def _texture(arrays: Mapping[str, Array], k: int) -> bytes:
+    data = arrays[f"{k}/texture"]
+    if data.ndim != 1 or data.dtype != np.uint8:
+        raise ValueError(f"{k}/texture is no picture")
+    texture = data.tobytes()
+    if texture and not texture.startswith(tuple(PICTURES)):
+        raise ValueError(f"{k}/texture is neither PNG nor JPEG")
+    return texture
