@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, diags
-from scipy.sparse.linalg import spsolve
+from scipy.sparse import coo_matrix, csc_matrix, diags
+from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.features.rigging import lid_share
-from surface.fit.points.net import Net
-from surface.fit.points.solve import solve
+from surface.fit.transfer.finer_mesh import finer_mesh
+from surface.fit.transfer.finer_points import fit_points
 from surface.fit.transfer.register import Matcher
 from surface.fit.transfer.warp import Warp
-from surface.head import Contact, Head, HeadPart
+from surface.head import Contact, Head, HeadPart, Jaw, PartData
 from surface.head.model.parameters import smoothstep
 
 DETAIL_MM, PASSES = 5.0, 3  # greatest distance of the scan's detail that one pass follows; number of passes
@@ -26,7 +26,6 @@ UNFOLDINGS, STILL = 4, 0.1  # attempts of a pass to remove folds; weight that ke
 RIM_MM = (1.5, 4.0)  # distance from the rim of an opening where detail of the scan begins to count, and counts fully
 CLOSINGS = 12  # iterations, because each one leaves a share of the gap
 LIP_FADE_MM = (3.0, 16.0)  # distance from the line of the lips up to which skin moves with them, and where it is still
-FAIR = 1e-4  # weight of fairness in the fit of control points
 NEAR, NEAR_MM = 6, 12.0  # nearest points of the skin that another part follows, and distance at which it no longer does
 
 
@@ -42,19 +41,20 @@ class Skin:
     """One part of skin as triangles: ``rest (n, 3)`` on the head it comes from, ``at (n, 3)`` on the scan.
 
     points : (k, 3) control points of its surface, set by :meth:`solve`. rims : (r, 3) rims of all openings. eyes : the
-    eyeballs of the head it comes from.
+    eyeballs of the head it comes from. longest : of the triangles' edges, mm; the head's own are split.
     """
 
-    def __init__(self, part: HeadPart, rims: Floats, warp: Warp, eyes: Ball) -> None:
-        self.name, self.surface, self.mesh = part.name, part.surface, part.mesh
-        n = len(part.mesh.uv)  # seams may have added copies
-        self.rest = part.vertices[:n].astype(float)
+    def __init__(self, part: HeadPart, rims: Floats, warp: Warp, eyes: Ball, longest: float = np.inf) -> None:
+        self.name, self.surface = part.name, part.surface
+        own = part.vertices[: len(part.mesh.uv)].astype(float)  # seams may have added copies
+        self.mesh = finer_mesh(part.mesh, own, part.surface, warp, longest)
+        self.rest, n = self.mesh.rest, len(self.mesh.uv)
         self.at = warp(self.rest)
         distance = cKDTree(rims).query(self.rest)[0] if len(rims) else np.full(n, np.inf)
         self.points = part.surface.points.copy()
         # lids keep their own form, because those of a scan are joined to its eyes, or lie inside an eyeball
         self._seen = smoothstep(distance, *RIM_MM) * (1.0 - np.abs(lid_share(self.rest, eyes.centres, eyes.radius)))
-        self._matrix = _laplacian(part.mesh.triangles, n)
+        self._matrix = _laplacian(self.mesh.triangles, n)
 
     def follow(self, matcher: Matcher, scale: float) -> None:
         """Move the skin along its normals to the scan where the scan has data, and interpolate smoothly elsewhere.
@@ -71,7 +71,7 @@ class Skin:
             for _ in range(UNFOLDINGS):
                 weight = np.where(folds, STILL, self._seen * match.found)
                 system = (diags(weight + 1e-6) + SMOOTH * self._matrix).tocsc()
-                at = self.at + spsolve(system, weight * np.where(folds, 0.0, off))[:, None] * normals
+                at = self.at + _solved(system, weight * np.where(folds, 0.0, off))[:, None] * normals
                 if not (more := self._folded(at, mapped) & ~folds).any():
                     break
                 folds |= more
@@ -106,14 +106,22 @@ class Skin:
         unit: Floats = out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None]
         return unit
 
-    def solve(self) -> None:
-        """Fit the control points to the skin in least squares, and move the skin to the fitted surface."""
-        s = self.surface
-        net = Net(np.zeros((s.n, 4), np.int64), *s.padded)
-        b = s.basis_matrix(self.mesh.uv, side=self.mesh.side)
-        moves = solve(net, b, np.ones(len(self.rest)), self.at - b @ s.points, FAIR)
-        self.points = s.points + moves
-        self.at = b @ self.points
+    def solve(self, part: PartData, jaw: Jaw) -> PartData:
+        """Fit the control points to the skin in least squares, and move the skin to the fitted surface.
+
+        part, jaw : the skin, and the path of the jaw, of the head that they come from. Returns the part with more
+        control points where they were too far apart; it has its form and expressions as before.
+        """
+        fitted = fit_points(part, self.mesh, self.at, self._seen, jaw)
+        self.surface, self.points, self.at = fitted.surface, fitted.points, fitted.at
+        return fitted.part
+
+
+def _solved(system: csc_matrix, right: Floats) -> Floats:
+    """x (n,) with system @ x = right; the system (n, n) is symmetric and positive, which saves most of the time."""
+    factors = splu(system, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+    x: Floats = factors.solve(right)
+    return x
 
 
 def _laplacian(triangles: Ints, n: int) -> coo_matrix:

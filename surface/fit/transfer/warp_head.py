@@ -4,6 +4,7 @@ teeth as rigid bodies; contacts reach as far as the eyeballs' size says.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from surface.fit.transfer.skin import Ball, Skin, behind_lids, close_lips, follo
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Group, Head, HeadData, PartData
+from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.model.parameters import read_pose
 from surface.head.posing.rig import SkinRig
 
@@ -23,6 +25,7 @@ STRETCH = (0.6, 1.6)  # least and greatest stretch of a displacement
 RIGID = ("teeth", "gums", "tongue")
 SOCKETS = "sockets"
 CONTACT_PASSES = 2
+LONGEST_MM = 2.2  # of the edges of triangles that follow a scan's detail
 
 
 def warp_head(
@@ -34,7 +37,7 @@ def warp_head(
     """
     data = head.data
     old, new = Ball(data.eyes, data.eye_radius), Ball(*place_eyes(template, warp))
-    skins = _skins(head, warp, matcher, old, new)
+    skins, finer = _skins(head, warp, matcher, old, new)
     lips = next(c for c in data.contacts if c.name == "lips")
     face = skins[lips.part]
     crowns = [p.vertices for p in head.parts if p.material == "teeth"]
@@ -42,7 +45,7 @@ def warp_head(
     if crowns:
         teeth = behind_skin(teeth, np.concatenate(crowns).astype(float), face.rest, face.at)
     parts = []
-    for part in data.parts:
+    for part in (finer.get(p.name, p) for p in data.parts):
         if part.follows in ("left_eye", "right_eye"):
             side = int(part.follows == "right_eye")
             points = new.centres[side] + new.radius / old.radius * (part.points - old.centres[side])
@@ -64,24 +67,27 @@ def warp_head(
         eye_radius=new.radius, jaw=place_jaw(data, warp), parts=parts,
         contacts=[replace(c, reach_mm=scale * c.reach_mm) for c in data.contacts],
     )  # fmt: skip
-    return with_contacts_solved(warped)
+    return with_triangles(with_contacts_solved(warped), tuple(skins))
 
 
-def _skins(head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball) -> dict[str, Skin]:
-    """The visible parts of skin, moved onto the scan; by name."""
+def _skins(
+    head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball
+) -> tuple[dict[str, Skin], dict[str, PartData]]:  # fmt: skip
+    """The visible parts of skin, moved onto the scan, and the same parts of the head with as many control points as
+    they need there; both by name."""
     rims, scale = rims_of(head), new.radius / old.radius
     lips = next(c for c in head.data.contacts if c.name == "lips")
-    out = {}
+    data, out, finer = {p.name: p for p in head.data.parts}, {}, {}
     for part in head.parts:
         if part.follows == "skin" and part.material == "skin" and part.name != SOCKETS:
-            skin = Skin(part, rims, warp, old)
+            skin = Skin(part, rims, warp, old, LONGEST_MM * scale)
             skin.follow(matcher, scale)
             skin.at = seat_on_eyeballs(skin.at, skin.rest, old, new)
-            skin.solve()
+            finer[part.name] = skin.solve(data[part.name], head.data.jaw)
             if part.name == lips.part:
                 close_lips(skin, lips, scale)
             out[part.name] = skin
-    return out
+    return out, finer
 
 
 def stretches(warp: Warp, points: Floats) -> Floats:
@@ -110,3 +116,13 @@ def with_contacts_solved(head: HeadData) -> HeadData:
         points = [SkinRig(p, head).apply(rest).copy() if p.follows == "skin" else p.points for p in head.parts]
         head = replace(head, parts=[replace(p, points=at) for p, at in zip(head.parts, points, strict=True)])
     return head
+
+
+def with_triangles(head: HeadData, names: Sequence[str]) -> HeadData:
+    """The head whose parts of these names are tessellated anew: they bend elsewhere than in the form they had."""
+
+    def drawn(part: PartData) -> PartData:
+        mesh = tessellate(part, make_surface(part), head.seams)
+        return replace(part, mesh=pack(mesh, part.budget))
+
+    return replace(head, parts=[drawn(p) if p.name in names else p for p in head.parts])

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from small_head import sheet
+from small_head import JAW, sheet
+from small_head import part as small_part
 
 from surface.fit.transfer import skin as module
 from surface.fit.transfer.register import Matcher, Matches
@@ -100,7 +101,7 @@ def test_the_surface_is_put_where_the_skin_lies() -> None:
     made = Skin(part, RIM, lambda p: p, FAR)
     goal = part.surface.points * [1.1, 0.9, 1.0] + [0, 0, 5.0]
     made.at = part.surface.with_points(goal).evaluate(part.mesh.uv)
-    made.solve()
+    assert len(made.solve(small_part("face", 0.0), JAW).points) == 25
     np.testing.assert_allclose(made.points, goal, atol=0.3)
     np.testing.assert_allclose(made.at, part.surface.with_points(made.points).evaluate(part.mesh.uv), atol=1e-9)
 
@@ -112,7 +113,7 @@ def test_control_points_follow_waves_that_their_net_is_fine_enough_for(root: Pat
     x, y = 2 * np.pi / 48.0 * made.rest[:, :2].T
     made.at = made.rest + np.column_stack([0 * x, 0 * x, np.sin(x) * np.sin(y)])
     wanted = made.at.copy()
-    made.solve()
+    assert len(made.solve(head.data.parts[0], head.data.jaw).points) == len(head.data.parts[0].points)
     assert np.sqrt(((made.at - wanted) ** 2).sum(axis=1).mean()) < 0.022
 
 

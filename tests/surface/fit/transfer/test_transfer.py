@@ -64,14 +64,18 @@ def made(scan_file):
 
 
 def corresponding(shipped: Head, head: Head, pose: dict[str, float]) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices of both faces in a pose, those at the front; they have the same (u, v)."""
+    """Places of both faces in a pose, those of the shipped head's vertices at the front; they have the same (u, v),
+    which does not hold for the vertices, because a head is tessellated in its own form."""
     out = []
-    front = shipped.part("face").mesh.uv
+    mesh = shipped.part("face").mesh
+    front = mesh.uv
     rest = shipped.part("face").surface.evaluate(front)
     chosen = (rest[:, 2] > 60) & (rest[:, 1] > -80) & (rest[:, 1] < 80)
     for h in (shipped, head):
         h.pose(h.values(pose))
-        out.append(h.part("face").vertices[: len(front)][chosen].astype(float))
+        face = h.part("face")
+        weights = face.surface.basis_matrix(front, side=mesh.side)
+        out.append((weights @ face.control_points)[chosen])
         h.pose(h.values({}))
     return out[0], out[1]
 

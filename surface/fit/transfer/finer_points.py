@@ -1,0 +1,112 @@
+"""Fit control points to skin on a scan, and split those that are too far apart for its detail, a few times over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+from scipy.sparse import csr_matrix, identity
+
+from surface.base.arrays import Floats, Ints
+from surface.dcp import DCPSurface
+from surface.fit.points.solve import normal_equations
+from surface.fit.transfer.finer_mesh import FineMesh
+from surface.fit.transfer.split_points import how_many, split_points
+from surface.head import Jaw, PartData
+from surface.head.model.meshes import make_surface
+
+FAIR = 1e-4  # weight of fairness
+ROUNDS = 3  # of splitting points
+GROWTH = 1.8  # most points of a part, relative to those it had
+SHARE = 0.6  # of the points that are left to be added, how many a round adds
+ENOUGH_MM = 0.25  # RMS error around a control point up to which it is not split
+CLOSEST_MM = 3.0  # least distance of the knots of a point that is split: finer ones would follow a scanner's noise
+LEAST_SHARE = 0.04  # of a place, that a control point has to be counted there
+
+
+@dataclass(frozen=True)
+class FittedPart:
+    """A part with as many control points as its form needs, their places ``points (k, 3)`` in the new form, and the
+    skin's places ``at (n, 3)``. The part itself has the form and the expressions that it had."""
+
+    part: PartData
+    surface: DCPSurface
+    points: Floats
+    at: Floats
+
+
+def fit_points(part: PartData, mesh: FineMesh, at: Floats, counts: Floats, jaw: Jaw) -> FittedPart:
+    """Fit a part's surface to skin ``at (n, 3)`` over a mesh, with more control points where it needs them.
+
+    counts : (n,) 0..1, how much an error matters there. jaw : the path of the jaw, for its expressions.
+    """
+    most = int(GROWTH * len(part.points))
+    for left in range(ROUNDS, -1, -1):
+        surface = make_surface(part)
+        basis = surface.basis_matrix(mesh.uv, side=mesh.side)
+        points = surface.points + solve_moves(surface, basis, at - basis @ surface.points)
+        if not left:
+            break
+        error = counts * ((basis @ points - at) ** 2).sum(axis=1)
+        chosen = too_far_apart(part, basis, error, points)
+        room = most - len(part.points)
+        chosen = chosen[: how_many(part, chosen, room if left == 1 else int(SHARE * room))]
+        if not len(chosen):
+            break
+        part = split_points(part, chosen, jaw)
+    return FittedPart(part, surface, points, basis @ points)
+
+
+def solve_moves(surface: DCPSurface, basis: csr_matrix, moves: Floats) -> Floats:
+    """(k, 3) moves of control points that move the surface by ``moves (n, 3)`` at the samples of ``basis (n, k)``.
+
+    As :func:`surface.fit.points.solve.solve`, for control points that have weights.
+    """
+    n = surface.n
+    normal, right = normal_equations(basis, np.ones(len(moves)), moves)
+    fair = (identity(n) - surface.basis_matrix(centres(surface))).tocsr()
+    strength = len(moves) / n
+    normal += (FAIR * strength * (fair.T @ fair)).toarray()
+    normal[np.diag_indices(n)] += 1e-7 * strength
+    solved: Floats = cho_solve(cho_factor(normal, check_finite=False), right, check_finite=False)
+    return solved
+
+
+def centres(surface: DCPSurface) -> Floats:
+    """(k, 2) the middle of each control point's knots, inside its support also beside a slit."""
+    middles: Floats = np.column_stack([knots[:, 1:4].mean(axis=1) for knots in surface.padded])
+    return middles
+
+
+def too_far_apart(part: PartData, basis: csr_matrix, error: Floats, points: Floats) -> Ints:
+    """Control points that may be split, those with the greatest errors first.
+
+    At every sample these are the finest ones that have a share of it. error : (n,) mm² at the samples of ``basis``.
+    """
+    span, n = _spans_mm(part, points), len(points)
+    shares = basis.tocsr()
+    kept = shares.data > LEAST_SHARE
+    row = np.repeat(np.arange(shares.shape[0]), np.diff(shares.indptr))[kept]
+    column, share = shares.indices[kept], shares.data[kept]
+    finest = np.full(shares.shape[0], np.inf)
+    np.minimum.at(finest, row, span[column])
+    own = span[column] < 1.5 * finest[row]
+    weight = np.bincount(column[own], share[own], n)
+    rms = np.sqrt(np.bincount(column[own], (share * error[row])[own], n) / np.maximum(weight, 1e-12))
+    able = (rms > ENOUGH_MM) & (span > CLOSEST_MM) & (part.lids == 0.0) & bool((part.degrees == 3).all())
+    order = np.argsort(-np.where(able, rms, 0.0), kind="stable")
+    ids: Ints = order[: int(able.sum())]
+    return ids
+
+
+def _spans_mm(part: PartData, points: Floats) -> Floats:
+    """(k,) mean distance of neighbouring knots of each control point, the geometric mean of both directions, mm."""
+    surface = make_surface(replace(part, points=points))
+    _, along_u, along_v = surface.derivatives(centres(surface))
+    u, v = (
+        np.linalg.norm(along, axis=1) * (knots[:, 4] - knots[:, 0]) / 4.0
+        for along, knots in zip((along_u, along_v), surface.padded, strict=True)
+    )
+    span: Floats = np.sqrt(u * v)
+    return span
