@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from surface.head import Head  # imported lazily: not needed for --help
 
 _NO_SHADE = "no OpenGL here: the head has no baked shading; for a better picture, fit it on a machine with OpenGL"
-_NO_SHAPES = "the mesh has no shapes of a face: --expressions-from ict transfers the expressions of another head to it"
+_FEW_SHAPES = (
+    "the mesh has few shapes of a face, or none: --expressions-from ict transfers the expressions of another head to it"
+)
 Identity = Annotated[
     str | None,
     typer.Option(
@@ -317,7 +319,7 @@ def _fit_remarks(found: FitReport, shaded: bool) -> list[str]:
     lines = [face_bounds(found), *filter(None, [kinds_line(found)]), *found.notes]
     lines += [f"no shape for {missing}: these parameters will not move this head"] if missing else []
     lines += [f"left out, not ARKit's: {left_out}"] if left_out else []
-    lines += [_NO_SHAPES] if all(name.startswith("eyeLook") for name in found.parameters) else []
+    lines += [_FEW_SHAPES] if len(found.missing) > len(found.parameters) or not found.parameters else []
     lines += [] if shaded else [_NO_SHADE]
     lines += found.dense.lines()[::-1] if found.dense else []
     return lines + [f"written by --force: {fault}" for fault in found.faults]
