@@ -100,7 +100,7 @@ def _middle(placed: Floats, eyes: Floats | None, size: HeadSize) -> Floats:
 def _accessory(worn: FitMesh, k: int, placed: Floats, middle: Floats, scale: float) -> Accessory:
     """One piece, with a vertex for each of its texture coordinates and normals."""
     own, hair = worn.piece == k, kind_of(worn.pieces[k]).name == "hair"
-    tri, rows = triangles(worn.faces[own]), triangles(worn.face_uv[own])
+    tri, rows = triangles(worn.faces[own]), triangles(worn.face_uv[own], worn.faces[own])
     material = (worn.materials[k] if worn.materials else None) or Material()
     normals = corner_normals(placed, tri)
     normals = _rounded(normals, placed[tri], middle) if hair else normals

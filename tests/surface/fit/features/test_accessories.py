@@ -103,6 +103,16 @@ def test_what_is_worn_far_from_the_head_is_left_out_but_hair_never_is():
     assert len(keep_accessories(worn, Placement(), None, HeadSize()).accessories) == 3  # nobody knows where the head is
 
 
+@pytest.mark.parametrize("bare", [[0, 1], [1]])
+def test_quads_without_texture_coordinates_are_kept_too(bare):
+    two = strips([(0, 30, 100), (30, 30, 100)], ("Hat", "b"), Material("m", texture=picture(RED), mime="image/png"))
+    rows = two.face_uv.copy()
+    rows[bare] = -1
+    worn = replace(two, face_uv=rows, piece=np.zeros(2, np.int64), pieces=("Hat",), materials=two.materials[:1])
+    found = keep_accessories(worn, Placement(), EYES, HeadSize()).accessories
+    assert sum(len(one.triangles) for one in found) == 4
+
+
 def test_opacity_counts_only_where_something_is_clear():
     hole = Material("h", texture=picture(RED, hole=True), mime="image/png", alpha="MASK", cutoff=0.3, two_sided=False)
     at = [(0.0, 30.0, 100.0)]
