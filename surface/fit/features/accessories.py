@@ -25,6 +25,7 @@ from surface.readers.meshdata import Material
 
 CREASE_DEG = 55.0  # faces that meet at a sharper angle do not share their normals
 MOST_PAIRS = 20_000_000  # of corners of faces at one vertex; a mesh with more gets smooth normals
+PAIRS_AT_ONCE = 1_000_000  # that are held in memory together, 100 bytes each; a vertex with more gets smooth normals
 ROUND = 1.6  # of hair: weight of directions from the middle of the head beside its cards' own normals
 SKULL = np.array([0.0, -15.0, -75.0])  # from the middle of the eyes to that of the hair, mm, on a head of usual size
 DEEP_MM, DARKEST = 30.0, 0.5  # of a head of usual size: how deep in hair it is darkest; how dark, linear
@@ -162,23 +163,25 @@ def corner_normals(points: Floats, tri: Ints) -> Floats:
     direction = face / np.maximum(area, 1e-30)
     order = np.argsort(tri.ravel(), kind="stable")
     _, first, count = np.unique(tri.ravel()[order], return_index=True, return_counts=True)
-    if float((count.astype(float) ** 2).sum()) > MOST_PAIRS:
+    pairs = np.cumsum(count.astype(float) ** 2)
+    if pairs[-1] > MOST_PAIRS or count.max() ** 2 > PAIRS_AT_ONCE:
         return _smooth(points, tri, face)
-    mine, other = _pairs(first, count)
-    a, b = order[mine] // 3, order[other] // 3
-    soft = (direction[a] * direction[b]).sum(axis=1) > np.cos(np.radians(CREASE_DEG))
     out = np.zeros((tri.size, 3))
-    for axis in range(3):
-        out[:, axis] = np.bincount(order[mine[soft]], face[b[soft], axis], tri.size)
+    for runs in np.split(np.arange(len(count)), np.flatnonzero(np.diff(pairs // PAIRS_AT_ONCE)) + 1):
+        mine, other = _pairs(first[runs], count[runs])
+        a, b = order[mine] // 3, order[other] // 3
+        soft = (direction[a] * direction[b]).sum(axis=1) > np.cos(np.radians(CREASE_DEG))
+        np.add.at(out, order[mine[soft]], face[b[soft]])
     return _unit(out).reshape(*tri.shape, 3)
 
 
 def _pairs(first: Ints, count: Ints) -> tuple[Ints, Ints]:
-    """All pairs within runs that begin at ``first`` and are ``count`` long, each with itself, too."""
+    """All pairs within runs that begin at ``first``, one after the other, and are ``count`` long, each with itself,
+    too."""
     run = np.repeat(np.arange(len(count)), count)
     of = np.repeat(np.arange(len(run)), count[run])
     start = np.concatenate([[0], np.cumsum(count[run])[:-1]])
-    return of, first[run][of] + np.arange(len(of)) - start[of]
+    return of + first[0], first[run][of] + np.arange(len(of)) - start[of]
 
 
 def _smooth(points: Floats, tri: Ints, face: Floats) -> Floats:

@@ -13,6 +13,7 @@ from PIL import Image
 from slit_sheet import slit_sheet
 
 from surface.fit import fit_head
+from surface.fit.features import accessories
 from surface.fit.features.accessories import DARKEST, corner_normals, keep_accessories, make_accessories
 from surface.fit.source.load import LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh
@@ -139,6 +140,18 @@ def test_normals_are_shared_by_faces_that_meet_softly_and_not_at_an_edge():
     hard = corner_normals(points, tri)
     np.testing.assert_allclose(hard[0], np.tile([0, 0, 1.0], (3, 1)), atol=1e-9)
     np.testing.assert_allclose(hard[1], np.tile([1.0, 0, 0], (3, 1)), atol=1e-9)
+
+
+def test_normals_of_large_meshes_are_made_in_blocks(monkeypatch):
+    x, y = np.meshgrid(np.arange(9.0), np.arange(9.0))
+    points = np.column_stack([x.ravel(), y.ravel(), np.sin(2.0 * x.ravel())])
+    k = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    tri = np.concatenate([np.column_stack([k, k + 1, k + 10]), np.column_stack([k, k + 10, k + 9])])
+    whole, sizes, pairs = corner_normals(points, tri), list[int](), accessories._pairs
+    monkeypatch.setattr(accessories, "_pairs", lambda *a: (found := pairs(*a), sizes.append(len(found[0])))[0])
+    monkeypatch.setattr(accessories, "PAIRS_AT_ONCE", 100)
+    np.testing.assert_array_equal(corner_normals(points, tri), whole)
+    assert len(sizes) > 10 and max(sizes) <= 200
 
 
 def test_cards_of_hair_look_outwards_and_are_darker_below_others():
