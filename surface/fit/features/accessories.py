@@ -120,7 +120,7 @@ def _accessory(worn: FitMesh, k: int, placed: Floats, middle: Floats, scale: flo
 
 def _coloured(made: Accessory, material: Material, *, mapped: bool) -> Accessory:
     """An accessory with the colours of its material; one of which nothing is clear is solid, whatever that says."""
-    picture, clear = reduced_picture(material) if mapped and material.texture is not None else (b"", False)
+    picture, clear, _ = reduced_picture(material) if mapped and material.texture is not None else (b"", False, "")
     alpha = material.alpha if clear or material.colour[3] < 1.0 else "OPAQUE"
     return replace(made, colour=material.colour, texture=picture, alpha=alpha, cutoff=material.cutoff)
 
