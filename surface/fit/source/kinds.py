@@ -28,6 +28,7 @@ SHORT_ENDINGS = (
     "brows",
     "hair",
 )  # shorter entries that are also found at the end of a longer word
+WHITE = (1.0, 1.0, 1.0)
 SKIN, PROP = "skin", "prop"
 MAX_NAMES = 4  # of pieces of one kind that a note lists
 FACE_MOTION = 0.5  # of the largest motion: a piece that shapes move this far belongs to the face, whatever its name
@@ -41,19 +42,23 @@ class Kind:
     name : "skin", "iris", "hair" and so on. rule : "skin", "part", "eye" or "out", as the table explains.
     material : by which a head draws it; "skin" for what is drawn as no part of its own.
     worn : whether a head keeps it as it is, unless shapes move it.
+    colour : linear RGB of what is worn, where the mesh does not say.
     """
 
     name: str
     rule: str
     material: str
     worn: bool = False
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @cache
 def kinds() -> dict[str, Kind]:
     """All kinds by name."""
     return {
-        name: Kind(name, row["rule"], row.get("material", SKIN), row.get("worn", False))
+        name: Kind(
+            name, row["rule"], row.get("material", SKIN), row.get("worn", False), tuple(row.get("colour", WHITE))
+        )
         for name, row in _table().items()
     }
 
