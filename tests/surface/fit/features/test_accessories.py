@@ -15,12 +15,13 @@ from slit_sheet import slit_sheet
 from surface.fit import fit_head
 from surface.fit.features import accessories
 from surface.fit.features.accessories import DARKEST, corner_normals, keep_accessories, make_accessories
+from surface.fit.source.kinds import kinds
 from surface.fit.source.load import LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.placing.place import HeadSize
 from surface.head import Head
 from surface.head.model.placement import Placement
-from surface.readers.meshdata import Material
+from surface.readers.meshdata import Material, linear
 
 EYES = np.array([0.0, 36.0, 84.0])
 
@@ -104,14 +105,66 @@ def test_what_is_worn_far_from_the_head_is_left_out_but_hair_never_is():
     assert len(keep_accessories(worn, Placement(), None, HeadSize()).accessories) == 3  # nobody knows where the head is
 
 
-@pytest.mark.parametrize("bare", [[0, 1], [1]])
-def test_quads_without_texture_coordinates_are_kept_too(bare):
-    two = strips([(0, 30, 100), (30, 30, 100)], ("Hat", "b"), Material("m", texture=picture(RED), mime="image/png"))
+PAINTED = Material("m", texture=picture(RED), mime="image/png")
+
+
+def one_hat(bare: list[int], material: Material) -> FitMesh:
+    """Two quads that are one hat; those of ``bare`` have no texture coordinates."""
+    two = strips([(0, 30, 100), (30, 30, 100)], ("Hat", "b"), material)
     rows = two.face_uv.copy()
     rows[bare] = -1
-    worn = replace(two, face_uv=rows, piece=np.zeros(2, np.int64), pieces=("Hat",), materials=two.materials[:1])
-    found = keep_accessories(worn, Placement(), EYES, HeadSize()).accessories
-    assert sum(len(one.triangles) for one in found) == 4
+    return replace(two, face_uv=rows, piece=np.zeros(2, np.int64), pieces=("Hat",), materials=(material,))
+
+
+def test_quads_without_texture_coordinates_are_kept_in_one_colour():
+    kept = keep_accessories(one_hat([0, 1], PAINTED), Placement(), EYES, HeadSize())
+    (hat,) = kept.accessories
+    assert len(hat.triangles) == 4 and hat.texture == b"" and hat.colour == (*kinds()["hat"].colour, 1.0)
+    assert kept.notes == [
+        "kept as they are, in one colour: hat 'Hat'",
+        "without their texture, some of their faces have no texture coordinates: 'Hat'",
+    ]
+
+
+def test_faces_with_texture_coordinates_keep_their_texture_and_others_get_its_mean_colour():
+    kept = keep_accessories(one_hat([1], PAINTED), Placement(), EYES, HeadSize())
+    full, bare = kept.accessories
+    assert full.texture and not bare.texture and len(full.triangles) == len(bare.triangles) == 2
+    assert full.vertices[:, 0].max() < 15 < bare.vertices[:, 0].min()
+    np.testing.assert_allclose(bare.colour, (*linear(np.array(RED[:3]) / 255.0), 1.0), atol=1e-6)
+    assert kept.notes[0] == "kept as they are, with their texture: hat 'Hat'"
+    assert kept.notes[1] == "kept as they are, in one colour: hat 'Hat'"
+
+
+@pytest.mark.parametrize(("given", "why"), [
+    ({"texture": b"\x89PNG broken", "mime": "image/png"}, "its picture cannot be read"),
+    ({"texture": None, "lost": "its picture is missing"}, "its picture is missing"), ({"texture": None}, ""),
+])  # fmt: skip
+@pytest.mark.parametrize(("colour", "wanted"), [
+    ((1.0, 1.0, 1.0, 0.5), (*kinds()["hat"].colour, 0.5)), ((0.1, 0.2, 0.3, 1.0), (0.1, 0.2, 0.3, 1.0)),
+])  # fmt: skip
+def test_a_lost_texture_is_said_and_white_becomes_the_colour_of_the_kind(given, why, colour, wanted):
+    kept = keep_accessories(one_hat([], Material("m", colour, **given)), Placement(), EYES, HeadSize())
+    (hat,) = kept.accessories
+    assert hat.texture == b"" and hat.colour == wanted
+    assert kept.notes[0] == "kept as they are, in one colour: hat 'Hat'"
+    assert [why in note and "'Hat'" in note for note in kept.notes[1:]] == [True] * bool(why)
+
+
+def test_grey_beside_a_lost_texture_tells_nothing():
+    lost = Material("m", (0.8, 0.8, 0.8, 1.0), lost="its picture is missing")
+    for material, wanted in ((lost, kinds()["hat"].colour), (replace(lost, lost=""), (0.8, 0.8, 0.8))):
+        (hat,) = keep_accessories(one_hat([], material), Placement(), EYES, HeadSize()).accessories
+        assert hat.colour[:3] == wanted
+
+
+def test_texture_coordinates_far_from_all_others_count_as_none():
+    hat = one_hat([], PAINTED)
+    uv = hat.uv + 7.25
+    uv[4:] += 2e5
+    full, bare = keep_accessories(replace(hat, uv=uv), Placement(), EYES, HeadSize()).accessories
+    assert full.uv.min() >= 0.0 and full.uv.max() <= 2.0 and len(bare.triangles) == 2
+    assert not bare.uv.any()
 
 
 def test_opacity_counts_only_where_something_is_clear():

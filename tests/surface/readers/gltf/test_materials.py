@@ -103,8 +103,8 @@ def test_damage_in_colours_refuses_no_mesh(tmp_path, material):
 
 def test_a_texture_that_cannot_be_read_is_said(tmp_path):
     for number, coordinates, data, why in (
-        (9, 0, PNG, "its picture is missing"), (0, 0, b"no picture", "no PNG, JPEG or WebP"), (0, 1, PNG, "second texture"),
-        (0, 0, PNG, ""),
+        (9, 0, PNG, "its picture is missing"), (0, 0, b"no picture", "no PNG, JPEG or WebP"),
+        (0, 1, PNG, "second texture"), (0, 0, PNG, ""),
     ):  # fmt: skip
         table = {"pbrMetallicRoughness": {"baseColorTexture": {"index": number, "texCoord": coordinates}}}
         found = read(tmp_path, coloured(table, data))
