@@ -175,7 +175,7 @@ def _places(at: Floats, rows: Ints) -> tuple[Floats, Bools]:
     """Places (t, 3, 2) of triangles in a texture, of rows (t, 3) among all (n, 2), less whole repeats, so that small
     floats hold them exactly; and which triangles (t,) have any that are not far from all others. Others get 0."""
     uv = np.vstack([at, np.zeros((1, 2))])[rows]
-    mapped: Bools = (rows >= 0).all(axis=1)
+    mapped: Bools = np.all(rows >= 0, axis=1)
     if mapped.any():
         ranked = uv[mapped, 0]
         middle = ranked[np.argsort(ranked[:, 0])[(len(ranked) - 1) // 2]]
