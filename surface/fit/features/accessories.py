@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
+from surface.fit.features.worn_limits import some_triangles, within_limits
 from surface.fit.source.kinds import kind_of, kinds, listed
 from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh, face_areas, triangles
@@ -76,16 +77,23 @@ def keep_accessories(
         found += made
         if why:
             lost.setdefault(why, []).append(name)
-    notes = [*_kept_notes(found), *(f"without their texture, {why}: {listed(names)}" for why, names in lost.items())]
+    limited = within_limits(found)
+    notes = [
+        *_kept_notes(found, limited.gone),
+        *(f"without their texture, {why}: {listed(names)}" for why, names in lost.items()),
+    ]
     notes += [f"left out, because it is not worn on the head: {listed(gone)}"] * bool(gone)
-    pieces = {name: f"{kind}, left out" if name in gone else f"{kind}, kept as it is" for name, kind in named.items()}
-    return Kept(tuple(found), notes, pieces)
+    out = {*gone, *limited.gone}
+    pieces = {name: f"{kind}, left out" if name in out else f"{kind}, kept as it is" for name, kind in named.items()}
+    return Kept(limited.accessories, notes + limited.notes, pieces)
 
 
-def _kept_notes(found: list[Accessory]) -> list[str]:
-    """What is kept with a texture, and what in one colour, by kind."""
+def _kept_notes(found: list[Accessory], gone: list[str]) -> list[str]:
+    """What is kept with a texture, and what in one colour, by kind; not what is ``gone``."""
     every = dict[tuple[bool, str], dict[str, None]]()
     for one in found:
+        if one.name in gone:
+            continue
         every.setdefault((bool(one.texture), one.kind), {})[one.name] = None
     rows = ((how, [f"{kind} {listed([*names])}" for (has, kind), names in every.items() if has == how])
             for how in (True, False))  # fmt: skip
@@ -162,13 +170,6 @@ def _plain(made: Accessory, material: Material, picture: bytes, lost: str) -> tu
     told = np.ptp(colour) > 0.0 or not (lost or (colour == 1.0).all())
     r, g, b = (colour if told else kinds()[made.kind].colour) if mean is None else (colour * mean).tolist()
     return float(r), float(g), float(b), material.colour[3]
-
-
-def some_triangles(accessory: Accessory, which: Bools | Ints) -> Accessory:
-    """An accessory with some of its triangles, and the vertices of these."""
-    used, corner = np.unique(accessory.triangles[which], return_inverse=True)
-    rows = {key: getattr(accessory, key)[used] for key in ("vertices", "normals", "uv", "shade")}
-    return replace(accessory, triangles=corner.reshape(-1, 3).astype(np.int32), **rows)
 
 
 def _places(at: Floats, rows: Ints) -> tuple[Floats, Bools]:

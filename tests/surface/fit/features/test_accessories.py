@@ -20,6 +20,7 @@ from surface.fit.source.load import LoadOptions, load_mesh
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.placing.place import HeadSize
 from surface.head import Head
+from surface.head.model.accessories import fault_of
 from surface.head.model.placement import Placement
 from surface.readers.meshdata import Material, linear
 
@@ -165,6 +166,18 @@ def test_texture_coordinates_far_from_all_others_count_as_none():
     full, bare = keep_accessories(replace(hat, uv=uv), Placement(), EYES, HeadSize()).accessories
     assert full.uv.min() >= 0.0 and full.uv.max() <= 2.0 and len(bare.triangles) == 2
     assert not bare.uv.any()
+
+
+def test_more_pieces_than_a_head_can_hold_are_kept_within_its_limits():
+    names = (*(f"Hair {k}" for k in range(300)), "Hat " + 300 * "a")
+    kept = keep_accessories(strips([(0, 30, 100)] * 301, names, PAINTED), Placement(), EYES, HeadSize())
+    assert len(kept.accessories) == 2 and fault_of(*kept.accessories) == ""
+    assert any("joined" in note for note in kept.notes) and any("cut to 256 letters" in note for note in kept.notes)
+    assert set(kept.pieces.values()) == {"hair, kept as it is", "hat, kept as it is"}
+    far = replace(strips([(0, 30, 100), (1e6, 0, 0)], ("Hair a", "Hair b"), PAINTED))
+    kept = keep_accessories(far, Placement(), EYES, HeadSize())
+    assert [one.name for one in kept.accessories] == ["Hair a"] and kept.pieces["Hair b"] == "hair, left out"
+    assert "'Hair b'" in kept.notes[-1] and "'Hair b'" not in kept.notes[0]
 
 
 def test_opacity_counts_only_where_something_is_clear():
