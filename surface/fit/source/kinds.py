@@ -100,11 +100,12 @@ def worn_faces(mesh: FitMesh) -> Bools:
     worn = np.zeros(len(mesh.faces), bool)
     named = [k for k, name in enumerate(mesh.pieces) if kind_of(name).worn]
     far = np.abs(mesh.deltas).max(axis=(0, 2), initial=0.0) if named else np.zeros(0)  # how far each vertex moves
+    far[~np.isfinite(far)] = 0.0  # what is damaged is found later
     for k in named:
         own = mesh.piece == k
         used = np.unique(mesh.faces[own])
         least = HAIR_MOTION if kind_of(mesh.pieces[k]).rule == "part" else FACE_MOTION
-        moved = far[used[used >= 0]].max(initial=0.0)
+        moved = far[used[(used >= 0) & (used < len(far))]].max(initial=0.0)
         if not moved or moved < least * far.max():
             worn |= own
     return worn if not worn.all() else np.zeros(len(mesh.faces), bool)

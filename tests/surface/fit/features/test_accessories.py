@@ -15,8 +15,8 @@ from slit_sheet import slit_sheet
 from surface.fit import fit_head
 from surface.fit.features import accessories
 from surface.fit.features.accessories import DARKEST, corner_normals, keep_accessories, make_accessories
-from surface.fit.source.kinds import kinds
-from surface.fit.source.load import LoadOptions, load_mesh
+from surface.fit.source.kinds import kinds, worn_faces
+from surface.fit.source.load import LoadOptions, load_mesh, worn_mesh
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.placing.place import HeadSize
 from surface.head import Head
@@ -229,6 +229,42 @@ def test_cards_of_hair_look_outwards_and_are_darker_below_others():
     assert (hair.normals[:, 2] > 0.5).all()
     outer = hair.vertices[:, 2] > 100
     assert (hair.shade[outer] > 0.95).all() and (hair.shade[~outer] < 0.5 * (1.0 + DARKEST)).all()
+
+
+@pytest.mark.parametrize(("damage", "why"), [
+    ("v 1e30 0 0", "a vertex is not a finite number of usable size"),
+    ("v 20.000000 120.000000 10.000000", "all its vertices are in one place"),
+    ("f 99999/1 2/1 3/1", "a face points at what is not there"),
+    ("f 1/99999 2/1 3/1", "a face points at what is not there"),
+])  # fmt: skip
+def test_a_damaged_piece_costs_the_head_that_piece_only(tmp_path, damage, why):
+    from surface.fit.transfer.scan import read_scan
+
+    path = dressed_file(tmp_path)
+    first = len(slit_sheet().vertices) + 4  # of the hat
+    for file in (path, tmp_path / "m_shapes" / "jawOpen.obj"):
+        lines = file.read_text().splitlines()
+        vertices = [k for k, line in enumerate(lines) if line.startswith("v ")][first : first + 4]
+        face = lines.index("o Hat") + 2
+        for k in [face] if damage.startswith("f") else vertices[: 1 if "20." not in damage else 4]:
+            lines[k] = damage
+        file.write_text("\n".join(lines) + "\n")
+    loaded, scan = load_mesh(path, LoadOptions(unit="mm")), read_scan(path)
+    assert [one.name for one in make_accessories(loaded).accessories] == ["Hair/Red"]
+    for notes in (loaded.notes, scan.notes):
+        assert f"'Hat/Red' left out, because {why}" in notes
+    assert scan.worn is not None and len(scan.worn.faces) == 1
+
+
+def test_numbers_that_are_none_in_one_piece_leave_the_others():
+    two = strips([(0, 30, 100), (30, 30, 100)], ("Hat", "Hair"), Material())
+    two.vertices[1, 2] = np.nan
+    moved = replace(two, names=("jawOpen",), deltas=np.full((1, 8, 3), np.nan))  # as a shape minus what is none
+    assert worn_faces(replace(moved, pieces=("Hat", "Face"))).tolist() == [True, False]
+    worn, notes = worn_mesh(moved, np.ones(2, bool), "m")
+    assert worn is not None and len(worn.faces) == 1 and np.isfinite(worn.vertices).all()
+    assert notes == ["'Hat' left out, because a vertex is not a finite number of usable size"]
+    assert worn_mesh(moved, np.array([True, False]), "m")[0] is None
 
 
 def test_a_scan_keeps_them_too(tmp_path):
