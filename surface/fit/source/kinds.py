@@ -167,7 +167,8 @@ def _moves(mesh: FitMesh, own: Bools) -> bool:
     """Whether shapes move some faces (f,) nearly as far as they move anything."""
     used = np.unique(mesh.faces[own])
     most = np.abs(mesh.deltas).max(initial=0.0)
-    return bool(most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= FACE_MOTION * most)
+    used = used[(used >= 0) & (used < len(mesh.vertices))]
+    return bool(most > 0 and np.abs(mesh.deltas[:, used]).max(initial=0.0) >= FACE_MOTION * most)
 
 
 @cache

@@ -181,8 +181,9 @@ def wanted_faces(mesh: FitMesh | MeshData, words: tuple[str, ...], where: str) -
 
 
 def keep_faces(mesh: FitMesh, kept: Bools) -> FitMesh:
-    """The mesh with some faces (f,) bool and the vertices they use."""
+    """The mesh with some faces (f,) bool and the vertices they use; what points beyond all of them still does."""
     used, faces = renumbered(mesh.faces[kept])
+    used = used[used < len(mesh.vertices)]
     return replace(
         mesh, vertices=mesh.vertices[used], faces=faces, face_uv=mesh.face_uv[kept], deltas=mesh.deltas[:, used],
         piece=mesh.piece[kept] if len(mesh.piece) else mesh.piece,

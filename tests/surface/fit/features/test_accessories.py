@@ -12,6 +12,7 @@ from cards import RED, picture
 from PIL import Image
 from slit_sheet import slit_sheet
 
+from surface.base.errors import FitError
 from surface.fit import fit_head
 from surface.fit.features import accessories
 from surface.fit.features.accessories import DARKEST, corner_normals, keep_accessories, make_accessories
@@ -254,6 +255,22 @@ def test_a_damaged_piece_costs_the_head_that_piece_only(tmp_path, damage, why):
     for notes in (loaded.notes, scan.notes):
         assert f"'Hat/Red' left out, because {why}" in notes
     assert scan.worn is not None and len(scan.worn.faces) == 1
+
+
+@pytest.mark.parametrize(("name", "without", "refused"), [
+    ("Face", (), True), ("Hat", ("Boots",), False), ("Boots", (), False),
+])  # fmt: skip
+def test_a_face_that_points_nowhere_is_named_or_left_out(tmp_path, name, without, refused):
+    path = dressed_file(tmp_path)
+    lines = path.read_text().splitlines()
+    first = next(k for k in range(lines.index(f"o {name}"), len(lines)) if lines[k].startswith("f "))
+    path.write_text("\n".join([*lines[:first], "f 99999/1 2/1 3/1", *lines[first + 1 :]]) + "\n")
+    if refused:
+        with pytest.raises(FitError, match=r"faces\[0\] points at"):
+            load_mesh(path, LoadOptions(unit="mm"))
+    else:
+        loaded = load_mesh(path, LoadOptions(unit="mm", without=without))
+        assert any("left out" in note and name in note for note in loaded.notes)
 
 
 def test_numbers_that_are_none_in_one_piece_leave_the_others():
