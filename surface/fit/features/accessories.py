@@ -153,13 +153,11 @@ def _coloured(made: Accessory, mapped: Bools, material: Material) -> tuple[list[
         lost = lost or UNMAPPED * (not mapped.all())
     solid = material.alpha if material.colour[3] < 1.0 else "OPAQUE"
     made = replace(made, alpha=solid, cutoff=material.cutoff)
-    bare = replace(made, colour=_plain(made, material, picture, lost), uv=np.zeros_like(made.uv))
-    if not picture:
-        return [bare], lost
     full = replace(made, colour=material.colour, texture=picture, alpha=material.alpha if clear else solid)
-    if mapped.all():
+    if picture and mapped.all():
         return [full], lost
-    return [some_triangles(full, mapped), some_triangles(bare, ~mapped)], lost
+    bare = replace(made, colour=_plain(made, material, picture, lost), uv=np.zeros_like(made.uv))
+    return [some_triangles(full, mapped), some_triangles(bare, ~mapped)] if picture else [bare], lost
 
 
 def _plain(made: Accessory, material: Material, picture: bytes, lost: str) -> tuple[float, float, float, float]:

@@ -38,6 +38,12 @@ def test_very_many_pieces_are_joined_where_they_look_alike(tmp_path: Path) -> No
     assert len(read_accessories(tmp_path)) == 2
 
 
+def test_a_texture_that_ends_at_its_edge_is_not_joined_with_one_that_repeats(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worn_limits, "MOST", 2)
+    found = [card(), card(), replace(card(), uv=card().uv + np.float32(0.5))]
+    assert [one.repeats for one in within_limits(found).accessories] == [False, True]
+
+
 def test_those_beyond_the_most_that_look_different_are_left_out() -> None:
     found = [replace(card(), name=f"Hat.{k}", colour=(k / 300.0, 0.0, 0.0, 1.0)) for k in range(258)]
     limited = within_limits(found)
