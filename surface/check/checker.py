@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from surface.check import borders, motions, overlaps, spikes, stance
+from surface.check.accessories import damaged_textures
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import Mouth, find_mouth, lips_gap
 from surface.check.places import Places
@@ -24,6 +25,7 @@ def check_head(head: Head) -> list[Finding]:
     """
     subject = Subject(head)
     found = list(not_finite(subject)) or list(stance.wrong_unit(subject))
+    worn = list(damaged_textures(head))
     if not found:
         mouth = find_mouth(subject)
         places, edges = Places(subject, mouth), borders.find_borders(subject)
@@ -34,7 +36,7 @@ def check_head(head: Head) -> list[Finding]:
             *spikes.spikes(subject, places, edges), *overlaps.overlapping(subject, places),
         ]  # fmt: skip
     head.pose(head.values({}))
-    return found
+    return [*found, *worn]
 
 
 def not_finite(subject: Subject) -> Iterator[Finding]:

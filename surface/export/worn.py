@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from surface.base.arrays import Floats32
+from surface.base.pictures import decoded
 from surface.export.shapes import ExportPart, unit
 from surface.head import Head
 from surface.head.model.accessories import Accessory
@@ -76,18 +77,14 @@ def web_texture(accessory: Accessory) -> tuple[bytes, str]:
     """Return the texture, and its kind, of at most :data:`WEB_PIXELS`; as it is without Pillow, or where that is
     smaller."""
     kept = accessory.texture, accessory.mime
-    try:
-        from PIL import Image  # optional: the extra view
-    except ImportError:
-        return kept
     if not accessory.texture:
         return kept
     try:
-        with Image.open(io.BytesIO(accessory.texture)) as image:
-            clear = accessory.alpha != "OPAQUE" and "A" in image.getbands()
-            small = image.convert("RGBA" if clear else "RGB")
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        image = decoded(accessory.texture)
+    except (ImportError, ValueError):
         return kept
+    clear = accessory.alpha != "OPAQUE" and "A" in image.getbands()
+    small = image.convert("RGBA" if clear else "RGB")
     small.thumbnail((WEB_PIXELS, WEB_PIXELS))
     out, kind = io.BytesIO(), "PNG" if clear else "JPEG"
     small.save(out, kind, **({"optimize": True} if clear else {"quality": WEB_QUALITY}))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ from surface.base.arrays import Floats, Ints
 from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT, read_file, reading
 
+OTHER_PICTURE = "its picture is missing, or is no PNG, JPEG or WebP"
 PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg", b"RIFF": "image/webp"}  # by their first bytes
 MAX_VERTICES = 400_000
 MAX_MOVES = 40_000_000  # vertices times shapes; each takes 24 bytes
@@ -29,6 +30,7 @@ class Material:
     two_sided : whether backs of faces are drawn, too; so they are where the file does not say.
     image_of_uv : (2, 3) from (u, v, 1) of the mesh, v up, to x to the right and y down in pictures of size 1; pictures
         repeat beyond that. See :meth:`in_picture`.
+    lost : why a texture that the file names is none here; "" where it names none.
     """
 
     name: str = ""
@@ -39,6 +41,7 @@ class Material:
     cutoff: float = 0.5
     image_of_uv: tuple[tuple[float, float, float], tuple[float, float, float]] = ((1.0, 0.0, 0.0), (0.0, -1.0, 1.0))
     two_sided: bool = True
+    lost: str = field(default="", compare=False)
 
     def in_picture(self, uv: Floats) -> Floats:
         """Return places (t, 2) of texture coordinates (t, 2) in the texture: 0..1 to the right, 0..1 down."""

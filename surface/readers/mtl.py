@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from surface.base.errors import FitError
-from surface.readers.meshdata import Material, kind_of_picture, read_bytes
+from surface.readers.meshdata import OTHER_PICTURE, Material, kind_of_picture, read_bytes
+
+MAX_SHOWN = 80  # letters of a name in a message, the last ones
 
 
 def read_mtl(folder: Path, names: str) -> dict[str, Material]:
@@ -73,8 +75,14 @@ def _take(row: dict[str, Any], word: str, rest: str) -> None:
 
 def _material(folder: Path, name: str, row: dict[str, Any]) -> Material:
     """Return a material; a texture replaces the colour, which many programs write as grey beside it."""
-    data = _data(folder, row.get("texture", "")) or _data(folder, (row.get("texture", "").split() or [""])[-1])
+    named = row.get("texture", "")
+    data = _data(folder, named) or _data(folder, (named.split() or [""])[-1])
     mime = kind_of_picture(data or b"")
     r, g, b = (1.0, 1.0, 1.0) if mime else row.get("colour", (1.0, 1.0, 1.0))
-    alpha = row.get("alpha", 1.0)
-    return Material(name, (r, g, b, alpha), data if mime else None, mime, "BLEND" if alpha < 1.0 else "OPAQUE")
+    alpha, lost = (
+        row.get("alpha", 1.0),
+        f"{OTHER_PICTURE} beside the mesh: {named[-MAX_SHOWN:]}" * bool(named and not mime),
+    )
+    return Material(
+        name, (r, g, b, alpha), data if mime else None, mime, "BLEND" if alpha < 1.0 else "OPAQUE", lost=lost
+    )  # fmt: skip

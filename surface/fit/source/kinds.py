@@ -28,6 +28,7 @@ SHORT_ENDINGS = (
     "brows",
     "hair",
 )  # shorter entries that are also found at the end of a longer word
+WHITE = (1.0, 1.0, 1.0)
 SKIN, PROP = "skin", "prop"
 MAX_NAMES = 4  # of pieces of one kind that a note lists
 FACE_MOTION = 0.5  # of the largest motion: a piece that shapes move this far belongs to the face, whatever its name
@@ -41,19 +42,23 @@ class Kind:
     name : "skin", "iris", "hair" and so on. rule : "skin", "part", "eye" or "out", as the table explains.
     material : by which a head draws it; "skin" for what is drawn as no part of its own.
     worn : whether a head keeps it as it is, unless shapes move it.
+    colour : linear RGB of what is worn, where the mesh does not say.
     """
 
     name: str
     rule: str
     material: str
     worn: bool = False
+    colour: tuple[float, float, float] = (1.0, 1.0, 1.0)
 
 
 @cache
 def kinds() -> dict[str, Kind]:
     """All kinds by name."""
     return {
-        name: Kind(name, row["rule"], row.get("material", SKIN), row.get("worn", False))
+        name: Kind(
+            name, row["rule"], row.get("material", SKIN), row.get("worn", False), tuple(row.get("colour", WHITE))
+        )
         for name, row in _table().items()
     }
 
@@ -95,11 +100,12 @@ def worn_faces(mesh: FitMesh) -> Bools:
     worn = np.zeros(len(mesh.faces), bool)
     named = [k for k, name in enumerate(mesh.pieces) if kind_of(name).worn]
     far = np.abs(mesh.deltas).max(axis=(0, 2), initial=0.0) if named else np.zeros(0)  # how far each vertex moves
+    far[~np.isfinite(far)] = 0.0  # what is damaged is found later
     for k in named:
         own = mesh.piece == k
         used = np.unique(mesh.faces[own])
         least = HAIR_MOTION if kind_of(mesh.pieces[k]).rule == "part" else FACE_MOTION
-        moved = far[used[used >= 0]].max(initial=0.0)
+        moved = far[used[(used >= 0) & (used < len(far))]].max(initial=0.0)
         if not moved or moved < least * far.max():
             worn |= own
     return worn if not worn.all() else np.zeros(len(mesh.faces), bool)
@@ -161,7 +167,8 @@ def _moves(mesh: FitMesh, own: Bools) -> bool:
     """Whether shapes move some faces (f,) nearly as far as they move anything."""
     used = np.unique(mesh.faces[own])
     most = np.abs(mesh.deltas).max(initial=0.0)
-    return bool(most > 0 and np.abs(mesh.deltas[:, used[used >= 0]]).max(initial=0.0) >= FACE_MOTION * most)
+    used = used[(used >= 0) & (used < len(mesh.vertices))]
+    return bool(most > 0 and np.abs(mesh.deltas[:, used]).max(initial=0.0) >= FACE_MOTION * most)
 
 
 @cache

@@ -11,7 +11,7 @@ import numpy as np
 from surface.base.arrays import Bools, Floats
 from surface.base.errors import FitError
 from surface.fit.source.kinds import piece_kinds, without_clothes, worn_faces
-from surface.fit.source.mesh import FitMesh, bare_where_damaged, check_mesh, renumbered
+from surface.fit.source.mesh import LARGE, SMALL, FitMesh, bare_where_damaged, check_mesh, renumbered
 from surface.fit.source.names import NameMap, map_names, read_names
 from surface.fit.source.naming.expressions import with_expressions
 from surface.fit.source.naming.namenotes import name_notes
@@ -80,7 +80,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
         mesh = keep_faces(mesh, wanted_faces(mesh, options.without, str(path)))
     aside = worn_faces(mesh)
     kept, notes = without_clothes(mesh, aside)
-    worn = worn_mesh(mesh, aside, str(path)) if aside.any() else None
+    worn, damage = worn_mesh(mesh, aside, str(path))
     pieces = piece_kinds(mesh, kept)
     mesh, other = with_expressions(mesh if kept.all() else keep_faces(mesh, kept), raw.expressions)
     mesh = bare_where_damaged(mesh)
@@ -92,7 +92,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
         faces=mesh.faces, convention=convention_of(path),
     )  # fmt: skip
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
-    every = (*frame.notes, *notes, *name_notes(mesh.names, named, other))
+    every = (*frame.notes, *notes, *damage, *name_notes(mesh.names, named, other))
     return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces, is_export(path), worn)
 
 
@@ -101,11 +101,32 @@ def fit_mesh_of(raw: MeshData) -> FitMesh:
     return FitMesh(**{f.name: getattr(raw, f.name) for f in fields(FitMesh)} | {"materials": tinted(raw)})
 
 
-def worn_mesh(mesh: FitMesh, faces: Bools, where: str) -> FitMesh:
-    """What is kept as it is of a mesh, faces (f,), without shapes. Raises FitError: it is damaged."""
-    worn = bare_where_damaged(keep_faces(replace(mesh, names=(), deltas=mesh.deltas[:0]), faces))
+def worn_mesh(mesh: FitMesh, faces: Bools, where: str) -> tuple[FitMesh | None, list[str]]:
+    """What is kept as it is of a mesh, faces (f,), without shapes, None where that is nothing; and notes on damaged
+    pieces, which are left out."""
+    kept, notes = faces.copy(), list[str]()
+    for k, name in enumerate(mesh.pieces):
+        own = faces & (mesh.piece == k)
+        if own.any() and (why := _damage(mesh, own)):
+            kept &= ~own
+            notes.append(f"{name!r} left out, because {why}")
+    if not kept.any():
+        return None, notes
+    worn = bare_where_damaged(keep_faces(replace(mesh, names=(), deltas=mesh.deltas[:0]), kept))
     check_mesh(worn, f"{where}: hair, glasses and what else is worn")
-    return worn
+    return worn, notes
+
+
+def _damage(mesh: FitMesh, own: Bools) -> str:
+    """Why some faces (f,) cannot be drawn; "" where they can."""
+    used = mesh.faces[own]
+    used = used[used >= 0]
+    if used.max(initial=-1) >= len(mesh.vertices) or mesh.face_uv[own].max(initial=-1) >= len(mesh.uv):
+        return "a face points at what is not there"
+    points = mesh.vertices[used]
+    if not (np.abs(points) < LARGE).all():
+        return "a vertex is not a finite number of usable size"
+    return "" if len(used) and np.ptp(points, axis=0).max() > SMALL else "all its vertices are in one place"
 
 
 def _shapes(mesh: FitMesh, named: NameMap) -> dict[str, Floats]:
@@ -160,8 +181,9 @@ def wanted_faces(mesh: FitMesh | MeshData, words: tuple[str, ...], where: str) -
 
 
 def keep_faces(mesh: FitMesh, kept: Bools) -> FitMesh:
-    """The mesh with some faces (f,) bool and the vertices they use."""
+    """The mesh with some faces (f,) bool and the vertices they use; what points beyond all of them still does."""
     used, faces = renumbered(mesh.faces[kept])
+    used = used[used < len(mesh.vertices)]
     return replace(
         mesh, vertices=mesh.vertices[used], faces=faces, face_uv=mesh.face_uv[kept], deltas=mesh.deltas[:, used],
         piece=mesh.piece[kept] if len(mesh.piece) else mesh.piece,

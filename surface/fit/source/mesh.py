@@ -120,9 +120,12 @@ def check_manifold(mesh: FitMesh, where: str) -> None:
             raise FitError(f"{where}: not a manifold: {edge_name} {why.format(count[bad])}", hint=hint)
 
 
-def triangles(faces: Ints) -> Ints:
-    """Quads (f, 4) with -1 for triangles, cut into triangles (t, 3)."""
-    quads = faces[faces[:, 3] >= 0]
+def triangles(faces: Ints, like: Ints | None = None) -> Ints:
+    """Quads (f, 4) with -1 for triangles, cut into triangles (t, 3).
+
+    like : (f, 4) faces that say which are quads, where ``faces`` are texture coordinates, all -1 in a face without any.
+    """
+    quads = faces[(faces if like is None else like)[:, 3] >= 0]
     return np.concatenate([faces[:, :3], quads[:, [0, 2, 3]]])
 
 

@@ -3,46 +3,60 @@
 from __future__ import annotations
 
 import io
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats
+from surface.base.pictures import decoded
 from surface.fit.source.textures import LARGEST, MOST_PIXELS
 from surface.readers.meshdata import Material
 
 QUALITY = 90  # of a JPEG
 CLEAR = 0.5  # opacity below which a texel's colour is not to be trusted: painters leave anything there
+INSTALL = "pip install 'omote[view]'"
 PLAIN = ("image/png", "image/jpeg")
 
 
-def reduced_picture(material: Material) -> tuple[bytes, bool]:
-    """The texture of a material as a PNG or JPEG file, empty where it cannot be read; and whether its material leaves
-    some of it clear.
+class Reduced(NamedTuple):
+    """A texture as a PNG or JPEG file, empty where it cannot be read; whether its material leaves some of it clear; and
+    why it is lost, "" where it is not."""
+
+    data: bytes
+    clear: bool
+    lost: str = ""
+
+
+def reduced_picture(material: Material) -> Reduced:
+    """The texture of a material as a head keeps it.
 
     One that has nothing clear and is small enough stays as it is. Without Pillow, PNG and JPEG stay as they are, and
     others are left out.
     """
     data = material.texture or b""
     try:
-        from PIL import Image  # optional: the extra view
+        image = decoded(data, MOST_PIXELS)
     except ImportError:
-        return data if material.mime in PLAIN else b"", True
-    try:
-        with Image.open(io.BytesIO(data)) as image:
-            if image.width * image.height > MOST_PIXELS:
-                return b"", True
-            clear = material.alpha != "OPAQUE" and _has_clear(image)
-            if not clear and material.mime in PLAIN and max(image.size) <= LARGEST:
-                return data, clear
-            small = image.convert("RGBA" if clear else "RGB")
-            small.thumbnail((LARGEST, LARGEST))
-            if clear:
-                small = Image.fromarray(bled(np.asarray(small)))
-            return _encoded(small, "PNG" if clear else "JPEG"), clear
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
-        return b"", True
+        if material.mime in PLAIN:
+            return Reduced(data, True)
+        return Reduced(b"", True, f"a picture of this kind needs Pillow: {INSTALL}")
+    except ValueError as error:
+        return Reduced(b"", True, f"its picture cannot be read: {error}")
+    clear = material.alpha != "OPAQUE" and _has_clear(image)
+    if not clear and material.mime in PLAIN and max(image.size) <= LARGEST:
+        return Reduced(data, clear)
+    return Reduced(_reduced(image, clear=clear), clear)
+
+
+def _reduced(image: Any, *, clear: bool) -> bytes:
+    from PIL import Image  # optional: the extra view
+
+    small = image.convert("RGBA" if clear else "RGB")
+    small.thumbnail((LARGEST, LARGEST))
+    if clear:
+        small = Image.fromarray(bled(np.asarray(small)))
+    return _encoded(small, "PNG" if clear else "JPEG")
 
 
 def _has_clear(image: Any) -> bool:

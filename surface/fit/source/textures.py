@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from surface.base.arrays import Floats, Ints
+from surface.base.pictures import eight_bits
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.readers.meshdata import Material, MeshData, linear
 
@@ -104,6 +105,15 @@ def _inside(steps: int) -> Floats:
     return np.column_stack([1.0 - s - t, s, t])
 
 
+def average_colour(data: bytes) -> Floats | None:
+    """(3,) mean linear RGB of what is not clear of an encoded picture; None where it or Pillow cannot be read."""
+    picture = _picture(data)
+    if picture is None or not picture[..., 3].any():
+        return None
+    mean: Floats = np.average(picture[..., :3].reshape(-1, 3), axis=0, weights=picture[..., 3].ravel())
+    return mean
+
+
 def _picture(data: bytes) -> Floats | None:
     """(h, w, 4) linear RGB and opacity of an encoded picture; None where it or Pillow cannot be read."""
     try:
@@ -113,7 +123,7 @@ def _picture(data: bytes) -> Floats | None:
             if image.width * image.height > MOST_PIXELS:
                 return None
             image.draft("RGB", (LARGEST, LARGEST))
-            small = image.convert("RGBA")
+            small = eight_bits(image).convert("RGBA")
             small.thumbnail((LARGEST, LARGEST))
             pixels = np.asarray(small, float) / 255.0
     except (ImportError, OSError, ValueError, SyntaxError, Image.DecompressionBombError):

@@ -84,8 +84,8 @@ def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
             aside[:] = False
         kept, notes = skin_and_eyes(raw, wanted & ~aside)
         scan = make_scan(raw.vertices, triangles(raw.faces[kept]), str(path))
-        worn = worn_mesh(still, aside, str(path)) if aside.any() else None
-        return replace(scan, colours=scan_colours(raw, kept), notes=tuple(notes), worn=worn)
+        worn, damage = worn_mesh(still, aside, str(path))
+        return replace(scan, colours=scan_colours(raw, kept), notes=(*notes, *damage), worn=worn)
     if kind not in OTHERS:
         raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
                        hint=f"export it as {', '.join([*OWN, *OTHERS])}")  # fmt: skip
@@ -122,10 +122,13 @@ def make_scan(vertices: Floats, faces: Ints, where: str) -> Scan:
         raise FitError(f"{where}: holds no faces", hint="a cloud of points is not enough: export its triangles")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise FitError(f"{where}: a face points at a vertex that is not there", hint="export the scan again")
-    bad = np.flatnonzero(~(np.abs(vertices) < LARGE).all(axis=1))
+    fine: Bools = np.all(np.abs(vertices) < LARGE, axis=1)
+    used = np.unique(faces)
+    bad = used[~fine[used]]
     if len(bad):
         raise FitError(f"{where}: vertex {bad[0]} is not a finite number of usable size", hint="repair the scan")
-    size = float(np.ptp(vertices[np.unique(faces)], axis=0).max())
+    vertices = np.where(fine[:, None], vertices, vertices[used[0]])  # others belong to no face of these
+    size = float(np.ptp(vertices[used], axis=0).max())
     if not size > SMALL:
         raise FitError(f"{where}: all vertices are in one place", hint="export the scan again")
     _, first, original = np.unique(np.round(vertices / (SAME * size)), axis=0, return_index=True, return_inverse=True)

@@ -13,15 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Array, Floats32
-from surface.head.model.sidecar import Sidecar, read_sidecar, sidecar_path, write_sidecar
+from surface.base.errors import HeadFileError
+from surface.head.model.sidecar import DAMAGED, Sidecar, read_sidecar, reason, sidecar_path, write_sidecar
 
 FILE = "accessories.npz"
 KINDS = ("hair", "hat", "glasses", "jewellery")
 ALPHA = ("OPAQUE", "MASK", "BLEND")
 PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """Kinds of pictures that may be a texture, by their first bytes: those that every reader of glTF knows."""
-MOST, MAX_NAME_BYTES = 256, 1024
-MAX_VERTICES = 400_000
+MOST, MAX_NAME = 256, 256  # accessories of a head, and letters of a name
+MAX_VERTICES, MAX_TRIANGLES = 400_000, 1_000_000  # of one accessory
 LARGE_MM = 1e5  # no vertex lies further out
 TABLES = ("names", "kinds", "alphas", "colours", "cutoffs", "two_sided")
 """Arrays with a row for each accessory."""
@@ -77,12 +78,28 @@ def write_accessories(head: str | Path, accessories: Sequence[Accessory]) -> Pat
     """Write accessories to a head's folder, or remove those of the head that it held before; returns the file's path,
     None where there is nothing to write.
 
-    Raises HeadFileError: it cannot be written.
+    Raises HeadFileError: it cannot be written, or could not be read again; the file stays as it was.
     """
     path = sidecar_path(head, FILE)
     if not accessories:
         path.unlink(missing_ok=True)
         return None
+    if fault := fault_of(*accessories):
+        raise HeadFileError(f"{path}: could not be read again: {fault}", hint="leave it out: omote fit --without NAME")
+    return write_sidecar(path, _packed(accessories))
+
+
+def fault_of(*accessories: Accessory) -> str:
+    """Return why a head that wears them could not be read, "" where nothing is wrong."""
+    try:
+        _unpack(Sidecar(Path(FILE), _packed(accessories), {}))
+    except DAMAGED as error:
+        return reason(error)
+    return ""
+
+
+def _packed(accessories: Sequence[Accessory]) -> dict[str, Array]:
+    """Return the arrays of a file."""
     rows: dict[str, Array] = {
         "names": np.array([a.name for a in accessories]), "kinds": np.array([a.kind for a in accessories]),
         "alphas": np.array([a.alpha for a in accessories]),
@@ -93,7 +110,7 @@ def write_accessories(head: str | Path, accessories: Sequence[Accessory]) -> Pat
     for k, one in enumerate(accessories):
         rows |= {f"{k}/{key}": getattr(one, key) for key in ("vertices", "normals", "uv", "triangles", "shade")}
         rows[f"{k}/texture"] = np.frombuffer(one.texture, np.uint8)
-    return write_sidecar(path, rows)
+    return rows
 
 
 def _unpack(file: Sidecar) -> tuple[Accessory, ...]:
@@ -106,13 +123,14 @@ def _unpack(file: Sidecar) -> tuple[Accessory, ...]:
     for key, words, known in (("kinds", kinds, KINDS), ("alphas", alphas, ALPHA)):
         if len(words) != count or not set(words) <= set(known):
             raise ValueError(f"{key} is no list of {count} of {', '.join(known)}")
-    return tuple(
-        Accessory(
-            names[k], kinds[k], *_mesh(z, k), _colour(colours[k]), _texture(z, k), alphas[k], float(cutoffs[k]),
-            bool(two_sided[k]),
-        )
-        for k in range(count)
-    )  # fmt: skip
+    found = list[Accessory]()
+    for k, name in enumerate(names):
+        try:
+            rest = _texture(z, k), alphas[k], float(cutoffs[k]), bool(two_sided[k])
+            found.append(Accessory(name, kinds[k], *_mesh(z, k), _colour(colours[k]), *rest))
+        except ValueError as error:
+            raise ValueError(f"{name!r}: {error}") from error
+    return tuple(found)
 
 
 def _colour(row: Floats32) -> tuple[float, float, float, float]:
@@ -122,8 +140,12 @@ def _colour(row: Floats32) -> tuple[float, float, float, float]:
 
 def _words(arrays: Mapping[str, Array], key: str) -> list[str]:
     words = arrays[key]
-    if words.ndim != 1 or words.dtype.kind != "U" or len(words) > MOST or words.itemsize > MAX_NAME_BYTES:
-        raise ValueError(f"{key} is no list of at most {MOST} words")
+    if words.ndim != 1 or words.dtype.kind != "U":
+        raise ValueError(f"{key} is no list of words")
+    if len(words) > MOST:
+        raise ValueError(f"{key} are {len(words)}, {MOST} are the most")
+    if words.itemsize > 4 * MAX_NAME:  # 4 bytes a letter
+        raise ValueError(f"{key} have {words.itemsize // 4} letters, {MAX_NAME} are the most")
     return [str(word) for word in words]
 
 
@@ -147,6 +169,8 @@ def _mesh(arrays: Mapping[str, Array], k: int) -> tuple[Floats32, Floats32, Floa
     triangles = arrays[f"{k}/triangles"]
     if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu" or not len(triangles):
         raise ValueError(f"{k}/triangles is no table of triangles")
+    if len(triangles) > MAX_TRIANGLES:
+        raise ValueError(f"{k}/triangles holds {len(triangles)} triangles, {MAX_TRIANGLES} are the most")
     if triangles.min() < 0 or triangles.max() >= m:
         raise ValueError(f"{k}/triangles names vertices beyond the {m} there are")
     return vertices, normals, uv, np.ascontiguousarray(triangles, np.int32), _numbers(arrays, f"{k}/shade", (m,))

@@ -14,7 +14,7 @@ from typing import Any
 from surface.base.errors import FitError
 from surface.base.files import DATA_LIMIT
 from surface.readers.gltf.container import Gltf
-from surface.readers.meshdata import Material, kind_of_picture
+from surface.readers.meshdata import OTHER_PICTURE, Material, kind_of_picture
 
 ALPHA = ("OPAQUE", "MASK", "BLEND")
 WHITE = (1.0, 1.0, 1.0, 1.0)
@@ -55,12 +55,13 @@ def _material(file: Gltf, images: _Images, index: int, table: dict[str, Any]) ->
     colour, texture = _colour_and_texture(table)
     if not texture and colour == WHITE:
         colour, texture = _vrm_colour_and_texture(file, index)
-    data, mime = _picture(file, images, texture)
+    data, mime, lost = _picture(file, images, texture)
     alpha, cutoff = str(table.get("alphaMode", "OPAQUE")), _number(table.get("alphaCutoff"), 0.5)
     name = table.get("name")
     return Material(
         name if isinstance(name, str) else "", colour, data, mime, alpha if alpha in ALPHA else "OPAQUE", cutoff,
         _image_of_uv(_extension(texture, "KHR_texture_transform")), table.get("doubleSided") is True,
+        lost,
     )  # fmt: skip
 
 
@@ -109,21 +110,23 @@ def _to_linear(srgb: float) -> float:
     return float(srgb / 12.92 if srgb <= 0.04045 else ((srgb + 0.055) / 1.055) ** 2.4)
 
 
-def _picture(file: Gltf, images: _Images, texture: dict[str, Any]) -> tuple[bytes | None, str]:
-    """Return the encoded texture and its kind. One over the second texture coordinates, which are not read, is left
-    out."""
+def _picture(file: Gltf, images: _Images, texture: dict[str, Any]) -> tuple[bytes | None, str, str]:
+    """Return the encoded texture, its kind, and why there is none where the material names one. One over the second
+    texture coordinates, which are not read, is left out."""
     moved = _extension(texture, "KHR_texture_transform")
-    if not texture or moved.get("texCoord", texture.get("texCoord", 0)) != 0:
-        return None, ""
+    if not texture:
+        return None, "", ""
+    if moved.get("texCoord", texture.get("texCoord", 0)) != 0:
+        return None, "", "it lies over second texture coordinates, which are not read"
     try:
         entry = file.item("textures", texture.get("index"), "texture")
         for source in (_extension(entry, "EXT_texture_webp").get("source"), entry.get("source")):
             data, mime = _image(images, source) if source is not None else (None, "")
             if data is not None:
-                return data, mime
+                return data, mime, ""
     except FitError:
         pass
-    return None, ""
+    return None, "", OTHER_PICTURE
 
 
 def _image(images: _Images, source: Any) -> tuple[bytes | None, str]:

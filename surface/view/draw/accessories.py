@@ -6,9 +6,10 @@ they hide; the rest is blended over the finished picture.
 
 from __future__ import annotations
 
-import io
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.base.errors import ViewError
 from surface.base.extras import require
+from surface.base.pictures import decoded
 from surface.head.model.accessories import ALPHA, Accessory
 from surface.head.posing.dressing import WornMesh
 from surface.head.posing.part import Turn
@@ -25,6 +27,8 @@ from surface.view.draw.vertex_sums import set_turn
 if TYPE_CHECKING:
     import moderngl
 
+log = logging.getLogger(__name__)
+HINT = "fit the head again, or leave it out: omote fit --without NAME"
 SOLID, CLEAR = "accessory_solid", "accessory"
 PROGRAMS: dict[str, dict[str, int | str]] = {SOLID: {"SOLID": 1}, CLEAR: {}}
 """Programs by name, and their macros: of solid accessories, and of those that are clear in places."""
@@ -63,7 +67,8 @@ class AccessoryBuffers:
     programs : those of :func:`accessory_programs`, whose lights and camera its owner sets.
     simplified : textures are not mixed between their sizes, for pictures drawn in software.
 
-    Raises ViewError: a texture cannot be read, or is larger than the driver draws.
+    What has a texture that cannot be read, or is larger than the driver draws, is drawn in one colour; a warning is
+    logged.
     """
 
     def __init__(
@@ -145,14 +150,13 @@ def _buffers(ctx: moderngl.Context, mesh: WornMesh, program: moderngl.Program) -
 
 
 def _texture(ctx: moderngl.Context, accessory: Accessory) -> moderngl.Texture:
-    """The texture with smaller versions of it; one white texel where there is none."""
+    """The texture with smaller versions of it; one white texel where there is none that can be drawn."""
     size, pixels = (1, 1), _WHITE
     if accessory.texture:
-        size, pixels = decoded_picture(accessory)
-    most = ctx.info["GL_MAX_TEXTURE_SIZE"]
-    if max(size) > most:
-        raise ViewError(f"{accessory.name}: its texture has {max(size)} pixels, {most} are the most here",
-                        hint="fit the head again with a smaller texture")  # fmt: skip
+        try:
+            size, pixels = decoded_picture(accessory, ctx.info["GL_MAX_TEXTURE_SIZE"])
+        except ViewError as error:
+            _warn_once(f"{error}: it is drawn in one colour; {error.hint}")
     texture = ctx.texture(size, 4, pixels)
     texture.build_mipmaps()
     texture.filter = (ctx.LINEAR_MIPMAP_LINEAR, ctx.LINEAR)
@@ -160,15 +164,22 @@ def _texture(ctx: moderngl.Context, accessory: Accessory) -> moderngl.Texture:
     return texture
 
 
-def decoded_picture(accessory: Accessory) -> tuple[tuple[int, int], bytes]:
-    """Width, height and RGBA bytes of a texture, top row first. Raises ViewError: it is damaged."""
-    require("accessories", "PIL")
-    from PIL import Image  # optional: the extra view
+@lru_cache(64)
+def _warn_once(text: str) -> None:
+    log.warning(text)  # a head is drawn again and again, in several windows
 
+
+def decoded_picture(accessory: Accessory, most: int) -> tuple[tuple[int, int], bytes]:
+    """Width, height and RGBA bytes of a texture, top row first.
+
+    Raises ViewError: it is damaged, or has more than ``most`` pixels in a side, or too many in all.
+    """
+    require("accessories", "PIL")
     try:
-        with Image.open(io.BytesIO(accessory.texture)) as image:
-            pixels = image.convert("RGBA")
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        raise ViewError(f"{accessory.name}: its texture cannot be read ({error})",
-                        hint="fit the head again, or leave it out: omote fit --without NAME") from error  # fmt: skip
-    return pixels.size, pixels.tobytes()
+        image = decoded(accessory.texture)
+    except ValueError as error:
+        raise ViewError(f"{accessory.name}: its texture cannot be read ({error})", hint=HINT) from error
+    if max(image.size) > most:
+        raise ViewError(f"{accessory.name}: its texture has {max(image.size)} pixels, {most} are the most here",
+                        hint="fit the head again with a smaller texture")  # fmt: skip
+    return image.size, image.convert("RGBA").tobytes()

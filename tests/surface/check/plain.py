@@ -32,6 +32,7 @@ class PlainHead:
     """Parts that shapes move linearly; it has as much of a head as the checks read."""
 
     parameters = NAMES
+    accessories = ()
 
     def __init__(self, parts: Sequence[SimpleNamespace], *, eyes: np.ndarray | None = EYES, radius: float = RADIUS,
                  jaw: float = 0.0) -> None:  # fmt: skip

@@ -15,7 +15,7 @@ from small_head import small_head
 
 from surface.export import export_head
 from surface.export.urdf import SKULL
-from surface.export.worn import WEB_PIXELS
+from surface.export.worn import WEB_PIXELS, web_texture
 from surface.fit.features.accessories import make_accessories
 from surface.fit.source.load import LoadOptions, load_mesh
 from surface.head import Head
@@ -92,6 +92,15 @@ def test_the_web_file_has_them_smaller_and_bound_to_the_neck(tmp_path: Path) -> 
     assert colour["count"] == 4
     lens = next(m for m in table["materials"] if m["name"] == "glasses")
     assert lens["alphaMode"] == "BLEND" and "baseColorTexture" not in lens["pbrMetallicRoughness"]
+
+
+def test_textures_for_pages_are_kept_where_they_cannot_be_made_smaller(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = picture((200, 20, 20), (1024, 512))
+    for data in (whole[:-200], b"", b"\x89PNG"):
+        assert web_texture(replace(HAIR, texture=data))[0] == data
+    assert web_texture(replace(HAIR, texture=whole))[0] != whole
+    monkeypatch.setattr("surface.base.pictures.decoded.__defaults__", (1024 * 512 - 1,))
+    assert web_texture(replace(HAIR, texture=whole))[0] == whole
 
 
 def obj_points(path: Path, name: str) -> np.ndarray:

@@ -55,6 +55,14 @@ def test_damage_is_left_out(tmp_path, mtl):
     assert found == () or {m for m in found if m} <= {Material("Skin")}
 
 
+def test_a_texture_that_cannot_be_read_is_said_with_its_name(tmp_path):
+    (tmp_path / "b.dds").write_bytes(b"DDS ")
+    for name in ("no.png", "b.dds"):
+        skin, *_ = materials(tmp_path, f"newmtl Skin\nmap_Kd {name}")
+        assert skin.texture is None and "no PNG, JPEG or WebP" in skin.lost and skin.lost.endswith(name)
+    assert materials(tmp_path, "newmtl Skin\nKd 1 1 1")[0].lost == ""
+
+
 @pytest.mark.parametrize("library", ["../m.mtl", "/etc/passwd", "none.mtl"])
 def test_only_files_beside_are_opened(tmp_path, library):
     folder = tmp_path / "in"

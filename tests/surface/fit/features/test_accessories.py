@@ -12,14 +12,18 @@ from cards import RED, picture
 from PIL import Image
 from slit_sheet import slit_sheet
 
+from surface.base.errors import FitError
 from surface.fit import fit_head
+from surface.fit.features import accessories
 from surface.fit.features.accessories import DARKEST, corner_normals, keep_accessories, make_accessories
-from surface.fit.source.load import LoadOptions, load_mesh
+from surface.fit.source.kinds import kinds, worn_faces
+from surface.fit.source.load import LoadOptions, load_mesh, worn_mesh
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.placing.place import HeadSize
 from surface.head import Head
+from surface.head.model.accessories import fault_of
 from surface.head.model.placement import Placement
-from surface.readers.meshdata import Material
+from surface.readers.meshdata import Material, linear
 
 EYES = np.array([0.0, 36.0, 84.0])
 
@@ -103,6 +107,80 @@ def test_what_is_worn_far_from_the_head_is_left_out_but_hair_never_is():
     assert len(keep_accessories(worn, Placement(), None, HeadSize()).accessories) == 3  # nobody knows where the head is
 
 
+PAINTED = Material("m", texture=picture(RED), mime="image/png")
+
+
+def one_hat(bare: list[int], material: Material) -> FitMesh:
+    """Two quads that are one hat; those of ``bare`` have no texture coordinates."""
+    two = strips([(0, 30, 100), (30, 30, 100)], ("Hat", "b"), material)
+    rows = two.face_uv.copy()
+    rows[bare] = -1
+    return replace(two, face_uv=rows, piece=np.zeros(2, np.int64), pieces=("Hat",), materials=(material,))
+
+
+def test_quads_without_texture_coordinates_are_kept_in_one_colour():
+    kept = keep_accessories(one_hat([0, 1], PAINTED), Placement(), EYES, HeadSize())
+    (hat,) = kept.accessories
+    assert len(hat.triangles) == 4 and hat.texture == b"" and hat.colour == (*kinds()["hat"].colour, 1.0)
+    assert kept.notes == [
+        "kept as they are, in one colour: hat 'Hat'",
+        "without their texture, some of their faces have no texture coordinates: 'Hat'",
+    ]
+
+
+def test_faces_with_texture_coordinates_keep_their_texture_and_others_get_its_mean_colour():
+    kept = keep_accessories(one_hat([1], PAINTED), Placement(), EYES, HeadSize())
+    full, bare = kept.accessories
+    assert full.texture and not bare.texture and len(full.triangles) == len(bare.triangles) == 2
+    assert full.vertices[:, 0].max() < 15 < bare.vertices[:, 0].min()
+    np.testing.assert_allclose(bare.colour, (*linear(np.array(RED[:3]) / 255.0), 1.0), atol=1e-6)
+    assert kept.notes[0] == "kept as they are, with their texture: hat 'Hat'"
+    assert kept.notes[1] == "kept as they are, in one colour: hat 'Hat'"
+
+
+@pytest.mark.parametrize(("given", "why"), [
+    ({"texture": b"\x89PNG broken", "mime": "image/png"}, "its picture cannot be read"),
+    ({"texture": None, "lost": "its picture is missing"}, "its picture is missing"), ({"texture": None}, ""),
+])  # fmt: skip
+@pytest.mark.parametrize(("colour", "wanted"), [
+    ((1.0, 1.0, 1.0, 0.5), (*kinds()["hat"].colour, 0.5)), ((0.1, 0.2, 0.3, 1.0), (0.1, 0.2, 0.3, 1.0)),
+])  # fmt: skip
+def test_a_lost_texture_is_said_and_white_becomes_the_colour_of_the_kind(given, why, colour, wanted):
+    kept = keep_accessories(one_hat([], Material("m", colour, **given)), Placement(), EYES, HeadSize())
+    (hat,) = kept.accessories
+    assert hat.texture == b"" and hat.colour == wanted
+    assert kept.notes[0] == "kept as they are, in one colour: hat 'Hat'"
+    assert [why in note and "'Hat'" in note for note in kept.notes[1:]] == [True] * bool(why)
+
+
+def test_grey_beside_a_lost_texture_tells_nothing():
+    lost = Material("m", (0.8, 0.8, 0.8, 1.0), lost="its picture is missing")
+    for material, wanted in ((lost, kinds()["hat"].colour), (replace(lost, lost=""), (0.8, 0.8, 0.8))):
+        (hat,) = keep_accessories(one_hat([], material), Placement(), EYES, HeadSize()).accessories
+        assert hat.colour[:3] == wanted
+
+
+def test_texture_coordinates_far_from_all_others_count_as_none():
+    hat = one_hat([], PAINTED)
+    uv = hat.uv + 7.25
+    uv[4:] += 2e5
+    full, bare = keep_accessories(replace(hat, uv=uv), Placement(), EYES, HeadSize()).accessories
+    assert full.uv.min() >= 0.0 and full.uv.max() <= 2.0 and len(bare.triangles) == 2
+    assert not bare.uv.any()
+
+
+def test_more_pieces_than_a_head_can_hold_are_kept_within_its_limits():
+    names = (*(f"Hair {k}" for k in range(300)), "Hat " + 300 * "a")
+    kept = keep_accessories(strips([(0, 30, 100)] * 301, names, PAINTED), Placement(), EYES, HeadSize())
+    assert len(kept.accessories) == 2 and fault_of(*kept.accessories) == ""
+    assert any("joined" in note for note in kept.notes) and any("cut to 256 letters" in note for note in kept.notes)
+    assert set(kept.pieces.values()) == {"hair, kept as it is", "hat, kept as it is"}
+    far = replace(strips([(0, 30, 100), (1e6, 0, 0)], ("Hair a", "Hair b"), PAINTED))
+    kept = keep_accessories(far, Placement(), EYES, HeadSize())
+    assert [one.name for one in kept.accessories] == ["Hair a"] and kept.pieces["Hair b"] == "hair, left out"
+    assert "'Hair b'" in kept.notes[-1] and "'Hair b'" not in kept.notes[0]
+
+
 def test_opacity_counts_only_where_something_is_clear():
     hole = Material("h", texture=picture(RED, hole=True), mime="image/png", alpha="MASK", cutoff=0.3, two_sided=False)
     at = [(0.0, 30.0, 100.0)]
@@ -131,6 +209,18 @@ def test_normals_are_shared_by_faces_that_meet_softly_and_not_at_an_edge():
     np.testing.assert_allclose(hard[1], np.tile([1.0, 0, 0], (3, 1)), atol=1e-9)
 
 
+def test_normals_of_large_meshes_are_made_in_blocks(monkeypatch):
+    x, y = np.meshgrid(np.arange(9.0), np.arange(9.0))
+    points = np.column_stack([x.ravel(), y.ravel(), np.sin(2.0 * x.ravel())])
+    k = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    tri = np.concatenate([np.column_stack([k, k + 1, k + 10]), np.column_stack([k, k + 10, k + 9])])
+    whole, sizes, pairs = corner_normals(points, tri), list[int](), accessories._pairs
+    monkeypatch.setattr(accessories, "_pairs", lambda *a: (found := pairs(*a), sizes.append(len(found[0])))[0])
+    monkeypatch.setattr(accessories, "PAIRS_AT_ONCE", 100)
+    np.testing.assert_array_equal(corner_normals(points, tri), whole)
+    assert len(sizes) > 10 and max(sizes) <= 200
+
+
 def test_cards_of_hair_look_outwards_and_are_darker_below_others():
     front = (0.0, 30.0, 110.0)
     worn = strips([front, (0.0, 30.0, 75.0)], ("Hair", "Hair.001"), Material())
@@ -140,6 +230,58 @@ def test_cards_of_hair_look_outwards_and_are_darker_below_others():
     assert (hair.normals[:, 2] > 0.5).all()
     outer = hair.vertices[:, 2] > 100
     assert (hair.shade[outer] > 0.95).all() and (hair.shade[~outer] < 0.5 * (1.0 + DARKEST)).all()
+
+
+@pytest.mark.parametrize(("damage", "why"), [
+    ("v 1e30 0 0", "a vertex is not a finite number of usable size"),
+    ("v 20.000000 120.000000 10.000000", "all its vertices are in one place"),
+    ("f 99999/1 2/1 3/1", "a face points at what is not there"),
+    ("f 1/99999 2/1 3/1", "a face points at what is not there"),
+])  # fmt: skip
+def test_a_damaged_piece_costs_the_head_that_piece_only(tmp_path, damage, why):
+    from surface.fit.transfer.scan import read_scan
+
+    path = dressed_file(tmp_path)
+    first = len(slit_sheet().vertices) + 4  # of the hat
+    for file in (path, tmp_path / "m_shapes" / "jawOpen.obj"):
+        lines = file.read_text().splitlines()
+        vertices = [k for k, line in enumerate(lines) if line.startswith("v ")][first : first + 4]
+        face = lines.index("o Hat") + 2
+        for k in [face] if damage.startswith("f") else vertices[: 1 if "20." not in damage else 4]:
+            lines[k] = damage
+        file.write_text("\n".join(lines) + "\n")
+    loaded, scan = load_mesh(path, LoadOptions(unit="mm")), read_scan(path)
+    assert [one.name for one in make_accessories(loaded).accessories] == ["Hair/Red"]
+    for notes in (loaded.notes, scan.notes):
+        assert f"'Hat/Red' left out, because {why}" in notes
+    assert scan.worn is not None and len(scan.worn.faces) == 1 and np.abs(scan.vertices).max() < 1e3
+
+
+@pytest.mark.parametrize(("name", "without", "refused"), [
+    ("Face", (), True), ("Hat", ("Boots",), False), ("Boots", (), False),
+])  # fmt: skip
+def test_a_face_that_points_nowhere_is_named_or_left_out(tmp_path, name, without, refused):
+    path = dressed_file(tmp_path)
+    lines = path.read_text().splitlines()
+    first = next(k for k in range(lines.index(f"o {name}"), len(lines)) if lines[k].startswith("f "))
+    path.write_text("\n".join([*lines[:first], "f 99999/1 2/1 3/1", *lines[first + 1 :]]) + "\n")
+    if refused:
+        with pytest.raises(FitError, match=r"faces\[0\] points at"):
+            load_mesh(path, LoadOptions(unit="mm"))
+    else:
+        loaded = load_mesh(path, LoadOptions(unit="mm", without=without))
+        assert any("left out" in note and name in note for note in loaded.notes)
+
+
+def test_numbers_that_are_none_in_one_piece_leave_the_others():
+    two = strips([(0, 30, 100), (30, 30, 100)], ("Hat", "Hair"), Material())
+    two.vertices[1, 2] = np.nan
+    moved = replace(two, names=("jawOpen",), deltas=np.full((1, 8, 3), np.nan))  # as a shape minus what is none
+    assert worn_faces(replace(moved, pieces=("Hat", "Face"))).tolist() == [True, False]
+    worn, notes = worn_mesh(moved, np.ones(2, bool), "m")
+    assert worn is not None and len(worn.faces) == 1 and np.isfinite(worn.vertices).all()
+    assert notes == ["'Hat' left out, because a vertex is not a finite number of usable size"]
+    assert worn_mesh(moved, np.array([True, False]), "m")[0] is None
 
 
 def test_a_scan_keeps_them_too(tmp_path):

@@ -26,18 +26,18 @@ def pixels(data: bytes) -> np.ndarray:
 @pytest.mark.parametrize("kind", ["PNG", "JPEG"])
 def test_a_small_one_without_anything_clear_stays_byte_for_byte(kind):
     own = picture(RED[:3], kind=kind)
-    assert reduced_picture(material(own)) == (own, False)
-    assert reduced_picture(material(own, "BLEND")) == (own, False)
+    assert reduced_picture(material(own)) == (own, False, "")
+    assert reduced_picture(material(own, "BLEND")) == (own, False, "")
 
 
 def test_a_large_one_becomes_a_jpeg_and_a_webp_too():
     for own in (picture(RED[:3], (3000, 30)), picture(RED[:3], kind="WEBP")):
-        found, clear = reduced_picture(material(own))
+        found, clear, _ = reduced_picture(material(own))
         assert found.startswith(b"\xff\xd8") and not clear and max(pixels(found).shape) <= 1024
 
 
 def test_clear_texels_get_the_colour_of_the_opaque_ones_beside_them():
-    found, clear = reduced_picture(material(picture(RED, (2048, 64), hole=True), "MASK"))
+    found, clear, _ = reduced_picture(material(picture(RED, (2048, 64), hole=True), "MASK"))
     seen = pixels(found)
     assert clear and found.startswith(b"\x89PNG") and seen.shape == (32, 1024, 4)
     assert seen[:, :500, 3].min() == 255 and seen[:, 520:, 3].max() == 0
@@ -45,12 +45,21 @@ def test_clear_texels_get_the_colour_of_the_opaque_ones_beside_them():
 
 
 def test_opaque_materials_do_not_mind_what_is_clear():
-    found, clear = reduced_picture(material(picture(RED, (2048, 64), hole=True)))
+    found, clear, _ = reduced_picture(material(picture(RED, (2048, 64), hole=True)))
     assert not clear and pixels(found).shape == (32, 1024, 3)
 
 
-def test_what_cannot_be_read_is_left_out():
-    assert reduced_picture(material(b"\x89PNG broken")) == (b"", True)
+@pytest.mark.parametrize("kind", ["PNG", "JPEG"])
+def test_what_cannot_be_read_is_left_out_and_it_is_said_why(kind):
+    for own in (b"\x89PNG broken", picture(RED[:3], (300, 300), kind)[:-200]):
+        data, _, lost = reduced_picture(material(own))
+        assert data == b"" and lost.startswith("its picture cannot be read: ") and "object at" not in lost
+
+
+def test_greys_of_16_bits_keep_their_tone():
+    out = io.BytesIO()
+    Image.fromarray(np.full((4, 2000), 257 * 100, np.uint16)).save(out, "PNG")
+    assert np.abs(pixels(reduced_picture(material(out.getvalue())).data).astype(int) - 100).max() < 3
 
 
 def test_faint_texels_keep_some_of_their_colour_and_a_picture_of_nothing_stays():
@@ -74,4 +83,5 @@ def test_without_pillow_png_and_jpeg_stay(monkeypatch):
     )  # fmt: skip
     own = picture.__globals__["RED"], b"\x89PNG"
     assert reduced_picture(material(own[1]))[0] == own[1]
-    assert reduced_picture(material(b"RIFF"))[0] == b""
+    data, _, lost = reduced_picture(material(b"RIFF"))
+    assert data == b"" and "pip install 'omote[view]'" in lost

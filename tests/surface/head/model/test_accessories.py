@@ -12,7 +12,7 @@ from small_head import small_head
 
 from surface.base.errors import HeadFileError
 from surface.head import Head, save_data
-from surface.head.model.accessories import FILE, read_accessories, write_accessories
+from surface.head.model.accessories import FILE, Accessory, fault_of, read_accessories, write_accessories
 from surface.head.model.sidecar import FORMAT
 
 
@@ -76,6 +76,28 @@ def test_negative_and_no_triangles_are_refused_too_and_a_newer_version(tmp_path:
         np.savez_compressed(path, **{**arrays, key: array})
         with pytest.raises(HeadFileError):
             read_accessories(tmp_path)
+
+
+MANY = replace(card(), **{key: np.zeros((400_001, n), np.float32) for key, n in (("vertices", 3), ("uv", 2))})
+FAR = np.full((4, 3), 2e5, np.float32)
+
+
+@pytest.mark.parametrize(("worn", "why"), [
+    ([replace(card(), vertices=FAR)], "'Card': 0/vertices"), ([replace(card(), uv=FAR[:, :2])], "'Card': 0/uv"),
+    ([card(), replace(card(), name="b", texture=b"GIF89a")], "'b': 1/texture is neither PNG nor JPEG"),
+    ([replace(card(), name=257 * "a")], "names have 257 letters, 256 are the most"),
+    ([card()] * 257, "names are 257, 256 are the most"), ([card(kind="boots")], "kinds"),
+    ([replace(card(), triangles=np.zeros((1_000_001, 3), np.int32))], "1000001 triangles, 1000000 are the most"),
+    ([MANY], "400001 vertices, 400000 are the most"),
+])  # fmt: skip
+def test_nothing_is_written_that_could_not_be_read(tmp_path: Path, worn: list[Accessory], why: str) -> None:
+    path = write_accessories(tmp_path, [card()])
+    assert path is not None
+    before = path.read_bytes()
+    with pytest.raises(HeadFileError, match="could not be read again") as caught:
+        write_accessories(tmp_path, worn)
+    assert why in str(caught.value) and path.read_bytes() == before
+    assert why in fault_of(*worn) and fault_of(card()) == ""
 
 
 def test_a_file_that_is_cut_short_is_refused(tmp_path: Path) -> None:

@@ -101,6 +101,18 @@ def test_damage_in_colours_refuses_no_mesh(tmp_path, material):
     assert found is not None and found.texture is None and found.colour == (1.0, 1.0, 1.0, 1.0)
 
 
+def test_a_texture_that_cannot_be_read_is_said(tmp_path):
+    for number, coordinates, data, why in (
+        (9, 0, PNG, "its picture is missing"), (0, 0, b"no picture", "no PNG, JPEG or WebP"),
+        (0, 1, PNG, "second texture"), (0, 0, PNG, ""),
+    ):  # fmt: skip
+        table = {"pbrMetallicRoughness": {"baseColorTexture": {"index": number, "texCoord": coordinates}}}
+        found = read(tmp_path, coloured(table, data))
+        assert found is not None and why in found.lost and bool(why) == bool(found.lost) == (found.texture is None)
+    bare = read(tmp_path, coloured({}))
+    assert bare is not None and bare.lost == ""
+
+
 def test_a_picture_outside_the_folder_is_not_opened(tmp_path):
     builder = coloured({"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}, PNG)
     builder.document["images"] = [{"uri": "../secret.png"}]

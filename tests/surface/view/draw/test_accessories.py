@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from ball_head import BallHead, values
 from cards import card, picture
+from PIL import Image
 from small_head import small_head
 
 from surface.base.errors import ViewError
@@ -18,6 +20,7 @@ from surface.head.model.accessories import Accessory
 from surface.head.model.data import Neck
 from surface.head.posing.dressing import WornMesh
 from surface.view import Camera, Offscreen
+from surface.view.draw import accessories as drawing
 
 SIZE = (160, 160)
 NECK = Neck((0.0, 0.0, 0.0), 0.0, -500.0, -400.0)  # all of it turns
@@ -132,6 +135,39 @@ def test_what_was_drawn_before_the_head_turned_is_erased(gl: None) -> None:
         np.testing.assert_array_equal(shown, fresh.render(head.values({"headYaw": 1.0}), Camera.front()))
 
 
-def test_a_texture_that_is_damaged_is_named(gl: None) -> None:
-    with pytest.raises(ViewError, match="Card: its texture cannot be read"):
-        drawn([replace(FRONT, texture=b"\x89PNG broken")])
+def warnings(one: Accessory, caplog: pytest.LogCaptureFixture) -> tuple[np.ndarray, list[str]]:
+    """A picture of a ball that wears it, drawn twice, and what was logged."""
+    drawing._warn_once.cache_clear()
+    with caplog.at_level("WARNING", drawing.__name__):
+        seen = [drawn([one]) for _ in range(2)]
+    return seen[1], [record.getMessage() for record in caplog.records]
+
+
+@pytest.mark.parametrize("data", [b"\x89PNG broken", picture(GREEN, (300, 300))[:-200]])
+def test_what_has_a_damaged_texture_is_drawn_in_its_own_colour_and_named_once(
+    gl: None, data: bytes, caplog: pytest.LogCaptureFixture
+) -> None:  # fmt: skip
+    seen, said = warnings(replace(FRONT, texture=data, colour=(0.01, 0.4, 0.01, 1.0)), caplog)
+    assert greens(seen).sum() > 300
+    assert len(said) == 1 and said[0].startswith("Card: its texture cannot be read (") and "object at" not in said[0]
+
+
+def test_a_texture_of_too_many_pixels_is_not_decoded(gl: None, caplog: pytest.LogCaptureFixture) -> None:
+    out = io.BytesIO()
+    Image.new("1", (4097, 4096)).save(out, "PNG")
+    _, said = warnings(replace(FRONT, texture=out.getvalue()), caplog)
+    assert "4097 x 4096 pixels are too many" in said[0]
+
+
+def test_a_texture_longer_than_the_driver_draws_is_refused() -> None:
+    with pytest.raises(ViewError, match="Card: its texture has 64 pixels, 63 are the most here"):
+        drawing.decoded_picture(replace(FRONT, texture=picture(GREEN, (64, 2))), 63)
+
+
+def test_greys_of_16_bits_keep_their_tone() -> None:
+    out = io.BytesIO()
+    Image.fromarray(np.full((1, 2), 257 * 100, np.uint16)).save(out, "PNG")
+    assert drawing.decoded_picture(replace(FRONT, texture=out.getvalue()), 64) == (
+        (2, 1),
+        bytes([100, 100, 100, 255] * 2),
+    )
