@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from surface.base.arrays import Floats32
+from surface.base.texels import has_clear, reduced
 from surface.export.shapes import ExportPart, unit
 from surface.head import Head
 from surface.head.model.accessories import Accessory
@@ -84,11 +85,10 @@ def web_texture(accessory: Accessory) -> tuple[bytes, str]:
         return kept
     try:
         with Image.open(io.BytesIO(accessory.texture)) as image:
-            clear = accessory.alpha != "OPAQUE" and "A" in image.getbands()
-            small = image.convert("RGBA" if clear else "RGB")
+            clear = accessory.alpha != "OPAQUE" and has_clear(image)
+            small = reduced(image, WEB_PIXELS, clear=clear)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
         return kept
-    small.thumbnail((WEB_PIXELS, WEB_PIXELS))
     out, kind = io.BytesIO(), "PNG" if clear else "JPEG"
     small.save(out, kind, **({"optimize": True} if clear else {"quality": WEB_QUALITY}))
     packed = out.getvalue()
