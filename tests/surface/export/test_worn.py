@@ -17,7 +17,7 @@ from small_head import small_head
 
 from surface.export import export_head
 from surface.export.urdf import SKULL
-from surface.export.worn import WEB_PIXELS, web_texture
+from surface.export.worn import WEB_PIXELS, accessory_parts, web_texture
 from surface.fit.features.accessories import make_accessories
 from surface.fit.source.load import LoadOptions, load_mesh
 from surface.head import Head
@@ -129,6 +129,13 @@ def test_names_are_on_one_line_and_none_is_there_twice(tmp_path: Path) -> None:
     export_head(wearing(*twice), tmp_path / "h.glb")
     names = [node["name"] for node in document(tmp_path / "h.glb")["nodes"]]
     assert names[-4:] == ["Hair", "Hair 2", "x y", "hat"]
+
+
+def test_a_name_that_another_object_or_a_part_of_the_head_has_gets_the_next_free_number() -> None:
+    named = [replace(card(), name=name) for name in ("A 2", "A", "A", "A", "tooth", "Hair band", "Hair")]
+    assert [part.name for part in accessory_parts(wearing(*named))] == [
+        "A 2", "A", "A 3", "A 4", "tooth 2", "Hair band", "Hair",
+    ]  # fmt: skip
 
 
 def noisy(palette: bool = False) -> bytes:
