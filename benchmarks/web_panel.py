@@ -101,7 +101,7 @@ def own_fps(still: Still) -> float:
     head = still.load_head()
     with Offscreen(head, SIZE, quality="full", theme=still.look.make_theme()) as screen:
         screen.go_live()
-        camera = framed(still.look.make_camera(), head)
+        camera = framed(still.look.make_camera(), head, worn=still.look.dressed)
         for i in range(5):
             screen.draw(for_head(values(i), head.parameters), camera)
         return max(_round(screen, head, camera) for _ in range(ROUNDS))

@@ -3,7 +3,8 @@
     python examples/draw_head.py configs/heads/ict smile.png mouthSmileLeft=1 mouthSmileRight=1 jawOpen=0.3
 
 It evaluates Eq. (1) at the stored vertices, after groups, rules and the jaw have moved the control points. What needs
-more than the files say is left out: contacts of lips and lids, gaze, the head's rotation, seams and paint.
+more than the two files say is left out: contacts of lips and lids, gaze, the head's rotation, seams and paint; and so
+are accessories, such as hair that the head wears as a mesh, which lie in a file of their own.
 """
 
 from __future__ import annotations

@@ -209,7 +209,8 @@ class HeadlessFace:
 
         self._angles = head_angles
         self._screen = _open_screen(head, settings)
-        self._head, self._camera, self._settings = head, framed(settings.make_camera(), head), settings
+        self._head, self._settings = head, settings
+        self._camera = framed(settings.make_camera(), head, worn=settings.dressed)
         self._values, self._recorder = values, recorder
         self._log = FrameLog()
         self._screen.go_live()

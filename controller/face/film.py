@@ -40,7 +40,7 @@ def draw_film(
 
 def _pictures(still: Still, rows: Floats, fps: float, progress: Callable[[int, int], None]) -> Iterator[np.ndarray]:
     head, look = still.load_head(), still.look
-    camera = framed(look.make_camera(), head)
+    camera = framed(look.make_camera(), head, worn=look.dressed)
     with Offscreen(
         head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator
     ) as screen:

@@ -32,6 +32,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Crowd, Head
 from surface.view.pictures.offscreen import Offscreen
 from surface.view.pictures.sheet import compose, contact_sheet, crowd_sheet, write_png
+from surface.view.scene.camera import Camera
 from surface.view.scene.framing import framed
 
 
@@ -153,6 +154,11 @@ def _add_expression(parameters: Parameters, vocabulary: Vocabulary, values: NDAr
     np.clip(values, parameters.low, parameters.high, out=values)
 
 
+def _camera(look: PictureSettings, head: Head) -> Camera:
+    """The camera of a look, which shows this head."""
+    return framed(look.make_camera(), head, worn=look.dressed)
+
+
 def draw_still(still: Still, out: Path) -> None:
     """Draw ``still`` and write it to ``out`` (PNG), completely or not at all."""
     if still.wall is not None:
@@ -162,9 +168,7 @@ def draw_still(still: Still, out: Path) -> None:
     with Offscreen(
         head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator
     ) as screen:
-        picture = screen.render(
-            for_head(still.values, head.parameters, still.parameters), framed(look.make_camera(), head)
-        )
+        picture = screen.render(for_head(still.values, head.parameters, still.parameters), _camera(look, head))
     write_png(picture, out)
 
 
@@ -213,7 +217,7 @@ def draw_sheet(still: Still, out: Path, progress: Callable[[int, int], None] | N
     poses = sheet_poses(still.vocabulary, still.parameters)
     entries = [(label, for_head(values, head.parameters, still.parameters)) for label, values in poses]
     page = contact_sheet(
-        head, entries, views=[framed(look.make_camera(), head)], quality=look.still_quality, theme=look.make_theme(),
+        head, entries, views=[_camera(look, head)], quality=look.still_quality, theme=look.make_theme(),
         progress=progress,
     )  # fmt: skip
     write_png(page, out)
@@ -247,7 +251,7 @@ def draw_crowd(still: Still, count: int, out: Path, progress: Callable[[int, int
     crowd = Crowd(head, count)
     crowd.pose(np.stack([for_head(values, head.parameters, still.parameters) for _, values in poses]))
     page = crowd_sheet(
-        crowd, [label for label, _ in poses], camera=framed(look.make_camera(), head), quality=look.still_quality,
+        crowd, [label for label, _ in poses], camera=_camera(look, head), quality=look.still_quality,
         theme=look.make_theme(), columns=math.isqrt(count - 1) + 1, progress=progress,
     )  # fmt: skip
     write_png(page, out)

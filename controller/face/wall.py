@@ -103,7 +103,8 @@ class LoadedHead:
     def camera(self, tile: tuple[int, int]) -> Camera:
         """A camera that shows the head whole in a tile of a size, pixels."""
         narrow = min(1.0, tile[0] / tile[1] / _ASPECT)
-        return zoom_to_head(framed(self.stage.settings.face.make_camera(), self.head)).zoom(narrow)
+        face = self.stage.settings.face
+        return zoom_to_head(framed(face.make_camera(), self.head, worn=face.dressed)).zoom(narrow)
 
 
 def load_heads(

@@ -103,7 +103,8 @@ def _pieces(head: Head, pose: Mapping[str, float]) -> list[Piece]:
 
 
 def _worn(head: Head) -> list[Piece]:
-    """Return a piece of each accessory, which the skull carries, in the colour of its kind."""
+    """Return a piece of each accessory, in the colour of its kind. The skull carries all of it, of long hair, too: cut
+    where it hangs over the neck, it would tear there."""
     colours = {name: np.asarray(table["colour"], float) for name, table in materials().items() if "colour" in table}
     return [
         Piece(

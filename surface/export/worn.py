@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterable, Mapping
+from itertools import chain, count
 from typing import Any
 
 import numpy as np
 
 from surface.base.arrays import Floats32
 from surface.base.pictures import decoded
+from surface.base.texels import has_clear, reduced
 from surface.export.shapes import ExportPart, unit
 from surface.head import Head
 from surface.head.model.accessories import Accessory
@@ -23,7 +25,8 @@ WEB_PIXELS, WEB_QUALITY = 512, 80  # of a side of a texture, and of a JPEG, in f
 def accessory_parts(head: Head, pose: Mapping[str, float] | None = None) -> list[ExportPart]:
     """Return the accessories of a head as parts, turned as its head is in a pose; their material is their kind."""
     turn = rotation(*read_pose(head.values(pose or {})[: len(Head.parameters)]).head)
-    found, names = list[ExportPart](), _names(one.accessory for one in head.accessories)
+    names = _names((one.accessory for one in head.accessories), (part.name for part in head.parts))
+    found = list[ExportPart]()
     for one, name in zip(head.accessories, names, strict=True):
         own, (vertices, normals) = one.accessory, one.turned(turn)
         found.append(ExportPart(
@@ -33,13 +36,14 @@ def accessory_parts(head: Head, pose: Mapping[str, float] | None = None) -> list
     return found
 
 
-def _names(accessories: Iterable[Accessory]) -> list[str]:
-    """Return a name for each, of the object that it was in its file: on one line, and none twice."""
-    found = list[str]()
+def _names(accessories: Iterable[Accessory], taken: Iterable[str]) -> list[str]:
+    """Return a name for each, of the object that it was in its file: on one line, none twice and none of ``taken``."""
+    found, used = list[str](), set(taken)
     for one in accessories:
         name = " ".join(c for c in one.name.split("/")[0].split() if c.isprintable()) or one.kind
-        count = sum(other == name or other.startswith(f"{name} ") for other in found)
-        found.append(f"{name} {count + 1}" if count else name)
+        numbered = (f"{name} {number}" for number in count(2))
+        found.append(next(each for each in chain([name], numbered) if each not in used))
+        used.add(found[-1])
     return found
 
 
@@ -83,9 +87,8 @@ def web_texture(accessory: Accessory) -> tuple[bytes, str]:
         image = decoded(accessory.texture)
     except (ImportError, ValueError):
         return kept
-    clear = accessory.alpha != "OPAQUE" and "A" in image.getbands()
-    small = image.convert("RGBA" if clear else "RGB")
-    small.thumbnail((WEB_PIXELS, WEB_PIXELS))
+    clear = accessory.alpha != "OPAQUE" and has_clear(image)
+    small = reduced(image, WEB_PIXELS, clear=clear)
     out, kind = io.BytesIO(), "PNG" if clear else "JPEG"
     small.save(out, kind, **({"optimize": True} if clear else {"quality": WEB_QUALITY}))
     packed = out.getvalue()

@@ -168,8 +168,9 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
 
 def _kinds(loaded: Loaded) -> set[str]:
     """Of the mesh's pieces, those that were left out, too, but not those that are worn as they are."""
-    worn = loaded.worn.pieces if loaded.worn is not None else ()
-    return {kind.split(",")[0] for name, kind in loaded.pieces.items() if name not in worn}
+    worn = loaded.worn
+    kept = {name for k, name in enumerate(worn.pieces) if (worn.piece == k).any()} if worn is not None else set()
+    return {kind.split(",")[0] for name, kind in loaded.pieces.items() if name not in kept}
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ from surface.view.scene.camera import Camera
 from surface.view.scene.choice import LEVELS, QualityChoice
 from surface.view.scene.framing import framing_of
 from surface.view.scene.parts import ViewHead
-from surface.view.scene.theme import Theme
+from surface.view.scene.theme import Theme, find_theme
 from surface.view.scene.viewpoint import Viewpoint
 
 if TYPE_CHECKING:
@@ -96,7 +96,8 @@ def run_window(
         raise ViewError("there is no display to open a window on (DISPLAY is not set)", hint=HEADLESS_HINT)
     with importing("the window", "imgui_bundle"):
         from imgui_bundle import hello_imgui, imgui  # optional: the extra view
-    viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera, framing_of(head))
+    framing = framing_of(head, worn=find_theme(theme).dressed)
+    viewpoint = camera if isinstance(camera, Viewpoint) else Viewpoint(camera, framing)
     make = partial(Renderer, head=head, theme=theme, evaluator=evaluator)
     window = _Window(imgui, source, viewpoint, make, quality)
     window.gui, window.seconds, window.keep_going, window.kiosk = gui, seconds, keep_going, kiosk

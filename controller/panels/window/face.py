@@ -35,7 +35,7 @@ from surface.head.model.parameters import head_angles
 from surface.view.docks import PictureArea, Remake
 from surface.view.draw.renderer import Renderer
 from surface.view.scene.choice import QualityChoice
-from surface.view.scene.framing import framed, framing_of
+from surface.view.scene.framing import framing_of
 from surface.view.scene.viewpoint import Viewpoint
 from surface.view.window import run_window
 
@@ -76,7 +76,8 @@ class WindowFace:
         choice = HeadChoice(heads, values, panel_state, send)
         ask = choice.send
         self._head, self._settings, self._values = head, settings, values
-        self._viewpoint = Viewpoint(framed(settings.make_camera(), head), framing_of(head))
+        framing = framing_of(head, worn=settings.dressed)
+        self._viewpoint = Viewpoint(framing.camera(settings.make_camera()), framing)
         self._area = PictureArea()
         newest = lambda: values.full  # noqa: E731
         parameters = PARAMETERS if options is None else options.parameters
@@ -190,7 +191,7 @@ class WindowFace:
         """Use another head for posing, dragging and gaze from now on."""
         self._head = head
         self._values.follow(head.parameters)
-        self._viewpoint.reframe(framing_of(head))
+        self._viewpoint.reframe(framing_of(head, worn=self._settings.dressed))
         if self._mouse is not None:
             looks = self._looks
             self._mouse.change(head, looks.shown_light if looks else (), same=looks is not None and looks.only_light)

@@ -7,11 +7,9 @@ from pathlib import Path
 
 from surface.base.arrays import Floats
 from surface.base.errors import FitError
-from surface.head import Head
-from surface.head.model.accessories import Accessory, write_accessories
+from surface.fit.measures.saving import save_head
+from surface.head.model.accessories import Accessory
 from surface.head.model.data import HeadData
-from surface.head.model.file import save_data
-from surface.head.posing.fit_error import drop_fit_error, write_fit_error
 
 REFUSED = "-refused"  # what is put behind the name of a folder
 HINT = "correct the mesh there or leave out what hides it (--without NAME)"
@@ -29,8 +27,7 @@ def save_or_refuse(
 ) -> None:  # fmt: skip
     """Write a head to ``out_dir``; one with faults to the folder :func:`refused_folder` instead, unless forced.
 
-    errors : by part, (m,) mm from each vertex at rest to the mesh, NaN where there is none; kept beside the head, as
-    ``accessories`` are.
+    errors, accessories : as for :func:`surface.fit.measures.saving.save_head`, which says in which order files change.
     hint : what to do about faults, in words.
 
     Raises FitError: the head has faults; what is in ``out_dir`` stays as it was. HeadFileError: a folder cannot be
@@ -38,10 +35,7 @@ def save_or_refuse(
     """
     refused = bool(faults) and not force
     folder = refused_folder(out_dir) if refused else Path(out_dir)
-    drop_fit_error(folder)  # of the head that was there
-    save_data(folder, head)
-    write_fit_error(folder, errors, Head(head).parts)
-    write_accessories(folder, accessories)
+    save_head(folder, head, errors, accessories)
     if refused:
         what = f"the head is refused: {'; '.join(faults)}; it was written to {folder} instead"
         look = f"look at it (omote render --head {folder} -o out.png), {hint}"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from surface.base.arrays import Floats
 from surface.base.pictures import decoded
+from surface.base.texels import has_clear
 from surface.fit.source.textures import LARGEST, MOST_PIXELS
 from surface.readers.meshdata import Material
 
@@ -43,7 +44,7 @@ def reduced_picture(material: Material) -> Reduced:
         return Reduced(b"", True, f"a picture of this kind needs Pillow: {INSTALL}")
     except ValueError as error:
         return Reduced(b"", True, f"its picture cannot be read: {error}")
-    clear = material.alpha != "OPAQUE" and _has_clear(image)
+    clear = material.alpha != "OPAQUE" and has_clear(image)
     if not clear and material.mime in PLAIN and max(image.size) <= LARGEST:
         return Reduced(data, clear)
     return Reduced(_reduced(image, clear=clear), clear)
@@ -53,15 +54,10 @@ def _reduced(image: Any, *, clear: bool) -> bytes:
     from PIL import Image  # optional: the extra view
 
     small = image.convert("RGBA" if clear else "RGB")
-    small.thumbnail((LARGEST, LARGEST))
+    small.thumbnail((LARGEST, LARGEST))  # weights colours by opacity; what is left clear is filled afterwards
     if clear:
         small = Image.fromarray(bled(np.asarray(small)))
     return _encoded(small, "PNG" if clear else "JPEG")
-
-
-def _has_clear(image: Any) -> bool:
-    """Whether any texel is not opaque."""
-    return bool(image.convert("RGBA").getchannel("A").getextrema()[0] < 255)
 
 
 def _encoded(image: Any, kind: str) -> bytes:

@@ -11,6 +11,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.base.progress import Progress, no_progress, part_of
 from surface.fit.features.findings import findings
+from surface.fit.measures.saving import save_head
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.anatomy import Eyes, Landmarks
 from surface.fit.surfaces.build import make_part, with_mesh
@@ -25,11 +26,9 @@ from surface.fit.transfer.api import transfer
 from surface.fit.transfer.reports.landmarkfile import read_landmarks
 from surface.fit.transfer.scan import make_scan
 from surface.head import Head
-from surface.head.model.accessories import write_accessories
 from surface.head.model.data import HeadData, Jaw, Seam
-from surface.head.model.file import check_writable, save_data
+from surface.head.model.file import check_writable
 from surface.head.model.parameters import SHAPES
-from surface.head.posing.fit_error import drop_fit_error
 from surface.readers import NamedSurface
 
 MADE = "surfaces of {}, by omote fit: the file's own control points"
@@ -78,9 +77,7 @@ def fit_surfaces(
     head, report = _make(pieces, name, options, progress, str(path), notes)
     if report_dir is not None:
         write_report(report, report_dir)
-    drop_fit_error(out_dir)  # of a mesh that the head before was fitted to, as its accessories were
-    write_accessories(out_dir, ())
-    save_data(out_dir, head)
+    save_head(out_dir, head)
     return report
 
 

@@ -24,7 +24,7 @@ from surface.fit.transfer.faults import HINT, faults_of_transfer
 from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.lining import keep_lining_behind
 from surface.fit.transfer.place_parts import scaled
-from surface.fit.transfer.register import STAGES, Matcher, register
+from surface.fit.transfer.register import STAGES, Matcher, Registered, register
 from surface.fit.transfer.reports.errors import face_reports, skin_errors
 from surface.fit.transfer.reports.gaps import measure_gaps
 from surface.fit.transfer.reports.landmarkfile import read_landmarks, swapped
@@ -36,7 +36,7 @@ from surface.fit.transfer.reports.report import (
     reseated,
 )
 from surface.fit.transfer.reports.reportfile import write_transfer_report
-from surface.fit.transfer.scan import Scan, read_scan, sample
+from surface.fit.transfer.scan import Samples, Scan, read_scan, sample
 from surface.fit.transfer.symmetry import levelled, mirror_plane, symmetrised
 from surface.fit.transfer.template import Template, make_template
 from surface.fit.transfer.warp_head import warp_head
@@ -110,20 +110,16 @@ def transfer(
     found = find_face(scan, template, picked, options, where)
     found, mirrored = upright(scan, template, found)
     scan, marks = in_frame(scan, template, found), {n: found.points(p) for n, p in picked.items()}
-    samples = sample(scan, MANY)
-    progress("face", 0.15)
-    done = register(template, samples, marks, lambda share: progress("face", 0.15 + 0.5 * share))
-    done = symmetrised(done) if mirrored else done
+    samples, done = _registered(scan, template, marks, progress, mirrored=mirrored)
     matcher = Matcher(samples)
     provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
     warped = warp_head(head, template, done.warp, done.smooth, matcher, provenance, name)
     progress("lids", 0.75)
-    data, lid_notes = seat_drawn_lids(close_lids(warped, head.data))
-    data, lining_notes = keep_lining_behind(data)
+    data, mended = _with_lids_and_lining(warped, head.data)
     changed = reseated(warped, data)
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
-    notes += [*scan.notes, *lid_notes, *lining_notes]
+    notes += [*scan.notes, *mended]
     notes += ["the face is symmetric, and was fitted symmetrically"] if mirrored else []
     if scan.colours is not None:
         data, colour_notes = with_colours(data, scan.colours)
@@ -133,9 +129,8 @@ def transfer(
     faults = tuple(faults_of_transfer(parts, registered[1], data, head))
     face = Head(data)
     landmarks, openings = landmarks_of(face, done.marks, found), openings_of(face, samples)
-    middle = data.eyes.mean(axis=0)
     errors = {part: factor * mm for part, mm in skin_errors(face, scan).items()}
-    data = replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, options.unit or ""))
+    data = _in_true_size(data, found, factor, options.unit or "")
     worn = _worn(scan, data)
     notes += worn.notes
     moving = [n for n in head.parameters if any(g.name == n for p in data.parts for g in p.groups)]
@@ -145,6 +140,30 @@ def transfer(
     fit = FitReport(name, parts, moving, notes=notes, scale=1.0, faults=faults)
     report = TransferReport(fit, head.name, *registered, landmarks, openings, changed, gaps)
     return Transferred(data, report, found, errors, worn.accessories)
+
+
+def _registered(
+    scan: Scan, template: Template, marks: dict[str, Floats], progress: Progress, *, mirrored: bool
+) -> tuple[Samples, Registered]:  # fmt: skip
+    """Samples of a scan that is in the head's frame, and the template's registration to them, symmetric if
+    ``mirrored``. marks : landmarks (3,) there."""
+    samples = sample(scan, MANY)
+    progress("face", 0.15)
+    done = register(template, samples, marks, lambda share: progress("face", 0.15 + 0.5 * share))
+    return samples, symmetrised(done) if mirrored else done
+
+
+def _with_lids_and_lining(warped: HeadData, source: HeadData) -> tuple[HeadData, list[str]]:
+    """The warped head with lids that close as those of its ``source``, and a mouth's lining behind the skin; notes."""
+    data, lid_notes = seat_drawn_lids(close_lids(warped, source))
+    data, lining_notes = keep_lining_behind(data)
+    return data, [*lid_notes, *lining_notes]
+
+
+def _in_true_size(data: HeadData, found: Similarity, factor: float, unit: str) -> HeadData:
+    """The head enlarged by ``factor`` about the middle of its eyes, with its placement."""
+    middle = data.eyes.mean(axis=0)
+    return replace(scaled(data, factor, middle), placement=_placement(found, factor, middle, unit))
 
 
 def _worn(scan: Scan, head: HeadData) -> Kept:

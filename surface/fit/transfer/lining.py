@@ -32,6 +32,7 @@ POSES: tuple[dict[str, float], ...] = (
 STEP_MM = 0.4  # size of a pixel in which skin and lining are compared
 BEHIND_MM = 1.0  # least distance of the lining behind the skin
 MOST_MM = 8.0  # what is further before the skin than this has nothing to do with it
+TOLD_MM = 0.05  # no remark is made on less, which would be called 0.0 mm
 ROUNDS, GAIN = 6, 1.5  # of moving control points; each moves them by so much more than is missing
 
 
@@ -52,7 +53,7 @@ def keep_lining_behind(head: HeadData) -> tuple[HeadData, list[str]]:
         return head, []
     parts = [replace(p, points=moved[p.name]) if p.name in moved else p for p in head.parts]
     note = f"the lining of the mouth was moved back by up to {most:.1f} mm, to stay behind the skin"
-    return replace(head, parts=parts), [note]
+    return replace(head, parts=parts), [note] if most >= TOLD_MM else []
 
 
 def _moved_back(posed: Head, lips: str, lining: SkinPart) -> Floats:

@@ -112,15 +112,23 @@ class WornMesh:
     def __init__(self, accessory: Accessory, neck: Neck) -> None:
         self.accessory, self.pivot = accessory, neck.pivot
         self.share = neck.share(accessory.vertices.astype(np.float64)).astype(np.float32)
-        self._last: tuple[bytes, Floats32, Floats32] = b"", accessory.vertices, accessory.normals
+        self._rest = _read_only(accessory.vertices), _read_only(accessory.normals)
+        self._last: tuple[bytes, Floats32, Floats32] = b"", *self._rest
 
     def turned(self, matrix: Floats) -> tuple[Floats32, Floats32]:
         """Return vertices and normals (m, 3) with the head turned by ``matrix`` (3, 3); read-only."""
         turn = Turn(np.asarray(matrix, np.float64), self.pivot)
         if turn.none:
-            return self.accessory.vertices, self.accessory.normals
+            return self._rest
         if turn.key != self._last[0]:
             vertices, normals = np.empty_like(self.accessory.vertices), np.empty_like(self.accessory.normals)
             turn.rotate(self.accessory, self.share, (0, len(self.share)), vertices, normals)
-            self._last = turn.key, vertices, normals
+            self._last = turn.key, _read_only(vertices), _read_only(normals)
         return self._last[1:]
+
+
+def _read_only(rows: Floats32) -> Floats32:
+    """Return the same numbers for those who must not change them."""
+    view = rows.view()
+    view.flags.writeable = False
+    return view

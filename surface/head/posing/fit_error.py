@@ -53,11 +53,6 @@ def write_fit_error(head: str | Path, errors: Mapping[str, Floats], parts: Itera
     return write_sidecar(sidecar_path(head, FIT_ERROR), packed, checks)
 
 
-def drop_fit_error(head: str | Path) -> None:
-    """Remove what belongs to a head that this folder held before."""
-    sidecar_path(head, FIT_ERROR).unlink(missing_ok=True)
-
-
 def apply_fit_error(parts: Iterable[HeadPart], errors: Mapping[str, Floats32]) -> None:
     """Set the ``fit_error`` attribute (m,) mm of the parts that were measured."""
     for part in parts:

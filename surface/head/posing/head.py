@@ -79,20 +79,11 @@ class Head:
         Raises HeadFileError: a file is missing, damaged, cut short, of another version or made for another mesh (names
         file and key), or the head has no identity of that name. ValueError: control points that cannot be added.
         """
-        data = load_data(path)
-        if identity:
-            data = with_identities(data, load_identities(path), identity, str(path))
-        if look is not None:
-            data = with_age(data, look.age)
+        data = _with_person(load_data(path), path, identity, look)
+        _check_tilts(data, path)
         garments = tuple(read_garment(worn) for worn in look.worn) if look is not None else ()
         if garments:
             data = with_garments(data, garments, str(path))
-        for shape in data.jaw.tilts:
-            if shape not in SHAPES:
-                raise HeadFileError(
-                    f"{path}: jaw.tilts.{shape}: is no shape",
-                    hint="name a shape of the head",
-                )
         refined: Mapping[str, Refined] = {}
         if light:
             data, refined = with_light(data, light, partial(coarser_of, path))
@@ -215,6 +206,22 @@ class Head:
         if key != self._last_turn[0]:
             self._last_turn = key, Turn(rotation(*angles), self.data.neck.pivot)
         return self._last_turn[1]
+
+
+def _with_person(
+    data: HeadData, path: str | Path, identity: Mapping[str, float] | None, look: Look | None
+) -> HeadData:  # fmt: skip
+    """Return the data of the head at ``path`` with an identity and the age of a look; errors as :meth:`Head.load`."""
+    if identity:
+        data = with_identities(data, load_identities(path), identity, str(path))
+    return data if look is None else with_age(data, look.age)
+
+
+def _check_tilts(data: HeadData, path: str | Path) -> None:
+    """Raise HeadFileError where the jaw tilts by what is no shape."""
+    for shape in data.jaw.tilts:
+        if shape not in SHAPES:
+            raise HeadFileError(f"{path}: jaw.tilts.{shape}: is no shape", hint="name a shape of the head")
 
 
 def _make_part(part: PartData, head: HeadData, drivers: Drivers, where: str) -> HeadPart:

@@ -60,7 +60,7 @@ class Renderer:
             raise ValueError(f"quality must be one of {', '.join(QUALITIES)}, not {quality!r}")
         self.ctx, self.head, self.quality = ctx, head, quality
         self.theme = find_theme(theme)
-        self._middle_z = framing_of(head).point((0.0, 0.0, 0.0))[2]
+        self._middle_z = framing_of(head, worn=False).point((0.0, 0.0, 0.0))[2]
         self._values = np.zeros(len(head.parameters))
         head.pose(self._values)
         self.evaluator = choose(ctx, head, evaluator)
@@ -98,7 +98,7 @@ class Renderer:
         """The head's accessories, ``simplified`` for live pictures drawn in software; none of a mask or a robot, which
         show the face alone."""
         meshes = getattr(self.head, "accessories", ())
-        if not meshes or not self.theme.use_painted:
+        if not meshes or not self.theme.dressed:
             return None
         self._programs |= accessory_programs(self.ctx, "fast" if simplified else self.quality)
         return AccessoryBuffers(self.ctx, meshes, self._programs, simplified=simplified)

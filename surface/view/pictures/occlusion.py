@@ -36,6 +36,7 @@ SKY_RANGE = 2.0
 #: Skin whose other side is further away lets no light through, mm.
 _THICK_MM = 11.0
 _NEIGHBOURS = 220
+_NOTHING = np.zeros((0, 3))
 #: Pose in which mouth and lids show what they hide at rest.
 _OPEN = {"jawOpen": 0.45, "eyeBlinkLeft": 0.8, "eyeBlinkRight": 0.8}
 
@@ -152,21 +153,21 @@ def _bake(
     normals = np.concatenate([np.asarray(part.normals, np.float64) for part in parts])
     program = build(ctx, ("depth.vert",), ("depth.frag",))
     arrays, over = ([_vertex_array(ctx, program, part) for part in each] for each in (parts, worn))
-    every = np.concatenate([points, *(one.vertices for one in worn)])
+    around = np.concatenate([np.zeros((0, 3)), *(one.vertices for one in worn)])
     depth = ctx.depth_texture((resolution, resolution))
     target = ctx.framebuffer([], depth)
     seen, total = np.zeros(len(points)), np.zeros(len(points))
     normal, right = np.zeros((len(points), 4, 4)), np.zeros((len(points), 4))
     for direction in sphere_directions(directions):
         weight = np.clip(normals @ direction, 0.0, None)
-        box, matrix, span = orthographic(every, direction)
+        box, matrix, span = orthographic(points, direction, around)
         set_uniforms(program, {"view_projection": matrix})
         target.use()
         ctx.enable_only(ctx.DEPTH_TEST)
         target.clear(depth=1.0)
-        visible = _drawn_visibility(arrays, depth, box[: len(points)], bias_mm / span)
+        visible = _drawn_visibility(arrays, depth, box, bias_mm / span)
         if over:
-            shaded = _drawn_visibility(over, depth, box[: len(points)], bias_mm / span)
+            shaded = _drawn_visibility(over, depth, box, bias_mm / span)
             visible += _WORN_SHADE * (shaded - visible)
         seen += weight * visible
         total += weight
@@ -203,8 +204,13 @@ def sphere_directions(count: int) -> np.ndarray:
     return np.column_stack([ring * np.cos(angle), height, ring * np.sin(angle)])
 
 
-def orthographic(points: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+def orthographic(
+    points: np.ndarray, direction: np.ndarray, around: np.ndarray = _NOTHING
+) -> tuple[np.ndarray, np.ndarray, float]:
     """View of `points` (m, 3) from far away along `direction` (3,).
+
+    around : (k, 3) what may hide them. The cube begins before it, but is no wider for it: what lies beside `points`
+    hides nothing, and a wider picture would be coarser.
 
     Returns their coordinates in the unit cube (m, 3), depth last and growing away from the viewer; the matrix (4, 4) to
     clip space; and the depth of the cube in mm.
@@ -213,7 +219,9 @@ def orthographic(points: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray,
     side /= np.linalg.norm(side)
     frame = np.array([side, np.cross(direction, side), -direction])
     own = points @ frame.T
-    low, size = own.min(axis=0), np.maximum(np.ptp(own, axis=0), 1e-6)
+    low, high = own.min(axis=0), own.max(axis=0)
+    low[2] = (around @ frame[2]).min(initial=low[2])
+    size = np.maximum(high - low, 1e-6)
     low, size = low - 0.02 * size, 1.04 * size
     matrix = np.eye(4)
     matrix[:3, :3] = 2.0 * frame / size[:, None]

@@ -79,7 +79,7 @@ class Offscreen:
                 self.ctx.release()
             raise ViewError(f"cannot draw {size[0]}x{size[1]} pixels", hint=f"choose a size from 1 to {limit}")
         self.renderer = Renderer(self.ctx, head, quality=quality, theme=theme, evaluator=evaluator)
-        self._front = framed(Camera.front(), head)
+        self._front = framed(Camera.front(), head, worn=self.renderer.theme.dressed)
         software = is_software(self.ctx)
         self._sampling = AdaptiveSampling(quality, samples, software=software)
         self._fence = None if software else FrameFence(self.ctx)

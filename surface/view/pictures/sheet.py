@@ -14,7 +14,7 @@ from surface.view.pictures.offscreen import Offscreen
 from surface.view.scene.camera import Camera
 from surface.view.scene.framing import framed
 from surface.view.scene.parts import ViewHead
-from surface.view.scene.theme import Theme
+from surface.view.scene.theme import Theme, find_theme
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -49,7 +49,8 @@ def contact_sheet(
 
     Raises ViewError: no entries, no OpenGL, no Pillow.
     """
-    cameras = [zoom_to_head(camera) for camera in views or (framed(Camera.front(), head),)]
+    front = framed(Camera.front(), head, worn=find_theme(theme).dressed)
+    cameras = [zoom_to_head(camera) for camera in views or (front,)]
     pictures = []
     with Offscreen(head, tile, quality=quality, theme=theme) as screen:
         for index, (_, values) in enumerate(entries):
@@ -74,7 +75,7 @@ def crowd_sheet(
 
     labels : one for each head. camera : zoomed in, since tiles are small; the front if None.
     """
-    camera = zoom_to_head(camera or framed(Camera.front(), crowd.head))
+    camera = zoom_to_head(camera or framed(Camera.front(), crowd.head, worn=find_theme(theme).dressed))
     pictures = []
     with Offscreen(crowd.head, tile, quality=quality, theme=theme, evaluator="cpu") as screen:
         for k in range(len(crowd)):

@@ -20,24 +20,29 @@ LIPS_SHAPES = ("mouthPucker", "mouthFunnel", "mouthClose", "mouthRollLower", "mo
 WORN_UP, WORN_ASIDE, WORN_BACK = 126.0, 155.0, 230.0  # mm from the middle of its eyes that its pictures show
 MOST_UP = 55.0  # mm on the shipped head: so far up a camera looks for what is worn before it steps back
 MOST_WORN = 1.4  # times a head's size: what is worn is shown by that much smaller at most
+MOST_OF_IT = 0.99  # of the area of what is worn that a camera makes room for: stray cards may lie further out
 BLINKS = ("eyeBlinkLeft", "eyeBlinkRight")
 SKIN, SAMPLES = "skin", 400  # places of a part that its outline is measured at
 
 
 @dataclass(frozen=True)
 class Framing:
-    """A move and a scale that bring the shipped head's place to a head's: ``at`` (3,) mm is the middle of its eyes,
-    ``size`` its size relative to the shipped head's."""
+    """A move and a scale that bring the shipped head's place to a head's.
+
+    at : (3,) mm, the middle of its eyes. size : relative to the shipped head's; greater where cameras make room for
+    what it wears. up : mm, by how much cameras look higher for that.
+    """
 
     at: tuple[float, float, float] = (float(EYES[0]), float(EYES[1]), float(EYES[2]))
     size: float = 1.0
+    up: float = 0.0
 
     def point(self, place: tuple[float, float, float]) -> tuple[float, float, float]:
-        """A place (3,), mm, at the shipped head as one at this head."""
+        """A place (3,), mm, of a camera at the shipped head as one at this head."""
         if self == Framing():
             return place  # exactly: the shipped head's pictures depend on it
         x, y, z = (np.array(self.at) + self.size * (np.array(place) - EYES)).tolist()
-        return x, y, z
+        return x, y + self.up, z
 
     def camera(self, camera: Camera) -> Camera:
         """A camera made for the shipped head as one that shows this head in the same way."""
@@ -47,9 +52,10 @@ class Framing:
         return replace(camera, eye=eye, target=target, near=self.size * camera.near, far=self.size * camera.far)
 
 
-def framing_of(head: ViewHead) -> Framing:
+def framing_of(head: ViewHead, *, worn: bool = True) -> Framing:
     """The framing of a head, from its eyes, lips and outline at rest; the shipped head's where it hardly differs, and
-    for one of which nothing is known."""
+    for one of which nothing is known. worn : make room for its accessories, too, for pictures that show them (see
+    :attr:`surface.view.scene.theme.Theme.dressed`)."""
     data = getattr(head, "data", None)
     if data is None:
         return Framing()
@@ -58,14 +64,15 @@ def framing_of(head: ViewHead) -> Framing:
         return Framing()
     at, known = _eyes(data, skin)
     size = _size(data, skin, at) if known else _height(skin)
-    wanted, up = _room(getattr(head, "accessories", ()), at, size)
+    wanted, up = _room(getattr(head, "accessories", ()) if worn else (), at, size)
     near = np.abs(at - EYES).max() < NEAR_MM and abs(np.log(size)) < np.log1p(NEAR_SIZE) and wanted <= 1.0 and up <= 0.0
-    return Framing() if near else Framing((float(at[0]), float(at[1]) + up, float(at[2])), max(size, wanted))
+    return Framing() if near else Framing((float(at[0]), float(at[1]), float(at[2])), max(size, wanted), up)
 
 
-def framed(camera: Camera, head: ViewHead) -> Camera:
-    """A camera made for the shipped head, as a preset is, moved to a head's own face."""
-    return framing_of(head).camera(camera)
+def framed(camera: Camera, head: ViewHead, *, worn: bool = True) -> Camera:
+    """A camera made for the shipped head, as a preset is, moved to a head's own face; ``worn`` as for
+    :func:`framing_of`."""
+    return framing_of(head, worn=worn).camera(camera)
 
 
 def _skin_points(head: Any) -> np.ndarray:
@@ -117,17 +124,34 @@ def _size(data: Any, skin: np.ndarray, at: np.ndarray) -> float:
 
 
 def _room(accessories: Sequence[Any], at: np.ndarray, size: float) -> tuple[float, float]:
-    """Size at which cameras show the hats and hair around a head of ``size``, and how far up they look for it, mm; of
-    what lies above its lips, for hair may hang down out of a picture."""
-    found = [one.accessory.vertices for one in accessories]
-    points = np.concatenate([np.zeros((0, 3)), *found]) - at
-    points = points[points[:, 1] > -size * LIPS]
-    if not len(points):
+    """Size at which cameras show the hats and hair around a head of ``size``, and how far up they look for it, mm."""
+    corners = _worn_triangles(accessories, at, size)
+    if not len(corners):
         return 0.0, 0.0
-    top, wide, back = points[:, 1].max(), np.abs(points[:, 0]).max(), -points[:, 2].min()
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    ends = corners[..., 1].max(axis=1), np.abs(corners[..., 0]).max(axis=1), -corners[..., 2].min(axis=1)
+    top, wide, back = (_share_below(each, area, MOST_OF_IT) for each in ends)
     wanted = min(max(wide / WORN_ASIDE, back / WORN_BACK, top / (WORN_UP + MOST_UP)), MOST_WORN * size)
     shown = max(size, wanted)
     return float(wanted), float(np.clip(top - WORN_UP * shown, 0.0, MOST_UP * shown))
+
+
+def _worn_triangles(accessories: Sequence[Any], at: np.ndarray, size: float) -> np.ndarray:
+    """(t, 3, 3) corners, mm from ``at``, of the triangles that make up what is worn: those above the lips, for hair may
+    hang down out of a picture, and not so far from the head that no camera shows them."""
+    found = [one.accessory.vertices[one.accessory.triangles] for one in accessories]
+    corners = np.concatenate([np.zeros((0, 3, 3)), *found]) - at
+    reach = MOST_WORN * size * np.array([WORN_ASIDE, WORN_UP + MOST_UP, WORN_BACK])
+    near = (corners.min(axis=1) < reach).all(axis=1) & (corners.max(axis=1) > -reach).all(axis=1)
+    kept: np.ndarray = corners[near & (corners[..., 1].mean(axis=1) > -size * LIPS)]
+    return kept
+
+
+def _share_below(values: np.ndarray, weight: np.ndarray, share: float) -> float:
+    """The least of ``values`` (n,) that is not exceeded by so much of the ``weight`` (n,)."""
+    order = np.argsort(values)
+    total = np.cumsum(weight[order])
+    return float(values[order[min(np.searchsorted(total, share * total[-1]), len(order) - 1)]])
 
 
 def _moved(data: Any, names: tuple[str, ...]) -> np.ndarray | None:

@@ -81,6 +81,11 @@ class Theme:
         return any(self.lamps)
 
     @property
+    def dressed(self) -> bool:
+        """Whether accessories of a head are drawn: not on a mask or a robot, which show the face alone."""
+        return self.use_painted
+
+    @property
     def pupil(self) -> float:
         """How wide pupils are in this light, in those of the theme "skin", for which a room's luminance is assumed; a
         mask's stay as they are. Moon and Spencer, "On the Stiles-Crawford effect", J. Opt. Soc. Am. 34 (1944)."""

@@ -38,7 +38,11 @@ def test_every_row_is_a_picture_at_its_time(monkeypatch: pytest.MonkeyPatch) -> 
         parameters=list(P.names), sway=SimpleNamespace(advance=lambda angles, at_s: swayed.append((angles, at_s)))
     )
     look = SimpleNamespace(
-        make_camera=lambda: "camera", make_theme=lambda: "theme", still_quality="full", evaluator="cpu"
+        make_camera=lambda: "camera",
+        make_theme=lambda: "theme",
+        still_quality="full",
+        evaluator="cpu",
+        dressed=False,
     )
     still: Any = SimpleNamespace(load_head=lambda: head, look=look, size=(64, 48), parameters=P)
 
@@ -51,7 +55,7 @@ def test_every_row_is_a_picture_at_its_time(monkeypatch: pytest.MonkeyPatch) -> 
         return len(list(pictures))
 
     monkeypatch.setattr(film, "Offscreen", screen)
-    monkeypatch.setattr(film, "framed", lambda camera, of: f"{camera} of the head" if of is head else "")
+    monkeypatch.setattr(film, "framed", lambda camera, of, worn: f"{camera} of the head" * (of is head and not worn))
     monkeypatch.setattr(film, "write_clip", write)
     monkeypatch.setattr(film, "head_angles", lambda values: float(values[YAW]))
     rows = np.zeros((3, len(P)))

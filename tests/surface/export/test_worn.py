@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 from dataclasses import replace
@@ -11,11 +12,12 @@ from typing import Any
 import numpy as np
 import pytest
 from cards import RED, card, picture
+from PIL import Image
 from small_head import small_head
 
 from surface.export import export_head
 from surface.export.urdf import SKULL
-from surface.export.worn import WEB_PIXELS, web_texture
+from surface.export.worn import WEB_PIXELS, accessory_parts, web_texture
 from surface.fit.features.accessories import make_accessories
 from surface.fit.source.load import LoadOptions, load_mesh
 from surface.head import Head
@@ -136,3 +138,39 @@ def test_names_are_on_one_line_and_none_is_there_twice(tmp_path: Path) -> None:
     export_head(wearing(*twice), tmp_path / "h.glb")
     names = [node["name"] for node in document(tmp_path / "h.glb")["nodes"]]
     assert names[-4:] == ["Hair", "Hair 2", "x y", "hat"]
+
+
+def test_a_name_that_another_object_or_a_part_of_the_head_has_gets_the_next_free_number() -> None:
+    named = [replace(card(), name=name) for name in ("A 2", "A", "A", "A", "tooth", "Hair band", "Hair")]
+    assert [part.name for part in accessory_parts(wearing(*named))] == [
+        "A 2", "A", "A 3", "A 4", "tooth 2", "Hair band", "Hair",
+    ]  # fmt: skip
+
+
+def noisy(palette: bool = False) -> bytes:
+    """A large picture of reds whose right half is clear, and as red; with a palette, of which one entry is clear."""
+    reds = np.random.default_rng(0).integers(180, 220, (1024, 1024)).astype(np.uint8)
+    pixels = np.dstack([reds, reds // 8, reds // 8, np.full_like(reds, 255)])
+    pixels[:, 512:, 3] = 0
+    image, out = Image.fromarray(pixels), io.BytesIO()
+    if palette:
+        own = image.convert("RGB").quantize(200).point(lambda index: max(index, 1))
+        own.paste(0, (512, 0, 1024, 1024))
+        own.save(out, "PNG", transparency=0)
+    else:
+        image.save(out, "PNG")
+    return out.getvalue()
+
+
+def test_clear_texels_of_the_web_file_keep_their_colour() -> None:
+    packed, kind = web_texture(replace(card(), alpha="MASK", texture=noisy()))
+    pixels = np.asarray(Image.open(io.BytesIO(packed)))
+    assert (kind, pixels.shape) == ("image/png", (WEB_PIXELS, WEB_PIXELS, 4))
+    assert not pixels[:, 300:, 3].any() and pixels[..., 0].min() > 170
+
+
+def test_what_a_palette_leaves_clear_is_clear_in_the_web_file() -> None:
+    packed, kind = web_texture(replace(card(), alpha="MASK", texture=noisy(palette=True)))
+    pixels = np.asarray(Image.open(io.BytesIO(packed)).convert("RGBA"))
+    assert (kind, pixels.shape) == ("image/png", (WEB_PIXELS, WEB_PIXELS, 4))
+    assert pixels[:, :200, 3].all() and not pixels[:, 300:, 3].any()

@@ -18,7 +18,8 @@ from surface.fit.points.refine import FitRequest
 from surface.fit.points.report import FitResult
 from surface.fit.points.strength import Strength
 from surface.fit.source.islands import find_islands
-from surface.fit.source.load import Loaded
+from surface.fit.source.kinds import piece_kinds, worn_faces
+from surface.fit.source.load import Loaded, worn_mesh
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names
 from surface.head import Head
@@ -275,3 +276,16 @@ def test_a_mesh_without_height_is_refused(tmp_path):
     with pytest.raises(FitError, match=r"flat\.obj: lies flat: it has no height") as caught:
         fit_head(path, tmp_path / "head", name="flat")
     assert "--up" in caught.value.hint and list(tmp_path.iterdir()) == [path]
+
+
+def test_what_is_worn_does_not_hide_the_kinds_of_other_pieces():
+    sheet = slit_sheet()
+    mesh = replace(sheet, pieces=("Face", "Teeth", "Hair"), piece=np.arange(len(sheet.faces)) % 3)
+    mesh = replace(mesh, names=(), deltas=mesh.deltas[:0])
+    aside = worn_faces(mesh)
+    loaded = Loaded(
+        mesh, map_names(()), pieces=piece_kinds(mesh, ~aside), worn=worn_mesh(mesh, aside, "a mesh")
+    )  # fmt: skip
+    assert aside.sum() == (mesh.piece == 2).sum()
+    assert api._kinds(loaded) == {"skin", "teeth"}
+    assert api._kinds(replace(loaded, worn=None)) == {"skin", "teeth", "hair"}

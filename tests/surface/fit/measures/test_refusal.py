@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cards import card
 from small_head import small_head
 
 from surface.base.errors import FitError
 from surface.fit.measures.refusal import refused_folder, save_or_refuse
 from surface.head import Head
+from surface.head.model.accessories import read_accessories
 from surface.head.posing.fit_error import read_fit_error
 
 
@@ -39,3 +41,10 @@ def test_who_insists_gets_the_head_in_its_place_with_its_errors(tmp_path: Path) 
     assert not refused_folder(place).exists()
     save_or_refuse(place, data, [], {})
     assert read_fit_error(place, Head.load(place).parts) == {}, "those of the head before are gone"
+
+
+def test_accessories_are_kept_beside_the_head_until_another_one_is_written(tmp_path: Path) -> None:
+    save_or_refuse(tmp_path, small_head(), [], {}, [card()])
+    assert [one.name for one in read_accessories(tmp_path)] == ["Card"]
+    save_or_refuse(tmp_path, small_head(), [], {})
+    assert read_accessories(tmp_path) == ()

@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from cards import card
 from relief import ball, cube_tsm, named, relief, tube
 
 from surface import Domain
-from surface.base.errors import FitError, SurfaceFileError
+from surface.base.errors import FitError, HeadFileError, SurfaceFileError
 from surface.export import export_head
 from surface.fit.surfaces import SurfaceOptions, fit_surfaces, head_of
 from surface.fit.surfaces.report import SurfaceReport
 from surface.head import Group, Head, HeadData
+from surface.head.model.accessories import read_accessories, write_accessories
 from surface.head.model.file import load_data
 from surface.head.posing.part import HeadPart
 from surface.readers import NamedSurface, write_surfaces
@@ -228,3 +231,18 @@ def test_the_group_file_of_the_docs_is_read(tmp_path: Path, root: Path) -> None:
         named(face=relief().with_points(relief().points + np.array([0, 0, 60]))), name="h", options=options
     )
     assert {g.name for g in groups.parts[0].groups} == {"mouthSmileLeft", "mouthSmileRight", "jawOpen"}
+
+
+def test_a_head_that_cannot_be_replaced_keeps_its_hair_and_one_that_is_leaves_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, place = write(tmp_path, named(tube=tube(60, 200))), tmp_path / "h"
+    fit_surfaces(path, place, name="h", options=MM)
+    write_accessories(place, [card()])
+    with monkeypatch.context() as patch:
+        patch.setattr("surface.fit.measures.saving.save_data", Mock(side_effect=HeadFileError("full")))
+        with pytest.raises(HeadFileError, match="full"):
+            fit_surfaces(path, place, name="h", options=MM)
+    assert len(read_accessories(place)) == 1
+    fit_surfaces(path, place, name="h", options=MM)
+    assert {file.name for file in place.iterdir()} == {"head.toml", "head.npz"}

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from small_head import all_points, part, small_head
 
 from surface.fit.transfer import lining as module
@@ -47,6 +48,17 @@ def test_a_lining_that_comes_through_the_skin_is_moved_back() -> None:
     low = np.flatnonzero(before.parts[1].knots_v[:, 1:4].mean(axis=1) == 0.0)
     assert not moves[low].any()  # nothing comes out there
     np.testing.assert_array_equal(after.parts[0].points, before.parts[0].points)
+
+
+@pytest.mark.parametrize(("moved", "told"), [(0.04, []), (0.06, ["0.1 mm"])])
+def test_no_remark_says_that_the_lining_was_moved_by_nothing(
+    monkeypatch: pytest.MonkeyPatch, moved: float, told: list[str]
+) -> None:
+    monkeypatch.setattr(module, "_moved_back", lambda _posed, _lips, lining: lining.rig.rest - [0.0, 0.0, moved])
+    before = head()
+    after, notes = keep_lining_behind(before)
+    np.testing.assert_allclose(before.parts[1].points[:, 2] - after.parts[1].points[:, 2], moved)
+    assert len(notes) == len(told) and all(word in note for word, note in zip(told, notes, strict=True))
 
 
 def test_what_stays_behind_in_every_pose_is_left_alone() -> None:

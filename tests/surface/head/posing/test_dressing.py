@@ -114,7 +114,7 @@ def test_an_accessory_turns_with_the_head_and_over_the_neck_by_its_share() -> No
     assert worn.share.tolist() == [0.0, 0.0, 1.0, 1.0]
     rest = worn.accessory.vertices.copy()
     same, _ = worn.turned(np.eye(3))
-    assert same is worn.accessory.vertices  # a head that does not turn costs nothing
+    assert same.base is worn.accessory.vertices  # a head that does not turn costs nothing
     quarter = rotation(1.0, 0.0, 0.0)
     vertices, normals = worn.turned(quarter)
     np.testing.assert_allclose(vertices[:2], rest[:2], atol=1e-4)
@@ -122,3 +122,11 @@ def test_an_accessory_turns_with_the_head_and_over_the_neck_by_its_share() -> No
     np.testing.assert_allclose(vertices[2:], (rest[2:] - pivot) @ quarter.T + pivot, atol=1e-3)
     np.testing.assert_allclose(normals[2], quarter @ [0.0, 0.0, 1.0], atol=1e-5)
     assert worn.turned(quarter)[0] is vertices and (worn.accessory.vertices == rest).all()
+
+
+def test_nobody_can_damage_an_accessory_at_rest_or_as_it_was_turned_last() -> None:
+    worn = WornMesh(card(), Neck((0.0, -50.0, 0.0), slope=0.0, still=-40.0, whole=0.0))
+    for turn in (np.eye(3), rotation(1.0, 0.0, 0.0)):
+        for rows in worn.turned(turn):
+            with pytest.raises(ValueError, match="read-only"):
+                rows += 1.0

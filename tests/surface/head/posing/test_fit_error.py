@@ -14,7 +14,7 @@ from surface.head import Head, save_data
 from surface.head.model.light import LightPoints
 from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.model.sidecar import write_sidecar
-from surface.head.posing.fit_error import FIT_ERROR, drop_fit_error, read_fit_error, write_fit_error
+from surface.head.posing.fit_error import FIT_ERROR, read_fit_error, write_fit_error
 
 
 @pytest.fixture
@@ -38,9 +38,6 @@ def test_distances_survive_the_file_to_a_hundredth_and_the_head_has_them(folder:
     again = Head.load(folder)
     np.testing.assert_allclose(again.part("a").attributes["fit_error"], wanted, atol=0.0051)
     assert "fit_error" not in again.part("b").attributes
-    drop_fit_error(folder)
-    drop_fit_error(folder)
-    assert read_fit_error(folder) == {}
 
 
 def test_the_greatest_distance_is_not_taken_for_an_unknown_one(folder: Path) -> None:

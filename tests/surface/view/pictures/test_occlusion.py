@@ -268,6 +268,24 @@ def test_hair_and_hats_shade_what_lies_below_them(gl: None, kind: str, alpha: st
     assert least < middle.min() and middle.max() < most + 0.01
 
 
+def test_hair_far_from_a_head_does_not_shade_it(gl: None) -> None:
+    points, normals, triangles = ball(80.0, 41, 61)
+    parts = [BallPart("ball", "skin", triangles, points, normals)]
+    far = card((-3.0, -3.0), (3.0, 3.0), z=-2500.0, kind="hair", texture=b"")
+    bare, worn = (bake(parts, directions=24, resolution=320, worn=each)["ball"] for each in ((), (far,)))
+    assert bare[:, 0].min() > 0.95 and np.abs(worn[:, 0] - bare[:, 0]).max() < 0.01
+
+
+def test_what_lies_before_a_view_makes_it_deeper_and_no_wider() -> None:
+    points, direction = np.random.default_rng(3).normal(0.0, 50.0, (40, 3)), np.array([0.0, 0.0, 1.0])
+    box, _, span = orthographic(points, direction)
+    deeper, matrix, long = orthographic(points, direction, np.array([[900.0, 900.0, 700.0], [0.0, 0.0, -700.0]]))
+    np.testing.assert_allclose(deeper[:, :2], box[:, :2])
+    assert span + 300.0 < long < 1.04 * (700.0 - points[:, 2].min()) + 1e-6
+    nearest = matrix @ [0.0, 0.0, 700.0, 1.0]
+    assert -1.0 < nearest[2] < -0.9 and deeper[:, 2].min() > 0.5
+
+
 def test_the_accessories_beside_a_head_shade_it(gl: None, tmp_path: Path) -> None:
     save_data(tmp_path, small_head())
     bare = np.load(shade_head(tmp_path))["a"].astype(float)

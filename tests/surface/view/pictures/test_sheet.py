@@ -7,11 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from ball_head import BallHead, values
+from cards import card
 from PIL import Image
+from small_head import small_head
 
 from surface.base.errors import ViewError
-from surface.view import Camera, contact_sheet, write_png
-from surface.view.pictures.sheet import compose, zoom_to_head
+from surface.head import Crowd, Head
+from surface.head.posing.dressing import WornMesh
+from surface.view import Camera, Offscreen, contact_sheet, write_png
+from surface.view.pictures.sheet import compose, crowd_sheet, zoom_to_head
 
 
 def plain(colour: tuple[int, int, int], size: tuple[int, int] = (60, 80)) -> np.ndarray:
@@ -129,3 +133,17 @@ def test_a_head_is_nearer_and_higher_on_a_sheet() -> None:
     assert near.distance == pytest.approx(camera.distance / 1.36)
     side = zoom_to_head(Camera.profile())
     assert side.distance == pytest.approx(Camera.profile().distance / 1.16)
+
+
+def test_pictures_of_a_mask_are_the_same_with_a_hat_that_they_do_not_draw(gl: None) -> None:
+    bare, hat = Head(small_head()), Head(small_head())
+    hat.accessories = (WornMesh(card((-300.0, 0.0), (300.0, 400.0), z=-5.0), hat.data.neck),)
+    rest = ("rest", np.zeros(len(bare.parameters)))
+    for theme, same in (("mask", True), ("robot", True), ("skin", False)):
+        crowds = Crowd(bare, 1), Crowd(hat, 1)
+        pages = [np.asarray(contact_sheet(head, [rest], tile=(60, 60), theme=theme)) for head in (bare, hat)]
+        pages += [np.asarray(crowd_sheet(crowd, ["rest"], tile=(60, 60), theme=theme)) for crowd in crowds]
+        assert (pages[0] == pages[1]).all() == (pages[2] == pages[3]).all() == same
+        with Offscreen(bare, (60, 60), theme=theme) as a, Offscreen(hat, (60, 60), theme=theme) as b:
+            assert (a.render(rest[1]) == b.render(rest[1])).all() == same
+            assert a.renderer._middle_z == b.renderer._middle_z

@@ -189,3 +189,29 @@ def test_hats_and_hair_are_in_the_picture_and_the_face_stays_large(shipped):
         assert chin[1] / chin[3] > -0.95
     huge = framing_of(wearing(data, 900.0, wide=900.0))
     assert huge.size == pytest.approx(1.4, rel=0.1)
+
+
+def test_a_stray_card_or_one_far_behind_the_head_does_not_move_the_camera(shipped):
+    head = wearing(few(shipped), 110.0, wide=100.0)
+    for z in (-220.0, -900.0):  # as near as any hair, but less than a hundredth of it; and where no camera shows it
+        stray = card((-2.5, 150.0), (2.5, 155.0), z=z)
+        head.accessories = (*head.accessories[:1], WornMesh(stray, head.data.neck))
+        assert framing_of(head) == Framing()
+    head.accessories = head.accessories[1:]
+    assert framing_of(head) == Framing()
+    head.accessories = (WornMesh(card((-2.5, 150.0), (2.5, 155.0), z=-220.0), head.data.neck),)
+    assert framing_of(head).size > 1.2
+
+
+def test_pictures_that_draw_no_accessories_make_no_room_for_them(shipped):
+    bare, hat = (moved(few(shipped), 2.0, (0.0, 900.0, 0.0)) for _ in range(2))
+    hat.accessories = tuple(WornMesh(card((-60, 900), (60, 1500)), hat.data.neck) for _ in range(1))
+    assert framing_of(hat) != framing_of(bare) == framing_of(hat, worn=False)
+    assert framed(Camera.front(), hat, worn=False) == framed(Camera.front(), bare)
+
+
+def test_a_framing_is_about_the_eyes_and_says_apart_how_far_up_cameras_look(shipped):
+    data = few(shipped)
+    framing = framing_of(wearing(data, 240.0))
+    np.testing.assert_allclose(framing.at, data.eyes.mean(axis=0), atol=1e-4)
+    assert framing.up > 10.0 and framing.point(tuple(EYES.tolist()))[1] == pytest.approx(framing.at[1] + framing.up)
