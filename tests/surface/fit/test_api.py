@@ -283,9 +283,9 @@ def test_what_is_worn_does_not_hide_the_kinds_of_other_pieces():
     mesh = replace(sheet, pieces=("Face", "Teeth", "Hair"), piece=np.arange(len(sheet.faces)) % 3)
     mesh = replace(mesh, names=(), deltas=mesh.deltas[:0])
     aside = worn_faces(mesh)
-    loaded = Loaded(
-        mesh, map_names(()), pieces=piece_kinds(mesh, ~aside), worn=worn_mesh(mesh, aside, "a mesh")
-    )  # fmt: skip
+    worn, damage = worn_mesh(mesh, aside, "a mesh")
+    loaded = Loaded(mesh, map_names(()), pieces=piece_kinds(mesh, ~aside), worn=worn)
+    assert not damage
     assert aside.sum() == (mesh.piece == 2).sum()
     assert api._kinds(loaded) == {"skin", "teeth"}
     assert api._kinds(replace(loaded, worn=None)) == {"skin", "teeth", "hair"}
